@@ -1,0 +1,105 @@
+"""The void fabric of granular packings by scan lines: the public names, loaded when used."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from scanfab.cell import Cell
+    from scanfab.contacts import find_contacts
+    from scanfab.directions import DirectionRule, direction_rule
+    from scanfab.errors import (
+        PackingError,
+        ReadError,
+        ScanfabError,
+        ScanfabWarning,
+        SettingsError,
+        UnknownFormatError,
+    )
+    from scanfab.fabric.contact import contact_fabric
+    from scanfab.fabric.tensor import FabricTensor
+    from scanfab.fabric.void import VoidFabric, void_fabric
+    from scanfab.packing import ContactList, Contacts, Packing
+    from scanfab.pipeline import compute
+    from scanfab.scan import ScanSums, Solids, scan_lines
+    from scanfab.series import Series, read, read_series
+    from scanfab.settings import Settings
+    from scanfab.table import COLUMNS, Row, Table
+
+# numpy, numba and the readers are loaded by the first name that needs them
+_HOME = {
+    "COLUMNS": "table",
+    "Cell": "cell",
+    "ContactList": "packing",
+    "Contacts": "packing",
+    "DirectionRule": "directions",
+    "FabricTensor": "fabric.tensor",
+    "Packing": "packing",
+    "PackingError": "errors",
+    "ReadError": "errors",
+    "Row": "table",
+    "ScanSums": "scan",
+    "ScanfabError": "errors",
+    "ScanfabWarning": "errors",
+    "Series": "series",
+    "Settings": "settings",
+    "SettingsError": "errors",
+    "Solids": "scan",
+    "Table": "table",
+    "UnknownFormatError": "errors",
+    "VoidFabric": "fabric.void",
+    "compute": "pipeline",
+    "contact_fabric": "fabric.contact",
+    "direction_rule": "directions",
+    "find_contacts": "contacts",
+    "read": "series",
+    "read_series": "series",
+    "scan_lines": "scan",
+    "void_fabric": "fabric.void",
+}
+
+__all__ = [
+    "COLUMNS",
+    "Cell",
+    "ContactList",
+    "Contacts",
+    "DirectionRule",
+    "FabricTensor",
+    "Packing",
+    "PackingError",
+    "ReadError",
+    "Row",
+    "ScanSums",
+    "ScanfabError",
+    "ScanfabWarning",
+    "Series",
+    "Settings",
+    "SettingsError",
+    "Solids",
+    "Table",
+    "UnknownFormatError",
+    "VoidFabric",
+    "compute",
+    "contact_fabric",
+    "direction_rule",
+    "find_contacts",
+    "read",
+    "read_series",
+    "scan_lines",
+    "void_fabric",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("scanfab")
+    if name not in _HOME:
+        raise AttributeError(f"module 'scanfab' has no attribute {name!r}")
+    return getattr(import_module(f"scanfab.{_HOME[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

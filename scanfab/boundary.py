@@ -1,0 +1,152 @@
+"""Which particles are boundary: expressions such as ``type=2`` or ``id>=13723`` on the columns."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.errors import SettingsError
+from scanfab.packing import Packing
+
+__all__ = ["BoundaryRule", "enclosing_class", "select_boundary"]
+
+BoolArray = npt.NDArray[np.bool_]
+
+OPERATORS = {
+    "=": np.equal,
+    "!=": np.not_equal,
+    ">": np.greater,
+    ">=": np.greater_equal,
+    "<": np.less,
+    "<=": np.less_equal,
+}
+# columns that sort particles into classes
+CLASS_COLUMNS = ("type", "mask", "material", "matid", "materialid", "mat", "group")
+
+
+@dataclass(frozen=True)
+class BoundaryRule:
+    """
+    One expression: column, operator, and value, list of values (``3,4``) or range (``100..200``).
+
+    Examples
+    --------
+    >>> from scanfab import Packing
+    >>> from scanfab.boundary import BoundaryRule
+    >>> packing = Packing([[0, 0, 0], [3, 0, 0]], 1.0, columns={"type": [1, 2]})
+    >>> BoundaryRule.parse("type=2").select(packing)
+    array([False,  True])
+    """
+
+    text: str
+    column: str
+    operator: str
+    ranges: tuple[tuple[float, float], ...]
+
+    @classmethod
+    def parse(cls, text: str) -> BoundaryRule:
+        """Read an expression; SettingsError if it is none."""
+        match = re.fullmatch(r"\s*([^<>=!]+?)\s*(>=|<=|!=|==|=|>|<)\s*(.+?)\s*", text)
+        try:
+            if match is None:
+                raise ValueError
+            operator = "=" if match[2] == "==" else match[2]
+            ranges = tuple(_range(part) for part in match[3].split(","))
+            if operator not in ("=", "!=") and (len(ranges) > 1 or ranges[0][0] != ranges[0][1]):
+                raise ValueError
+        except ValueError:
+            raise SettingsError(
+                f"boundary: expected COLUMN=VALUE, COLUMN=V1,V2, COLUMN=FROM..TO, or one of "
+                f"> >= < <= != (in quotes for the shell), found {text!r}"
+            ) from None
+        return cls(text, match[1], operator, ranges)
+
+    def select(self, packing: Packing) -> BoolArray:
+        """
+        The particles for which the expression holds, shape (N,).
+
+        Raises
+        ------
+        SettingsError
+            If there is no such column.
+        """
+        values = _column(packing, self.column)
+        if self.operator in ("=", "!="):
+            within = [(values >= low) & (values <= high) for low, high in self.ranges]
+            chosen: BoolArray = np.any(within, axis=0)
+            return chosen if self.operator == "=" else ~chosen
+        return np.asarray(OPERATORS[self.operator](values, self.ranges[0][0]))
+
+
+def select_boundary(packing: Packing, rules: Sequence[BoundaryRule]) -> BoolArray:
+    """
+    The particles that any of the expressions holds for, shape (N,).
+
+    Raises
+    ------
+    SettingsError
+        If a column does not exist, or if no grain is left.
+    """
+    chosen = np.zeros(len(packing), dtype=bool)
+    for rule in rules:
+        chosen |= rule.select(packing)
+    if len(packing) and chosen.all():
+        raise SettingsError(
+            f"boundary: {' or '.join(rule.text for rule in rules)} selects all "
+            f"{len(packing)} particles: no grain is left"
+        )
+    return chosen
+
+
+def enclosing_class(packing: Packing) -> str | None:
+    """
+    The class of particles that encloses the others, as an expression; None if there is none.
+
+    All particles of the class lie farther out than nearly all others, measured in the box of the
+    sample, round or square.
+    """
+    if len(packing) < 50:
+        return None
+    low, high = packing.position.min(axis=0), packing.position.max(axis=0)
+    scaled = (packing.position - 0.5 * (low + high)) / np.maximum(high - low, 1e-300)
+    distances = np.linalg.norm(scaled, axis=1), np.abs(scaled).max(axis=1)
+    for name, values in packing.columns.items():
+        if name.lower() not in CLASS_COLUMNS or values.ndim != 1:
+            continue
+        classes = np.unique(values)
+        if not 2 <= classes.size <= 20:
+            continue
+        for value in classes:
+            inside = values != value
+            if any(d[~inside].min() > np.quantile(d[inside], 0.98) for d in distances):
+                return f"{name}={value:g}"
+    return None
+
+
+def _range(text: str) -> tuple[float, float]:
+    low, dots, high = text.partition("..")
+    if not dots:
+        return float(text), float(text)
+    return float(low) if low.strip() else -np.inf, float(high) if high.strip() else np.inf
+
+
+def _column(packing: Packing, name: str) -> npt.NDArray[Any]:
+    """A column of numbers by name; id, radius and coordinates included."""
+    known: dict[str, npt.NDArray[Any]] = {
+        "id": packing.id,
+        "radius": packing.radius,
+        **dict(zip("xyz", packing.position.T, strict=True)),
+        **{key: values for key, values in packing.columns.items() if values.ndim == 1},
+    }
+    if name not in known:
+        raise SettingsError(
+            f"boundary: there is no column {name!r}; the columns are {', '.join(known)}"
+        )
+    if known[name].dtype.kind not in "iufb":
+        raise SettingsError(f"boundary: the column {name!r} does not hold numbers")
+    return known[name]

@@ -1,0 +1,177 @@
+"""The periodic cell of a packing: three lattice vectors, an origin, and which of them repeat."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.errors import PackingError
+
+__all__ = ["Cell"]
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+
+class Cell:
+    """
+    A cell that repeats along some of its lattice vectors.
+
+    Parameters
+    ----------
+    vectors : array_like, shape (3, 3) or (3,)
+        Lattice vectors as rows, in the dump's length unit; three numbers are the edges of an
+        orthogonal cell.
+    periodic : tuple of bool, optional
+        Along which lattice vectors the packing repeats; all by default.
+    origin : array_like, shape (3,), optional
+        Corner of the cell, in the dump's length unit.
+
+    Raises
+    ------
+    PackingError
+        If the vectors span no volume.
+
+    Examples
+    --------
+    >>> from scanfab import Cell
+    >>> cell = Cell([2.0, 3.0, 4.0], periodic=(True, True, False))
+    >>> cell.wrap([[2.5, -0.5, 9.0]])
+    array([[0.5, 2.5, 9. ]])
+    """
+
+    __slots__ = ("origin", "periodic", "vectors")
+
+    def __init__(
+        self,
+        vectors: npt.ArrayLike,
+        periodic: tuple[bool, bool, bool] = (True, True, True),
+        origin: npt.ArrayLike = (0.0, 0.0, 0.0),
+    ) -> None:
+        lattice = np.asarray(vectors, dtype=np.float64)
+        self.vectors: FloatArray = np.diag(lattice) if lattice.shape == (3,) else lattice
+        self.periodic: tuple[bool, bool, bool] = (
+            bool(periodic[0]),
+            bool(periodic[1]),
+            bool(periodic[2]),
+        )
+        self.origin: FloatArray = np.asarray(origin, dtype=np.float64)
+        if self.vectors.shape != (3, 3) or self.origin.shape != (3,):
+            raise PackingError(
+                f"a cell needs vectors of shape (3, 3) and an origin of shape (3,), "
+                f"not {self.vectors.shape} and {self.origin.shape}"
+            )
+        if not np.all(np.isfinite(self.vectors)) or not np.all(np.isfinite(self.origin)):
+            raise PackingError("the cell's vectors and origin must be finite numbers")
+        edges = np.linalg.norm(self.vectors, axis=1)
+        if np.any(edges == 0) or abs(np.linalg.det(self.vectors / edges[:, None])) < 1e-6:
+            raise PackingError(f"the cell's vectors span no volume: {self.vectors.tolist()}")
+
+    def __repr__(self) -> str:
+        return (
+            f"Cell({self.vectors.tolist()}, periodic={self.periodic}, "
+            f"origin={self.origin.tolist()})"
+        )
+
+    @property
+    def is_periodic(self) -> bool:
+        """Whether the packing repeats along any lattice vector."""
+        return any(self.periodic)
+
+    @property
+    def is_orthogonal(self) -> bool:
+        """Whether the lattice vectors lie along x, y and z."""
+        return bool(np.count_nonzero(self.vectors - np.diag(np.diagonal(self.vectors))) == 0)
+
+    @property
+    def heights(self) -> FloatArray:
+        """Perpendicular distances between opposite faces, shape (3,), dump's length unit."""
+        heights: FloatArray = 1.0 / np.linalg.norm(np.linalg.inv(self.vectors), axis=0)
+        return heights
+
+    @property
+    def center(self) -> FloatArray:
+        """The middle of the cell, shape (3,), dump's length unit."""
+        center: FloatArray = self.origin + 0.5 * self.vectors.sum(axis=0)
+        return center
+
+    def fractional(self, position: npt.ArrayLike) -> FloatArray:
+        """Coordinates along the lattice vectors, 0 to 1 inside the cell; dimensionless."""
+        fractions: FloatArray = (np.asarray(position, dtype=np.float64) - self.origin) @ (
+            np.linalg.inv(self.vectors)
+        )
+        return fractions
+
+    def wrap(self, position: npt.ArrayLike) -> FloatArray:
+        """Positions moved into the cell along its periodic vectors, shape (N, 3)."""
+        position = np.asarray(position, dtype=np.float64)
+        turns = np.where(self.periodic, np.floor(self.fractional(position)), 0.0)
+        wrapped: FloatArray = position - turns @ self.vectors
+        # a position a rounding error below a face lands on the opposite face: the same place
+        on_face = np.where(self.periodic, np.floor(self.fractional(wrapped)), 0.0)
+        wrapped -= on_face @ self.vectors
+        return wrapped
+
+    def nearest_image(self, branch: npt.ArrayLike) -> IntArray:
+        """
+        The lattice translation that makes each branch vector shortest.
+
+        Parameters
+        ----------
+        branch : array_like, shape (M, 3)
+            Vectors from first to second centres, dump's length unit.
+
+        Returns
+        -------
+        ndarray of int, shape (M, 3)
+            Numbers of lattice vectors to add to each branch; 0 along vectors that do not repeat.
+
+        Raises
+        ------
+        PackingError
+            If the cell is tilted.
+        """
+        if not self.is_orthogonal:
+            raise PackingError("nearest images in a tilted cell are not supported yet")
+        turns = np.rint(np.asarray(branch, dtype=np.float64) / np.diagonal(self.vectors))
+        return np.where(self.periodic, -turns, 0.0).astype(np.int64)
+
+    def images(
+        self, position: FloatArray, margin: float
+    ) -> tuple[FloatArray, npt.NDArray[np.intp], IntArray]:
+        """
+        The periodic images of points that lie outside the cell, but within a margin of it.
+
+        Parameters
+        ----------
+        position : ndarray, shape (N, 3)
+            Points inside the cell, dump's length unit.
+        margin : float
+            Distance from the cell's faces, dump's length unit.
+
+        Returns
+        -------
+        position : ndarray, shape (K, 3)
+            The images.
+        row : ndarray of int, shape (K,)
+            The point that each image repeats.
+        image : ndarray of int, shape (K, 3)
+            The lattice translation of each image.
+        """
+        fractions = self.fractional(position)
+        reach = np.where(self.periodic, margin / self.heights, 0.0)
+        layers = [range(-int(n), int(n) + 1) for n in np.ceil(reach)]
+        # empty arrays of the right shape first, for the case without any image
+        positions, rows, images = [position[:0]], [np.arange(0)], [np.zeros((0, 3), np.int64)]
+        for shift in product(*layers):
+            if shift == (0, 0, 0):
+                continue
+            moved = fractions + shift
+            near = (moved >= -reach) & (moved <= 1.0 + reach)
+            chosen = np.flatnonzero(np.all(near | ~np.array(self.periodic), axis=1))
+            positions.append(position[chosen] + np.array(shift, dtype=float) @ self.vectors)
+            rows.append(chosen)
+            images.append(np.tile(np.array(shift, dtype=np.int64), (chosen.size, 1)))
+        return np.concatenate(positions), np.concatenate(rows), np.concatenate(images)

@@ -1,0 +1,85 @@
+"""What goes to people: warnings and progress on standard error, tables on a terminal."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import click
+
+from scanfab.errors import ScanfabWarning
+from scanfab.table import Row
+
+__all__ = ["print_table", "reported_warnings", "with_progress"]
+
+# what fits a terminal; the file has all columns
+SHOWN = {
+    "frame": "frame",
+    "strain": "strain",
+    "variant": "variant",
+    "grains": "grains",
+    "contacts": "contacts",
+    "coordination": "coordination",
+    "solid_fraction": "solid fraction",
+    "mean_length": "mean length",
+    "alpha_vs": "α_vs",
+    "alpha_vs_axial": "α_vs axial",
+    "alpha_vs_axial_se": "±",
+    "alpha_c_axial": "α_c axial",
+}
+
+
+@contextmanager
+def reported_warnings() -> Iterator[None]:
+    """Warnings of scanfab as single lines on standard error, each text once."""
+    seen: set[str] = set()
+
+    def show(message: Any, category: type[Warning], *rest: Any, **more: Any) -> None:
+        text = str(message)
+        if issubclass(category, ScanfabWarning) and text not in seen:
+            seen.add(text)
+            click.echo(f"scanfab: warning: {text}", err=True)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        warnings.simplefilter("always", ScanfabWarning)
+        warnings.showwarning = show
+        yield
+
+
+def with_progress(rows: Iterable[Row]) -> Iterator[Row]:
+    """The same rows, with a line of progress on standard error if it is a terminal."""
+    if not sys.stderr.isatty():
+        yield from rows
+        return
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task("first frame (the scan is compiled when it first runs)")
+        for row in rows:
+            progress.update(task, description=f"{row.source}: frame {row.frame} done")
+            yield row
+
+
+def print_table(rows: Iterable[Row]) -> None:
+    """A readable table on standard output."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, header_style="bold")
+    for title in SHOWN.values():
+        table.add_column(title, justify="right")
+    for row in rows:
+        table.add_row(*(_spell(getattr(row, name)) for name in SHOWN))
+    Console().print(table)
+
+
+def _spell(value: Any) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

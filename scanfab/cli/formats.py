@@ -1,0 +1,30 @@
+"""scanfab formats: what can be read and written."""
+
+from __future__ import annotations
+
+import click
+
+__all__ = ["formats"]
+
+
+@click.command()
+def formats() -> None:
+    """List every reader and writer, its extensions, and the package it comes from."""
+    from scanfab.cli.console import reported_warnings
+    from scanfab.readers.registry import installed_readers
+    from scanfab.writers.rows import FILE_FORMATS
+
+    with reported_warnings():
+        lines = [
+            ("reader", name, " ".join(one.reader.extensions), one.package, one.reader.description)
+            for name, one in installed_readers().items()
+        ]
+    lines += [
+        ("writer", suffix.lstrip("."), suffix, "scanfab", description)
+        for suffix, description in FILE_FORMATS.items()
+    ]
+    titles = ("kind", "name", "extensions", "package", "description")
+    widths = [max(len(line[k]) for line in [titles, *lines]) for k in range(4)]
+    for line in [titles, *lines]:
+        padded = [word.ljust(width) for word, width in zip(line, widths, strict=False)]
+        click.echo("  ".join([*padded, line[4]]))

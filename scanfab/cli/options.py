@@ -1,0 +1,133 @@
+"""Options that commands share: how to read the sources."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+__all__ = ["CellCommand", "reading_arguments", "reading_options"]
+
+Command = Callable[..., Any]
+
+
+class CellCommand(click.Command):
+    """A command whose --cell takes three or six numbers."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Join the numbers behind --cell into one word, as click knows no variable count."""
+        joined: list[str] = []
+        rest = list(args)
+        while rest:
+            word = rest.pop(0)
+            joined.append(word)
+            if word == "--cell":
+                numbers = _leading_numbers(rest)
+                joined.append(" ".join(rest[:numbers]))
+                del rest[:numbers]
+        return super().parse_args(ctx, joined)
+
+
+def reading_options(command: Command) -> Command:
+    """Add the options that say how to read the sources."""
+    for option in reversed(_READING):
+        command = option(command)
+    return command
+
+
+def reading_arguments(options: dict[str, Any]) -> dict[str, Any]:
+    """Take the reading options out of a command's, as arguments of ``read_series``."""
+    taken = {name: options.pop(name) for name in _READING_NAMES}
+    taken["columns"] = _column_names(taken["columns"])
+    taken["cell"] = _numbers(taken["cell"])
+    _check_periodic(taken["periodic"])
+    if taken["format"] is not None:
+        _check_format(taken["format"])
+    return taken
+
+
+_READING = [
+    click.option("--format", metavar="NAME", help="Reader to use (default: by content)."),
+    click.option(
+        "--columns",
+        metavar="NAMES",
+        help='Names of columns that are not the usual ones: "radius=c_rad,x=px".',
+    ),
+    click.option(
+        "--contact-columns",
+        metavar="KEYWORDS",
+        help='Columns of a dump local: LIGGGHTS keywords, "pos id force".',
+    ),
+    click.option(
+        "--radius",
+        type=click.FloatRange(min=0, min_open=True),
+        metavar="L",
+        help="Radius for dumps without one.",
+    ),
+    click.option(
+        "--cell",
+        metavar="LX LY LZ [XY XZ YZ]",
+        help="The cell, for formats that do not carry it (periodic in xyz unless --periodic).",
+    ),
+    click.option("--periodic", metavar="xyz", help="Periodic directions (default: the dump's)."),
+    click.option(
+        "--contacts",
+        default="auto",
+        metavar="PATH|file|geometric",
+        help="Contacts: a file, folder or glob matched by step; from the dump's own contact files; "
+        "or by geometry (default: file if there is one, else geometric).",
+    ),
+]
+_READING_NAMES = (
+    "format", "columns", "contact_columns", "radius", "cell", "periodic", "contacts",
+)  # fmt: skip
+
+
+def _leading_numbers(words: list[str]) -> int:
+    """How many numbers --cell takes: three, or six if six follow."""
+    count = 0
+    while count < len(words) and re.fullmatch(r"[-+]?[\d.]+([eE][-+]?\d+)?", words[count]):
+        count += 1
+    return 6 if count >= 6 else min(count, 3)
+
+
+def _numbers(text: str | None) -> tuple[float, ...] | None:
+    if text is None:
+        return None
+    numbers = tuple(float(word) for word in text.split())
+    if len(numbers) not in (3, 6) or min(numbers[:3]) <= 0:
+        raise click.UsageError(
+            "--cell: expected three lengths LX LY LZ above 0, or six numbers with XY XZ YZ"
+        )
+    return numbers
+
+
+def _column_names(text: str | None) -> dict[str, str] | None:
+    if text is None:
+        return None
+    names = {}
+    for part in text.split(","):
+        standard, equals, own = part.partition("=")
+        if not (equals and standard.strip() and own.strip()):
+            raise click.UsageError(
+                f'--columns: expected NAME=COLUMN such as "radius=c_rad,x=px", found {part!r}'
+            )
+        names[standard.strip()] = own.strip()
+    return names
+
+
+def _check_periodic(letters: str | None) -> None:
+    if letters is not None and not re.fullmatch("[xyz]{1,3}", letters):
+        raise click.UsageError(f"--periodic: expected letters out of xyz, found {letters!r}")
+
+
+def _check_format(name: str) -> None:
+    from scanfab.errors import UnknownFormatError
+    from scanfab.readers.registry import reader_named
+
+    try:
+        reader_named(name)
+    except UnknownFormatError as error:
+        raise click.UsageError(f"--format: {error}") from None

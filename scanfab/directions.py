@@ -1,0 +1,222 @@
+"""Scan directions: unit axes with quadrature weights; every rule knows its degree and its bias."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.resources import files
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.errors import SettingsError
+
+__all__ = ["DirectionRule", "direction_rule"]
+
+FloatArray = npt.NDArray[np.float64]
+
+# SciPy's Lebedev rules of these degrees have negative weights: they would amplify noise
+NEGATIVE_LEBEDEV = (13, 25, 27)
+LEBEDEV_DEGREES = (*range(3, 32, 2), *range(35, 132, 6))
+
+
+@dataclass(frozen=True, eq=False)
+class DirectionRule:
+    """
+    A set of axes with weights that sum to 1: a quadrature rule for even functions on the sphere.
+
+    n and -n are one line, so an axis stands for both.
+    """
+
+    name: str
+    """As users write it, for instance ``lebedev:11``."""
+    axes: FloatArray
+    """Unit vectors, shape (D, 3), dimensionless."""
+    weights: FloatArray
+    """Weights, shape (D,), sum 1, dimensionless."""
+    degree: int | None
+    """Exact for polynomials to this degree; None if for no degree worth the name."""
+    turned: bool = True
+    """Whether replicates turn the rule at random; a literal grid is only shifted."""
+
+    def __len__(self) -> int:
+        return len(self.axes)
+
+    @cached_property
+    def isotropic_tensor(self) -> FloatArray:
+        """The fabric tensor that the rule gives to a mean length equal in all directions."""
+        tensor: FloatArray = np.einsum("d,di,dj->ij", self.weights, self.axes, self.axes)
+        return tensor
+
+    @property
+    def bias(self) -> float:
+        """α of that tensor, largest minus smallest principal value; 0 for a sound rule."""
+        values = np.linalg.eigvalsh(self.isotropic_tensor)
+        return float(values[-1] - values[0])
+
+
+def direction_rule(text: str) -> DirectionRule:
+    """
+    The rule that a user names.
+
+    Parameters
+    ----------
+    text : str
+        A number of axes N, rounded up to the next Lebedev rule with positive weights, or one of
+        ``lebedev:DEGREE``, ``design:DEGREE``, ``product:DEGREE``, ``fibonacci:N``,
+        ``equal-angle:STEP`` (the printed ranges of Eq. 1 of the 2017 paper, unit weights),
+        ``equal-angle-full:STEP`` (the half sphere, unit weights); steps in degrees.
+
+    Raises
+    ------
+    SettingsError
+        If there is no such rule.
+
+    Notes
+    -----
+    Lebedev rules: SciPy. Designs: antipodal spherical designs, equal weights, after Womersley
+    (2018), doi:10.1007/978-3-319-72456-0_57, computed for this package. A degree without a rule
+    is rounded up to the next that has one.
+
+    Examples
+    --------
+    >>> from scanfab.directions import direction_rule
+    >>> rule = direction_rule("lebedev:11")
+    >>> len(rule), rule.degree
+    (25, 11)
+    """
+    if re.fullmatch(r"\d+", text):
+        return _at_least(int(text))
+    name, _, argument = text.partition(":")
+    if name not in RULES:
+        raise SettingsError(
+            f"directions: no rule is called {text!r}; expected a number or one of "
+            + ", ".join(f"{rule}:{what}" for rule, (_, what) in RULES.items())
+        )
+    make, what = RULES[name]
+    try:
+        value = float(argument) if what == "STEP" else int(argument)
+    except ValueError:
+        raise SettingsError(
+            f"directions: expected {name}:{what} with a number, found {text!r}"
+        ) from None
+    return make(value)
+
+
+def _at_least(count: int) -> DirectionRule:
+    """The smallest Lebedev rule with ``count`` axes, or a product rule beyond the largest."""
+    if count < 1:
+        raise SettingsError("directions: at least one axis is needed, found 0")
+    for degree in LEBEDEV_DEGREES:
+        if degree not in NEGATIVE_LEBEDEV:
+            rule = lebedev(degree)
+            if len(rule) >= count:
+                return rule
+    degree = 131
+    while len(rule := product(degree)) < count:
+        degree += 2
+    return rule
+
+
+def lebedev(degree: float) -> DirectionRule:
+    """Lebedev's rule of this degree or the next that SciPy has (of positive weights)."""
+    from scipy.integrate import lebedev_rule
+
+    degrees = [d for d in LEBEDEV_DEGREES if d >= degree and d not in NEGATIVE_LEBEDEV]
+    if not degrees or degree < 1:
+        raise SettingsError(f"directions: lebedev has degrees 3 to 131, found {degree:g}")
+    points, weights = lebedev_rule(degrees[0])
+    half = _upper_half(points.T)
+    return _normalised(f"lebedev:{degrees[0]}", points.T[half], weights[half], degrees[0])
+
+
+def design(degree: float) -> DirectionRule:
+    """The antipodal spherical design of this degree or the next that the package has."""
+    table = np.loadtxt(str(files("scanfab") / "designs.csv"), delimiter=",", comments="#")
+    degrees = np.unique(table[:, 0])
+    if not 1 <= degree <= degrees[-1]:
+        raise SettingsError(
+            f"directions: design has degrees {degrees[0]:g} to {degrees[-1]:g}, found {degree:g}"
+        )
+    chosen = int(degrees[degrees >= degree][0])
+    axes = table[table[:, 0] == chosen, 1:]
+    return _normalised(f"design:{chosen}", axes, np.ones(len(axes)), chosen)
+
+
+def product(degree: float) -> DirectionRule:
+    """Gauss-Legendre in cos φ times even steps in θ, both exact to the degree."""
+    if not 1 <= degree <= 1000:
+        raise SettingsError(f"directions: product has degrees 1 to 1000, found {degree:g}")
+    degree = int(degree)
+    heights, height_weights = np.polynomial.legendre.leggauss(degree // 2 + 1)
+    azimuths = degree + 1 + (degree + 1) % 2
+    theta = 2 * np.pi * (np.arange(azimuths) + 0.5) / azimuths
+    z, azimuth = (grid.ravel() for grid in np.meshgrid(heights, theta, indexing="ij"))
+    weights = np.repeat(height_weights, azimuths)
+    flat = np.sqrt(1 - z**2)
+    points = np.column_stack([flat * np.cos(azimuth), flat * np.sin(azimuth), z])
+    half = _upper_half(points)
+    return _normalised(f"product:{degree}", points[half], weights[half], degree)
+
+
+def fibonacci(count: float) -> DirectionRule:
+    """A Fibonacci lattice of N axes on the half sphere, equal weights."""
+    if not 1 <= count <= 1_000_000:
+        raise SettingsError(f"directions: fibonacci takes 1 to 1000000 axes, found {count:g}")
+    number = np.arange(int(count))
+    z = (number + 0.5) / count
+    theta = np.pi * (3 - np.sqrt(5)) * number
+    flat = np.sqrt(1 - z**2)
+    axes = np.column_stack([flat * np.cos(theta), flat * np.sin(theta), z])
+    return _normalised(f"fibonacci:{int(count)}", axes, np.ones(len(axes)), None)
+
+
+def equal_angle(step: float) -> DirectionRule:
+    """Equal steps over θ in (-90°, 90°], φ in (0°, 90°], unit weights: Eq. 1 as printed."""
+    return _angle_grid(f"equal-angle:{step:g}", step, 90.0)
+
+
+def equal_angle_full(step: float) -> DirectionRule:
+    """Equal steps over the half sphere, θ in (-180°, 180°], φ in (0°, 90°], unit weights."""
+    return _angle_grid(f"equal-angle-full:{step:g}", step, 180.0)
+
+
+RULES: dict[str, tuple[Callable[[float], DirectionRule], str]] = {
+    "lebedev": (lebedev, "DEGREE"),
+    "design": (design, "DEGREE"),
+    "product": (product, "DEGREE"),
+    "fibonacci": (fibonacci, "N"),
+    "equal-angle": (equal_angle, "STEP"),
+    "equal-angle-full": (equal_angle_full, "STEP"),
+}
+
+
+def _angle_grid(name: str, step: float, theta_end: float) -> DirectionRule:
+    if not 0.5 <= step <= 90 or abs(90 / step - round(90 / step)) > 1e-9:
+        raise SettingsError(
+            f"directions: {name}: expected a step that divides 90 degrees, 0.5 to 90"
+        )
+    number = round(90 / step)
+    phi = np.radians(step * np.arange(1, number + 1))
+    turns = round(theta_end / step)
+    theta = np.radians(step * np.arange(1 - turns, turns + 1))
+    polar, azimuth = (grid.ravel() for grid in np.meshgrid(phi, theta, indexing="ij"))
+    axes = np.column_stack(
+        [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)]
+    )
+    return _normalised(name, axes, np.ones(len(axes)), None, turned=False)
+
+
+def _upper_half(points: FloatArray) -> npt.NDArray[np.bool_]:
+    """Which of an antipodal set of points to keep so that n and -n occur once."""
+    x, y, z = np.where(np.abs(points) < 1e-12, 0.0, points).T
+    half: npt.NDArray[np.bool_] = (z > 0) | ((z == 0) & (y > 0)) | ((z == 0) & (y == 0) & (x > 0))
+    return half
+
+
+def _normalised(
+    name: str, axes: FloatArray, weights: FloatArray, degree: int | None, turned: bool = True
+) -> DirectionRule:
+    return DirectionRule(name, np.ascontiguousarray(axes), weights / weights.sum(), degree, turned)

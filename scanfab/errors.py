@@ -1,0 +1,36 @@
+"""The errors and warnings of scanfab: one kind for each thing that a user can mend."""
+
+from __future__ import annotations
+
+__all__ = [
+    "PackingError",
+    "ReadError",
+    "ScanfabError",
+    "ScanfabWarning",
+    "SettingsError",
+    "UnknownFormatError",
+]
+
+
+class ScanfabError(Exception):
+    """Base of all errors that scanfab raises on purpose; the message is written for users."""
+
+
+class ReadError(ScanfabError):
+    """A file could not be read; names the file, what was found and what was expected."""
+
+
+class UnknownFormatError(ReadError):
+    """No reader knows the file, or the named reader does not exist."""
+
+
+class PackingError(ScanfabError):
+    """Grains, contacts or cell do not form a packing (a radius of zero, a missing grain)."""
+
+
+class SettingsError(ScanfabError):
+    """An option has a value that cannot be used, by itself or with this packing."""
+
+
+class ScanfabWarning(UserWarning):
+    """Something that the user should know, although the result stands."""

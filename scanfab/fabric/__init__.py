@@ -1,0 +1,1 @@
+"""Fabric tensors: of the void segments and of the contacts."""

@@ -1,0 +1,54 @@
+"""
+Contact fabric: G_c = (1/N_c) Σ n⊗n over the contacts, Eq. 2 of the 2017 paper.
+
+Theocharis, Vairaktaris and Dafalias (2017), Powders and Grains 2017, EPJ Web of
+Conferences 140; the tensor is that of Satake (1982) and Oda (1982).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.fabric.tensor import FabricTensor
+
+__all__ = ["axial_error", "contact_fabric"]
+
+
+def contact_fabric(normals: npt.ArrayLike) -> FabricTensor | None:
+    """
+    The fabric tensor of contact normals.
+
+    Parameters
+    ----------
+    normals : array_like, shape (M, 3)
+        Unit normals, dimensionless; their signs do not matter.
+
+    Returns
+    -------
+    FabricTensor or None
+        None if there is no contact.
+
+    Examples
+    --------
+    >>> from scanfab import contact_fabric
+    >>> contact_fabric([[0, 0, 1], [0, 0, -1]]).matrix[2, 2]
+    np.float64(1.0)
+    """
+    vectors = np.asarray(normals, dtype=np.float64)
+    if len(vectors) == 0:
+        return None
+    return FabricTensor(vectors.T @ vectors / len(vectors))
+
+
+def axial_error(normals: npt.ArrayLike, axis: npt.ArrayLike) -> float | None:
+    """
+    Standard error of the contact fabric's axial anisotropy, dimensionless.
+
+    The standard deviation of (3(a·n)² - 1)/2 over the contacts, divided by √N_c; None for fewer
+    than two contacts.
+    """
+    cosine = np.asarray(normals, dtype=np.float64) @ np.asarray(axis, dtype=np.float64)
+    if len(cosine) < 2:
+        return None
+    return float(np.std(1.5 * cosine**2 - 0.5, ddof=1) / np.sqrt(len(cosine)))

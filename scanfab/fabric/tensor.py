@@ -1,0 +1,90 @@
+"""A fabric tensor: symmetric, second order, trace 1."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["COMPONENTS", "FabricTensor", "axial"]
+
+FloatArray = npt.NDArray[np.float64]
+
+COMPONENTS = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
+
+
+def axial(tensor: npt.NDArray[np.float64], axis: npt.ArrayLike) -> FloatArray:
+    """
+    Signed anisotropy along an axis: a·G·a - (1 - a·G·a)/2.
+
+    Linear in G, so nearly unbiased where α is small: the quantity to plot and to correlate. It is
+    not the intensity when the principal axes turn.
+
+    Parameters
+    ----------
+    tensor : ndarray, shape (..., 3, 3)
+        Fabric tensors of trace 1, dimensionless.
+    axis : array_like, shape (3,)
+        Unit vector.
+
+    Returns
+    -------
+    ndarray, shape (...)
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab.fabric.tensor import axial
+    >>> float(axial(np.diag([0.25, 0.25, 0.5]), (0, 0, 1)))
+    0.25
+    """
+    unit = np.asarray(axis, dtype=np.float64)
+    along: FloatArray = np.asarray(tensor @ unit @ unit)
+    return 1.5 * along - 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class FabricTensor:
+    """
+    A fabric tensor G, dimensionless.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab import FabricTensor
+    >>> round(FabricTensor(np.diag([0.3, 0.3, 0.4])).alpha, 12)
+    0.1
+    """
+
+    matrix: FloatArray
+    """Shape (3, 3), trace 1."""
+
+    @cached_property
+    def _eigen(self) -> tuple[FloatArray, FloatArray]:
+        values, vectors = np.linalg.eigh(self.matrix)
+        return values[::-1], vectors.T[::-1]
+
+    @property
+    def principal_values(self) -> FloatArray:
+        """Principal values, largest first, shape (3,)."""
+        return self._eigen[0]
+
+    @property
+    def principal_axes(self) -> FloatArray:
+        """Unit vectors as rows, in the order of the principal values, shape (3, 3)."""
+        return self._eigen[1]
+
+    @property
+    def alpha(self) -> float:
+        """α: largest minus smallest principal value; never negative, so noise raises it."""
+        return float(self.principal_values[0] - self.principal_values[2])
+
+    def axial(self, axis: npt.ArrayLike) -> float:
+        """Signed anisotropy along an axis, see :func:`axial`."""
+        return float(axial(self.matrix, axis))
+
+    def components(self) -> dict[str, float]:
+        """The six components by name, ``xx`` to ``yz``."""
+        return {name: float(self.matrix[place]) for name, place in COMPONENTS.items()}

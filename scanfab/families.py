@@ -1,0 +1,123 @@
+"""Files sorted into families: names that differ in their numbers only, in natural order."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from scanfab.errors import ReadError
+from scanfab.readers.base import FileKind, Reader
+from scanfab.readers.files import bare_name
+from scanfab.readers.registry import reader_for, reader_named
+
+__all__ = ["Family", "sort_into_families"]
+
+NUMBER = re.compile(r"\d+")
+
+
+@dataclass(frozen=True)
+class Family:
+    """Files of one kind that differ in the step only."""
+
+    pattern: str
+    """A glob for users, such as ``dumps/dump_*.txt``."""
+    files: dict[int | None, Path]
+    """By the step in the name, in natural order; None for a name without a number."""
+    reader: Reader | None
+    """None if no reader knows them."""
+    kind: FileKind
+
+
+def sort_into_families(files: Sequence[Path], format: str | None) -> list[Family]:
+    """
+    Sort files into families, and find the reader and kind of each by its largest file.
+
+    Parameters
+    ----------
+    files : sequence of Path
+        In any order.
+    format : str, optional
+        Name of the reader to use for all.
+
+    Raises
+    ------
+    ReadError
+        If two files of a family are of the same step.
+    UnknownFormatError
+        If there is no reader of that name.
+    """
+    groups: dict[tuple[Path, str], list[Path]] = defaultdict(list)
+    for file in files:
+        groups[file.parent, NUMBER.sub("*", bare_name(file))].append(file)
+    return [
+        _family(members, format) for _, group in sorted(groups.items()) for members in _split(group)
+    ]
+
+
+def _numbers(file: Path) -> tuple[int, ...]:
+    # the ending of a name (.mp4, .bz2) is not a number of the frame
+    return tuple(int(number) for number in NUMBER.findall(Path(bare_name(file)).stem))
+
+
+def _split(group: list[Path]) -> list[list[Path]]:
+    """
+    Tell series apart whose names differ in a number too (run1_100, run1_200, run2_100).
+
+    One series: its numbers before the step never fall while the step rises, and no step occurs
+    twice.
+    """
+    ordered = sorted(group, key=lambda file: (_step(file, group) or 0, _numbers(file)))
+    steps = [_step(file, group) for file in ordered]
+    leading = [_leading(file, group) for file in ordered]
+    repeated = len(set(steps)) < len(steps) and len(set(leading)) > 1
+    if not repeated and leading == sorted(leading):
+        return [ordered]
+    series: dict[tuple[int, ...], list[Path]] = defaultdict(list)
+    for file, key in zip(ordered, leading, strict=True):
+        series[key].append(file)
+    return list(series.values())
+
+
+def _place(group: list[Path]) -> int:
+    """Which number of the names is the step: the last one that differs."""
+    columns = list(zip(*(_numbers(file) for file in group), strict=True))
+    differing = [place for place, column in enumerate(columns) if len(set(column)) > 1]
+    return differing[-1] if differing else len(columns) - 1
+
+
+def _step(file: Path, group: list[Path]) -> int | None:
+    numbers = _numbers(file)
+    return numbers[_place(group)] if numbers else None
+
+
+def _leading(file: Path, group: list[Path]) -> tuple[int, ...]:
+    return _numbers(file)[: max(_place(group), 0)]
+
+
+def _family(members: list[Path], format: str | None) -> Family:
+    files: dict[int | None, Path] = {}
+    for file in members:
+        step = _step(file, members)
+        if step in files:
+            raise ReadError(f"two files for one step: {files[step]} and {file}: name one of them")
+        files[step] = file
+    sample = max(members, key=lambda file: file.stat().st_size)
+    reader = reader_for(sample) if format is None else reader_named(format)
+    kind: FileKind = "other"
+    if reader is not None:
+        kind = reader.kind(sample)
+    return Family(_glob(members), files, reader, kind)
+
+
+def _glob(members: list[Path]) -> str:
+    """The names, with a star for each number in which they differ."""
+    texts = [NUMBER.findall(file.name) for file in members]
+    shown = iter(zip(*texts, strict=False))
+
+    def star(match: re.Match[str]) -> str:
+        return "*" if len(set(next(shown, match[0]))) > 1 else match[0]
+
+    return str(members[0].with_name(NUMBER.sub(star, members[0].name)))

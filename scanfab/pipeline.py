@@ -1,0 +1,307 @@
+"""compute(): the one place that knows all the steps, from packings to rows of the fabric table."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.adaptive import scan_to_tolerance
+from scanfab.boundary import enclosing_class, select_boundary
+from scanfab.contacts import find_contacts
+from scanfab.errors import ScanfabWarning, SettingsError
+from scanfab.fabric.contact import axial_error, contact_fabric
+from scanfab.fabric.tensor import COMPONENTS, FabricTensor
+from scanfab.fabric.void import VoidFabric, void_fabric
+from scanfab.packing import Packing
+from scanfab.plan import Plan, make_plan
+from scanfab.scan import ScanSums, Solids
+from scanfab.series import Series
+from scanfab.settings import STRAIN_MODES, Settings
+from scanfab.strain import StrainFile, axial_length
+from scanfab.table import Row, Table
+from scanfab.variants import VARIANTS, Sample, Variant
+
+__all__ = ["compute", "compute_rows"]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def compute(source: Packing | Series, **options: Any) -> Table:
+    """
+    The fabric table of a packing or of a series.
+
+    Parameters
+    ----------
+    source : Packing or Series
+        One frame, or what :func:`scanfab.read_series` returns: one frame in memory at a time.
+    **options
+        See :meth:`scanfab.Settings.make`: ``variants``, ``rv``, ``boundary``, ``cutoff``,
+        ``spacing``, ``directions``, ``tolerance``, ...
+
+    Returns
+    -------
+    Table
+        A row for each frame and variant; lengths in the dump's unit, fabric dimensionless.
+
+    Raises
+    ------
+    ScanfabError
+        If a frame cannot be read, or the settings do not fit the packing.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab import Packing, compute
+    >>> grid = np.stack(np.meshgrid(*3 * [np.arange(6.0)]), axis=-1).reshape(-1, 3)
+    >>> table = compute(Packing(grid, 0.5), variants="c", contact_tolerance=1e-4, tolerance=0.01)
+    >>> bool(table["alpha_c"][0] < 1e-12)
+    True
+    """
+    return Table(compute_rows(source, Settings.make(**options)))
+
+
+def compute_rows(source: Packing | Series, settings: Settings) -> Iterator[Row]:
+    """The rows of :func:`compute`, each as soon as its frame is done."""
+    name = "" if isinstance(source, Packing) else source.name
+    strains = _Strains(settings)
+    plan: Plan | None = None
+    chosen = _chosen(source, settings.frames)
+    found = False
+    for number, read in _frames(source):
+        if plan is not None and number not in chosen:
+            continue
+        sample = _classify(read(), settings)
+        if plan is None and sample.grains.any():
+            plan = make_plan(settings, sample)
+            strains.start(sample)
+            _warn_of_boundary(sample, settings)
+        if number in chosen:
+            found = True
+            strain = strains.at(number, sample)
+            yield from _frame_rows(name, number, sample, plan, settings, strain)
+        if number >= chosen.stop - 1 and plan is not None:
+            break
+    if not found:
+        raise SettingsError(f"frames: the series has no frame in {settings.frames}")
+
+
+def _frames(source: Packing | Series) -> Iterator[tuple[int, Any]]:
+    if isinstance(source, Packing):
+        yield 0, lambda: source
+    else:
+        for number, frame in enumerate(source):
+            yield number, frame.read
+
+
+def _chosen(source: Packing | Series, frames: slice) -> range:
+    """The frames to compute, in the order of the source."""
+    bounds = (frames.start, frames.stop, frames.step)
+    if any(bound is not None and bound < 0 for bound in bounds):
+        count = 1 if isinstance(source, Packing) else sum(1 for _ in source)
+        chosen = range(count)[frames]
+        return chosen if chosen.step > 0 else chosen[::-1]
+    # without counting the frames first: a dump may hold very many
+    endless = 2**62
+    return range(endless)[frames]
+
+
+class _Strains:
+    """Strain of the frames of a series, from its first frame that has grains."""
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+        self.file = None if settings.strain in STRAIN_MODES else StrainFile(Path(settings.strain))
+        self.first: float | None = None
+
+    def start(self, sample: Sample) -> None:
+        if self.file is None:
+            self.first = axial_length(sample, self.settings.strain, self.settings.axis)
+
+    def at(self, number: int, sample: Sample) -> float | None:
+        if self.file is not None:
+            return self.file.at(number, sample.packing.step)
+        if self.first is None or not sample.grains.any():
+            return None
+        length = axial_length(sample, self.settings.strain, self.settings.axis)
+        return None if length is None or self.first == 0 else 1.0 - length / self.first
+
+
+def _classify(packing: Packing, settings: Settings) -> Sample:
+    """Contacts and boundary of a frame."""
+    if packing.contacts is None:
+        packing = find_contacts(packing, settings.contact_tolerance)
+    return Sample(packing, select_boundary(packing, settings.boundary), settings.min_contacts)
+
+
+def _warn_of_boundary(sample: Sample, settings: Settings) -> None:
+    if settings.boundary:
+        return
+    expression = enclosing_class(sample.packing)
+    if expression is not None:
+        warnings.warn(
+            f"the particles with {expression} enclose the others: if they are a boundary, "
+            f'name them: --boundary "{expression}"',
+            ScanfabWarning,
+            stacklevel=3,
+        )
+
+
+def _frame_rows(
+    name: str,
+    number: int,
+    sample: Sample,
+    plan: Plan | None,
+    settings: Settings,
+    strain: float | None,
+) -> Iterator[Row]:
+    packing = sample.packing
+    frame: dict[str, Any] = {
+        "source": name,
+        "frame": number,
+        "step": packing.step,
+        "time": packing.time,
+        "strain": strain,
+        "contacts_from": sample.contacts.source,
+    }
+    sums: ScanSums | None = None
+    weights = np.zeros(0)
+    if plan is not None and sample.grains.any():
+        if plan.window is not None:
+            plan.window.check_inside(packing)
+        sums, rule = scan_to_tolerance(_solids(sample, plan, settings), plan, settings)
+        weights = rule.weights
+    for variant in settings.variants:
+        yield Row(
+            **frame,
+            variant=variant,
+            **_sample_columns(sample, plan, VARIANTS[variant]),
+            **_scan_columns(sums, plan, weights, variant, settings, number),
+            **_contact_columns(sample, plan, VARIANTS[variant], settings),
+        )
+
+
+def _solids(sample: Sample, plan: Plan, settings: Settings) -> Solids:
+    """The spheres that the lines may meet: all grains, or those that reach into the RV."""
+    packing, window = sample.packing, plan.window
+    position, radius = packing.position[sample.grains], packing.radius[sample.grains]
+    removed = sample.rattlers[sample.grains]
+    if packing.cell is not None and packing.is_periodic:
+        ghosts, row, _ = packing.cell.images(position, float(radius.max()))
+        position = np.concatenate([position, ghosts])
+        radius = np.concatenate([radius, radius[row]])
+        removed = np.concatenate([removed, removed[row]])
+    if window is None:
+        return Solids(position - position.mean(axis=0), radius, removed)
+    position = position - window.center
+    if not settings.needs_whole:
+        near = np.linalg.norm(position, axis=1) < window.radius + radius
+        position, radius, removed = position[near], radius[near], removed[near]
+    return Solids(position, radius, removed, window.radius)
+
+
+def _sample_columns(sample: Sample, plan: Plan | None, variant: Variant) -> dict[str, Any]:
+    if plan is None or not sample.grains.any():
+        return {"grains": 0, "rattlers": 0, "coordination": None}
+    counted = sample.counted(variant, plan.window)
+    return {
+        "grains": int((counted & ~sample.removed(variant)).sum()),
+        "rattlers": int((counted & sample.rattlers).sum()),
+        "coordination": sample.coordination(variant, plan.window),
+    }
+
+
+def _scan_columns(
+    sums: ScanSums | None,
+    plan: Plan | None,
+    weights: FloatArray,
+    variant: str,
+    settings: Settings,
+    number: int,
+) -> dict[str, Any]:
+    """What the scan says of one variant."""
+    fabric: VoidFabric | None = None
+    columns: dict[str, Any] = {
+        "solid_fraction": None,
+        "directions": len(weights),
+        "replicates": 0,
+        "lines": 0,
+        "segments": 0,
+        "spacing": None,
+        "cutoff": None,
+    }
+    if sums is not None and plan is not None:
+        which = "abcd".index(variant)
+        fabric = void_fabric(sums, weights, variant)
+        _warn_of_few_segments(fabric, sums, variant, plan, number)
+        columns = {
+            "solid_fraction": _solid_fraction(sums, weights, which),
+            "directions": len(weights),
+            "replicates": sums.replicates,
+            "lines": int(sums.lines[:, which].sum()),
+            "segments": int(sums.segments[:, which].sum()),
+            # of all replicates together, as a fixed scan is asked for
+            "spacing": plan.spacing / math.sqrt(sums.replicates),
+            "cutoff": plan.cutoff,
+        }
+    return {
+        **columns,
+        "mean_length": fabric.mean_length if fabric else None,
+        **_tensor_columns("gvs", fabric.tensor if fabric else None),
+        "alpha_vs": fabric.tensor.alpha if fabric else None,
+        "alpha_vs_axial": fabric.tensor.axial(settings.axis) if fabric else None,
+        "alpha_vs_axial_se": fabric.axial_error(settings.axis) if fabric else None,
+    }
+
+
+def _solid_fraction(sums: ScanSums, weights: FloatArray, which: int) -> float | None:
+    """1 - void length / line length in the window, weighted like the directions."""
+    length = float(weights @ sums.line_length[:, which].sum(axis=0))
+    if length == 0:
+        return None
+    return 1.0 - float(weights @ sums.void[:, which].sum(axis=0)) / length
+
+
+def _contact_columns(
+    sample: Sample, plan: Plan | None, variant: Variant, settings: Settings
+) -> dict[str, Any]:
+    normals = np.zeros((0, 3)) if plan is None else sample.normals(variant, plan.window)
+    tensor = contact_fabric(normals)
+    return {
+        "contacts": len(normals),
+        **_tensor_columns("gc", tensor),
+        "alpha_c": tensor.alpha if tensor else None,
+        "alpha_c_axial": tensor.axial(settings.axis) if tensor else None,
+        "alpha_c_axial_se": axial_error(normals, settings.axis),
+    }
+
+
+def _tensor_columns(prefix: str, tensor: FabricTensor | None) -> dict[str, float | None]:
+    values: Iterable[tuple[str, float | None]] = (
+        tensor.components().items() if tensor else ((name, None) for name in COMPONENTS)
+    )
+    return {f"{prefix}_{name}": value for name, value in values}
+
+
+def _warn_of_few_segments(
+    fabric: VoidFabric | None, sums: ScanSums, variant: str, plan: Plan, number: int
+) -> None:
+    where = f"frame {number}, variant {variant}"
+    which = "abcd".index(variant)
+    if sums.segments[:, which].sum() == 0:
+        message = f"no void segment reaches the cut-off {plan.cutoff:g}"
+    elif fabric is None:
+        message = "in some direction no void segment is kept, so there is no void fabric"
+    elif fabric.filled > 0.01:
+        message = (
+            f"{fabric.filled:.0%} of the directions keep no void segment in a replicate: "
+            f"choose a smaller spacing"
+        )
+    else:
+        return
+    warnings.warn(f"{where}: {message}", ScanfabWarning, stacklevel=4)

@@ -1,0 +1,112 @@
+"""What a reader plugin offers, what it is asked, and what it answers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, NamedTuple, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.cell import Cell
+from scanfab.packing import ContactList
+
+__all__ = ["FileKind", "GrainTable", "JoinedContacts", "ReadOptions", "Reader", "Snapshot"]
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+FileKind = Literal["grains", "points", "contacts", "other"]
+"""``points``: grains without a radius, unless the user gives one; ``other``: a file of the format
+that holds neither grains nor contacts (a wall mesh, a bounding box)."""
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """What users tell of a dump that the dump does not tell itself."""
+
+    columns: Mapping[str, str] = field(default_factory=dict)
+    """Standard name to the file's own, for instance ``{"radius": "c_rad"}``."""
+    contact_columns: str | None = None
+    """Meaning of a contact file's columns, in the reader's own terms."""
+    radius: float | None = None
+    """Radius of all grains, for dumps without one; dump's length unit."""
+    cell: tuple[float, ...] | None = None
+    """LX LY LZ, or LX LY LZ XY XZ YZ; dump's length unit."""
+    periodic: str | None = None
+    """Letters out of xyz."""
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """One frame inside a file."""
+
+    path: Path
+    step: int | None = None
+    time: float | None = None
+    start: int = 0
+    """Where it starts in the (decompressed) file, in bytes."""
+    stop: int | None = None
+    """Where it ends; None: the end of the file."""
+
+
+class GrainTable(NamedTuple):
+    """The grains of a snapshot."""
+
+    position: FloatArray
+    """Shape (N, 3), dump's length unit."""
+    radius: FloatArray
+    """Shape (N,), dump's length unit."""
+    id: IntArray | None
+    """Shape (N,); None if the dump has none."""
+    columns: dict[str, npt.NDArray[Any]]
+    """What else the dump says of each grain, by its own names."""
+    cell: Cell | None
+
+
+class JoinedContacts(NamedTuple):
+    """The contacts of a snapshot, joined to the rows of its grains."""
+
+    contacts: ContactList | None
+    """None if the file lists contacts with walls only."""
+    wall_contacts: IntArray
+    """Number of contacts with walls of each grain, shape (N,)."""
+
+
+class Reader(Protocol):
+    """
+    A reader plugin: an object registered under the entry point group ``scanfab.readers``.
+
+    All methods raise ReadError, with the file and what was expected, and nothing else.
+    """
+
+    name: str
+    """As in ``--format NAME``."""
+    description: str
+    """One line for ``scanfab formats``."""
+    extensions: tuple[str, ...]
+    """Usual file name extensions, the first the most usual."""
+
+    def recognises(self, path: Path) -> bool:
+        """Whether the content is surely of this format."""
+        ...
+
+    def kind(self, path: Path) -> FileKind:
+        """What a file of this format holds."""
+        ...
+
+    def snapshots(self, path: Path) -> list[Snapshot]:
+        """The frames in a file, found without parsing them."""
+        ...
+
+    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+        """The grains of a frame."""
+        ...
+
+    def read_contacts(
+        self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
+    ) -> JoinedContacts:
+        """The contacts of a frame."""
+        ...

@@ -1,0 +1,180 @@
+"""From the columns of a dump, by name, to positions, radii and ids."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.cell import Cell
+from scanfab.errors import ReadError
+from scanfab.readers.base import GrainTable, ReadOptions
+
+__all__ = ["grain_table", "has_radius", "user_cell"]
+
+FloatArray = npt.NDArray[np.float64]
+Columns = Mapping[str, npt.NDArray[Any]]
+
+# names are compared without regard to case
+RADIUS_NAMES = ("radius", "radii", "rad", "r", "f_radius")
+DIAMETER_NAMES = ("diameter", "diam")
+ID_NAMES = ("id", "ids", "particle_id", "particleid", "body_id", "bodyid")
+# coordinates in the order of preference, and whether they are fractions of the box
+POSITION_NAMES = (("x y z", False), ("xu yu zu", False), ("xs ys zs", True), ("xsu ysu zsu", True))
+
+
+def has_radius(names: Sequence[str]) -> bool:
+    """Whether some column is a radius or a diameter."""
+    lower = {name.lower() for name in names}
+    return bool(lower & {*RADIUS_NAMES, *DIAMETER_NAMES})
+
+
+def grain_table(
+    path: Path, columns: Columns, cell: Cell | None, options: ReadOptions, where: str = ""
+) -> GrainTable:
+    """
+    Sort out which column is what.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    columns : mapping of str to ndarray
+        All columns by the dump's names, N rows each; coordinates may be a column ``position`` of
+        shape (N, 3).
+    cell : Cell, optional
+        From the dump.
+    options : ReadOptions
+        Names, radius and cell from the user.
+    where : str, optional
+        For messages, such as ``", step 100"``.
+
+    Raises
+    ------
+    ReadError
+        If coordinates or radii cannot be found.
+    """
+    rest = dict(columns)
+    named = _named_by_user(path, rest, options)
+    cell = user_cell(path, cell, options)
+    position = _position(path, rest, named, cell, where)
+    radius = _radius(path, rest, named, len(position), options, where)
+    id = named.get("id", _take(rest, ID_NAMES))
+    return GrainTable(
+        position,
+        radius,
+        None if id is None else _whole_numbers(path, id, where),
+        rest,
+        cell,
+    )
+
+
+def user_cell(path: Path, cell: Cell | None, options: ReadOptions) -> Cell | None:
+    """The dump's cell with the user's --cell and --periodic on top."""
+    periodic: tuple[bool, bool, bool] | None = None
+    if options.periodic is not None:
+        periodic = (
+            "x" in options.periodic,
+            "y" in options.periodic,
+            "z" in options.periodic,
+        )
+    if options.cell is not None:
+        lx, ly, lz, xy, xz, yz = (*options.cell, 0.0, 0.0, 0.0)[:6]
+        vectors = [[lx, 0, 0], [xy, ly, 0], [xz, yz, lz]]
+        origin = np.zeros(3) if cell is None else cell.origin
+        return Cell(vectors, periodic or (True, True, True), origin)
+    if periodic is None:
+        return cell
+    if cell is None:
+        raise ReadError(
+            f"{path}: --periodic {options.periodic} was asked for, but the dump names no cell: "
+            f"give it with --cell LX LY LZ"
+        )
+    return Cell(cell.vectors, periodic, cell.origin)
+
+
+def _named_by_user(path: Path, rest: dict[str, Any], options: ReadOptions) -> dict[str, Any]:
+    """Columns that the user named, taken out of the rest."""
+    named = {}
+    for standard, own in options.columns.items():
+        if own not in rest:
+            raise ReadError(
+                f"{path}: there is no column {own!r} to serve as {standard}; "
+                f"the columns are {', '.join(rest)}"
+            )
+        named[standard] = rest.pop(own)
+    for standard in [name for name in named if name not in ("x", "y", "z", "id", "radius")]:
+        rest[standard] = named.pop(standard)
+    return named
+
+
+def _position(
+    path: Path, rest: dict[str, Any], named: dict[str, Any], cell: Cell | None, where: str
+) -> FloatArray:
+    if "position" in rest:
+        return np.asarray(rest.pop("position"), dtype=np.float64)
+    for names, scaled in POSITION_NAMES:
+        found = [
+            named[axis] if axis in named else _take(rest, (name,), keep=True)
+            for name, axis in zip(names.split(), "xyz", strict=True)
+        ]
+        if any(column is None for column in found):
+            continue
+        for name in names.split():
+            _take(rest, (name,))
+        position = np.column_stack([np.asarray(column, dtype=np.float64) for column in found])
+        if not scaled:
+            return position
+        if cell is None:
+            raise ReadError(f"{path}{where}: {names} are fractions of a box, but there is no box")
+        return np.asarray(cell.origin + position @ cell.vectors)
+    raise ReadError(
+        f"{path}{where}: no coordinates: expected the columns x y z (or xu yu zu, xs ys zs), "
+        f"found {', '.join(rest) or 'none'}; name them with --columns x=...,y=...,z=..."
+    )
+
+
+def _radius(
+    path: Path,
+    rest: dict[str, Any],
+    named: dict[str, Any],
+    count: int,
+    options: ReadOptions,
+    where: str,
+) -> FloatArray:
+    if options.radius is not None:
+        return np.full(count, options.radius)
+    if "radius" in named:
+        return np.asarray(named["radius"], dtype=np.float64)
+    radius = _take(rest, RADIUS_NAMES)
+    if radius is not None:
+        return np.asarray(radius, dtype=np.float64)
+    diameter = _take(rest, DIAMETER_NAMES)
+    if diameter is not None:
+        return 0.5 * np.asarray(diameter, dtype=np.float64)
+    raise ReadError(
+        f"{path}{where}: no radius: expected a column radius (or diameter), found "
+        f"{', '.join(rest) or 'none'}; name it with --columns radius=..., or give one radius for "
+        f"all grains with --radius"
+    )
+
+
+def _take(rest: dict[str, Any], names: Sequence[str], keep: bool = False) -> Any:
+    """The first column that has one of the names; taken out of the rest unless kept."""
+    lower = {name.lower(): name for name in reversed(rest)}
+    for name in names:
+        if name in lower:
+            return rest[lower[name]] if keep else rest.pop(lower[name])
+    return None
+
+
+def _whole_numbers(path: Path, id: npt.NDArray[Any], where: str) -> npt.NDArray[np.int64]:
+    numbers = np.asarray(id)
+    if numbers.dtype.kind == "f" and not np.all(
+        np.isfinite(numbers) & (numbers == np.rint(numbers))
+    ):
+        raise ReadError(f"{path}{where}: ids must be whole numbers")
+    return numbers.astype(np.int64)

@@ -1,0 +1,286 @@
+"""
+The ``ITEM:`` text dumps of LIGGGHTS and LAMMPS: sections by their key, never by line number.
+
+Knows the syntax of snapshots, not the meaning of columns.
+"""
+
+from __future__ import annotations
+
+import io
+import mmap
+import re
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.cell import Cell
+from scanfab.errors import ReadError, ScanfabWarning
+from scanfab.readers.base import Snapshot
+from scanfab.readers.files import plain
+
+__all__ = ["DumpBlock", "index_dump", "read_block", "row_word"]
+
+FloatArray = npt.NDArray[np.float64]
+
+# a snapshot's header never comes near this size, whatever the number of columns
+HEADER_BYTES = 1 << 16
+COUNT_KEY = re.compile(rb"^ITEM: NUMBER OF (\S+)[ \t]*\r?$", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class DumpBlock:
+    """One snapshot, as it stands."""
+
+    step: int | None
+    time: float | None
+    cell: Cell | None
+    names: list[str]
+    """Names of the columns; empty in very old files."""
+    values: FloatArray
+    """Shape (N, columns)."""
+
+
+def row_word(head: bytes) -> str | None:
+    """What a dump counts: ``ATOMS``, ``ENTRIES``, or the word of a label; None if no dump."""
+    if not head.startswith((b"ITEM: ", b"\xef\xbb\xbfITEM: ")):
+        return None
+    match = COUNT_KEY.search(head)
+    return match[1].decode("ascii", "replace") if match else None
+
+
+def index_dump(path: Path) -> list[Snapshot]:
+    """
+    The snapshots of a file, by their first bytes.
+
+    An incomplete last snapshot (the program is still writing) is left out with a warning if there
+    is a complete one before it.
+    """
+    file = plain(path)
+    if file.stat().st_size == 0:
+        raise ReadError(f"{path}: the file is empty")
+    with open(file, "rb") as stream:
+        data = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
+        try:
+            starts = _starts(data)
+            if not starts:
+                raise ReadError(f"{path}: expected a line ITEM: TIMESTEP, found none")
+            stops = [*starts[1:], len(data)]
+            found = [
+                _snapshot(path, data, start, stop)
+                for start, stop in zip(starts, stops, strict=True)
+            ]
+            if len(found) > 1 and not _is_complete(data, starts[-1], len(data)):
+                warnings.warn(
+                    f"{path}: the last snapshot (step {found[-1].step}) is incomplete and is "
+                    f"left out",
+                    ScanfabWarning,
+                    stacklevel=2,
+                )
+                found.pop()
+        finally:
+            data.close()
+    return found
+
+
+def read_block(snapshot: Snapshot) -> DumpBlock:
+    """
+    Parse one snapshot.
+
+    Raises
+    ------
+    ReadError
+        If the header or a line is not as it should be; names the line.
+    """
+    path = snapshot.path
+    with open(plain(path), "rb") as stream:
+        stream.seek(snapshot.start)
+        size = None if snapshot.stop is None else snapshot.stop - snapshot.start
+        block = stream.read() if size is None else stream.read(size)
+    where = f"{path}" if snapshot.step is None else f"{path}, step {snapshot.step}"
+    sections, body = _sections(where, block)
+    count = _count(where, sections)
+    names = body.names
+    values = _values(path, snapshot, block, body, count)
+    if names and count and values.shape[1] != len(names):
+        raise ReadError(
+            f"{where}: the header names {len(names)} columns, the lines have {values.shape[1]}"
+        )
+    if not count:
+        values = np.zeros((0, len(names)))
+    return DumpBlock(snapshot.step, snapshot.time, _cell(where, sections), names, values)
+
+
+@dataclass(frozen=True)
+class _Body:
+    names: list[str]
+    start: int
+
+
+def _starts(data: mmap.mmap) -> list[int]:
+    """Where snapshots begin: UNITS and TIME may stand before TIMESTEP."""
+    starts, place = [], data.find(b"ITEM: TIMESTEP")
+    while place >= 0:
+        if place == 0 or data[place - 1 : place] in (b"\n", b"\xbf"):
+            starts.append(place)
+        place = data.find(b"\nITEM: TIMESTEP", place + 1)
+        place += place >= 0
+    return starts
+
+
+def _snapshot(path: Path, data: mmap.mmap, start: int, stop: int) -> Snapshot:
+    lines = data[start : min(start + 200, stop)].split(b"\n")
+    try:
+        step = int(lines[1])
+    except (IndexError, ValueError):
+        raise ReadError(f"{path}: expected a whole number after ITEM: TIMESTEP") from None
+    # LAMMPS writes the time of a snapshot before or after its step
+    header = data[start : min(start + HEADER_BYTES, stop)]
+    match = re.search(rb"^ITEM: TIME[ \t]*\r?\n\s*(\S+)", header, re.MULTILINE)
+    try:
+        time = float(match[1]) if match else None
+    except ValueError:
+        time = None
+    return Snapshot(path, step=step, time=time, start=start, stop=stop)
+
+
+def _is_complete(data: mmap.mmap, start: int, stop: int) -> bool:
+    block = data[start:stop]
+    try:
+        sections, body = _sections("", block)
+        count = _count("", sections)
+    except ReadError:
+        return False
+    lines = block.count(b"\n", body.start) + (not block.endswith(b"\n"))
+    # a last line without its end may be cut within a number
+    return lines >= count and (count == 0 or block.endswith(b"\n"))
+
+
+def _sections(where: str, block: bytes) -> tuple[dict[str, list[str]], _Body]:
+    """The header's sections by key, and the body: the first section whose key has no known word."""
+    sections: dict[str, list[str]] = {}
+    word, place = None, 0
+    for line in block[:HEADER_BYTES].splitlines(keepends=True):
+        place += len(line)
+        text = line.decode("utf-8", "replace").strip().removeprefix("\ufeff")
+        if not text.startswith("ITEM:"):
+            if sections:
+                next(reversed(sections.values())).append(text)
+            continue
+        key = text.removeprefix("ITEM:").strip()
+        if key.startswith("NUMBER OF "):
+            word = key.removeprefix("NUMBER OF ")
+        elif word is not None and key.split()[:1] == [word]:
+            return sections, _Body(key.split()[1:], place)
+        sections[key] = []
+    raise ReadError(f"{where}: the header is incomplete: no ITEM: {word or 'ATOMS'} line")
+
+
+def _count(where: str, sections: dict[str, list[str]]) -> int:
+    key = next((key for key in sections if key.startswith("NUMBER OF ")), None)
+    try:
+        count = int(sections[key][0]) if key else -1
+    except (IndexError, ValueError):
+        count = -1
+    if count < 0:
+        raise ReadError(f"{where}: expected a whole number after ITEM: {key or 'NUMBER OF ATOMS'}")
+    return count
+
+
+def _values(path: Path, snapshot: Snapshot, block: bytes, body: _Body, count: int) -> FloatArray:
+    """The numbers of the body; columns of text come out as NaN."""
+    if count == 0:
+        return np.zeros((0, len(body.names)))
+    available = block.count(b"\n", body.start) + 1
+    if count > available:
+        raise ReadError(
+            f"{path}, step {snapshot.step}: the header counts {count} rows, but the file ends "
+            f"after about {available - 1}: the snapshot is incomplete"
+        )
+    lines = io.BytesIO(block)
+    lines.seek(body.start)
+    text = _text_columns(block, body)
+    converters: dict[int | str, Callable[[str], float]] = dict.fromkeys(text, _nan)
+    try:
+        values: FloatArray = np.loadtxt(
+            lines,
+            dtype=np.float64,
+            max_rows=count,
+            comments=None,
+            ndmin=2,
+            converters=converters or None,
+            encoding="latin1",
+        )
+    except ValueError as error:
+        raise ReadError(_locate(path, snapshot, block, body, str(error))) from None
+    if len(values) < count:
+        raise ReadError(
+            f"{path}, step {snapshot.step}: the header counts {count} rows, found {len(values)}: "
+            f"the snapshot is incomplete"
+        )
+    return values
+
+
+def _nan(_: str) -> float:
+    return float("nan")
+
+
+def _text_columns(block: bytes, body: _Body) -> list[int]:
+    """Columns of words (the element's name), by the first line."""
+    first = block[body.start : body.start + HEADER_BYTES].split(b"\n", 1)[0].split()
+    known = {"element", "lattice"}
+    return [
+        place
+        for place, name in enumerate(body.names)
+        if place < len(first) and name.lower() in known
+    ]
+
+
+def _locate(path: Path, snapshot: Snapshot, block: bytes, body: _Body, reason: str) -> str:
+    """A message with the line of the file, from numpy's with the row of the block."""
+    match = re.search(r"at row (\d+)", reason)
+    line = _lines_before(snapshot) + block.count(b"\n", 0, body.start) + 1
+    if match:
+        line += int(match[1]) - ("changed" in reason)
+        reason = reason[: match.start()].rstrip(" ;,")
+    reason = reason.replace("could not convert string", "expected a number, found")
+    reason = reason.replace(" to float64", "")
+    return f"{path}, line {line}: {reason}"
+
+
+def _lines_before(snapshot: Snapshot) -> int:
+    with open(plain(snapshot.path), "rb") as stream:
+        return stream.read(snapshot.start).count(b"\n")
+
+
+def _cell(where: str, sections: dict[str, list[str]]) -> Cell | None:
+    """The box, periodic along the axes that are flagged pp; None if it has no volume."""
+    key = next((key for key in sections if key.startswith("BOX BOUNDS")), None)
+    if key is None:
+        return None
+    words = key.removeprefix("BOX BOUNDS").split()
+    try:
+        bounds = np.array([line.split() for line in sections[key][:3]], dtype=np.float64)
+    except ValueError:
+        bounds = np.zeros(0)
+    tilted = words[:3] == ["xy", "xz", "yz"]
+    if bounds.shape != (3, 3 if tilted else 2):
+        raise ReadError(
+            f"{where}: ITEM: {key}: expected three lines of {3 if tilted else 2} numbers"
+        )
+    flags = [word == "pp" for word in words[-3:]] if len(words) >= 3 else [False] * 3
+    low, high = bounds[:, 0].copy(), bounds[:, 1].copy()
+    xy, xz, yz = bounds[:, 2] if tilted else (0.0, 0.0, 0.0)
+    # the bounds of a tilted box are those of the box around it
+    low[0] -= min(0.0, xy, xz, xy + xz)
+    high[0] -= max(0.0, xy, xz, xy + xz)
+    low[1] -= min(0.0, yz)
+    high[1] -= max(0.0, yz)
+    edge = high - low
+    if not np.all(np.isfinite(edge)) or np.any(edge <= 0):
+        return None
+    vectors = [[edge[0], 0, 0], [xy, edge[1], 0], [xz, yz, edge[2]]]
+    return Cell(vectors, (flags[0], flags[1], flags[2]), low)

@@ -1,0 +1,88 @@
+"""Files as readers want them: plain, whatever they are packed with."""
+
+from __future__ import annotations
+
+import atexit
+import bz2
+import gzip
+import lzma
+import os
+import shutil
+import tempfile
+import zlib
+from collections import OrderedDict
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from scanfab.errors import ReadError
+
+__all__ = ["COMPRESSED_SUFFIXES", "bare_name", "first_bytes", "plain"]
+
+OPENERS: dict[bytes, Callable[..., Any]] = {
+    b"\x1f\x8b": gzip.open,
+    b"BZh": bz2.open,
+    b"\xfd7zXZ\x00": lzma.open,
+}
+COMPRESSED_SUFFIXES = (".gz", ".bz2", ".xz")
+# decompressed copies of the files used last; two frames need at most a few
+KEPT = 6
+_copies: OrderedDict[tuple[str, int, int], Path] = OrderedDict()
+_folder: list[str] = []
+
+
+def bare_name(path: Path) -> str:
+    """The file name without the ending of a compression program."""
+    return path.stem if path.suffix in COMPRESSED_SUFFIXES else path.name
+
+
+def first_bytes(path: Path, count: int = 4096) -> bytes:
+    """The first bytes of the decompressed file; ReadError if it cannot be opened."""
+    try:
+        with _opener(path)(path, "rb") as stream:
+            head: bytes = stream.read(count)
+            return head
+    except (OSError, EOFError, lzma.LZMAError, zlib.error) as error:
+        raise ReadError(f"{path}: cannot be read: {_reason(error)}") from None
+
+
+def plain(path: Path) -> Path:
+    """The file itself, or a decompressed temporary copy that keeps its bare name."""
+    opener = _opener(path)
+    if opener is open:
+        return path
+    status = path.stat()
+    key = (str(path), status.st_mtime_ns, status.st_size)
+    if key in _copies:
+        _copies.move_to_end(key)
+        return _copies[key]
+    if not _folder:
+        _folder.append(tempfile.mkdtemp(prefix="scanfab-"))
+        atexit.register(shutil.rmtree, _folder[0], ignore_errors=True)
+    copy = Path(tempfile.mkdtemp(dir=_folder[0])) / bare_name(path)
+    try:
+        with opener(path, "rb") as packed, open(copy, "wb") as unpacked:
+            shutil.copyfileobj(packed, unpacked, 1 << 20)
+    except (OSError, EOFError, lzma.LZMAError, zlib.error) as error:
+        shutil.rmtree(copy.parent, ignore_errors=True)
+        raise ReadError(f"{path}: cannot be decompressed: {_reason(error)}") from None
+    _copies[key] = copy
+    while len(_copies) > KEPT:
+        _, oldest = _copies.popitem(last=False)
+        shutil.rmtree(oldest.parent, ignore_errors=True)
+    return copy
+
+
+def _opener(path: Path) -> Callable[..., Any]:
+    try:
+        with open(path, "rb") as stream:
+            magic = stream.read(6)
+    except OSError as error:
+        raise ReadError(f"{path}: cannot be read: {_reason(error)}") from None
+    return next((opener for key, opener in OPENERS.items() if magic.startswith(key)), open)
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, OSError) and error.errno is not None:
+        return os.strerror(error.errno)
+    return str(error) or "the file ends too early"

@@ -1,0 +1,157 @@
+"""Contacts to rows of the grain table: by ids, or by the positions of both centres."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import KDTree
+
+from scanfab.errors import ReadError
+from scanfab.packing import ContactList
+from scanfab.readers.base import GrainTable, JoinedContacts
+
+__all__ = ["count_walls", "join_ids", "join_positions", "rows_of_ids"]
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+# an end of a contact within this fraction of a radius from a centre belongs to that grain
+SAME_PLACE = 0.01
+
+
+def rows_of_ids(grains: GrainTable, ids: npt.ArrayLike) -> IntArray:
+    """Rows of the grains with these ids; -1 where no grain has the id."""
+    wanted = np.asarray(ids)
+    if grains.id is None or len(grains.id) == 0:
+        return np.full(wanted.shape, -1, dtype=np.int64)
+    order = np.argsort(grains.id)
+    place = np.minimum(np.searchsorted(grains.id[order], wanted), len(order) - 1)
+    rows = order[place]
+    return np.where(grains.id[rows] == wanted, rows, -1)
+
+
+def join_ids(
+    path: Path,
+    grains: GrainTable,
+    ids: IntArray,
+    force: FloatArray | None,
+    *,
+    walls: bool,
+) -> JoinedContacts:
+    """
+    Join contacts that name grains by id.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    grains : GrainTable
+        With ids.
+    ids : ndarray, shape (M, 2)
+        As the file names them.
+    force : ndarray, shape (M, 3), optional
+        Force on the second grain.
+    walls : bool
+        Whether one of the two ids may be a wall's, which is no grain.
+
+    Raises
+    ------
+    ReadError
+        If a contact names a grain that does not exist.
+    """
+    if grains.id is None:
+        raise ReadError(f"{path}: names grains by id, but the grain file has no ids")
+    rows = rows_of_ids(grains, ids)
+    return _join(
+        path,
+        rows,
+        force,
+        walls,
+        lambda contact, end: f"names the grain {ids[contact, end]}",
+        len(grains.radius),
+    )
+
+
+def join_positions(
+    path: Path, grains: GrainTable, ends: FloatArray, force: FloatArray | None
+) -> JoinedContacts:
+    """
+    Join contacts that are lines between centres; an end where no grain is belongs to a wall.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    grains : GrainTable
+        Wrapped into the cell here, as the ends are.
+    ends : ndarray, shape (M, 2, 3)
+        Both centres, dump's length unit.
+    force : ndarray, shape (M, 3), optional
+        Force on the second grain.
+
+    Raises
+    ------
+    ReadError
+        If both ends of a contact are where no grain is.
+    """
+    points = ends.reshape(-1, 3)
+    rows = np.full(len(points), -1, dtype=np.int64)
+    if len(grains.position) and len(points):
+        rows = _grains_at(grains, points)
+    return _join(
+        path,
+        rows.reshape(-1, 2),
+        force,
+        True,
+        lambda contact, end: f"ends at {ends[contact, end].tolist()}, where no grain is",
+        len(grains.radius),
+    )
+
+
+def count_walls(rows: IntArray, count: int) -> IntArray:
+    """How often each of ``count`` grains occurs."""
+    return np.bincount(rows, minlength=count).astype(np.int64)
+
+
+def _grains_at(grains: GrainTable, points: FloatArray) -> IntArray:
+    """Rows of the grains whose centres are at the points; -1 where there is none."""
+    position, radius, row = grains.position, grains.radius, np.arange(len(grains.position))
+    if grains.cell is not None and grains.cell.is_periodic:
+        points, position = grains.cell.wrap(points), grains.cell.wrap(position)
+        # rounding may put a point and its centre on opposite faces: images just outside help
+        images, of, _ = grains.cell.images(position, SAME_PLACE * float(radius.max()))
+        position = np.concatenate([position, images])
+        row = np.concatenate([row, of])
+    distance, nearest = KDTree(position).query(points)
+    same = distance < SAME_PLACE * radius[row[nearest]]
+    return np.where(same, row[nearest], -1)
+
+
+def _join(
+    path: Path,
+    rows: IntArray,
+    force: FloatArray | None,
+    walls: bool,
+    describe: Callable[[int, int], str],
+    count: int,
+) -> JoinedContacts:
+    """Tell contacts of two grains from contacts with a wall (one row is -1) and from errors."""
+    unknown = rows < 0
+    wrong = unknown.all(axis=1) if walls else unknown.any(axis=1)
+    if wrong.any():
+        contact = int(np.argmax(wrong))
+        end = int(np.argmax(unknown[contact]))
+        raise ReadError(
+            f"{path}: contact {contact + 1} {describe(contact, end)}, which is not in the grain "
+            f"file ({np.count_nonzero(wrong)} of {len(rows)} contacts): do both files belong to "
+            f"the same step?"
+        )
+    both = ~unknown.any(axis=1)
+    with_wall = rows[~both].max(axis=1)
+    return JoinedContacts(
+        ContactList(rows[both], force=None if force is None else force[both]),
+        count_walls(with_wall, count),
+    )

@@ -1,0 +1,301 @@
+"""
+VTK files: grains as points with a radius, contacts as lines between centres.
+
+meshio reads unstructured grids and XDMF, pyvista the rest; both print and exit where a library
+should raise, which ends here.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.cell import Cell
+from scanfab.errors import ReadError
+from scanfab.readers.base import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
+from scanfab.readers.columns import grain_table, has_radius
+from scanfab.readers.files import bare_name, first_bytes, plain
+from scanfab.readers.join import join_ids, join_positions
+
+__all__ = ["Mesh", "VtkReader", "read_mesh"]
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+VTK_VERTEX, VTK_POLY_VERTEX, VTK_LINE = 1, 2, 3
+
+
+class Mesh(NamedTuple):
+    """What a VTK file holds, whichever library has read it."""
+
+    points: FloatArray
+    """Shape (N, 3)."""
+    point_arrays: dict[str, npt.NDArray[Any]]
+    """N rows each."""
+    lines: IntArray
+    """Points of each line, shape (M, 2)."""
+    line_arrays: dict[str, npt.NDArray[Any]]
+    """M rows each."""
+    has_faces: bool
+    """Triangles, boxes and the like."""
+
+
+class VtkReader:
+    """Reader plugin for VTK files of any origin."""
+
+    name = "vtk"
+    description = "any VTK point cloud with a radius; contacts as lines (.vtk .vtp .vtu .xdmf)"
+    extensions: tuple[str, ...] = (".vtk", ".vtp", ".vtu", ".xdmf", ".xmf")
+    # whether one end of a contact may be a wall, which is not in the grain file
+    walls = True
+
+    def recognises(self, path: Path) -> bool:
+        """By the first line of legacy VTK, or the root element of the XML formats."""
+        return _form(path) is not None
+
+    def kind(self, path: Path) -> FileKind:
+        """Lines are contacts, points without any other cells are grains."""
+        form = _form(path)
+        if form in (None, "RectilinearGrid", "ImageData", "StructuredGrid"):
+            return "other"
+        mesh = read_mesh(path)
+        if mesh.has_faces:
+            return "other"
+        if len(mesh.lines):
+            return "contacts"
+        if len(mesh.points) == 0:
+            # an empty frame; VTK may have dropped its arrays
+            return "grains" if b"radi" in plain(path).read_bytes().lower() else "other"
+        return "grains" if has_radius(list(mesh.point_arrays)) else "points"
+
+    def snapshots(self, path: Path) -> list[Snapshot]:
+        """One; only its name may say which step it is."""
+        return [Snapshot(path)]
+
+    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+        """Points and their arrays, with the box of LIGGGHTS' file beside it."""
+        mesh = read_mesh(snapshot.path)
+        columns = {**mesh.point_arrays, "position": mesh.points}
+        if len(mesh.points) == 0:
+            columns["radius"] = np.zeros(0)
+        return grain_table(snapshot.path, columns, _box_beside(snapshot.path), options)
+
+    def read_contacts(
+        self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
+    ) -> JoinedContacts:
+        """Lines; by the arrays id1 and id2 where grains have ids, else by their ends."""
+        mesh = read_mesh(snapshot.path)
+        force = self.force_on_second(mesh)
+        ids = [mesh.line_arrays.get(name) for name in ("id1", "id2")]
+        if grains.id is not None and ids[0] is not None and ids[1] is not None:
+            pairs = np.column_stack([np.rint(ids[0]), np.rint(ids[1])]).astype(np.int64)
+            return join_ids(snapshot.path, grains, pairs, force, walls=self.walls)
+        return join_positions(snapshot.path, grains, mesh.points[mesh.lines], force)
+
+    def force_on_second(self, mesh: Mesh) -> FloatArray | None:
+        """Force on the second grain, shape (M, 3); None: which one it acts on is not known."""
+        return None
+
+
+def read_mesh(path: Path) -> Mesh:
+    """
+    Read a VTK file.
+
+    Raises
+    ------
+    ReadError
+        If neither library can, with what they say.
+    """
+    form = _form(path)
+    if form is None:
+        raise ReadError(f"{path}: expected a VTK file, found something else")
+    file = plain(path)
+    reasons = []
+    if form in ("UnstructuredGrid", "UNSTRUCTURED_GRID", "Xdmf"):
+        try:
+            return _from_meshio(file, form)
+        except _MeshioError as error:
+            reasons.append(f"meshio: {error}")
+    if form != "Xdmf":
+        if _is_empty_legacy(file):
+            return Mesh(np.zeros((0, 3)), {}, np.zeros((0, 2), np.int64), {}, False)
+        try:
+            return _from_pyvista(path, file)
+        except _VtkError as error:
+            reasons.append(f"VTK: {error}")
+    raise ReadError(f"{path}: cannot be read as VTK ({form}): {'; '.join(reasons)}")
+
+
+class _MeshioError(Exception):
+    pass
+
+
+class _VtkError(Exception):
+    pass
+
+
+def _form(path: Path) -> str | None:
+    """``PolyData``, ``UNSTRUCTURED_GRID``, ``Xdmf``, ...: what the header says; None if no VTK."""
+    head = first_bytes(path)
+    if head.startswith(b"# vtk DataFile"):
+        match = re.search(rb"^\s*DATASET\s+(\w+)", head, re.MULTILINE)
+        return match[1].decode() if match else None
+    match = re.search(rb"<VTKFile[^>]*\btype=[\"'](\w+)", head)
+    if match:
+        return match[1].decode()
+    return "Xdmf" if re.search(rb"<Xdmf\b", head) else None
+
+
+def _is_empty_legacy(file: Path) -> bool:
+    """VTK reports an error for no points, although that is a frame without grains."""
+    return re.search(rb"^POINTS\s+0\s", first_bytes(file), re.MULTILINE) is not None
+
+
+def _from_meshio(file: Path, form: str) -> Mesh:
+    import meshio
+
+    reader = {"UNSTRUCTURED_GRID": meshio.vtk, "UnstructuredGrid": meshio.vtu}.get(
+        form, meshio.xdmf
+    )
+    silence = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(silence), contextlib.redirect_stderr(silence):
+            mesh = reader.read(str(file))
+    # meshio raises whatever its parsing meets, and exits for what it does not know
+    except (Exception, SystemExit) as error:
+        raise _MeshioError(str(error) or type(error).__name__) from None
+    points = np.zeros((len(mesh.points), 3))
+    points[:, : mesh.points.shape[1]] = mesh.points
+    arrays = {name: np.asarray(values) for name, values in mesh.point_data.items()}
+    vertices = [place for place, block in enumerate(mesh.cells) if block.type == "vertex"]
+    if len(vertices) == len(mesh.cells) == 1 and len(mesh.cells[0].data) == len(points):
+        # one vertex cell for each point: arrays of the cells are arrays of the grains
+        own = mesh.cells[0].data[:, 0]
+        if np.array_equal(own, np.arange(len(points))):
+            arrays.update({name: np.asarray(v[0]) for name, v in mesh.cell_data.items()})
+    lines = [place for place, block in enumerate(mesh.cells) if block.type == "line"]
+    pairs = [np.asarray(mesh.cells[place].data, np.int64) for place in lines]
+    line_arrays = {
+        name: np.concatenate([np.asarray(values[place]) for place in lines])
+        for name, values in mesh.cell_data.items()
+        if lines
+    }
+    return Mesh(
+        points,
+        arrays,
+        np.concatenate(pairs) if pairs else np.zeros((0, 2), np.int64),
+        line_arrays,
+        has_faces=len(vertices) + len(lines) < len(mesh.cells),
+    )
+
+
+def _from_pyvista(path: Path, file: Path) -> Mesh:
+    import pyvista
+
+    suffix = Path(bare_name(path)).suffix.lower()
+    if first_bytes(path).startswith(b"# vtk"):
+        suffix = ".vtk"
+    elif suffix not in (".vtp", ".vtu"):
+        suffix = ".vtp" if _form(path) == "PolyData" else ".vtu"
+    with _quiet_vtk(), pyvista.VtkErrorCatcher(send_to_logging=False) as caught:
+        try:
+            reader = pyvista.get_reader(str(file), force_ext=suffix).reader
+            reader.Update()
+            mesh = pyvista.wrap(reader.GetOutput())
+        except Exception as error:  # VTK's Python layer raises many kinds
+            raise _VtkError(str(error).splitlines()[0]) from None
+    if caught.error_events:
+        raise _VtkError(caught.error_events[0].alert)
+    if isinstance(mesh, pyvista.PolyData):
+        return _from_polydata(mesh)
+    if isinstance(mesh, pyvista.UnstructuredGrid):
+        return _from_grid(mesh)
+    raise _VtkError(f"a {type(mesh).__name__} holds neither grains nor contacts")
+
+
+@contextlib.contextmanager
+def _quiet_vtk() -> Iterator[None]:
+    """VTK's own log off: its errors are raised instead."""
+    from vtkmodules.vtkCommonCore import vtkLogger
+
+    before = vtkLogger.GetCurrentVerbosityCutoff()
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
+    try:
+        yield
+    finally:
+        vtkLogger.SetStderrVerbosity(before)
+
+
+def _from_polydata(mesh: Any) -> Mesh:
+    # cell arrays come in the order vertices, lines, faces
+    lines = _pairs(np.asarray(mesh.lines))
+    first = mesh.n_verts
+    cells = {name: np.asarray(mesh.cell_data[name]) for name in mesh.cell_data}
+    return Mesh(
+        np.asarray(mesh.points, dtype=np.float64),
+        {name: np.asarray(mesh.point_data[name]) for name in mesh.point_data},
+        lines,
+        {name: values[first : first + len(lines)] for name, values in cells.items()},
+        has_faces=mesh.n_cells > mesh.n_verts + mesh.n_lines,
+    )
+
+
+def _from_grid(mesh: Any) -> Mesh:
+    types = np.asarray(mesh.celltypes)
+    chosen = np.flatnonzero(types == VTK_LINE)
+    lines = np.asarray(mesh.cells_dict.get(VTK_LINE, np.zeros((0, 2))), dtype=np.int64)
+    cells = {name: np.asarray(mesh.cell_data[name]) for name in mesh.cell_data}
+    return Mesh(
+        np.asarray(mesh.points, dtype=np.float64),
+        {name: np.asarray(mesh.point_data[name]) for name in mesh.point_data},
+        lines,
+        {name: values[chosen] for name, values in cells.items()},
+        has_faces=bool(np.any(~np.isin(types, (VTK_VERTEX, VTK_POLY_VERTEX, VTK_LINE)))),
+    )
+
+
+def _pairs(flat: IntArray) -> IntArray:
+    """VTK's flat list of lines (2, a, b, 2, c, d, ...) as pairs; longer lines by their ends."""
+    if flat.size % 3 == 0 and np.all(flat[::3] == 2):
+        return flat.reshape(-1, 3)[:, 1:].astype(np.int64)
+    pairs, place = [], 0
+    while place < flat.size:
+        pairs.append((flat[place + 1], flat[place + flat[place]]))
+        place += flat[place] + 1
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+
+
+def _box_beside(path: Path) -> Cell | None:
+    """The box that LIGGGHTS writes beside a VTK dump; it does not say what is periodic."""
+    match = re.fullmatch(r"(.*?)(\d+)\.\w+", bare_name(path))
+    if match is None:
+        return None
+    for suffix in (".vtk", ".vtr", ".vtk.gz", ".vtr.gz"):
+        beside = path.with_name(f"{match[1]}boundingBox_{match[2]}{suffix}")
+        if beside.is_file():
+            return _read_box(beside)
+    return None
+
+
+def _read_box(path: Path) -> Cell | None:
+    import pyvista
+
+    suffix = ".vtk" if first_bytes(path).startswith(b"# vtk") else ".vtr"
+    with _quiet_vtk(), pyvista.VtkErrorCatcher(send_to_logging=False) as caught:
+        try:
+            reader = pyvista.get_reader(str(plain(path)), force_ext=suffix).reader
+            reader.Update()
+            bounds = np.array(pyvista.wrap(reader.GetOutput()).bounds).reshape(3, 2)
+        except Exception as error:  # as above
+            raise ReadError(f"{path}: cannot be read: {str(error).splitlines()[0]}") from None
+    edges = bounds[:, 1] - bounds[:, 0]
+    if caught.error_events or not np.all(edges > 0):
+        return None
+    return Cell(edges, (False, False, False), bounds[:, 0])

@@ -1,0 +1,330 @@
+"""From files and folders to a series of frames; pairs the grain file and contact file of a step."""
+
+from __future__ import annotations
+
+import glob
+import os
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scanfab.errors import PackingError, ReadError, ScanfabWarning, UnknownFormatError
+from scanfab.families import Family, sort_into_families
+from scanfab.packing import Packing
+from scanfab.readers.base import GrainTable, JoinedContacts, Reader, ReadOptions, Snapshot
+
+__all__ = ["Frame", "Series", "open_sources", "read", "read_series"]
+
+PathLike = str | os.PathLike[str]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One frame of a series, not read yet."""
+
+    reader: Reader
+    snapshot: Snapshot
+    contacts: tuple[tuple[Reader, Snapshot], ...]
+    """Contact files of the same step; empty if contacts come from geometry."""
+    options: ReadOptions
+
+    def read(self) -> Packing:
+        """
+        The frame's packing; its contacts are None if no file lists them.
+
+        Raises
+        ------
+        ReadError
+            If a file is not as it should be.
+        PackingError
+            If its content is no packing.
+        """
+        grains = self.reader.read_grains(self.snapshot, self.options)
+        joined = [
+            reader.read_contacts(snapshot, self.options, grains)
+            for reader, snapshot in self.contacts
+        ]
+        listed = [part.contacts for part in joined if part.contacts is not None]
+        if len(listed) > 1:
+            paths = " and ".join(str(snapshot.path) for _, snapshot in self.contacts)
+            raise ReadError(f"two contact lists for one frame: {paths}: choose with --contacts")
+        try:
+            return Packing(
+                grains.position,
+                grains.radius,
+                id=grains.id,
+                columns=grains.columns,
+                contacts=listed[0] if listed else None,
+                wall_contacts=_wall_contacts(grains, joined),
+                cell=grains.cell,
+                step=self.snapshot.step,
+                time=self.snapshot.time,
+            )
+        except PackingError as error:
+            raise PackingError(f"{self.snapshot.path}: {error}") from None
+
+
+@dataclass(frozen=True)
+class Series:
+    """
+    Frames in the order of their steps, read one at a time.
+
+    Iterating gives :class:`Frame` objects; ``frame.read()`` gives the packing.
+    """
+
+    name: str
+    """As the user named it."""
+    grains: Family
+    contacts: tuple[Family, ...] = ()
+    contacts_required: bool = False
+    options: ReadOptions = field(default_factory=ReadOptions)
+
+    def __iter__(self) -> Iterator[Frame]:
+        reader = self.grains.reader
+        assert reader is not None
+        for name_step, path in self.grains.files.items():
+            for snapshot in reader.snapshots(path):
+                found = self._contact_files(name_step, snapshot)
+                if snapshot.step is None:
+                    snapshot = Snapshot(
+                        path, name_step, snapshot.time, snapshot.start, snapshot.stop
+                    )
+                yield Frame(reader, snapshot, found, self.options)
+
+    def _contact_files(
+        self, name_step: int | None, snapshot: Snapshot
+    ) -> tuple[tuple[Reader, Snapshot], ...]:
+        """The snapshots of the contact files that belong to a frame."""
+        found = []
+        for family in self.contacts:
+            contacts = _same_step(family, name_step, snapshot, len(self.grains.files) == 1)
+            if contacts is not None:
+                assert family.reader is not None
+                found.append((family.reader, contacts))
+        if not found and self.contacts:
+            step = name_step if snapshot.step is None else snapshot.step
+            patterns = ", ".join(family.pattern for family in self.contacts)
+            message = f"{snapshot.path}: no contact file for step {step} among {patterns}"
+            if self.contacts_required:
+                raise ReadError(message)
+            warnings.warn(
+                f"{message}: contacts are found by geometry", ScanfabWarning, stacklevel=3
+            )
+        return tuple(found)
+
+
+def read(path: PathLike, *, frame: int = 0, **options: Any) -> Packing:
+    """
+    Read one frame.
+
+    Parameters
+    ----------
+    path : path
+        A particle file.
+    frame : int, optional
+        Which snapshot, if the file holds several; negative from the end.
+    **options
+        See :func:`read_series`.
+
+    Returns
+    -------
+    Packing
+
+    Raises
+    ------
+    ScanfabError
+        If the file cannot be read, or has no such frame.
+
+    Examples
+    --------
+    >>> import scanfab
+    >>> packing = scanfab.read(
+    ...     "sample_data/yade_triaxial/triaxial-spheres-00000000.vtk.gz",
+    ...     contacts="sample_data/yade_triaxial/triaxial-intrs-00000000.vtk.gz",
+    ... )
+    >>> len(packing)
+    1800
+    """
+    frames = list(read_series(path, **options))
+    try:
+        return frames[frame].read()
+    except IndexError:
+        raise ReadError(f"{path}: has {len(frames)} frames, there is no frame {frame}") from None
+
+
+def read_series(
+    source: PathLike | Sequence[PathLike],
+    *,
+    format: str | None = None,
+    contacts: str | PathLike = "auto",
+    columns: dict[str, str] | None = None,
+    contact_columns: str | None = None,
+    radius: float | None = None,
+    cell: tuple[float, ...] | None = None,
+    periodic: str | None = None,
+) -> Series:
+    """
+    Open a series of frames: a folder, a file, or several files.
+
+    Parameters
+    ----------
+    source : path or sequence of paths
+        A folder with one series, or its files.
+    format : str, optional
+        Name of the reader; by content if not given.
+    contacts : str or path, optional
+        ``auto``: from contact files if there are any, else by geometry; ``file``; ``geometric``; or
+        a file, folder or glob, matched by step.
+    columns : dict, optional
+        Standard names to the file's own, such as ``{"radius": "c_rad"}``.
+    contact_columns : str, optional
+        Keywords of LIGGGHTS' ``compute pair/gran/local``.
+    radius : float, optional
+        Radius for dumps without one, dump's length unit.
+    cell : tuple of float, optional
+        LX LY LZ or LX LY LZ XY XZ YZ, for formats that do not carry it.
+    periodic : str, optional
+        Letters out of xyz.
+
+    Returns
+    -------
+    Series
+
+    Raises
+    ------
+    UnknownFormatError
+        If no reader knows the files.
+    ReadError
+        If there is no series, or more than one.
+    """
+    paths = [Path(p) for p in ([source] if isinstance(source, (str, os.PathLike)) else source)]
+    options = ReadOptions(columns or {}, contact_columns, radius, cell, periodic)
+    files = [file for path in paths for file in _files(path)]
+    families = sort_into_families(files, format)
+    grains = _grain_family(paths, families)
+    _note_passed_over(families)
+    name = str(paths[0]) if len(paths) == 1 else _common_folder(paths)
+    if contacts == "geometric":
+        return Series(name, grains, options=options)
+    if contacts in ("auto", "file"):
+        found = tuple(family for family in families if family.kind == "contacts")
+        if contacts == "file" and not found:
+            raise ReadError(f"{name}: --contacts file was asked for, but there is no contact file")
+        return Series(name, grains, found, contacts == "file", options)
+    return Series(name, grains, _named_contacts(contacts, format), True, options)
+
+
+def open_sources(sources: Sequence[PathLike], **options: Any) -> list[Series]:
+    """
+    The series of a command line: one for each folder, and one for all single files together.
+
+    Parameters
+    ----------
+    sources : sequence of paths
+        Folders and files.
+    **options
+        See :func:`read_series`.
+    """
+    folders = [source for source in sources if Path(source).is_dir()]
+    files = [source for source in sources if not Path(source).is_dir()]
+    series = [read_series(folder, **options) for folder in folders]
+    if files:
+        series.append(read_series(files if len(files) > 1 else files[0], **options))
+    return series
+
+
+def _files(path: Path) -> list[Path]:
+    if path.is_dir():
+        found = sorted(file for file in path.iterdir() if file.is_file())
+        files = [file for file in found if not file.name.startswith(".")]
+        if not files:
+            raise ReadError(f"{path}: the folder holds no files")
+        return files
+    if not path.exists():
+        raise ReadError(f"{path}: there is no such file or folder")
+    return [path]
+
+
+def _grain_family(paths: list[Path], families: list[Family]) -> Family:
+    """The one family of grain files."""
+    grains = [family for family in families if family.kind == "grains"]
+    grains = grains or [family for family in families if family.kind == "points"]
+    where = ", ".join(str(path) for path in paths[:3]) + (", ..." if len(paths) > 3 else "")
+    if len(grains) > 1:
+        raise ReadError(
+            f"{where}: several series of grains: choose one of\n  "
+            + "\n  ".join(family.pattern for family in grains)
+        )
+    if not grains:
+        known = [family for family in families if family.reader is not None]
+        if not known:
+            raise UnknownFormatError(
+                f"{where}: no reader knows the format; scanfab formats lists those that exist"
+            )
+        raise ReadError(
+            f"{where}: no grains: expected points with a radius, found only "
+            + ", ".join(f"{family.pattern} ({family.kind})" for family in known)
+        )
+    return grains[0]
+
+
+def _note_passed_over(families: list[Family]) -> None:
+    unknown = [family.pattern for family in families if family.reader is None]
+    if unknown:
+        names = ", ".join(Path(pattern).name for pattern in unknown[:5])
+        more = f" and {len(unknown) - 5} more" if len(unknown) > 5 else ""
+        warnings.warn(
+            f"passed over, no reader knows them: {names}{more}", ScanfabWarning, stacklevel=3
+        )
+
+
+def _named_contacts(contacts: PathLike, format: str | None) -> tuple[Family, ...]:
+    """Contact files from --contacts PATH: a file, a folder or a glob."""
+    path = Path(contacts)
+    files = (
+        _files(path)
+        if path.exists()
+        else [Path(match) for match in sorted(glob.glob(str(contacts)))]
+    )
+    if not files:
+        raise ReadError(f"{contacts}: there is no such contact file, folder or glob")
+    families = sort_into_families(files, format)
+    found = tuple(family for family in families if family.kind == "contacts")
+    if not found:
+        raise ReadError(f"{contacts}: expected contacts, found none")
+    return found
+
+
+def _same_step(
+    family: Family, name_step: int | None, grains: Snapshot, only: bool
+) -> Snapshot | None:
+    """
+    The contacts of a grain snapshot in a family of contact files; None if there are none.
+
+    Steps inside the files decide; where a file has none, the number in its name does. A single
+    contact file beside a single grain file needs neither.
+    """
+    path = family.files.get(name_step)
+    alone = len(family.files) == 1
+    if path is None and alone:
+        path = next(iter(family.files.values()))
+    if path is None:
+        return None
+    assert family.reader is not None
+    snapshots = family.reader.snapshots(path)
+    if len(snapshots) == 1 and (snapshots[0].step is None or grains.step is None):
+        matches = name_step in family.files or (alone and only)
+        return snapshots[0] if matches else None
+    return next((one for one in snapshots if one.step == grains.step), None)
+
+
+def _wall_contacts(grains: GrainTable, joined: list[JoinedContacts]) -> Any:
+    return sum((part.wall_contacts for part in joined), np.zeros(len(grains.radius), np.int64))
+
+
+def _common_folder(paths: list[Path]) -> str:
+    return os.path.commonpath([str(path.parent) for path in paths]) or "."

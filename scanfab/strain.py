@@ -1,0 +1,101 @@
+"""Axial strain of a frame: 1 - L/L0 along the loading axis, positive in compression."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+
+from scanfab.errors import ReadError, SettingsError
+from scanfab.variants import Sample
+
+__all__ = ["StrainFile", "axial_length"]
+
+Vector = tuple[float, float, float]
+
+
+def axial_length(sample: Sample, mode: str, axis: Vector) -> float | None:
+    """
+    The length L whose change is the axial strain.
+
+    Parameters
+    ----------
+    sample : Sample
+        One frame.
+    mode : str
+        ``cell``: the diagonal entry of the cell along the axis; ``boundary`` and ``grains``: the
+        extent of those particles' centres; ``auto``: the cell if it is periodic along the axis,
+        else the boundary if there is one, else none.
+    axis : three floats
+        Unit vector.
+
+    Returns
+    -------
+    float or None
+        In the dump's length unit; None where ``auto`` finds nothing to measure.
+
+    Raises
+    ------
+    SettingsError
+        If what the mode measures does not exist.
+    """
+    cell = sample.packing.cell
+    along = int(np.argmax(np.abs(axis)))
+    on_axis = abs(axis[along]) > 1 - 1e-12
+    if mode == "auto":
+        if cell is not None and on_axis and cell.periodic[along]:
+            mode = "cell"
+        elif sample.boundary.any():
+            mode = "boundary"
+        else:
+            return None
+    if mode == "cell":
+        if cell is None or not on_axis:
+            what = "the dump has no cell" if cell is None else "the axis is not x, y or z"
+            raise SettingsError(f"strain: cell was asked for, but {what}")
+        return float(cell.vectors[along, along])
+    chosen = sample.boundary if mode == "boundary" else sample.grains
+    if not chosen.any():
+        raise SettingsError(
+            f"strain: {mode} was asked for, but the frame has none"
+            + (": name them with --boundary" if mode == "boundary" else "")
+        )
+    return float(np.ptp(sample.packing.position[chosen] @ np.array(axis)))
+
+
+class StrainFile:
+    """
+    Strains from a CSV file with the columns ``step`` or ``frame``, and ``strain``.
+
+    Raises
+    ------
+    ReadError
+        If a column is missing or a value is no number.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        with open(path, newline="", encoding="utf-8-sig") as stream:
+            rows = csv.DictReader(stream)
+            names = [name.strip() for name in rows.fieldnames or []]
+            self.key = "step" if "step" in names else "frame"
+            if self.key not in names or "strain" not in names:
+                raise ReadError(
+                    f"{path}: expected the columns step or frame, and strain; found {names}"
+                )
+            self.strain: dict[int, float] = {}
+            for row in rows:
+                clean = {(name or "").strip(): value for name, value in row.items()}
+                try:
+                    self.strain[int(float(clean[self.key]))] = float(clean["strain"])
+                except (TypeError, ValueError):
+                    raise ReadError(
+                        f"{path}, line {rows.line_num}: expected numbers as {self.key} and "
+                        f"strain, found {clean[self.key]!r} and {clean['strain']!r}"
+                    ) from None
+
+    def at(self, frame: int, step: int | None) -> float | None:
+        """The strain of a frame; None if the file does not name it."""
+        number = step if self.key == "step" else frame
+        return None if number is None else self.strain.get(number)

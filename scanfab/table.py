@@ -1,0 +1,101 @@
+"""The fabric table: one row for each frame and variant, with the columns that scripts rely on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, overload
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["COLUMNS", "Row", "Table"]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Row:
+    """One frame and variant; None is a value that does not exist. Lengths in the dump's unit."""
+
+    source: str
+    frame: int
+    step: int | None
+    time: float | None
+    strain: float | None
+    variant: str
+    grains: int
+    rattlers: int
+    contacts: int
+    contacts_from: str
+    coordination: float | None
+    solid_fraction: float | None
+    directions: int
+    replicates: int
+    lines: int
+    segments: int
+    spacing: float | None
+    cutoff: float | None
+    mean_length: float | None
+    gvs_xx: float | None
+    gvs_yy: float | None
+    gvs_zz: float | None
+    gvs_xy: float | None
+    gvs_xz: float | None
+    gvs_yz: float | None
+    alpha_vs: float | None
+    alpha_vs_axial: float | None
+    alpha_vs_axial_se: float | None
+    gc_xx: float | None
+    gc_yy: float | None
+    gc_zz: float | None
+    gc_xy: float | None
+    gc_xz: float | None
+    gc_yz: float | None
+    alpha_c: float | None
+    alpha_c_axial: float | None
+    alpha_c_axial_se: float | None
+
+
+COLUMNS: tuple[str, ...] = tuple(field.name for field in fields(Row))
+
+
+class Table(Sequence[Row]):
+    """
+    The rows of a computation.
+
+    ``table["alpha_vs"]`` is a column as an array (missing numbers are NaN), ``table[0]`` a row.
+    """
+
+    def __init__(self, rows: Iterable[Row]) -> None:
+        self.rows = tuple(rows)
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __iter__(self) -> Iterator[Row]:
+        return iter(self.rows)
+
+    @overload
+    def __getitem__(self, key: int) -> Row: ...
+    @overload
+    def __getitem__(self, key: slice) -> Table: ...
+    @overload
+    def __getitem__(self, key: str) -> npt.NDArray[Any]: ...
+    def __getitem__(self, key: int | slice | str) -> Row | Table | npt.NDArray[Any]:
+        if isinstance(key, str):
+            if key not in COLUMNS:
+                raise KeyError(f"no column {key!r}; the columns are {', '.join(COLUMNS)}")
+            values = [getattr(row, key) for row in self.rows]
+            text = any(isinstance(value, str) for value in values)
+            return np.array(values if text else [np.nan if v is None else v for v in values])
+        return Table(self.rows[key]) if isinstance(key, slice) else self.rows[key]
+
+    def select(self, **wanted: Any) -> Table:
+        """The rows whose columns have the given values, for instance ``variant="a"``."""
+        return Table(
+            row
+            for row in self.rows
+            if all(getattr(row, name) == value for name, value in wanted.items())
+        )
+
+    def __repr__(self) -> str:
+        return f"Table({len(self)} rows)"

@@ -1,0 +1,112 @@
+"""
+The four variants of the 2017 paper, and what belongs to each: solids, contacts, counted grains.
+
+a: whole sample; b: whole, rattlers are void; c: RV; d: RV, rattlers are void.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.packing import Contacts, Packing
+from scanfab.window import SphereWindow
+
+__all__ = ["VARIANTS", "Sample", "Variant"]
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One of the four choices."""
+
+    name: str
+    in_window: bool
+    """Only what lies in the RV."""
+    without_rattlers: bool
+    """Rattlers are void, and their contacts do not count."""
+
+
+VARIANTS = {
+    "a": Variant("a", in_window=False, without_rattlers=False),
+    "b": Variant("b", in_window=False, without_rattlers=True),
+    "c": Variant("c", in_window=True, without_rattlers=False),
+    "d": Variant("d", in_window=True, without_rattlers=True),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """A packing whose particles are told apart: boundary, grains, rattlers."""
+
+    packing: Packing
+    boundary: BoolArray
+    """Shape (N,)."""
+    min_contacts: int = 2
+    """A grain with fewer contacts is a rattler."""
+
+    @property
+    def contacts(self) -> Contacts:
+        """The contacts of the packing, which must be known."""
+        assert self.packing.contacts is not None
+        return self.packing.contacts
+
+    @property
+    def grains(self) -> BoolArray:
+        """Particles that are not boundary, shape (N,)."""
+        return ~self.boundary
+
+    @cached_property
+    def rattlers(self) -> BoolArray:
+        """
+        Grains with fewer than ``min_contacts`` contacts, shape (N,).
+
+        One pass, no repetition; contacts with boundary particles and walls count.
+        """
+        everything = np.ones(len(self.contacts), dtype=bool)
+        return self.grains & (self.contact_numbers(everything) < self.min_contacts)
+
+    def contact_numbers(self, chosen: BoolArray) -> IntArray:
+        """Number of the chosen contacts and of the wall contacts of each particle, shape (N,)."""
+        ends = self.contacts.pairs[chosen].ravel()
+        return np.bincount(ends, minlength=len(self.packing)) + self.packing.wall_contacts
+
+    def removed(self, variant: Variant) -> BoolArray:
+        """Grains that the variant leaves out, shape (N,)."""
+        return self.rattlers if variant.without_rattlers else np.zeros(len(self.packing), bool)
+
+    def counted(self, variant: Variant, window: SphereWindow | None) -> BoolArray:
+        """Grains whose centre lies in the variant's window, rattlers included, shape (N,)."""
+        if not variant.in_window:
+            return self.grains
+        assert window is not None
+        return self.grains & window.contains(self.packing.position, self.packing)
+
+    def normals(self, variant: Variant, window: SphereWindow | None) -> FloatArray:
+        """Normals of the grain-grain contacts that enter the variant's contact fabric, (M, 3)."""
+        contacts = self.contacts
+        outside = self.boundary | self.removed(variant)
+        chosen = ~outside[contacts.pairs].any(axis=1)
+        if variant.in_window:
+            assert window is not None
+            chosen &= window.contains(contacts.point, self.packing)
+        return contacts.normal[chosen]
+
+    def coordination(self, variant: Variant, window: SphereWindow | None) -> float | None:
+        """
+        Mean number of contacts of the variant's grains, boundary's included.
+
+        Contacts with removed grains are left out. None if there is no grain.
+        """
+        removed = self.removed(variant)
+        counted = self.counted(variant, window) & ~removed
+        if not counted.any():
+            return None
+        chosen = np.asarray(~removed[self.contacts.pairs].any(axis=1))
+        return float(self.contact_numbers(chosen)[counted].mean())

@@ -1,0 +1,81 @@
+"""The sphere RV (representative volume): what lies in it, of lines, grains and contacts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.errors import SettingsError
+from scanfab.packing import Packing
+
+__all__ = ["SphereWindow", "default_center", "smallest_extent"]
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class SphereWindow:
+    """A sphere RV, fixed for a series; lengths in the dump's unit."""
+
+    center: FloatArray
+    """Shape (3,)."""
+    radius: float
+
+    def contains(self, points: FloatArray, packing: Packing) -> BoolArray:
+        """Which points (shape (N, 3)) lie in the window, through periodic faces too."""
+        return np.asarray(self.distance(points, packing) < self.radius)
+
+    def distance(self, points: FloatArray, packing: Packing) -> FloatArray:
+        """Distance of points from the centre, nearest image, shape (N,)."""
+        branch = points - self.center
+        if packing.cell is not None and packing.is_periodic:
+            branch = branch + packing.cell.nearest_image(branch) @ packing.cell.vectors
+        distance: FloatArray = np.linalg.norm(branch, axis=1)
+        return distance
+
+    def check_inside(self, packing: Packing) -> None:
+        """
+        Make sure that the window lies inside the periodic cell.
+
+        Raises
+        ------
+        SettingsError
+            If it reaches through a periodic face.
+        """
+        if packing.cell is None or not packing.is_periodic:
+            return
+        reach = self.radius / packing.cell.heights
+        center = packing.cell.fractional(self.center)
+        outside = (center < reach) | (center > 1.0 - reach)
+        if np.any(outside & np.array(packing.cell.periodic)):
+            raise SettingsError(
+                f"the RV (radius {self.radius:g} about {np.round(self.center, 9).tolist()}) "
+                f"reaches through a periodic face of the cell: "
+                f"choose a smaller --rv or another --rv-center"
+            )
+
+
+def smallest_extent(packing: Packing, grains: BoolArray) -> float:
+    """The smallest extent of the grains' surfaces (of the cell, along its periodic vectors)."""
+    low, high = _surface_box(packing, grains)
+    extent = high - low
+    if packing.cell is not None:
+        extent = np.where(packing.cell.periodic, packing.cell.heights, extent)
+    return float(extent.min())
+
+
+def default_center(packing: Packing, grains: BoolArray) -> FloatArray:
+    """The middle of the box of the grains' surfaces (of the cell, along its periodic vectors)."""
+    low, high = _surface_box(packing, grains)
+    middle: FloatArray = 0.5 * (low + high)
+    if packing.cell is not None:
+        middle = np.where(packing.cell.periodic, packing.cell.center, middle)
+    return middle
+
+
+def _surface_box(packing: Packing, grains: BoolArray) -> tuple[FloatArray, FloatArray]:
+    position, radius = packing.position[grains], packing.radius[grains, None]
+    return (position - radius).min(axis=0), (position + radius).max(axis=0)
