@@ -70,10 +70,11 @@ def _missing_work(sums: ScanSums, rule: DirectionRule, settings: Settings) -> fl
     """By what factor the lines must grow for every variant to meet the tolerance; <= 1: done."""
     factor = 0.0
     for variant in settings.variants:
-        fabric = void_fabric(sums, rule.weights, variant)
+        length, segments = sums.kept(variant)
+        fabric = void_fabric(sums.axes, rule.weights, length, segments)
         if fabric is None:
             # nothing kept in some direction: no use going on for ever
-            found = sums.segments[:, "abcd".index(variant)].sum() > 0 and sums.replicates < 256
+            found = segments.sum() > 0 and sums.replicates < 256
             factor = max(factor, GROWTH if found else 0.0)
         elif (error := fabric.axial_error(settings.axis)) is not None:
             factor = max(factor, (error / settings.tolerance) ** 2)

@@ -237,7 +237,7 @@ def _scan_columns(
     }
     if sums is not None and plan is not None:
         which = "abcd".index(variant)
-        fabric = void_fabric(sums, weights, variant)
+        fabric = void_fabric(sums.axes, weights, *sums.kept(variant))
         _warn_of_few_segments(fabric, sums, variant, plan, number)
         columns = {
             "solid_fraction": _solid_fraction(sums, weights, which),

@@ -69,6 +69,11 @@ class ScanSums:
         """Number of replicates R."""
         return len(self.axes)
 
+    def kept(self, variant: str) -> tuple[FloatArray, IntArray]:
+        """Lengths and numbers of one variant's kept segments, shapes (R, D)."""
+        which = "abcd".index(variant)
+        return self.length[:, which], self.segments[:, which]
+
     @classmethod
     def concatenate(cls, parts: Iterable[ScanSums]) -> ScanSums:
         """All replicates of several scans."""

@@ -9,7 +9,7 @@ from typing import Any, overload
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["COLUMNS", "Row", "Table"]
+__all__ = ["COLUMNS", "MEANINGS", "Row", "Table"]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -56,6 +56,47 @@ class Row:
 
 
 COLUMNS: tuple[str, ...] = tuple(field.name for field in fields(Row))
+
+MEANINGS: dict[str, str] = {
+    "source": "the series as given: folder, file, or the files' common folder",
+    "frame": "index in the series, from 0",
+    "step": "of the dump",
+    "time": "of the dump",
+    "strain": "axial strain 1 - L/L0 along the loading axis, positive in compression",
+    "variant": "a whole sample, b without rattlers, c RV, d RV without rattlers",
+    "grains": "solid in this variant, centre in the window",
+    "rattlers": "grains with too few contacts, centre in the window",
+    "contacts": "contacts between grains that enter gc_*",
+    "contacts_from": "file or geometric",
+    "coordination": "mean number of contacts of the grains counted in grains, boundary's included",
+    "solid_fraction": "of this variant's solids in the RV, by the scan; empty for the whole",
+    "directions": "axes of the direction rule, in each replicate",
+    "replicates": "number of replicates",
+    "lines": "scan lines that meet the window (for the whole: any solid)",
+    "segments": "void segments kept",
+    "spacing": "distance between neighbouring lines of one direction, all replicates together",
+    "cutoff": "shortest void segment kept",
+    "mean_length": "mean length of the kept segments, Σ w·sum / Σ w·count",
+    "gvs_xx": "void fabric tensor, trace 1",
+    "gvs_yy": "likewise",
+    "gvs_zz": "likewise",
+    "gvs_xy": "likewise",
+    "gvs_xz": "likewise",
+    "gvs_yz": "likewise",
+    "alpha_vs": "largest minus smallest principal value of the void fabric",
+    "alpha_vs_axial": "signed anisotropy of the void fabric along the loading axis",
+    "alpha_vs_axial_se": "its standard error from the scan, by the scatter of the replicates",
+    "gc_xx": "contact fabric tensor, trace 1",
+    "gc_yy": "likewise",
+    "gc_zz": "likewise",
+    "gc_xy": "likewise",
+    "gc_xz": "likewise",
+    "gc_yz": "likewise",
+    "alpha_c": "largest minus smallest principal value of the contact fabric",
+    "alpha_c_axial": "signed anisotropy of the contact fabric along the loading axis",
+    "alpha_c_axial_se": "its standard error if contacts were independent",
+}
+"""What each column holds; lengths are in the dump's unit."""
 
 
 class Table(Sequence[Row]):

@@ -14,11 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.fabric.tensor import FabricTensor, axial
-from scanfab.scan import ScanSums
 
 __all__ = ["VoidFabric", "void_fabric"]
 
 FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,29 +46,39 @@ class VoidFabric:
         return float(np.std(axial(self.replicates, axis), ddof=1) / np.sqrt(count))
 
 
-def void_fabric(sums: ScanSums, weights: FloatArray, variant: str) -> VoidFabric | None:
+def void_fabric(
+    axes: FloatArray, weights: FloatArray, length: FloatArray, segments: IntArray
+) -> VoidFabric | None:
     """
-    The void fabric of one variant of a scan.
+    The void fabric from the sums of a scan.
 
     In each replicate ℓ(n) is the length of an axis' kept segments divided by their number, over
     all lines of the axis together: a mean of per-line means invents anisotropy.
 
     Parameters
     ----------
-    sums : ScanSums
-        Of all replicates.
+    axes : ndarray, shape (R, D, 3)
+        Unit vectors of each replicate.
     weights : ndarray, shape (D,)
         The direction rule's weights.
-    variant : str
-        One of a, b, c, d.
+    length : ndarray, shape (R, D)
+        Sum of the lengths of the kept segments, dump's length unit.
+    segments : ndarray of int, shape (R, D)
+        Number of the kept segments.
 
     Returns
     -------
     VoidFabric or None
         None if some axis keeps no segment in all replicates together.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab import void_fabric
+    >>> ones = np.ones((1, 3))
+    >>> void_fabric(np.eye(3)[None], np.ones(3) / 3, ones * [1, 1, 2], ones).tensor.matrix[2, 2]
+    np.float64(0.5)
     """
-    which = "abcd".index(variant)
-    length, segments = sums.length[:, which], sums.segments[:, which]
     total_length, total_segments = length.sum(axis=0), segments.sum(axis=0)
     if np.any(total_segments == 0):
         return None
@@ -76,7 +86,7 @@ def void_fabric(sums: ScanSums, weights: FloatArray, variant: str) -> VoidFabric
     # an axis that kept nothing in one replicate takes its mean over the others
     mean = np.where(empty, total_length / total_segments, length / np.where(empty, 1, segments))
     weighted = weights * mean
-    tensors = np.einsum("rd,rdi,rdj->rij", weighted, sums.axes, sums.axes)
+    tensors = np.einsum("rd,rdi,rdj->rij", weighted, axes, axes)
     tensors /= weighted.sum(axis=1)[:, None, None]
     return VoidFabric(
         tensor=FabricTensor(tensors.mean(axis=0)),

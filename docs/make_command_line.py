@@ -1,0 +1,53 @@
+"""Write docs/command-line.md from the code: the help of every command, and the columns."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from scanfab.cli.main import COMMANDS, cli
+from scanfab.table import COLUMNS, MEANINGS
+
+PAGE = Path(__file__).parent / "command-line.md"
+
+INTRODUCTION = """\
+# The command line
+
+This page is written by `python docs/make_command_line.py` from the code.
+
+A source is a folder with one series of dumps, or the files of one series. Results go to standard
+output, everything else to standard error. Exit codes: 0 done; 1 a failure, or no row has a void
+fabric; 2 wrong usage; 130 interrupted. With `-o FILE` the rows go to `FILE.part`, which becomes
+`FILE` at the end: `FILE` is complete or untouched.
+
+Lengths are in the dump's own units; nothing is converted. `rmin`, `rmean` and `rmax` are the
+smallest, mean and largest radius of the grains without the boundary, in the series' first frame that
+has grains.
+"""
+
+
+def help_of(name: str) -> str:
+    """The help of one command, as a terminal of 100 columns shows it."""
+    parent = click.Context(cli, info_name="scanfab")
+    command = cli.get_command(parent, name)
+    assert command is not None
+    context = click.Context(
+        command, info_name=name, parent=parent, terminal_width=100, max_content_width=100
+    )
+    return command.get_help(context)
+
+
+def page() -> str:
+    """The whole page."""
+    helps = [f"## scanfab {name}\n\n```text\n{help_of(name)}\n```\n" for name in COMMANDS]
+    rows = "\n".join(f"| `{name}` | {MEANINGS[name]} |" for name in COLUMNS)
+    columns = (
+        "## Columns of the table\n\nA value that does not exist is an empty cell.\n\n"
+        f"| column | what it holds |\n|---|---|\n{rows}\n"
+    )
+    return "\n".join([INTRODUCTION, *helps, columns])
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
