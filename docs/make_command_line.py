@@ -22,8 +22,8 @@ fabric; 2 wrong usage; 130 interrupted. With `-o FILE` the rows go to `FILE.part
 `FILE` at the end: `FILE` is complete or untouched.
 
 Lengths are in the dump's own units; nothing is converted. `rmin`, `rmean` and `rmax` are the
-smallest, mean and largest radius of the grains without the boundary, in the series' first frame that
-has grains.
+smallest, mean and largest radius of the grains, without the boundary, in the first frame of the
+series that has grains.
 """
 
 

@@ -95,9 +95,9 @@ def line_frames(axes: FloatArray) -> FloatArray:
     >>> import numpy as np
     >>> from scanfab.scan import line_frames
     >>> line_frames(np.array([[0.0, 0.0, 1.0]]))[0]
-    array([[ 1.,  0.,  0.],
-           [-0.,  1.,  0.],
-           [ 0.,  0.,  1.]])
+    array([[1., 0., 0.],
+           [0., 1., 0.],
+           [0., 0., 1.]])
     """
     helper = np.eye(3)[np.argmin(np.abs(axes), axis=1)]
     u = helper - np.sum(helper * axes, axis=1, keepdims=True) * axes

@@ -1,0 +1,147 @@
+"""Slow, obvious twins of every kernel and formula: what the fast ones must equal."""
+
+from itertools import product
+from math import ceil, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Gaps(NamedTuple):
+    """The void segments on all lines of one grid, in the whole sample and in the window."""
+
+    whole: list[float]
+    whole_lines: int
+    window: list[float]
+    window_lines: int
+    window_line_length: float
+
+
+class Tally(NamedTuple):
+    """What a scan adds up, in the order of the kernel's tally."""
+
+    whole_length: float
+    whole_kept: int
+    whole_lines: int
+    window_length: float
+    window_kept: int
+    window_lines: int
+    window_void: float
+    window_line_length: float
+
+
+def chords(position, radius, point, direction):
+    """Where the line through a point meets the spheres: list of (entry, exit) along it."""
+    relative = position - point
+    depth = relative @ direction
+    across = relative - np.outer(depth, direction)
+    half2 = radius**2 - np.sum(across**2, axis=1)
+    half = np.sqrt(np.maximum(half2, 0.0))
+    hit = half2 > 0
+    return list(zip((depth - half)[hit].tolist(), (depth + half)[hit].tolist(), strict=True))
+
+
+def union(intervals):
+    """Intervals merged where they overlap or touch, in order."""
+    merged = []
+    for start, end in sorted(intervals):
+        if merged and start <= merged[-1][1]:
+            merged[-1] = (merged[-1][0], max(merged[-1][1], end))
+        else:
+            merged.append((start, end))
+    return merged
+
+
+def gaps_between(solids):
+    """Lengths between neighbouring solids of a union."""
+    return [after[0] - before[1] for before, after in zip(solids, solids[1:], strict=False)]
+
+
+def gaps_within(solids, low, high):
+    """Lengths of what a union leaves free between two ends, which act as solids."""
+    inside = [(start, end) for start, end in solids if end > low and start < high]
+    walls = [(low, low), *((max(s, low), min(e, high)) for s, e in inside), (high, high)]
+    return [length for length in gaps_between(walls) if length > 0]
+
+
+def scan(position, radius, frame, offset, spacing, window_radius):
+    """All gaps on the square grid of lines along the third row of a frame (rows u, v, n)."""
+    u, v, direction = frame
+    surfaces = np.linalg.norm(position, axis=1) + radius
+    number = ceil(max([window_radius, *surfaces]) / spacing) + 1
+    whole, whole_lines, window, window_lines, line_length = [], 0, [], 0, 0.0
+    for i, j in product(range(-number, number + 1), repeat=2):
+        x, y = (i + offset[0]) * spacing, (j + offset[1]) * spacing
+        solids = union(chords(position, radius, x * u + y * v, direction))
+        whole += gaps_between(solids)
+        whole_lines += bool(solids)
+        if x * x + y * y < window_radius**2:
+            half = sqrt(window_radius**2 - x * x - y * y)
+            window += gaps_within(solids, -half, half)
+            window_lines += 1
+            line_length += 2 * half
+    return Gaps(whole, whole_lines, window, window_lines, line_length)
+
+
+def tally(gaps, cutoff):
+    """Sums and numbers of the gaps that are not shorter than the cut-off."""
+    whole = [length for length in gaps.whole if length >= cutoff]
+    window = [length for length in gaps.window if length >= cutoff]
+    return Tally(
+        sum(whole),
+        len(whole),
+        gaps.whole_lines,
+        sum(window),
+        len(window),
+        gaps.window_lines,
+        sum(gaps.window),
+        gaps.window_line_length,
+    )
+
+
+def contacts(position, radius, tolerance=0.0, edges=None, periodic=(True, True, True)):
+    """
+    Contacts by geometry, of all pairs with all images: a set of (first, second, image).
+
+    Each contact once, named from its lower row; one with an own image by the image whose first
+    shift is positive. ``edges`` are those of an orthogonal cell.
+    """
+    reach = 2 * max(radius, default=0.0) * (1 + tolerance)
+    edges = np.full(3, np.inf) if edges is None else np.where(periodic, edges, np.inf)
+    layers = [range(-n, n + 1) for n in (int(ceil(reach / edge)) + 1 for edge in edges)]
+    shifts = [s for s in product(*layers) if not any(np.isinf(edges[np.nonzero(s)]))]
+    found = set()
+    for i, j in product(range(len(position)), repeat=2):
+        for shift in shifts:
+            if i > j or (i == j and shift <= (0, 0, 0)):
+                continue
+            moved = position[j] + np.where(np.isinf(edges), 0.0, np.nan_to_num(edges) * shift)
+            distance = np.linalg.norm(moved - position[i])
+            if distance < (radius[i] + radius[j]) * (1 + tolerance):
+                found.add((i, j, shift))
+    return found
+
+
+def void_tensor(axes, weights, mean_lengths):
+    """G_vs of one replicate: Σ w ℓ n⊗n / Σ w ℓ, written out."""
+    tensor, total = np.zeros((3, 3)), 0.0
+    for axis, weight, length in zip(axes, weights, mean_lengths, strict=True):
+        total += weight * length
+        for i, j in product(range(3), repeat=2):
+            tensor[i, j] += weight * length * axis[i] * axis[j]
+    return tensor / total
+
+
+def contact_tensor(normals):
+    """G_c: the mean of n⊗n, written out."""
+    tensor = np.zeros((3, 3))
+    for normal in normals:
+        for i, j in product(range(3), repeat=2):
+            tensor[i, j] += normal[i] * normal[j] / len(normals)
+    return tensor
+
+
+def axial(tensor, axis):
+    """a·G·a - (1 - a·G·a)/2, written out."""
+    along = sum(axis[i] * tensor[i][j] * axis[j] for i, j in product(range(3), repeat=2))
+    return along - (1 - along) / 2

@@ -1,0 +1,66 @@
+"""Scans for tests: along given axes, with random shifts of the lines, as estimates with errors."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scanfab.directions import direction_rule
+from scanfab.fabric.void import void_fabric
+from scanfab.scan import ScanSums, Solids, _scan_frames, line_frames, scan_lines
+
+Z = np.array([[0.0, 0.0, 1.0]])
+
+
+class Estimate(NamedTuple):
+    """Values and their standard errors, from the scatter of independent samples."""
+
+    value: np.ndarray
+    error: np.ndarray
+
+    def agrees(self, expected, within=1e-3):
+        """Within 4 standard errors, and within a fraction of the expected value."""
+        off = np.abs(self.value - expected)
+        return np.all(off < 4 * self.error) and np.all(off < within * np.abs(expected))
+
+
+def solids_of(spheres, window_radius=0.0, removed=None):
+    """Spheres about the window's centre, as a scan takes them."""
+    none = np.zeros(len(spheres.radius), bool)
+    return Solids(
+        spheres.position, spheres.radius, none if removed is None else removed, window_radius
+    )
+
+
+def scan_along(solids, axes, spacing, cutoff=0.0, replicates=16, seed=0):
+    """Scan along the same axes in every replicate: only the lines are shifted."""
+    random = np.random.default_rng(seed)
+    frames = line_frames(np.asarray(axes, dtype=float))
+    return ScanSums.concatenate(
+        _scan_frames(solids, frames, random.random((len(frames), 2)), spacing, cutoff, "abcd")
+        for _ in range(replicates)
+    )
+
+
+def ratio(length, segments):
+    """Σ length / Σ segments over the samples (first axis), error by the delta method."""
+    value = length.sum(axis=0) / segments.sum(axis=0)
+    residual = (length - value * segments) / segments.mean(axis=0)
+    return Estimate(value, residual.std(axis=0, ddof=1) / np.sqrt(len(length)))
+
+
+def mean_lengths(sums, variant):
+    """ℓ(n) of each axis of :func:`scan_along`."""
+    return ratio(*sums.kept(variant))
+
+
+def fabric(solids, rule="design:9", variant="c", **options):
+    """The void fabric of a scan with turned directions."""
+    rule = direction_rule(rule)
+    sums = scan_lines(solids, rule, variants=variant, **options)
+    return void_fabric(sums.axes, rule.weights, *sums.kept(variant))
+
+
+def isotropic(result, within=1e-3):
+    """Whether a void fabric is I/3 within 4 standard errors, and absolutely."""
+    error = result.replicates.std(axis=0, ddof=1) / np.sqrt(len(result.replicates))
+    off = np.abs(result.tensor.matrix - np.eye(3) / 3)
+    return bool(np.all(off < 4 * error + 1e-15) and np.all(off < within))

@@ -1,0 +1,135 @@
+"""The documentation is complete and true: names, generated pages, examples, links."""
+
+from __future__ import annotations
+
+import doctest
+import importlib.util
+import inspect
+import pkgutil
+import re
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+import click
+import pytest
+
+import scanfab
+from scanfab.cli.main import COMMANDS, cli
+from scanfab.directions import RULES
+from scanfab.readers.registry import installed_readers
+from scanfab.table import COLUMNS, MEANINGS
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md"))]
+MODULES = [
+    name
+    for _, name, _ in pkgutil.walk_packages(scanfab.__path__, "scanfab.")
+    if not name.startswith("scanfab.cli.")
+]
+
+
+def page_maker() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("maker", DOCS / "make_command_line.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_the_command_line_page_is_fresh() -> None:
+    assert (DOCS / "command-line.md").read_text(encoding="utf-8") == page_maker().page(), (
+        "run python docs/make_command_line.py"
+    )
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_option_is_documented(name: str) -> None:
+    text = (DOCS / "command-line.md").read_text(encoding="utf-8")
+    command = cli.get_command(click.Context(cli), name)
+    assert command is not None
+    for parameter in command.params:
+        for option in parameter.opts:
+            assert not option.startswith("-") or option in text
+
+
+def test_every_column_has_a_meaning() -> None:
+    assert tuple(MEANINGS) == COLUMNS
+
+
+def test_every_reader_has_a_section() -> None:
+    text = (DOCS / "formats.md").read_text(encoding="utf-8")
+    for name in installed_readers():
+        assert f"## {name}\n" in text
+
+
+def test_every_direction_rule_is_on_the_method_page() -> None:
+    text = (DOCS / "method.md").read_text(encoding="utf-8")
+    for name, (_, argument) in RULES.items():
+        assert f"`{name}:{argument}`" in text
+
+
+def test_every_module_is_on_the_architecture_page() -> None:
+    text = (DOCS / "architecture.md").read_text(encoding="utf-8")
+    for path in (ROOT / "scanfab").rglob("*.py"):
+        if path.name != "__init__.py":
+            assert f"{path.stem}.py" in text, path
+
+
+def test_every_dependency_is_justified() -> None:
+    project = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    listed = re.search(r"\ndependencies = \[(.*?)\]", project, re.DOTALL)
+    assert listed is not None
+    text = (DOCS / "architecture.md").read_text(encoding="utf-8")
+    for name in re.findall(r'"([a-z]+)', listed[1]):
+        assert f"| {name} |" in text
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_examples_in_docstrings_run(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    assert doctest.testmod(import_module(name)).failed == 0
+
+
+@pytest.mark.parametrize("name", [n for n in scanfab.__all__ if n[0].islower()])
+def test_every_public_function_has_an_example(name: str) -> None:
+    if name in ("read_series", "scan_lines"):
+        pytest.skip("shown on the README and by the functions that call it")
+    assert ">>>" in (inspect.getdoc(getattr(scanfab, name)) or "")
+
+
+def python_blocks() -> list[tuple[str, str]]:
+    return [
+        (page.name, block)
+        for page in PAGES
+        for block in re.findall(r"^```python\n(.*?)^```", page.read_text("utf-8"), re.M | re.S)
+    ]
+
+
+@pytest.mark.parametrize(("page", "block"), python_blocks())
+@pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabWarning")
+def test_python_in_the_pages_runs(page: str, block: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    exec(compile(block, page, "exec"), {"__name__": "docs"})
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_between_pages_lead_somewhere(page: Path) -> None:
+    for target in re.findall(r"\]\(([^)#]+)", page.read_text(encoding="utf-8")):
+        if "://" not in target:
+            assert (page.parent / target).exists(), target
+
+
+def test_the_pages_speak_of_options_that_exist() -> None:
+    options = {
+        option
+        for name in COMMANDS
+        for parameter in getattr(cli.get_command(click.Context(cli), name), "params", [])
+        for option in parameter.opts
+    }
+    known = {*options, "--format", "--help", "--version", "--debug"}
+    for page in PAGES:
+        for option in re.findall(r"(?<![\w-])--[a-z][a-z-]+", page.read_text(encoding="utf-8")):
+            assert option in known, f"{page.name}: {option}"

@@ -1,0 +1,74 @@
+"""The answers that stand beside the dumps of sample_data, and what a packing says to compare."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+SAMPLE_DATA = Path(__file__).parent.parent / "sample_data"
+FLOOR = SAMPLE_DATA / "liggghts_formats" / "floor"
+PERIODIC = SAMPLE_DATA / "liggghts_formats" / "periodic"
+YADE = SAMPLE_DATA / "yade_formats"
+TRIAXIAL = SAMPLE_DATA / "yade_triaxial"
+BOX = SAMPLE_DATA / "liggghts_box"
+
+COMPONENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
+
+# rounding of numbers with six digits
+SIX_DIGITS = 5.1e-6
+
+
+def csv_rows(path: Path) -> Any:
+    """A CSV file as an array with named columns."""
+    return np.genfromtxt(path, delimiter=",", names=True, dtype=None, encoding="utf-8")
+
+
+def id_pairs(packing) -> set[tuple[int, int]]:
+    """The contacts of a packing by the grains' ids, the smaller first."""
+    pairs = np.sort(packing.id[packing.contacts.pairs], axis=1)
+    return {(int(one), int(two)) for one, two in pairs}
+
+
+def true_pairs(truth) -> set[tuple[int, int]]:
+    """The contacts of a truth file, the smaller id first."""
+    pairs = np.sort(np.column_stack([truth["id1"], truth["id2"]]), axis=1)
+    return {(int(one), int(two)) for one, two in pairs}
+
+
+def vectors_by_pair(first_id, second_id, vectors) -> dict[tuple[int, int], np.ndarray]:
+    """Vectors that point from the first id to the second, turned to point to the larger id."""
+    return {
+        (min(one, two), max(one, two)): np.asarray(vector if one < two else -vector)
+        for one, two, vector in zip(first_id.tolist(), second_id.tolist(), vectors, strict=True)
+    }
+
+
+def normals_by_pair(packing) -> dict[tuple[int, int], np.ndarray]:
+    """Unit normals, towards the grain with the larger id."""
+    ids = packing.id[packing.contacts.pairs]
+    return vectors_by_pair(ids[:, 0], ids[:, 1], packing.contacts.normal)
+
+
+def forces_by_pair(packing) -> dict[tuple[int, int], np.ndarray]:
+    """Forces on the grain with the larger id."""
+    ids = packing.id[packing.contacts.pairs]
+    return vectors_by_pair(ids[:, 0], ids[:, 1], packing.contacts.force)
+
+
+def assert_same_vectors(found, expected, *, atol: float) -> None:
+    """The same pairs, and vectors that differ by no more than ``atol``."""
+    assert set(found) == set(expected)
+    keys = sorted(expected)
+    np.testing.assert_allclose(
+        [found[key] for key in keys], [expected[key] for key in keys], rtol=0, atol=atol
+    )
+
+
+def off_by(packing, position) -> np.ndarray:
+    """How far the grains are from the given positions, nearest image."""
+    branch = packing.position - position
+    if packing.is_periodic:
+        branch = branch + packing.cell.nearest_image(branch) @ packing.cell.vectors
+    return np.abs(branch)
