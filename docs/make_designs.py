@@ -29,6 +29,19 @@ def sums(angles: np.ndarray, degree: int) -> tuple[np.ndarray, np.ndarray]:
     return np.array(values), np.array(derivatives)
 
 
+def to_axes(angles: np.ndarray) -> np.ndarray:
+    """Unit vectors from the polar angles and the azimuths, one after the other."""
+    theta, phi = angles.reshape(2, -1)
+    flat = np.sin(theta)
+    return np.column_stack([flat * np.cos(phi), flat * np.sin(phi), np.cos(theta)])
+
+
+def to_angles(axes: np.ndarray) -> np.ndarray:
+    """The inverse, with polar angles in [0, pi]."""
+    azimuth = np.arctan2(axes[:, 1], axes[:, 0])
+    return np.concatenate([np.arccos(np.clip(axes[:, 2], -1, 1)), azimuth])
+
+
 def solve(degree: int) -> np.ndarray:
     """The axes of the design of one degree, shape (N, 3)."""
     fewest = -(-(degree * degree + degree + 4) // 4)
@@ -42,14 +55,14 @@ def solve(degree: int) -> np.ndarray:
             jac=lambda a: sums(a, degree)[1],
             max_nfev=200,
         )
-        angles = found.x
-        for _ in range(4):  # the last digits
+        # SciPy's harmonics hold for theta in [0, pi]: an angle that has left it starts again there
+        angles = to_angles(to_axes(found.x))
+        for _ in range(6):  # the last digits
             values, slopes = sums(angles, degree)
             angles = angles - np.linalg.lstsq(slopes, values)[0]
-        if np.abs(sums(angles, degree)[0]).max() < 2e-15:
-            theta, phi = angles.reshape(2, -1)
-            flat = np.sin(theta)
-            return np.column_stack([flat * np.cos(phi), flat * np.sin(phi), np.cos(theta)])
+        axes = to_axes(angles)
+        if np.abs(sums(to_angles(axes), degree)[0]).max() < 2e-15:
+            return axes
     raise RuntimeError(f"no design of degree {degree} found in {STARTS} starts")
 
 
