@@ -57,6 +57,8 @@ class BoundaryRule:
                 raise ValueError
             operator = "=" if match[2] == "==" else match[2]
             ranges = tuple(_range(part) for part in match[3].split(","))
+            if any(low > high for low, high in ranges):
+                raise ValueError
             if operator not in ("=", "!=") and (len(ranges) > 1 or ranges[0][0] != ranges[0][1]):
                 raise ValueError
         except ValueError:
@@ -75,6 +77,8 @@ class BoundaryRule:
         SettingsError
             If there is no such column.
         """
+        if len(packing) == 0:
+            return np.zeros(0, dtype=bool)  # an empty frame may have lost its columns
         values = _column(packing, self.column)
         if self.operator in ("=", "!="):
             within = [(values >= low) & (values <= high) for low, high in self.ranges]
@@ -90,16 +94,11 @@ def select_boundary(packing: Packing, rules: Sequence[BoundaryRule]) -> BoolArra
     Raises
     ------
     SettingsError
-        If a column does not exist, or if no grain is left.
+        If a column does not exist.
     """
     chosen = np.zeros(len(packing), dtype=bool)
     for rule in rules:
         chosen |= rule.select(packing)
-    if len(packing) and chosen.all():
-        raise SettingsError(
-            f"boundary: {' or '.join(rule.text for rule in rules)} selects all "
-            f"{len(packing)} particles: no grain is left"
-        )
     return chosen
 
 
@@ -116,7 +115,7 @@ def enclosing_class(packing: Packing) -> str | None:
     scaled = (packing.position - 0.5 * (low + high)) / np.maximum(high - low, 1e-300)
     distances = np.linalg.norm(scaled, axis=1), np.abs(scaled).max(axis=1)
     for name, values in packing.columns.items():
-        if name.lower() not in CLASS_COLUMNS or values.ndim != 1:
+        if name.lower() not in CLASS_COLUMNS or values.ndim != 1 or values.dtype.kind not in "iuf":
             continue
         classes = np.unique(values)
         if not 2 <= classes.size <= 20:
@@ -141,8 +140,10 @@ def _column(packing: Packing, name: str) -> npt.NDArray[Any]:
         "id": packing.id,
         "radius": packing.radius,
         **dict(zip("xyz", packing.position.T, strict=True)),
-        **{key: values for key, values in packing.columns.items() if values.ndim == 1},
     }
+    for key, values in packing.columns.items():
+        if values.ndim == 1:
+            known.setdefault(key, values)
     if name not in known:
         raise SettingsError(
             f"boundary: there is no column {name!r}; the columns are {', '.join(known)}"

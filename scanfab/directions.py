@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ FloatArray = npt.NDArray[np.float64]
 
 # SciPy's Lebedev rules of these degrees have negative weights: they would amplify noise
 NEGATIVE_LEBEDEV = (13, 25, 27)
+LARGEST_PRODUCT = 999
 LEBEDEV_DEGREES = (*range(3, 32, 2), *range(35, 132, 6))
 
 
@@ -114,10 +116,13 @@ def _at_least(count: int) -> DirectionRule:
             rule = lebedev(degree)
             if len(rule) >= count:
                 return rule
-    degree = 131
-    while len(rule := product(degree)) < count:
-        degree += 2
-    return rule
+    # a product rule of odd degree t has ((t + 1) / 2)(t + 1) / 2 axes
+    degree = 2 * math.ceil(math.sqrt(count)) - 1
+    if degree > LARGEST_PRODUCT:
+        raise SettingsError(
+            f"directions: at most {(LARGEST_PRODUCT + 1) ** 2 // 4} axes, found {count}"
+        )
+    return product(degree)
 
 
 def lebedev(degree: float) -> DirectionRule:
@@ -147,8 +152,10 @@ def design(degree: float) -> DirectionRule:
 
 def product(degree: float) -> DirectionRule:
     """Gauss-Legendre in cos φ times even steps in θ, both exact to the degree."""
-    if not 1 <= degree <= 1000:
-        raise SettingsError(f"directions: product has degrees 1 to 1000, found {degree:g}")
+    if not 1 <= degree <= LARGEST_PRODUCT:
+        raise SettingsError(
+            f"directions: product has degrees 1 to {LARGEST_PRODUCT}, found {degree:g}"
+        )
     degree = int(degree)
     heights, height_weights = np.polynomial.legendre.leggauss(degree // 2 + 1)
     azimuths = degree + 1 + (degree + 1) % 2

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from scanfab.errors import ReadError
+from scanfab.errors import ReadError, UnknownFormatError
 from scanfab.readers.base import FileKind, Reader
 from scanfab.readers.files import bare_name
 from scanfab.readers.registry import reader_for, reader_named
@@ -29,6 +29,16 @@ class Family:
     reader: Reader | None
     """None if no reader knows them."""
     kind: FileKind
+    problem: str | None = None
+    """Why the reader cannot tell what they hold."""
+    clash: str | None = None
+    """What is wrong with their steps."""
+
+    def check(self) -> Family:
+        """The family itself; ReadError if two files are of the same step."""
+        if self.clash is not None:
+            raise ReadError(self.clash)
+        return self
 
 
 def sort_into_families(files: Sequence[Path], format: str | None) -> list[Family]:
@@ -44,8 +54,6 @@ def sort_into_families(files: Sequence[Path], format: str | None) -> list[Family
 
     Raises
     ------
-    ReadError
-        If two files of a family are of the same step.
     UnknownFormatError
         If there is no reader of that name.
     """
@@ -58,8 +66,10 @@ def sort_into_families(files: Sequence[Path], format: str | None) -> list[Family
 
 
 def _numbers(file: Path) -> tuple[int, ...]:
-    # the ending of a name (.mp4, .bz2) is not a number of the frame
-    return tuple(int(number) for number in NUMBER.findall(Path(bare_name(file)).stem))
+    # the ending of a name (.mp4) is not a number of the frame, unless it is nothing else (dump.100)
+    name = Path(bare_name(file))
+    text = name.name if name.suffix[1:].isdigit() else name.stem
+    return tuple(int(number) for number in NUMBER.findall(text))
 
 
 def _split(group: list[Path]) -> list[list[Path]]:
@@ -98,18 +108,26 @@ def _leading(file: Path, group: list[Path]) -> tuple[int, ...]:
 
 
 def _family(members: list[Path], format: str | None) -> Family:
+    sample = max(members, key=lambda file: file.stat().st_size)
+    reader: Reader | None = None
+    kind: FileKind = "other"
+    problem: str | None = None
+    try:
+        reader = reader_for(sample) if format is None else reader_named(format)
+        kind = "other" if reader is None else reader.kind(sample)
+    except UnknownFormatError:
+        raise
+    except ReadError as error:
+        # in a folder one damaged file is passed over; alone it is the error
+        problem = str(error)
     files: dict[int | None, Path] = {}
+    clash: str | None = None
     for file in members:
         step = _step(file, members)
         if step in files:
-            raise ReadError(f"two files for one step: {files[step]} and {file}: name one of them")
-        files[step] = file
-    sample = max(members, key=lambda file: file.stat().st_size)
-    reader = reader_for(sample) if format is None else reader_named(format)
-    kind: FileKind = "other"
-    if reader is not None:
-        kind = reader.kind(sample)
-    return Family(_glob(members), files, reader, kind)
+            clash = f"two files for one step: {files[step]} and {file}: name one of them"
+        files.setdefault(step, file)
+    return Family(_glob(members), files, reader, kind, problem, clash)
 
 
 def _glob(members: list[Path]) -> str:

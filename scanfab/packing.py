@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
@@ -10,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.cell import Cell
-from scanfab.errors import PackingError
+from scanfab.errors import PackingError, ScanfabWarning
 
 __all__ = ["ContactList", "Contacts", "Packing"]
 
@@ -118,6 +119,7 @@ class Packing:
         self.id: IntArray = _cast("id", np.arange(count) if id is None else id, np.int64, (count,))
         _check_grains(centres, self.radius, self.id)
         self.position: FloatArray = centres if cell is None else cell.wrap(centres)
+        self.position.flags.writeable = False
         self.columns: dict[str, npt.NDArray[Any]] = {
             name: _cast(name, values, None, (count, ...))
             for name, values in (columns or {}).items()
@@ -129,8 +131,10 @@ class Packing:
             (count,),
         )
         self.cell = cell
-        self.step = step
-        self.time = time
+        self.step = None if step is None else int(step)
+        self.time = None if time is None else float(time)
+        if np.any(self.wall_contacts < 0):
+            raise PackingError("wall_contacts: expected 0 or more for each grain")
         self.contacts: Contacts | None = None
         if contacts is not None:
             listed = contacts if isinstance(contacts, ContactList) else ContactList(contacts)
@@ -166,7 +170,7 @@ class Packing:
 
     def _resolve(self, listed: ContactList) -> Contacts:
         """Geometry of the listed contacts, each pair and image once."""
-        pairs = _cast("contacts", np.reshape(listed.pairs, (-1, 2)), np.int64, (None, 2))
+        pairs = _cast("contacts", listed.pairs, np.int64, (None, 2))
         if pairs.size and (pairs.min() < 0 or pairs.max() >= len(self)):
             wrong = int(np.flatnonzero(np.any((pairs < 0) | (pairs >= len(self)), axis=1))[0])
             raise PackingError(
@@ -188,23 +192,35 @@ class Packing:
         if listed.force is not None:
             force = _cast("force", listed.force, np.float64, (len(pairs), 3))[keep]
         pairs, image, branch = pairs[keep], image[keep], branch[keep]
-        length = self._checked_length(pairs, branch)
+        length: FloatArray = np.linalg.norm(branch, axis=1)
+        itself = (pairs[:, 0] == pairs[:, 1]) & ~image.any(axis=1)
+        if np.any(itself):
+            raise PackingError(f"{_grains(self.id[pairs[:, 0]], itself)}: in contact with itself")
+        if np.any(length == 0):
+            self._warn_of_same_centre(pairs[length == 0])
+            some = length > 0
+            pairs, image, branch, length = pairs[some], image[some], branch[some], length[some]
+            force = None if force is None else force[some]
+        if listed.source == "file":
+            self._refuse_long_contacts(pairs, length)
         normal = branch / length[:, None]
         radius = self.radius[pairs]
         middle = 0.5 * (length + radius[:, 0] - radius[:, 1])
         point = self.position[pairs[:, 0]] + middle[:, None] * normal
         return Contacts(pairs, image, normal, point, force, listed.source)
 
-    def _checked_length(self, pairs: IntArray, branch: FloatArray) -> FloatArray:
-        """Lengths of the branch vectors; an error if one is zero or too long for a contact."""
-        length: FloatArray = np.linalg.norm(branch, axis=1)
+    def _warn_of_same_centre(self, pairs: IntArray) -> None:
+        one, two = self.id[pairs[0]]
+        warnings.warn(
+            f"the grains {one} and {two} have the same centre ({len(pairs)} such pairs): a contact "
+            f"between them has no direction and is left out",
+            ScanfabWarning,
+            stacklevel=4,
+        )
+
+    def _refuse_long_contacts(self, pairs: IntArray, length: FloatArray) -> None:
+        """An error if the centres of a listed contact are too far apart for a contact."""
         radius = self.radius[pairs]
-        if np.any(length == 0):
-            one, two = self.id[pairs[np.argmin(length)]]
-            raise PackingError(
-                f"the grains {one} and {two} are in contact but have the same centre: "
-                f"the contact has no direction"
-            )
         # a gap of half a grain, by the smaller of the two
         excess = length - radius.sum(axis=1) - radius.min(axis=1)
         if np.any(excess > 0):
@@ -221,7 +237,6 @@ class Packing:
                 f"{length[worst]:g} apart and their radii add up to {radius[worst].sum():g}: "
                 f"{advice}"
             )
-        return length
 
 
 def _cast(
@@ -230,6 +245,8 @@ def _cast(
     """An array of the given type and shape (None: any length; ...: any further dimensions)."""
     try:
         array = np.asarray(values)
+        if array.size == 0 and shape[0] is None:
+            array = np.zeros((0, *shape[1:]))  # an empty list
         cast = array.astype(dtype, copy=True) if dtype is not None else array.copy()
     except (TypeError, ValueError) as error:
         raise PackingError(f"{name}: expected numbers of shape {_spell(shape)}: {error}") from None

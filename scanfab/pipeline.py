@@ -68,19 +68,24 @@ def compute(source: Packing | Series, **options: Any) -> Table:
 
 def compute_rows(source: Packing | Series, settings: Settings) -> Iterator[Row]:
     """The rows of :func:`compute`, each as soon as its frame is done."""
+    if not isinstance(source, Packing | Series):
+        raise SettingsError(f"compute: expected a Packing or a Series, found {source!r}")
     name = "" if isinstance(source, Packing) else source.name
     strains = _Strains(settings)
     plan: Plan | None = None
-    chosen = _chosen(source, settings.frames)
-    found = False
+    chosen = chosen_frames(source, settings.frames)
+    found, particles = False, 0
     for number, read in _frames(source):
         if plan is not None and number not in chosen:
             continue
-        sample = _classify(read(), settings)
+        sample = classify(read(), settings)
+        particles += len(sample.packing)
         if plan is None and sample.grains.any():
             plan = make_plan(settings, sample)
             strains.start(sample)
-            _warn_of_boundary(sample, settings)
+            hint = boundary_hint(sample, settings)
+            if hint is not None:
+                warnings.warn(hint, ScanfabWarning, stacklevel=2)
         if number in chosen:
             found = True
             strain = strains.at(number, sample)
@@ -88,7 +93,23 @@ def compute_rows(source: Packing | Series, settings: Settings) -> Iterator[Row]:
         if number >= chosen.stop - 1 and plan is not None:
             break
     if not found:
-        raise SettingsError(f"frames: the series has no frame in {settings.frames}")
+        raise SettingsError(f"frames: the series has no frame in {_spell(settings.frames)}")
+    if plan is None:
+        _complain_of_no_grains(name, particles, settings)
+
+
+def _complain_of_no_grains(name: str, particles: int, settings: Settings) -> None:
+    if particles:
+        named = " or ".join(rule.text for rule in settings.boundary)
+        raise SettingsError(
+            f"boundary: {named} selects all particles of every frame: no grain is left"
+        )
+    warnings.warn(f"{name}: no frame has any grains", ScanfabWarning, stacklevel=3)
+
+
+def _spell(frames: slice) -> str:
+    parts = [frames.start, frames.stop, *([] if frames.step is None else [frames.step])]
+    return ":".join("" if part is None else str(part) for part in parts)
 
 
 def _frames(source: Packing | Series) -> Iterator[tuple[int, Any]]:
@@ -99,7 +120,7 @@ def _frames(source: Packing | Series) -> Iterator[tuple[int, Any]]:
             yield number, frame.read
 
 
-def _chosen(source: Packing | Series, frames: slice) -> range:
+def chosen_frames(source: Packing | Series, frames: slice) -> range:
     """The frames to compute, in the order of the source."""
     bounds = (frames.start, frames.stop, frames.step)
     if any(bound is not None and bound < 0 for bound in bounds):
@@ -132,24 +153,25 @@ class _Strains:
         return None if length is None or self.first == 0 else 1.0 - length / self.first
 
 
-def _classify(packing: Packing, settings: Settings) -> Sample:
+def classify(packing: Packing, settings: Settings) -> Sample:
     """Contacts and boundary of a frame."""
     if packing.contacts is None:
         packing = find_contacts(packing, settings.contact_tolerance)
     return Sample(packing, select_boundary(packing, settings.boundary), settings.min_contacts)
 
 
-def _warn_of_boundary(sample: Sample, settings: Settings) -> None:
+def boundary_hint(sample: Sample, settings: Settings) -> str | None:
+    """What to tell of boundary particles that are not named, or of a name that fits none."""
     if settings.boundary:
-        return
+        named = " or ".join(rule.text for rule in settings.boundary)
+        return None if sample.boundary.any() else f"boundary: no particle has {named}"
     expression = enclosing_class(sample.packing)
-    if expression is not None:
-        warnings.warn(
-            f"the particles with {expression} enclose the others: if they are a boundary, "
-            f'name them: --boundary "{expression}"',
-            ScanfabWarning,
-            stacklevel=3,
-        )
+    if expression is None:
+        return None
+    return (
+        f"the particles with {expression} enclose the others: if they are a boundary, "
+        f'name them: --boundary "{expression}"'
+    )
 
 
 def _frame_rows(
@@ -170,18 +192,16 @@ def _frame_rows(
         "contacts_from": sample.contacts.source,
     }
     sums: ScanSums | None = None
-    weights = np.zeros(0)
     if plan is not None and sample.grains.any():
         if plan.window is not None:
             plan.window.check_inside(packing)
-        sums, rule = scan_to_tolerance(_solids(sample, plan, settings), plan, settings)
-        weights = rule.weights
+        sums, plan = scan_to_tolerance(_solids(sample, plan, settings), plan, settings)
     for variant in settings.variants:
         yield Row(
             **frame,
             variant=variant,
             **_sample_columns(sample, plan, VARIANTS[variant]),
-            **_scan_columns(sums, plan, weights, variant, settings, number),
+            **_scan_columns(sums, plan, variant, settings, number),
             **_contact_columns(sample, plan, VARIANTS[variant], settings),
         )
 
@@ -219,23 +239,16 @@ def _sample_columns(sample: Sample, plan: Plan | None, variant: Variant) -> dict
 def _scan_columns(
     sums: ScanSums | None,
     plan: Plan | None,
-    weights: FloatArray,
     variant: str,
     settings: Settings,
     number: int,
 ) -> dict[str, Any]:
     """What the scan says of one variant."""
     fabric: VoidFabric | None = None
-    columns: dict[str, Any] = {
-        "solid_fraction": None,
-        "directions": len(weights),
-        "replicates": 0,
-        "lines": 0,
-        "segments": 0,
-        "spacing": None,
-        "cutoff": None,
-    }
+    names = ("solid_fraction", "directions", "replicates", "lines", "segments", "spacing", "cutoff")
+    columns: dict[str, Any] = dict.fromkeys(names)
     if sums is not None and plan is not None:
+        weights = plan.rule.weights
         which = "abcd".index(variant)
         fabric = void_fabric(sums.axes, weights, *sums.kept(variant))
         _warn_of_few_segments(fabric, sums, variant, plan, number)

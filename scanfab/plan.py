@@ -74,6 +74,8 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     lines = math.pi * reach**2 / asked**2
     replicates = int(min(max(lines / FEWEST_LINES, 1), REPLICATES))
     auto = "directions" if settings.directions is None else ""
+    if auto:
+        replicates = REPLICATES
     return Plan(window, cutoff, rule, asked * math.sqrt(replicates), replicates, auto)
 
 

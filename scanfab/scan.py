@@ -14,7 +14,7 @@ from scanfab.directions import DirectionRule
 from scanfab.errors import SettingsError
 from scanfab.kernels import sweep as kernel
 
-__all__ = ["MAX_LINES", "ScanSums", "Solids", "line_frames", "scan_lines"]
+__all__ = ["MAX_LINES", "ScanSums", "Solids", "is_affordable", "line_frames", "scan_lines"]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -156,6 +156,8 @@ def scan_lines(
         return _scan_frames(solids, turned, offsets, spacing, cutoff, variants)
 
     numbers = list(replicates)
+    if not numbers:
+        raise SettingsError("replicates: expected at least one")
     if workers == 1 or len(numbers) == 1:
         return ScanSums.concatenate(map(one, numbers))
     with ThreadPoolExecutor(workers) as pool:
@@ -216,11 +218,20 @@ def _scan_frames(
     )
 
 
-def _check_spacing(solids: Solids, spacing: float) -> None:
+def is_affordable(solids: Solids, spacing: float) -> bool:
+    """Whether memory should hold the lines of one axis and replicate."""
+    return _most_lines(solids, spacing) <= MAX_LINES
+
+
+def _most_lines(solids: Solids, spacing: float) -> float:
     reach = solids.window_radius
     if len(solids.position):
         reach = max(reach, float((np.linalg.norm(solids.position, axis=1) + solids.radius).max()))
-    lines = (2.0 * reach / spacing + 1.0) ** 2
+    return (2.0 * reach / spacing + 1.0) ** 2
+
+
+def _check_spacing(solids: Solids, spacing: float) -> None:
+    lines = _most_lines(solids, spacing)
     if lines > MAX_LINES:
         raise SettingsError(
             f"spacing: {spacing:g} between lines of one direction and replicate makes "

@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -26,11 +26,16 @@ PathLike = str | os.PathLike[str]
 class Frame:
     """One frame of a series, not read yet."""
 
-    reader: Reader
+    series: Series
     snapshot: Snapshot
-    contacts: tuple[tuple[Reader, Snapshot], ...]
-    """Contact files of the same step; empty if contacts come from geometry."""
-    options: ReadOptions
+    name_step: int | None
+    """The step in the file's name."""
+
+    @property
+    def reader(self) -> Reader:
+        """The reader of the grain file."""
+        assert self.series.grains.reader is not None
+        return self.series.grains.reader
 
     def read(self) -> Packing:
         """
@@ -43,15 +48,17 @@ class Frame:
         PackingError
             If its content is no packing.
         """
-        grains = self.reader.read_grains(self.snapshot, self.options)
-        joined = [
-            reader.read_contacts(snapshot, self.options, grains)
-            for reader, snapshot in self.contacts
-        ]
+        options = self.series.options
+        files = self._contact_files()
+        grains = self.reader.read_grains(self.snapshot, options)
+        joined = [reader.read_contacts(snapshot, options, grains) for reader, snapshot in files]
         listed = [part.contacts for part in joined if part.contacts is not None]
+        if self.series.contacts_from == "auto" and grains.contacts is not None:
+            listed.append(grains.contacts)
         if len(listed) > 1:
-            paths = " and ".join(str(snapshot.path) for _, snapshot in self.contacts)
+            paths = " and ".join(str(snapshot.path) for _, snapshot in files)
             raise ReadError(f"two contact lists for one frame: {paths}: choose with --contacts")
+        step = self.name_step if self.snapshot.step is None else self.snapshot.step
         try:
             return Packing(
                 grains.position,
@@ -61,11 +68,31 @@ class Frame:
                 contacts=listed[0] if listed else None,
                 wall_contacts=_wall_contacts(grains, joined),
                 cell=grains.cell,
-                step=self.snapshot.step,
+                step=step,
                 time=self.snapshot.time,
             )
         except PackingError as error:
             raise PackingError(f"{self.snapshot.path}: {error}") from None
+
+    def _contact_files(self) -> list[tuple[Reader, Snapshot]]:
+        """The snapshots of the contact files that belong to this frame."""
+        series, found = self.series, []
+        for family in series.contacts:
+            named = series.contacts_from == "path" and len(series.grains.files) == 1
+            contacts = _same_step(family, self.name_step, self.snapshot, named)
+            if contacts is not None:
+                assert family.reader is not None
+                found.append((family.reader, contacts))
+        if not found and series.contacts:
+            step = self.name_step if self.snapshot.step is None else self.snapshot.step
+            patterns = ", ".join(family.pattern for family in series.contacts)
+            message = f"{self.snapshot.path}: no contact file for step {step} among {patterns}"
+            if series.contacts_from == "path":
+                raise ReadError(message)
+            warnings.warn(
+                f"{message}: contacts are found by geometry", ScanfabWarning, stacklevel=3
+            )
+        return found
 
 
 @dataclass(frozen=True)
@@ -80,7 +107,7 @@ class Series:
     """As the user named it."""
     grains: Family
     contacts: tuple[Family, ...] = ()
-    contacts_required: bool = False
+    contacts_from: Literal["auto", "geometric", "path"] = "auto"
     options: ReadOptions = field(default_factory=ReadOptions)
 
     def __iter__(self) -> Iterator[Frame]:
@@ -88,33 +115,7 @@ class Series:
         assert reader is not None
         for name_step, path in self.grains.files.items():
             for snapshot in reader.snapshots(path):
-                found = self._contact_files(name_step, snapshot)
-                if snapshot.step is None:
-                    snapshot = Snapshot(
-                        path, name_step, snapshot.time, snapshot.start, snapshot.stop
-                    )
-                yield Frame(reader, snapshot, found, self.options)
-
-    def _contact_files(
-        self, name_step: int | None, snapshot: Snapshot
-    ) -> tuple[tuple[Reader, Snapshot], ...]:
-        """The snapshots of the contact files that belong to a frame."""
-        found = []
-        for family in self.contacts:
-            contacts = _same_step(family, name_step, snapshot, len(self.grains.files) == 1)
-            if contacts is not None:
-                assert family.reader is not None
-                found.append((family.reader, contacts))
-        if not found and self.contacts:
-            step = name_step if snapshot.step is None else snapshot.step
-            patterns = ", ".join(family.pattern for family in self.contacts)
-            message = f"{snapshot.path}: no contact file for step {step} among {patterns}"
-            if self.contacts_required:
-                raise ReadError(message)
-            warnings.warn(
-                f"{message}: contacts are found by geometry", ScanfabWarning, stacklevel=3
-            )
-        return tuple(found)
+                yield Frame(self, snapshot, name_step)
 
 
 def read(path: PathLike, *, frame: int = 0, **options: Any) -> Packing:
@@ -201,21 +202,22 @@ def read_series(
     ReadError
         If there is no series, or more than one.
     """
-    paths = [Path(p) for p in ([source] if isinstance(source, (str, os.PathLike)) else source)]
+    given = [source] if isinstance(source, str | os.PathLike) else list(source)
+    paths = [Path(path) for path in given]
     options = ReadOptions(columns or {}, contact_columns, radius, cell, periodic)
-    files = [file for path in paths for file in _files(path)]
-    families = sort_into_families(files, format)
-    grains = _grain_family(paths, families)
-    _note_passed_over(families)
-    name = str(paths[0]) if len(paths) == 1 else _common_folder(paths)
+    families = sort_into_families([file for path in paths for file in _files(path)], format)
+    grains = _grain_family(paths, families).check()
+    name = os.fspath(given[0]) if len(given) == 1 else _common_folder(paths)
+    own = tuple(family for family in families if family.kind == "contacts")
+    _note_passed_over(families, [grains, *own])
     if contacts == "geometric":
-        return Series(name, grains, options=options)
+        return Series(name, grains, (), "geometric", options)
     if contacts in ("auto", "file"):
-        found = tuple(family for family in families if family.kind == "contacts")
-        if contacts == "file" and not found:
+        if contacts == "file" and not own:
             raise ReadError(f"{name}: --contacts file was asked for, but there is no contact file")
-        return Series(name, grains, found, contacts == "file", options)
-    return Series(name, grains, _named_contacts(contacts, format), True, options)
+        checked = tuple(family.check() for family in own)
+        return Series(name, grains, checked, "auto" if contacts == "auto" else "path", options)
+    return Series(name, grains, _named_contacts(contacts, format), "path", options)
 
 
 def open_sources(sources: Sequence[PathLike], **options: Any) -> list[Series]:
@@ -229,12 +231,19 @@ def open_sources(sources: Sequence[PathLike], **options: Any) -> list[Series]:
     **options
         See :func:`read_series`.
     """
-    folders = [source for source in sources if Path(source).is_dir()]
-    files = [source for source in sources if not Path(source).is_dir()]
-    series = [read_series(folder, **options) for folder in folders]
-    if files:
-        series.append(read_series(files if len(files) > 1 else files[0], **options))
-    return series
+    groups: list[PathLike | list[PathLike]] = []
+    files: list[PathLike] = []
+    for source in sources:
+        if Path(source).is_dir():
+            groups.append(source)
+        else:
+            if not files:
+                groups.append(files)
+            files.append(source)
+    return [
+        read_series(group[0] if isinstance(group, list) and len(group) == 1 else group, **options)
+        for group in groups
+    ]
 
 
 def _files(path: Path) -> list[Path]:
@@ -251,8 +260,9 @@ def _files(path: Path) -> list[Path]:
 
 def _grain_family(paths: list[Path], families: list[Family]) -> Family:
     """The one family of grain files."""
-    grains = [family for family in families if family.kind == "grains"]
-    grains = grains or [family for family in families if family.kind == "points"]
+    grains: list[Family] = []
+    for kind in ("grains", "index", "points"):
+        grains = grains or [family for family in families if family.kind == kind]
     where = ", ".join(str(path) for path in paths[:3]) + (", ..." if len(paths) > 3 else "")
     if len(grains) > 1:
         raise ReadError(
@@ -260,6 +270,9 @@ def _grain_family(paths: list[Path], families: list[Family]) -> Family:
             + "\n  ".join(family.pattern for family in grains)
         )
     if not grains:
+        problem = next((family.problem for family in families if family.problem), None)
+        if problem is not None:
+            raise ReadError(problem)
         known = [family for family in families if family.reader is not None]
         if not known:
             raise UnknownFormatError(
@@ -272,14 +285,20 @@ def _grain_family(paths: list[Path], families: list[Family]) -> Family:
     return grains[0]
 
 
-def _note_passed_over(families: list[Family]) -> None:
-    unknown = [family.pattern for family in families if family.reader is None]
-    if unknown:
-        names = ", ".join(Path(pattern).name for pattern in unknown[:5])
-        more = f" and {len(unknown) - 5} more" if len(unknown) > 5 else ""
+def _note_passed_over(families: list[Family], used: list[Family]) -> None:
+    """One warning for the files that do not enter, and one for each that is damaged."""
+    unused = [one.pattern for one in families if one not in used and one.problem is None]
+    if unused:
+        names = ", ".join(Path(pattern).name for pattern in unused[:5])
+        more = f" and {len(unused) - 5} more" if len(unused) > 5 else ""
         warnings.warn(
-            f"passed over, no reader knows them: {names}{more}", ScanfabWarning, stacklevel=3
+            f"passed over, neither grains nor contacts: {names}{more}",
+            ScanfabWarning,
+            stacklevel=3,
         )
+    for family in families:
+        if family.problem is not None:
+            warnings.warn(f"passed over: {family.problem}", ScanfabWarning, stacklevel=3)
 
 
 def _named_contacts(contacts: PathLike, format: str | None) -> tuple[Family, ...]:
@@ -293,31 +312,32 @@ def _named_contacts(contacts: PathLike, format: str | None) -> tuple[Family, ...
     if not files:
         raise ReadError(f"{contacts}: there is no such contact file, folder or glob")
     families = sort_into_families(files, format)
-    found = tuple(family for family in families if family.kind == "contacts")
+    found = tuple(family.check() for family in families if family.kind == "contacts")
     if not found:
         raise ReadError(f"{contacts}: expected contacts, found none")
     return found
 
 
 def _same_step(
-    family: Family, name_step: int | None, grains: Snapshot, only: bool
+    family: Family, name_step: int | None, grains: Snapshot, named: bool
 ) -> Snapshot | None:
     """
     The contacts of a grain snapshot in a family of contact files; None if there are none.
 
     Steps inside the files decide; where a file has none, the number in its name does. A single
-    contact file beside a single grain file needs neither.
+    contact file that the user named for a single grain file needs no number.
     """
-    path = family.files.get(name_step)
-    alone = len(family.files) == 1
-    if path is None and alone:
+    step = name_step if grains.step is None else grains.step
+    path = family.files.get(name_step, family.files.get(step))
+    if path is None and len(family.files) == 1:
         path = next(iter(family.files.values()))
     if path is None:
         return None
     assert family.reader is not None
     snapshots = family.reader.snapshots(path)
     if len(snapshots) == 1 and (snapshots[0].step is None or grains.step is None):
-        matches = name_step in family.files or (alone and only)
+        numbered = None not in family.files and step is not None
+        matches = named or not numbered or bool({name_step, step} & set(family.files))
         return snapshots[0] if matches else None
     return next((one for one in snapshots if one.step == grains.step), None)
 
@@ -327,4 +347,7 @@ def _wall_contacts(grains: GrainTable, joined: list[JoinedContacts]) -> Any:
 
 
 def _common_folder(paths: list[Path]) -> str:
-    return os.path.commonpath([str(path.parent) for path in paths]) or "."
+    folders = [str(path.parent) for path in paths]
+    if len({path.is_absolute() for path in paths}) > 1:
+        folders = [os.path.abspath(folder) for folder in folders]
+    return os.path.commonpath(folders) or "."

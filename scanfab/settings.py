@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -58,6 +59,33 @@ def parse_length(name: str, text: str | float | Length) -> Length:
             f"found {str(text)!r}"
         )
     return Length(value, match[2] or "")  # type: ignore[arg-type]
+
+
+def _number(name: str, value: object) -> float:
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        raise SettingsError(f"{name}: expected a number, found {value!r}") from None
+
+
+def _whole(name: str, value: object) -> int:
+    number = _number(name, value)
+    if not number.is_integer():
+        raise SettingsError(f"{name}: expected a whole number, found {value!r}")
+    return int(number)
+
+
+def _vector(name: str, values: Sequence[float]) -> Vector:
+    numbers = tuple(_number(name, value) for value in values)
+    if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
+        raise SettingsError(f"{name}: expected three finite numbers, found {values!r}")
+    return numbers
+
+
+def _rule(directions: str | int | DirectionRule) -> DirectionRule | None:
+    if isinstance(directions, DirectionRule):
+        return directions
+    return None if directions == "auto" else direction_rule(str(directions))
 
 
 def parse_axis(text: str | Vector) -> Vector:
@@ -180,28 +208,26 @@ class Settings:
         SettingsError
             If a value cannot be used.
         """
-        text = str(directions)
-        given = None if text == "auto" else direction_rule(text)
         return cls(
             variants="".join(v for v in "abcd" if v in variants),
-            rv=float(rv),
-            rv_radius=None if rv_radius is None else float(rv_radius),
-            rv_center=rv_center,
+            rv=_number("rv", rv),
+            rv_radius=None if rv_radius is None else _number("rv-radius", rv_radius),
+            rv_center=None if rv_center is None else _vector("rv-center", rv_center),
             boundary=tuple(
                 BoundaryRule.parse(rule)
                 for rule in ([boundary] if isinstance(boundary, str) else boundary)
             ),
             cutoff=parse_length("cutoff", cutoff),
             spacing=None if spacing == "auto" else parse_length("spacing", spacing),
-            directions=directions if isinstance(directions, DirectionRule) else given,
-            tolerance=float(tolerance),
-            min_contacts=int(min_contacts),
-            contact_tolerance=float(contact_tolerance),
+            directions=_rule(directions),
+            tolerance=_number("tolerance", tolerance),
+            min_contacts=_whole("min-contacts", min_contacts),
+            contact_tolerance=_number("contact-tolerance", contact_tolerance),
             axis=parse_axis(axis),
             strain=str(strain),
             frames=parse_frames(frames),
-            seed=int(seed),
-            workers=(os.cpu_count() or 1) if workers is None else int(workers),
+            seed=_whole("seed", seed),
+            workers=(os.cpu_count() or 1) if workers is None else _whole("workers", workers),
         )._checked(variants)
 
     def _checked(self, variants: str) -> Settings:
@@ -217,10 +243,6 @@ class Settings:
             (
                 self.rv_radius is None or (self.rv_radius > 0 and math.isfinite(self.rv_radius)),
                 f"rv-radius: expected a length above 0, found {self.rv_radius}",
-            ),
-            (
-                self.rv_center is None or all(map(math.isfinite, self.rv_center)),
-                f"rv-center: expected three finite numbers, found {self.rv_center}",
             ),
             (self.cutoff.value >= 0, f"cutoff: expected 0 or more, found {self.cutoff.value:g}"),
             (

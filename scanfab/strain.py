@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from pathlib import Path
 
 import numpy as np
@@ -75,25 +76,32 @@ class StrainFile:
     """
 
     def __init__(self, path: Path) -> None:
-        self.path = path
-        with open(path, newline="", encoding="utf-8-sig") as stream:
-            rows = csv.DictReader(stream)
-            names = [name.strip() for name in rows.fieldnames or []]
-            self.key = "step" if "step" in names else "frame"
-            if self.key not in names or "strain" not in names:
+        self.strain: dict[int, float] = {}
+        try:
+            with open(path, newline="", encoding="utf-8-sig") as stream:
+                self._read(path, csv.DictReader(stream, skipinitialspace=True))
+        except UnicodeDecodeError:
+            raise ReadError(f"{path}: expected a CSV file, found bytes that are no text") from None
+
+    def _read(self, path: Path, rows: csv.DictReader[str]) -> None:
+        names = [name.strip() for name in rows.fieldnames or []]
+        rows.fieldnames = names
+        self.key = "step" if "step" in names else "frame"
+        if self.key not in names or "strain" not in names:
+            raise ReadError(
+                f"{path}: expected the columns step or frame, and strain; found {names}"
+            )
+        for row in rows:
+            try:
+                strain = float(row["strain"])
+                self.strain[int(float(row[self.key]))] = strain
+            except (OverflowError, TypeError, ValueError):
+                strain = math.nan
+            if not math.isfinite(strain):
                 raise ReadError(
-                    f"{path}: expected the columns step or frame, and strain; found {names}"
+                    f"{path}, line {rows.line_num}: expected numbers as {self.key} and strain, "
+                    f"found {row[self.key]!r} and {row['strain']!r}"
                 )
-            self.strain: dict[int, float] = {}
-            for row in rows:
-                clean = {(name or "").strip(): value for name, value in row.items()}
-                try:
-                    self.strain[int(float(clean[self.key]))] = float(clean["strain"])
-                except (TypeError, ValueError):
-                    raise ReadError(
-                        f"{path}, line {rows.line_num}: expected numbers as {self.key} and "
-                        f"strain, found {clean[self.key]!r} and {clean['strain']!r}"
-                    ) from None
 
     def at(self, frame: int, step: int | None) -> float | None:
         """The strain of a frame; None if the file does not name it."""

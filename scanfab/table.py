@@ -28,10 +28,10 @@ class Row:
     contacts_from: str
     coordination: float | None
     solid_fraction: float | None
-    directions: int
-    replicates: int
-    lines: int
-    segments: int
+    directions: int | None
+    replicates: int | None
+    lines: int | None
+    segments: int | None
     spacing: float | None
     cutoff: float | None
     mean_length: float | None

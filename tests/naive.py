@@ -1,6 +1,6 @@
 """Slow, obvious twins of every kernel and formula: what the fast ones must equal."""
 
-from itertools import product
+from itertools import pairwise, product
 from math import ceil, sqrt
 from typing import NamedTuple
 
@@ -54,7 +54,7 @@ def union(intervals):
 
 def gaps_between(solids):
     """Lengths between neighbouring solids of a union."""
-    return [after[0] - before[1] for before, after in zip(solids, solids[1:], strict=False)]
+    return [after[0] - before[1] for before, after in pairwise(solids)]
 
 
 def gaps_within(solids, low, high):
@@ -108,7 +108,7 @@ def contacts(position, radius, tolerance=0.0, edges=None, periodic=(True, True, 
     """
     reach = 2 * max(radius, default=0.0) * (1 + tolerance)
     edges = np.full(3, np.inf) if edges is None else np.where(periodic, edges, np.inf)
-    layers = [range(-n, n + 1) for n in (int(ceil(reach / edge)) + 1 for edge in edges)]
+    layers = [range(-n, n + 1) for n in (ceil(reach / edge) + 1 for edge in edges)]
     shifts = [s for s in product(*layers) if not any(np.isinf(edges[np.nonzero(s)]))]
     found = set()
     for i, j in product(range(len(position)), repeat=2):

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+
 from scanfab.directions import direction_rule
 from scanfab.fabric.void import void_fabric
 from scanfab.scan import ScanSums, Solids, _scan_frames, line_frames, scan_lines

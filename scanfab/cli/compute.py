@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from scanfab.cli.options import CellCommand, reading_arguments, reading_options
+from scanfab.cli.options import CellCommand, open_series, reading_arguments, reading_options
 
 if TYPE_CHECKING:
     from scanfab.series import Series
@@ -21,7 +21,11 @@ __all__ = ["compute"]
 
 @click.command(cls=CellCommand)
 @click.argument(
-    "sources", metavar="SOURCE...", nargs=-1, required=True, type=click.Path(exists=True)
+    "sources",
+    metavar="SOURCE...",
+    nargs=-1,
+    required=True,
+    type=click.Path(exists=True, allow_dash=True),
 )
 @reading_options
 @click.option(
@@ -107,14 +111,13 @@ def compute(sources: tuple[str, ...], output: Path | None, **options: Any) -> in
     """
     Compute the fabric table: one row per frame and variant.
 
-    SOURCE is a folder with a series of dumps, or files of one series.
+    SOURCE is a folder with a series of dumps, files of one series, or - for standard input.
 
     Variants: a whole sample; b whole sample, rattlers removed; c representative volume (RV); d RV,
     rattlers removed. Lengths are in the dump's own units.
     """
     from scanfab.cli.console import reported_warnings
     from scanfab.errors import SettingsError
-    from scanfab.series import open_sources
     from scanfab.settings import Settings
     from scanfab.writers.rows import check_suffix
 
@@ -126,7 +129,7 @@ def compute(sources: tuple[str, ...], output: Path | None, **options: Any) -> in
                 check_suffix(output)
         except SettingsError as error:
             raise click.UsageError(str(error)) from None
-        series = open_sources(sources, **reading)
+        series = open_series(sources, reading)
         return _write(_rows(series, settings), output)
 
 

@@ -15,20 +15,20 @@ from scanfab.table import Row
 
 __all__ = ["print_table", "reported_warnings", "with_progress"]
 
-# what fits a terminal; the file has all columns
+# title of each column on a terminal, and the width of terminal from which it is shown
 SHOWN = {
-    "frame": "frame",
-    "strain": "strain",
-    "variant": "variant",
-    "grains": "grains",
-    "contacts": "contacts",
-    "coordination": "coordination",
-    "solid_fraction": "solid fraction",
-    "mean_length": "mean length",
-    "alpha_vs": "α_vs",
-    "alpha_vs_axial": "α_vs axial",
-    "alpha_vs_axial_se": "±",
-    "alpha_c_axial": "α_c axial",
+    "frame": ("frame", 0),
+    "strain": ("strain", 0),
+    "variant": ("variant", 0),
+    "grains": ("grains", 0),
+    "contacts": ("contacts", 0),
+    "coordination": ("coordination", 120),
+    "solid_fraction": ("solid fraction", 120),
+    "mean_length": ("mean length", 100),
+    "alpha_vs": ("α_vs", 100),
+    "alpha_vs_axial": ("α_vs axial", 0),
+    "alpha_vs_axial_se": ("±", 0),
+    "alpha_c_axial": ("α_c axial", 0),
 }
 
 
@@ -71,15 +71,17 @@ def print_table(rows: Iterable[Row]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(box=None, header_style="bold")
-    for title in SHOWN.values():
-        table.add_column(title, justify="right")
+    console = Console()
+    shown = {name: title for name, (title, width) in SHOWN.items() if width <= console.width}
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    for title in shown.values():
+        table.add_column(title, justify="right", no_wrap=True)
     for row in rows:
-        table.add_row(*(_spell(getattr(row, name)) for name in SHOWN))
-    Console().print(table)
+        table.add_row(*(_spell(getattr(row, name)) for name in shown))
+    console.print(table)
 
 
 def _spell(value: Any) -> str:
     if value is None:
         return "-"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    return f"{value:.3g}" if isinstance(value, float) else str(value)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from importlib import import_module
 
@@ -52,15 +53,22 @@ def _print_version(ctx: click.Context, param: click.Parameter, value: bool) -> N
     callback=_print_version,
     help="Show the version and exit.",
 )
-@click.option("--debug", is_flag=True, help="Show a traceback with an error.")
-@click.pass_context
-def cli(ctx: click.Context, debug: bool) -> None:
+@click.option("--debug", is_flag=True, expose_value=False, help="Show a traceback with an error.")
+def cli() -> None:
     """The void fabric of granular packings by scan lines, from DEM particle dumps."""
-    ctx.obj = {"debug": debug}
+
+
+class Terminated(BaseException):
+    """The process was told to end (SIGTERM)."""
 
 
 def main(args: list[str] | None = None) -> None:
-    """Run the command line and exit: 0 done, 1 failed, 2 wrong usage, 130 interrupted."""
+    """Run the command line and exit: 0 done, 1 failed, 2 wrong usage, 130 and 143 interrupted."""
+
+    def terminate(*_: object) -> None:
+        raise Terminated
+
+    signal.signal(signal.SIGTERM, terminate)
     sys.exit(run(sys.argv[1:] if args is None else args))
 
 
@@ -68,7 +76,9 @@ def run(args: list[str]) -> int:
     """The command line's exit code; errors become one message on standard error."""
     from scanfab.errors import ScanfabError
 
+    # wherever it stands: the group knows it only for its help
     debug = "--debug" in args
+    args = [word for word in args if word != "--debug"]
     try:
         code = cli.main(args, prog_name="scanfab", standalone_mode=False)
         return code if isinstance(code, int) else 0
@@ -78,10 +88,9 @@ def run(args: list[str]) -> int:
     except (KeyboardInterrupt, click.Abort):
         click.echo("scanfab: interrupted", err=True)
         return 130
-    except BrokenPipeError:
-        # the reader of our output has seen enough; keep the interpreter from flushing at exit
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+    except Terminated:
+        click.echo("scanfab: terminated", err=True)
+        return 143
     except (ScanfabError, OSError, MemoryError) as error:
         if debug:
             raise

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-__all__ = ["CellCommand", "reading_arguments", "reading_options"]
+if TYPE_CHECKING:
+    from scanfab.series import Series
+
+__all__ = ["CellCommand", "open_series", "reading_arguments", "reading_options"]
 
 Command = Callable[..., Any]
 
@@ -48,7 +52,24 @@ def reading_arguments(options: dict[str, Any]) -> dict[str, Any]:
     return taken
 
 
-_READING = [
+def open_series(sources: tuple[str, ...], reading: dict[str, Any]) -> list[Series]:
+    """The series of a command line; ``-`` is one that comes by standard input."""
+    from dataclasses import replace
+
+    from scanfab.readers.files import temporary_copy
+    from scanfab.series import open_sources, read_series
+
+    if "-" not in sources:
+        return open_sources(sources, **reading)
+    if reading["format"] is None:
+        raise click.UsageError("standard input needs --format NAME")
+    if len(sources) > 1:
+        raise click.UsageError("standard input is a series of its own: name no other source")
+    copy = temporary_copy(sys.stdin.buffer, "standard-input")
+    return [replace(read_series(copy, **reading), name="-")]
+
+
+_READING: list[Callable[[Command], Command]] = [
     click.option("--format", metavar="NAME", help="Reader to use (default: by content)."),
     click.option(
         "--columns",
@@ -96,7 +117,10 @@ def _leading_numbers(words: list[str]) -> int:
 def _numbers(text: str | None) -> tuple[float, ...] | None:
     if text is None:
         return None
-    numbers = tuple(float(word) for word in text.split())
+    try:
+        numbers = tuple(float(word) for word in text.split())
+    except ValueError:
+        numbers = ()
     if len(numbers) not in (3, 6) or min(numbers[:3]) <= 0:
         raise click.UsageError(
             "--cell: expected three lengths LX LY LZ above 0, or six numbers with XY XZ YZ"

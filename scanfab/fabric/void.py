@@ -20,6 +20,8 @@ __all__ = ["VoidFabric", "void_fabric"]
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
+MOST_FILLED = 0.5
+
 
 @dataclass(frozen=True, eq=False)
 class VoidFabric:
@@ -69,7 +71,8 @@ def void_fabric(
     Returns
     -------
     VoidFabric or None
-        None if some axis keeps no segment in all replicates together.
+        None if some axis keeps no segment in all replicates together, or if most axes keep none in
+        their replicate: a tensor of directions that were filled in would look isotropic.
 
     Examples
     --------
@@ -83,6 +86,8 @@ def void_fabric(
     if np.any(total_segments == 0):
         return None
     empty = segments == 0
+    if empty.mean() > MOST_FILLED:
+        return None
     # an axis that kept nothing in one replicate takes its mean over the others
     mean = np.where(empty, total_length / total_segments, length / np.where(empty, 1, segments))
     weighted = weights * mean

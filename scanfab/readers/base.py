@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.cell import Cell
+from scanfab.errors import SettingsError
 from scanfab.packing import ContactList
 
 __all__ = ["FileKind", "GrainTable", "JoinedContacts", "ReadOptions", "Reader", "Snapshot"]
@@ -18,9 +19,11 @@ __all__ = ["FileKind", "GrainTable", "JoinedContacts", "ReadOptions", "Reader", 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
-FileKind = Literal["grains", "points", "contacts", "other"]
-"""``points``: grains without a radius, unless the user gives one; ``other``: a file of the format
-that holds neither grains nor contacts (a wall mesh, a bounding box)."""
+FileKind = Literal["grains", "index", "points", "contacts", "other"]
+"""
+What a file holds. ``index``: names of other files that hold grains; ``points``: grains without a
+radius, unless the user gives one; ``other``: neither grains nor contacts (a wall mesh, a box).
+"""
 
 
 @dataclass(frozen=True)
@@ -37,6 +40,19 @@ class ReadOptions:
     """LX LY LZ, or LX LY LZ XY XZ YZ; dump's length unit."""
     periodic: str | None = None
     """Letters out of xyz."""
+
+    def __post_init__(self) -> None:
+        """Raise SettingsError if a value cannot be used."""
+        cell, periodic = self.cell, self.periodic
+        if cell is not None and (len(cell) not in (3, 6) or not min(cell[:3]) > 0):
+            raise SettingsError(
+                f"cell: expected three lengths LX LY LZ above 0, or six numbers with XY XZ YZ, "
+                f"found {tuple(cell)}"
+            )
+        if periodic is not None and not set(periodic) <= set("xyz"):
+            raise SettingsError(f"periodic: expected letters out of xyz, found {periodic!r}")
+        if self.radius is not None and not 0 < self.radius < float("inf"):
+            raise SettingsError(f"radius: expected a length above 0, found {self.radius}")
 
 
 @dataclass(frozen=True)
@@ -64,6 +80,8 @@ class GrainTable(NamedTuple):
     columns: dict[str, npt.NDArray[Any]]
     """What else the dump says of each grain, by its own names."""
     cell: Cell | None
+    contacts: ContactList | None = None
+    """Contacts that the grain file itself lists."""
 
 
 class JoinedContacts(NamedTuple):
@@ -79,7 +97,9 @@ class Reader(Protocol):
     """
     A reader plugin: an object registered under the entry point group ``scanfab.readers``.
 
-    All methods raise ReadError, with the file and what was expected, and nothing else.
+    All methods raise ReadError, with the file and what was expected, and nothing else. A reader of
+    a format that any program may write can say so with an attribute ``generic = True``: it is asked
+    after the others.
     """
 
     name: str

@@ -30,6 +30,10 @@ FloatArray = npt.NDArray[np.float64]
 HEADER_BYTES = 1 << 16
 COUNT_KEY = re.compile(rb"^ITEM: NUMBER OF (\S+)[ \t]*\r?$", re.MULTILINE)
 
+# LAMMPS writes units and time before the step
+BEFORE_STEP = re.compile(rb"(?:^ITEM: (?:UNITS|TIME)[ \t]*\r?\n[^\n]*\n)+\Z", re.MULTILINE)
+STEP_OR_TIME = re.compile(rb"^ITEM: (TIMESTEP|TIME)[ \t]*\r?\n\s*(\S+)", re.MULTILINE)
+
 
 @dataclass(frozen=True)
 class DumpBlock:
@@ -69,21 +73,20 @@ def index_dump(path: Path) -> list[Snapshot]:
             if not starts:
                 raise ReadError(f"{path}: expected a line ITEM: TIMESTEP, found none")
             stops = [*starts[1:], len(data)]
-            found = [
-                _snapshot(path, data, start, stop)
-                for start, stop in zip(starts, stops, strict=True)
-            ]
-            if len(found) > 1 and not _is_complete(data, starts[-1], len(data)):
+            if len(starts) > 1 and not _is_complete(data, starts[-1], stops[-1]):
                 warnings.warn(
-                    f"{path}: the last snapshot (step {found[-1].step}) is incomplete and is "
-                    f"left out",
+                    f"{path}: the last snapshot, number {len(starts)}, is incomplete and is left "
+                    f"out",
                     ScanfabWarning,
                     stacklevel=2,
                 )
-                found.pop()
+                starts.pop()
+            return [
+                _snapshot(path, data, start, stop)
+                for start, stop in zip(starts, stops, strict=False)
+            ]
         finally:
             data.close()
-    return found
 
 
 def read_block(snapshot: Snapshot) -> DumpBlock:
@@ -125,38 +128,36 @@ def _starts(data: mmap.mmap) -> list[int]:
     starts, place = [], data.find(b"ITEM: TIMESTEP")
     while place >= 0:
         if place == 0 or data[place - 1 : place] in (b"\n", b"\xbf"):
-            starts.append(place)
+            before = BEFORE_STEP.search(data[max(place - 300, 0) : place])
+            starts.append(place - len(before[0]) if before else place)
         place = data.find(b"\nITEM: TIMESTEP", place + 1)
         place += place >= 0
     return starts
 
 
 def _snapshot(path: Path, data: mmap.mmap, start: int, stop: int) -> Snapshot:
-    lines = data[start : min(start + 200, stop)].split(b"\n")
+    # what belongs to the snapshot stands before its count of rows
+    header = data[start : min(start + HEADER_BYTES, stop)].partition(b"ITEM: NUMBER OF")[0]
+    found = dict(STEP_OR_TIME.findall(header))
     try:
-        step = int(lines[1])
-    except (IndexError, ValueError):
+        step = int(found[b"TIMESTEP"])
+    except (KeyError, ValueError):
         raise ReadError(f"{path}: expected a whole number after ITEM: TIMESTEP") from None
-    # LAMMPS writes the time of a snapshot before or after its step
-    header = data[start : min(start + HEADER_BYTES, stop)]
-    match = re.search(rb"^ITEM: TIME[ \t]*\r?\n\s*(\S+)", header, re.MULTILINE)
     try:
-        time = float(match[1]) if match else None
+        time = float(found[b"TIME"]) if b"TIME" in found else None
     except ValueError:
         time = None
     return Snapshot(path, step=step, time=time, start=start, stop=stop)
 
 
 def _is_complete(data: mmap.mmap, start: int, stop: int) -> bool:
+    """Whether all rows that the header counts are there, each with its line end."""
     block = data[start:stop]
     try:
         sections, body = _sections("", block)
-        count = _count("", sections)
+        return block.count(b"\n", body.start) >= _count("", sections)
     except ReadError:
         return False
-    lines = block.count(b"\n", body.start) + (not block.endswith(b"\n"))
-    # a last line without its end may be cut within a number
-    return lines >= count and (count == 0 or block.endswith(b"\n"))
 
 
 def _sections(where: str, block: bytes) -> tuple[dict[str, list[str]], _Body]:

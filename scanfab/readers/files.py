@@ -13,11 +13,11 @@ import zlib
 from collections import OrderedDict
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from scanfab.errors import ReadError
 
-__all__ = ["COMPRESSED_SUFFIXES", "bare_name", "first_bytes", "plain"]
+__all__ = ["COMPRESSED_SUFFIXES", "bare_name", "first_bytes", "plain", "temporary_copy"]
 
 OPENERS: dict[bytes, Callable[..., Any]] = {
     b"\x1f\x8b": gzip.open,
@@ -56,20 +56,30 @@ def plain(path: Path) -> Path:
     if key in _copies:
         _copies.move_to_end(key)
         return _copies[key]
-    if not _folder:
-        _folder.append(tempfile.mkdtemp(prefix="scanfab-"))
-        atexit.register(shutil.rmtree, _folder[0], ignore_errors=True)
-    copy = Path(tempfile.mkdtemp(dir=_folder[0])) / bare_name(path)
     try:
-        with opener(path, "rb") as packed, open(copy, "wb") as unpacked:
-            shutil.copyfileobj(packed, unpacked, 1 << 20)
+        with opener(path, "rb") as packed:
+            copy = temporary_copy(packed, bare_name(path))
     except (OSError, EOFError, lzma.LZMAError, zlib.error) as error:
-        shutil.rmtree(copy.parent, ignore_errors=True)
         raise ReadError(f"{path}: cannot be decompressed: {_reason(error)}") from None
     _copies[key] = copy
     while len(_copies) > KEPT:
         _, oldest = _copies.popitem(last=False)
         shutil.rmtree(oldest.parent, ignore_errors=True)
+    return copy
+
+
+def temporary_copy(stream: IO[bytes], name: str) -> Path:
+    """What a stream holds, as a file that goes with the process."""
+    if not _folder:
+        _folder.append(tempfile.mkdtemp(prefix="scanfab-"))
+        atexit.register(shutil.rmtree, _folder[0], ignore_errors=True)
+    copy = Path(tempfile.mkdtemp(dir=_folder[0])) / name
+    try:
+        with open(copy, "wb") as file:
+            shutil.copyfileobj(stream, file, 1 << 20)
+    except BaseException:
+        shutil.rmtree(copy.parent, ignore_errors=True)
+        raise
     return copy
 
 

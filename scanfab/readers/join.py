@@ -101,6 +101,8 @@ def join_positions(
     rows = np.full(len(points), -1, dtype=np.int64)
     if len(grains.position) and len(points):
         rows = _grains_at(grains, points)
+        if grains.cell is None or not grains.cell.is_periodic:
+            _refuse_images(path, grains, rows.reshape(-1, 2), ends)
     return _join(
         path,
         rows.reshape(-1, 2),
@@ -109,6 +111,35 @@ def join_positions(
         lambda contact, end: f"ends at {ends[contact, end].tolist()}, where no grain is",
         len(grains.radius),
     )
+
+
+def _refuse_images(path: Path, grains: GrainTable, rows: IntArray, ends: FloatArray) -> None:
+    """
+    Ends at periodic images of grains are no walls.
+
+    An image has two coordinates in common with its grain (in a cell that is not tilted), and lies
+    at the distance of a contact; a wall's reference point does so by chance at most.
+    """
+    one = np.flatnonzero((rows < 0).sum(axis=1) == 1)
+    if len(one) == 0 or len(grains.radius) < 2:
+        return
+    lost = np.argmax(rows[one] < 0, axis=1)
+    partner = rows[one, 1 - lost]
+    point = ends[one, lost]
+    length = np.linalg.norm(point - ends[one, 1 - lost], axis=1)
+    near = SAME_PLACE * float(grains.radius.min())
+    image = np.zeros(len(one), dtype=bool)
+    for two in ([0, 1], [0, 2], [1, 2]):
+        distance, nearest = KDTree(grains.position[:, two]).query(point[:, two], k=2)
+        for k in range(2):
+            reach = grains.radius[partner] + grains.radius[nearest[:, k]]
+            other = (nearest[:, k] != partner) & (distance[:, k] < near)
+            image |= other & (length > 0.5 * reach) & (length < 1.05 * reach)
+    if image.sum() > 0.5 * len(one):
+        raise ReadError(
+            f"{path}: {image.sum()} contacts end at periodic images of grains, but the sample has "
+            f"no cell: name it with --cell LX LY LZ (and --periodic)"
+        )
 
 
 def count_walls(rows: IntArray, count: int) -> IntArray:
@@ -147,7 +178,7 @@ def _join(
         raise ReadError(
             f"{path}: contact {contact + 1} {describe(contact, end)}, which is not in the grain "
             f"file ({np.count_nonzero(wrong)} of {len(rows)} contacts): do both files belong to "
-            f"the same step?"
+            f"the same step? A periodic sample also needs its cell (--cell)"
         )
     both = ~unknown.any(axis=1)
     with_wall = rows[~both].max(axis=1)

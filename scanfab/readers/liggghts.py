@@ -124,6 +124,7 @@ class LiggghtsReader:
             return join_ids(path, grains, pairs, None, walls=False)
         if grains.id is None:
             raise ReadError(f"{path}: names grains by id, but the grain file has no ids")
+        _refuse_rounded_ids(path, block.values, grains)
         place, force = _given_places(path, options.contact_columns, block)
         if place is None:
             place = _pair_column(block.values, grains)
@@ -138,8 +139,10 @@ class LiggghtsReader:
                 f"belong to another step; or name the keywords of the compute with "
                 f'--contact-columns "pos id force ..."'
             )
-        _refuse_rounded_ids(path, block.values[:, place : place + 2])
-        ids = block.values[:, place : place + 2].astype(np.int64)
+        listed = block.values[:, place : place + 2]
+        if not (_are_whole(listed) and np.all(np.abs(listed) < 2.0**53)):
+            raise ReadError(f"{path}: expected ids in the columns {place + 1} and {place + 2}")
+        ids = listed.astype(np.int64)
         # the file has the force on the first grain
         on_second = None if force is None else -block.values[:, force : force + 3]
         return join_ids(path, grains, ids, on_second, walls=False)
@@ -231,9 +234,14 @@ def _are_ids(values: FloatArray, grains: GrainTable) -> bool:
     return _are_whole(values) and bool(np.mean(rows_of_ids(grains, values) >= 0) > MOST)
 
 
-def _refuse_rounded_ids(path: Path, ids: FloatArray) -> None:
-    """%g keeps six digits: from a million on ids are rounded."""
-    if ids.size and ids.max() >= 1e6 and np.all(ids[ids >= 1e6] % 10 == 0):
+def _refuse_rounded_ids(path: Path, values: FloatArray, grains: GrainTable) -> None:
+    """%g keeps six digits: from a million on ids may be rounded."""
+    assert grains.id is not None
+    longer = grains.id[grains.id >= 1_000_000]
+    digits = 10 ** (np.floor(np.log10(np.maximum(longer, 1))).astype(np.int64) - 5)
+    longer = longer[longer % digits != 0]
+    large = np.any(values >= 1e6, axis=0) & np.all(values == np.rint(values), axis=0)
+    if longer.size and large.any() and not np.isin(values[:, large], longer).any():
         raise ReadError(
             f"{path}: ids above 999999 are rounded to six digits, so contacts name wrong grains: "
             f'write them with dump_modify ... format "%.0f ..."'

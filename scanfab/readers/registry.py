@@ -8,7 +8,7 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 
-from scanfab.errors import ScanfabWarning, UnknownFormatError
+from scanfab.errors import ReadError, ScanfabWarning, UnknownFormatError
 from scanfab.readers.base import Reader
 from scanfab.readers.files import bare_name
 
@@ -47,7 +47,7 @@ def load_readers(points: tuple[EntryPoint, ...] | list[EntryPoint]) -> dict[str,
         package = point.dist.name if point.dist is not None else "unknown package"
         try:
             reader: Reader = point.load()()
-        except Exception as error:  # a foreign plugin may fail in any way
+        except (Exception, SystemExit) as error:  # a foreign plugin may fail in any way
             warnings.warn(
                 f"the reader {point.name!r} of {package} cannot be loaded: "
                 f"{type(error).__name__}: {error}",
@@ -77,17 +77,24 @@ def reader_named(name: str) -> Reader:
 def reader_for(path: Path) -> Reader | None:
     """The reader that knows a file by its content, else by its extension; None if none does."""
     readers = [installed.reader for installed in installed_readers().values()]
+    # a format that any program may write comes after the programs' own
+    readers.sort(key=lambda reader: bool(getattr(reader, "generic", False)))
     for reader in readers:
-        if reader.recognises(path):
-            return reader
+        try:
+            if reader.recognises(path):
+                return reader
+        except ReadError:
+            raise
+        except Exception as error:  # as above
+            raise ReadError(
+                f"{path}: the reader {reader.name!r} failed: {type(error).__name__}: {error}"
+            ) from error
     name = bare_name(path).lower()
     return next((r for r in readers if name.endswith(r.extensions) and _can_open(r, path)), None)
 
 
 def _can_open(reader: Reader, path: Path) -> bool:
     """An extension alone proves little: many programs write .txt."""
-    from scanfab.errors import ReadError
-
     try:
         return reader.kind(path) != "other"
     except ReadError:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import io
 import re
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,10 +20,12 @@ import numpy.typing as npt
 
 from scanfab.cell import Cell
 from scanfab.errors import ReadError
+from scanfab.packing import ContactList
 from scanfab.readers.base import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
 from scanfab.readers.columns import grain_table, has_radius
 from scanfab.readers.files import bare_name, first_bytes, plain
 from scanfab.readers.join import join_ids, join_positions
+from scanfab.readers.legacy import missing_values
 
 __all__ = ["Mesh", "VtkReader", "read_mesh"]
 
@@ -30,6 +33,8 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 VTK_VERTEX, VTK_POLY_VERTEX, VTK_LINE = 1, 2, 3
+# other kinds of VTK files are grids and indexes of files
+HOLDING_POINTS = ("PolyData", "POLYDATA", "UnstructuredGrid", "UNSTRUCTURED_GRID", "Xdmf")
 
 
 class Mesh(NamedTuple):
@@ -51,8 +56,9 @@ class VtkReader:
     """Reader plugin for VTK files of any origin."""
 
     name = "vtk"
-    description = "any VTK point cloud with a radius; contacts as lines (.vtk .vtp .vtu .xdmf)"
-    extensions: tuple[str, ...] = (".vtk", ".vtp", ".vtu", ".xdmf", ".xmf")
+    description = "any VTK point cloud with a radius; contacts as lines (also .pvd series)"
+    extensions: tuple[str, ...] = (".vtk", ".vtp", ".vtu", ".pvd", ".xdmf", ".xmf")
+    generic = True
     # whether one end of a contact may be a wall, which is not in the grain file
     walls = True
 
@@ -63,21 +69,23 @@ class VtkReader:
     def kind(self, path: Path) -> FileKind:
         """Lines are contacts, points without any other cells are grains."""
         form = _form(path)
-        if form in (None, "RectilinearGrid", "ImageData", "StructuredGrid"):
+        if form == "Collection":
+            return "index"
+        if form not in HOLDING_POINTS:
             return "other"
         mesh = read_mesh(path)
         if mesh.has_faces:
             return "other"
-        if len(mesh.lines):
-            return "contacts"
         if len(mesh.points) == 0:
             # an empty frame; VTK may have dropped its arrays
             return "grains" if b"radi" in plain(path).read_bytes().lower() else "other"
-        return "grains" if has_radius(list(mesh.point_arrays)) else "points"
+        if has_radius(list(mesh.point_arrays)):
+            return "grains"
+        return "contacts" if len(mesh.lines) else "points"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
-        """One; only its name may say which step it is."""
-        return [Snapshot(path)]
+        """One, and only its name may say which step it is; those that a ``.pvd`` lists."""
+        return self._listed(path) if _form(path) == "Collection" else [Snapshot(path)]
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         """Points and their arrays, with the box of LIGGGHTS' file beside it."""
@@ -85,7 +93,11 @@ class VtkReader:
         columns = {**mesh.point_arrays, "position": mesh.points}
         if len(mesh.points) == 0:
             columns["radius"] = np.zeros(0)
-        return grain_table(snapshot.path, columns, _box_beside(snapshot.path), options)
+        grains = grain_table(snapshot.path, columns, _box_beside(snapshot.path), options)
+        if len(mesh.lines) == 0:
+            return grains
+        # lines between the grains' own points
+        return grains._replace(contacts=ContactList(mesh.lines, force=self.force_on_second(mesh)))
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
@@ -99,9 +111,36 @@ class VtkReader:
             return join_ids(snapshot.path, grains, pairs, force, walls=self.walls)
         return join_positions(snapshot.path, grains, mesh.points[mesh.lines], force)
 
+    def _listed(self, index: Path) -> list[Snapshot]:
+        """The grain files of a ``.pvd``, in its order."""
+        try:
+            root = ElementTree.parse(plain(index)).getroot()
+            entries = [
+                (index.parent / entry.attrib["file"], float(entry.attrib["timestep"]))
+                for entry in root.iter("DataSet")
+            ]
+        except (ElementTree.ParseError, KeyError, ValueError) as error:
+            raise ReadError(f"{index}: cannot be read as a list of VTK files: {error}") from None
+        kinds: dict[str, FileKind] = {}
+        found = []
+        for path, time in entries:
+            # parts of one name hold the same; some are boxes and contacts
+            family = re.sub(r"\d+", "*", path.name)
+            kinds.setdefault(family, "other")
+            if kinds[family] == "other":
+                kinds[family] = self.kind(path)
+            if kinds[family] in ("grains", "points"):
+                found.append(Snapshot(path, step=_last_number(path), time=time))
+        return found
+
     def force_on_second(self, mesh: Mesh) -> FloatArray | None:
         """Force on the second grain, shape (M, 3); None: which one it acts on is not known."""
         return None
+
+
+def _last_number(path: Path) -> int | None:
+    numbers = re.findall(r"\d+", Path(bare_name(path)).stem)
+    return int(numbers[-1]) if numbers else None
 
 
 def read_mesh(path: Path) -> Mesh:
@@ -158,6 +197,10 @@ def _is_empty_legacy(file: Path) -> bool:
     return re.search(rb"^POINTS\s+0\s", first_bytes(file), re.MULTILINE) is not None
 
 
+def _is_ascii(file: Path) -> bool:
+    return re.search(rb"^ASCII\s*$", first_bytes(file), re.MULTILINE) is not None
+
+
 def _from_meshio(file: Path, form: str) -> Mesh:
     import meshio
 
@@ -170,6 +213,8 @@ def _from_meshio(file: Path, form: str) -> Mesh:
             mesh = reader.read(str(file))
     # meshio raises whatever its parsing meets, and exits for what it does not know
     except (Exception, SystemExit) as error:
+        if isinstance(error, ModuleNotFoundError) and error.name == "h5py":
+            raise _MeshioError("the data are HDF5: pip install 'scanfab[hdf5]'") from None
         raise _MeshioError(str(error) or type(error).__name__) from None
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = mesh.points
@@ -202,6 +247,9 @@ def _from_pyvista(path: Path, file: Path) -> Mesh:
     suffix = Path(bare_name(path)).suffix.lower()
     if first_bytes(path).startswith(b"# vtk"):
         suffix = ".vtk"
+        missing = missing_values(file) if _is_ascii(file) else None
+        if missing is not None:
+            raise _VtkError(f"the file is incomplete: {missing}")
     elif suffix not in (".vtp", ".vtu"):
         suffix = ".vtp" if _form(path) == "PolyData" else ".vtu"
     with _quiet_vtk(), pyvista.VtkErrorCatcher(send_to_logging=False) as caught:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import re
 import struct
+import warnings
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.cell import Cell
-from scanfab.errors import ReadError
+from scanfab.errors import PackingError, ReadError
 from scanfab.readers.base import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
 from scanfab.readers.columns import grain_table
 from scanfab.readers.files import first_bytes, plain
@@ -33,6 +34,7 @@ class YadeReader(VtkReader):
     name = "yade"
     description = "YADE export.VTKExporter, VTKRecorder, export.text, export.textExt"
     extensions = (".vtk", ".vtu", ".vtp", ".txt")
+    generic = False
 
     def recognises(self, path: Path) -> bool:
         """YADE's own first lines, or the arrays of VTKRecorder's interactions."""
@@ -52,7 +54,8 @@ class YadeReader(VtkReader):
         path = snapshot.path
         lines = first_bytes(path, 1 << 14).decode("utf-8", "replace").splitlines()
         values = _numbers(path)
-        names, cell = _text_columns(path, lines, values.shape[1])
+        names, cell = _text_columns(path, lines, values.shape[1] if values.size else None)
+        values = values.reshape(-1, len(names))
         columns = dict(zip(names, values.T, strict=True))
         return grain_table(path, columns, cell, options)
 
@@ -81,21 +84,23 @@ def _is_text(path: Path) -> bool:
 
 def _numbers(path: Path) -> FloatArray:
     try:
-        values: FloatArray = np.loadtxt(plain(path), dtype=np.float64, comments="#", ndmin=2)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # numpy's, of a file without rows: an empty frame
+            values: FloatArray = np.loadtxt(plain(path), dtype=np.float64, comments="#", ndmin=2)
     except ValueError as error:
         reason = str(error).replace("could not convert string", "expected a number, found")
         raise ReadError(f"{path}: {reason}") from None
     return values
 
 
-def _text_columns(path: Path, lines: list[str], count: int) -> tuple[list[str], Cell | None]:
-    """Names of the columns and the cell, from the first lines."""
+def _text_columns(path: Path, lines: list[str], count: int | None) -> tuple[list[str], Cell | None]:
+    """Names of the columns and the cell, from the first lines; count is None without rows."""
     head = lines[0]
     if head.startswith("##PERIODIC::"):
         try:
             edges = [float(word) for word in head.removeprefix("##PERIODIC::").split()]
             cell = Cell(edges)
-        except (ValueError, IndexError):
+        except (ValueError, PackingError):
             raise ReadError(f"{path}, line 1: expected three lengths, found {head!r}") from None
         names = ["x", "y", "z", "r", "clumpId"][:count]
     else:
@@ -104,8 +109,8 @@ def _text_columns(path: Path, lines: list[str], count: int) -> tuple[list[str], 
         if names[-1] == "attrs":
             named = re.fullmatch(r"#\s*(x y z r( .*)?)", lines[1]) if len(lines) > 1 else None
             names = named[1].split() if named else names[:-1]
-            names += [f"attr{number}" for number in range(1, count - len(names) + 1)]
-    if len(names) != count:
+            names += [f"attr{number}" for number in range(1, (count or 0) - len(names) + 1)]
+    if count is not None and len(names) != count:
         raise ReadError(f"{path}: the first line names {len(names)} columns, the rows have {count}")
     return names, cell
 

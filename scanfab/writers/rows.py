@@ -37,7 +37,7 @@ class CsvWriter:
             self._started = True
         self._writer.writerow(
             [
-                "" if value is None else repr(value) if isinstance(value, float) else value
+                "" if value is None else repr(float(value)) if isinstance(value, float) else value
                 for value in astuple(row)
             ]
         )

@@ -1,10 +1,5 @@
 """The depth-ordered sweep equals its slow twin on random packings of every awkward kind."""
 
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,9 +9,9 @@ from scanfab.kernels import sweep as kernel
 from scanfab.scan import line_frames
 from tests import naive
 from tests.lattices import ball_points, poisson_spheres, rotation
+from tests.uncompiled import run_uncompiled
 
 RUNS_OF_A_KIND = 300
-NO_WINDOW = np.zeros((0, 3)), np.zeros(0)
 
 
 def scattered(random):
@@ -56,7 +51,7 @@ def covering_the_window(random):
 
 
 def nothing(random):
-    return NO_WINDOW
+    return np.zeros((0, 3)), np.zeros(0)
 
 
 def lattice_points(random):
@@ -137,8 +132,8 @@ def check_random_packing(kind, random):
     )
 
 
-def solve_with_suspects(spheres, frame, offset, spacing, window, cutoff=0.0):
-    """The kernel's steps for all spheres: number of suspect lines, and the whole's kept gaps."""
+def suspect_lines(spheres, frame, offset, spacing, window):
+    """How many lines the sweep of all spheres leaves to be solved again."""
     position, radius = spheres
     u, v, depth = (position @ frame.T).T
     order = np.argsort(depth)
@@ -146,7 +141,8 @@ def solve_with_suspects(spheres, frame, offset, spacing, window, cutoff=0.0):
     grid = kernel.cover(-reach, reach, -reach, reach, offset, spacing)
     state = kernel.line_state(grid, window)
     sorted_spheres = kernel.Spheres(u[order], v[order], depth[order], radius[order])
-    return kernel.sweep(sorted_spheres, grid, state, cutoff, np.zeros(kernel.TALLY_SIZE))
+    tally = np.zeros(kernel.TALLY_SIZE)
+    return kernel.sweep(sorted_spheres, np.arange(len(order)), grid, state, 1e-300, tally)
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
@@ -185,14 +181,14 @@ def test_a_chord_that_reaches_back_past_the_last_gap_makes_its_line_suspect():
     position = np.array([[0.0, 0, 0], [0, 0, 1.0], [0, 0, 1.05]])
     spheres = position, np.array([0.2, 0.2, 2.0])
     frame, offset = np.eye(3), np.array([0.3, 0.4])
-    assert solve_with_suspects(spheres, frame, offset, 0.05, 1.5) > 20
+    assert suspect_lines(spheres, frame, offset, 0.05, 1.5) > 20
     assert_fast_equals_naive(spheres, np.zeros(3, bool), frame, offset, 0.05, [0.0, 0.3], 1.5)
 
 
 def test_only_lines_that_need_it_are_suspect():
     """Grains in a row with gaps between them: each chord lies behind the one before."""
     spheres = np.array([[0.0, 0, z] for z in range(5)]), np.full(5, 0.4)
-    assert solve_with_suspects(spheres, np.eye(3), np.array([0.3, 0.4]), 0.05, 1.5) == 0
+    assert suspect_lines(spheres, np.eye(3), np.array([0.3, 0.4]), 0.05, 1.5) == 0
 
 
 @pytest.mark.parametrize("kind", [overlapping, size_ratio_fifty, covering_the_window])
@@ -202,7 +198,7 @@ def test_random_packings_have_suspect_lines(kind):
     for seed in range(50):
         random = np.random.default_rng(seed)
         spheres = kind(random)
-        found += solve_with_suspects(spheres, rotation(random), random.random(2), 0.2, 1.0) > 0
+        found += suspect_lines(spheres, rotation(random), random.random(2), 0.2, 1.0) > 0
     assert found >= 10
 
 
@@ -253,17 +249,3 @@ def test_sweep_equals_the_slow_twin_uncompiled():
         "here.test_a_chord_that_reaches_back_past_the_last_gap_makes_its_line_suspect()\n"
     )
     run_uncompiled(code)
-
-
-def run_uncompiled(code):
-    """Run Python code in a process without the compiler; it must end well."""
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1"},
-        cwd=Path(__file__).parents[2],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr

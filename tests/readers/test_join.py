@@ -109,9 +109,9 @@ def test_rounding_at_a_face_does_not_part_an_end_from_its_grain(error):
     np.testing.assert_array_equal(joined.contacts.pairs, [[3, 0]])
 
 
-def test_without_a_cell_nothing_is_wrapped():
-    joined = by_places([[POSITION[3], [7.6, 0, 0]]])
-    np.testing.assert_array_equal(joined.wall_contacts, [0, 0, 0, 1])
+def test_without_a_cell_the_image_of_a_grain_is_no_wall():
+    with pytest.raises(ReadError, match=r"1 contacts end at periodic images of grains.*--cell"):
+        by_places([[POSITION[3], [7.6, 0, 0]]])
 
 
 def test_no_grains_at_all_are_an_error_of_the_contact():

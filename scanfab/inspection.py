@@ -1,0 +1,95 @@
+"""What a reader sees in each frame of a series, with nothing computed from it."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from scanfab.pipeline import boundary_hint, chosen_frames, classify
+from scanfab.series import Frame, Series
+from scanfab.settings import Settings
+from scanfab.variants import VARIANTS, Sample
+
+__all__ = ["FrameReport", "inspect_series"]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class FrameReport:
+    """One frame as the reader sees it; lengths in the dump's unit."""
+
+    source: str
+    frame: int
+    step: int | None
+    time: float | None
+    format: str
+    grains: int
+    boundary: int
+    radius_min: float | None
+    radius_max: float | None
+    contacts: int
+    """All that are listed (or found by geometry), those with boundary particles included."""
+    contacts_from: str
+    rattlers: int
+    coordination: float | None
+    cell: list[list[float]] | None
+    periodic: list[bool] | None
+    columns: list[str]
+    warnings: list[str]
+
+
+def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
+    """
+    Read the chosen frames and tell what is in them.
+
+    Parameters
+    ----------
+    series : Series
+        The frames.
+    settings : Settings
+        ``boundary``, ``frames``, ``min_contacts`` and ``contact_tolerance`` count.
+
+    Raises
+    ------
+    ScanfabError
+        If a frame cannot be read.
+    """
+    chosen = chosen_frames(series, settings.frames)
+    for number, frame in enumerate(series):
+        if number in chosen:
+            yield _report(series.name, number, frame, settings)
+        if number >= chosen.stop - 1:
+            break
+
+
+def _report(source: str, number: int, frame: Frame, settings: Settings) -> FrameReport:
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        sample = classify(frame.read(), settings)
+    packing, grains = sample.packing, sample.grains
+    radius = packing.radius[grains]
+    cell = packing.cell
+    return FrameReport(
+        source=source,
+        frame=number,
+        step=packing.step,
+        time=packing.time,
+        format=frame.reader.name,
+        grains=int(grains.sum()),
+        boundary=int(sample.boundary.sum()),
+        radius_min=float(radius.min()) if radius.size else None,
+        radius_max=float(radius.max()) if radius.size else None,
+        contacts=len(sample.contacts),
+        contacts_from=sample.contacts.source,
+        rattlers=int(sample.rattlers.sum()),
+        coordination=sample.coordination(VARIANTS["a"], None),
+        cell=None if cell is None else cell.vectors.tolist(),
+        periodic=None if cell is None else list(cell.periodic),
+        columns=["id", "x", "y", "z", "radius", *packing.columns],
+        warnings=[str(one.message) for one in caught] + _hints(sample, settings),
+    )
+
+
+def _hints(sample: Sample, settings: Settings) -> list[str]:
+    hint = boundary_hint(sample, settings)
+    return [hint] if hint else []

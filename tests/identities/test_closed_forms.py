@@ -1,0 +1,139 @@
+"""Mean lengths of void segments that are known in closed form."""
+
+import numpy as np
+import pytest
+
+from tests.lattices import Spheres, poisson_spheres, separate_spheres
+from tests.scanning import Z, fabric, isotropic, mean_lengths, ratio, scan_along, solids_of
+
+AXES = np.array([[0, 0, 1], [1, 0, 0], [0.6, 0, 0.8], [-0.48, 0.6, 0.64]])
+NOTHING = Spheres(np.zeros((0, 3)), np.zeros(0))
+
+
+def touching_pair(distance=2.0, radius=1.0):
+    return Spheres(np.array([[0.0, 0, 0], [0, 0, distance]]), np.full(2, radius))
+
+
+@pytest.mark.parametrize("cutoff", [0.0, 0.7, 1.6])
+def test_empty_window(cutoff):
+    """ℓ = (4/3)(R³ - h³)/(R² - h²), h = c/2."""
+    sums = scan_along(solids_of(NOTHING, 1.0), AXES, 0.02, cutoff, replicates=32)
+    h = cutoff / 2
+    assert mean_lengths(sums, "c").agrees(4 / 3 * (1 - h**3) / (1 - h**2))
+
+
+def test_empty_window_keeps_nothing_at_its_diameter():
+    sums = scan_along(solids_of(NOTHING, 1.0), AXES, 0.02, 2.0)
+    assert sums.kept("c")[1].sum() == 0
+    assert sums.void[:, 2].sum() > 0
+
+
+def test_one_sphere_in_a_concentric_window():
+    """ℓ = (4/3)(R³ - r³)/(R² + r²) in every direction."""
+    solids = solids_of(Spheres(np.zeros((1, 3)), np.array([0.6])), 1.0)
+    expected = 4 / 3 * (1 - 0.6**3) / (1 + 0.6**2)
+    assert mean_lengths(scan_along(solids, AXES, 0.02, replicates=32), "c").agrees(expected)
+    assert isotropic(fabric(solids, spacing=0.05, cutoff=0.0))
+
+
+@pytest.mark.parametrize(
+    "spheres",
+    [
+        separate_spheres(np.random.default_rng(0), 60, 6.0),
+        separate_spheres(np.random.default_rng(1), 5, 6.0, radii=(0.3, 2.5)),
+        Spheres(np.array([[0.0, 0, z] for z in range(-4, 5)]), np.full(9, 0.5)),
+    ],
+    ids=["sixty", "five", "a row along z"],
+)
+def test_spheres_without_overlap_in_a_window(spheres):
+    """ℓ(n) = (V_window - ΣV)/(πR² + Σπr²) in every direction, G = I/3 for any arrangement."""
+    window = 6.0
+    solids = solids_of(spheres, window)
+    void = 4 / 3 * np.pi * (window**3 - np.sum(spheres.radius**3))
+    expected = void / (np.pi * (window**2 + np.sum(spheres.radius**2)))
+    assert mean_lengths(scan_along(solids, AXES, 0.1, replicates=32), "c").agrees(expected)
+    assert isotropic(fabric(solids, spacing=0.25, cutoff=0.0, replicates=range(64)))
+
+
+class Lens:
+    """The common part of the unit spheres at 0 and (0, 0, 1.2)."""
+
+    distance = 1.2
+    spheres = touching_pair(distance, 1.0).moved([0, 0, -0.6])
+    height = 1.0 - distance / 2
+    volume = 2 * np.pi * height**2 * (3 - height) / 3
+    # seen along the axis a disc, from the side what two discs share, in the mean a quarter
+    # of the surface (Cauchy)
+    along = np.pi * (1 - 0.6**2)
+    across = 2 * np.arccos(0.6) - 2 * 0.6 * np.sqrt(1 - 0.6**2)
+    mean = 2 * (2 * np.pi * height) / 4
+
+    @classmethod
+    def mean_length(cls, shadow, window=2.0):
+        void = 4 / 3 * np.pi * (window**3 - 2) + cls.volume
+        return void / (np.pi * (window**2 + 2) - shadow)
+
+
+@pytest.mark.parametrize(
+    ("axis", "shadow"), [((0, 0, 1), Lens.along), ((1, 0, 0), Lens.across), ((0.6, 0.8, 0), None)]
+)
+def test_two_overlapping_spheres(axis, shadow):
+    """V_void/(πR² + 2πr² - A(n)), A the projected area of the common lens."""
+    sums = scan_along(solids_of(Lens.spheres, 2.0), [axis], 0.03, replicates=32)
+    expected = Lens.mean_length(Lens.across if shadow is None else shadow)
+    assert mean_lengths(sums, "c").agrees(expected)
+
+
+def test_two_overlapping_spheres_in_all_directions():
+    """The mean length over all directions holds the lens' mean shadow; α_axial is positive."""
+    result = fabric(
+        solids_of(Lens.spheres, 2.0), "lebedev:17", spacing=0.05, cutoff=0.0, replicates=range(32)
+    )
+    assert result.mean_length == pytest.approx(Lens.mean_length(Lens.mean), rel=3e-4)
+    # A is the larger along the axis, and so is ℓ
+    assert result.tensor.axial((0, 0, 1)) > 10 * result.axial_error((0, 0, 1))
+
+
+@pytest.mark.parametrize(
+    ("distance", "cutoff"), [(2.0, 0.0), (2.0, 0.5), (2.0, 1.9), (3.0, 0.0), (3.0, 1.5), (2.6, 2.0)]
+)
+def test_two_equal_spheres_whole_along_their_axis(distance, cutoff):
+    """ℓ = d - 4h/3, h = min(r, (d - c)/2)."""
+    sums = scan_along(solids_of(touching_pair(distance)), Z, 0.01, cutoff, replicates=32)
+    h = min(1.0, (distance - cutoff) / 2)
+    # the few lines between touching spheres that a long cut-off leaves
+    assert mean_lengths(sums, "a").agrees(distance - 4 * h / 3)
+
+
+def test_two_touching_spheres_at_their_radius_as_the_cutoff():
+    """ℓ = 2(r + c)/3."""
+    sums = scan_along(solids_of(touching_pair()), Z, 0.01, 1.0, replicates=32)
+    assert mean_lengths(sums, "a").agrees(2 * (1 + 1) / 3)
+
+
+def test_rattlers_between_the_first_and_the_last_solid_are_void():
+    """In b the removed grain at the end is no solid either: only the gap in the middle is left."""
+    row = Spheres(np.array([[0.0, 0, 3.0 * k] for k in range(4)]), np.ones(4))
+    removed = np.array([False, True, False, True])
+    sums = scan_along(solids_of(row, removed=removed), Z, 0.02, replicates=32)
+    assert mean_lengths(sums, "a").agrees(3 - 4 / 3)
+    assert mean_lengths(sums, "b").agrees(6 - 4 / 3)
+    assert np.all(sums.kept("a")[1] == 3 * sums.kept("b")[1])
+
+
+@pytest.mark.parametrize("cutoff", [0.0, 0.5, 1.5])
+def test_poisson_spheres_in_a_clipped_window(cutoff):
+    """ℓ = c + A1/(A0 + βA1): union, clipping and cut-off at once."""
+    window, density = 8.0, 0.08
+    beta = density * np.pi * 13 / 12  # <r²> of radii uniform in [0.5, 1.5]
+    a0 = 1 - cutoff**2 / (4 * window**2)
+    a1 = 4 * window / 3 - cutoff + cutoff**3 / (12 * window**2)
+    length, segments = [], []
+    for seed in range(3000):
+        spheres = poisson_spheres(np.random.default_rng([seed, 7]), density, window)
+        sums = scan_along(solids_of(spheres, window), AXES, 0.8, cutoff, replicates=1, seed=seed)
+        length.append(sums.kept("c")[0].sum())
+        segments.append(sums.kept("c")[1].sum())
+    estimate = ratio(np.array(length), np.array(segments))
+    assert estimate.error < 1.5e-3 * estimate.value
+    assert estimate.agrees(cutoff + a1 / (a0 + beta * a1), within=2e-3)

@@ -1,0 +1,127 @@
+"""The RV in a periodic cell: it sees what the repeated packing shows, wherever the cell begins."""
+
+from itertools import product
+
+import numpy as np
+import pytest
+
+from scanfab import Cell, Packing, compute, find_contacts
+from tests.lattices import Spheres
+
+EDGES = np.array([6.0, 5.0, 7.0])
+RV = {"rv_radius": 2.0, "variants": "cd"}
+LOOK = {"directions": "lebedev:9", "spacing": 0.1, "cutoff": 0.2, **RV}
+SAME = ("grains", "rattlers", "contacts", "lines", "segments")
+CLOSE = ("coordination", "solid_fraction", "mean_length", "gvs_xx", "gvs_xy", "gvs_yz", "alpha_vs")
+CLOSE += ("alpha_vs_axial", "alpha_vs_axial_se", "gc_xx", "gc_zz", "gc_xz", "alpha_c_axial_se")
+
+
+@pytest.fixture(scope="module")
+def spheres():
+    """Loose enough to have rattlers, with grains of up to half the thinnest edge."""
+    random = np.random.default_rng(8)
+    radius = np.append(random.uniform(0.25, 0.6, 110), [1.2, 0.9])
+    return Spheres(random.random((112, 3)) * EDGES, radius)
+
+
+def table(spheres, center, origin=(0.0, 0, 0), periodic=(True, True, True)):
+    packing = Packing(*spheres, cell=Cell(EDGES, periodic, origin))
+    return compute(packing, rv_center=tuple(np.asarray(center, dtype=float)), **LOOK)
+
+
+def repeated(spheres, periodic=(True, True, True)):
+    """The packing as an open one, with the copies around it."""
+    shifts = list(product(*([-1, 0, 1] if repeats else [0] for repeats in periodic)))
+    position = np.concatenate([spheres.position + shift * EDGES for shift in np.array(shifts)])
+    return Packing(position, np.tile(spheres.radius, len(shifts)))
+
+
+def assert_same_tables(one, other):
+    for name in SAME:
+        assert np.array_equal(one[name], other[name]), name
+    for name in CLOSE:
+        assert one[name] == pytest.approx(other[name], rel=1e-9, abs=1e-12), name
+
+
+@pytest.mark.parametrize(
+    "periodic", [(True, True, True), (True, True, False), (False, True, False)]
+)
+def test_periodic_rv_equals_the_rv_of_the_repeated_packing(spheres, periodic):
+    """Grains that reach in through a face are solids; rattlers and contacts are the same too."""
+    center = np.array([2.5, 2.3, 4.6])
+    here = table(spheres, center, periodic=periodic)
+    there = compute(repeated(spheres, periodic), rv_center=tuple(center), **LOOK)
+    assert here["rattlers"][1] > 0
+    assert_same_tables(here, there)
+
+
+def test_grains_outside_the_cell_reach_into_the_rv(spheres):
+    """Without the images the scan would differ: the comparison above is not empty."""
+    center = np.array([2.01, 2.01, 2.01])
+    here = table(spheres, center)
+    alone = compute(Packing(*spheres), rv_center=tuple(center), **LOOK)
+    assert here["segments"][0] != alone["segments"][0]
+    assert here["solid_fraction"][0] > alone["solid_fraction"][0]
+
+
+def test_rattler_that_reaches_in_through_a_face_is_void_in_d():
+    """The only solid of the RV is the image of a grain without contacts."""
+    rattler = Spheres(np.array([[5.9, 2.5, 3.5]]), np.array([0.9]))
+    packing = Packing(*rattler, cell=Cell(EDGES))
+    options = {**LOOK, "rv_radius": 1.4, "rv_center": (1.5, 2.5, 3.5)}
+    c, d = compute(packing, **options)
+    assert c.solid_fraction > 0.02
+    assert d.solid_fraction == pytest.approx(0.0, abs=1e-12)
+    assert (c.grains, d.grains) == (0, 0)
+
+
+def test_every_grain_and_the_rv_shifted_by_one_vector(spheres):
+    """Grains wrap through faces, the RV stays in the cell: nothing changes."""
+    before = table(spheres, [2.5, 2.3, 2.6])
+    shift = np.array([0.9, 0.4, 2.1])
+    after = table(spheres.moved(shift), np.array([2.5, 2.3, 2.6]) + shift)
+    assert_same_tables(before, after)
+
+
+def test_cell_wrapped_elsewhere(spheres):
+    """Another corner of the same repeated packing, the RV in place."""
+    center = np.array([2.5, 2.3, 2.6])
+    before = table(spheres, center)
+    assert_same_tables(before, table(spheres, center, origin=(-0.7, 0.2, -2.2)))
+
+
+def test_grains_written_outside_the_cell(spheres):
+    """By whole turns of the cell, as unwrapped dumps have them."""
+    turns = np.random.default_rng(0).integers(-3, 4, (112, 3))
+    center = np.array([2.5, 2.3, 2.6])
+    unwrapped = Spheres(spheres.position + turns * EDGES, spheres.radius)
+    assert_same_tables(table(spheres, center), table(unwrapped, center))
+
+
+def test_every_grain_shifted_under_an_rv_at_rest(spheres):
+    """The RV sees another part of a homogeneous sample: solid fraction and ℓ scatter, no more."""
+    shifts = np.random.default_rng(1).random((24, 3)) * EDGES
+    rows = [table(spheres.moved(shift), [3.0, 2.5, 3.5])[0] for shift in shifts]
+    fractions = np.array([row.solid_fraction for row in rows])
+    # the mean over all places is the solid fraction of the cell
+    volume = np.prod(EDGES)
+    points = np.random.default_rng(2).random((60_000, 3)) * EDGES
+    cell = Cell(EDGES)
+    solid = np.zeros(len(points), bool)
+    for centre, radius in zip(spheres.position, spheres.radius, strict=True):
+        branch = points - centre
+        branch = branch + cell.nearest_image(branch) @ cell.vectors
+        solid |= np.linalg.norm(branch, axis=1) < radius
+    assert 4 / 3 * np.pi * np.sum(spheres.radius**3) / volume > solid.mean()  # they overlap
+    error = np.hypot(fractions.std() / np.sqrt(24), np.sqrt(0.25 / 60_000))
+    assert abs(fractions.mean() - solid.mean()) < 4 * error
+
+
+def test_contacts_through_faces_are_found_from_the_inside(spheres):
+    """Each contact of the cell once: half of those that the repeated packing's centre has."""
+    packing = find_contacts(Packing(*spheres, cell=Cell(EDGES)))
+    around = find_contacts(repeated(spheres))
+    ends = around.contacts.pairs
+    middle = 13 * 112
+    own = (ends >= middle) & (ends < middle + 112)
+    assert 2 * len(packing.contacts) == own.sum()

@@ -1,0 +1,110 @@
+"""An auto scan goes on until every variant meets the tolerance, and no further than needed."""
+
+import numpy as np
+import pytest
+
+from scanfab import (
+    Packing,
+    ScanfabWarning,
+    Settings,
+    adaptive,
+    compute,
+    find_contacts,
+    scan_lines,
+)
+from scanfab.plan import REPLICATES, make_plan
+from scanfab.variants import Sample
+from tests.lattices import shaken_cubic
+from tests.scanning import solids_of
+
+
+@pytest.fixture(scope="module")
+def packing():
+    return find_contacts(Packing(*shaken_cubic(np.random.default_rng(0), 6)))
+
+
+@pytest.mark.parametrize("options", [{}, {"directions": 30}, {"spacing": "0.4rmin"}])
+@pytest.mark.parametrize("tolerance", [5e-3, 4e-4])
+def test_auto_scan_meets_the_tolerance_for_every_variant(packing, options, tolerance):
+    table = compute(packing, tolerance=tolerance, **options)
+    assert len(table) == 4
+    assert table["alpha_vs_axial_se"].max() <= tolerance
+
+
+def test_auto_scan_serves_all_variants_with_the_same_lines(packing):
+    table = compute(packing, tolerance=4e-4)
+    assert len(set(table["replicates"])) == 1
+    assert table["replicates"][0] > REPLICATES
+
+
+def test_rounds_of_an_auto_scan_never_draw_the_same_lines_again(packing):
+    """Together they are the scan of as many replicates, numbered from 0."""
+    centred = Packing(packing.position - 3.0, packing.radius)
+    solids = solids_of(centred, 2.0)
+    settings = Settings.make(variants="c", tolerance=4e-4, workers=1, cutoff=0.4)
+    plan = make_plan(settings, Sample(find_contacts(centred), np.zeros(len(packing), bool)))
+    sums, plan = adaptive.scan_to_tolerance(solids, plan, settings)
+    again = scan_lines(
+        solids,
+        plan.rule,
+        spacing=plan.spacing,
+        cutoff=plan.cutoff,
+        variants="c",
+        replicates=range(sums.replicates),
+    )
+    assert sums.replicates > REPLICATES
+    assert np.array_equal(sums.axes, again.axes)
+    assert np.array_equal(sums.length, again.length)
+
+
+def test_auto_scan_does_not_much_more_than_it_must(packing):
+    """The worst variant's error is not far below the tolerance."""
+    table = compute(packing, tolerance=4e-4)
+    assert table["alpha_vs_axial_se"].max() > 2e-4
+
+
+def test_smaller_tolerance_takes_more_replicates(packing):
+    counts = [
+        compute(packing, tolerance=t, variants="c")["replicates"][0] for t in (1e-2, 4e-4, 2e-4)
+    ]
+    assert counts[0] < counts[1] < counts[2]
+
+
+def test_auto_directions_takes_more_axes_and_keeps_spacing_and_replicates(packing):
+    options = {"spacing": 0.2, "variants": "c"}
+    coarse, fine = (compute(packing, tolerance=t, **options)[0] for t in (1.0, 4e-4))
+    assert fine.directions > coarse.directions
+    assert fine.replicates == coarse.replicates
+    assert fine.spacing == coarse.spacing == pytest.approx(0.2)
+
+
+def test_tolerance_does_not_matter_to_a_fixed_scan(packing):
+    options = {"spacing": 0.2, "directions": 20, "variants": "c"}
+    strict, loose = (compute(packing, tolerance=t, **options) for t in (1e-6, 1.0))
+    assert strict.rows == loose.rows
+
+
+def test_auto_scan_looks_at_the_loading_axis(packing):
+    tolerance = 4e-4
+    table = compute(packing, tolerance=tolerance, axis=(1.0, 1.0, 0.0))
+    assert table["alpha_vs_axial_se"].max() <= tolerance
+
+
+@pytest.mark.parametrize(
+    ("limit", "value", "options"),
+    [("MAX_REPLICATES", 32, {}), ("MAX_DIRECTIONS", 30, {"spacing": 0.3})],
+)
+def test_scan_that_stops_short_of_its_tolerance_says_so(
+    packing, monkeypatch, limit, value, options
+):
+    monkeypatch.setattr(adaptive, limit, value)
+    with pytest.warns(ScanfabWarning, match="stopped before the tolerance 1e-05 was met"):
+        row = compute(packing, tolerance=1e-5, variants="c", **options)[0]
+    assert row.alpha_vs_axial_se > 1e-5
+    assert row.alpha_vs is not None
+
+
+def test_default_settings_ask_for_the_tolerance():
+    assert Settings.make().tolerance == 1e-4
+    assert Settings.make().spacing is None
+    assert Settings.make().directions is None

@@ -1,0 +1,195 @@
+"""Which particles are boundary: every operator, errors that help, and the class that encloses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scanfab.boundary import BoundaryRule, enclosing_class, select_boundary
+from scanfab.errors import SettingsError
+from scanfab.packing import Packing
+from scanfab.pipeline import compute
+
+COUNT = 6
+
+
+@pytest.fixture
+def packing():
+    """Six grains with the ids 10 to 60 and some columns."""
+    position = np.column_stack([np.arange(COUNT) * 3.0, np.zeros(COUNT), np.zeros(COUNT)])
+    return Packing(
+        position,
+        np.linspace(0.5, 1.0, COUNT),
+        id=[10, 20, 30, 40, 50, 60],
+        columns={
+            "type": [1, 1, 2, 2, 3, 3],
+            "c_ca[1]": [0.0, 1, 2, 3, 4, 5],
+            "element": ["Si", "O", "O", "O", "O", "Si"],
+            "v": position,
+        },
+    )
+
+
+def chosen(packing, *expressions):
+    rules = [BoundaryRule.parse(text) for text in expressions]
+    return packing.id[select_boundary(packing, rules)].tolist()
+
+
+@pytest.mark.parametrize(
+    ("expression", "ids"),
+    [
+        ("type=2", [30, 40]),
+        ("type==2", [30, 40]),
+        ("type = 2", [30, 40]),
+        ("  type=2  ", [30, 40]),
+        ("type!=2", [10, 20, 50, 60]),
+        ("type=1,3", [10, 20, 50, 60]),
+        ("type!=1,3", [30, 40]),
+        ("id>40", [50, 60]),
+        ("id>=40", [40, 50, 60]),
+        ("id<20", [10]),
+        ("id<=20", [10, 20]),
+        ("id=20..40", [20, 30, 40]),
+        ("id=40..", [40, 50, 60]),
+        ("id=..20", [10, 20]),
+        ("id!=20..", [10]),
+        ("id=10,30..40,60", [10, 30, 40, 60]),
+        ("id=20.0", [20]),
+        ("radius>0.95", [60]),
+        ("radius>=1e0", [60]),
+        ("x<4", [10, 20]),
+        ("x>-1e3", [10, 20, 30, 40, 50, 60]),
+        ("c_ca[1]=4..5", [50, 60]),
+        ("c_ca[1]=-1..1", [10, 20]),
+        ("type=9", []),
+    ],
+)
+def test_expressions_select(packing, expression, ids):
+    if ids is None:
+        with pytest.raises(SettingsError):
+            chosen(packing, expression)
+    else:
+        assert chosen(packing, expression) == ids
+
+
+def test_expressions_are_joined_by_or(packing):
+    assert chosen(packing, "type=2", "id=10", "x>14") == [10, 30, 40, 60]
+
+
+def test_without_expressions_nothing_is_boundary(packing):
+    assert chosen(packing) == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "type",
+        "type=",
+        "=2",
+        "type=two",
+        "type=1,,2",
+        "type=1,",
+        "type>1,2",
+        "type>=1..2",
+        "type=1..2..3",
+        "type 2",
+        "type<>2",
+        "type=1;2",
+    ],
+)
+def test_other_texts_are_errors_that_show_what_is_expected(text):
+    with pytest.raises(SettingsError, match=r"boundary: expected COLUMN=VALUE.*found") as error:
+        BoundaryRule.parse(text)
+    assert repr(text) in str(error.value)
+
+
+def test_a_range_runs_upwards():
+    with pytest.raises(SettingsError, match="boundary: "):
+        BoundaryRule.parse("id=40..20")
+
+
+def test_a_missing_column_is_an_error_that_lists_the_others(packing):
+    message = r"no column 'mask'; the columns are id, radius, x, y, z, type, c_ca\[1\], element"
+    with pytest.raises(SettingsError, match=message):
+        chosen(packing, "mask=2")
+
+
+def test_a_column_of_words_is_an_error(packing):
+    with pytest.raises(SettingsError, match="the column 'element' does not hold numbers"):
+        chosen(packing, "element=2")
+
+
+def test_a_column_of_vectors_is_no_column(packing):
+    with pytest.raises(SettingsError, match="no column 'v'"):
+        chosen(packing, "v>1")
+
+
+def test_selecting_everything_in_every_frame_is_an_error_that_repeats_the_expressions(packing):
+    message = "type=1 or type>1 selects all particles of every frame: no grain is left"
+    with pytest.raises(SettingsError, match=message):
+        compute(packing, boundary=["type=1", "type>1"])
+
+
+def test_no_particles_select_nothing():
+    empty = Packing(np.zeros((0, 3)), np.zeros(0), columns={"type": []})
+    assert chosen(empty, "type=1") == []
+
+
+def test_the_radius_is_that_of_the_grains_whatever_the_file_calls_it():
+    packing = Packing([[0, 0, 0], [5, 0, 0]], [1.0, 2.0], columns={"radius": [9.0, 9.0]})
+    assert chosen(packing, "radius>1.5") == [1]
+
+
+# the class that encloses
+
+
+def cloud(shell, **columns):
+    random = np.random.default_rng(1)
+    inner = random.uniform(-1, 1, (200, 3)) * 0.5
+    return Packing(np.vstack([inner, shell]), 0.01, columns=columns)
+
+
+def sphere_shell(count=150):
+    random = np.random.default_rng(2)
+    points = random.normal(size=(count, 3))
+    return points / np.linalg.norm(points, axis=1, keepdims=True)
+
+
+def box_shell(count=150):
+    random = np.random.default_rng(2)
+    points = random.uniform(-1, 1, (count, 3))
+    points[np.arange(count), random.integers(0, 3, count)] = random.choice([-1, 1], count)
+    return points
+
+
+@pytest.mark.parametrize("shell", [sphere_shell(), box_shell()])
+@pytest.mark.parametrize("name", ["type", "mask", "Type", "matId", "materialId"])
+def test_a_class_that_encloses_the_rest_is_named(shell, name):
+    values = np.r_[np.ones(200), np.full(len(shell), 3)]
+    assert enclosing_class(cloud(shell, **{name: values})) == f"{name}=3"
+
+
+def test_classes_that_are_mixed_enclose_nothing():
+    values = np.arange(350) % 2
+    assert enclosing_class(cloud(sphere_shell(), type=values)) is None
+
+
+def test_columns_that_are_no_classes_are_not_looked_at():
+    values = np.r_[np.ones(200), np.full(150, 3)]
+    assert enclosing_class(cloud(sphere_shell(), c_ca=values)) is None
+
+
+@pytest.mark.parametrize("values", [np.ones(350), np.arange(350)])
+def test_one_class_or_very_many_enclose_nothing(values):
+    assert enclosing_class(cloud(sphere_shell(), type=values)) is None
+
+
+def test_a_few_particles_are_not_judged():
+    packing = Packing(sphere_shell(20), 0.01, columns={"type": np.arange(20) % 2})
+    assert enclosing_class(packing) is None
+
+
+def test_a_class_column_of_words_is_passed_over():
+    words = np.where(np.arange(350) < 200, "grain", "wall")
+    assert enclosing_class(cloud(sphere_shell(), type=words)) is None

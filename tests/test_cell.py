@@ -1,0 +1,163 @@
+"""The cell: wrapping, nearest images, images outside it, and what cannot be a cell."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from scanfab.cell import Cell
+from scanfab.errors import PackingError
+
+EDGES = np.array([2.0, 3.0, 4.0])
+TILTED = np.array([[2.0, 0, 0], [0.7, 3, 0], [-0.5, 0.4, 4]])
+coordinates = st.floats(-50, 50)
+points = st.tuples(coordinates, coordinates, coordinates)
+
+
+def test_three_numbers_are_edges():
+    cell = Cell(EDGES)
+    np.testing.assert_array_equal(cell.vectors, np.diag(EDGES))
+    assert cell.is_orthogonal
+    assert cell.is_periodic
+
+
+def test_vectors_are_rows():
+    cell = Cell(TILTED, (True, False, False), [1, 1, 1])
+    np.testing.assert_allclose(cell.fractional(1 + TILTED[1]), [0, 1, 0], atol=1e-15)
+    np.testing.assert_allclose(cell.center, 1 + TILTED.sum(axis=0) / 2)
+    assert not cell.is_orthogonal
+
+
+def test_heights_are_distances_of_opposite_faces():
+    np.testing.assert_allclose(Cell(EDGES).heights, EDGES)
+    a, b, c = TILTED
+    volume = np.dot(a, np.cross(b, c))
+    faces = [np.cross(b, c), np.cross(c, a), np.cross(a, b)]
+    expected = [volume / np.linalg.norm(face) for face in faces]
+    np.testing.assert_allclose(Cell(TILTED).heights, expected)
+
+
+@pytest.mark.parametrize("vectors", [[1, 2], [[1, 2, 3]], np.eye(2), 1.0])
+def test_a_cell_has_three_vectors(vectors):
+    with pytest.raises(PackingError, match=r"a cell needs vectors of shape \(3, 3\)"):
+        Cell(vectors)
+
+
+def test_an_origin_is_a_point():
+    with pytest.raises(PackingError, match="an origin of shape"):
+        Cell(EDGES, origin=[0, 0])
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf])
+def test_a_cell_is_finite(wrong):
+    with pytest.raises(PackingError, match="must be finite numbers"):
+        Cell([1, wrong, 1])
+    with pytest.raises(PackingError, match="must be finite numbers"):
+        Cell(EDGES, origin=[0, 0, wrong])
+
+
+@pytest.mark.parametrize(
+    "vectors", [[1, 0, 1], [[1, 0, 0], [0, 1, 0], [1, 1, 0]], np.zeros((3, 3))]
+)
+def test_a_cell_has_a_volume(vectors):
+    with pytest.raises(PackingError, match="span no volume"):
+        Cell(vectors)
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1e9])
+def test_the_size_of_a_cell_does_not_matter(scale):
+    np.testing.assert_allclose(Cell(scale * TILTED).heights, scale * Cell(TILTED).heights)
+
+
+@pytest.mark.parametrize("trap", [-1e-17, -1e-300, -0.0, np.nextafter(0, -1)])
+@pytest.mark.parametrize("vectors", [EDGES, TILTED])
+def test_a_rounding_error_below_a_face_is_not_on_the_opposite_face(vectors, trap):
+    cell = Cell(vectors)
+    wrapped = cell.wrap([[trap, trap, trap]])
+    fractions = cell.fractional(wrapped)
+    assert np.all(fractions < 1)
+    np.testing.assert_allclose(wrapped, 0, atol=1e-15)
+
+
+@given(points)
+def test_wrapping_moves_by_whole_vectors_into_the_cell(point):
+    cell = Cell(TILTED, origin=[-1, 0.5, 2])
+    wrapped = cell.wrap([point])
+    fractions = cell.fractional(wrapped)
+    assert np.all((fractions > -1e-12) & (fractions < 1))
+    turns = (np.array(point) - wrapped) @ np.linalg.inv(TILTED)
+    np.testing.assert_allclose(turns, np.rint(turns), atol=1e-9)
+
+
+@given(points)
+def test_wrapping_twice_is_wrapping_once(point):
+    cell = Cell(EDGES, origin=[0.1, -7, 3])
+    once = cell.wrap([point])
+    np.testing.assert_allclose(cell.wrap(once), once, atol=1e-13)
+
+
+def test_wrapping_leaves_vectors_that_do_not_repeat_alone():
+    cell = Cell(EDGES, (False, True, False))
+    np.testing.assert_allclose(cell.wrap([[-5, -1, 9]]), [[-5, 2, 9]])
+
+
+@given(points)
+def test_the_nearest_image_is_the_shortest_of_all(branch):
+    cell = Cell(EDGES)
+    image = cell.nearest_image([branch])
+    found = np.linalg.norm(np.array(branch) + image @ cell.vectors)
+    near = [
+        np.linalg.norm(np.array(branch) + (image[0] + shift) @ cell.vectors)
+        for shift in product((-1, 0, 1), repeat=3)
+    ]
+    assert found <= min(near) + 1e-12
+
+
+def test_the_nearest_image_is_in_the_same_cell_along_vectors_that_do_not_repeat():
+    image = Cell(EDGES, (True, False, False)).nearest_image([[1.9, 2.9, 3.9]])
+    np.testing.assert_array_equal(image, [[-1, 0, 0]])
+
+
+def test_nearest_images_in_a_tilted_cell_are_refused():
+    with pytest.raises(PackingError, match="tilted cell are not supported yet"):
+        Cell(TILTED).nearest_image([[1, 1, 1]])
+
+
+@pytest.mark.parametrize("margin", [0.0, 0.3, 1.0, 2.5, 5.0])
+@pytest.mark.parametrize("periodic", [(True, True, True), (True, False, True)])
+@pytest.mark.parametrize("vectors", [np.diag(EDGES), TILTED])
+def test_images_are_all_those_within_the_margin(vectors, periodic, margin):
+    cell = Cell(vectors, periodic, origin=[-1, 0.5, 2])
+    position = cell.origin + np.random.default_rng(3).random((20, 3)) @ vectors
+    images, row, image = cell.images(position, margin)
+    np.testing.assert_allclose(images, position[row] + image @ cell.vectors)
+    found = {(int(r), *map(int, shift)) for r, shift in zip(row, image, strict=True)}
+    assert len(found) == len(row)
+    fractions, reach = cell.fractional(position), margin / cell.heights
+    span = [range(-4, 5) if repeats else (0,) for repeats in periodic]
+    expected = {
+        (index, *shift)
+        for index in range(20)
+        for shift in product(*span)
+        if shift != (0, 0, 0)
+        and all(
+            -reach[k] <= fractions[index, k] + shift[k] <= 1 + reach[k]
+            for k in range(3)
+            if periodic[k]
+        )
+    }
+    assert found == expected
+
+
+def test_a_cell_that_does_not_repeat_has_no_images():
+    images, row, image = Cell(EDGES, (False, False, False)).images(np.ones((4, 3)), 10.0)
+    assert images.shape == image.shape == (0, 3)
+    assert len(row) == 0
+
+
+def test_no_points_have_no_images():
+    assert len(Cell(EDGES).images(np.zeros((0, 3)), 1.0)[0]) == 0

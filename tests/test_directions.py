@@ -1,0 +1,198 @@
+"""Direction rules: exact to their degree, axes once each, and the biases they admit to."""
+
+from itertools import product
+from math import prod
+
+import numpy as np
+import pytest
+from scipy.special import eval_legendre
+
+from scanfab import SettingsError, direction_rule
+from scanfab.directions import LEBEDEV_DEGREES, NEGATIVE_LEBEDEV
+from scanfab.settings import AUTO_RULE
+from tests.naive import axial
+
+LEBEDEV = [f"lebedev:{degree}" for degree in LEBEDEV_DEGREES if degree not in NEGATIVE_LEBEDEV]
+DESIGNS = [f"design:{degree}" for degree in range(3, 22, 2)]
+PRODUCTS = [f"product:{degree}" for degree in (2, 3, 4, 5, 8, 9, 16, 17, 40)]
+GRIDS = ["fibonacci:100", "equal-angle:10", "equal-angle-full:10"]
+
+
+def double_factorial(number):
+    return prod(range(number, 0, -2))
+
+
+def mean_of_monomial(powers):
+    """The mean of x^a y^b z^c over the sphere."""
+    if any(power % 2 for power in powers):
+        return 0.0
+    return prod(double_factorial(power - 1) for power in powers) / double_factorial(sum(powers) + 1)
+
+
+def zonal_error(rule, degree):
+    """Largest of the means of P_l(n·m) for random m: 0 if all harmonics of degree l are exact."""
+    poles = np.random.default_rng(0).normal(size=(20, 3))
+    poles /= np.linalg.norm(poles, axis=1, keepdims=True)
+    return np.abs(rule.weights @ eval_legendre(degree, rule.axes @ poles.T)).max()
+
+
+@pytest.mark.parametrize("text", DESIGNS + LEBEDEV + PRODUCTS)
+def test_rule_integrates_even_harmonics_to_its_degree(text):
+    rule = direction_rule(text)
+    assert rule.name == text
+    assert max(zonal_error(rule, degree) for degree in range(2, rule.degree + 1, 2)) < 1e-12
+
+
+@pytest.mark.parametrize("text", DESIGNS + LEBEDEV[:8] + PRODUCTS[:7])
+def test_rule_integrates_even_monomials_to_its_degree(text):
+    """Those of the highest even degree hold all lower ones, as x² + y² + z² = 1."""
+    rule = direction_rule(text)
+    highest = rule.degree - rule.degree % 2
+    for a, b in product(range(highest + 1), repeat=2):
+        if a + b <= highest:
+            powers = (a, b, highest - a - b)
+            mean = rule.weights @ np.prod(rule.axes ** np.array(powers), axis=1)
+            assert mean == pytest.approx(mean_of_monomial(powers), abs=1e-13)
+
+
+@pytest.mark.parametrize("text", DESIGNS + LEBEDEV[:8] + PRODUCTS[:7])
+def test_rule_is_not_exact_beyond_its_degree(text):
+    """So the tests above can fail. Of odd degrees every rule of axes is exact."""
+    rule = direction_rule(text)
+    beyond = max(zonal_error(rule, rule.degree + k) for k in range(1, 6))
+    assert beyond > 1e-4
+
+
+@pytest.mark.parametrize("text", DESIGNS + LEBEDEV + PRODUCTS + GRIDS[:1])
+def test_axes_are_unit_vectors_with_positive_weights_that_sum_to_one(text):
+    rule = direction_rule(text)
+    assert np.linalg.norm(rule.axes, axis=1) == pytest.approx(np.ones(len(rule)), abs=1e-12)
+    assert rule.weights.sum() == pytest.approx(1.0, abs=1e-12)
+    assert np.all(rule.weights > 0)
+    assert rule.axes.shape == (len(rule), 3)
+
+
+@pytest.mark.parametrize("text", DESIGNS + LEBEDEV[:20] + PRODUCTS + GRIDS[:1])
+def test_no_line_occurs_twice(text):
+    """Neither an axis nor its opposite."""
+    axes = direction_rule(text).axes
+    cosines = np.abs(axes @ axes.T)
+    np.fill_diagonal(cosines, 0.0)
+    assert cosines.max(initial=0.0) < 1 - 1e-6
+
+
+@pytest.mark.parametrize("text", DESIGNS + LEBEDEV + PRODUCTS)
+def test_exact_rule_gives_an_isotropic_sample_no_fabric(text):
+    rule = direction_rule(text)
+    assert np.abs(rule.isotropic_tensor - np.eye(3) / 3).max() < 1e-13
+    assert rule.bias < 1e-12
+    assert rule.turned
+
+
+def test_auto_rule_is_exact_to_the_eighth_degree():
+    assert direction_rule(AUTO_RULE).degree >= 8
+
+
+@pytest.mark.parametrize(
+    ("text", "alpha", "along_z", "gxz"),
+    [
+        ("equal-angle:10", 0.43, 0.167, 0.20),
+        ("equal-angle:0.5", 0.48, 0.25, 0.20),
+        ("equal-angle-full:10", 0.167, 0.167, 0.0),
+        ("equal-angle-full:0.5", 0.25, 0.25, 0.0),
+    ],
+)
+def test_literal_grids_know_their_bias(text, alpha, along_z, gxz):
+    """Unit weights on equal steps: 0.48 and 0.25 in the limit. The step 0.5° is 0.004 from it."""
+    rule = direction_rule(text)
+    limit = 0.006
+    assert rule.bias == pytest.approx(alpha, abs=limit)
+    assert axial(rule.isotropic_tensor, (0, 0, 1)) == pytest.approx(along_z, abs=limit)
+    assert rule.isotropic_tensor[0, 2] == pytest.approx(gxz, abs=limit)
+    assert rule.weights == pytest.approx(np.full(len(rule), 1 / len(rule)))
+    assert not rule.turned
+    assert rule.degree is None
+
+
+def test_literal_grids_cover_the_ranges_they_name():
+    """θ in (-90°, 90°] or (-180°, 180°], φ in (0°, 90°], both in steps of 30°."""
+    printed, full = direction_rule("equal-angle:30"), direction_rule("equal-angle-full:30")
+    assert (len(printed), len(full)) == (3 * 6, 3 * 12)
+    assert printed.axes[:, 0].min() > -1e-12
+    for rule in (printed, full):
+        polar = np.degrees(np.arccos(np.clip(rule.axes[:, 2], -1, 1)))
+        assert sorted(set(np.round(polar, 6))) == [30, 60, 90]
+    azimuth = np.round(np.degrees(np.arctan2(*printed.axes[-6:, 1::-1].T)), 6)
+    assert azimuth.tolist() == [-60, -30, 0, 30, 60, 90]
+
+
+def test_fibonacci_has_a_small_bias():
+    assert direction_rule("fibonacci:100").bias == pytest.approx(0.0075, abs=5e-4)
+    assert direction_rule("fibonacci:100").degree is None
+    assert direction_rule("fibonacci:10000").bias < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("count", "name", "axes"),
+    [(1, "lebedev:3", 3), (3, "lebedev:3", 3), (4, "lebedev:5", 7), (25, "lebedev:11", 25)],
+)
+def test_number_of_axes_is_rounded_up(count, name, axes):
+    rule = direction_rule(str(count))
+    assert (rule.name, len(rule)) == (name, axes)
+
+
+@pytest.mark.parametrize("count", [26, 44, 74, 100, 500, 1001, 2905])
+def test_number_of_axes_gives_the_next_lebedev_rule_of_positive_weights(count):
+    rule = direction_rule(str(count))
+    lower = [direction_rule(text) for text in LEBEDEV if int(text[8:]) < rule.degree]
+    assert len(rule) >= count
+    assert max(len(other) for other in lower) < count
+    assert np.all(rule.weights > 0)
+
+
+def test_number_beyond_the_largest_lebedev_rule_gives_a_product_rule():
+    rule = direction_rule("2906")
+    assert rule.name.startswith("product:")
+    assert 2906 <= len(rule) < 6000
+    assert rule.bias < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [("lebedev:4", "lebedev:5"), ("lebedev:13", "lebedev:15"), ("design:8", "design:9")],
+)
+def test_degree_without_a_rule_is_rounded_up(text, name):
+    assert direction_rule(text).name == name
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "0",
+        "-3",
+        "2.5",
+        "many",
+        "gauss:5",
+        "lebedev",
+        "lebedev:",
+        "lebedev:x",
+        "lebedev:0",
+        "lebedev:133",
+        "lebedev:7.5",
+        "design:23",
+        "design:0",
+        "product:0",
+        "product:1001",
+        "fibonacci:0",
+        "fibonacci:-1",
+        "equal-angle:7",
+        "equal-angle:0",
+        "equal-angle:0.1",
+        "equal-angle:nan",
+        "equal-angle-full:100",
+    ],
+)
+def test_text_that_names_no_rule_is_an_error(text):
+    with pytest.raises(SettingsError, match=r"^directions: "):
+        direction_rule(text)

@@ -1,0 +1,412 @@
+"""compute(): empty and changing frames, chosen frames, lengths, strain, and refusals."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import io
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab.cell import Cell
+from scanfab.errors import ScanfabWarning, SettingsError
+from scanfab.packing import Packing
+from scanfab.pipeline import compute_rows
+from scanfab.settings import Settings
+from scanfab.table import COLUMNS
+from scanfab.writers.rows import CsvWriter
+from tests.dumps import dump_text, pairs_text, write, yade_spheres
+
+SCAN = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin"}
+COUNT = 110
+NAMES = "id type x y z radius"
+BOX = ((0, 10),) * 3
+
+
+def heap(count=COUNT, squeeze=1.0, seed=5):
+    """Rows of a dump: spheres about the points of a lattice, type 2 on the lowest layer."""
+    random = np.random.default_rng(seed)
+    grid = np.stack(np.meshgrid(*[np.arange(5.0)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    order = random.permutation(len(grid))[:count]
+    position = (grid + random.uniform(-0.05, 0.05, grid.shape))[order] + 2
+    position[:, 2] *= squeeze
+    radius = random.uniform(0.42, 0.62, len(grid))[order]
+    type = np.where(grid[order, 2] == 0, 2, 1)
+    return [
+        (id + 1, kind, *place, size)
+        for id, (kind, place, size) in enumerate(
+            zip(type.tolist(), position.tolist(), radius.tolist(), strict=True)
+        )
+    ]
+
+
+def packing_of(rows, **arguments):
+    values = np.array(rows)
+    return Packing(
+        values[:, 2:5], values[:, 5], id=values[:, 0], columns={"type": values[:, 1]}, **arguments
+    )
+
+
+def series_of(folder, frames):
+    """A file of snapshots; steps are 100 for each frame."""
+    texts = [dump_text(rows, NAMES, step=100 * k, box=BOX) for k, rows in enumerate(frames)]
+    return scanfab.read_series(write(folder / "dump.txt", "".join(texts)))
+
+
+def without(row, *names):
+    return {key: value for key, value in dataclasses.asdict(row).items() if key not in names}
+
+
+SHRINKING = [heap(squeeze=factor) for factor in (1.0, 0.95, 0.9, 0.85)]
+
+
+@pytest.fixture(scope="module")
+def shrinking(tmp_path_factory):
+    return series_of(tmp_path_factory.mktemp("series"), SHRINKING)
+
+
+@pytest.fixture(scope="module")
+def whole_table(shrinking):
+    return scanfab.compute(shrinking, **SCAN)
+
+
+# one frame
+
+
+def test_a_packing_has_a_row_for_each_variant():
+    table = scanfab.compute(packing_of(heap()), **SCAN)
+    assert [row.variant for row in table] == ["a", "b", "c", "d"]
+    assert {row.frame for row in table} == {0}
+    assert {row.source for row in table} == {""}
+    assert {row.contacts_from for row in table} == {"geometric"}
+
+
+@pytest.mark.parametrize("variants", ["a", "b", "c", "d", "ad", "bc"])
+def test_each_variant_is_the_same_alone(variants):
+    packing = packing_of(heap())
+    everything = scanfab.compute(packing, **SCAN)
+    for row in scanfab.compute(packing, variants=variants, **SCAN):
+        expected = everything.select(variant=row.variant)[0]
+        if variants in ("ad", "bc", "c", "d"):
+            assert row.segments == pytest.approx(expected.segments, rel=0.02)
+        for name in ("grains", "rattlers", "contacts", "coordination", "gc_xx", "cutoff"):
+            assert getattr(row, name) == getattr(expected, name)
+
+
+def test_the_same_seed_gives_the_same_bytes_with_any_number_of_workers():
+    packing = packing_of(heap())
+    tables = [scanfab.compute(packing, workers=n, seed=3, **SCAN).rows for n in (1, 2, 5)]
+    assert tables[0] == tables[1] == tables[2]
+
+
+def test_another_seed_is_another_scan():
+    packing = packing_of(heap())
+    one, two = (scanfab.compute(packing, seed=seed, **SCAN)[0] for seed in (0, 1))
+    assert one.alpha_vs != two.alpha_vs
+    assert one.alpha_vs == pytest.approx(two.alpha_vs, abs=0.2)
+
+
+def test_rows_come_as_soon_as_their_frame_is_done(shrinking):
+    rows = compute_rows(shrinking, Settings.make(**SCAN))
+    assert [next(rows).frame for _ in range(5)] == [0, 0, 0, 0, 1]
+
+
+def test_every_number_of_a_row_reads_back_the_same(whole_table):
+    stream = io.StringIO(newline="")
+    writer = CsvWriter(stream)
+    for row in whole_table:
+        writer.write(row)
+    text = stream.getvalue()
+    assert "np." not in text
+    assert "nan" not in text
+    for found, row in zip(csv.DictReader(io.StringIO(text)), whole_table, strict=True):
+        for name in COLUMNS:
+            value = getattr(row, name)
+            assert found[name] == ("" if value is None else str(value))
+            if isinstance(value, float):
+                assert float(found[name]) == value
+
+
+# lengths
+
+
+@pytest.mark.parametrize(
+    ("text", "length"),
+    [("0.5rmin", "min"), ("0.5rmean", "mean"), ("0.5rmax", "max"), ("0.25", None)],
+)
+def test_lengths_are_relative_to_the_radii_of_the_grains(text, length):
+    rows = heap()
+    grains = np.array([row[5] for row in rows if row[1] != 2])
+    expected = 0.25 if length is None else 0.5 * getattr(grains, length)()
+    options = {**SCAN, "cutoff": text, "spacing": text, "boundary": "type=2"}
+    table = scanfab.compute(packing_of(rows), **options)
+    np.testing.assert_allclose(table["cutoff"], expected, rtol=1e-15)
+    np.testing.assert_allclose(table["spacing"], expected, rtol=1e-12)
+
+
+def test_lengths_scale_with_the_dump():
+    rows = heap()
+    small = [(id, type, *(1e-9 * value for value in rest)) for id, type, *rest in rows]
+    one, other = (scanfab.compute(packing_of(r), **SCAN) for r in (rows, small))
+    np.testing.assert_array_equal(one["contacts"], other["contacts"])
+    np.testing.assert_allclose(one["alpha_vs"], other["alpha_vs"], atol=1e-3)
+    np.testing.assert_allclose(other["mean_length"], 1e-9 * one["mean_length"], rtol=1e-3)
+
+
+# series
+
+
+def test_frames_are_numbered_and_keep_their_steps(whole_table):
+    whole = whole_table.select(variant="a")
+    np.testing.assert_array_equal(whole["frame"], [0, 1, 2, 3])
+    np.testing.assert_array_equal(whole["step"], [0, 100, 200, 300])
+    assert whole_table[0].source.endswith("dump.txt")
+
+
+@pytest.mark.parametrize(
+    ("frames", "numbers"),
+    [
+        ("1:3", [1, 2]),
+        ("2", [2]),
+        ("::2", [0, 2]),
+        ("1::2", [1, 3]),
+        ("-1", [3]),
+        ("-1:", [3]),
+        ("-3:-1", [1, 2]),
+        (":-2", [0, 1]),
+        ("::-1", [0, 1, 2, 3]),
+        ("::-2", [1, 3]),
+        ("2:100", [2, 3]),
+        (slice(1, 2), [1]),
+    ],
+)
+def test_chosen_frames_have_the_rows_that_they_have_among_all(
+    shrinking, whole_table, frames, numbers
+):
+    table = scanfab.compute(shrinking, frames=frames, **SCAN)
+    assert table.rows == tuple(row for row in whole_table if row.frame in numbers)
+
+
+@pytest.mark.parametrize("frames", ["4:", "9", "2:1", "-9:-5"])
+def test_no_frames_at_all_are_an_error(shrinking, frames):
+    with pytest.raises(SettingsError, match="frames: the series has no frame in"):
+        scanfab.compute(shrinking, frames=frames, **SCAN)
+
+
+def test_a_packing_is_frame_zero():
+    packing = packing_of(heap())
+    assert len(scanfab.compute(packing, frames="-1", **SCAN)) == 4
+    with pytest.raises(SettingsError, match="no frame in"):
+        scanfab.compute(packing, frames="1:", **SCAN)
+
+
+@pytest.mark.parametrize("strain", ["auto", "grains", "boundary"])
+def test_empty_first_frames_have_rows_without_values(tmp_path, strain):
+    series = series_of(tmp_path, [[], [], *SHRINKING])
+    table = scanfab.compute(series, boundary="type=2", strain=strain, axis="x", **SCAN)
+    (tmp_path / "full").mkdir()
+    full = series_of(tmp_path / "full", SHRINKING)
+    expected = scanfab.compute(full, boundary="type=2", strain=strain, axis="x", **SCAN)
+    for row in table[:8]:
+        assert (row.grains, row.contacts, row.segments, row.lines) == (0, 0, None, None)
+        assert row.step == 100 * row.frame
+        assert row.strain is None
+        assert row.alpha_vs is None
+        assert row.alpha_c is None
+        assert row.solid_fraction is None
+    shifted = [without(row, "frame", "step", "source") for row in table[8:]]
+    assert shifted == [without(row, "frame", "step", "source") for row in expected]
+    assert [row.frame for row in table[8:]] == [row.frame + 2 for row in expected]
+
+
+def test_an_empty_frame_among_others_has_rows_without_values(tmp_path, whole_table):
+    table = scanfab.compute(series_of(tmp_path, [SHRINKING[0], [], *SHRINKING[1:]]), **SCAN)
+    assert [row.alpha_vs is None for row in table.select(variant="a")] == [
+        False,
+        True,
+        False,
+        False,
+        False,
+    ]
+    names = ("frame", "step", "source")
+    assert [without(row, *names) for row in table if row.frame != 1] == [
+        without(row, *names) for row in whole_table
+    ]
+
+
+def test_chosen_frames_start_from_the_first_frame_with_grains(tmp_path):
+    series = series_of(tmp_path, [[], *SHRINKING])
+    everything = scanfab.compute(series, strain="grains", **SCAN)
+    last = scanfab.compute(series, strain="grains", frames="-1", **SCAN)
+    assert last.rows == everything.rows[-4:]
+    only_empty = scanfab.compute(series, strain="grains", frames="0", **SCAN)
+    assert only_empty.rows == everything.rows[:4]
+
+
+def test_a_series_without_any_grains_has_rows_without_values(tmp_path):
+    with pytest.warns(scanfab.ScanfabWarning, match="no frame has any grains"):
+        table = scanfab.compute(series_of(tmp_path, [[], []]), **SCAN)
+    assert len(table) == 8
+    assert np.isnan(table["alpha_vs"]).all()
+
+
+def test_an_empty_vtk_frame_does_not_need_the_columns_of_the_boundary(tmp_path):
+    empty = (
+        "# vtk DataFile Version 3.0\nx\nASCII\nDATASET POLYDATA\nPOINTS 0 float\n"
+        "VERTICES 0 0\nPOINT_DATA 0\nSCALARS radius float 1\nLOOKUP_TABLE default\n"
+    )
+    write(tmp_path / "s_0.vtk", empty)
+    values = np.array(heap())
+    for step in (1, 2):
+        yade_spheres(tmp_path / f"s_{step}.vtk", values[:, 2:5], values[:, 5], mask=values[:, 1])
+    table = scanfab.compute(scanfab.read_series(tmp_path), boundary="mask=2", **SCAN)
+    assert np.isnan(table["alpha_vs"][:4]).all()
+    assert np.isfinite(table["alpha_vs"][4:]).all()
+
+
+def test_the_number_of_grains_may_change(tmp_path):
+    frames = [heap()[:count] for count in (60, 80, 40)]
+    table = scanfab.compute(series_of(tmp_path, frames), variants="a", **SCAN)
+    np.testing.assert_array_equal(table["grains"], [60, 80, 40])
+    # lengths are those of the first frame
+    assert len(set(table["cutoff"].tolist())) == 1
+    smallest = min(row[5] for row in heap()[:60])
+    np.testing.assert_allclose(table["cutoff"], 0.2 * smallest)
+
+
+def test_the_rv_is_that_of_the_first_frame(tmp_path):
+    large = [(id, type, x, y, z, 1.2 * r) for id, type, x, y, z, r in heap()]
+    frames = [heap(), [(id, type, x + 20, y, z, r) for id, type, x, y, z, r in large]]
+    table = scanfab.compute(series_of(tmp_path, frames), variants="c", **SCAN)
+    assert table[0].grains > 0
+    assert table[1].grains == 0
+
+
+def test_contacts_by_geometry_stand_in_for_a_missing_file(tmp_path):
+    for step in (1, 2):
+        write(tmp_path / f"dump_{step}.txt", dump_text(heap(), NAMES, step=step, box=BOX))
+    write(tmp_path / "pairs_1.txt", pairs_text([], step=1))
+    with pytest.warns(ScanfabWarning, match="contacts are found by geometry"):
+        table = scanfab.compute(scanfab.read_series(tmp_path), variants="a", **SCAN)
+    assert table["contacts_from"].tolist() == ["file", "geometric"]
+    assert table["contacts"][0] == 0
+    assert table["contacts"][1] > 0
+
+
+def test_no_contacts_have_no_contact_fabric():
+    packing = packing_of(heap(), contacts=[])
+    row = scanfab.compute(packing, variants="a", **SCAN)[0]
+    assert row.contacts == 0
+    assert row.coordination == 0
+    assert row.alpha_c is None
+    assert row.gc_xx is None
+    assert row.alpha_vs is not None
+
+
+def test_only_rattlers_leave_nothing_to_scan():
+    with pytest.warns(ScanfabWarning, match="variant b: no void segment reaches the cut-off"):
+        row = scanfab.compute(packing_of(heap(), contacts=[]), variants="b", **SCAN)[0]
+    assert row.grains == 0
+    assert row.rattlers == COUNT
+    assert row.coordination is None
+    assert row.alpha_vs is None
+
+
+# strain
+
+
+def test_strain_is_measured_from_the_first_frame(shrinking):
+    tables = {mode: scanfab.compute(shrinking, strain=mode, **SCAN) for mode in ("grains", "cell")}
+    found = tables["grains"].select(variant="a")["strain"]
+    np.testing.assert_allclose(found, [0, 0.05, 0.1, 0.15], atol=1e-12)
+    np.testing.assert_array_equal(tables["cell"]["strain"], 0)
+
+
+def test_strain_along_another_axis(shrinking):
+    strain = scanfab.compute(shrinking, strain="grains", axis="x", **SCAN)["strain"]
+    np.testing.assert_allclose(strain, 0, atol=1e-12)
+
+
+def test_strain_of_the_boundary_is_that_of_its_centres(shrinking):
+    lowest = np.ptp([row[4] for row in SHRINKING[0] if row[1] == 2])
+    last = np.ptp([row[4] for row in SHRINKING[3] if row[1] == 2])
+    for mode in ("auto", "boundary"):
+        table = scanfab.compute(shrinking, strain=mode, boundary="type=2", **SCAN)
+        assert table[-1].strain == pytest.approx(1 - last / lowest)
+
+
+def test_strain_is_unknown_without_a_boundary_or_a_periodic_cell(whole_table):
+    assert {row.strain for row in whole_table} == {None}
+
+
+@pytest.mark.parametrize(("key", "values"), [("step", [0, 200]), ("frame", [0, 2])])
+def test_strain_from_a_file_is_empty_where_the_file_says_nothing(tmp_path, shrinking, key, values):
+    text = f"{key},strain\n{values[0]},0.0\n{values[1]},0.125\n"
+    path = write(tmp_path / "strain.csv", text)
+    table = scanfab.compute(shrinking, strain=path, variants="a", **SCAN)
+    assert [row.strain for row in table] == [0.0, None, 0.125, None]
+
+
+def test_strain_of_a_periodic_cell():
+    frames = [packing_of(heap(), cell=Cell([8.0, 8.0, 8.0]))]
+    row = scanfab.compute(frames[0], variants="c", **SCAN)[0]
+    assert row.strain == 0.0
+
+
+# boundary, and what is refused
+
+
+def test_a_class_that_encloses_the_rest_is_a_warning():
+    random = np.random.default_rng(3)
+    shell = random.normal(size=(200, 3))
+    shell *= 6 / np.linalg.norm(shell, axis=1, keepdims=True)
+    rows = [(*row[:2], *(np.array(row[2:5]) - 4), row[5]) for row in heap(125)]
+    rows = [(id, 1, *rest) for id, _, *rest in rows]
+    rows += [(1000 + k, 3, *place, 0.5) for k, place in enumerate(shell)]
+    with pytest.warns(ScanfabWarning, match=r'type=3 enclose the others.*--boundary "type=3') as e:
+        scanfab.compute(packing_of(rows), variants="a", **SCAN)
+    assert len(e) == 1
+    table = scanfab.compute(packing_of(rows), variants="a", boundary="type=3", **SCAN)
+    assert table[0].grains == 125
+
+
+@pytest.mark.parametrize("variants", ["abcd", "a", "bd"])
+def test_the_whole_of_a_periodic_sample_is_refused(variants):
+    packing = packing_of(heap(), cell=Cell([8.0, 8.0, 8.0]))
+    with pytest.raises(SettingsError, match=r"no first and last solid.*use --variants cd"):
+        scanfab.compute(packing, variants=variants, **SCAN)
+
+
+def test_a_tilted_periodic_cell_is_refused():
+    packing = packing_of(heap(), cell=Cell([[8, 0, 0], [1, 8, 0], [0, 0, 8]]), contacts=None)
+    with pytest.raises(scanfab.ScanfabError, match="tilted"):
+        scanfab.compute(packing, variants="cd", **SCAN)
+
+
+def test_an_rv_through_a_periodic_face_is_refused():
+    packing = packing_of(heap(), cell=Cell([8.0, 8.0, 8.0]))
+    with pytest.raises(SettingsError, match="reaches through a periodic face"):
+        scanfab.compute(packing, variants="c", rv_radius=4.5, **SCAN)
+    with pytest.raises(SettingsError, match="another --rv-center"):
+        scanfab.compute(packing, variants="c", rv_radius=2.0, rv_center=(1, 4, 4), **SCAN)
+
+
+def test_a_box_that_does_not_repeat_changes_nothing():
+    open_box = packing_of(heap(), cell=Cell([9.0, 9.0, 9.0], (False, False, False)))
+    assert (
+        scanfab.compute(open_box, **SCAN).rows == scanfab.compute(packing_of(heap()), **SCAN).rows
+    )
+
+
+def test_settings_are_checked_before_a_frame_is_read(tmp_path):
+    series = series_of(tmp_path, [heap()])
+    (tmp_path / "dump.txt").unlink()
+    with pytest.raises(SettingsError, match="rv: expected"):
+        scanfab.compute(series, rv=-1)
+
+
+def test_a_boundary_that_is_everything_is_refused(tmp_path):
+    with pytest.raises(SettingsError, match="no grain is left"):
+        scanfab.compute(series_of(tmp_path, [heap()]), boundary="radius>0", **SCAN)

@@ -1,0 +1,159 @@
+"""The plan: settings turned into lengths, lines and replicates by the first frame."""
+
+import math
+
+import numpy as np
+import pytest
+
+from scanfab import Cell, Packing, ScanfabWarning, Settings, SettingsError, compute, find_contacts
+from scanfab.plan import FEWEST_LINES, REPLICATES, make_plan
+from scanfab.settings import AUTO_RULE
+from scanfab.variants import Sample
+from tests.lattices import shaken_cubic
+
+
+def sample_of(packing, boundary=None):
+    none = np.zeros(len(packing), bool)
+    return Sample(packing, none if boundary is None else np.asarray(boundary))
+
+
+@pytest.fixture(scope="module")
+def packing():
+    """216 grains of radii about 0.5 in a cube of about 6."""
+    return find_contacts(Packing(*shaken_cubic(np.random.default_rng(0), 6)))
+
+
+def plan_of(packing, boundary=None, **options):
+    return make_plan(Settings.make(**options), sample_of(packing, boundary))
+
+
+def test_lengths_relative_to_radii_are_those_of_the_grains_without_the_boundary():
+    packing = Packing([[0, 0, 0], [3, 0, 0], [6, 3, 3], [9, 0, 0]], [1.0, 0.5, 1.2, 0.1])
+    boundary = [False, False, False, True]
+    for text, length in [("2rmin", 1.0), ("1rmean", 0.9), ("0.5rmax", 0.6), ("0.25", 0.25)]:
+        plan = plan_of(packing, boundary, cutoff=text, spacing="0.1rmin", directions=20)
+        assert plan.cutoff == pytest.approx(length)
+    assert plan.spacing / math.sqrt(plan.replicates) == pytest.approx(0.05)
+
+
+def test_fixed_scan_shares_its_lines_among_sixteen_replicates(packing):
+    plan = plan_of(packing, spacing=0.05, directions="lebedev:11")
+    assert plan.replicates == REPLICATES == 16
+    assert plan.spacing == pytest.approx(0.05 * 4)
+    assert plan.rule.name == "lebedev:11"
+    assert plan.auto == ""
+
+
+@pytest.mark.parametrize("spacing", [0.1, 0.3, 0.5, 0.8, 1.5, 10.0])
+def test_no_replicate_of_a_fixed_scan_gets_fewer_than_thirty_lines(packing, spacing):
+    plan = plan_of(packing, spacing=spacing, directions="lebedev:11")
+    area = math.pi * plan.window.radius**2
+    lines = area / plan.spacing**2
+    assert plan.spacing == pytest.approx(spacing * math.sqrt(plan.replicates))
+    assert 1 <= plan.replicates <= 16
+    assert lines >= FEWEST_LINES or plan.replicates == 1
+    # and no fewer replicates than that takes
+    assert plan.replicates == 16 or area / spacing**2 / (plan.replicates + 1) < FEWEST_LINES
+
+
+def test_spacing_column_is_that_of_all_replicates_together(packing):
+    rows = compute(packing, spacing=0.25, directions="lebedev:5", variants="ac", rv_radius=2.0)
+    lines = math.pi * 2.0**2 / 0.25**2
+    for row in rows:
+        assert row.spacing == pytest.approx(0.25)
+        assert row.replicates == int(lines / FEWEST_LINES) == 6
+        assert row.directions == 7
+    # lines of the RV: area over spacing squared, in each direction
+    assert rows[1].lines == pytest.approx(lines * 7, rel=0.06)
+
+
+def test_one_replicate_has_an_empty_standard_error(packing):
+    row = compute(packing, spacing=0.8, directions="lebedev:5", variants="c", cutoff=0.1)[0]
+    assert row.replicates == 1
+    assert row.alpha_vs_axial is not None
+    assert row.alpha_vs_axial_se is None
+
+
+def test_a_direction_without_any_kept_segment_leaves_no_fabric(packing):
+    """One replicate of few lines: some of its axes keep nothing, and the row says so."""
+    options = {"spacing": 0.9, "directions": "lebedev:17", "cutoff": 1.5, "variants": "c"}
+    with pytest.warns(ScanfabWarning, match="variant c: in some direction no void segment is kept"):
+        row = compute(packing, **options)[0]
+    assert row.segments > 0
+    assert row.mean_length is None
+    assert row.alpha_vs is None
+
+
+def test_filled_directions_of_a_replicate_are_warned_of(packing):
+    options = {"spacing": 0.2, "directions": "lebedev:17", "cutoff": 1.5, "variants": "c"}
+    with pytest.warns(ScanfabWarning, match=r"\d% of the directions keep no void segment in a rep"):
+        row = compute(packing, **options)[0]
+    assert row.mean_length > 1.5
+    assert row.alpha_vs_axial_se > 0
+
+
+def test_auto_spacing_adds_replicates_and_keeps_the_rule(packing):
+    plan = plan_of(packing, directions="lebedev:11")
+    assert (plan.auto, plan.rule.name, plan.replicates) == ("replicates", "lebedev:11", 16)
+    assert plan_of(packing).rule.name == AUTO_RULE
+
+
+def test_auto_directions_adds_axes_and_keeps_the_spacing(packing):
+    plan = plan_of(packing, spacing=0.1)
+    assert (plan.auto, plan.rule.name) == ("directions", AUTO_RULE)
+    assert plan.spacing / math.sqrt(plan.replicates) == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-2])
+def test_auto_spacing_never_makes_too_few_lines(packing, tolerance):
+    plan = plan_of(packing, tolerance=tolerance)
+    assert math.pi * plan.window.radius**2 / plan.spacing**2 >= 4 * FEWEST_LINES * (1 - 1e-9)
+
+
+def test_auto_spacing_of_a_small_sample_is_the_smallest_radius():
+    random = np.random.default_rng(0)
+    packing = Packing(random.random((400, 3)) * 20, random.uniform(0.5, 1.0, 400))
+    plan = plan_of(packing, tolerance=1e-4)
+    assert plan.spacing == pytest.approx(packing.radius.min())
+
+
+def test_window_is_for_the_variants_that_have_one(packing):
+    assert plan_of(packing, variants="ab").window is None
+    assert plan_of(packing, variants="bd").window is not None
+
+
+def test_default_window_is_a_fraction_of_half_the_smallest_extent_of_the_surfaces():
+    packing = Packing([[0, 0, 0], [10, 0, 0], [0, 8, 0], [0, 0, 9]], [1.0, 0.5, 0.5, 0.5])
+    window = plan_of(packing, rv=0.6).window
+    # surfaces from -1 to 10.5, 8.5 and 9.5
+    assert window.radius == pytest.approx(0.6 * 9.5 / 2)
+    assert window.center == pytest.approx([4.75, 3.75, 4.25])
+
+
+def test_window_may_be_given_in_lengths(packing):
+    window = plan_of(packing, rv_radius=1.25, rv_center=(1.0, 2.0, 3.0)).window
+    assert window.radius == 1.25
+    assert window.center.tolist() == [1.0, 2.0, 3.0]
+
+
+def test_rule_with_a_bias_warns_of_it(packing):
+    with pytest.warns(ScanfabWarning, match=r"an isotropic sample would get alpha = 0\.43"):
+        plan_of(packing, directions="equal-angle:10")
+    with pytest.warns(ScanfabWarning, match=r"fibonacci:100: .* alpha = 0\.007"):
+        plan_of(packing, directions="fibonacci:100")
+
+
+def test_whole_variants_of_a_periodic_cell_are_refused(packing):
+    periodic = Packing(packing.position, packing.radius, cell=Cell([6.0, 6, 6]))
+    with pytest.raises(SettingsError, match="use --variants cd"):
+        plan_of(periodic, variants="ac")
+    assert plan_of(periodic, variants="cd").window.radius == pytest.approx(0.7 * 3)
+
+
+def test_cell_that_does_not_repeat_is_no_obstacle(packing):
+    walls = Packing(
+        packing.position, packing.radius, cell=Cell([6.0, 6, 6], periodic=(False, False, False))
+    )
+    plan = plan_of(walls)
+    assert plan.window.center == pytest.approx(plan_of(packing).window.center)
+    assert plan.window.radius == pytest.approx(plan_of(packing).window.radius)

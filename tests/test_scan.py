@@ -1,0 +1,155 @@
+"""The scan: frames, replicates, seeds and workers."""
+
+import numpy as np
+import pytest
+
+from scanfab import Packing, SettingsError, compute, direction_rule, scan_lines
+from scanfab.scan import MAX_LINES, ScanSums, _replicate, line_frames
+from tests import naive
+from tests.lattices import Spheres, poisson_spheres, separate_spheres, shaken_cubic
+from tests.scanning import fabric, solids_of
+
+RULE = direction_rule("lebedev:5")
+
+
+@pytest.fixture(scope="module")
+def solids():
+    spheres = poisson_spheres(np.random.default_rng(0), 0.1, 5.0)
+    return solids_of(spheres, 3.0, np.arange(len(spheres.radius)) % 4 == 0)
+
+
+def raw(sums):
+    return b"".join(
+        getattr(sums, name).tobytes()
+        for name in ("axes", "length", "segments", "lines", "void", "line_length")
+    )
+
+
+def test_frames_are_orthonormal_and_right_handed():
+    frames = line_frames(direction_rule("lebedev:41").axes)
+    assert np.abs(frames @ frames.transpose(0, 2, 1) - np.eye(3)).max() < 1e-14
+    assert np.linalg.det(frames) == pytest.approx(np.ones(len(frames)))
+    assert np.array_equal(frames[:, 2], direction_rule("lebedev:41").axes)
+
+
+def test_scan_equals_the_slow_twin_for_all_variants(solids):
+    """Its lines are those of the replicate's frames and shifts."""
+    sums = scan_lines(solids, RULE, spacing=0.6, cutoff=0.3, replicates=[3], seed=5)
+    frames, offsets = _replicate(RULE, line_frames(RULE.axes), 5, 3)
+    for number, (frame, offset) in enumerate(zip(frames, offsets, strict=True)):
+        keep = ~solids.removed
+        tallies = [
+            naive.tally(naive.scan(p, r, frame, offset, 0.6, 3.0), 0.3)
+            for p, r in [
+                (solids.position, solids.radius),
+                (solids.position[keep], solids.radius[keep]),
+            ]
+        ]
+        segments = [t.whole_kept for t in tallies] + [t.window_kept for t in tallies]
+        lines = [t.whole_lines for t in tallies] + [t.window_lines for t in tallies]
+        length = [t.whole_length for t in tallies] + [t.window_length for t in tallies]
+        assert sums.segments[0, :, number].tolist() == segments
+        assert sums.lines[0, :, number].tolist() == lines
+        assert sums.length[0, :, number] == pytest.approx(length, rel=1e-9)
+
+
+@pytest.mark.parametrize("workers", [2, 3, 7])
+def test_same_bytes_for_any_number_of_workers(solids, workers):
+    options = {"spacing": 0.2, "cutoff": 0.3, "seed": 4}
+    one = scan_lines(solids, RULE, **options, workers=1)
+    assert raw(scan_lines(solids, RULE, **options, workers=workers)) == raw(one)
+
+
+@pytest.mark.parametrize("options", [{"spacing": 0.3, "directions": 20}, {"tolerance": 5e-3}])
+def test_same_rows_for_any_number_of_workers(options):
+    packing = Packing(*shaken_cubic(np.random.default_rng(0), 5))
+    tables = [compute(packing, workers=workers, **options) for workers in (1, 2, 5)]
+    assert repr(tables[0].rows) == repr(tables[1].rows) == repr(tables[2].rows)
+
+
+def test_same_seed_gives_the_same_bytes_and_another_seed_others(solids):
+    first, again, other = (
+        scan_lines(solids, RULE, spacing=0.3, cutoff=0.3, seed=seed) for seed in (1, 1, 2)
+    )
+    assert raw(first) == raw(again)
+    assert not np.any(first.axes == other.axes)
+    assert first.segments.tobytes() != other.segments.tobytes()
+
+
+def test_replicate_depends_on_its_number_alone(solids):
+    """So an auto scan may go on where it stopped."""
+    options = {"spacing": 0.3, "cutoff": 0.3}
+    together = scan_lines(solids, RULE, replicates=range(6), **options)
+    first = scan_lines(solids, RULE, replicates=[0, 1], **options)
+    rest = scan_lines(solids, RULE, replicates=[2, 3, 4, 5], **options)
+    assert raw(ScanSums.concatenate([first, rest])) == raw(together)
+    assert together.replicates == 6
+
+
+def test_replicates_turn_the_rule_rigidly(solids):
+    sums = scan_lines(solids, RULE, spacing=0.5, cutoff=0.3)
+    cosines = sums.axes @ sums.axes.transpose(0, 2, 1)
+    assert np.abs(cosines - RULE.axes @ RULE.axes.T).max() < 1e-12
+    assert np.unique(np.round(sums.axes[:, 0], 9), axis=0).shape == (16, 3)
+
+
+def test_literal_grid_is_only_shifted(solids):
+    rule = direction_rule("equal-angle:30")
+    sums = scan_lines(solids, rule, spacing=0.5, cutoff=0.3)
+    assert np.all(sums.axes == rule.axes)
+    assert len(np.unique(sums.length[:, 2, 0])) == 16
+
+
+def test_variants_that_nobody_asks_for_are_zero(solids):
+    every = scan_lines(solids, RULE, spacing=0.4, cutoff=0.3)
+    for variant, which in zip("abcd", range(4), strict=True):
+        sums = scan_lines(solids, RULE, spacing=0.4, cutoff=0.3, variants=variant)
+        others = np.arange(4) != which
+        assert not sums.segments[:, others].any()
+        assert not sums.lines[:, others].any()
+        assert np.array_equal(sums.segments[:, which], every.segments[:, which])
+        assert sums.length[:, which] == pytest.approx(every.length[:, which], rel=1e-12)
+
+
+def test_void_and_line_length_give_the_solid_fraction_of_separate_spheres():
+    spheres = separate_spheres(np.random.default_rng(0), 30, 5.0)
+    sums = scan_lines(solids_of(spheres, 5.0), RULE, spacing=0.1, cutoff=1.0)
+    fraction = 1 - sums.void[:, 2].sum() / sums.line_length[:, 2].sum()
+    assert fraction == pytest.approx(np.sum(spheres.radius**3) / 125, rel=1e-3)
+    assert np.all(sums.length[:, 2] < sums.void[:, 2])
+    assert not sums.void[:, :2].any()
+
+
+def test_spacing_that_asks_for_too_many_lines_is_an_error(solids):
+    spacing = 2 * 3.0 / MAX_LINES**0.5
+    with pytest.raises(SettingsError, match=r"^spacing: .* choose a wider spacing"):
+        scan_lines(solids, RULE, spacing=spacing, cutoff=0.3)
+
+
+def test_no_spheres_and_no_window_give_nothing():
+    nothing = Spheres(np.zeros((0, 3)), np.zeros(0))
+    sums = scan_lines(solids_of(nothing), RULE, spacing=0.3, cutoff=0.0)
+    assert not sums.segments.any()
+    assert not sums.lines.any()
+
+
+def test_reported_error_is_the_scatter_over_seeds():
+    """Over 40 seeds, within 30 %: it is neither too bold nor too shy."""
+    spheres = poisson_spheres(np.random.default_rng(3), 0.15, 5.0)
+    options = {"spacing": 0.4, "cutoff": 0.5}
+    results = [fabric(solids_of(spheres, 3.0), seed=seed, **options) for seed in range(40)]
+    axial = [result.tensor.axial((0, 0, 1)) for result in results]
+    errors = [result.axial_error((0, 0, 1)) for result in results]
+    assert np.std(axial, ddof=1) == pytest.approx(np.mean(errors), rel=0.3)
+
+
+def test_alpha_vanishes_within_its_error_where_theory_says_so():
+    """Separate spheres in a sphere window without a cut-off: isotropic for any arrangement."""
+    rows = Spheres(np.array([[x, 0.0, z] for x in (-1.5, 0, 1.5) for z in range(-3, 4)]), 0)
+    spheres = Spheres(rows.position, np.full(21, 0.5))
+    for seed in range(20):
+        result = fabric(solids_of(spheres, 4.0), seed=seed, spacing=0.3, cutoff=0.0)
+        for axis in np.eye(3):
+            assert abs(result.tensor.axial(axis)) < 4 * result.axial_error(axis)
+    cut = fabric(solids_of(spheres, 4.0), spacing=0.3, cutoff=0.6)
+    assert abs(cut.tensor.axial((0, 1, 0))) > 4 * cut.axial_error((0, 1, 0))

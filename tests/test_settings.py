@@ -1,0 +1,213 @@
+"""Settings: what users write, and one error for each value that cannot be used."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from scanfab.directions import direction_rule
+from scanfab.errors import SettingsError
+from scanfab.settings import Length, Settings, parse_axis, parse_frames, parse_length
+from tests.dumps import write
+
+RADII = {"rmin": 0.5, "rmean": 1.0, "rmax": 2.0}
+
+
+@pytest.mark.parametrize(
+    ("text", "length"),
+    [
+        ("0.5", 0.5),
+        (0.5, 0.5),
+        (3, 3.0),
+        ("1e-3", 1e-3),
+        ("1rmin", 0.5),
+        ("0.2rmean", 0.2),
+        ("1.5rmax", 3.0),
+        (" 2 rmax ", 4.0),
+        ("1e-1rmin", 0.05),
+        (".5rmin", 0.25),
+        ("0", 0.0),
+        (Length(3.0, "rmax"), 6.0),
+    ],
+)
+def test_lengths_are_numbers_or_relative_to_a_radius(text, length):
+    assert parse_length("cutoff", text).resolve(RADII) == pytest.approx(length)
+
+
+@pytest.mark.parametrize("text", ["", "rmin", "1rmed", "long", "1 mm", "nan", "inf", "1,5", None])
+def test_other_lengths_are_errors_that_show_what_is_expected(text):
+    with pytest.raises(SettingsError, match=r"cutoff: expected a length such as.*found"):
+        parse_length("cutoff", text)
+
+
+@pytest.mark.parametrize(
+    ("text", "axis"),
+    [
+        ("x", (1, 0, 0)),
+        ("z", (0, 0, 1)),
+        ("0,0,2", (0, 0, 1)),
+        ("1, 1, 0", (2**-0.5, 2**-0.5, 0)),
+        ((0, -3.0, 0), (0, -1, 0)),
+    ],
+)
+def test_axes_are_unit_vectors(text, axis):
+    np.testing.assert_allclose(parse_axis(text), axis)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "w", "Z", "1,2", "1,2,3,4", "0,0,0", "a,b,c", "nan,0,1", (1, 2)]
+)
+def test_other_axes_are_errors(text):
+    with pytest.raises(SettingsError, match="axis: expected x, y, z or three numbers"):
+        parse_axis(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "frames"),
+    [
+        (None, range(10)),
+        ("2:5", [2, 3, 4]),
+        (":3", [0, 1, 2]),
+        ("7:", [7, 8, 9]),
+        ("::4", [0, 4, 8]),
+        ("-2:", [8, 9]),
+        (":-8", [0, 1]),
+        ("3", [3]),
+        ("-1", [9]),
+        ("-3", [7]),
+        ("::-1", range(9, -1, -1)),
+        ("1 : 3", [1, 2]),
+        (slice(1, 3), [1, 2]),
+    ],
+)
+def test_frames_are_slices(text, frames):
+    assert list(range(10)[parse_frames(text)]) == list(frames)
+
+
+@pytest.mark.parametrize("text", ["", "a", "1:2:3:4", "1.5", "::0", "1,2", "all"])
+def test_other_frames_are_errors(text):
+    with pytest.raises(SettingsError, match="frames: expected a slice such as"):
+        parse_frames(text)
+
+
+def test_the_defaults_are_those_of_the_command_line():
+    settings = Settings.make()
+    assert settings.variants == "abcd"
+    assert settings.rv == 0.7
+    assert settings.cutoff == Length(1.0, "rmin")
+    assert settings.spacing is None
+    assert settings.directions is None
+    assert settings.tolerance == 1e-4
+    assert settings.min_contacts == 2
+    assert settings.contact_tolerance == 0
+    assert settings.axis == (0, 0, 1)
+    assert settings.strain == "auto"
+    assert settings.seed == 0
+    assert settings.boundary == ()
+
+
+def test_variants_are_always_in_the_same_order():
+    assert Settings.make(variants="dca").variants == "acd"
+    assert Settings.make(variants="aab").variants == "ab"
+
+
+@pytest.mark.parametrize(
+    ("variants", "window", "whole"),
+    [("ab", False, True), ("cd", True, False), ("ad", True, True)],
+)
+def test_variants_say_what_is_needed(variants, window, whole):
+    settings = Settings.make(variants=variants)
+    assert (settings.needs_window, settings.needs_whole) == (window, whole)
+
+
+def test_directions_are_a_number_a_rule_or_auto():
+    assert len(Settings.make(directions=25).directions) >= 25
+    assert Settings.make(directions="fibonacci:40").directions.name.startswith("fibonacci")
+    rule = direction_rule("lebedev:7")
+    assert Settings.make(directions=rule).directions is rule
+
+
+def test_boundary_is_one_expression_or_several():
+    assert [rule.text for rule in Settings.make(boundary="type=2").boundary] == ["type=2"]
+    assert len(Settings.make(boundary=["type=2", "id>5"]).boundary) == 2
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [
+        ("variants", ""),
+        ("variants", "abe"),
+        ("variants", "a,b"),
+        ("rv", 0),
+        ("rv", -0.5),
+        ("rv", float("nan")),
+        ("rv", float("inf")),
+        ("rv_radius", 0),
+        ("rv_radius", -1),
+        ("rv_radius", float("nan")),
+        ("rv_center", (0, 0, float("nan"))),
+        ("rv_center", (0, 0, float("inf"))),
+        ("rv_center", (0, 0)),
+        ("rv_center", (0, 0, 0, 0)),
+        ("cutoff", -1),
+        ("cutoff", "-1rmin"),
+        ("spacing", 0),
+        ("spacing", "-1rmin"),
+        ("directions", 0),
+        ("directions", -5),
+        ("directions", "many"),
+        ("tolerance", 0),
+        ("tolerance", -1e-3),
+        ("tolerance", float("nan")),
+        ("min_contacts", -1),
+        ("contact_tolerance", -1e-9),
+        ("contact_tolerance", float("inf")),
+        ("strain", "volume"),
+        ("strain", "nowhere.csv"),
+        ("seed", -1),
+        ("workers", 0),
+        ("workers", -2),
+        ("axis", "w"),
+        ("frames", "x"),
+        ("boundary", "type"),
+    ],
+)
+def test_a_value_that_cannot_be_used_is_an_error_with_its_name(option, value):
+    with pytest.raises(
+        SettingsError, match=f"{option.replace('_', '-')}: expected|{option}: |direction"
+    ):
+        Settings.make(**{option: value})
+
+
+@pytest.mark.parametrize(
+    ("option", "value"),
+    [
+        ("rv", "wide"),
+        ("tolerance", "low"),
+        ("min_contacts", 1.5),
+        ("seed", "x"),
+        ("rv_radius", "a"),
+    ],
+)
+def test_a_value_of_the_wrong_kind_is_an_error_of_the_settings(option, value):
+    with pytest.raises(SettingsError):
+        Settings.make(**{option: value})
+
+
+def test_a_strain_file_must_exist(tmp_path):
+    path = write(tmp_path / "strain.csv", "step,strain\n0,0\n")
+    assert Settings.make(strain=path).strain == str(path)
+    with pytest.raises(SettingsError, match="a CSV file that exists"):
+        Settings.make(strain=tmp_path)
+
+
+def test_an_option_that_does_not_exist_is_an_error():
+    with pytest.raises(TypeError, match="windows"):
+        Settings.make(windows=3)
+
+
+def test_settings_cannot_be_changed():
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        Settings.make().rv = 0.5

@@ -1,0 +1,154 @@
+"""The four variants: rattlers, coordination, counted grains and the contacts that count."""
+
+import numpy as np
+import pytest
+
+from scanfab import Cell, Packing, contact_fabric, find_contacts
+from scanfab.variants import VARIANTS, Sample
+from scanfab.window import SphereWindow
+from tests.lattices import shaken_cubic
+
+A, B, C, D = (VARIANTS[name] for name in "abcd")
+
+
+def row_of_grains(count=6, boundary=(), **options):
+    """Grains along x at 0, 2, 4, ..., in contact with their neighbours."""
+    position = np.zeros((count, 3))
+    position[:, 0] = 2.0 * np.arange(count)
+    pairs = np.column_stack([np.arange(count - 1), np.arange(1, count)])
+    packing = Packing(position, 1.0, contacts=pairs, **options)
+    return Sample(packing, np.isin(np.arange(count), boundary))
+
+
+def rows(mask):
+    return np.flatnonzero(mask).tolist()
+
+
+def test_grain_with_fewer_than_two_contacts_is_a_rattler():
+    sample = row_of_grains()
+    assert rows(sample.rattlers) == [0, 5]
+
+
+def test_rattlers_are_found_in_one_pass():
+    """Without the ends the next grains would have one contact: they stay."""
+    sample = row_of_grains(4)
+    assert rows(sample.rattlers) == [0, 3]
+    assert rows(sample.removed(B)) == rows(sample.removed(D)) == [0, 3]
+    assert not sample.removed(A).any()
+    assert not sample.removed(C).any()
+
+
+def test_contacts_with_boundary_particles_count_for_the_rattler_rule():
+    sample = row_of_grains(boundary=[0])
+    assert rows(sample.rattlers) == [5]
+
+
+def test_boundary_particles_are_never_rattlers():
+    assert rows(row_of_grains(boundary=[0, 5]).rattlers) == []
+
+
+def test_contacts_with_walls_count_for_the_rattler_rule():
+    assert rows(row_of_grains(wall_contacts=[1, 0, 0, 0, 0, 0]).rattlers) == [5]
+    lonely = Sample(
+        Packing([[0, 0, 0], [9, 0, 0]], 1.0, contacts=np.zeros((0, 2)), wall_contacts=[2, 1]),
+        np.zeros(2, bool),
+    )
+    assert rows(lonely.rattlers) == [1]
+
+
+@pytest.mark.parametrize(
+    ("least", "expected"), [(0, []), (1, []), (2, [0, 5]), (3, [0, 1, 2, 3, 4, 5])]
+)
+def test_number_of_contacts_of_a_rattler_may_be_chosen(least, expected):
+    sample = row_of_grains()
+    assert rows(Sample(sample.packing, sample.boundary, least).rattlers) == expected
+
+
+def test_grain_held_by_its_own_images_is_no_rattler():
+    packing = find_contacts(Packing([[1, 1, 1]], 0.6, cell=Cell([1.0, 4.0, 4.0])))
+    sample = Sample(packing, np.zeros(1, bool))
+    assert sample.contact_numbers(np.ones(1, bool)).tolist() == [2]
+    assert rows(sample.rattlers) == []
+
+
+def test_coordination_of_all_grains():
+    assert row_of_grains().coordination(A, None) == pytest.approx((1 + 2 + 2 + 2 + 2 + 1) / 6)
+
+
+def test_coordination_without_removed_grains_leaves_their_contacts_out():
+    assert row_of_grains().coordination(B, None) == pytest.approx((1 + 2 + 2 + 1) / 4)
+
+
+def test_coordination_counts_contacts_with_boundary_and_walls():
+    """Boundary particles are no grains, their contacts are contacts of the grains."""
+    sample = row_of_grains(boundary=[0], wall_contacts=[5, 0, 0, 0, 0, 3])
+    assert sample.coordination(A, None) == pytest.approx((2 + 2 + 2 + 2 + 4) / 5)
+
+
+def test_coordination_in_the_window_is_of_the_grains_whose_centre_lies_in_it():
+    """The contacts of those grains count wherever they are."""
+    window = SphereWindow(np.array([0.0, 0, 0]), 2.5)
+    sample = row_of_grains()
+    assert rows(sample.counted(C, window)) == [0, 1]
+    assert sample.coordination(C, window) == pytest.approx((1 + 2) / 2)
+    # 0 is removed, with the contact of 1 to it
+    assert sample.coordination(D, window) == pytest.approx(1.0)
+
+
+def test_coordination_of_no_grain_is_none():
+    window = SphereWindow(np.array([50.0, 0, 0]), 1.0)
+    assert row_of_grains().coordination(C, window) is None
+    assert row_of_grains(2).coordination(B, None) is None
+
+
+def test_counted_grains_are_no_boundary_but_may_be_rattlers():
+    sample = row_of_grains(boundary=[1])
+    window = SphereWindow(np.array([0.0, 0, 0]), 4.5)
+    assert rows(sample.counted(A, None)) == rows(sample.counted(B, None)) == [0, 2, 3, 4, 5]
+    assert rows(sample.counted(C, window)) == rows(sample.counted(D, window)) == [0, 2]
+
+
+def test_contacts_with_boundary_particles_do_not_enter_the_contact_fabric():
+    assert len(row_of_grains().normals(A, None)) == 5
+    assert len(row_of_grains(boundary=[0, 3]).normals(A, None)) == 2
+
+
+def test_contacts_of_removed_grains_do_not_enter_the_contact_fabric():
+    assert len(row_of_grains().normals(B, None)) == 3
+
+
+@pytest.mark.parametrize(("reach", "contacts"), [(0.99, 0), (1.01, 1), (2.99, 1), (3.01, 2)])
+def test_contacts_of_the_window_are_those_whose_point_lies_in_it(reach, contacts):
+    """Points at 1, 3, 5, ...; centres at 0, 2, 4, ..."""
+    window = SphereWindow(np.array([0.0, 0, 0]), reach)
+    assert len(row_of_grains().normals(C, window)) == contacts
+    assert len(row_of_grains().normals(D, window)) == max(contacts - 1, 0)
+
+
+def test_contact_point_of_unequal_grains_is_the_middle_of_the_overlap():
+    """Radii 2 and 0.5, centres 2.4 apart: between 1.9 and 2.0."""
+    packing = Packing([[0, 0, 0], [2.4, 0, 0]], [2.0, 0.5], contacts=[[1, 0]])
+    sample = Sample(packing, np.zeros(2, bool))
+    for reach, contacts in [(1.949, 0), (1.951, 1)]:
+        assert len(sample.normals(C, SphereWindow(np.zeros(3), reach))) == contacts
+
+
+def test_contact_point_through_a_face_lies_in_the_window_on_either_side():
+    packing = find_contacts(Packing([[0.4, 5, 5], [9.4, 5, 5]], 0.51, cell=Cell([10.0, 10, 10])))
+    sample = Sample(packing, np.zeros(2, bool))
+    assert len(packing.contacts) == 1
+    for x in (0.2, 9.7):
+        assert len(sample.normals(C, SphereWindow(np.array([x, 5, 5]), 0.4))) == 1
+    assert len(sample.normals(C, SphereWindow(np.array([1.0, 5, 5]), 0.4))) == 0
+
+
+def test_window_that_holds_everything_gives_what_the_whole_gives():
+    packing = find_contacts(Packing(*shaken_cubic(np.random.default_rng(0), 5)))
+    sample = Sample(packing, packing.position[:, 2] < 0.8)
+    window = SphereWindow(np.array([2.5, 2.5, 2.5]), 50.0)
+    assert sample.rattlers.any()
+    for whole, inside in [(A, C), (B, D)]:
+        normals = sample.normals(whole, None)
+        assert np.array_equal(normals, sample.normals(inside, window))
+        assert sample.coordination(whole, None) == sample.coordination(inside, window)
+        assert contact_fabric(normals).alpha > 0

@@ -1,0 +1,98 @@
+"""The sphere RV: what lies in it, its default place and size, and periodic faces."""
+
+import numpy as np
+import pytest
+
+from scanfab import Cell, Packing, SettingsError, compute
+from scanfab.window import SphereWindow, default_center, smallest_extent
+from tests.lattices import shaken_cubic
+
+CELL = Cell([10.0, 8.0, 6.0], origin=(-1.0, 2.0, 3.0))
+ALL = np.ones(4, bool)
+
+
+def four_grains(**options):
+    """Surfaces from -1 to 10.5 along x, 8.25 along y, 9 along z."""
+    position = [[0, 0, 0], [10, 0, 0], [0, 8, 0], [0, 0, 8.75]]
+    return Packing(position, [1.0, 0.5, 0.25, 0.25], **options)
+
+
+def test_points_in_the_window_are_nearer_than_its_radius():
+    window = SphereWindow(np.array([1.0, 0.0, 0.0]), 2.0)
+    points = np.array([[1.0, 0, 0], [2.9, 0, 0], [3.1, 0, 0], [-0.9, 0, 0], [1, 1.5, 1.5]])
+    assert window.contains(points, four_grains()).tolist() == [True, True, False, True, False]
+
+
+def test_distance_is_to_the_nearest_image():
+    packing = Packing([[0, 3, 4]], 1.0, cell=CELL)
+    window = SphereWindow(np.array([-0.5, 2.5, 3.5]), 1.0)
+    points = np.array([[8.9, 2.5, 3.5], [-0.5, 9.8, 3.5], [-0.5, 2.5, 8.9], [4.5, 6.5, 6.5]])
+    expected = [0.6, 0.7, 0.6, np.sqrt(25 + 16 + 9)]
+    assert window.distance(points, packing) == pytest.approx(expected)
+    assert window.contains(points, packing).tolist() == [True, True, True, False]
+
+
+def test_faces_that_do_not_repeat_are_not_looked_through():
+    packing = Packing([[0, 3, 4]], 1.0, cell=Cell([10.0, 8, 6], periodic=(True, False, False)))
+    window = SphereWindow(np.array([0.5, 0.5, 0.5]), 1.0)
+    points = np.array([[9.9, 0.5, 0.5], [0.5, 7.9, 0.5], [0.5, 0.5, 5.9]])
+    assert window.contains(points, packing).tolist() == [True, False, False]
+
+
+def test_default_center_is_the_middle_of_the_surfaces():
+    assert default_center(four_grains(), ALL) == pytest.approx([4.75, 3.625, 4.0])
+
+
+def test_smallest_extent_is_that_of_the_surfaces():
+    assert smallest_extent(four_grains(), ALL) == pytest.approx(9.25)
+
+
+def test_boundary_does_not_count_for_center_and_extent():
+    grains = np.array([True, True, False, True])
+    assert default_center(four_grains(), grains) == pytest.approx([4.75, 0.0, 4.0])
+    assert smallest_extent(four_grains(), grains) == pytest.approx(2.0)
+
+
+def test_periodic_cell_gives_center_and_extent():
+    packing = Packing([[0, 3, 4]], 1.0, cell=CELL)
+    assert default_center(packing, np.ones(1, bool)) == pytest.approx([4.0, 6.0, 6.0])
+    assert smallest_extent(packing, np.ones(1, bool)) == pytest.approx(6.0)
+
+
+def test_only_periodic_vectors_of_a_cell_give_center_and_extent():
+    """Along the others it is the grains: here from 2 to 4."""
+    packing = Packing([[0, 3, 4]], 1.0, cell=Cell([10.0, 80.0, 6.0], (True, False, True)))
+    assert default_center(packing, np.ones(1, bool)) == pytest.approx([5.0, 3.0, 3.0])
+    assert smallest_extent(packing, np.ones(1, bool)) == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("center", "radius", "inside"),
+    [
+        ((4.0, 6.0, 6.0), 2.999, True),
+        ((4.0, 6.0, 6.0), 3.001, False),
+        ((0.5, 6.0, 6.0), 1.6, False),
+        ((4.0, 9.0, 6.0), 1.1, False),
+        ((40.0, 6.0, 6.0), 1.0, False),
+    ],
+)
+def test_window_must_not_reach_through_a_periodic_face(center, radius, inside):
+    packing = Packing([[0, 3, 4]], 1.0, cell=CELL)
+    window = SphereWindow(np.array(center), radius)
+    if inside:
+        window.check_inside(packing)
+    else:
+        with pytest.raises(SettingsError, match="reaches through a periodic face of the cell"):
+            window.check_inside(packing)
+
+
+def test_window_may_reach_beyond_faces_that_do_not_repeat():
+    packing = Packing([[0, 3, 4]], 1.0, cell=Cell([10.0, 8, 6], periodic=(True, False, False)))
+    SphereWindow(np.array([5.0, 0.0, 0.0]), 4.9).check_inside(packing)
+    SphereWindow(np.array([5.0, 0.0, 0.0]), 4.9).check_inside(four_grains())
+
+
+def test_window_through_a_periodic_face_stops_the_computation():
+    packing = Packing(*shaken_cubic(np.random.default_rng(0), 4), cell=Cell([4.0, 4, 4]))
+    with pytest.raises(SettingsError, match="choose a smaller --rv or another --rv-center"):
+        compute(packing, variants="c", rv_center=(1.0, 2.0, 2.0))
