@@ -57,9 +57,9 @@ def sort_into_families(files: Sequence[Path], format: str | None) -> list[Family
     UnknownFormatError
         If there is no reader of that name.
     """
-    groups: dict[tuple[Path, str], list[Path]] = defaultdict(list)
+    groups: dict[str, list[Path]] = defaultdict(list)
     for file in files:
-        groups[file.parent, NUMBER.sub("*", bare_name(file))].append(file)
+        groups[NUMBER.sub("*", bare_name(file))].append(file)
     return [
         _family(members, format) for _, group in sorted(groups.items()) for members in _split(group)
     ]

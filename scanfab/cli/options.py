@@ -143,7 +143,7 @@ def _column_names(text: str | None) -> dict[str, str] | None:
 
 
 def _check_periodic(letters: str | None) -> None:
-    if letters is not None and not re.fullmatch("[xyz]{1,3}", letters):
+    if letters is not None and not re.fullmatch("[xyz]{0,3}", letters):
         raise click.UsageError(f"--periodic: expected letters out of xyz, found {letters!r}")
 
 
