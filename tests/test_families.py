@@ -74,8 +74,10 @@ def test_other_endings_are_another_family(tmp_path):
     assert len(families_of(tmp_path, ["a_1.txt", "a_1.dump"])) == 2
 
 
-def test_other_folders_are_another_family(tmp_path):
-    assert len(families_of(tmp_path, ["one/a_1.txt", "two/a_2.txt"])) == 2
+def test_files_of_several_folders_may_be_one_family(tmp_path):
+    """The single files of one command line form one series."""
+    (family,) = families_of(tmp_path, ["one/a_1.txt", "two/a_2.txt"])
+    assert steps(family) == [1, 2]
 
 
 def test_runs_that_differ_in_a_number_are_several_series(tmp_path):

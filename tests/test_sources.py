@@ -136,6 +136,7 @@ def test_a_series_may_start_with_frames_of_boundary_alone(tmp_path: Path) -> Non
         scanfab.read_series(path),
         boundary="type=2",
         variants="c",
+        rv=1.5,
         directions=9,
         cutoff=0,
         spacing=0.1,
