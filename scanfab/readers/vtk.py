@@ -213,8 +213,6 @@ def _from_meshio(file: Path, form: str) -> Mesh:
             mesh = reader.read(str(file))
     # meshio raises whatever its parsing meets, and exits for what it does not know
     except (Exception, SystemExit) as error:
-        if isinstance(error, ModuleNotFoundError) and error.name == "h5py":
-            raise _MeshioError("the data are HDF5: pip install 'scanfab[hdf5]'") from None
         raise _MeshioError(str(error) or type(error).__name__) from None
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = mesh.points
