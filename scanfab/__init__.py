@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from scanfab.cell import Cell
+    from scanfab.compare import compare_tables
     from scanfab.contacts import find_contacts
     from scanfab.directions import DirectionRule, direction_rule
     from scanfab.errors import (
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from scanfab.series import Series, read, read_series
     from scanfab.settings import Settings
     from scanfab.table import COLUMNS, Row, Table
+    from scanfab.tabular import read_rows
 
 # numpy, numba and the readers are loaded by the first name that needs them
 _HOME = {
@@ -49,11 +51,13 @@ _HOME = {
     "Table": "table",
     "UnknownFormatError": "errors",
     "VoidFabric": "fabric.void",
+    "compare_tables": "compare",
     "compute": "pipeline",
     "contact_fabric": "fabric.contact",
     "direction_rule": "directions",
     "find_contacts": "contacts",
     "read": "series",
+    "read_rows": "tabular",
     "read_series": "series",
     "scan_lines": "scan",
     "void_fabric": "fabric.void",
@@ -80,11 +84,13 @@ __all__ = [
     "Table",
     "UnknownFormatError",
     "VoidFabric",
+    "compare_tables",
     "compute",
     "contact_fabric",
     "direction_rule",
     "find_contacts",
     "read",
+    "read_rows",
     "read_series",
     "scan_lines",
     "void_fabric",

@@ -8,6 +8,7 @@ __all__ = [
     "ScanfabError",
     "ScanfabWarning",
     "SettingsError",
+    "SkippedFrameWarning",
     "UnknownFormatError",
 ]
 
@@ -34,3 +35,7 @@ class SettingsError(ScanfabError):
 
 class ScanfabWarning(UserWarning):
     """Something that the user should know, although the result stands."""
+
+
+class SkippedFrameWarning(ScanfabWarning):
+    """A frame was left out because it could not be read."""

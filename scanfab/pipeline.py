@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +19,13 @@ import numpy.typing as npt
 from scanfab.adaptive import scan_to_tolerance
 from scanfab.boundary import enclosing_class, select_boundary
 from scanfab.contacts import find_contacts
-from scanfab.errors import ScanfabWarning, SettingsError
+from scanfab.errors import (
+    PackingError,
+    ReadError,
+    ScanfabWarning,
+    SettingsError,
+    SkippedFrameWarning,
+)
 from scanfab.fabric.contact import axial_error, contact_fabric
 from scanfab.fabric.tensor import COMPONENTS, FabricTensor
 from scanfab.fabric.void import VoidFabric, void_fabric
@@ -66,36 +77,131 @@ def compute(source: Packing | Series, **options: Any) -> Table:
     return Table(compute_rows(source, Settings.make(**options)))
 
 
-def compute_rows(source: Packing | Series, settings: Settings) -> Iterator[Row]:
-    """The rows of :func:`compute`, each as soon as its frame is done."""
+def compute_rows(source: Packing | Series, settings: Settings, *, start: int = 0) -> Iterator[Row]:
+    """
+    The rows of :func:`compute`, in the order of the frames, each as soon as it may come.
+
+    Parameters
+    ----------
+    source, settings
+        As for :func:`compute`.
+    start : int, optional
+        Leave out the frames before this one, which an earlier run has computed.
+    """
     if not isinstance(source, Packing | Series):
         raise SettingsError(f"compute: expected a Packing or a Series, found {source!r}")
-    name = "" if isinstance(source, Packing) else source.name
-    strains = _Strains(settings)
-    plan: Plan | None = None
-    chosen = chosen_frames(source, settings.frames)
-    found, particles = False, 0
-    for number, read in _frames(source):
-        if plan is not None and number not in chosen:
-            continue
-        sample = classify(read(), settings)
-        particles += len(sample.packing)
-        if plan is None and sample.grains.any():
-            plan = make_plan(settings, sample)
-            strains.start(sample)
-            hint = boundary_hint(sample, settings)
+    run = _Run(source, settings, start)
+    jobs = run.jobs()
+    with _Pool(settings.workers) as pool:
+        for rows in pool.in_order(jobs):
+            yield from rows
+    run.finish()
+
+
+class _Run:
+    """
+    One series under way.
+
+    Frames are read one after the other until one has grains, which makes the plan; from there on
+    they do not depend on one another.
+    """
+
+    def __init__(self, source: Packing | Series, settings: Settings, start: int) -> None:
+        self.source = source
+        self.settings = settings
+        self.name = "" if isinstance(source, Packing) else source.name
+        self.start = start
+        self.plan: Plan | None = None
+        self.strains = _Strains(settings)
+        self.particles = 0
+        self.found = False
+
+    def jobs(self) -> Iterator[Callable[[int], list[Row]]]:
+        """For each chosen frame what computes its rows, with a number of threads."""
+        chosen = chosen_frames(self.source, self.settings.frames)
+        for number, read in _frames(self.source):
+            due = number in chosen
+            self.found = self.found or due
+            due = due and number >= self.start
+            if self.plan is None:
+                sample = self._read(number, read)
+                if sample is not None:
+                    self._start(sample)
+                    if due:
+                        yield partial(self._rows, number, sample)
+            elif due:
+                yield partial(self._read_rows, number, read)
+            if number >= chosen.stop - 1 and self.plan is not None:
+                break
+
+    def finish(self) -> None:
+        """Complain of frames that do not exist, and of grains that were never met."""
+        frames = self.settings.frames
+        if not self.found:
+            raise SettingsError(f"frames: the series has no frame in {_spell(frames)}")
+        if self.plan is None:
+            _complain_of_no_grains(self.name, self.particles, self.settings)
+
+    def _start(self, sample: Sample) -> None:
+        """Make the plan, if the frame has grains."""
+        self.particles += len(sample.packing)
+        if sample.grains.any():
+            self.plan = make_plan(self.settings, sample)
+            self.strains.start(sample)
+            hint = boundary_hint(sample, self.settings)
             if hint is not None:
                 warnings.warn(hint, ScanfabWarning, stacklevel=2)
-        if number in chosen:
-            found = True
-            strain = strains.at(number, sample)
-            yield from _frame_rows(name, number, sample, plan, settings, strain)
-        if number >= chosen.stop - 1 and plan is not None:
-            break
-    if not found:
-        raise SettingsError(f"frames: the series has no frame in {_spell(settings.frames)}")
-    if plan is None:
-        _complain_of_no_grains(name, particles, settings)
+
+    def _read(self, number: int, read: Callable[[], Packing]) -> Sample | None:
+        """The frame; None if it cannot be read and such frames are to be skipped."""
+        try:
+            return classify(read(), self.settings)
+        except (PackingError, ReadError) as error:
+            if self.settings.on_error == "stop":
+                raise
+            warnings.warn(f"frame {number} skipped: {error}", SkippedFrameWarning, stacklevel=2)
+            return None
+
+    def _read_rows(self, number: int, read: Callable[[], Packing], threads: int) -> list[Row]:
+        sample = self._read(number, read)
+        return [] if sample is None else self._rows(number, sample, threads)
+
+    def _rows(self, number: int, sample: Sample, threads: int) -> list[Row]:
+        settings = replace(self.settings, workers=threads)
+        strain = self.strains.at(number, sample)
+        return list(_frame_rows(self.name, number, sample, self.plan, settings, strain))
+
+
+class _Pool:
+    """Threads that compute frames; with few frames, each has more of them for its scan."""
+
+    def __init__(self, workers: int) -> None:
+        self.workers = workers
+        self._pool = ThreadPoolExecutor(workers)
+
+    def __enter__(self) -> _Pool:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        # an interrupted run does not wait for the frames under way
+        self._pool.shutdown(wait=False, cancel_futures=True)
+
+    def in_order(self, jobs: Iterator[Callable[[int], list[Row]]]) -> Iterator[list[Row]]:
+        """The results in the order of the jobs, of which one a worker is under way."""
+        first = list(islice(jobs, self.workers))
+        threads = max(1, self.workers // max(len(first), 1))
+        waiting = deque(self._pool.submit(job, threads) for job in first)
+        while waiting:
+            rows = waiting.popleft().result()
+            following = next(jobs, None)
+            if following is not None:
+                waiting.append(self._pool.submit(following, threads))
+            yield rows
+
+
+def _spell(frames: slice) -> str:
+    parts = [frames.start, frames.stop, *([] if frames.step is None else [frames.step])]
+    return ":".join("" if part is None else str(part) for part in parts)
 
 
 def _complain_of_no_grains(name: str, particles: int, settings: Settings) -> None:
@@ -105,11 +211,6 @@ def _complain_of_no_grains(name: str, particles: int, settings: Settings) -> Non
             f"boundary: {named} selects all particles of every frame: no grain is left"
         )
     warnings.warn(f"{name}: no frame has any grains", ScanfabWarning, stacklevel=3)
-
-
-def _spell(frames: slice) -> str:
-    parts = [frames.start, frames.stop, *([] if frames.step is None else [frames.step])]
-    return ":".join("" if part is None else str(part) for part in parts)
 
 
 def _frames(source: Packing | Series) -> Iterator[tuple[int, Any]]:

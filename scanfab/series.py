@@ -30,6 +30,8 @@ class Frame:
     snapshot: Snapshot
     name_step: int | None
     """The step in the file's name."""
+    problem: ReadError | None = None
+    """Why not even the frames of the file can be told."""
 
     @property
     def reader(self) -> Reader:
@@ -48,6 +50,8 @@ class Frame:
         PackingError
             If its content is no packing.
         """
+        if self.problem is not None:
+            raise self.problem
         options = self.series.options
         files = self._contact_files()
         grains = self.reader.read_grains(self.snapshot, options)
@@ -114,8 +118,18 @@ class Series:
         reader = self.grains.reader
         assert reader is not None
         for name_step, path in self.grains.files.items():
-            for snapshot in reader.snapshots(path):
+            try:
+                snapshots = reader.snapshots(path)
+            except ReadError as error:
+                yield Frame(self, Snapshot(path), name_step, error)
+                continue
+            for snapshot in snapshots:
                 yield Frame(self, snapshot, name_step)
+
+    def files(self) -> Iterator[Path]:
+        """Every file that the frames come from."""
+        for family in (self.grains, *self.contacts):
+            yield from family.files.values()
 
 
 def read(path: PathLike, *, frame: int = 0, **options: Any) -> Packing:

@@ -148,6 +148,7 @@ class Settings:
     frames: slice = field(default_factory=lambda: slice(None))
     seed: int = 0
     workers: int = 1
+    on_error: str = "stop"
 
     @classmethod
     def make(
@@ -169,6 +170,7 @@ class Settings:
         frames: str | slice | None = None,
         seed: int = 0,
         workers: int | None = None,
+        on_error: str = "stop",
     ) -> Settings:
         """
         Settings from what users write.
@@ -202,6 +204,8 @@ class Settings:
             Which frames.
         seed, workers : int
             Seed of the random numbers; threads (all cores by default).
+        on_error : str
+            What a frame that cannot be read does: ``stop`` or ``skip``.
 
         Raises
         ------
@@ -228,6 +232,7 @@ class Settings:
             frames=parse_frames(frames),
             seed=_whole("seed", seed),
             workers=(os.cpu_count() or 1) if workers is None else _whole("workers", workers),
+            on_error=on_error,
         )._checked(variants)
 
     def _checked(self, variants: str) -> Settings:
@@ -265,6 +270,10 @@ class Settings:
                 self.strain in STRAIN_MODES or Path(self.strain).is_file(),
                 f"strain: expected auto, cell, boundary, grains or a CSV file that exists, "
                 f"found {self.strain!r}",
+            ),
+            (
+                self.on_error in ("stop", "skip"),
+                f"on-error: expected stop or skip, found {self.on_error!r}",
             ),
             (self.seed >= 0, f"seed: expected 0 or more, found {self.seed}"),
             (self.workers >= 1, f"workers: expected 1 or more, found {self.workers}"),

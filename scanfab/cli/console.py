@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from scanfab.errors import ScanfabWarning
+from scanfab.errors import ScanfabWarning, SkippedFrameWarning
 from scanfab.table import Row
 
 __all__ = ["print_table", "reported_warnings", "with_progress"]
@@ -32,13 +32,22 @@ SHOWN = {
 }
 
 
+class Told:
+    """What the warnings amount to."""
+
+    skipped = 0
+    """Frames that were skipped."""
+
+
 @contextmanager
-def reported_warnings() -> Iterator[None]:
+def reported_warnings() -> Iterator[Told]:
     """Warnings of scanfab as single lines on standard error, each text once."""
     seen: set[str] = set()
+    told = Told()
 
     def show(message: Any, category: type[Warning], *rest: Any, **more: Any) -> None:
         text = str(message)
+        told.skipped += issubclass(category, SkippedFrameWarning)
         if issubclass(category, ScanfabWarning) and text not in seen:
             seen.add(text)
             click.echo(f"scanfab: warning: {text}", err=True)
@@ -47,7 +56,7 @@ def reported_warnings() -> Iterator[None]:
         warnings.simplefilter("ignore")
         warnings.simplefilter("always", ScanfabWarning)
         warnings.showwarning = show
-        yield
+        yield told
 
 
 def with_progress(rows: Iterable[Row]) -> Iterator[Row]:

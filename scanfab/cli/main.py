@@ -14,8 +14,13 @@ __all__ = ["cli", "main"]
 # one module a command, imported only when the command runs: --help stays fast
 COMMANDS = {
     "compute": "the fabric table: one row per frame and variant",
+    "compare": "variants side by side, normalised curves, correlation with contact fabric",
+    "inspect": "what the reader sees, nothing computed",
     "formats": "every reader and writer, its extensions, and the package it comes from",
 }
+
+
+INTERRUPTED, TERMINATED = 130, 143
 
 
 class LazyGroup(click.Group):
@@ -69,7 +74,20 @@ def main(args: list[str] | None = None) -> None:
         raise Terminated
 
     signal.signal(signal.SIGTERM, terminate)
-    sys.exit(run(sys.argv[1:] if args is None else args))
+    code = run(sys.argv[1:] if args is None else args)
+    if code in (INTERRUPTED, TERMINATED):
+        _leave_at_once(code)
+    sys.exit(code)
+
+
+def _leave_at_once(code: int) -> None:
+    """Exit without waiting for the frames that other threads are computing."""
+    from scanfab.readers.files import remove_copies
+
+    remove_copies()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
 
 
 def run(args: list[str]) -> int:
@@ -87,10 +105,10 @@ def run(args: list[str]) -> int:
         return error.exit_code
     except (KeyboardInterrupt, click.Abort):
         click.echo("scanfab: interrupted", err=True)
-        return 130
+        return INTERRUPTED
     except Terminated:
         click.echo("scanfab: terminated", err=True)
-        return 143
+        return TERMINATED
     except (ScanfabError, OSError, MemoryError) as error:
         if debug:
             raise

@@ -5,20 +5,32 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
 if TYPE_CHECKING:
     from scanfab.series import Series
 
-__all__ = ["CellCommand", "open_series", "reading_arguments", "reading_options"]
+SETTINGS_FILE = "scanfab.toml"
+
+__all__ = [
+    "SourceCommand",
+    "fill_from_file",
+    "frame_options",
+    "open_series",
+    "output_option",
+    "reading_arguments",
+    "reading_options",
+]
 
 Command = Callable[..., Any]
 
 
-class CellCommand(click.Command):
-    """A command whose --cell takes three or six numbers."""
+class SourceCommand(click.Command):
+    """A command with sources, whose --cell takes three or six numbers."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Join the numbers behind --cell into one word, as click knows no variable count."""
@@ -41,6 +53,23 @@ def reading_options(command: Command) -> Command:
     return command
 
 
+def frame_options(command: Command) -> Command:
+    """Add the options that tell boundary, rattlers and the frames to take."""
+    for option in reversed(_FRAMES):
+        command = option(command)
+    return command
+
+
+output_option = click.option(
+    "-o",
+    "output",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Result file: .csv .tsv .json .jsonl .parquet (default: CSV on standard output, or a "
+    "readable table on a terminal).",
+)
+
+
 def reading_arguments(options: dict[str, Any]) -> dict[str, Any]:
     """Take the reading options out of a command's, as arguments of ``read_series``."""
     taken = {name: options.pop(name) for name in _READING_NAMES}
@@ -50,6 +79,71 @@ def reading_arguments(options: dict[str, Any]) -> dict[str, Any]:
     if taken["format"] is not None:
         _check_format(taken["format"])
     return taken
+
+
+def settings_file(sources: tuple[str, ...]) -> Path | None:
+    """The scanfab.toml beside the dumps; a usage error if the sources have different ones."""
+    folders = {Path(s) if Path(s).is_dir() else Path(s).parent for s in sources if s != "-"}
+    found = [folder / SETTINGS_FILE for folder in sorted(folders)]
+    found = [path for path in found if path.is_file()]
+    if len(found) > 1:
+        raise click.UsageError(
+            f"the sources have several settings files: {', '.join(map(str, found))}; "
+            f"compute them one by one"
+        )
+    return found[0] if found else None
+
+
+def fill_from_file(
+    ctx: click.Context, sources: tuple[str, ...], options: dict[str, Any]
+) -> dict[str, Any]:
+    """The options, those that the command line does not name from the settings file."""
+    path = settings_file(sources)
+    if path is None:
+        return options
+    parameters = {
+        name.removeprefix("--"): parameter
+        for parameter in ctx.command.params
+        for name in parameter.opts
+        if parameter.name in options
+    }
+    filled = dict(options)
+    for key, value in _section(path, "compute").items():
+        parameter = parameters.get(key)
+        if parameter is not None:
+            name = str(parameter.name)
+            if ctx.get_parameter_source(name) is ParameterSource.DEFAULT:
+                filled[name] = _from_toml(ctx, path, parameter, value)
+        elif ctx.command.name == "compute":
+            raise click.UsageError(f"{path}: compute has no option {key!r}")
+    return filled
+
+
+def _section(path: Path, name: str) -> dict[str, Any]:
+    import tomllib
+
+    try:
+        with open(path, "rb") as stream:
+            section = tomllib.load(stream).get(name, {})
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise click.UsageError(f"{path}: {error}") from None
+    if not isinstance(section, dict):
+        raise click.UsageError(f"{path}: expected a section [{name}]")
+    return section
+
+
+def _from_toml(ctx: click.Context, path: Path, parameter: click.Parameter, value: Any) -> Any:
+    """A value of the settings file as the command line would give it."""
+    if isinstance(value, list) and not parameter.multiple and parameter.nargs == 1:
+        value = " ".join(map(str, value))  # the numbers of a cell
+    elif parameter.multiple and not isinstance(value, list):
+        value = [value]
+    elif not isinstance(value, list):
+        value = str(value)
+    try:
+        return parameter.type_cast_value(ctx, value)
+    except click.BadParameter as error:
+        raise click.UsageError(f"{path}: {parameter.name}: {error.format_message()}") from None
 
 
 def open_series(sources: tuple[str, ...], reading: dict[str, Any]) -> list[Series]:
@@ -99,6 +193,31 @@ _READING: list[Callable[[Command], Command]] = [
         metavar="PATH|file|geometric",
         help="Contacts: a file, folder or glob matched by step; from the dump's own contact files; "
         "or by geometry (default: file if there is one, else geometric).",
+    ),
+]
+_FRAMES: list[Callable[[Command], Command]] = [
+    click.option(
+        "--contact-tolerance",
+        default=0.0,
+        show_default=True,
+        metavar="X",
+        help="Relative: contact if distance < (r1 + r2)(1 + X).",
+    ),
+    click.option(
+        "--boundary",
+        multiple=True,
+        metavar="EXPR",
+        help='Which particles are boundary: "type=2", "mask=3,4", "id>=13723"; repeated: or.',
+    ),
+    click.option(
+        "--min-contacts",
+        default=2,
+        show_default=True,
+        metavar="N",
+        help="A grain with fewer contacts is a rattler.",
+    ),
+    click.option(
+        "--frames", metavar="A:B:C", help="Which frames, as a Python slice (default: all)."
     ),
 ]
 _READING_NAMES = (

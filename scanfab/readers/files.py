@@ -17,7 +17,14 @@ from typing import IO, Any
 
 from scanfab.errors import ReadError
 
-__all__ = ["COMPRESSED_SUFFIXES", "bare_name", "first_bytes", "plain", "temporary_copy"]
+__all__ = [
+    "COMPRESSED_SUFFIXES",
+    "bare_name",
+    "first_bytes",
+    "plain",
+    "remove_copies",
+    "temporary_copy",
+]
 
 OPENERS: dict[bytes, Callable[..., Any]] = {
     b"\x1f\x8b": gzip.open,
@@ -72,7 +79,7 @@ def temporary_copy(stream: IO[bytes], name: str) -> Path:
     """What a stream holds, as a file that goes with the process."""
     if not _folder:
         _folder.append(tempfile.mkdtemp(prefix="scanfab-"))
-        atexit.register(shutil.rmtree, _folder[0], ignore_errors=True)
+        atexit.register(remove_copies)
     copy = Path(tempfile.mkdtemp(dir=_folder[0])) / name
     try:
         with open(copy, "wb") as file:
@@ -81,6 +88,12 @@ def temporary_copy(stream: IO[bytes], name: str) -> Path:
         shutil.rmtree(copy.parent, ignore_errors=True)
         raise
     return copy
+
+
+def remove_copies() -> None:
+    """Delete all temporary copies, at the end of the process."""
+    for folder in _folder:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _opener(path: Path) -> Callable[..., Any]:

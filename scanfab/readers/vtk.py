@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import io
 import re
+import threading
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from pathlib import Path
@@ -35,6 +36,10 @@ IntArray = npt.NDArray[np.int64]
 VTK_VERTEX, VTK_POLY_VERTEX, VTK_LINE = 1, 2, 3
 # other kinds of VTK files are grids and indexes of files
 HOLDING_POINTS = ("PolyData", "POLYDATA", "UnstructuredGrid", "UNSTRUCTURED_GRID", "Xdmf")
+
+
+# frames are read in threads, but both libraries print to streams of the process
+_ONE_AT_A_TIME = threading.RLock()
 
 
 class Mesh(NamedTuple):
@@ -152,6 +157,11 @@ def read_mesh(path: Path) -> Mesh:
     ReadError
         If neither library can, with what they say.
     """
+    with _ONE_AT_A_TIME:
+        return _read_mesh(path)
+
+
+def _read_mesh(path: Path) -> Mesh:
     form = _form(path)
     if form is None:
         raise ReadError(f"{path}: expected a VTK file, found something else")
@@ -334,7 +344,11 @@ def _read_box(path: Path) -> Cell | None:
     import pyvista
 
     suffix = ".vtk" if first_bytes(path).startswith(b"# vtk") else ".vtr"
-    with _quiet_vtk(), pyvista.VtkErrorCatcher(send_to_logging=False) as caught:
+    with (
+        _ONE_AT_A_TIME,
+        _quiet_vtk(),
+        pyvista.VtkErrorCatcher(send_to_logging=False) as caught,
+    ):
         try:
             reader = pyvista.get_reader(str(plain(path)), force_ext=suffix).reader
             reader.Update()

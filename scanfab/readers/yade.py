@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import re
 import struct
-import warnings
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
@@ -83,10 +82,11 @@ def _is_text(path: Path) -> bool:
 
 
 def _numbers(path: Path) -> FloatArray:
+    with open(plain(path), "rb") as lines:
+        if all(line.startswith(b"#") or not line.strip() for line in lines):
+            return np.zeros((0, 0))  # an empty frame
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # numpy's, of a file without rows: an empty frame
-            values: FloatArray = np.loadtxt(plain(path), dtype=np.float64, comments="#", ndmin=2)
+        values: FloatArray = np.loadtxt(plain(path), dtype=np.float64, comments="#", ndmin=2)
     except ValueError as error:
         reason = str(error).replace("could not convert string", "expected a number, found")
         raise ReadError(f"{path}: {reason}") from None

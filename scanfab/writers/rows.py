@@ -1,47 +1,154 @@
-"""Rows of the fabric table as text, and files that are complete or untouched."""
+"""Rows of a table as text or Parquet, one at a time."""
 
 from __future__ import annotations
 
 import csv
-import os
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import astuple
+import json
+from dataclasses import asdict, fields
 from pathlib import Path
-from typing import IO
+from typing import IO, Any, Protocol, get_type_hints
 
 from scanfab.errors import SettingsError
-from scanfab.table import COLUMNS, Row
 
-__all__ = ["FILE_FORMATS", "CsvWriter", "open_result"]
+__all__ = ["FILE_FORMATS", "RowWriter", "check_suffix", "row_writer"]
 
-FILE_FORMATS = {".csv": "comma-separated values, numbers that read back the same"}
+FILE_FORMATS = {
+    ".csv": "comma-separated values; numbers read back the same, a missing value is an empty cell",
+    ".tsv": "the same with tabs",
+    ".json": "one array of objects; a missing value is null",
+    ".jsonl": "JSON lines: one object a line",
+    ".parquet": "Apache Parquet (needs pyarrow: pip install 'scanfab[parquet]')",
+}
+
+
+class RowWriter(Protocol):
+    """Writes rows, which are dataclasses of one kind, to a stream."""
+
+    def write(self, row: Any) -> None:
+        """Write one row."""
+        ...
+
+    def close(self) -> None:
+        """Write what comes after the last row; the stream stays open."""
+        ...
 
 
 class CsvWriter:
     """
-    Writes rows as CSV, each at once; a value that does not exist is an empty cell.
+    Rows as CSV or TSV, each at once.
 
-    The header comes with the first row: a computation that fails before writes nothing.
+    The header comes with the first row: a computation that fails before writes nothing. Floats are
+    in the shortest form that reads back the same.
     """
 
-    def __init__(self, stream: IO[str]) -> None:
+    def __init__(self, stream: IO[str], delimiter: str = ",", header: bool = True) -> None:
         self.stream = stream
-        self._writer = csv.writer(stream, lineterminator="\n")
-        self._started = False
+        self._writer = csv.writer(stream, delimiter=delimiter, lineterminator="\n")
+        self._header = header
 
-    def write(self, row: Row) -> None:
-        """Write one row; floats in the shortest form that reads back the same."""
-        if not self._started:
-            self._writer.writerow(COLUMNS)
-            self._started = True
+    def write(self, row: Any) -> None:
+        """Write one row."""
+        values = asdict(row)
+        if self._header:
+            self._writer.writerow(values)
+            self._header = False
         self._writer.writerow(
             [
                 "" if value is None else repr(float(value)) if isinstance(value, float) else value
-                for value in astuple(row)
+                for value in values.values()
             ]
         )
         self.stream.flush()
+
+    def close(self) -> None:
+        """Nothing comes after the last row."""
+
+
+class JsonLinesWriter:
+    """Rows as JSON, one object a line."""
+
+    def __init__(self, stream: IO[str]) -> None:
+        self.stream = stream
+
+    def write(self, row: Any) -> None:
+        """Write one row."""
+        self.stream.write(json.dumps(asdict(row), ensure_ascii=False, allow_nan=False) + "\n")
+        self.stream.flush()
+
+    def close(self) -> None:
+        """Nothing comes after the last row."""
+
+
+class JsonWriter:
+    """Rows as one JSON array."""
+
+    def __init__(self, stream: IO[str]) -> None:
+        self.stream = stream
+        self._before = "[\n"
+
+    def write(self, row: Any) -> None:
+        """Write one row."""
+        text = json.dumps(asdict(row), ensure_ascii=False, allow_nan=False)
+        self.stream.write(self._before + text)
+        self._before = ",\n"
+
+    def close(self) -> None:
+        """The end of the array."""
+        self.stream.write("\n]\n" if self._before != "[\n" else "[]\n")
+
+
+class ParquetWriter:
+    """Rows as a Parquet file, written when closed."""
+
+    def __init__(self, stream: IO[bytes], kind: type) -> None:
+        self.stream = stream
+        self.kind = kind
+        self._rows: list[dict[str, Any]] = []
+
+    def write(self, row: Any) -> None:
+        """Keep one row."""
+        self._rows.append(asdict(row))
+
+    def close(self) -> None:
+        """Write the file."""
+        pyarrow = _pyarrow()
+        from pyarrow import parquet
+
+        hints = get_type_hints(self.kind)
+        schema = pyarrow.schema(
+            [(field.name, _arrow_type(pyarrow, hints[field.name])) for field in fields(self.kind)]
+        )
+        parquet.write_table(pyarrow.Table.from_pylist(self._rows, schema=schema), self.stream)
+
+
+def row_writer(suffix: str, stream: IO[Any], kind: type, header: bool = True) -> RowWriter:
+    """
+    The writer for a file of this suffix.
+
+    Parameters
+    ----------
+    suffix : str
+        One of ``FILE_FORMATS``.
+    stream : file object
+        For text, for ``.parquet`` for bytes.
+    kind : type
+        The dataclass of the rows.
+    header : bool, optional
+        Whether CSV and TSV start with the names of the columns.
+
+    Raises
+    ------
+    SettingsError
+        If there is no such format, or its package is missing.
+    """
+    if suffix in (".csv", ".tsv"):
+        return CsvWriter(stream, "\t" if suffix == ".tsv" else ",", header)
+    if suffix == ".jsonl":
+        return JsonLinesWriter(stream)
+    if suffix == ".json":
+        return JsonWriter(stream)
+    check_suffix(Path(f"table{suffix}"))
+    return ParquetWriter(stream, kind)
 
 
 def check_suffix(path: Path) -> None:
@@ -51,20 +158,22 @@ def check_suffix(path: Path) -> None:
             f"{path}: results can be written as {', '.join(FILE_FORMATS)}, "
             f"not as {path.suffix or 'a file without a suffix'}"
         )
+    if path.suffix.lower() == ".parquet":
+        _pyarrow()
 
 
-@contextmanager
-def open_result(path: Path) -> Iterator[IO[str]]:
-    """
-    Open FILE.part; it becomes FILE if all goes well, else FILE stays as it was.
+def _pyarrow() -> Any:
+    try:
+        import pyarrow
+    except ImportError:
+        raise SettingsError(
+            "Parquet files need the package pyarrow: pip install 'scanfab[parquet]'"
+        ) from None
+    return pyarrow
 
-    Raises
-    ------
-    SettingsError
-        If the suffix is not known.
-    """
-    check_suffix(path)
-    part = path.with_name(path.name + ".part")
-    with open(part, "w", newline="", encoding="utf-8") as stream:
-        yield stream
-    os.replace(part, path)
+
+def _arrow_type(pyarrow: Any, hint: Any) -> Any:
+    """int64, double or string for ``int``, ``float | None`` and the like."""
+    kinds = {int: pyarrow.int64(), float: pyarrow.float64(), str: pyarrow.string()}
+    options = getattr(hint, "__args__", (hint,))
+    return next(kinds[option] for option in options if option in kinds)

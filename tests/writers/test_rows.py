@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import math
@@ -11,9 +12,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scanfab.errors import SettingsError
-from scanfab.table import COLUMNS
-from scanfab.writers.rows import CsvWriter, check_suffix, open_result
+from scanfab.table import COLUMNS, Row
+from scanfab.tabular import read_rows
+from scanfab.writers.results import ResultFile
+from scanfab.writers.rows import FILE_FORMATS, CsvWriter, check_suffix
 from tests.test_table import a_row
+
+
+def result_in(folder):
+    return ResultFile(folder / "t.csv", Row)
+
+
+def interrupt(result, asked, rows):
+    """Write rows, and stop before the file is complete."""
+    with contextlib.suppress(KeyboardInterrupt), result.writer(asked) as writer:
+        for row in rows:
+            writer.write(row)
+        raise KeyboardInterrupt
 
 
 def written(*rows):
@@ -78,49 +93,78 @@ def test_each_row_is_written_at_once(tmp_path):
 
 
 def test_lines_end_alike_everywhere(tmp_path):
-    with open_result(tmp_path / "t.csv") as stream:
-        CsvWriter(stream).write(a_row())
-    data = (tmp_path / "t.csv").read_bytes()
+    result = result_in(tmp_path)
+    with result.writer({}) as writer:
+        writer.write(a_row())
+    data = result.path.read_bytes()
     assert b"\r" not in data
     assert data.endswith(b"\n")
 
 
 def test_a_result_appears_when_it_is_complete(tmp_path):
-    path = tmp_path / "t.csv"
-    with open_result(path) as stream:
-        stream.write("half")
-        assert not path.exists()
-        assert (tmp_path / "t.csv.part").exists()
-    assert path.read_text() == "half"
-    assert list(tmp_path.iterdir()) == [path]
+    result = result_in(tmp_path)
+    with result.writer({}) as writer:
+        writer.write(a_row())
+        assert not result.path.exists()
+        assert result.part.exists()
+    assert list(tmp_path.iterdir()) == [result.path]
 
 
 def test_an_error_leaves_the_old_result_and_keeps_the_part(tmp_path):
-    path = tmp_path / "t.csv"
-    path.write_text("old")
+    result = result_in(tmp_path)
+    result.path.write_text("old")
 
-    def fail():
-        with open_result(path) as stream:
-            stream.write("new")
-            raise RuntimeError("stopped")
-
-    with pytest.raises(RuntimeError, match="stopped"):
-        fail()
-    assert path.read_text() == "old"
-    assert (tmp_path / "t.csv.part").read_text() == "new"
+    interrupt(result, {}, [a_row()])
+    assert result.path.read_text() == "old"
+    assert len(result.part.read_text().splitlines()) == 2
 
 
 @pytest.mark.parametrize("name", ["t.docx", "t", "t.csv.gz", ".csv"])
 def test_other_endings_are_refused_before_anything_is_written(tmp_path, name):
     with pytest.raises(SettingsError, match=r"results can be written as .csv"):
         check_suffix(tmp_path / name)
-    with (
-        pytest.raises(SettingsError, match=r"results can be written as .csv"),
-        open_result(tmp_path / name),
-    ):
-        pass
+    with pytest.raises(SettingsError, match=r"results can be written as .csv"):
+        ResultFile(tmp_path / name, Row)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_the_ending_may_be_in_capitals(tmp_path):
     check_suffix(tmp_path / "T.CSV")
+
+
+@pytest.mark.parametrize("ending", FILE_FORMATS)
+def test_every_format_reads_back_the_same(tmp_path, ending):
+    rows = [a_row(frame=0, alpha_vs=1 / 3, grains=7), a_row(frame=1, strain=-1e-300, step=10**12)]
+    result = ResultFile(tmp_path / f"t{ending}", Row)
+    with result.writer({}) as writer:
+        for row in rows:
+            writer.write(row)
+    assert [Row(**row) for row in read_rows(result.path)] == rows
+    assert list(tmp_path.iterdir()) == [result.path]
+
+
+@pytest.mark.parametrize("ending", FILE_FORMATS)
+def test_finished_frames_are_kept_and_a_half_one_is_cut_off(tmp_path, ending):
+    result = ResultFile(tmp_path / f"t{ending}", Row)
+    rows = [a_row(frame=k // 2, variant="ab"[k % 2], alpha_vs=0.1 * k) for k in range(6)]
+    asked = {"seed": 0}
+    interrupt(result, asked, rows[:5])
+    with open(result.part, "a") as stream:
+        stream.write("half a li")
+    done = result.finished_rows(asked, 2)
+    assert [Row(**row) for row in done] == rows[:4]
+    with result.writer(asked, resume=True) as writer:
+        for row in rows[4:]:
+            writer.write(row)
+    assert [Row(**row) for row in read_rows(result.path)] == rows
+
+
+def test_other_settings_are_refused(tmp_path):
+    result = result_in(tmp_path)
+    interrupt(result, {"seed": 0, "rv": 0.7}, [a_row()])
+    with pytest.raises(SettingsError, match=r"made with other settings \(seed\)"):
+        result.finished_rows({"seed": 1, "rv": 0.7}, 1)
+
+
+def test_without_a_part_there_is_nothing_to_go_on_with(tmp_path):
+    assert result_in(tmp_path).finished_rows({}, 4) == []

@@ -1,0 +1,143 @@
+"""scanfab compare: variants of fabric tables side by side."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from scanfab.cli.options import output_option
+
+if TYPE_CHECKING:
+    from scanfab.compare import Comparison
+
+__all__ = ["compare"]
+
+BARS = " ▁▂▃▄▅▆▇█"
+
+
+@click.command()
+@click.argument(
+    "tables",
+    metavar="TABLE...",
+    nargs=-1,
+    required=True,
+    type=click.Path(exists=True, dir_okay=False, allow_dash=True),
+)
+@click.option("--summary", is_flag=True, help="One row per source and variant: slopes and peaks.")
+@click.option(
+    "--differences", is_flag=True, help="One row per frame and pair of variants: how far apart."
+)
+@click.option(
+    "--strain-max", type=float, metavar="X", help="Leave frames beyond this strain out of the fits."
+)
+@output_option
+def compare(
+    tables: tuple[str, ...],
+    summary: bool,
+    differences: bool,
+    strain_max: float | None,
+    output: Path | None,
+) -> int:
+    """
+    Set the variants of fabric tables side by side.
+
+    TABLE is what scanfab compute wrote (CSV, TSV, JSON, JSON lines, Parquet), or - for standard
+    input. Per frame: both anisotropies, also divided by their own largest absolute value; with
+    --summary, per source and variant: the slope of void on contact fabric. On a terminal both.
+    """
+    from scanfab.cli.console import reported_warnings
+    from scanfab.compare import compare_tables
+    from scanfab.tabular import read_rows
+
+    if summary and differences:
+        raise click.UsageError("--summary and --differences are two tables: ask for one of them")
+    with reported_warnings():
+        rows = [row for table in tables for row in read_rows(table)]
+        comparison = compare_tables(rows, strain_max=strain_max)
+        chosen: Sequence[Any] = comparison.frames
+        if summary:
+            chosen = comparison.summary
+        elif differences:
+            chosen = comparison.differences
+        if output is not None:
+            _write_file(chosen, output)
+        elif sys.stdout.isatty():
+            _print(comparison)
+        else:
+            _write_csv(chosen)
+    return 0 if any(row.alpha_vs_axial is not None for row in comparison.frames) else 1
+
+
+def _write_csv(rows: Sequence[Any]) -> None:
+    from scanfab.writers.rows import CsvWriter
+
+    writer = CsvWriter(sys.stdout)
+    for row in rows:
+        writer.write(row)
+
+
+def _write_file(rows: Sequence[Any], output: Path) -> None:
+    from scanfab.errors import SettingsError
+    from scanfab.writers.results import ResultFile
+
+    if not rows:
+        raise SettingsError("there is nothing to write: the tables hold no frames")
+    with ResultFile(output, type(rows[0])).writer({}) as writer:
+        for row in rows:
+            writer.write(row)
+
+
+def _print(comparison: Comparison) -> None:
+    """The summary, with a bar of the evolution for each curve, then the frames."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console()
+    table = Table(box=None, header_style="bold", pad_edge=False)
+    for title in ("source", "variant", "frames", "α_vs", "α_c", "slope", "R²", "peak", "final"):
+        table.add_column(title, justify="left" if title == "source" else "right")
+    for row in comparison.summary:
+        curve = [f for f in comparison.frames if (f.source, f.variant) == (row.source, row.variant)]
+        table.add_row(
+            row.source,
+            row.variant,
+            str(row.frames),
+            _bars([frame.alpha_vs_axial_norm for frame in curve]),
+            _bars([frame.alpha_c_axial_norm for frame in curve]),
+            *(_spell(value) for value in (row.slope, row.r2, row.peak, row.final)),
+        )
+    console.print(table)
+    frames = Table(box=None, header_style="bold", pad_edge=False)
+    titles = ("source", "frame", "strain", "variant", "α_vs", "α_c", "α_vs/max", "α_c/max")
+    for title in titles:
+        frames.add_column(title, justify="left" if title == "source" else "right")
+    for frame in comparison.frames:
+        frames.add_row(
+            frame.source,
+            str(frame.frame),
+            _spell(frame.strain),
+            frame.variant,
+            _spell(frame.alpha_vs_axial),
+            _spell(frame.alpha_c_axial),
+            _spell(frame.alpha_vs_axial_norm),
+            _spell(frame.alpha_c_axial_norm),
+        )
+    console.print()
+    console.print(frames)
+
+
+def _bars(values: Sequence[float | None], longest: int = 30) -> str:
+    """A curve of numbers up to 1 as a line of bars; negative ones are blank."""
+    step = -(-len(values) // longest) if values else 1
+    return "".join(
+        "·" if value is None else BARS[round(max(value, 0.0) * (len(BARS) - 1))]
+        for value in values[::step]
+    )
+
+
+def _spell(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"

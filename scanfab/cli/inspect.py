@@ -1,0 +1,88 @@
+"""scanfab inspect: what the reader sees, nothing computed."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from scanfab.cli.options import (
+    SourceCommand,
+    fill_from_file,
+    frame_options,
+    open_series,
+    reading_arguments,
+    reading_options,
+    settings_file,
+)
+
+if TYPE_CHECKING:
+    from scanfab.inspection import FrameReport
+
+__all__ = ["inspect"]
+
+
+@click.command(cls=SourceCommand)
+@click.argument(
+    "sources",
+    metavar="SOURCE...",
+    nargs=-1,
+    required=True,
+    type=click.Path(exists=True, allow_dash=True),
+)
+@reading_options
+@frame_options
+@click.option("--json", "as_json", is_flag=True, help="One JSON object a line and frame.")
+@click.pass_context
+def inspect(ctx: click.Context, /, sources: tuple[str, ...], as_json: bool, **options: Any) -> int:
+    """
+    Show what the reader sees in each frame: grains, radii, contacts, rattlers, cell, columns.
+
+    Nothing is computed; contacts are found by geometry where no file lists them.
+    """
+    from scanfab.cli.console import reported_warnings
+    from scanfab.errors import SettingsError
+    from scanfab.inspection import inspect_series
+    from scanfab.settings import Settings
+
+    options = fill_from_file(ctx, sources, options)
+    reading = reading_arguments(options)
+    with reported_warnings():
+        try:
+            settings = Settings.make(**options)
+        except SettingsError as error:
+            raise click.UsageError(str(error)) from None
+        found = settings_file(sources)
+        if found is not None:
+            click.echo(f"scanfab: options from {found}", err=True)
+        for series in open_series(sources, reading):
+            for report in inspect_series(series, settings):
+                if as_json:
+                    click.echo(json.dumps(asdict(report), ensure_ascii=False))
+                else:
+                    _print(report)
+    return 0
+
+
+def _print(report: FrameReport) -> None:
+    """A frame as lines of a name and its value."""
+    fields = asdict(report)
+    title = f"{fields.pop('source')}, frame {fields.pop('frame')}"
+    told = fields.pop("warnings")
+    click.echo(click.style(title, bold=True))
+    for name, value in fields.items():
+        click.echo(f"  {name:<13} {_spell(value)}")
+    for warning in told:
+        click.echo(f"  {'warning':<13} {warning}")
+
+
+def _spell(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    if isinstance(value, list):
+        return ", ".join(_spell(item) for item in value)
+    return str(value)

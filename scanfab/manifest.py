@@ -1,0 +1,88 @@
+"""What a result was made of: settings, versions, and the inputs with size and hash."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from scanfab.directions import DirectionRule
+from scanfab.series import Series
+from scanfab.settings import Settings
+
+__all__ = ["asked_for", "manifest"]
+
+PACKAGES = ("scanfab", "numpy", "numba", "scipy", "meshio", "pyvista", "click", "rich", "h5py")
+
+
+def asked_for(
+    sources: Sequence[str], reading: dict[str, Any], settings: Settings
+) -> dict[str, Any]:
+    """
+    What decides the bytes of a result, as JSON can hold it: all but the number of workers.
+
+    Parameters
+    ----------
+    sources : sequence of str
+        As given.
+    reading : dict
+        Options of ``read_series``.
+    settings : Settings
+        Of the computation.
+    """
+    chosen = {
+        name: _plain(getattr(settings, name))
+        for name in Settings.__dataclass_fields__
+        if name != "workers"
+    }
+    return {"scanfab": version("scanfab"), "sources": list(sources), **_plain(reading), **chosen}
+
+
+def manifest(asked: dict[str, Any], series: Iterable[Series]) -> dict[str, Any]:
+    """
+    The manifest of a finished result.
+
+    Parameters
+    ----------
+    asked : dict
+        From :func:`asked_for`.
+    series : iterable of Series
+        What was read.
+    """
+    files = {path for one in series for path in one.files()}
+    return {
+        "settings": asked,
+        "seed": asked["seed"],
+        "versions": {
+            "python": platform.python_version(),
+            **{name: version(name) for name in PACKAGES},
+        },
+        "inputs": [
+            {"path": str(path), "size": path.stat().st_size, "sha256": _hash(path)}
+            for path in sorted(files)
+        ],
+    }
+
+
+def _plain(value: Any) -> Any:
+    """A value in the types of JSON."""
+    if isinstance(value, DirectionRule):
+        return value.name
+    if isinstance(value, slice):
+        return [value.start, value.stop, value.step]
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, tuple | list):
+        return [_plain(item) for item in value]
+    if hasattr(value, "__dataclass_fields__"):
+        return _plain(asdict(value))
+    return str(value) if isinstance(value, Path) else value
+
+
+def _hash(path: Path) -> str:
+    with open(path, "rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()

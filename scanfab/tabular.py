@@ -1,0 +1,114 @@
+"""Tables read back: CSV, TSV, JSON, JSON lines and Parquet, told apart by their content."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from scanfab.errors import ReadError
+
+__all__ = ["read_rows"]
+
+TEXT_COLUMNS = ("source", "variant", "contacts_from")
+
+
+def read_rows(path: Path | str) -> list[dict[str, Any]]:
+    """
+    The rows of a table by column; a missing value is None.
+
+    Parameters
+    ----------
+    path : path
+        A file, or ``-`` for standard input.
+
+    Raises
+    ------
+    ReadError
+        If the file cannot be read as a table; names the line of a text file.
+
+    Examples
+    --------
+    >>> from scanfab.tabular import read_rows
+    >>> rows = read_rows("sample_data/yade_triaxial/engine.csv")
+    >>> rows[0]["contacts"]
+    2076
+    """
+    try:
+        data = sys.stdin.buffer.read() if str(path) == "-" else Path(path).read_bytes()
+    except OSError as error:
+        raise ReadError(f"{path}: cannot be read: {error.strerror}") from None
+    if data.startswith(b"PAR1"):
+        return _read_parquet(path, data)
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise ReadError(f"{path}: expected a table as text or Parquet, found other bytes") from None
+    start = text.lstrip()[:1]
+    if start == "[":
+        return _objects(path, _parse(path, text))
+    if start == "{":
+        lines = [line for line in text.split("\n") if line.strip()]
+        return _objects(path, [_parse(path, line) for line in lines])
+    return _read_csv(path, text)
+
+
+def _parse(path: Path | str, text: str) -> Any:
+    try:
+        return json.loads(text)
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise ReadError(f"{path}: cannot be read as JSON: {error}") from None
+
+
+def _objects(path: Path | str, rows: list[Any]) -> list[dict[str, Any]]:
+    if not all(isinstance(row, dict) for row in rows):
+        raise ReadError(f"{path}: expected JSON objects, one for each row")
+    return rows
+
+
+def _read_parquet(path: Path | str, data: bytes) -> list[dict[str, Any]]:
+    try:
+        from pyarrow import parquet
+    except ImportError:
+        raise ReadError(
+            f"{path}: Parquet files need the package pyarrow: pip install 'scanfab[parquet]'"
+        ) from None
+    try:
+        rows: list[dict[str, Any]] = parquet.read_table(io.BytesIO(data)).to_pylist()
+    except Exception as error:  # pyarrow raises kinds of its own
+        raise ReadError(f"{path}: cannot be read as Parquet: {error}") from None
+    return rows
+
+
+def _read_csv(path: Path | str, text: str) -> list[dict[str, Any]]:
+    first = text.split("\n", 1)[0]
+    reader = csv.reader(io.StringIO(text), delimiter="\t" if "\t" in first else ",")
+    try:
+        names = next(reader, [])
+        rows = []
+        for row in reader:
+            if len(row) != len(names):
+                raise ReadError(
+                    f"{path}, line {reader.line_num}: expected {len(names)} cells, found {len(row)}"
+                )
+            rows.append({name: _value(name, cell) for name, cell in zip(names, row, strict=True)})
+    except csv.Error as error:
+        raise ReadError(f"{path}, line {reader.line_num}: {error}") from None
+    if not names:
+        raise ReadError(f"{path}: expected a table, found nothing")
+    return rows
+
+
+def _value(name: str, cell: str) -> int | float | str | None:
+    if cell == "":
+        return None
+    if name not in TEXT_COLUMNS:
+        for kind in (int, float):
+            try:
+                return kind(cell)
+            except ValueError:
+                continue
+    return cell

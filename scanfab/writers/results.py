@@ -1,0 +1,122 @@
+"""
+A result file that is complete or untouched, and that an interrupted computation can go on with.
+
+Rows go to FILE.part, which becomes FILE at the end. FILE.part is CSV, TSV or JSON lines as FILE is;
+for other formats it is JSON lines, and converted at the end. What was asked for stands beside it in
+FILE.manifest.json.part, so that nobody goes on with other settings.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any
+
+from scanfab.errors import SettingsError
+from scanfab.writers.rows import RowWriter, check_suffix, row_writer
+
+__all__ = ["ResultFile"]
+
+LINE_FORMATS = (".csv", ".tsv", ".jsonl")
+
+
+class ResultFile:
+    """
+    A file for rows of one kind.
+
+    Parameters
+    ----------
+    path : Path
+        Its suffix is the format.
+    kind : type
+        The dataclass of the rows.
+
+    Raises
+    ------
+    SettingsError
+        If the suffix is not known.
+    """
+
+    def __init__(self, path: Path, kind: type) -> None:
+        check_suffix(path)
+        self.path = path
+        self.kind = kind
+        self.suffix = path.suffix.lower()
+        self.part = path.with_name(path.name + ".part")
+        self.manifest = path.with_name(path.name + ".manifest.json")
+        self._asked = path.with_name(self.manifest.name + ".part")
+        self._part_suffix = self.suffix if self.suffix in LINE_FORMATS else ".jsonl"
+
+    def finished_rows(self, asked: dict[str, Any], rows_per_frame: int) -> list[dict[str, Any]]:
+        """
+        The rows of the finished frames in FILE.part, which is cut behind them; none without it.
+
+        Parameters
+        ----------
+        asked : dict
+            What is asked for now.
+        rows_per_frame : int
+            A frame with fewer rows is not finished.
+
+        Raises
+        ------
+        SettingsError
+            If FILE.part was made with other settings.
+        """
+        if not self.part.exists():
+            return []
+        before = json.loads(self._asked.read_text("utf-8")) if self._asked.exists() else {}
+        # through JSON, as tuples come back as lists
+        now = json.loads(json.dumps(asked))
+        if before != now:
+            differing = [key for key in {*before, *now} if before.get(key) != now.get(key)]
+            raise SettingsError(
+                f"{self.part}: was made with other settings ({', '.join(sorted(differing))}): "
+                f"repeat them, or remove the file to start afresh"
+            )
+        lines = self.part.read_bytes().splitlines(keepends=True)
+        complete = [line for line in lines if line.endswith(b"\n")]
+        header = 0 if self._part_suffix == ".jsonl" else 1
+        frames = max(len(complete) - header, 0) // rows_per_frame
+        kept = complete[: header + frames * rows_per_frame] if frames else []
+        with open(self.part, "r+b") as stream:
+            stream.truncate(sum(map(len, kept)))
+        return self._rows()
+
+    @contextmanager
+    def writer(self, asked: dict[str, Any], resume: bool = False) -> Iterator[RowWriter]:
+        """Write rows to FILE.part, behind those that are there if resumed; then make FILE of it."""
+        self._asked.write_text(json.dumps(asked, indent=1), "utf-8")
+        going_on = resume and self.part.exists() and self.part.stat().st_size > 0
+        with open(self.part, "a" if going_on else "w", newline="", encoding="utf-8") as stream:
+            yield row_writer(self._part_suffix, stream, self.kind, header=not going_on)
+        if self._part_suffix == self.suffix:
+            os.replace(self.part, self.path)
+        else:
+            self._convert()
+        self._asked.unlink(missing_ok=True)
+
+    def _rows(self) -> list[dict[str, Any]]:
+        from scanfab.tabular import read_rows
+
+        return read_rows(self.part) if self.part.stat().st_size else []
+
+    def _convert(self) -> None:
+        """Write FILE from the JSON lines of FILE.part."""
+        final = self.path.with_name(self.path.name + ".part.tmp")
+        with _open_for(self.suffix, final) as stream:
+            writer = row_writer(self.suffix, stream, self.kind)
+            for row in self._rows():
+                writer.write(self.kind(**row))
+            writer.close()
+        os.replace(final, self.path)
+        self.part.unlink()
+
+
+def _open_for(suffix: str, path: Path) -> IO[Any]:
+    if suffix == ".parquet":
+        return open(path, "wb")
+    return open(path, "w", newline="", encoding="utf-8")
