@@ -17,6 +17,7 @@ __all__ = ["Comparison", "DifferenceRow", "FrameRow", "SummaryRow", "compare_tab
 FloatArray = npt.NDArray[np.float64]
 
 NEEDED = ("source", "frame", "strain", "variant", "alpha_vs_axial", "alpha_c_axial")
+NUMBERS = ("frame", "strain", "alpha_vs_axial", "alpha_c_axial", "alpha_vs_axial_se")
 # with fewer points a line says nothing
 FEWEST_FRAMES = 3
 
@@ -99,7 +100,7 @@ def compare_tables(
     Raises
     ------
     SettingsError
-        If a column is missing.
+        If a column is missing, or holds something else than numbers.
 
     Examples
     --------
@@ -128,15 +129,27 @@ def _grouped(
 ) -> dict[tuple[str, str], list[Mapping[str, Any]]]:
     """Rows by source and variant, in the order of their first appearance."""
     groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
-    for row in rows:
+    for number, row in enumerate(rows, start=1):
         missing = [name for name in NEEDED if name not in row]
         if missing:
             raise SettingsError(
                 f"the table has no column {', '.join(missing)}: "
                 f"expected a table of scanfab compute, found the columns {', '.join(row)}"
             )
+        _check_values(number, row)
         groups.setdefault((row["source"], row["variant"]), []).append(row)
     return groups
+
+
+def _check_values(number: int, row: Mapping[str, Any]) -> None:
+    """Tables come from anywhere: a word among the numbers is an error that says where."""
+    for name in ("source", "variant"):
+        if not isinstance(row[name], str):
+            raise SettingsError(f"row {number}: {name}: expected a name, found {row[name]!r}")
+    for name in NUMBERS:
+        value = row.get(name)
+        if value is not None and not (isinstance(value, int | float) and math.isfinite(value)):
+            raise SettingsError(f"row {number}: {name}: expected a number, found {value!r}")
 
 
 def _normalised(group: Sequence[Mapping[str, Any]]) -> list[FrameRow]:

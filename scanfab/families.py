@@ -79,9 +79,11 @@ def _split(group: list[Path]) -> list[list[Path]]:
     One series: its numbers before the step never fall while the step rises, and no step occurs
     twice.
     """
-    ordered = sorted(group, key=lambda file: (_step(file, group) or 0, _numbers(file)))
-    steps = [_step(file, group) for file in ordered]
-    leading = [_leading(file, group) for file in ordered]
+    place = _place(group)
+    numbers = {file: _numbers(file) for file in group}
+    ordered = sorted(group, key=lambda file: (numbers[file][place:][:1], numbers[file]))
+    steps = [numbers[file][place:][:1] for file in ordered]
+    leading = [numbers[file][:place] for file in ordered]
     repeated = len(set(steps)) < len(steps) and len(set(leading)) > 1
     if not repeated and leading == sorted(leading):
         return [ordered]
@@ -92,19 +94,10 @@ def _split(group: list[Path]) -> list[list[Path]]:
 
 
 def _place(group: list[Path]) -> int:
-    """Which number of the names is the step: the last one that differs."""
-    columns = list(zip(*(_numbers(file) for file in group), strict=True))
+    """Which number of the names is the step: the last one that differs, else the last."""
+    columns = list(zip(*map(_numbers, group), strict=True))
     differing = [place for place, column in enumerate(columns) if len(set(column)) > 1]
-    return differing[-1] if differing else len(columns) - 1
-
-
-def _step(file: Path, group: list[Path]) -> int | None:
-    numbers = _numbers(file)
-    return numbers[_place(group)] if numbers else None
-
-
-def _leading(file: Path, group: list[Path]) -> tuple[int, ...]:
-    return _numbers(file)[: max(_place(group), 0)]
+    return differing[-1] if differing else max(len(columns) - 1, 0)
 
 
 def _family(members: list[Path], format: str | None) -> Family:
@@ -122,8 +115,9 @@ def _family(members: list[Path], format: str | None) -> Family:
         problem = str(error)
     files: dict[int | None, Path] = {}
     clash: str | None = None
+    place = _place(members)
     for file in members:
-        step = _step(file, members)
+        step = next(iter(_numbers(file)[place:]), None)
         if step in files:
             clash = f"two files for one step: {files[step]} and {file}: name one of them"
         files.setdefault(step, file)

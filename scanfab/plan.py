@@ -12,7 +12,7 @@ from scanfab.directions import DirectionRule, direction_rule
 from scanfab.errors import ScanfabWarning, SettingsError
 from scanfab.settings import AUTO_RULE, Settings
 from scanfab.variants import Sample
-from scanfab.window import SphereWindow, default_center, smallest_extent
+from scanfab.window import SphereWindow, default_center, room_around, smallest_extent
 
 __all__ = ["Plan", "make_plan"]
 
@@ -58,6 +58,8 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     _refuse_periodic_whole(settings, sample)
     half_extent = 0.5 * smallest_extent(sample.packing, grains)
     window = _window(settings, sample, half_extent) if settings.needs_window else None
+    if window is not None:
+        _check_window(window, sample, lengths["rmax"])
     reach = half_extent if window is None else window.radius
     rule = settings.directions or direction_rule(AUTO_RULE)
     if rule.bias > 0.1 * settings.tolerance:
@@ -100,6 +102,29 @@ def _window(settings: Settings, sample: Sample, half_extent: float) -> SphereWin
     )
     radius = settings.rv * half_extent if settings.rv_radius is None else settings.rv_radius
     return SphereWindow(center, radius)
+
+
+def _check_window(window: SphereWindow, sample: Sample, largest: float) -> None:
+    """Refuse an RV without grains or larger than the sample; warn of one at its surface."""
+    packing, grains = sample.packing, sample.grains
+    distance = window.distance(packing.position[grains], packing)
+    room = room_around(window, packing, grains)
+    if not np.any(distance < window.radius + packing.radius[grains]):
+        raise SettingsError(
+            f"the {window} holds no grain: choose another --rv-center or a larger --rv-radius"
+        )
+    if room < -2 * largest:
+        raise SettingsError(
+            f"the {window} reaches {-room:g} beyond the sample, that is more than two of its "
+            f"largest radii ({largest:g}): choose a smaller --rv or another --rv-center"
+        )
+    if room < 2 * largest:
+        warnings.warn(
+            f"the {window} comes within two of the largest radii ({largest:g}) of the sample's "
+            f"surface, where the packing is another: choose a smaller --rv, or use more grains",
+            ScanfabWarning,
+            stacklevel=3,
+        )
 
 
 def _auto_spacing(settings: Settings, axes: int, reach: float, lengths: dict[str, float]) -> float:

@@ -21,6 +21,9 @@ __all__ = ["Frame", "Series", "open_sources", "read", "read_series"]
 
 PathLike = str | os.PathLike[str]
 
+# options of the command line, beside the dumps
+SETTINGS_FILE = "scanfab.toml"
+
 
 @dataclass(frozen=True)
 class Frame:
@@ -263,7 +266,9 @@ def open_sources(sources: Sequence[PathLike], **options: Any) -> list[Series]:
 def _files(path: Path) -> list[Path]:
     if path.is_dir():
         found = sorted(file for file in path.iterdir() if file.is_file())
-        files = [file for file in found if not file.name.startswith(".")]
+        files = [
+            file for file in found if not file.name.startswith(".") and file.name != SETTINGS_FILE
+        ]
         if not files:
             raise ReadError(f"{path}: the folder holds no files")
         return files

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from scanfab.errors import SettingsError
 from scanfab.packing import Packing
 
-__all__ = ["SphereWindow", "default_center", "smallest_extent"]
+__all__ = ["SphereWindow", "default_center", "room_around", "smallest_extent"]
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -36,6 +36,9 @@ class SphereWindow:
         distance: FloatArray = np.linalg.norm(branch, axis=1)
         return distance
 
+    def __str__(self) -> str:
+        return f"RV (radius {self.radius:g} about {np.round(self.center, 9).tolist()})"
+
     def check_inside(self, packing: Packing) -> None:
         """
         Make sure that the window lies inside the periodic cell.
@@ -52,8 +55,7 @@ class SphereWindow:
         outside = (center < reach) | (center > 1.0 - reach)
         if np.any(outside & np.array(packing.cell.periodic)):
             raise SettingsError(
-                f"the RV (radius {self.radius:g} about {np.round(self.center, 9).tolist()}) "
-                f"reaches through a periodic face of the cell: "
+                f"the {self} reaches through a periodic face of the cell: "
                 f"choose a smaller --rv or another --rv-center"
             )
 
@@ -74,6 +76,19 @@ def default_center(packing: Packing, grains: BoolArray) -> FloatArray:
     if packing.cell is not None:
         middle = np.where(packing.cell.periodic, packing.cell.center, middle)
     return middle
+
+
+def room_around(window: SphereWindow, packing: Packing, grains: BoolArray) -> float:
+    """
+    The smallest distance from the window to a face of the box of the grains' surfaces.
+
+    Negative if it reaches beyond; infinite if all directions are periodic, as there is no face.
+    """
+    low, high = _surface_box(packing, grains)
+    room = np.minimum(window.center - low, high - window.center) - window.radius
+    if packing.cell is not None:
+        room = np.where(packing.cell.periodic, np.inf, room)
+    return float(room.min())
 
 
 def _surface_box(packing: Packing, grains: BoolArray) -> tuple[FloatArray, FloatArray]:

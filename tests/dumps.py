@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from tests.lattices import shaken_cubic
+
 UNIT_BOX = ((0, 1), (0, 1), (0, 1))
 NAMES = "id type x y z radius"
 # three grains in a row; the first two touch, and the last two
@@ -35,6 +37,14 @@ def dump_text(
         + f"ITEM: {word} {names} \n"
     )
     return header + "".join(separator.join(map(str, row)) + end for row in rows)
+
+
+def cubic_rows(count: int = 4, squeeze: float = 1.0) -> list[tuple[object, ...]]:
+    """Rows of count³ grains that nearly touch, in a cube with the edge ``count``."""
+    packing = shaken_cubic(np.random.default_rng(0), count)
+    position = packing.position * [1, 1, squeeze]
+    numbers = zip(position.tolist(), packing.radius.tolist(), strict=True)
+    return [(row, 1, *place, size) for row, (place, size) in enumerate(numbers, start=1)]
 
 
 def local_text(rows: Sequence[Sequence[object]], *, step: int = 0, word: str = "ENTRIES") -> str:

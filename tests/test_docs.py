@@ -7,6 +7,7 @@ import importlib.util
 import inspect
 import pkgutil
 import re
+import shutil
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -22,7 +23,7 @@ from scanfab.table import COLUMNS, MEANINGS
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
-PAGES = [ROOT / "README.md", *sorted(DOCS.glob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted(DOCS.rglob("*.md"))]
 MODULES = [
     name
     for _, name, _ in pkgutil.walk_packages(scanfab.__path__, "scanfab.")
@@ -30,8 +31,8 @@ MODULES = [
 ]
 
 
-def page_maker() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("maker", DOCS / "make_command_line.py")
+def script(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -40,9 +41,9 @@ def page_maker() -> ModuleType:
 
 
 def test_the_command_line_page_is_fresh() -> None:
-    assert (DOCS / "command-line.md").read_text(encoding="utf-8") == page_maker().page(), (
-        "run python docs/make_command_line.py"
-    )
+    assert (DOCS / "command-line.md").read_text(encoding="utf-8") == script(
+        "make_command_line"
+    ).page(), "run python docs/make_command_line.py"
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -59,10 +60,11 @@ def test_every_column_has_a_meaning() -> None:
     assert tuple(MEANINGS) == COLUMNS
 
 
-def test_every_reader_has_a_section() -> None:
-    text = (DOCS / "formats.md").read_text(encoding="utf-8")
+def test_every_reader_has_a_page() -> None:
+    overview = (DOCS / "formats.md").read_text(encoding="utf-8")
     for name in installed_readers():
-        assert f"## {name}\n" in text
+        assert f"(formats/{name}.md)" in overview
+        assert (DOCS / "formats" / f"{name}.md").read_text("utf-8").startswith(f"# {name}\n")
 
 
 def test_every_direction_rule_is_on_the_method_page() -> None:
@@ -133,3 +135,17 @@ def test_the_pages_speak_of_options_that_exist() -> None:
     for page in PAGES:
         for option in re.findall(r"(?<![\w-])--[a-z][a-z-]+", page.read_text(encoding="utf-8")):
             assert option in known, f"{page.name}: {option}"
+
+
+def words_and_numbers(text: str) -> tuple[list[str], list[float]]:
+    """A text without its numbers, and the numbers: last digits depend on the machine."""
+    number = r"(?<![\w.])-?\d+\.\d+(?:e[-+]?\d+)?"
+    return re.split(number, text), [float(match) for match in re.findall(number, text)]
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="its commands are for bash")
+def test_the_tutorial_runs_and_prints_what_it_says() -> None:
+    said = words_and_numbers((DOCS / "tutorial.md").read_text(encoding="utf-8"))
+    now = words_and_numbers(script("make_tutorial").fresh_page())
+    assert now[0] == said[0], "run python docs/make_tutorial.py"
+    assert now[1] == pytest.approx(said[1], rel=1e-6)

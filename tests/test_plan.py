@@ -123,8 +123,8 @@ def test_window_is_for_the_variants_that_have_one(packing):
 
 
 def test_default_window_is_a_fraction_of_half_the_smallest_extent_of_the_surfaces():
-    packing = Packing([[0, 0, 0], [10, 0, 0], [0, 8, 0], [0, 0, 9]], [1.0, 0.5, 0.5, 0.5])
-    window = plan_of(packing, rv=0.6).window
+    position = [[0, 0, 0], [10, 0, 0], [0, 8, 0], [0, 0, 9], [5, 4, 4]]
+    window = plan_of(Packing(position, [1.0, 0.5, 0.5, 0.5, 0.5]), rv=0.6).window
     # surfaces from -1 to 10.5, 8.5 and 9.5
     assert window.radius == pytest.approx(0.6 * 9.5 / 2)
     assert window.center == pytest.approx([4.75, 3.75, 4.25])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scanfab import Cell, Packing, SettingsError, compute
-from scanfab.window import SphereWindow, default_center, smallest_extent
+from scanfab.window import SphereWindow, default_center, room_around, smallest_extent
 from tests.lattices import shaken_cubic
 
 CELL = Cell([10.0, 8.0, 6.0], origin=(-1.0, 2.0, 3.0))
@@ -96,3 +96,12 @@ def test_window_through_a_periodic_face_stops_the_computation():
     packing = Packing(*shaken_cubic(np.random.default_rng(0), 4), cell=Cell([4.0, 4, 4]))
     with pytest.raises(SettingsError, match="choose a smaller --rv or another --rv-center"):
         compute(packing, variants="c", rv_center=(1.0, 2.0, 2.0))
+
+
+def test_room_around_the_window_is_to_the_nearest_surface_that_is_no_periodic_face():
+    window = SphereWindow(np.array([4.0, 4.0, 4.0]), 3.0)
+    beyond = SphereWindow(np.array([4.0, 4.0, 4.0]), 6.0)
+    # along y the surfaces lie at -1 and 8.25, along x and z farther away
+    assert room_around(window, four_grains(), ALL) == pytest.approx(8.25 - 7)
+    assert room_around(beyond, four_grains(), ALL) == pytest.approx(8.25 - 10)
+    assert room_around(beyond, four_grains(cell=CELL), ALL) == np.inf

@@ -51,10 +51,17 @@ def compare(
     """
     from scanfab.cli.console import reported_warnings
     from scanfab.compare import compare_tables
+    from scanfab.errors import SettingsError
     from scanfab.tabular import read_rows
+    from scanfab.writers.rows import check_suffix
 
     if summary and differences:
         raise click.UsageError("--summary and --differences are two tables: ask for one of them")
+    try:
+        if output is not None:
+            check_suffix(output)
+    except SettingsError as error:
+        raise click.UsageError(str(error)) from None
     with reported_warnings():
         rows = [row for table in tables for row in read_rows(table)]
         comparison = compare_tables(rows, strain_max=strain_max)
@@ -63,9 +70,12 @@ def compare(
             chosen = comparison.summary
         elif differences:
             chosen = comparison.differences
+        if not chosen:
+            lacking = "two variants of one frame" if comparison.frames else "frames"
+            raise SettingsError(f"there is nothing to compare: the tables hold no {lacking}")
         if output is not None:
             _write_file(chosen, output)
-        elif sys.stdout.isatty():
+        elif sys.stdout.isatty() and not differences:
             _print(comparison)
         else:
             _write_csv(chosen)
@@ -81,11 +91,8 @@ def _write_csv(rows: Sequence[Any]) -> None:
 
 
 def _write_file(rows: Sequence[Any], output: Path) -> None:
-    from scanfab.errors import SettingsError
     from scanfab.writers.results import ResultFile
 
-    if not rows:
-        raise SettingsError("there is nothing to write: the tables hold no frames")
     with ResultFile(output, type(rows[0])).writer({}) as writer:
         for row in rows:
             writer.write(row)

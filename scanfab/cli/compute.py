@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from scanfab.series import Series
     from scanfab.settings import Settings
     from scanfab.table import Row
+    from scanfab.writers.results import ResultFile
 
 __all__ = ["compute"]
 
@@ -129,7 +130,8 @@ def compute(
     from scanfab.errors import SettingsError
     from scanfab.manifest import asked_for
     from scanfab.settings import Settings
-    from scanfab.writers.rows import check_suffix
+    from scanfab.table import Row
+    from scanfab.writers.results import ResultFile
 
     options = fill_from_file(ctx, sources, options)
     reading = reading_arguments(options)
@@ -138,13 +140,12 @@ def compute(
     with reported_warnings() as told:
         try:
             settings = Settings.make(**options)
-            if output is not None:
-                check_suffix(output)
+            result = None if output is None else ResultFile(output, Row)
         except SettingsError as error:
             raise click.UsageError(str(error)) from None
         asked = asked_for(sources, reading, settings)
         series = open_series(sources, reading)
-        found = _write(series, settings, asked, output, resume)
+        found = _write(series, settings, asked, result, resume)
         for path in _manifests(output, manifest_path):
             _write_manifest(path, asked, series)
     return 0 if found and not told.skipped else 1
@@ -154,13 +155,11 @@ def _write(
     series: list[Series],
     settings: Settings,
     asked: dict[str, Any],
-    output: Path | None,
+    result: ResultFile | None,
     resume: bool,
 ) -> bool:
     """Write the rows as they come; whether any of them has a void fabric."""
     from scanfab.cli.console import print_table, with_progress
-    from scanfab.table import Row
-    from scanfab.writers.results import ResultFile
     from scanfab.writers.rows import CsvWriter
 
     found = False
@@ -171,7 +170,7 @@ def _write(
             found = found or row.alpha_vs is not None
             yield row
 
-    if output is None:
+    if result is None:
         if sys.stdout.isatty():
             print_table(list(watched(_rows(series, settings, None))))
         else:
@@ -179,7 +178,6 @@ def _write(
             for row in watched(_rows(series, settings, None)):
                 printer.write(row)
         return found
-    result = ResultFile(output, Row)
     with _usage_errors():
         done = result.finished_rows(asked, len(settings.variants)) if resume else []
     found = any(row["alpha_vs"] is not None for row in done)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from contextlib import suppress
 from importlib import import_module
 
 import click
@@ -75,7 +76,10 @@ def main(args: list[str] | None = None) -> None:
 
     signal.signal(signal.SIGTERM, terminate)
     code = run(sys.argv[1:] if args is None else args)
-    if code in (INTERRUPTED, TERMINATED):
+    # the result stands: a signal would only spoil the exit code
+    for late in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(late, signal.SIG_IGN)
+    if code:
         _leave_at_once(code)
     sys.exit(code)
 
@@ -85,8 +89,9 @@ def _leave_at_once(code: int) -> None:
     from scanfab.readers.files import remove_copies
 
     remove_copies()
-    sys.stdout.flush()
-    sys.stderr.flush()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError):  # a full disk, a closed pipe: told already
+            stream.flush()
     os._exit(code)
 
 

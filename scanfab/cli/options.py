@@ -14,8 +14,6 @@ from click.core import ParameterSource
 if TYPE_CHECKING:
     from scanfab.series import Series
 
-SETTINGS_FILE = "scanfab.toml"
-
 __all__ = [
     "SourceCommand",
     "fill_from_file",
@@ -83,6 +81,8 @@ def reading_arguments(options: dict[str, Any]) -> dict[str, Any]:
 
 def settings_file(sources: tuple[str, ...]) -> Path | None:
     """The scanfab.toml beside the dumps; a usage error if the sources have different ones."""
+    from scanfab.series import SETTINGS_FILE
+
     folders = {Path(s) if Path(s).is_dir() else Path(s).parent for s in sources if s != "-"}
     found = [folder / SETTINGS_FILE for folder in sorted(folders)]
     found = [path for path in found if path.is_file()]

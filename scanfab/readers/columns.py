@@ -13,7 +13,7 @@ from scanfab.cell import Cell
 from scanfab.errors import ReadError
 from scanfab.readers.base import GrainTable, ReadOptions
 
-__all__ = ["grain_table", "has_radius", "user_cell"]
+__all__ = ["MOST", "grain_table", "has_radius", "user_cell", "whole_numbers"]
 
 FloatArray = npt.NDArray[np.float64]
 Columns = Mapping[str, npt.NDArray[Any]]
@@ -24,6 +24,11 @@ DIAMETER_NAMES = ("diameter", "diam")
 ID_NAMES = ("id", "ids", "particle_id", "particleid", "body_id", "bodyid")
 # coordinates in the order of preference, and whether they are fractions of the box
 POSITION_NAMES = (("x y z", False), ("xu yu zu", False), ("xs ys zs", True), ("xsu ysu zsu", True))
+
+# no length is larger: the cubes of this one are still numbers
+MOST = 1e100
+# nor is a grain so many cells away from a periodic cell
+MOST_TURNS = 1e9
 
 
 def has_radius(names: Sequence[str]) -> bool:
@@ -61,12 +66,13 @@ def grain_table(
     named = _named_by_user(path, rest, options)
     cell = user_cell(path, cell, options)
     position = _position(path, rest, named, cell, where)
+    _refuse_far(path, position, cell, where)
     radius = _radius(path, rest, named, len(position), options, where)
     id = named.get("id", _take(rest, ID_NAMES))
     return GrainTable(
         position,
         radius,
-        None if id is None else _whole_numbers(path, id, where),
+        None if id is None else whole_numbers(path, id, where),
         rest,
         cell,
     )
@@ -115,7 +121,7 @@ def _position(
     path: Path, rest: dict[str, Any], named: dict[str, Any], cell: Cell | None, where: str
 ) -> FloatArray:
     if "position" in rest:
-        return np.asarray(rest.pop("position"), dtype=np.float64)
+        return _lengths(path, rest.pop("position"), "a coordinate", where)
     for names, scaled in POSITION_NAMES:
         found = [
             named[axis] if axis in named else _take(rest, (name,), keep=True)
@@ -125,16 +131,31 @@ def _position(
             continue
         for name in names.split():
             _take(rest, (name,))
-        position = np.column_stack([np.asarray(column, dtype=np.float64) for column in found])
+        position = np.column_stack(
+            [_lengths(path, column, "a coordinate", where) for column in found]
+        )
         if not scaled:
             return position
         if cell is None:
             raise ReadError(f"{path}{where}: {names} are fractions of a box, but there is no box")
-        return np.asarray(cell.origin + position @ cell.vectors)
+        with np.errstate(invalid="ignore"):  # what is not finite is the packing's to refuse
+            return np.asarray(cell.origin + position @ cell.vectors)
     raise ReadError(
         f"{path}{where}: no coordinates: expected the columns x y z (or xu yu zu, xs ys zs), "
         f"found {', '.join(rest) or 'none'}; name them with --columns x=...,y=...,z=..."
     )
+
+
+def _refuse_far(path: Path, position: FloatArray, cell: Cell | None, where: str) -> None:
+    """An error if rounding would be all that is left of a position once it is in the cell."""
+    if cell is None or not cell.is_periodic:
+        return
+    turns = np.abs(cell.fractional(position[np.isfinite(position).all(axis=1)]))
+    if np.any(turns > MOST_TURNS):
+        raise ReadError(
+            f"{path}{where}: a grain is {turns.max():g} cells away from the cell: has the cell the "
+            f"unit of the coordinates?"
+        )
 
 
 def _radius(
@@ -148,13 +169,13 @@ def _radius(
     if options.radius is not None:
         return np.full(count, options.radius)
     if "radius" in named:
-        return np.asarray(named["radius"], dtype=np.float64)
+        return _lengths(path, named["radius"], "a radius", where)
     radius = _take(rest, RADIUS_NAMES)
     if radius is not None:
-        return np.asarray(radius, dtype=np.float64)
+        return _lengths(path, radius, "a radius", where)
     diameter = _take(rest, DIAMETER_NAMES)
     if diameter is not None:
-        return 0.5 * np.asarray(diameter, dtype=np.float64)
+        return 0.5 * _lengths(path, diameter, "a diameter", where)
     raise ReadError(
         f"{path}{where}: no radius: expected a column radius (or diameter), found "
         f"{', '.join(rest) or 'none'}; name it with --columns radius=..., or give one radius for "
@@ -171,10 +192,24 @@ def _take(rest: dict[str, Any], names: Sequence[str], keep: bool = False) -> Any
     return None
 
 
-def _whole_numbers(path: Path, id: npt.NDArray[Any], where: str) -> npt.NDArray[np.int64]:
-    numbers = np.asarray(id)
-    if numbers.dtype.kind == "f" and not np.all(
-        np.isfinite(numbers) & (numbers == np.rint(numbers))
-    ):
+def whole_numbers(path: Path, values: npt.ArrayLike, where: str = "") -> npt.NDArray[np.int64]:
+    """Ids as whole numbers; ReadError if they are not."""
+    numbers = np.asarray(values)
+    if numbers.dtype.kind not in "biuf" or numbers.ndim != 1:
+        raise ReadError(f"{path}{where}: ids must be whole numbers")
+    # a larger one has more digits than a double or an int64 holds
+    sound = np.abs(numbers.astype(np.float64)) < 2.0**62
+    if not np.all(sound & (numbers == np.rint(numbers))):
         raise ReadError(f"{path}{where}: ids must be whole numbers")
     return numbers.astype(np.int64)
+
+
+def _lengths(path: Path, values: npt.ArrayLike, what: str, where: str) -> FloatArray:
+    """Numbers that may be lengths; those that are not finite are the packing's to refuse."""
+    array = np.asarray(values)
+    if array.dtype.kind not in "biuf":
+        raise ReadError(f"{path}{where}: expected numbers for {what}, found {array.dtype}")
+    lengths = array.astype(np.float64)
+    if np.any(np.isfinite(lengths) & (np.abs(lengths) > MOST)):
+        raise ReadError(f"{path}{where}: {what} above {MOST:g} cannot be a length")
+    return lengths

@@ -20,6 +20,7 @@ import numpy.typing as npt
 from scanfab.cell import Cell
 from scanfab.errors import ReadError, ScanfabWarning
 from scanfab.readers.base import Snapshot
+from scanfab.readers.columns import MOST
 from scanfab.readers.files import plain
 
 __all__ = ["DumpBlock", "index_dump", "read_block", "row_word"]
@@ -29,6 +30,9 @@ FloatArray = npt.NDArray[np.float64]
 # a snapshot's header never comes near this size, whatever the number of columns
 HEADER_BYTES = 1 << 16
 COUNT_KEY = re.compile(rb"^ITEM: NUMBER OF (\S+)[ \t]*\r?$", re.MULTILINE)
+
+# also spaces of latin1, as numpy has them
+BLANK = re.compile(rb"^[\s\x1c-\x1f\x85\xa0]*\n", re.MULTILINE)
 
 # LAMMPS writes units and time before the step
 BEFORE_STEP = re.compile(rb"(?:^ITEM: (?:UNITS|TIME)[ \t]*\r?\n[^\n]*\n)+\Z", re.MULTILINE)
@@ -201,13 +205,18 @@ def _values(path: Path, snapshot: Snapshot, block: bytes, body: _Body, count: in
             f"{path}, step {snapshot.step}: the header counts {count} rows, but the file ends "
             f"after about {available - 1}: the snapshot is incomplete"
         )
-    lines = io.BytesIO(block)
-    lines.seek(body.start)
+    # numpy warns of lines without a word
+    rows = BLANK.sub(b"", block[body.start :])
+    if not rows.strip():
+        raise ReadError(
+            f"{path}, step {snapshot.step}: the header counts {count} rows, found none: "
+            f"the snapshot is incomplete"
+        )
     text = _text_columns(block, body)
     converters: dict[int | str, Callable[[str], float]] = dict.fromkeys(text, _nan)
     try:
         values: FloatArray = np.loadtxt(
-            lines,
+            io.BytesIO(rows),
             dtype=np.float64,
             max_rows=count,
             comments=None,
@@ -272,6 +281,8 @@ def _cell(where: str, sections: dict[str, list[str]]) -> Cell | None:
         raise ReadError(
             f"{where}: ITEM: {key}: expected three lines of {3 if tilted else 2} numbers"
         )
+    if not np.all(np.abs(bounds) < MOST):
+        return None
     flags = [word == "pp" for word in words[-3:]] if len(words) >= 3 else [False] * 3
     low, high = bounds[:, 0].copy(), bounds[:, 1].copy()
     xy, xz, yz = bounds[:, 2] if tilted else (0.0, 0.0, 0.0)
@@ -281,7 +292,7 @@ def _cell(where: str, sections: dict[str, list[str]]) -> Cell | None:
     low[1] -= min(0.0, yz)
     high[1] -= max(0.0, yz)
     edge = high - low
-    if not np.all(np.isfinite(edge)) or np.any(edge <= 0):
+    if np.any(edge <= 0):
         return None
     vectors = [[edge[0], 0, 0], [xy, edge[1], 0], [xz, yz, edge[2]]]
     return Cell(vectors, (flags[0], flags[1], flags[2]), low)

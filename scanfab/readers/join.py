@@ -12,6 +12,7 @@ from scipy.spatial import KDTree
 from scanfab.errors import ReadError
 from scanfab.packing import ContactList
 from scanfab.readers.base import GrainTable, JoinedContacts
+from scanfab.readers.columns import MOST
 
 __all__ = ["count_walls", "join_ids", "join_positions", "rows_of_ids"]
 
@@ -98,6 +99,11 @@ def join_positions(
         If both ends of a contact are where no grain is.
     """
     points = ends.reshape(-1, 3)
+    for what, numbers in (("a contact ends", points), ("a grain is", grains.position)):
+        if not np.all(np.abs(numbers) < MOST):
+            raise ReadError(f"{path}: {what} at coordinates that are no finite numbers")
+    if not np.all((grains.radius > 0) & (grains.radius < MOST)):
+        raise ReadError(f"{path}: the radii of the grains must be finite and larger than zero")
     rows = np.full(len(points), -1, dtype=np.int64)
     if len(grains.position) and len(points):
         rows = _grains_at(grains, points)
@@ -153,7 +159,8 @@ def _grains_at(grains: GrainTable, points: FloatArray) -> IntArray:
     if grains.cell is not None and grains.cell.is_periodic:
         points, position = grains.cell.wrap(points), grains.cell.wrap(position)
         # rounding may put a point and its centre on opposite faces: images just outside help
-        images, of, _ = grains.cell.images(position, SAME_PLACE * float(radius.max()))
+        margin = min(SAME_PLACE * float(radius.max()), float(grains.cell.heights.min()))
+        images, of, _ = grains.cell.images(position, margin)
         position = np.concatenate([position, images])
         row = np.concatenate([row, of])
     distance, nearest = KDTree(position).query(points)

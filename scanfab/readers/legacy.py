@@ -1,8 +1,9 @@
 """
-Whether a legacy ASCII VTK file is complete.
+Whether a legacy VTK file holds what its headers promise.
 
-VTK fills what is missing with whatever memory holds, and says nothing. What a cut file lacks is in
-its last section: that one is counted.
+VTK fills what is missing with whatever memory holds, takes all the memory that a header asks for,
+and walks off the end of a list of cells. So the file is walked through here before, section by
+section, and nothing is handed on that does not fit.
 """
 
 from __future__ import annotations
@@ -10,62 +11,261 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-__all__ = ["missing_values"]
+import numpy as np
+import numpy.typing as npt
 
-SECTION = re.compile(
-    rb"^[ \t]*(POINTS|VERTICES|LINES|POLYGONS|TRIANGLE_STRIPS|CELLS|CELL_TYPES|SCALARS|VECTORS|"
-    rb"NORMALS|TENSORS|FIELD|POINT_DATA|CELL_DATA|METADATA|LOOKUP_TABLE)\b(.*)$",
-    re.MULTILINE,
+__all__ = ["count_words", "flaw_of"]
+
+IntArray = npt.NDArray[np.int64]
+
+# bytes of a value in a binary file
+SIZES = {
+    "bit": 1,  # eight of them in fact
+    "char": 1,
+    "signed_char": 1,
+    "unsigned_char": 1,
+    "short": 2,
+    "unsigned_short": 2,
+    "int": 4,
+    "unsigned_int": 4,
+    "vtkidtype": 4,  # as VTK writes it, whatever it has in memory
+    "float": 4,
+    "long": 8,
+    "unsigned_long": 8,
+    "vtktypeint64": 8,
+    "vtktypeuint64": 8,
+    "double": 8,
+}
+CELLS = ("vertices", "lines", "polygons", "triangle_strips", "cells")
+COORDINATES = {"points": 3, "x_coordinates": 1, "y_coordinates": 1, "z_coordinates": 1}
+# attributes with a fixed number of values for each point or cell
+COMPONENTS = {
+    "vectors": 3,
+    "normals": 3,
+    "tensors": 9,
+    "tensors6": 6,
+    "global_ids": 1,
+    "pedigree_ids": 1,
+    "edge_flags": 1,
+}
+HEAD = re.compile(
+    rb"# vtk DataFile Version (\d{1,4})\.[^\n]*\n[^\n]*\n\s*(ASCII|BINARY)\s", re.IGNORECASE
 )
-ARRAY = re.compile(rb"^[ \t]*\S+[ \t]+(\d+)[ \t]+(\d+)[ \t]+[a-zA-Z_]\w*[ \t\r]*$", re.MULTILINE)
-COMPONENTS = {b"VECTORS": 3, b"NORMALS": 3, b"TENSORS": 9}
 
 
-def missing_values(file: Path) -> str | None:
-    """What the last section lacks, for a message; None if it is complete."""
-    data = file.read_bytes()
-    count, key, words, body = 0, b"", [b""], b""
-    for match in SECTION.finditer(data):
-        if match[1] == b"LOOKUP_TABLE":
-            # behind SCALARS, whose values follow it
-            body = data[match.end() :]
-            continue
-        key, words, body = match[1], match[2].split(), data[match.end() :]
-        if key in (b"POINT_DATA", b"CELL_DATA"):
-            count = _whole(words[-1:])
-    if key == b"FIELD":
-        return _missing_arrays(_whole(words[-1:]), body)
-    expected = _expected(key, words, body, count)
-    found = len(body.split()) if expected else 0
-    return f"{key.decode()} has {found} of {expected} values" if found < expected else None
+class _FlawError(Exception):
+    pass
 
 
-def _expected(key: bytes, words: list[bytes], body: bytes, count: int) -> int:
-    """How many words a section has behind its first line."""
-    if key == b"POINTS":
-        return 3 * _whole(words[:1])
-    if key == b"SCALARS":
-        return count * max(_whole(words[2:3]), 1)
-    if key in COMPONENTS:
-        return count * COMPONENTS[key]
-    if key in (b"POINT_DATA", b"CELL_DATA", b"METADATA"):
-        return 0
-    # VERTICES n size; since version 5.1 with the words OFFSETS type ... CONNECTIVITY type ...
-    numbers = _whole(words[:1]), _whole(words[-1:])
-    return sum(numbers) + 4 if body.lstrip().startswith(b"OFFSETS") else numbers[1]
+def flaw_of(file: Path) -> str | None:
+    """What does not fit in a legacy VTK file, for a message; None if all does."""
+    try:
+        _Walk(file.read_bytes()).through()
+    except _FlawError as flaw:
+        return str(flaw)
+    return None
 
 
-def _missing_arrays(arrays: int, body: bytes) -> str | None:
-    """The last array of a FIELD, or how many have not even begun."""
-    headers = list(ARRAY.finditer(body))
-    if len(headers) < arrays:
-        return f"FIELD has {len(headers)} of {arrays} arrays"
-    if not headers:
+class _Walk:
+    """A place in the file that moves behind one section after the other."""
+
+    def __init__(self, data: bytes) -> None:
+        self.data = data
+        head = HEAD.match(data)
+        if head is None:
+            raise _FlawError(
+                "expected a version, a title, and ASCII or BINARY in the first three lines"
+            )
+        self.place = head.end()
+        self.is_ascii = head[2].upper() == b"ASCII"
+        self.has_offsets = int(head[1]) >= 5
+        # where the words of an ASCII file begin
+        self.words = _word_starts(data) if self.is_ascii else np.zeros(0, np.int64)
+        # points and cells so far, and values of each attribute
+        self.points = self.cells = self.rows = 0
+
+    def through(self) -> None:
+        """Walk to the end."""
+        while (words := self._line()) is not None:
+            self._section(words[0].lower(), words)
+
+    def _section(self, key: str, words: list[str]) -> None:
+        if key in CELLS:
+            self._cells(words)
+        elif key in ("point_data", "cell_data"):
+            self._attributes(key, words)
+        elif key in COORDINATES:
+            self._coordinates(key, words)
+        elif key == "cell_types":
+            if _count(words, 1) != self.cells:
+                raise _FlawError(f"CELL_TYPES has {words[1]} types for {self.cells} cells")
+            self._values(words[0], self.cells, "int")
+        elif key == "metadata":
+            self._metadata()
+        elif key == "field":
+            self._field(words)
+        elif key not in ("dataset", "dimensions"):
+            self._attribute(key, words)
+
+    def _coordinates(self, key: str, words: list[str]) -> None:
+        count = _count(words, 1)
+        if key == "points":
+            if self.points:
+                raise _FlawError("POINTS stand there twice")
+            self.points = count
+        self._values(words[0], COORDINATES[key] * count, _word(words, 2))
+
+    def _attributes(self, key: str, words: list[str]) -> None:
+        """The number of rows of the attributes that follow."""
+        self.rows = _count(words, 1)
+        if self.rows != (self.points if key == "point_data" else self.cells):
+            raise _FlawError(
+                f"{words[0]} has {self.rows} rows for {self.points} points and {self.cells} cells"
+            )
+
+    def _metadata(self) -> None:
+        """Lines of no interest, up to an empty one."""
+        while (line := self._raw_line()) is not None and line.strip():
+            pass
+
+    def _attribute(self, key: str, words: list[str]) -> None:
+        """Values for each point or cell."""
+        name = words[0]
+        if key == "scalars":
+            components = _count(words, 3) if len(words) > 3 else 1
+            table = self.place
+            following = self._line()
+            if following is None or following[0].lower() != "lookup_table":
+                self.place = table
+            self._values(name, self.rows * components, _word(words, 2))
+        elif key in COMPONENTS:
+            self._values(name, self.rows * COMPONENTS[key], _word(words, 2))
+        elif key == "texture_coordinates":
+            self._values(name, self.rows * _count(words, 2), _word(words, 3))
+        elif key == "color_scalars":
+            self._values(name, self.rows * _count(words, 2), "unsigned_char")
+        elif key == "lookup_table":
+            self._values(name, 4 * _count(words, 2), "unsigned_char")
+        else:
+            raise _FlawError(f"expected the keyword of a section, found {name[:40]!r}")
+
+    def _field(self, words: list[str]) -> None:
+        """Arrays of any shape, each behind a line NAME COMPONENTS TUPLES TYPE."""
+        for _ in range(_count(words, 2)):
+            header = self._line()
+            if header is not None and header[0].lower() == "metadata":
+                self._metadata()
+                header = self._line()
+            if header is None:
+                raise _FlawError(f"{words[0]} has less than {words[2]} arrays")
+            components, tuples = _count(header, 1), _count(header, 2)
+            if self.rows and tuples != self.rows:
+                raise _FlawError(f"{header[0][:40]!r} has {tuples} of {self.rows} rows")
+            self._values(header[0], components * tuples, _word(header, 3))
+
+    def _cells(self, words: list[str]) -> None:
+        """Cells: count and points of each, or since version 5.1 offsets and points."""
+        count, size = _count(words, 1), _count(words, 2)
+        if not self.has_offsets:
+            start, stop = self._values(words[0], size, "int")
+            if not _is_list_of_cells(self._numbers(start, stop, size), count):
+                raise _FlawError(f"{words[0]}: {size} numbers are not {count} cells")
+            self.cells += count
+            return
+        for keyword, length in (("OFFSETS", count), ("CONNECTIVITY", size)):
+            header = self._line()
+            if header is None or header[0].upper() != keyword:
+                raise _FlawError(f"{words[0]} has no {keyword}")
+            self._values(words[0], length, _word(header, 1))
+        self.cells += max(count - 1, 0)
+
+    def _values(self, name: str, count: int, type: str) -> tuple[int, int]:
+        """Move behind so many values; where they begin and end."""
+        size = SIZES.get(type.lower())
+        if size is None:
+            raise _FlawError(f"{name[:40]}: there is no type {type[:40]!r}")
+        begin = self.place
+        if self.is_ascii:
+            first = int(np.searchsorted(self.words, begin))
+            found = len(self.words) - first
+            last = first + count
+            stop = int(self.words[last]) if last < len(self.words) else len(self.data)
+        else:
+            found = (len(self.data) - begin) // size
+            bits = type.lower() == "bit"
+            stop = begin + ((count + 7) // 8 if bits else count * size)
+            found = 8 * found if bits else found
+        if found < count:
+            raise _FlawError(f"{name[:40]} has {found} of {count} values")
+        self.place = stop
+        return begin, stop
+
+    def _numbers(self, start: int, stop: int, count: int) -> IntArray:
+        """Whole numbers between two places."""
+        if not self.is_ascii:
+            return np.frombuffer(self.data, ">i4", count, start).astype(np.int64)
+        try:
+            return np.fromiter(map(int, self.data[start:stop].split()), np.int64, count)
+        except (ValueError, OverflowError):
+            raise _FlawError("expected whole numbers for the points of cells") from None
+
+    def _line(self) -> list[str] | None:
+        """Words of the next line that has any; None at the end."""
+        while (line := self._raw_line()) is not None:
+            if line.strip():
+                return line.decode("latin1").split()
         return None
-    expected = int(headers[-1][1]) * int(headers[-1][2])
-    found = len(body[headers[-1].end() :].split())
-    return f"FIELD has {found} of {expected} values" if found < expected else None
+
+    def _raw_line(self) -> bytes | None:
+        if self.place >= len(self.data):
+            return None
+        end = self.data.find(b"\n", self.place)
+        end = len(self.data) if end < 0 else end + 1
+        line, self.place = self.data[self.place : end], end
+        return line
 
 
-def _whole(words: list[bytes]) -> int:
-    return int(words[0]) if words and words[0].isdigit() else 0
+def _word_starts(data: bytes) -> IntArray:
+    """Places of the first letters of all words."""
+    return np.flatnonzero(_begins_word(data))
+
+
+def count_words(data: bytes) -> int:
+    """How many words there are between blanks."""
+    return int(np.count_nonzero(_begins_word(data)))
+
+
+def _begins_word(data: bytes) -> npt.NDArray[np.bool_]:
+    letters = np.frombuffer(data, np.uint8)
+    begins: npt.NDArray[np.bool_] = (letters != 32) & ((letters < 9) | (letters > 13))
+    begins[1:] &= ~begins[:-1]
+    return begins
+
+
+def _is_list_of_cells(numbers: IntArray, count: int) -> bool:
+    """Whether the numbers are so many times a count and as many points."""
+    # nearly always they have as many points each
+    width = len(numbers) // max(count, 1)
+    if width and width * count == len(numbers) and np.all(numbers[::width] == width - 1):
+        return True
+    place = cells = 0
+    while place < len(numbers):
+        if numbers[place] < 0:
+            return False
+        place += int(numbers[place]) + 1
+        cells += 1
+    return place == len(numbers) and cells == count
+
+
+def _count(words: list[str], place: int) -> int:
+    """A whole number in a header."""
+    word = _word(words, place)
+    if not re.fullmatch(r"[0-9]{1,18}", word):
+        raise _FlawError(f"{words[0][:40]}: expected a whole number, found {word[:40]!r}")
+    return int(word)
+
+
+def _word(words: list[str], place: int) -> str:
+    if place >= len(words):
+        raise _FlawError(f"{words[0][:40]}: the line is incomplete")
+    return words[place]

@@ -118,7 +118,6 @@ class LiggghtsReader:
         if not _is_text(first_bytes(path)):
             return self._vtk.read_contacts(snapshot, options, grains)
         block = read_block(snapshot)
-        count = len(grains.radius)
         if len(block.values) == 0:
             pairs = np.zeros((0, 2), np.int64)
             return join_ids(path, grains, pairs, None, walls=False)
@@ -131,8 +130,7 @@ class LiggghtsReader:
             force = None if place is None else _force_column(block.values, place, grains)
             wall = _wall_column(block.values, grains) if place is None else None
             if wall is not None:
-                rows = rows_of_ids(grains, block.values[:, wall])
-                return JoinedContacts(None, count_walls(rows, count))
+                return JoinedContacts(None, _wall_contacts(path, block.values[:, wall], grains))
         if place is None:
             raise ReadError(
                 f"{path}: cannot tell which columns are the two ids of a contact: the ids may "
@@ -197,6 +195,7 @@ def _pair_column(values: FloatArray, grains: GrainTable) -> int | None:
     return candidates[0] if len(candidates) == 1 else None
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def _force_column(values: FloatArray, place: int, grains: GrainTable) -> int | None:
     """The three columns behind the periodic flag, if they push the first grain off the second."""
     force = values[:, place + 3 : place + 6]
@@ -211,6 +210,7 @@ def _force_column(values: FloatArray, place: int, grains: GrainTable) -> int | N
     return place + 3 if pushed.mean() > 0.9 else None
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def _wall_column(values: FloatArray, grains: GrainTable) -> int | None:
     """The grains' ids of a wall/gran/local file: behind wall and triangle, and a listed centre."""
     for place in range(5, values.shape[1]):
@@ -223,6 +223,17 @@ def _wall_column(values: FloatArray, grains: GrainTable) -> int | None:
             if np.mean(distance < 0.01 * size) > MOST:
                 return place
     return None
+
+
+def _wall_contacts(path: Path, ids: FloatArray, grains: GrainTable) -> IntArray:
+    """Contacts with walls of each grain."""
+    rows = rows_of_ids(grains, ids)
+    if np.any(rows < 0):
+        raise ReadError(
+            f"{path}: names the grain {ids[np.argmin(rows)]:g}, which is not in the grain file: "
+            f"do both files belong to the same step?"
+        )
+    return count_walls(rows, len(grains.radius))
 
 
 def _are_whole(values: FloatArray) -> bool:

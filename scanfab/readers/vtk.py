@@ -23,10 +23,11 @@ from scanfab.cell import Cell
 from scanfab.errors import ReadError
 from scanfab.packing import ContactList
 from scanfab.readers.base import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
-from scanfab.readers.columns import grain_table, has_radius
+from scanfab.readers.columns import MOST, grain_table, has_radius, whole_numbers
 from scanfab.readers.files import bare_name, first_bytes, plain
 from scanfab.readers.join import join_ids, join_positions
-from scanfab.readers.legacy import missing_values
+from scanfab.readers.legacy import flaw_of
+from scanfab.readers.markup import flaw_of_xml
 
 __all__ = ["Mesh", "VtkReader", "read_mesh"]
 
@@ -111,8 +112,9 @@ class VtkReader:
         mesh = read_mesh(snapshot.path)
         force = self.force_on_second(mesh)
         ids = [mesh.line_arrays.get(name) for name in ("id1", "id2")]
-        if grains.id is not None and ids[0] is not None and ids[1] is not None:
-            pairs = np.column_stack([np.rint(ids[0]), np.rint(ids[1])]).astype(np.int64)
+        named = [whole_numbers(snapshot.path, values) for values in ids if values is not None]
+        if grains.id is not None and len(named) == 2:
+            pairs = np.column_stack(named)
             return join_ids(snapshot.path, grains, pairs, force, walls=self.walls)
         return join_positions(snapshot.path, grains, mesh.points[mesh.lines], force)
 
@@ -166,27 +168,40 @@ def _read_mesh(path: Path) -> Mesh:
     if form is None:
         raise ReadError(f"{path}: expected a VTK file, found something else")
     file = plain(path)
+    _refuse_flaws(path)
     reasons = []
     if form in ("UnstructuredGrid", "UNSTRUCTURED_GRID", "Xdmf"):
         try:
-            return _from_meshio(file, form)
-        except _MeshioError as error:
+            return _checked(_from_meshio(file, form))
+        except _MeshError as error:
             reasons.append(f"meshio: {error}")
     if form != "Xdmf":
         if _is_empty_legacy(file):
             return Mesh(np.zeros((0, 3)), {}, np.zeros((0, 2), np.int64), {}, False)
         try:
-            return _from_pyvista(path, file)
-        except _VtkError as error:
+            return _checked(_from_pyvista(path, file))
+        except _MeshError as error:
             reasons.append(f"VTK: {error}")
     raise ReadError(f"{path}: cannot be read as VTK ({form}): {'; '.join(reasons)}")
 
 
-class _MeshioError(Exception):
+def _refuse_flaws(path: Path) -> None:
+    """ReadError for what VTK would read beyond the end of, or take all memory for."""
+    file = plain(path)
+    flaw = flaw_of(file) if first_bytes(file).startswith(b"# vtk") else flaw_of_xml(file)
+    if flaw is not None:
+        raise ReadError(f"{path}: the file is damaged or incomplete: {flaw}")
+
+
+class _MeshError(Exception):
     pass
 
 
-class _VtkError(Exception):
+class _MeshioError(_MeshError):
+    pass
+
+
+class _VtkError(_MeshError):
     pass
 
 
@@ -207,8 +222,18 @@ def _is_empty_legacy(file: Path) -> bool:
     return re.search(rb"^POINTS\s+0\s", first_bytes(file), re.MULTILINE) is not None
 
 
-def _is_ascii(file: Path) -> bool:
-    return re.search(rb"^ASCII\s*$", first_bytes(file), re.MULTILINE) is not None
+def _checked(mesh: Mesh) -> Mesh:
+    """The mesh, if its arrays and lines fit to its points; arrays of one column lose it."""
+    lines = mesh.lines
+    if lines.size and not 0 <= lines.min() <= lines.max() < len(mesh.points):
+        raise _MeshError("lines name points that do not exist")
+    for arrays, rows in ((mesh.point_arrays, len(mesh.points)), (mesh.line_arrays, len(lines))):
+        for name, values in arrays.items():
+            if len(values) != rows:
+                raise _MeshError(f"{name} has {len(values)} of {rows} rows")
+            if values.shape == (rows, 1):
+                arrays[name] = values[:, 0]
+    return mesh
 
 
 def _from_meshio(file: Path, form: str) -> Mesh:
@@ -220,10 +245,14 @@ def _from_meshio(file: Path, form: str) -> Mesh:
     silence = io.StringIO()
     try:
         with contextlib.redirect_stdout(silence), contextlib.redirect_stderr(silence):
-            mesh = reader.read(str(file))
+            return _from_meshio_mesh(reader.read(str(file)))
     # meshio raises whatever its parsing meets, and exits for what it does not know
     except (Exception, SystemExit) as error:
-        raise _MeshioError(str(error) or type(error).__name__) from None
+        raise _MeshioError(_first_line(error)) from None
+
+
+@np.errstate(invalid="ignore")  # ids that are no numbers name no points either
+def _from_meshio_mesh(mesh: Any) -> Mesh:
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = mesh.points
     arrays = {name: np.asarray(values) for name, values in mesh.point_data.items()}
@@ -255,25 +284,63 @@ def _from_pyvista(path: Path, file: Path) -> Mesh:
     suffix = Path(bare_name(path)).suffix.lower()
     if first_bytes(path).startswith(b"# vtk"):
         suffix = ".vtk"
-        missing = missing_values(file) if _is_ascii(file) else None
-        if missing is not None:
-            raise _VtkError(f"the file is incomplete: {missing}")
     elif suffix not in (".vtp", ".vtu"):
         suffix = ".vtp" if _form(path) == "PolyData" else ".vtu"
     with _quiet_vtk(), pyvista.VtkErrorCatcher(send_to_logging=False) as caught:
         try:
             reader = pyvista.get_reader(str(file), force_ext=suffix).reader
             reader.Update()
-            mesh = pyvista.wrap(reader.GetOutput())
+            output = reader.GetOutput()
+            _refuse_misfits(output)
+            mesh = _from_wrapped(pyvista.wrap(output))
+        except _VtkError:
+            raise
         except Exception as error:  # VTK's Python layer raises many kinds
-            raise _VtkError(str(error).splitlines()[0]) from None
+            raise _VtkError(_first_line(error)) from None
     if caught.error_events:
         raise _VtkError(caught.error_events[0].alert)
+    return mesh
+
+
+@np.errstate(invalid="ignore")  # as in the other library's meshes
+def _from_wrapped(mesh: Any) -> Mesh:
+    import pyvista
+
     if isinstance(mesh, pyvista.PolyData):
         return _from_polydata(mesh)
     if isinstance(mesh, pyvista.UnstructuredGrid):
         return _from_grid(mesh)
     raise _VtkError(f"a {type(mesh).__name__} holds neither grains nor contacts")
+
+
+def _first_line(error: BaseException) -> str:
+    return (str(error).splitlines() or [type(error).__name__])[0]
+
+
+def _refuse_misfits(output: Any) -> None:
+    """
+    _VtkError if arrays or cells do not fit to the points.
+
+    VTK reads them nevertheless, and walks off their end when they are used.
+    """
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+
+    for name in ("Verts", "Lines", "Strips", "Polys", "Cells"):
+        cells = getattr(output, f"Get{name}", lambda: None)()
+        if cells is None:
+            continue
+        if not cells.IsValid():
+            raise _VtkError(f"the offsets of {name} are wrong")
+        ids = np.asarray(vtk_to_numpy(cells.GetConnectivityArray()))
+        if ids.size and not 0 <= ids.min() <= ids.max() < output.GetNumberOfPoints():
+            raise _VtkError(f"{name} name points that do not exist")
+    for part, count in (
+        (output.GetPointData(), output.GetNumberOfPoints()),
+        (output.GetCellData(), output.GetNumberOfCells()),
+    ):
+        arrays = (part.GetAbstractArray(place) for place in range(part.GetNumberOfArrays()))
+        if any(array.GetNumberOfTuples() != count for array in arrays):
+            raise _VtkError("an array has more or less rows than there are points or cells")
 
 
 @contextlib.contextmanager
@@ -343,6 +410,7 @@ def _box_beside(path: Path) -> Cell | None:
 def _read_box(path: Path) -> Cell | None:
     import pyvista
 
+    _refuse_flaws(path)
     suffix = ".vtk" if first_bytes(path).startswith(b"# vtk") else ".vtr"
     with (
         _ONE_AT_A_TIME,
@@ -352,10 +420,10 @@ def _read_box(path: Path) -> Cell | None:
         try:
             reader = pyvista.get_reader(str(plain(path)), force_ext=suffix).reader
             reader.Update()
-            bounds = np.array(pyvista.wrap(reader.GetOutput()).bounds).reshape(3, 2)
+            bounds = np.array(reader.GetOutput().GetBounds()).reshape(3, 2)
         except Exception as error:  # as above
-            raise ReadError(f"{path}: cannot be read: {str(error).splitlines()[0]}") from None
+            raise ReadError(f"{path}: cannot be read: {_first_line(error)}") from None
     edges = bounds[:, 1] - bounds[:, 0]
-    if caught.error_events or not np.all(edges > 0):
+    if caught.error_events or not np.all((edges > 0) & (np.abs(bounds).max(axis=1) < MOST)):
         return None
     return Cell(edges, (False, False, False), bounds[:, 0])

@@ -7,6 +7,7 @@ import re
 import struct
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +15,7 @@ import numpy.typing as npt
 from scanfab.cell import Cell
 from scanfab.errors import PackingError, ReadError
 from scanfab.readers.base import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
-from scanfab.readers.columns import grain_table
+from scanfab.readers.columns import MOST, grain_table
 from scanfab.readers.files import first_bytes, plain
 from scanfab.readers.vtk import Mesh, VtkReader
 
@@ -24,6 +25,8 @@ FloatArray = npt.NDArray[np.float64]
 
 # legacy VTK by VTKExporter: VTK itself writes no dot behind the version
 EXPORTER_HEAD = b"# vtk DataFile Version 3.0.\n"
+# as numpy has them
+BLANKS = b" \t\n\r\v\f\x1c\x1d\x1e\x1f\x85\xa0"
 TEXT_HEADS = (b"#format ", b"##PERIODIC::")
 
 
@@ -70,11 +73,13 @@ class YadeReader(VtkReader):
     def force_on_second(self, mesh: Mesh) -> FloatArray | None:
         """YADE's forces act on the second body."""
         arrays = mesh.line_arrays
+        names = ["force"]
         if "normalForce" in arrays and "shearForce" in arrays:
-            force: FloatArray = arrays["normalForce"] + arrays["shearForce"]
-            return force
-        force = arrays.get("force", np.zeros(0))
-        return force if force.shape == (len(mesh.lines), 3) else None
+            names = ["normalForce", "shearForce"]
+        forces = [arrays.get(name, np.zeros(0)) for name in names]
+        if any(force.shape != (len(mesh.lines), 3) for force in forces):
+            return None
+        return np.asarray(sum(forces), dtype=np.float64)
 
 
 def _is_text(path: Path) -> bool:
@@ -83,10 +88,16 @@ def _is_text(path: Path) -> bool:
 
 def _numbers(path: Path) -> FloatArray:
     with open(plain(path), "rb") as lines:
-        if all(line.startswith(b"#") or not line.strip() for line in lines):
+        if all(not line.partition(b"#")[0].strip(BLANKS) for line in lines):
             return np.zeros((0, 0))  # an empty frame
+        lines.seek(0)
+        return _parsed(path, lines)
+
+
+def _parsed(path: Path, lines: IO[bytes]) -> FloatArray:
     try:
-        values: FloatArray = np.loadtxt(plain(path), dtype=np.float64, comments="#", ndmin=2)
+        # not by its name: numpy decompresses what is called .gz, packed or not
+        values: FloatArray = np.loadtxt(lines, dtype=np.float64, comments="#", ndmin=2)
     except ValueError as error:
         reason = str(error).replace("could not convert string", "expected a number, found")
         raise ReadError(f"{path}: {reason}") from None
@@ -99,6 +110,8 @@ def _text_columns(path: Path, lines: list[str], count: int | None) -> tuple[list
     if head.startswith("##PERIODIC::"):
         try:
             edges = [float(word) for word in head.removeprefix("##PERIODIC::").split()]
+            if not max(edges) < MOST:
+                raise ValueError
             cell = Cell(edges)
         except (ValueError, PackingError):
             raise ReadError(f"{path}, line 1: expected three lengths, found {head!r}") from None

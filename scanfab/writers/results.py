@@ -37,11 +37,13 @@ class ResultFile:
     Raises
     ------
     SettingsError
-        If the suffix is not known.
+        If the suffix is not known, or there is no such folder.
     """
 
     def __init__(self, path: Path, kind: type) -> None:
         check_suffix(path)
+        if not path.parent.is_dir():
+            raise SettingsError(f"{path}: there is no folder {path.parent} to write to")
         self.path = path
         self.kind = kind
         self.suffix = path.suffix.lower()
@@ -89,15 +91,31 @@ class ResultFile:
     @contextmanager
     def writer(self, asked: dict[str, Any], resume: bool = False) -> Iterator[RowWriter]:
         """Write rows to FILE.part, behind those that are there if resumed; then make FILE of it."""
-        self._asked.write_text(json.dumps(asked, indent=1), "utf-8")
         going_on = resume and self.part.exists() and self.part.stat().st_size > 0
-        with open(self.part, "a" if going_on else "w", newline="", encoding="utf-8") as stream:
-            yield row_writer(self._part_suffix, stream, self.kind, header=not going_on)
+        if not going_on:
+            # before its settings are overwritten: rows of other settings must not look like these
+            self.part.unlink(missing_ok=True)
+        self._write_asked(asked)
+        try:
+            with open(self.part, "a" if going_on else "w", newline="", encoding="utf-8") as stream:
+                yield row_writer(self._part_suffix, stream, self.kind, header=not going_on)
+        except BaseException:
+            if self.part.exists() and not self.part.stat().st_size:
+                # there is nothing to go on with
+                self.part.unlink()
+                self._asked.unlink()
+            raise
         if self._part_suffix == self.suffix:
             os.replace(self.part, self.path)
         else:
             self._convert()
         self._asked.unlink(missing_ok=True)
+
+    def _write_asked(self, asked: dict[str, Any]) -> None:
+        """Whole or not at all, as the process may be killed here too."""
+        whole = self._asked.with_name(self._asked.name + ".tmp")
+        whole.write_text(json.dumps(asked, indent=1), "utf-8")
+        os.replace(whole, self._asked)
 
     def _rows(self) -> list[dict[str, Any]]:
         from scanfab.tabular import read_rows

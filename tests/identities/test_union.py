@@ -75,8 +75,8 @@ def test_cutoff_that_ends_an_auto_scan():
     with pytest.warns(ScanfabWarning) as caught:
         rows = compute(packing, cutoff=10.0, tolerance=0.01)
     assert [row.segments for row in rows] == [0] * 4
-    assert all("no void segment reaches the cut-off 10" in str(w.message) for w in caught)
-    assert len(caught) == 4
+    told = [w for w in caught if "no void segment reaches the cut-off 10" in str(w.message)]
+    assert len(told) == 4
 
 
 def test_cutoff_of_a_smaller_window_leaves_the_whole_alone():

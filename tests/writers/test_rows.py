@@ -168,3 +168,21 @@ def test_other_settings_are_refused(tmp_path):
 
 def test_without_a_part_there_is_nothing_to_go_on_with(tmp_path):
     assert result_in(tmp_path).finished_rows({}, 4) == []
+
+
+def test_rows_of_other_settings_are_gone_before_the_new_settings_stand(tmp_path, monkeypatch):
+    """A process may be killed between the two."""
+    result = result_in(tmp_path)
+    interrupt(result, {"seed": 0}, [a_row()])
+
+    def killed(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("scanfab.writers.results.os.replace", killed)
+    interrupt(result, {"seed": 1}, [a_row()])
+    assert result.finished_rows({"seed": 1}, 1) == []
+
+
+def test_a_folder_that_does_not_exist_is_refused(tmp_path):
+    with pytest.raises(SettingsError, match=r"there is no folder .*nowhere to write to"):
+        ResultFile(tmp_path / "nowhere" / "t.csv", Row)

@@ -1,0 +1,47 @@
+"""
+Interrupt many runs at random moments and resume them: the bytes are those of an uninterrupted run.
+
+Usage, from the root of the repository (100 runs take about eight minutes)::
+
+    python -m tests.campaigns.interrupt [RUNS] [SEED]
+
+Each run computes 30 small frames and is stopped one to three times, by SIGINT, SIGTERM or SIGKILL,
+at a moment anywhere between its start and its end; the formats take turns. The exit code is 0 if
+every run gave the bytes of the run that nobody interrupted.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+from random import Random
+
+from scanfab.writers.rows import FILE_FORMATS
+from tests.interruptions import Interrupter, write_series
+
+OPTIONS = ("--tolerance", "6e-4")
+
+
+def main(runs: int = 100, seed: int = 0) -> int:
+    """The number of runs whose bytes differ."""
+    wrong = 0
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        tool = Interrupter(write_series(folder / "series"), OPTIONS, Random(seed))
+        expected = {suffix: tool.whole(folder / f"whole{suffix}") for suffix in FILE_FORMATS}
+        for run in range(runs):
+            suffix = list(FILE_FORMATS)[run % len(FILE_FORMATS)]
+            data, seconds = expected[suffix]
+            place = folder / f"run{run}"
+            place.mkdir()
+            times = tool.random.randint(1, 3)
+            same = tool.interrupted(place / f"table{suffix}", seconds, times) == data
+            wrong += not same
+            print(f"run {run + 1}: {suffix}, {'the same bytes' if same else 'OTHER BYTES'}")
+    print(f"{runs} runs, {wrong} with other bytes; exit codes {dict(tool.codes)}")
+    return wrong
+
+
+if __name__ == "__main__":
+    sys.exit(bool(main(*map(int, sys.argv[1:]))))

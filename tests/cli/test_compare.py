@@ -1,0 +1,125 @@
+"""scanfab compare: what it writes, in every format, from tables of every format."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from scanfab.cli.main import run
+from scanfab.tabular import read_rows
+from scanfab.writers.rows import FILE_FORMATS
+from tests.dumps import write
+from tests.tables import curve
+
+FRAMES = (
+    "source frame strain variant alpha_vs_axial alpha_c_axial "
+    "alpha_vs_axial_norm alpha_c_axial_norm"
+)
+SUMMARY = "source variant frames slope slope_origin r2 slope_se peak peak_strain final"
+DIFFERENCES = "source frame strain variants difference difference_se"
+
+
+def table(folder: Path, rows, name: str = "table.jsonl") -> str:
+    return str(write(folder / name, "".join(json.dumps(row) + "\n" for row in rows)))
+
+
+@pytest.fixture
+def compare(capsys):
+    """The rows printed by a comparison that succeeds."""
+
+    def ask(*words: str) -> list[dict[str, str]]:
+        assert run(["compare", *words]) == 0
+        return list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
+
+    return ask
+
+
+@pytest.mark.parametrize(
+    ("words", "columns", "count"),
+    [([], FRAMES, 10), (["--summary"], SUMMARY, 2), (["--differences"], DIFFERENCES, 5)],
+)
+def test_the_columns_are_those_that_scripts_rely_on(tmp_path, compare, words, columns, count):
+    rows = compare(table(tmp_path, [*curve(), *curve(variant="d")]), *words)
+    assert list(rows[0]) == columns.split()
+    assert len(rows) == count
+
+
+def test_several_tables_stand_side_by_side(tmp_path, compare):
+    tables = [table(tmp_path, curve(name), f"{name}.jsonl") for name in ("one", "two")]
+    assert [row["source"] for row in compare(*tables, "--summary")] == ["one", "two"]
+
+
+def test_the_largest_strain_is_that_of_the_fit(tmp_path, compare):
+    (row,) = compare(table(tmp_path, curve()), "--summary", "--strain-max", "0.02")
+    assert row["frames"] == "3"
+    assert row["slope_se"] == ""
+
+
+@pytest.mark.parametrize("words", [[], ["--summary"], ["--differences"]])
+@pytest.mark.parametrize("suffix", FILE_FORMATS)
+def test_every_format_holds_the_same(tmp_path, capsys, suffix, words):
+    given, output = table(tmp_path, [*curve(), *curve(variant="d")]), tmp_path / f"out{suffix}"
+    assert run(["compare", given, *words]) == 0
+    printed = write(tmp_path / "printed.csv", capsys.readouterr().out)
+    assert run(["compare", given, *words, "-o", str(output)]) == 0
+    assert capsys.readouterr().out == ""
+    assert read_rows(output) == read_rows(printed)
+
+
+@pytest.mark.parametrize("suffix", FILE_FORMATS)
+def test_the_tables_of_compute_are_read_in_every_format(tmp_path, compare, suffix):
+    sample = "sample_data/yade_triaxial/triaxial-spheres-00000000.vtk.gz"
+    root, output = Path(__file__).parents[2], tmp_path / f"table{suffix}"
+    fast = ["--directions", "9", "--spacing", "1rmin", "--boundary", "mask=3"]
+    assert run(["compute", str(root / sample), *fast, "-o", str(output)]) == 0
+    rows = compare(str(output))
+    assert [row["variant"] for row in rows] == list("abcd")
+    assert {abs(float(row["alpha_vs_axial_norm"])) for row in rows} == {1.0}
+
+
+def test_a_dash_is_standard_input(tmp_path, compare, monkeypatch):
+    data = Path(table(tmp_path, curve())).read_bytes()
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(data)))
+    assert len(compare("-")) == 5
+
+
+def test_tables_without_a_void_fabric_are_exit_code_1(tmp_path, capsys):
+    rows = [{**row, "alpha_vs_axial": None} for row in curve()]
+    assert run(["compare", table(tmp_path, rows)]) == 1
+    assert len(capsys.readouterr().out.splitlines()) == 6
+
+
+@pytest.mark.parametrize(
+    ("text", "words", "message"),
+    [
+        ("source,frame\n", [], "there is nothing to compare: the tables hold no frames"),
+        ("a,b\n1,2\n", [], "the table has no column source, frame"),
+        ("a,b\n1\n", [], "line 2: expected 2 cells, found 1"),
+        (json.dumps(curve()[0]), ["--differences"], "hold no two variants of one frame"),
+    ],
+)
+def test_what_cannot_be_compared_is_one_message(tmp_path, capsys, text, words, message):
+    output = write(tmp_path / "out.csv", "precious")
+    broken = str(write(tmp_path / "table.csv", text))
+    for more in ([], ["-o", str(output)]):
+        assert run(["compare", broken, *words, *more]) == 1
+        printed = capsys.readouterr()
+        assert printed.out == ""
+        assert printed.err.startswith("scanfab: error: ")
+        assert message in printed.err
+    assert output.read_text() == "precious"
+
+
+@pytest.mark.parametrize(
+    "words", [["--summary", "--differences"], ["-o", "out.docx"], ["nowhere.csv"]]
+)
+def test_wrong_usage(tmp_path, capsys, words, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code = run(["compare", table(tmp_path, curve()), *words])
+    assert code == 2
+    assert capsys.readouterr().out == ""

@@ -1,0 +1,120 @@
+"""The command line among other programs: pipes, streams, completion, and how fast it starts."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import io
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+
+from tests.dumps import cubic_rows, dump_text, write
+from tests.interruptions import PROGRAM
+
+FAST = ["--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin"]
+
+
+@pytest.fixture
+def packed(tmp_path):
+    """A compressed dump of three frames."""
+    texts = [dump_text(cubic_rows(squeeze=1 - 0.02 * k), step=k) for k in range(3)]
+    path = tmp_path / "dump.gz"
+    path.write_bytes(gzip.compress("".join(texts).encode()))
+    return path
+
+
+def piped(data: bytes, *commands: list[str]) -> list[subprocess.CompletedProcess[bytes]]:
+    """Real processes, each reading what the one before has printed."""
+    done = []
+    for command in commands:
+        done.append(
+            subprocess.run([*PROGRAM, *command], input=data, capture_output=True, check=False)
+        )
+        data = done[-1].stdout
+    return done
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a POSIX shell")
+def test_a_dump_is_computed_and_compared_in_one_pipe(packed):
+    program = f"'{sys.executable}' -c 'from scanfab.cli.main import main; main()'"
+    options = " ".join(FAST)
+    line = (
+        f"gzip -dc '{packed}' | {program} compute - --format liggghts {options} "
+        f"| {program} compare - --summary"
+    )
+    done = subprocess.run(["sh", "-c", line], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader(io.StringIO(done.stdout)))
+    assert [(row["source"], row["variant"], row["frames"]) for row in rows] == [
+        ("-", variant, "3") for variant in "abcd"
+    ]
+    assert all(float(row["r2"]) <= 1 for row in rows)
+    # words go past the pipe
+    assert all(line.startswith("scanfab: warning: ") for line in done.stderr.splitlines())
+
+
+def test_a_failure_in_a_pipe_leaves_nothing_to_compare():
+    compute, compare = piped(
+        b"nothing\n", ["compute", "-", "--format", "liggghts"], ["compare", "-"]
+    )
+    assert (compute.returncode, compute.stdout) == (1, b"")
+    assert (compare.returncode, compare.stdout) == (1, b"")
+    assert compare.stderr == b"scanfab: error: -: expected a table, found nothing\n"
+
+
+def test_inspect_reads_standard_input(packed):
+    (done,) = piped(
+        gzip.decompress(packed.read_bytes()), ["inspect", "-", "--format", "liggghts", "--json"]
+    )
+    assert done.returncode == 0
+    assert len(done.stdout.splitlines()) == 3
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_shells_get_a_completion_script(shell):
+    """bash is asked for its version, which some systems have not got."""
+    env = {**os.environ, "_SCANFAB_COMPLETE": f"{shell}_source"}
+    done = subprocess.run(PROGRAM, env=env, capture_output=True, text=True, check=False)
+    assert "_SCANFAB_COMPLETE" in done.stdout
+    assert f"{shell}_complete" in done.stdout
+    assert done.returncode == 0
+
+
+def test_commands_and_options_are_completed():
+    found = {}
+    for words, current in (("scanfab co", "co"), ("scanfab compute --tol", "--tol")):
+        env = {
+            **os.environ,
+            "_SCANFAB_COMPLETE": "bash_complete",
+            "COMP_WORDS": words,
+            "COMP_CWORD": str(len(words.split()) - 1),
+        }
+        done = subprocess.run(PROGRAM, env=env, capture_output=True, text=True, check=False)
+        found[current] = {line.split(",")[1] for line in done.stdout.split()}
+    assert found == {"co": {"compute", "compare"}, "--tol": {"--tolerance"}}
+
+
+@pytest.mark.parametrize("word", ["--help", "--version"])
+def test_help_and_version_are_there_at_once(word):
+    def seconds() -> float:
+        start = time.perf_counter()
+        subprocess.run([*PROGRAM, word], capture_output=True, check=True)
+        return time.perf_counter() - start
+
+    # 150 ms on a machine at rest
+    assert min(seconds() for _ in range(5)) < 0.6
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a POSIX shell")
+def test_head_ends_a_computation_quietly(tmp_path):
+    texts = [dump_text(cubic_rows(), step=k) for k in range(30)]
+    dump = write(tmp_path / "dump.txt", "".join(texts))
+    program = f"'{sys.executable}' -c 'from scanfab.cli.main import main; main()'"
+    line = f"{program} inspect '{dump}' --json | head -n 1"
+    done = subprocess.run(["sh", "-c", line], capture_output=True, text=True, check=False)
+    assert len(done.stdout.splitlines()) == 1
+    assert done.stderr == ""

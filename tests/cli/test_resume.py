@@ -1,0 +1,154 @@
+"""Interrupted runs that are resumed give the bytes of a run that nobody interrupted."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from scanfab.cli.main import run
+from scanfab.writers.rows import CsvWriter, JsonLinesWriter
+from tests.interruptions import Interrupter, write_series
+
+# about a second of scanning
+OPTIONS = ("--tolerance", "1e-3")
+FAST = (
+    "--workers",
+    "2",
+    "--directions",
+    "9",
+    "--spacing",
+    "0.5rmin",
+    "--cutoff",
+    "0.2rmin",
+    "--variants",
+    "ac",
+)
+
+
+@pytest.fixture(scope="module")
+def tool(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("interrupted")
+    return Interrupter(write_series(folder / "series"), OPTIONS, Random(1))
+
+
+@pytest.fixture(scope="module")
+def short_series(tmp_path_factory):
+    return write_series(tmp_path_factory.mktemp("short") / "series", 4)
+
+
+@pytest.fixture
+def compute(short_series, tmp_path):
+    """The exit code of a run in this process."""
+
+    def compute(output: Path, *words: str) -> int:
+        return run(["compute", str(short_series), *FAST, "-o", str(output), *words])
+
+    return compute
+
+
+@pytest.fixture
+def stopped(compute, monkeypatch, tmp_path):
+    """A FILE, of which FILE.part holds two frames and a half."""
+
+    def stop(name: str = "table.csv") -> Path:
+        output = tmp_path / name
+        writer = CsvWriter if name.endswith(("csv", "tsv")) else JsonLinesWriter
+        write, rows = writer.write, []
+
+        def interrupted(self, row):
+            rows.append(row)
+            if len(rows) == 6:
+                raise KeyboardInterrupt
+            write(self, row)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(writer, "write", interrupted)
+            assert compute(output) == 130
+        assert not output.exists()
+        assert len(rows) == 6
+        return output
+
+    return stop
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
+def test_runs_stopped_by_signals_at_random_moments_give_the_same_bytes(tool, tmp_path):
+    expected, seconds = tool.whole(tmp_path / "whole.csv")
+    for attempt in range(5):
+        place = tmp_path / str(attempt)
+        place.mkdir()
+        assert tool.interrupted(place / "table.csv", seconds, 2) == expected
+    known = {0, 130, 143, *(-sent for sent in signal.Signals)}
+    assert set(tool.codes) <= known
+    assert sum(tool.codes.values()) >= 5
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".tsv", ".json", ".jsonl", ".parquet"])
+def test_every_format_is_the_same_when_resumed(compute, stopped, tmp_path, suffix):
+    whole = tmp_path / f"whole{suffix}"
+    assert compute(whole) == 0
+    output = stopped(f"table{suffix}")
+    assert compute(output, "--resume", "--workers", "1") == 0
+    assert output.read_bytes() == whole.read_bytes()
+    assert not Path(f"{output}.part").exists()
+
+
+def test_finished_frames_are_not_computed_again(compute, stopped, short_series, monkeypatch):
+    output, computed = stopped(), []
+    from scanfab import pipeline
+
+    scan = pipeline.scan_to_tolerance
+    monkeypatch.setattr(
+        pipeline, "scan_to_tolerance", lambda *words: computed.append(1) or scan(*words)
+    )
+    assert compute(output, "--resume") == 0
+    assert len(computed) == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [(["--seed", "1"], "seed"), (["--rv", "0.6"], "rv"), (["--contacts", "geometric"], "contacts")],
+)
+def test_other_settings_are_wrong_usage(compute, stopped, capsys, words, named):
+    output = stopped()
+    part = Path(f"{output}.part")
+    before = part.read_bytes()
+    assert compute(output, "--resume", *words) == 2
+    assert f"was made with other settings ({named})" in capsys.readouterr().err
+    assert part.read_bytes() == before
+    assert not output.exists()
+
+
+@pytest.mark.parametrize("workers", ["1", "2", "5"])
+def test_other_workers_are_no_other_settings(compute, stopped, workers):
+    assert compute(stopped(), "--resume", "--workers", workers) == 0
+
+
+def test_without_a_part_everything_is_computed(compute, tmp_path):
+    one, two = tmp_path / "one.csv", tmp_path / "two.csv"
+    assert compute(one) == compute(two, "--resume") == 0
+    assert one.read_bytes() == two.read_bytes()
+
+
+def test_without_resume_the_part_is_overwritten(compute, stopped, tmp_path):
+    output = stopped()
+    assert compute(output, "--seed", "1") == 0
+    whole = tmp_path / "whole.csv"
+    assert compute(whole, "--seed", "1") == 0
+    assert output.read_bytes() == whole.read_bytes()
+
+
+def test_a_part_whose_settings_are_lost_is_refused(compute, stopped, capsys):
+    output = stopped()
+    Path(f"{output}.manifest.json.part").unlink()
+    assert compute(output, "--resume") == 2
+    assert "was made with other settings" in capsys.readouterr().err
+
+
+def test_resume_needs_a_file(short_series, capsys):
+    assert run(["compute", str(short_series), "--resume"]) == 2
+    assert "--resume goes with -o FILE" in capsys.readouterr().err

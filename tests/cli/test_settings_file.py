@@ -1,0 +1,116 @@
+"""scanfab.toml beside the dumps: any option, below the command line."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+
+import pytest
+
+from scanfab.cli.main import run
+from tests.dumps import cubic_rows, dump_text, write
+
+FAST = 'directions = 9\nspacing = "0.5rmin"\ncutoff = "0.2rmin"\n'
+
+
+@pytest.fixture
+def series(tmp_path):
+    write(tmp_path / "dump_0.txt", dump_text(cubic_rows()))
+    return tmp_path
+
+
+@pytest.fixture
+def compute(series, capsys):
+    """The rows of a computation with the given settings file."""
+
+    def ask(text: str, *words: str, source: Path = series) -> list[dict[str, str]]:
+        write(series / "scanfab.toml", f"[compute]\n{FAST}{text}")
+        code = run(["compute", str(source), *words])
+        printed = capsys.readouterr()
+        assert code == 0, printed.err
+        assert "scanfab.toml" not in printed.err
+        return list(csv.DictReader(io.StringIO(printed.out)))
+
+    return ask
+
+
+def refused(series: Path, text: str, capsys: pytest.CaptureFixture[str]) -> str:
+    write(series / "scanfab.toml", text)
+    assert run(["compute", str(series)]) == 2
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert f"{series}/scanfab.toml: " in printed.err
+    return printed.err
+
+
+def test_options_are_those_of_the_file(compute):
+    rows = compute('variants = "a"\n')
+    assert [(row["variant"], row["directions"]) for row in rows] == [("a", "13")]
+
+
+def test_the_file_serves_single_files_beside_it_too(compute, series):
+    assert len(compute('variants = "ac"\n', source=series / "dump_0.txt")) == 2
+
+
+def test_the_command_line_wins(compute):
+    rows = compute('variants = "a"\n', "--variants", "cd")
+    assert [row["variant"] for row in rows] == ["c", "d"]
+
+
+def test_the_command_line_wins_with_a_default_too(compute):
+    assert len(compute('variants = "a"\n', "--variants", "abcd")) == 4
+
+
+@pytest.mark.parametrize("text", ['boundary = "id>=63"', 'boundary = ["id=63", "id=64"]'])
+def test_an_option_that_may_be_repeated_is_a_word_or_a_list(compute, text):
+    (row,) = compute(f'variants = "a"\n{text}\n')
+    assert row["grains"] == "62"
+
+
+@pytest.mark.parametrize("cell", ["[4, 4, 4]", '"4 4 4"'])
+def test_a_cell_is_a_list_or_a_word(compute, cell):
+    assert len(compute(f'variants = "c"\nrv = 0.5\ncell = {cell}\n')) == 1
+
+
+def test_several_numbers_are_a_list(compute):
+    (row,) = compute('variants = "c"\nrv-radius = 1.0\nrv-center = [2, 2, 2]\n')
+    assert 0 < float(row["solid_fraction"]) < 1
+
+
+def test_other_sections_are_left_alone(compute):
+    assert len(compute("[view]\ncolour = 1\n")) == 4
+
+
+def test_an_unknown_option_is_refused(series, capsys):
+    assert "compute has no option 'variant'" in refused(
+        series, '[compute]\nvariant = "a"\n', capsys
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[compute\n", "Expected"),
+        ("compute = 3\n", "expected a section [compute]"),
+        ('[compute]\nseed = "many"\n', "seed: "),
+        ("[compute]\nrv-center = [1, 2]\n", "rv_center: "),
+    ],
+)
+def test_a_broken_file_is_named(series, capsys, text, message):
+    assert message in refused(series, text, capsys)
+
+
+def test_a_value_that_cannot_be_used_is_wrong_usage(series, capsys):
+    write(series / "scanfab.toml", '[compute]\nvariants = "x"\n')
+    assert run(["compute", str(series)]) == 2
+    assert "variants: expected letters out of abcd" in capsys.readouterr().err
+
+
+def test_different_files_of_several_sources_are_refused(tmp_path, capsys):
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        write(tmp_path / name / "dump_0.txt", dump_text(cubic_rows()))
+        write(tmp_path / name / "scanfab.toml", "[compute]\n")
+    assert run(["compute", str(tmp_path / "one"), str(tmp_path / "two")]) == 2
+    assert "the sources have several settings files" in capsys.readouterr().err

@@ -1,0 +1,255 @@
+"""Files that once crashed a reader, took all memory, or drew a warning of a library."""
+
+from __future__ import annotations
+
+import base64
+
+import numpy as np
+import pytest
+import pyvista
+
+import scanfab
+from scanfab.errors import ReadError
+from scanfab.readers.base import GrainTable, ReadOptions, Snapshot
+from scanfab.readers.vtk import VtkReader, read_mesh
+from scanfab.readers.yade import YadeReader
+from tests.dumps import ROWS, dump_text, pairs_text, write, yade_lines, yade_spheres
+from tests.fuzzing import only_scanfabs_warnings
+from tests.truth import YADE
+
+POINTS = "POINTS 2 double\n0 0 0 2 0 0\n"
+
+
+def legacy(path, body, version="3.0", dataset="POLYDATA"):
+    return write(path, f"# vtk DataFile Version {version}\n\nASCII\nDATASET {dataset}\n{body}")
+
+
+def xml(path, piece, content="", type="PolyData"):
+    return write(
+        path,
+        f'<VTKFile type="{type}" version="0.1" byte_order="LittleEndian"><{type}>'
+        f"<Piece {piece}>{content}</Piece></{type}></VTKFile>",
+    )
+
+
+def refuses(read, *args, match=None, **options):
+    """ReadError, and no warning of a library."""
+    with only_scanfabs_warnings(), pytest.raises(ReadError, match=match):
+        read(*args, **options)
+
+
+@pytest.mark.parametrize(
+    ("body", "reason"),
+    [
+        (POINTS.replace("2", "9" * 5000, 1), "expected a whole number"),
+        (POINTS.replace("2", "1" + "0" * 14, 1), "has 6 of 300000000000000 values"),
+        (POINTS.replace("2", "-2", 1), "expected a whole number"),
+        (POINTS + "LINES 1 1\n7\n", "1 numbers are not 1 cells"),
+        (POINTS + "LINES 1 3\n-2 0 1\n", "3 numbers are not 1 cells"),
+        (POINTS + "LINES 2 3\n2 0 1\n", "3 numbers are not 2 cells"),
+        (POINTS + "LINES 1 3\n2 0 x\n", "whole numbers"),
+        (POINTS + "POINT_DATA 2\nFIELD FieldData 4294967296\nr 1 2 double\n1 1\n", "arrays"),
+        (POINTS + "POINT_DATA 3\nSCALARS radius double\n1 1 1\n", "3 rows for 2 points"),
+        (POINTS + "POINT_DATA 2\nSCALARS radius double\nLOOKUP_TABLE default\n1\n", "1 of 2"),
+        (POINTS + "POINT_DATA 2\nSCALARS radius complex\n1 1\n", "there is no type"),
+        (POINTS + "POINT_DATA 2\nFIELD FieldData 1\nradius 1 1 double\n1\n", "1 of 2 rows"),
+        (POINTS + POINTS, "twice"),
+        (POINTS + "POINT_DATA\n", "incomplete"),
+        (POINTS + "SPLINES 2\n", "keyword"),
+    ],
+)
+def test_legacy_counts_are_those_of_the_content(tmp_path, body, reason):
+    refuses(read_mesh, legacy(tmp_path / "a.vtk", body), match=reason)
+
+
+@pytest.mark.parametrize(
+    ("version", "cells"),
+    [
+        ("3.0", "CELLS 3 2\nOFFSETS vtktypeint64\n0 1 2\nCONNECTIVITY vtktypeint64\n0 1\n"),
+        ("5.1", "CELLS 2 4\n1 0 1 1\n"),
+    ],
+)
+def test_cells_are_written_as_the_version_has_them(tmp_path, version, cells):
+    body = POINTS + cells + "CELL_TYPES 2\n1\n1\n"
+    refuses(read_mesh, legacy(tmp_path / "a.vtk", body, version, "UNSTRUCTURED_GRID"))
+
+
+def test_a_legacy_file_needs_its_three_first_lines(tmp_path):
+    refuses(read_mesh, write(tmp_path / "a.vtk", "# vtk DataFile Version \n\nASCII\nDATASET X\n"))
+
+
+@pytest.mark.parametrize("id", [2, -1, 10**10])
+def test_legacy_lines_name_points_that_exist(tmp_path, id):
+    refuses(read_mesh, legacy(tmp_path / "a.vtk", POINTS + f"LINES 1 3\n2 0 {id}\n"))
+
+
+@pytest.mark.parametrize("binary", [False, True])
+def test_offsets_of_lines_rise(tmp_path, binary):
+    mesh = pyvista.PolyData(np.eye(3), lines=[2, 0, 1, 2, 1, 2])
+    mesh.save(tmp_path / "a.vtk", binary=binary)
+    data = (tmp_path / "a.vtk").read_bytes()
+    sound, wrong = b"0 2 4 ", b"0 9 4 "
+    if binary:
+        sound, wrong = (np.array(n, ">i8").tobytes() for n in ((0, 2, 4), (0, 9, 4)))
+    assert sound in data
+    (tmp_path / "a.vtk").write_bytes(data.replace(sound, wrong))
+    refuses(read_mesh, tmp_path / "a.vtk", match="Lines")
+
+
+def test_grids_have_types_that_exist(tmp_path):
+    body = POINTS + "CELLS 2 4\n1 0 1 1\nCELL_TYPES 2\n133\n133\n"
+    refuses(read_mesh, legacy(tmp_path / "a.vtk", body, dataset="UNSTRUCTURED_GRID"))
+
+
+@pytest.mark.parametrize("count", [10**8, 10**15, 10**30, -1, "many"])
+@pytest.mark.parametrize("name", ["Points", "Polys"])
+def test_xml_counts_fit_into_the_file(tmp_path, name, count):
+    counts = {"Points": 1, "Verts": 0, "Lines": 0, "Strips": 0, "Polys": 0, name: count}
+    piece = " ".join(f'NumberOf{key}="{value}"' for key, value in counts.items())
+    refuses(read_mesh, xml(tmp_path / "a.vtp", piece), match=f"NumberOf{name} cannot be")
+
+
+def test_xml_arrays_fit_into_the_file(tmp_path):
+    array = '<PointData><DataArray NumberOfComponents="150"/></PointData>'
+    path = xml(tmp_path / "a.vtp", 'NumberOfPoints="100"', array)
+    refuses(read_mesh, path, match="150 components")
+
+
+def test_the_blocks_of_packed_arrays_fit_into_the_file(tmp_path):
+    sizes = base64.b64encode(np.array([1, 2**31, 2**31, 16], "<u4").tobytes()).decode()
+    array = (
+        f'<Points><DataArray NumberOfComponents="3" format="binary">{sizes}</DataArray></Points>'
+    )
+    path = xml(tmp_path / "a.vtp", 'NumberOfPoints="1"', array)
+    text = path.read_text().replace("<VTKFile", '<VTKFile compressor="vtkZLibDataCompressor"')
+    refuses(read_mesh, write(path, text), match="bytes before it")
+
+
+def test_a_box_of_any_extent_fits_into_the_file(tmp_path):
+    yade_spheres(tmp_path / "g1.vtk", [[0, 0, 0]], [1])
+    extent = "0 1000000000 0 1 0 1"
+    write(
+        tmp_path / "gboundingBox_1.vtr",
+        f'<VTKFile type="RectilinearGrid"><RectilinearGrid WholeExtent="{extent}">'
+        f'<Piece Extent="{extent}"/></RectilinearGrid></VTKFile>',
+    )
+    refuses(scanfab.read, tmp_path / "g1.vtk", match="extent")
+
+
+def test_meshio_keeps_scalars_flat(tmp_path):
+    body = (
+        POINTS + "CELLS 2 4\n1 0 1 1\nCELL_TYPES 2\n1\n1\n"
+        "POINT_DATA 2\nSCALARS radius double\nLOOKUP_TABLE default\n1 1\n"
+    )
+    path = legacy(tmp_path / "a.vtk", body, dataset="UNSTRUCTURED_GRID")
+    np.testing.assert_array_equal(scanfab.read(path).radius, [1, 1])
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e300])
+def test_contacts_end_at_finite_places(tmp_path, value):
+    ends = [[[0, 0, 0], [value, 0, 0]]]
+    path = yade_lines(tmp_path / "a.vtk", ends)
+    grains = GrainTable(np.zeros((1, 3)), np.ones(1), None, {}, None)
+    read = VtkReader().read_contacts
+    refuses(read, Snapshot(path), ReadOptions(), grains, match="no finite numbers")
+
+
+@pytest.mark.parametrize(("position", "radius"), [(np.nan, 1), (0, np.nan), (0, 0), (0, np.inf)])
+def test_contacts_need_grains_with_a_place_and_a_size(tmp_path, position, radius):
+    path = yade_lines(tmp_path / "a.vtk", [[[0, 0, 0], [1, 0, 0]]])
+    cell = scanfab.Cell([4, 4, 4])
+    grains = GrainTable(np.full((1, 3), position), np.full(1, radius), None, {}, cell)
+    refuses(VtkReader().read_contacts, Snapshot(path), ReadOptions(), grains, match="finite")
+
+
+def test_a_large_grain_in_a_small_cell_has_few_images(tmp_path):
+    path = yade_lines(tmp_path / "a.vtk", [[[0, 0, 0], [1, 0, 0]]])
+    cell = scanfab.Cell([4, 4, 4])
+    grains = GrainTable(np.zeros((1, 3)), np.full(1, 1e50), None, {}, cell)
+    VtkReader().read_contacts(Snapshot(path), ReadOptions(), grains)
+
+
+def test_ids_of_contacts_are_whole_numbers(tmp_path):
+    path = yade_lines(tmp_path / "a.vtk", [[[0, 0, 0], [1, 0, 0]]], id1=[np.nan], id2=[1])
+    grains = GrainTable(np.zeros((1, 3)), np.ones(1), np.array([1]), {}, None)
+    read = VtkReader().read_contacts
+    refuses(read, Snapshot(path), ReadOptions(), grains, match="ids must be whole numbers")
+
+
+def test_forces_of_another_shape_are_no_forces(tmp_path):
+    vectors = {"normalForce": [[1, 0, 0]]}
+    path = yade_lines(tmp_path / "a.vtk", [[[0, 0, 0], [1, 0, 0]]], vectors, shearForce=[1])
+    assert YadeReader().force_on_second(read_mesh(path)) is None
+
+
+def test_a_text_export_may_be_called_gz(tmp_path):
+    path = write(tmp_path / "a.txt.gz", "#format x_y_z_r\n0 0 0 1\n")
+    assert len(scanfab.read(path)) == 1
+
+
+def test_indented_comments_are_no_rows(tmp_path):
+    path = write(tmp_path / "a.txt", "#format x_y_z_r\n  # none\n")
+    with only_scanfabs_warnings():
+        assert len(scanfab.read(path)) == 0
+
+
+@pytest.mark.parametrize("edge", ["1e200", "inf", "nan"])
+def test_a_text_exports_cell_is_finite(tmp_path, edge):
+    path = write(tmp_path / "a.txt", f"##PERIODIC:: 1 1 {edge}\n0 0 0 1 -1\n")
+    refuses(scanfab.read, path, match="expected three lengths")
+
+
+def test_blank_lines_between_rows_draw_no_warning(tmp_path):
+    text = dump_text().replace(" \n2 1", "\n \t\n\n2 1")
+    with only_scanfabs_warnings():
+        assert len(scanfab.read(write(tmp_path / "a.txt", text))) == len(ROWS)
+
+
+def test_blank_lines_are_no_rows(tmp_path):
+    text = dump_text(ROWS[:1]).replace("1 1 0.2 0.5 0.5 0.1", "")
+    refuses(scanfab.read, write(tmp_path / "a.txt", text), match="counts 1 rows, found none")
+
+
+@pytest.mark.parametrize("value", ["inf", "nan", "1e300"])
+def test_fractions_of_the_box_are_numbers(tmp_path, value):
+    rows = [(1, value, 0.5, 0.5, 0.1)]
+    path = write(tmp_path / "a.txt", dump_text(rows, "id xs ys zs radius"))
+    with only_scanfabs_warnings(), pytest.raises(scanfab.ScanfabError):
+        scanfab.read(path)
+
+
+def test_a_box_without_limits_is_no_box(tmp_path):
+    path = write(tmp_path / "a.txt", dump_text(box=((-1e300, 1e300), (0, 1), (0, 1))))
+    with only_scanfabs_warnings():
+        assert scanfab.read(path).cell is None
+
+
+@pytest.mark.parametrize("name", ["x", "radius"])
+def test_coordinates_and_radii_are_lengths(tmp_path, name):
+    rows = [(1, *(1e200 if one == name else 0.5 for one in ("x", "y", "z", "radius")))]
+    path = write(tmp_path / "a.txt", dump_text(rows, "id x y z radius"))
+    refuses(scanfab.read, path, match="cannot be a length")
+
+
+def test_a_grain_is_not_far_from_its_cell(tmp_path):
+    rows = [(1, 1e30, 0.5, 0.5, 0.1)]
+    text = dump_text(rows, "id x y z radius", flags=" pp pp pp")
+    refuses(scanfab.read, write(tmp_path / "a.txt", text), match=r"1e\+30 cells away")
+
+
+@pytest.mark.parametrize("id", ["1e300", "nan", "inf", "0.5"])
+def test_ids_are_whole_numbers(tmp_path, id):
+    path = write(tmp_path / "a.txt", dump_text([(id, 1, 0.5, 0.5, 0.5, 0.1)]))
+    refuses(scanfab.read, path, match="ids must be whole numbers")
+
+
+def test_forces_of_any_size_draw_no_warning(tmp_path):
+    write(tmp_path / "d1.txt", dump_text())
+    write(tmp_path / "p1.txt", pairs_text().replace("-1.5", "-1e308"))
+    with only_scanfabs_warnings():
+        assert len(scanfab.read(tmp_path).contacts) == 2
+
+
+def test_sound_files_still_pass():
+    packing = scanfab.read(YADE / "zlib_spheres.30000.vtu", contacts="geometric")
+    assert len(packing) > 100

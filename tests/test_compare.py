@@ -1,0 +1,133 @@
+"""Comparison of variants: normalised curves, fits, differences."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from scanfab.compare import compare_tables
+from scanfab.errors import SettingsError
+from tests.tables import CONTACT, STRAIN, VOID, curve
+
+
+def summary_of(rows, **options):
+    (row,) = compare_tables(rows, **options).summary
+    return row
+
+
+def test_each_curve_is_divided_by_its_own_largest_absolute_value():
+    frames = compare_tables(curve()).frames
+    assert [row.alpha_vs_axial for row in frames] == list(VOID)
+    np.testing.assert_allclose([row.alpha_vs_axial_norm for row in frames], np.array(VOID) / 0.05)
+    np.testing.assert_allclose([row.alpha_c_axial_norm for row in frames], np.array(CONTACT) / 0.1)
+
+
+def test_groups_are_source_and_variant():
+    rows = [*curve("one", "c"), *curve("one", "d", 2.0), *curve("two", "c", 4.0)]
+    comparison = compare_tables(rows)
+    groups = [(row.source, row.variant) for row in comparison.summary]
+    assert groups == [("one", "c"), ("one", "d"), ("two", "c")]
+    assert [row.alpha_vs_axial_norm for row in comparison.frames] == pytest.approx(
+        3 * list(np.array(VOID) / 0.05)
+    )
+
+
+def test_slopes_are_those_of_least_squares():
+    row = summary_of(curve())
+    slope, intercept = np.polyfit(CONTACT, VOID, 1)
+    residual = np.array(VOID) - slope * np.array(CONTACT) - intercept
+    assert row.frames == 5
+    assert row.slope == pytest.approx(slope, rel=1e-12)
+    assert row.r2 == pytest.approx(1 - residual @ residual / (5 * np.var(VOID)), rel=1e-12)
+    origin = np.linalg.lstsq(np.array(CONTACT)[:, None], np.array(VOID), rcond=None)[0][0]
+    assert row.slope_origin == pytest.approx(origin, rel=1e-12)
+
+
+def test_frames_give_the_slope_no_standard_error():
+    assert summary_of(curve()).slope_se is None
+
+
+def test_the_peak_is_the_largest_absolute_value():
+    row = summary_of(curve())
+    assert (row.peak, row.peak_strain, row.final) == (-0.05, 0.02, -0.03)
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_under_three_frames_the_slope_is_empty(count):
+    comparison = compare_tables(curve()[:count])
+    assert len(comparison.summary) == min(count, 1)
+    for row in comparison.summary:
+        assert row.frames == count
+        assert row.slope is row.slope_origin is row.r2 is None
+        assert row.final == VOID[count - 1]
+
+
+def test_frames_beyond_the_largest_strain_are_out_of_the_fit_alone():
+    row = summary_of(curve(), strain_max=0.02)
+    assert row.frames == 3
+    assert row.slope == pytest.approx(np.polyfit(CONTACT[:3], VOID[:3], 1)[0], rel=1e-12)
+    assert row.final == VOID[-1]
+    assert len(compare_tables(curve(), strain_max=0.02).frames) == 5
+
+
+def test_frames_without_a_strain_are_out_of_a_fit_up_to_a_strain():
+    rows = [{**row, "strain": None} for row in curve()]
+    assert summary_of(rows).frames == 5
+    assert summary_of(rows, strain_max=1.0).frames == 0
+
+
+def test_frames_without_a_value_are_left_out():
+    rows = curve()
+    rows[2]["alpha_vs_axial"] = None
+    rows[4]["alpha_c_axial"] = None
+    kept = [0, 1, 3]
+    row = summary_of(rows)
+    assert row.frames == 3
+    expected = np.polyfit(np.array(CONTACT)[kept], np.array(VOID)[kept], 1)[0]
+    assert row.slope == pytest.approx(expected, rel=1e-12)
+    assert compare_tables(rows).frames[2].alpha_vs_axial_norm is None
+
+
+@pytest.mark.parametrize("column", ["alpha_vs_axial", "alpha_c_axial"])
+def test_a_curve_of_zeros_has_no_norm(column):
+    rows = [{**row, column: 0.0} for row in curve()]
+    assert {getattr(row, f"{column}_norm") for row in compare_tables(rows).frames} == {None}
+
+
+def test_a_constant_contact_fabric_has_no_slope():
+    row = summary_of([{**row, "alpha_c_axial": 0.1} for row in curve()])
+    assert row.slope is row.r2 is None
+    assert row.slope_origin == pytest.approx(np.mean(VOID) / 0.1)
+
+
+def test_differences_are_between_variants_of_a_frame():
+    rows = [*curve("one", "c"), *curve("one", "a", 3.0), *curve("two", "b")]
+    differences = compare_tables(rows).differences
+    assert [row.variants for row in differences] == ["a-c"] * 5
+    assert [row.difference for row in differences] == pytest.approx([2 * x for x in VOID])
+    assert [row.strain for row in differences] == list(STRAIN)
+    assert differences[0].difference_se == pytest.approx(math.sqrt(2) * 3e-4)
+
+
+def test_differences_without_standard_errors_have_none():
+    rows = [*curve("one", "c"), *curve("one", "d")]
+    rows[0]["alpha_vs_axial_se"] = None
+    rows[1].pop("alpha_vs_axial_se")
+    assert [row.difference_se for row in compare_tables(rows).differences[:2]] == [None, None]
+
+
+def test_a_table_without_the_columns_is_refused():
+    rows = curve()
+    rows[1].pop("strain")
+    with pytest.raises(SettingsError, match=r"the table has no column strain: expected a table of"):
+        compare_tables(rows)
+
+
+@pytest.mark.parametrize("column", ["strain", "alpha_vs_axial", "alpha_c_axial"])
+@pytest.mark.parametrize("value", ["abc", float("nan"), float("inf"), [1]])
+def test_a_word_among_the_numbers_is_named(column, value):
+    rows = [*curve()[:2], {**curve()[2], column: value}]
+    with pytest.raises(SettingsError, match=f"row 3: {column}: expected a number, found "):
+        compare_tables(rows)

@@ -1,0 +1,58 @@
+"""What is told of each frame, computed from nothing but the packing."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import pytest
+
+import scanfab
+from scanfab.inspection import FrameReport, inspect_series
+from scanfab.settings import Settings
+from tests.dumps import ROWS, dump_text, pairs_text, write
+
+
+def reports(folder, texts, **options):
+    write(folder / "dump.txt", "".join(texts))
+    return list(inspect_series(scanfab.read_series(folder), Settings.make(**options)))
+
+
+def test_grains_contacts_and_rattlers_are_counted(tmp_path):
+    write(tmp_path / "pairs.txt", pairs_text())
+    (report,) = reports(tmp_path, [dump_text()])
+    # three in a row: those at the ends have one contact
+    assert (report.grains, report.contacts, report.rattlers) == (3, 2, 2)
+    assert report.coordination == pytest.approx(4 / 3)
+    assert (report.radius_min, report.radius_max) == (0.1, 0.1)
+    assert report.contacts_from == "file"
+
+
+def test_boundary_particles_are_no_grains(tmp_path):
+    (report,) = reports(tmp_path, [dump_text()], boundary="type=2")
+    assert (report.grains, report.boundary) == (2, 1)
+
+
+def test_a_boundary_that_fits_nothing_is_a_warning(tmp_path):
+    (report,) = reports(tmp_path, [dump_text()], boundary="type=9")
+    assert report.warnings == ["boundary: no particle has type=9"]
+
+
+def test_an_empty_frame_has_no_radii(tmp_path):
+    empty, full = reports(tmp_path, [dump_text([]), dump_text(step=1)])
+    assert (empty.grains, empty.radius_min, empty.radius_max, empty.coordination) == (
+        0, None, None, None,
+    )  # fmt: skip
+    assert full.grains == len(ROWS)
+
+
+def test_chosen_frames_keep_their_numbers(tmp_path):
+    texts = [dump_text(step=step) for step in range(5)]
+    assert [report.frame for report in reports(tmp_path, texts, frames="1:4:2")] == [1, 3]
+
+
+def test_every_value_is_plain(tmp_path):
+    (report,) = reports(tmp_path, [dump_text(flags=" pp pp pp")])
+    assert isinstance(report, FrameReport)
+    allowed = (int, float, str, list, bool, type(None))
+    for name, value in dataclasses.asdict(report).items():
+        assert type(value) in allowed, name
