@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from scanfab.pipeline import boundary_hint, chosen_frames, classify
+from scanfab.pipeline import boundary_hint, chosen_frames, classify, no_such_frames
 from scanfab.series import Frame, Series
 from scanfab.settings import Settings
 from scanfab.variants import VARIANTS, Sample
@@ -55,11 +55,15 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
         If a frame cannot be read.
     """
     chosen = chosen_frames(series, settings.frames)
+    found = False
     for number, frame in enumerate(series):
         if number in chosen:
+            found = True
             yield _report(series.name, number, frame, settings)
         if number >= chosen.stop - 1:
             break
+    if not found:
+        raise no_such_frames(settings.frames)
 
 
 def _report(source: str, number: int, frame: Frame, settings: Settings) -> FrameReport:

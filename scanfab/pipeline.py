@@ -138,7 +138,7 @@ class _Run:
         """Complain of frames that do not exist, and of grains that were never met."""
         frames = self.settings.frames
         if not self.found:
-            raise SettingsError(f"frames: the series has no frame in {_spell(frames)}")
+            raise no_such_frames(frames)
         if self.plan is None:
             _complain_of_no_grains(self.name, self.particles, self.settings)
 
@@ -199,9 +199,11 @@ class _Pool:
             yield rows
 
 
-def _spell(frames: slice) -> str:
+def no_such_frames(frames: slice) -> SettingsError:
+    """The error for a slice that meets no frame."""
     parts = [frames.start, frames.stop, *([] if frames.step is None else [frames.step])]
-    return ":".join("" if part is None else str(part) for part in parts)
+    spelt = ":".join("" if part is None else str(part) for part in parts)
+    return SettingsError(f"frames: the series has no frame in {spelt}")
 
 
 def _complain_of_no_grains(name: str, particles: int, settings: Settings) -> None:

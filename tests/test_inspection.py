@@ -56,3 +56,8 @@ def test_every_value_is_plain(tmp_path):
     allowed = (int, float, str, list, bool, type(None))
     for name, value in dataclasses.asdict(report).items():
         assert type(value) in allowed, name
+
+
+def test_frames_that_do_not_exist_are_an_error(tmp_path):
+    with pytest.raises(scanfab.SettingsError, match="no frame in 99:100"):
+        reports(tmp_path, [dump_text()], frames="99")

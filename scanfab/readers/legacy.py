@@ -124,9 +124,18 @@ class _Walk:
             )
 
     def _metadata(self) -> None:
-        """Lines of no interest, up to an empty one."""
+        """Lines of no interest, up to an empty one; but VTK relies on the counts in them."""
+        promised = named = 0
         while (line := self._raw_line()) is not None and line.strip():
-            pass
+            words = _words(line)
+            key = words[0].upper()
+            if key == "INFORMATION":
+                promised += _count(words, 1)
+            named += key == "NAME"
+            if key == "DATA" and len(words) > 2 and _count(words, 1) != len(words) - 2:
+                raise _FlawError(f"METADATA has {len(words) - 2} of {words[1]} values")
+        if named != promised:
+            raise _FlawError(f"METADATA has {named} of {promised} entries")
 
     def _attribute(self, key: str, words: list[str]) -> None:
         """Values for each point or cell."""
@@ -213,7 +222,7 @@ class _Walk:
         """Words of the next line that has any; None at the end."""
         while (line := self._raw_line()) is not None:
             if line.strip():
-                return line.decode("latin1").split()
+                return _words(line)
         return None
 
     def _raw_line(self) -> bytes | None:
@@ -255,6 +264,10 @@ def _is_list_of_cells(numbers: IntArray, count: int) -> bool:
         place += int(numbers[place]) + 1
         cells += 1
     return place == len(numbers) and cells == count
+
+
+def _words(line: bytes) -> list[str]:
+    return [word.decode("latin1") for word in line.split()]
 
 
 def _count(words: list[str], place: int) -> int:

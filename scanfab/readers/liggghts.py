@@ -76,7 +76,8 @@ class LiggghtsReader:
         """An ``ITEM:`` dump, or a legacy VTK file that names LIGGGHTS."""
         head = first_bytes(path)
         return _is_text(head) or (
-            head.startswith(b"# vtk DataFile") and b"LIGGGHTS" in head.split(b"\n")[1]
+            head.startswith(b"# vtk DataFile")
+            and b"LIGGGHTS" in head.partition(b"\n")[2].partition(b"\n")[0]
         )
 
     def kind(self, path: Path) -> FileKind:

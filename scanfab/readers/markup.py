@@ -26,15 +26,14 @@ __all__ = ["flaw_of_xml"]
 
 IntArray = npt.NDArray[np.int64]
 
-ROOT = re.compile(rb"<VTKFile\b([^>]*)>")
+ROOT = re.compile(rb"<VTKFile\b([^<>]*)>")
 # the arrays of a piece stand in sections
 SECTIONS = (b"FieldData", b"PointData", b"CellData", b"Points", b"Coordinates")
 CELLS = (b"Verts", b"Lines", b"Strips", b"Polys", b"Cells")
 TAG = re.compile(
-    rb"<(RectilinearGrid|Piece|DataArray|" + b"|".join((*SECTIONS, *CELLS)) + rb")\b([^>]*)>"
+    rb"<(RectilinearGrid|Piece|DataArray|" + b"|".join((*SECTIONS, *CELLS)) + rb")\b([^<>]*)>"
 )
-ATTRIBUTE = re.compile(rb"\b(\w+)\s*=\s*(?:\"\s*([^\"]*?)\s*\"|'\s*([^']*?)\s*')")
-NOT_VALUES = re.compile(rb"<InformationKey\b.*?</InformationKey>", re.DOTALL)
+ATTRIBUTE = re.compile(rb"\b(\w+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
 BLANKS = re.compile(rb"\s*")
 TYPES = {
     b"Int8": "i1",
@@ -189,8 +188,10 @@ class _Walk:
     def _content(self, place: int) -> bytes:
         """The text of an array; children hold numbers too."""
         end = self.head.find(b"</DataArray", place)
-        content = self.head[place : len(self.head) if end < 0 else end]
-        return NOT_VALUES.sub(b"", content) if b"<" in content else content
+        if end < 0 or self.head.find(b"<DataArray", place, end) >= 0:
+            raise _FlawError("an array has no end")
+        first, *others = self.head[place:end].split(b"<InformationKey")
+        return first + b"".join(part.partition(b"</InformationKey>")[2] for part in others)
 
     def _sizes(self, place: int, is_raw: bool) -> list[int]:
         """The sizes before an array; its bytes, too, are there."""
@@ -270,7 +271,7 @@ class _Walk:
 
 
 def _attributes(text: bytes) -> dict[bytes, bytes]:
-    return {name: double or single for name, double, single in ATTRIBUTE.findall(text)}
+    return {name: (double or single).strip() for name, double, single in ATTRIBUTE.findall(text)}
 
 
 def _rows(section: bytes, piece: dict[bytes, int]) -> int | None:

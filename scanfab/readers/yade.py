@@ -110,7 +110,7 @@ def _text_columns(path: Path, lines: list[str], count: int | None) -> tuple[list
     if head.startswith("##PERIODIC::"):
         try:
             edges = [float(word) for word in head.removeprefix("##PERIODIC::").split()]
-            if not max(edges) < MOST:
+            if not all(abs(edge) < MOST for edge in edges):
                 raise ValueError
             cell = Cell(edges)
         except (ValueError, PackingError):

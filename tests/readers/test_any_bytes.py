@@ -36,6 +36,7 @@ HEADS = (
 FEW = settings(
     max_examples=150,
     deadline=None,
+    derandomize=True,  # others are left to tests/fuzz: a crash would end all tests
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import base64
+import time
 
 import numpy as np
 import pytest
 import pyvista
+from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
 
 import scanfab
 from scanfab.errors import ReadError
 from scanfab.readers.base import GrainTable, ReadOptions, Snapshot
+from scanfab.readers.liggghts import LiggghtsReader
 from scanfab.readers.vtk import VtkReader, read_mesh
 from scanfab.readers.yade import YadeReader
-from tests.dumps import ROWS, dump_text, pairs_text, write, yade_lines, yade_spheres
+from tests.dumps import ROWS, dump_text, local_text, pairs_text, write, yade_lines, yade_spheres
 from tests.fuzzing import only_scanfabs_warnings
 from tests.truth import YADE
 
@@ -54,8 +57,12 @@ def refuses(read, *args, match=None, **options):
         (POINTS + "POINT_DATA 2\nSCALARS radius complex\n1 1\n", "there is no type"),
         (POINTS + "POINT_DATA 2\nFIELD FieldData 1\nradius 1 1 double\n1\n", "1 of 2 rows"),
         (POINTS + POINTS, "twice"),
+        (POINTS + "METADATA\nINFORMATION 1e308\n\n", "whole number"),
+        (POINTS + "METADATA\nINFORMATION 999999999\n\n", "0 of 999999999 entries"),
+        (POINTS + "METADATA\nINFORMATION 1\nNAME A LOCATION B\nDATA 9 1 2\n\n", "2 of 9 values"),
         (POINTS + "POINT_DATA\n", "incomplete"),
         (POINTS + "SPLINES 2\n", "keyword"),
+        (POINTS + "\xa0\n", "keyword"),
     ],
 )
 def test_legacy_counts_are_those_of_the_content(tmp_path, body, reason):
@@ -109,20 +116,121 @@ def test_xml_counts_fit_into_the_file(tmp_path, name, count):
     refuses(read_mesh, xml(tmp_path / "a.vtp", piece), match=f"NumberOf{name} cannot be")
 
 
-def test_xml_arrays_fit_into_the_file(tmp_path):
-    array = '<PointData><DataArray NumberOfComponents="150"/></PointData>'
-    path = xml(tmp_path / "a.vtp", 'NumberOfPoints="100"', array)
-    refuses(read_mesh, path, match="150 components")
+def array(content="", **words):
+    """A DataArray of the Points of one point."""
+    words = {"type": "Float64", "NumberOfComponents": "3", "format": "binary", **words}
+    return f"<DataArray {' '.join(f'{k}={v!r}' for k, v in words.items())}>{content}</DataArray>"
 
 
-def test_the_blocks_of_packed_arrays_fit_into_the_file(tmp_path):
-    sizes = base64.b64encode(np.array([1, 2**31, 2**31, 16], "<u4").tobytes()).decode()
-    array = (
-        f'<Points><DataArray NumberOfComponents="3" format="binary">{sizes}</DataArray></Points>'
+def sizes(*numbers, type="<u4"):
+    return base64.b64encode(np.array(numbers, type).tobytes()).decode()
+
+
+@pytest.mark.parametrize(
+    ("points", "reason"),
+    [
+        (array("0 0", format="ascii"), "2 of 3 values"),
+        (array("0 <InformationKey>1 2</InformationKey> 0", format="ascii"), "2 of 3 values"),
+        (array("0 0 0", format="ascii").replace("</DataArray>", ""), "no end"),
+        (array(NumberOfComponents="9999999"), "NumberOfComponents cannot be"),
+        (array(type="Complex"), "there is no type 'Complex'"),
+        (array(), "end too early"),
+        (array("!!!!!!!!"), "base64"),
+        (array(sizes(24)), "end too early"),
+        (array(sizes(4, 0)), "0 of 3 values"),
+        (array(sizes(2**31, 0, 0)), "end too early"),
+        (array(format="appended"), "offset cannot be ''"),
+        (array(format="appended", offset="2.5"), "offset cannot be '2.5'"),
+        (array(format="appended", offset="99"), "end too early"),
+        (array(format="anything"), "offset cannot be ''"),
+    ],
+)
+def test_xml_arrays_have_their_values(tmp_path, points, reason):
+    path = xml(tmp_path / "a.vtp", 'NumberOfPoints="1"', f"<Points>{points}</Points>")
+    refuses(read_mesh, path, match=reason)
+
+
+@pytest.mark.parametrize(
+    ("blocks", "reason"),
+    [
+        (sizes(1, 2**31, 2**31, 16), "end too early"),
+        (sizes(1, 2**31, 0, 0), "bytes"),
+        (sizes(2**31, 1, 0, 0), "blocks"),
+        (sizes(2, 24, 0, 0), "end too early"),
+        (sizes(1, 16, 0, 0), "2 of 3 values"),
+    ],
+)
+@pytest.mark.parametrize("compressor", ["ZLib", "LZ4", "LZMA"])
+def test_packed_arrays_have_their_blocks(tmp_path, blocks, reason, compressor):
+    path = xml(tmp_path / "a.vtp", 'NumberOfPoints="1"', f"<Points>{array(blocks)}</Points>")
+    text = path.read_text().replace(
+        "<VTKFile", f'<VTKFile compressor="vtk{compressor}DataCompressor"'
     )
-    path = xml(tmp_path / "a.vtp", 'NumberOfPoints="1"', array)
-    text = path.read_text().replace("<VTKFile", '<VTKFile compressor="vtkZLibDataCompressor"')
-    refuses(read_mesh, write(path, text), match="bytes before it")
+    refuses(read_mesh, write(path, text), match=reason)
+
+
+@pytest.mark.parametrize(
+    "part",
+    ["<DataArray ", "<DataArray format='ascii'>", "<Piece", "<InformationKey", "a=' ", "<!--", " "],
+)
+def test_the_time_grows_as_the_file_does(tmp_path, part):
+    head = '<VTKFile type="PolyData"><PolyData><Piece NumberOfPoints="1"><Points>'
+    path = write(tmp_path / "a.vtp", f"{head}<DataArray {part * 100_000}</DataArray>")
+    began = time.monotonic()
+    refuses(read_mesh, path)
+    assert time.monotonic() - began < 10
+
+
+def test_there_are_three_compressors(tmp_path):
+    path = xml(tmp_path / "a.vtp", 'NumberOfPoints="0"')
+    text = path.read_text().replace("<VTKFile", '<VTKFile compressor="vtkRARDataCompressor"')
+    refuses(read_mesh, write(path, text), match="there is no compressor")
+
+
+@pytest.mark.parametrize("offset", ["1", "-2", "99999999999", "9" * 30, "x"])
+@pytest.mark.parametrize("order", [1, -1])
+def test_offsets_of_xml_cells_are_those_of_their_points(tmp_path, offset, order):
+    parts = [
+        array("0 1 0 1", format="ascii", type="Int64", Name="connectivity", NumberOfComponents="1"),
+        array(f"2 {offset}", format="ascii", type="Int64", Name="offsets", NumberOfComponents="1"),
+    ]
+    points = array("0 0 0 2 0 0", format="ascii")
+    content = f"<Points>{points}</Points><Lines>{''.join(parts[::order])}</Lines>"
+    path = xml(tmp_path / "a.vtp", 'NumberOfPoints="2" NumberOfLines="2"', content)
+    refuses(read_mesh, path, match="offsets of")
+
+
+@pytest.mark.parametrize("count", [1, 5000])
+@pytest.mark.parametrize("compressor", ["ZLib", "LZ4", "LZMA", "None"])
+@pytest.mark.parametrize("mode", ["Ascii", "Binary", "Appended"])
+@pytest.mark.parametrize("is_raw", [False, True])
+def test_all_that_vtk_writes_passes(tmp_path, count, compressor, mode, is_raw):
+    points = np.random.default_rng(1).random((count, 3))
+    mesh = pyvista.PolyData(points)
+    mesh["radius"] = np.ones(count)
+    grid = mesh.cast_to_unstructured_grid()
+    for data, ending in ((mesh, "vtp"), (grid, "vtu")):
+        for header, order in ((32, 0), (32, 1), (64, 0), (64, 1)):
+            writer = vtkXMLPolyDataWriter() if data is mesh else vtkXMLUnstructuredGridWriter()
+            writer.SetInputData(data)
+            getattr(writer, f"SetCompressorTypeTo{compressor}")()
+            getattr(writer, f"SetDataModeTo{mode}")()
+            writer.SetEncodeAppendedData(not is_raw)
+            writer.SetHeaderType(header)
+            writer.SetByteOrder(order)
+            writer.SetFileName(str(tmp_path / f"a.{ending}"))
+            writer.Write()
+            assert len(read_mesh(tmp_path / f"a.{ending}").points) == count
+
+
+def test_wall_contacts_name_grains_that_exist(tmp_path):
+    position = np.array([row[2:5] for row in ROWS])
+    grains = GrainTable(position, np.full(3, 0.1), np.array([1, 2, 3]), {}, None)
+    rows = [(*place, 0, 0, id) for place, id in zip(position, (1, 2, 9), strict=True)]
+    path = write(tmp_path / "a.txt", local_text(rows))
+    snapshot = LiggghtsReader().snapshots(path)[0]
+    read = LiggghtsReader().read_contacts
+    refuses(read, snapshot, ReadOptions(), grains, match="names the grain 9, which is not")
 
 
 def test_a_box_of_any_extent_fits_into_the_file(tmp_path):
@@ -193,7 +301,7 @@ def test_indented_comments_are_no_rows(tmp_path):
         assert len(scanfab.read(path)) == 0
 
 
-@pytest.mark.parametrize("edge", ["1e200", "inf", "nan"])
+@pytest.mark.parametrize("edge", ["1e200", "-1e200", "inf", "nan"])
 def test_a_text_exports_cell_is_finite(tmp_path, edge):
     path = write(tmp_path / "a.txt", f"##PERIODIC:: 1 1 {edge}\n0 0 0 1 -1\n")
     refuses(scanfab.read, path, match="expected three lengths")
