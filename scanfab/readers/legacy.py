@@ -177,15 +177,21 @@ class _Walk:
         count, size = _count(words, 1), _count(words, 2)
         if not self.has_offsets:
             start, stop = self._values(words[0], size, "int")
-            if not _is_list_of_cells(self._numbers(start, stop, size), count):
+            if not _is_list_of_cells(self._numbers(start, stop, size, "int"), count):
                 raise _FlawError(f"{words[0]}: {size} numbers are not {count} cells")
             self.cells += count
             return
+        numbers = []
         for keyword, length in (("OFFSETS", count), ("CONNECTIVITY", size)):
             header = self._line()
             if header is None or header[0].upper() != keyword:
                 raise _FlawError(f"{words[0]} has no {keyword}")
-            self._values(words[0], length, _word(header, 1))
+            type = _word(header, 1).lower()
+            start, stop = self._values(words[0], length, type)
+            numbers.append(self._numbers(start, stop, length, type))
+        ends = numbers[0]
+        if count and (ends[0] != 0 or ends[-1] != size or np.any(np.diff(ends) < 0)):
+            raise _FlawError(f"{words[0]}: the offsets of the cells are wrong")
         self.cells += max(count - 1, 0)
 
     def _values(self, name: str, count: int, type: str) -> tuple[int, int]:
@@ -209,10 +215,11 @@ class _Walk:
         self.place = stop
         return begin, stop
 
-    def _numbers(self, start: int, stop: int, count: int) -> IntArray:
+    def _numbers(self, start: int, stop: int, count: int, type: str) -> IntArray:
         """Whole numbers between two places."""
         if not self.is_ascii:
-            return np.frombuffer(self.data, ">i4", count, start).astype(np.int64)
+            dtype = f">i{SIZES[type]}"
+            return np.frombuffer(self.data, dtype, count, start).astype(np.int64)
         try:
             return np.fromiter(map(int, self.data[start:stop].split()), np.int64, count)
         except (ValueError, OverflowError):

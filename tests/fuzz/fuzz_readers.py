@@ -28,8 +28,8 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 SECONDS, MEGABYTES = 10, 1024
-# executions of one process: what the libraries leak stays far below the limit of memory
-RUNS_OF_A_PROCESS = 20_000
+# executions of one process: what atheris' tracing leaks stays below the limit of memory
+RUNS_OF_A_PROCESS = 5_000
 LONGEST = 20_000
 KEPT_OF_A_KIND = 3
 COUNTER = struct.Struct("<q")

@@ -100,7 +100,17 @@ def test_offsets_of_lines_rise(tmp_path, binary):
         sound, wrong = (np.array(n, ">i8").tobytes() for n in ((0, 2, 4), (0, 9, 4)))
     assert sound in data
     (tmp_path / "a.vtk").write_bytes(data.replace(sound, wrong))
-    refuses(read_mesh, tmp_path / "a.vtk", match="Lines")
+    refuses(read_mesh, tmp_path / "a.vtk", match="LINES: the offsets")
+
+
+@pytest.mark.parametrize(
+    ("offsets", "ids"),
+    [("0 1 2", "0 one"), ("0 x 2", "0 1"), ("0 1 1", "0 1"), ("1 1 2", "0 1"), ("0 3 2", "0 1")],
+)
+def test_legacy_offsets_and_points_of_cells_are_numbers(tmp_path, offsets, ids):
+    cells = f"CELLS 3 2\nOFFSETS vtktypeint64\n{offsets}\nCONNECTIVITY vtktypeint64\n{ids}\n"
+    body = POINTS + cells + "CELL_TYPES 2\n1\n1\n"
+    refuses(read_mesh, legacy(tmp_path / "a.vtk", body, "5.1", "UNSTRUCTURED_GRID"))
 
 
 def test_grids_have_types_that_exist(tmp_path):
