@@ -99,7 +99,7 @@ class _Walk:
         elif key == "cell_types":
             if _count(words, 1) != self.cells:
                 raise _FlawError(f"CELL_TYPES has {words[1]} types for {self.cells} cells")
-            self._values(words[0], self.cells, "int")
+            self._numbers(*self._values(words[0], self.cells, "int"), self.cells, "int")
         elif key == "metadata":
             self._metadata()
         elif key == "field":

@@ -113,8 +113,9 @@ def test_legacy_offsets_and_points_of_cells_are_numbers(tmp_path, offsets, ids):
     refuses(read_mesh, legacy(tmp_path / "a.vtk", body, "5.1", "UNSTRUCTURED_GRID"))
 
 
-def test_grids_have_types_that_exist(tmp_path):
-    body = POINTS + "CELLS 2 4\n1 0 1 1\nCELL_TYPES 2\n133\n133\n"
+@pytest.mark.parametrize("types", ["133 133", "1 x"])
+def test_grids_have_types_that_exist(tmp_path, types):
+    body = POINTS + f"CELLS 2 4\n1 0 1 1\nCELL_TYPES 2\n{types}\n"
     refuses(read_mesh, legacy(tmp_path / "a.vtk", body, dataset="UNSTRUCTURED_GRID"))
 
 
