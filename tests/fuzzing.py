@@ -18,7 +18,7 @@ from scanfab.errors import ScanfabError, ScanfabWarning
 from scanfab.families import Family
 from scanfab.readers.base import GrainTable, ReadOptions
 from scanfab.readers.registry import reader_for, reader_named
-from scanfab.readers.vtk import _read_box
+from scanfab.readers.mesh import read_bounds
 from scanfab.series import Series
 from tests.dumps import PAIRS, ROWS, dump_text, local_text, pairs_text, yade_lines, yade_spheres
 from tests.truth import FLOOR, PERIODIC, YADE
@@ -207,7 +207,7 @@ def read_everything(path: Path, format: str, options: ReadOptions) -> None:
                 reader.read_contacts(snapshot, options, grains)
         if format != "yade":
             with suppress(ScanfabError):
-                _read_box(path)
+                read_bounds(path)
         with suppress(ScanfabError):
             own = Series("", companion, (_family(path, format, "contacts"),), "auto", options)
             next(iter(own)).read()

@@ -19,7 +19,8 @@ from scanfab.readers.columns import grain_table, has_radius
 from scanfab.readers.dump import DumpBlock, index_dump, read_block, row_word
 from scanfab.readers.files import first_bytes
 from scanfab.readers.join import count_walls, join_ids, rows_of_ids
-from scanfab.readers.vtk import Mesh, VtkReader
+from scanfab.readers.mesh import Mesh
+from scanfab.readers.vtk import VtkReader
 
 __all__ = ["LiggghtsReader"]
 

@@ -17,7 +17,8 @@ from scanfab.errors import PackingError, ReadError
 from scanfab.readers.base import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
 from scanfab.readers.columns import MOST, grain_table
 from scanfab.readers.files import first_bytes, plain
-from scanfab.readers.vtk import Mesh, VtkReader
+from scanfab.readers.mesh import Mesh
+from scanfab.readers.vtk import VtkReader
 
 __all__ = ["YadeReader"]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
+import threading
 from pathlib import Path
 from random import Random
 
@@ -50,6 +51,13 @@ def compute(short_series, tmp_path):
     return compute
 
 
+def _wait_for_frames_under_way() -> None:
+    """An interrupted process ends without its threads; in this one they go on for a while."""
+    for thread in threading.enumerate():
+        if thread is not threading.current_thread() and not thread.daemon:
+            thread.join()
+
+
 @pytest.fixture
 def stopped(compute, monkeypatch, tmp_path):
     """A FILE, of which FILE.part holds two frames and a half."""
@@ -68,6 +76,7 @@ def stopped(compute, monkeypatch, tmp_path):
         with monkeypatch.context() as patch:
             patch.setattr(writer, "write", interrupted)
             assert compute(output) == 130
+        _wait_for_frames_under_way()
         assert not output.exists()
         assert len(rows) == 6
         return output

@@ -14,7 +14,8 @@ import scanfab
 from scanfab.errors import ReadError
 from scanfab.readers.base import GrainTable, ReadOptions, Snapshot
 from scanfab.readers.liggghts import LiggghtsReader
-from scanfab.readers.vtk import VtkReader, read_mesh
+from scanfab.readers.mesh import read_mesh
+from scanfab.readers.vtk import VtkReader
 from scanfab.readers.yade import YadeReader
 from tests.dumps import ROWS, dump_text, local_text, pairs_text, write, yade_lines, yade_spheres
 from tests.fuzzing import only_scanfabs_warnings
@@ -113,10 +114,14 @@ def test_legacy_offsets_and_points_of_cells_are_numbers(tmp_path, offsets, ids):
     refuses(read_mesh, legacy(tmp_path / "a.vtk", body, "5.1", "UNSTRUCTURED_GRID"))
 
 
-@pytest.mark.parametrize("types", ["133 133", "1 x"])
-def test_grids_have_types_that_exist(tmp_path, types):
-    body = POINTS + f"CELLS 2 4\n1 0 1 1\nCELL_TYPES 2\n{types}\n"
+def test_types_of_cells_are_numbers(tmp_path):
+    body = POINTS + "CELLS 2 4\n1 0 1 1\nCELL_TYPES 2\n1 x\n"
     refuses(read_mesh, legacy(tmp_path / "a.vtk", body, dataset="UNSTRUCTURED_GRID"))
+
+
+def test_cells_of_a_kind_that_does_not_exist_are_no_grains(tmp_path):
+    body = POINTS + "CELLS 2 4\n1 0 1 1\nCELL_TYPES 2\n133 133\n"
+    assert read_mesh(legacy(tmp_path / "a.vtk", body, dataset="UNSTRUCTURED_GRID")).has_faces
 
 
 @pytest.mark.parametrize("count", [10**8, 10**15, 10**30, -1, "many"])
@@ -372,3 +377,17 @@ def test_forces_of_any_size_draw_no_warning(tmp_path):
 def test_sound_files_still_pass():
     packing = scanfab.read(YADE / "zlib_spheres.30000.vtu", contacts="geometric")
     assert len(packing) > 100
+
+
+@pytest.mark.parametrize("cells", ["CELLS 1 4\n3 0 1 1\n", "CELLS 1 2\n1 0\n", "CELLS 1 1\n0\n"])
+def test_lines_of_another_number_of_points_than_two(tmp_path, cells):
+    """VTK's own table of cells by type walks off their end."""
+    body = POINTS + cells + "CELL_TYPES 1\n3\n"
+    refuses(read_mesh, legacy(tmp_path / "a.vtk", body, dataset="UNSTRUCTURED_GRID"), match="fit")
+
+
+def test_lines_beside_cells_of_other_kinds(tmp_path):
+    body = POINTS + "CELLS 3 9\n1 0\n2 0 1\n3 1 0 1\nCELL_TYPES 3\n1\n3\n5\n"
+    mesh = read_mesh(legacy(tmp_path / "a.vtk", body, dataset="UNSTRUCTURED_GRID"))
+    assert mesh.lines.tolist() == [[0, 1]]
+    assert mesh.has_faces
