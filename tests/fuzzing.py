@@ -17,8 +17,8 @@ import pyvista
 from scanfab.errors import ScanfabError, ScanfabWarning
 from scanfab.families import Family
 from scanfab.readers.base import GrainTable, ReadOptions
-from scanfab.readers.registry import reader_for, reader_named
 from scanfab.readers.mesh import read_bounds
+from scanfab.readers.registry import reader_for, reader_named
 from scanfab.series import Series
 from tests.dumps import PAIRS, ROWS, dump_text, local_text, pairs_text, yade_lines, yade_spheres
 from tests.truth import FLOOR, PERIODIC, YADE
