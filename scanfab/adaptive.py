@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from scanfab.directions import direction_rule
-from scanfab.errors import ScanfabWarning
+from scanfab.errors import ScanfabWarning, SettingsError
 from scanfab.fabric.void import void_fabric
 from scanfab.plan import Plan
 from scanfab.scan import ScanSums, Solids, is_affordable, scan_lines
@@ -17,7 +17,7 @@ from scanfab.settings import Settings
 
 __all__ = ["scan_to_tolerance"]
 
-# an auto scan that has not met its tolerance by then stops and says so
+# beyond these there is more overhead than scan
 MAX_REPLICATES = 16_384
 MAX_DIRECTIONS = 3_000
 # a round multiplies the work by this at most: early estimates of the error are uncertain
@@ -37,8 +37,10 @@ def scan_to_tolerance(solids: Solids, plan: Plan, settings: Settings) -> tuple[S
     Plan
         With the rule and the spacing of each replicate as they were in the end.
     """
+    if plan.auto:
+        plan = _within_budget(plan, solids, settings)
     sums: ScanSums | None = None
-    start, stop = 0, plan.replicates
+    start, stop, spent = 0, plan.replicates, 0
     while True:
         batch = scan_lines(
             solids,
@@ -50,25 +52,44 @@ def scan_to_tolerance(solids: Solids, plan: Plan, settings: Settings) -> tuple[S
             seed=settings.seed,
             workers=settings.workers,
         )
+        spent += int(batch.chords.sum())
         sums = batch if sums is None else ScanSums.concatenate([sums, batch])
         if not plan.auto:
             return sums, plan
+        left = (settings.max_chords - spent) / max(float(sums.chords.mean()), 1.0)
         if start == 0 and plan.auto == "replicates" and _too_few_lines(sums, settings):
             finer = replace(plan, spacing=0.5 * plan.spacing)
-            if is_affordable(solids, finer.spacing):
+            if is_affordable(solids, finer.spacing) and left > 4 * stop:
                 plan, sums = finer, None
                 continue
-        factor = min(1.05 * _missing_work(sums, plan, settings), GROWTH)
+        factor = min(_missing_work(sums, plan, settings), GROWTH)
         if factor <= 1.0:
             return sums, plan
-        if plan.auto == "replicates" and stop < MAX_REPLICATES:
-            start, stop = stop, min(math.ceil(factor * stop), MAX_REPLICATES)
-        elif plan.auto == "directions" and len(plan.rule) < MAX_DIRECTIONS:
+        if plan.auto == "replicates":
+            start, stop = stop, int(min(math.ceil(factor * stop), MAX_REPLICATES, stop + left))
+            if stop > start:
+                continue
+        elif factor * stop <= left and len(plan.rule) < MAX_DIRECTIONS:
             more = direction_rule(str(math.ceil(factor * len(plan.rule))))
             plan, sums = replace(plan, rule=more), None
-        else:
-            _warn_of_missed_tolerance(factor, settings)
-            return sums, plan
+            continue
+        _warn_of_missed_tolerance(factor, spent, settings)
+        return sums, plan
+
+
+def _within_budget(plan: Plan, solids: Solids, settings: Settings) -> Plan:
+    """The plan, with wider lines if its first round alone would cut more chords than allowed."""
+    areas = float(np.pi * np.sum(solids.radius**2))
+    chords = areas / plan.spacing**2 * len(plan.rule) * plan.replicates
+    if chords <= settings.max_chords:
+        return plan
+    if plan.auto == "replicates":
+        return replace(plan, spacing=plan.spacing * math.sqrt(chords / settings.max_chords))
+    raise SettingsError(
+        f"spacing: {plan.replicates} replicates of {len(plan.rule)} directions would cut "
+        f"{chords:.2g} chords from the grains, more than --max-chords {settings.max_chords:g}: "
+        f"choose a wider spacing"
+    )
 
 
 def _too_few_lines(sums: ScanSums, settings: Settings) -> bool:
@@ -82,23 +103,30 @@ def _too_few_lines(sums: ScanSums, settings: Settings) -> bool:
 
 def _missing_work(sums: ScanSums, plan: Plan, settings: Settings) -> float:
     """By what factor the lines must grow for every variant to meet the tolerance; <= 1: done."""
-    factor = 0.0
+    missing = expected = 0.0
     for variant in settings.variants:
         length, segments = sums.kept(variant)
         fabric = void_fabric(sums.axes, plan.rule.weights, length, segments)
         if fabric is not None:
-            error = fabric.axial_error(settings.axis)
-            factor = max(factor, 0.0 if error is None else (error / settings.tolerance) ** 2)
+            error = fabric.axial_error(settings.axis) or 0.0
+            missing = max(missing, (error / settings.tolerance) ** 2)
+            error = fabric.expected_error(settings.axis) or error
+            expected = max(expected, (error / settings.tolerance) ** 2)
         elif segments.any() and plan.auto == "replicates" and sums.replicates < 256:
             # a direction without any segment may still get one
-            factor = GROWTH
-    return factor
+            return GROWTH
+    if missing <= 1.0:
+        return missing
+    # the replicates' own scatter decides, but it is too noisy to say how much is missing
+    return max(1.05 * expected, min(missing, 1.1))
 
 
-def _warn_of_missed_tolerance(factor: float, settings: Settings) -> None:
+def _warn_of_missed_tolerance(factor: float, spent: int, settings: Settings) -> None:
+    more = "at least " if factor >= GROWTH else ""
     warnings.warn(
-        f"the scan stopped before the tolerance {settings.tolerance:g} was met: see "
-        f"alpha_vs_axial_se; {factor:.1f} times the lines, or more, would be needed",
+        f"the scan stopped after {spent:.2g} chords before the tolerance {settings.tolerance:g} "
+        f"was met: alpha_vs_axial_se is what it reached; {more}{factor:.1f} times as many lines "
+        f"would be needed (--max-chords, --tolerance)",
         ScanfabWarning,
         stacklevel=3,
     )

@@ -11,13 +11,19 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.errors import SettingsError
+from scanfab.fabric.jackknife import BLOCKS, jackknife_error
 
 __all__ = ["Comparison", "DifferenceRow", "FrameRow", "SummaryRow", "compare_tables"]
 
 FloatArray = npt.NDArray[np.float64]
 
 NEEDED = ("source", "frame", "strain", "variant", "alpha_vs_axial", "alpha_c_axial")
-NUMBERS = ("frame", "strain", "alpha_vs_axial", "alpha_c_axial", "alpha_vs_axial_se")
+WITHOUT = tuple(
+    f"{name}_without_{block}"
+    for name in ("alpha_vs_axial", "alpha_c_axial")
+    for block in range(1, BLOCKS + 1)
+)
+NUMBERS = ("frame", "strain", "alpha_vs_axial", "alpha_c_axial", "alpha_vs_axial_se", *WITHOUT)
 # with fewer points a line says nothing
 FEWEST_FRAMES = 3
 
@@ -92,7 +98,8 @@ def compare_tables(
         ``frames``: each anisotropy also divided by its group's largest absolute value.
         ``summary``: ``slope`` is the least-squares slope of ``alpha_vs_axial`` on
         ``alpha_c_axial`` with an intercept, ``slope_origin`` without; ``r2`` of the former;
-        ``slope_se`` is None: it needs blocks of the sample, as frames are not independent.
+        ``slope_se`` is that of the sample: the scatter of the slopes when each of the eight octants
+        is left out in all frames; None if a frame has no values without octants.
         ``peak`` is the largest ``alpha_vs_axial`` by absolute value, ``final`` the last one.
         ``differences``: of ``alpha_vs_axial`` between two variants of a frame; the standard error
         takes both scans as independent, which is too large where they share lines.
@@ -182,15 +189,7 @@ def _largest(group: Sequence[Mapping[str, Any]], name: str) -> float | None:
 def _summary(
     source: str, variant: str, group: Sequence[Mapping[str, Any]], strain_max: float | None
 ) -> SummaryRow:
-    fitted = np.array(
-        [
-            (row["alpha_c_axial"], row["alpha_vs_axial"])
-            for row in group
-            if row["alpha_c_axial"] is not None
-            and row["alpha_vs_axial"] is not None
-            and _within(row["strain"], strain_max)
-        ]
-    ).reshape(-1, 2)
+    fitted = _points(group, strain_max)
     slope, slope_origin, r2 = _fit(*fitted.T)
     curve = [row for row in group if row["alpha_vs_axial"] is not None]
     peak = max(curve, key=lambda row: abs(row["alpha_vs_axial"]), default=None)
@@ -201,11 +200,39 @@ def _summary(
         slope=slope,
         slope_origin=slope_origin,
         r2=r2,
-        slope_se=None,
+        slope_se=_slope_error(group, strain_max) if slope is not None else None,
         peak=None if peak is None else peak["alpha_vs_axial"],
         peak_strain=None if peak is None else peak["strain"],
         final=curve[-1]["alpha_vs_axial"] if curve else None,
     )
+
+
+def _points(
+    group: Sequence[Mapping[str, Any]], strain_max: float | None, suffix: str = ""
+) -> FloatArray:
+    """Contact and void anisotropy of the frames of a fit, shape (M, 2)."""
+    names = [f"alpha_c_axial{suffix}", f"alpha_vs_axial{suffix}"]
+    values = [
+        [row.get(name) for name in names] for row in group if _within(row["strain"], strain_max)
+    ]
+    return np.array([pair for pair in values if None not in pair], float).reshape(-1, 2)
+
+
+def _slope_error(group: Sequence[Mapping[str, Any]], strain_max: float | None) -> float | None:
+    """
+    Standard error of the slope from the blocks of the sample.
+
+    Frames of one sample are not independent: their scatter about the line says nothing of it.
+    """
+    frames = len(_points(group, strain_max))
+    slopes = []
+    for block in range(1, BLOCKS + 1):
+        points = _points(group, strain_max, f"_without_{block}")
+        slope = _fit(*points.T)[0]
+        if slope is None or len(points) < frames:
+            return None
+        slopes.append(slope)
+    return jackknife_error(np.array(slopes))
 
 
 def _within(strain: float | None, strain_max: float | None) -> bool:

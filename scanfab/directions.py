@@ -67,7 +67,8 @@ def direction_rule(text: str) -> DirectionRule:
     ----------
     text : str
         A number of axes N, rounded up to the next Lebedev rule with positive weights, or one of
-        ``lebedev:DEGREE``, ``design:DEGREE``, ``product:DEGREE``, ``fibonacci:N``,
+        ``lebedev:DEGREE``, ``design:DEGREE``, ``icosahedral:DEGREE``, ``product:DEGREE``,
+        ``fibonacci:N``,
         ``equal-angle:STEP`` (the printed ranges of Eq. 1 of the 2017 paper, unit weights),
         ``equal-angle-full:STEP`` (the half sphere, unit weights); steps in degrees.
 
@@ -150,6 +151,26 @@ def design(degree: float) -> DirectionRule:
     return _normalised(f"design:{chosen}", axes, np.ones(len(axes)), chosen)
 
 
+def icosahedral(degree: float) -> DirectionRule:
+    """The corners of an icosahedron and of its dual, which together are exact to degree 9."""
+    if not 1 <= degree <= 9:
+        raise SettingsError(f"directions: icosahedral has degree 9, found {degree:g}")
+    golden = (1 + math.sqrt(5)) / 2
+    signs = np.array([[1, 1], [1, -1]])
+    corners = np.concatenate(
+        [np.roll(np.column_stack([[0, 0], signs * [1, golden]]), k, axis=1) for k in range(3)]
+    )
+    centres = np.concatenate(
+        [np.roll(np.column_stack([[0, 0], signs * [golden, 1 / golden]]), k, 1) for k in range(3)]
+    )
+    cube = np.array([[1, 1, 1], [1, 1, -1], [1, -1, 1], [1, -1, -1]])
+    axes = np.concatenate(
+        [corners / math.sqrt(1 + golden**2), centres / math.sqrt(3), cube / math.sqrt(3)]
+    )
+    weights = np.repeat([5 / 168, 9 / 280], [6, 10])
+    return _normalised("icosahedral:9", axes, weights, 9)
+
+
 def product(degree: float) -> DirectionRule:
     """Gauss-Legendre in cos φ times even steps in θ, both exact to the degree."""
     if not 1 <= degree <= LARGEST_PRODUCT:
@@ -193,6 +214,7 @@ def equal_angle_full(step: float) -> DirectionRule:
 RULES: dict[str, tuple[Callable[[float], DirectionRule], str]] = {
     "lebedev": (lebedev, "DEGREE"),
     "design": (design, "DEGREE"),
+    "icosahedral": (icosahedral, "DEGREE"),
     "product": (product, "DEGREE"),
     "fibonacci": (fibonacci, "N"),
     "equal-angle": (equal_angle, "STEP"),

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -13,10 +12,6 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
-from scanfab.adaptive import scan_to_tolerance
 from scanfab.boundary import enclosing_class, select_boundary
 from scanfab.contacts import find_contacts
 from scanfab.errors import (
@@ -26,21 +21,16 @@ from scanfab.errors import (
     SettingsError,
     SkippedFrameWarning,
 )
-from scanfab.fabric.contact import axial_error, contact_fabric
-from scanfab.fabric.tensor import COMPONENTS, FabricTensor
-from scanfab.fabric.void import VoidFabric, void_fabric
+from scanfab.measure import frame_rows
 from scanfab.packing import Packing
 from scanfab.plan import Plan, make_plan
-from scanfab.scan import ScanSums, Solids
 from scanfab.series import Series
 from scanfab.settings import STRAIN_MODES, Settings
 from scanfab.strain import StrainFile, axial_length
 from scanfab.table import Row, Table
-from scanfab.variants import VARIANTS, Sample, Variant
+from scanfab.variants import Sample
 
 __all__ = ["compute", "compute_rows"]
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def compute(source: Packing | Series, **options: Any) -> Table:
@@ -169,7 +159,7 @@ class _Run:
     def _rows(self, number: int, sample: Sample, threads: int) -> list[Row]:
         settings = replace(self.settings, workers=threads)
         strain = self.strains.at(number, sample)
-        return list(_frame_rows(self.name, number, sample, self.plan, settings, strain))
+        return list(frame_rows(self.name, number, sample, self.plan, settings, strain))
 
 
 class _Pool:
@@ -275,149 +265,3 @@ def boundary_hint(sample: Sample, settings: Settings) -> str | None:
         f"the particles with {expression} enclose the others: if they are a boundary, "
         f'name them: --boundary "{expression}"'
     )
-
-
-def _frame_rows(
-    name: str,
-    number: int,
-    sample: Sample,
-    plan: Plan | None,
-    settings: Settings,
-    strain: float | None,
-) -> Iterator[Row]:
-    packing = sample.packing
-    frame: dict[str, Any] = {
-        "source": name,
-        "frame": number,
-        "step": packing.step,
-        "time": packing.time,
-        "strain": strain,
-        "contacts_from": sample.contacts.source,
-    }
-    sums: ScanSums | None = None
-    if plan is not None and sample.grains.any():
-        if plan.window is not None:
-            plan.window.check_inside(packing)
-        sums, plan = scan_to_tolerance(_solids(sample, plan, settings), plan, settings)
-    for variant in settings.variants:
-        yield Row(
-            **frame,
-            variant=variant,
-            **_sample_columns(sample, plan, VARIANTS[variant]),
-            **_scan_columns(sums, plan, variant, settings, number),
-            **_contact_columns(sample, plan, VARIANTS[variant], settings),
-        )
-
-
-def _solids(sample: Sample, plan: Plan, settings: Settings) -> Solids:
-    """The spheres that the lines may meet: all grains, or those that reach into the RV."""
-    packing, window = sample.packing, plan.window
-    position, radius = packing.position[sample.grains], packing.radius[sample.grains]
-    removed = sample.rattlers[sample.grains]
-    if packing.cell is not None and packing.is_periodic:
-        ghosts, row, _ = packing.cell.images(position, float(radius.max()))
-        position = np.concatenate([position, ghosts])
-        radius = np.concatenate([radius, radius[row]])
-        removed = np.concatenate([removed, removed[row]])
-    if window is None:
-        return Solids(position - position.mean(axis=0), radius, removed)
-    position = position - window.center
-    if not settings.needs_whole:
-        near = np.linalg.norm(position, axis=1) < window.radius + radius
-        position, radius, removed = position[near], radius[near], removed[near]
-    return Solids(position, radius, removed, window.radius)
-
-
-def _sample_columns(sample: Sample, plan: Plan | None, variant: Variant) -> dict[str, Any]:
-    if plan is None or not sample.grains.any():
-        return {"grains": 0, "rattlers": 0, "coordination": None}
-    counted = sample.counted(variant, plan.window)
-    return {
-        "grains": int((counted & ~sample.removed(variant)).sum()),
-        "rattlers": int((counted & sample.rattlers).sum()),
-        "coordination": sample.coordination(variant, plan.window),
-    }
-
-
-def _scan_columns(
-    sums: ScanSums | None,
-    plan: Plan | None,
-    variant: str,
-    settings: Settings,
-    number: int,
-) -> dict[str, Any]:
-    """What the scan says of one variant."""
-    fabric: VoidFabric | None = None
-    names = ("solid_fraction", "directions", "replicates", "lines", "segments", "spacing", "cutoff")
-    columns: dict[str, Any] = dict.fromkeys(names)
-    if sums is not None and plan is not None:
-        weights = plan.rule.weights
-        which = "abcd".index(variant)
-        fabric = void_fabric(sums.axes, weights, *sums.kept(variant))
-        _warn_of_few_segments(fabric, sums, variant, plan, number)
-        columns = {
-            "solid_fraction": _solid_fraction(sums, weights, which),
-            "directions": len(weights),
-            "replicates": sums.replicates,
-            "lines": int(sums.lines[:, which].sum()),
-            "segments": int(sums.segments[:, which].sum()),
-            # of all replicates together, as a fixed scan is asked for
-            "spacing": plan.spacing / math.sqrt(sums.replicates),
-            "cutoff": plan.cutoff,
-        }
-    return {
-        **columns,
-        "mean_length": fabric.mean_length if fabric else None,
-        **_tensor_columns("gvs", fabric.tensor if fabric else None),
-        "alpha_vs": fabric.tensor.alpha if fabric else None,
-        "alpha_vs_axial": fabric.tensor.axial(settings.axis) if fabric else None,
-        "alpha_vs_axial_se": fabric.axial_error(settings.axis) if fabric else None,
-    }
-
-
-def _solid_fraction(sums: ScanSums, weights: FloatArray, which: int) -> float | None:
-    """1 - void length / line length in the window, weighted like the directions."""
-    length = float(weights @ sums.line_length[:, which].sum(axis=0))
-    if length == 0:
-        return None
-    return 1.0 - float(weights @ sums.void[:, which].sum(axis=0)) / length
-
-
-def _contact_columns(
-    sample: Sample, plan: Plan | None, variant: Variant, settings: Settings
-) -> dict[str, Any]:
-    normals = np.zeros((0, 3)) if plan is None else sample.normals(variant, plan.window)
-    tensor = contact_fabric(normals)
-    return {
-        "contacts": len(normals),
-        **_tensor_columns("gc", tensor),
-        "alpha_c": tensor.alpha if tensor else None,
-        "alpha_c_axial": tensor.axial(settings.axis) if tensor else None,
-        "alpha_c_axial_se": axial_error(normals, settings.axis),
-    }
-
-
-def _tensor_columns(prefix: str, tensor: FabricTensor | None) -> dict[str, float | None]:
-    values: Iterable[tuple[str, float | None]] = (
-        tensor.components().items() if tensor else ((name, None) for name in COMPONENTS)
-    )
-    return {f"{prefix}_{name}": value for name, value in values}
-
-
-def _warn_of_few_segments(
-    fabric: VoidFabric | None, sums: ScanSums, variant: str, plan: Plan, number: int
-) -> None:
-    where = f"frame {number}, variant {variant}"
-    which = "abcd".index(variant)
-    if sums.segments[:, which].sum() == 0:
-        message = f"no void segment reaches the cut-off {plan.cutoff:g}"
-    elif fabric is None:
-        message = "in some direction no void segment is kept, so there is no void fabric"
-    elif fabric.filled > 0.01:
-        message = (
-            f"{fabric.filled:.0%} of the directions keep no void segment in a replicate: "
-            f"choose a smaller spacing"
-        )
-    else:
-        return
-    warnings.warn(f"{where}: {message}", ScanfabWarning, stacklevel=4)

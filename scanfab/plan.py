@@ -20,8 +20,9 @@ __all__ = ["Plan", "make_plan"]
 REPLICATES = 16
 # lines of one axis below which a replicate's mean lengths are too uncertain to be of use
 FEWEST_LINES = 30
-# segments for a standard error of 1: measured 0.16 to 0.26 squared for spacings of r_min to 2 r_min
-SEGMENTS_PER_VARIANCE = 0.04
+# segments for a standard error of 1: measured 0.16 to 0.26 squared at spacings of r_min to 2 r_min;
+# what the first round lacks is added to it, what it has too many cannot be taken back
+SEGMENTS_PER_VARIANCE = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +31,9 @@ class Plan:
 
     window: SphereWindow | None
     cutoff: float
+    """Of the scan that is to meet the tolerance."""
+    cutoffs: tuple[float, ...]
+    """Of the table's rows, in ascending order."""
     rule: DirectionRule
     spacing: float
     """Between the lines of one axis and replicate."""
@@ -69,16 +73,17 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
             stacklevel=2,
         )
     cutoff = settings.cutoff.resolve(lengths)
+    cutoffs = tuple(sorted({one.resolve(lengths) for one in settings.cutoffs})) or (cutoff,)
     if settings.spacing is None:
         spacing = _auto_spacing(settings, len(rule), reach, lengths)
-        return Plan(window, cutoff, rule, spacing, REPLICATES, "replicates")
+        return Plan(window, cutoff, cutoffs, rule, spacing, REPLICATES, "replicates")
     asked = settings.spacing.resolve(lengths)
     lines = math.pi * reach**2 / asked**2
     replicates = int(min(max(lines / FEWEST_LINES, 1), REPLICATES))
     auto = "directions" if settings.directions is None else ""
     if auto:
         replicates = REPLICATES
-    return Plan(window, cutoff, rule, asked * math.sqrt(replicates), replicates, auto)
+    return Plan(window, cutoff, cutoffs, rule, asked * math.sqrt(replicates), replicates, auto)
 
 
 def _refuse_periodic_whole(settings: Settings, sample: Sample) -> None:
@@ -130,11 +135,11 @@ def _check_window(window: SphereWindow, sample: Sample, largest: float) -> None:
 def _auto_spacing(settings: Settings, axes: int, reach: float, lengths: dict[str, float]) -> float:
     """
     Spacing of one replicate's lines: r_min, wider where the sample is so large that the first
-    round would do more than half of the work; never so wide that lines get too few.
+    round would do more than the work; never so wide that lines get too few.
     """
     area = math.pi * reach**2
     segments = SEGMENTS_PER_VARIANCE / settings.tolerance**2
     segments_per_line = max(reach / (3.0 * lengths["rmean"]), 1.0)
-    lines = 0.5 * segments / (REPLICATES * axes * segments_per_line)
+    lines = segments / (REPLICATES * axes * segments_per_line)
     spacing = max(lengths["rmin"], math.sqrt(area / lines))
     return min(spacing, math.sqrt(area / (4 * FEWEST_LINES)))

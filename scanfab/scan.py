@@ -12,9 +12,18 @@ from scipy.spatial.transform import Rotation
 
 from scanfab.directions import DirectionRule
 from scanfab.errors import SettingsError
-from scanfab.kernels import sweep as kernel
+from scanfab.kernels import sweep
+from scanfab.kernels.axes import scan_axes
 
-__all__ = ["MAX_LINES", "ScanSums", "Solids", "is_affordable", "line_frames", "scan_lines"]
+__all__ = [
+    "MAX_LINES",
+    "ScanSums",
+    "Solids",
+    "is_affordable",
+    "line_frames",
+    "scan_lines",
+    "turned_frames",
+]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -63,6 +72,8 @@ class ScanSums:
     """Length of all void in the window, kept or not, shape (R, 4, D); 0 for the whole."""
     line_length: FloatArray
     """Length of the lines in the window, shape (R, 4, D); 0 for the whole."""
+    chords: IntArray
+    """Chords that all spheres together cut from the lines, shape (R,)."""
 
     @property
     def replicates(self) -> int:
@@ -152,7 +163,7 @@ def scan_lines(
     frames = line_frames(rule.axes)
 
     def one(replicate: int) -> ScanSums:
-        turned, offsets = _replicate(rule, frames, seed, replicate)
+        turned, offsets = turned_frames(rule, frames, seed, replicate)
         return _scan_frames(solids, turned, offsets, spacing, cutoff, variants)
 
     numbers = list(replicates)
@@ -164,10 +175,15 @@ def scan_lines(
         return ScanSums.concatenate(pool.map(one, numbers))
 
 
-def _replicate(
+def turned_frames(
     rule: DirectionRule, frames: FloatArray, seed: int, replicate: int
 ) -> tuple[FloatArray, FloatArray]:
-    """The rule's line frames, turned, and the shifts of the grids."""
+    """
+    The lines of one replicate.
+
+    Returns the rule's line frames (shape (D, 3, 3)), turned, and the shifts of the grids in units
+    of the spacing (shape (D, 2)).
+    """
     random = np.random.default_rng([seed, replicate])
     rotation = Rotation.random(rng=random).as_matrix()
     offsets = random.random((len(rule), 2))
@@ -183,38 +199,46 @@ def _scan_frames(
     variants: str,
 ) -> ScanSums:
     """One replicate: given line frames (D, 3, 3) and shifts (D, 2)."""
-    tallies = np.zeros((len(frames), 2, kernel.TALLY_SIZE))
-    kernel.scan_axes(
-        np.ascontiguousarray(solids.position),
-        solids.radius,
-        solids.removed,
-        ("a" in variants or "c" in variants, "b" in variants or "d" in variants),
-        "a" in variants or "b" in variants,
+    tallies = np.zeros((len(frames), 2, sweep.TALLY_SIZE))
+    first, second = ("a" in variants or "c" in variants), ("b" in variants or "d" in variants)
+    # without a or c, the solids of b and d are the only ones
+    solid = slice(None) if first else ~solids.removed
+    scan_axes(
+        np.ascontiguousarray(solids.position[solid]),
+        solids.radius[solid],
+        solids.removed[solid],
         np.ascontiguousarray(frames),
         offsets,
         spacing,
         cutoff,
         solids.window_radius,
         tallies,
+        True if first and second else None,
+        True if "a" in variants or "b" in variants else None,
+        True if "c" in variants or "d" in variants else None,
     )
-    zero = np.zeros((len(frames), 2))
+    if not first:
+        tallies = tallies[:, ::-1]
+    return _by_variant(frames[:, 2], tallies, variants)
 
-    def by_variant(whole: FloatArray, window: FloatArray) -> FloatArray:
-        values = np.concatenate([whole, window], axis=1).T[None]
-        chosen = [variant in variants for variant in "abcd"]
-        return np.where(np.array(chosen)[:, None], values, 0.0)
+
+def _by_variant(axes: FloatArray, tallies: FloatArray, variants: str) -> ScanSums:
+    """The sums of one replicate from its tallies by axis and set of solids."""
+
+    def of(entry: int) -> FloatArray:
+        groups = [tallies[..., sweep.WHOLE + entry], tallies[..., sweep.WINDOW + entry]]
+        values = np.concatenate(groups, axis=1).T[None]
+        wanted = np.array([variant in variants for variant in "abcd"])
+        return np.where(wanted[:, None], values, 0.0)
 
     return ScanSums(
-        axes=frames[None, :, 2],
-        length=by_variant(tallies[..., kernel.WHOLE_LENGTH], tallies[..., kernel.WINDOW_LENGTH]),
-        segments=by_variant(
-            tallies[..., kernel.WHOLE_KEPT], tallies[..., kernel.WINDOW_KEPT]
-        ).astype(np.int64),
-        lines=by_variant(
-            tallies[..., kernel.WHOLE_LINES], tallies[..., kernel.WINDOW_LINES]
-        ).astype(np.int64),
-        void=by_variant(zero, tallies[..., kernel.WINDOW_VOID]),
-        line_length=by_variant(zero, tallies[..., kernel.WINDOW_LINE_LENGTH]),
+        axes=axes[None],
+        length=of(sweep.LENGTH),
+        segments=of(sweep.KEPT).astype(np.int64),
+        lines=of(sweep.LINES).astype(np.int64),
+        void=of(sweep.VOID),
+        line_length=of(sweep.LINE_LENGTH),
+        chords=np.array([tallies[:, :, sweep.CHORDS].sum()]).astype(np.int64),
     )
 
 

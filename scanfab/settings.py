@@ -20,7 +20,8 @@ Vector = tuple[float, float, float]
 
 AXES: dict[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 # equal weights and few axes: the random turns of the replicates do the rest
-AUTO_RULE = "design:9"
+AUTO_RULE = "icosahedral:9"
+MOST_CUTOFFS = 1000
 STRAIN_MODES = ("auto", "cell", "boundary", "grains")
 
 
@@ -59,6 +60,34 @@ def parse_length(name: str, text: str | float | Length) -> Length:
             f"found {str(text)!r}"
         )
     return Length(value, match[2] or "")  # type: ignore[arg-type]
+
+
+def parse_lengths(name: str, text: str) -> tuple[Length, ...]:
+    """
+    Lengths as ``FROM:TO:STEP``, both ends included, or as ``L,L,...``.
+
+    Examples
+    --------
+    >>> from scanfab.settings import parse_lengths
+    >>> [length.value for length in parse_lengths("cutoffs", "0:1rmin:0.5rmin")]
+    [0.0, 0.5, 1.0]
+    """
+    if ":" not in text:
+        return tuple(parse_length(name, part) for part in text.split(","))
+    lengths = [parse_length(name, part) for part in text.split(":")]
+    units = {length.unit for length in lengths if length.value != 0}
+    if len(lengths) != 3 or len(units) > 1 or lengths[2].value <= 0:
+        raise SettingsError(
+            f"{name}: expected FROM:TO:STEP of one unit such as 0:3rmin:0.1rmin, found {text!r}"
+        )
+    first, last, step = (length.value for length in lengths)
+    count = math.floor((last - first) / step + 1e-9) + 1
+    if not 1 <= count <= MOST_CUTOFFS:
+        raise SettingsError(
+            f"{name}: expected 1 to {MOST_CUTOFFS} of them, found {count}: {text!r}"
+        )
+    # not by adding steps, whose rounding would show
+    return tuple(Length(round(first + k * step, 12), *units) for k in range(count))
 
 
 def _number(name: str, value: object) -> float:
@@ -136,11 +165,15 @@ class Settings:
     rv_center: Vector | None = None
     boundary: tuple[BoundaryRule, ...] = ()
     cutoff: Length = Length(1.0, "rmin")
+    cutoffs: tuple[Length, ...] = ()
+    """Several instead of the one, each with its rows."""
+    moment: int = 1
     spacing: Length | None = None
     """None for ``auto``."""
     directions: DirectionRule | None = None
     """None for ``auto``."""
     tolerance: float = 1e-4
+    max_chords: float = 1e11
     min_contacts: int = 2
     contact_tolerance: float = 0.0
     axis: Vector = AXES["z"]
@@ -160,9 +193,12 @@ class Settings:
         rv_center: Vector | None = None,
         boundary: str | tuple[str, ...] | list[str] = (),
         cutoff: str | float = "1rmin",
+        cutoffs: str | None = None,
+        moment: int = 1,
         spacing: str | float = "auto",
         directions: str | int | DirectionRule = "auto",
         tolerance: float = 1e-4,
+        max_chords: float = 1e11,
         min_contacts: int = 2,
         contact_tolerance: float = 0.0,
         axis: str | Vector = "z",
@@ -188,10 +224,17 @@ class Settings:
         cutoff, spacing : str or float
             A length in the dump's unit, or with the suffix ``rmin``, ``rmean`` or ``rmax``; spacing
             also ``auto``.
+        cutoffs : str, optional
+            Several cut-offs in one pass: ``FROM:TO:STEP`` or ``L,L,...``; ``cutoff`` is then the
+            one at which the scan meets the tolerance.
+        moment : int
+            1: ℓ is the mean length of the kept segments; 2: the mean of the squares over the mean.
         directions : str, int or DirectionRule
             ``auto``, a number of axes, or a rule, see :func:`scanfab.direction_rule`.
         tolerance : float
             Target standard error of ``alpha_vs_axial`` where spacing or directions are ``auto``.
+        max_chords : float
+            An ``auto`` scan stops before it cuts more chords from grains, in each frame.
         min_contacts : int
             A grain with fewer contacts is a rattler.
         contact_tolerance : float
@@ -222,9 +265,12 @@ class Settings:
                 for rule in ([boundary] if isinstance(boundary, str) else boundary)
             ),
             cutoff=parse_length("cutoff", cutoff),
+            cutoffs=() if cutoffs is None else parse_lengths("cutoffs", cutoffs),
+            moment=_whole("moment", moment),
             spacing=None if spacing == "auto" else parse_length("spacing", spacing),
             directions=_rule(directions),
             tolerance=_number("tolerance", tolerance),
+            max_chords=_number("max-chords", max_chords),
             min_contacts=_whole("min-contacts", min_contacts),
             contact_tolerance=_number("contact-tolerance", contact_tolerance),
             axis=parse_axis(axis),
@@ -251,12 +297,21 @@ class Settings:
             ),
             (self.cutoff.value >= 0, f"cutoff: expected 0 or more, found {self.cutoff.value:g}"),
             (
+                all(one.value >= 0 for one in self.cutoffs),
+                "cutoffs: expected lengths of 0 or more",
+            ),
+            (self.moment in (1, 2), f"moment: expected 1 or 2, found {self.moment}"),
+            (
                 self.spacing is None or self.spacing.value > 0,
                 f"spacing: expected a length above 0, found {self.spacing and self.spacing.value}",
             ),
             (
                 self.tolerance > 0 and math.isfinite(self.tolerance),
                 f"tolerance: expected a number above 0, found {self.tolerance:g}",
+            ),
+            (
+                self.max_chords >= 1,
+                f"max-chords: expected a number of at least 1, found {self.max_chords:g}",
             ),
             (
                 self.min_contacts >= 0,
@@ -282,6 +337,16 @@ class Settings:
             if not holds:
                 raise SettingsError(message)
         return self
+
+    @property
+    def lists_gaps(self) -> bool:
+        """Whether sums for one cut-off do not suffice."""
+        return bool(self.cutoffs) or self.moment != 1
+
+    @property
+    def rows_per_frame(self) -> int:
+        """Rows of each frame: one for each variant and cut-off."""
+        return len(self.variants) * max(len(self.cutoffs), 1)
 
     @property
     def needs_window(self) -> bool:

@@ -53,6 +53,24 @@ class Row:
     alpha_c: float | None
     alpha_c_axial: float | None
     alpha_c_axial_se: float | None
+    alpha_vs_axial_sample_se: float | None
+    alpha_c_axial_sample_se: float | None
+    alpha_vs_axial_without_1: float | None
+    alpha_vs_axial_without_2: float | None
+    alpha_vs_axial_without_3: float | None
+    alpha_vs_axial_without_4: float | None
+    alpha_vs_axial_without_5: float | None
+    alpha_vs_axial_without_6: float | None
+    alpha_vs_axial_without_7: float | None
+    alpha_vs_axial_without_8: float | None
+    alpha_c_axial_without_1: float | None
+    alpha_c_axial_without_2: float | None
+    alpha_c_axial_without_3: float | None
+    alpha_c_axial_without_4: float | None
+    alpha_c_axial_without_5: float | None
+    alpha_c_axial_without_6: float | None
+    alpha_c_axial_without_7: float | None
+    alpha_c_axial_without_8: float | None
 
 
 COLUMNS: tuple[str, ...] = tuple(field.name for field in fields(Row))
@@ -95,6 +113,24 @@ MEANINGS: dict[str, str] = {
     "alpha_c": "largest minus smallest principal value of the contact fabric",
     "alpha_c_axial": "signed anisotropy of the contact fabric along the loading axis",
     "alpha_c_axial_se": "its standard error if contacts were independent",
+    "alpha_vs_axial_sample_se": "the sample's own scatter, by a jackknife over eight octants",
+    "alpha_c_axial_sample_se": "likewise",
+    "alpha_vs_axial_without_1": "alpha_vs_axial without the segments of octant 1 (-x, -y, -z)",
+    "alpha_vs_axial_without_2": "likewise, octant 2, where x counts fastest",
+    "alpha_vs_axial_without_3": "likewise",
+    "alpha_vs_axial_without_4": "likewise",
+    "alpha_vs_axial_without_5": "likewise",
+    "alpha_vs_axial_without_6": "likewise",
+    "alpha_vs_axial_without_7": "likewise",
+    "alpha_vs_axial_without_8": "likewise",
+    "alpha_c_axial_without_1": "alpha_c_axial without the contacts of octant 1",
+    "alpha_c_axial_without_2": "likewise",
+    "alpha_c_axial_without_3": "likewise",
+    "alpha_c_axial_without_4": "likewise",
+    "alpha_c_axial_without_5": "likewise",
+    "alpha_c_axial_without_6": "likewise",
+    "alpha_c_axial_without_7": "likewise",
+    "alpha_c_axial_without_8": "likewise",
 }
 """What each column holds; lengths are in the dump's unit."""
 

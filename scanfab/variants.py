@@ -88,15 +88,15 @@ class Sample:
         assert window is not None
         return self.grains & window.contains(self.packing.position, self.packing)
 
-    def normals(self, variant: Variant, window: SphereWindow | None) -> FloatArray:
-        """Normals of the grain-grain contacts that enter the variant's contact fabric, (M, 3)."""
+    def fabric_contacts(self, variant: Variant, window: SphereWindow | None) -> BoolArray:
+        """Which grain-grain contacts enter the variant's contact fabric, shape (M,)."""
         contacts = self.contacts
         outside = self.boundary | self.removed(variant)
         chosen = ~outside[contacts.pairs].any(axis=1)
         if variant.in_window:
             assert window is not None
             chosen &= window.contains(contacts.point, self.packing)
-        return contacts.normal[chosen]
+        return np.asarray(chosen)
 
     def coordination(self, variant: Variant, window: SphereWindow | None) -> float | None:
         """

@@ -7,8 +7,10 @@ from scanfab import (
     Packing,
     ScanfabWarning,
     Settings,
+    SettingsError,
     adaptive,
     compute,
+    direction_rule,
     find_contacts,
     scan_lines,
 )
@@ -98,10 +100,37 @@ def test_scan_that_stops_short_of_its_tolerance_says_so(
     packing, monkeypatch, limit, value, options
 ):
     monkeypatch.setattr(adaptive, limit, value)
-    with pytest.warns(ScanfabWarning, match="stopped before the tolerance 1e-05 was met"):
+    with pytest.warns(ScanfabWarning, match="before the tolerance 1e-05 was met"):
         row = compute(packing, tolerance=1e-5, variants="c", **options)[0]
     assert row.alpha_vs_axial_se > 1e-5
     assert row.alpha_vs is not None
+
+
+def test_scan_stops_before_it_cuts_more_chords_than_allowed(packing):
+    """Of 216 grains in a window; a chord is where a line meets a grain."""
+    cut = []
+    for most in (1e5, 1e6):
+        with pytest.warns(ScanfabWarning, match="1e-06 was met.*--max-chords"):
+            row = compute(packing, tolerance=1e-6, variants="a", max_chords=most)[0]
+        chords = np.pi * np.sum(packing.radius**2) / row.spacing**2 * row.directions
+        cut.append(chords)
+        assert 0.5 * most < chords <= 1.1 * most
+        assert row.alpha_vs_axial_se > 1e-6
+    assert cut[0] < cut[1]
+
+
+def test_fixed_spacing_that_needs_more_chords_than_allowed_is_refused(packing):
+    with pytest.raises(SettingsError, match="more than --max-chords 10000: choose a wider spacing"):
+        compute(packing, spacing=0.02, max_chords=1e4)
+
+
+def test_chords_of_a_scan_are_those_of_all_grains(packing):
+    """Their number is the grains' projected area over the area of a line."""
+    solids = solids_of(packing, 0.0)
+    rule = direction_rule("lebedev:5")
+    sums = scan_lines(solids, rule, spacing=0.1, cutoff=0.1, variants="ab")
+    expected = np.pi * np.sum(packing.radius**2) / 0.1**2 * len(rule)
+    assert sums.chords.mean() == pytest.approx(expected, rel=0.01)
 
 
 def test_default_settings_ask_for_the_tolerance():

@@ -13,7 +13,7 @@ from scanfab.settings import AUTO_RULE
 from tests.naive import axial
 
 LEBEDEV = [f"lebedev:{degree}" for degree in LEBEDEV_DEGREES if degree not in NEGATIVE_LEBEDEV]
-DESIGNS = [f"design:{degree}" for degree in range(3, 22, 2)]
+DESIGNS = [*(f"design:{degree}" for degree in range(3, 22, 2)), "icosahedral:9"]
 PRODUCTS = [f"product:{degree}" for degree in (2, 3, 4, 5, 8, 9, 16, 17, 40)]
 GRIDS = ["fibonacci:100", "equal-angle:10", "equal-angle-full:10"]
 

@@ -60,6 +60,18 @@ __all__ = ["compute"]
     help="Shortest void segment kept: in the dump's units, or with rmin, rmean, rmax.",
 )
 @click.option(
+    "--cutoffs",
+    metavar="FROM:TO:STEP|L,L,...",
+    help="Several cut-offs, a row for each, from one pass over the void segments.",
+)
+@click.option(
+    "--moment",
+    default=1,
+    show_default=True,
+    metavar="1|2",
+    help="Mean length of the void segments (1), or mean of the squares over the mean (2).",
+)
+@click.option(
     "--spacing",
     default="auto",
     show_default=True,
@@ -72,7 +84,7 @@ __all__ = ["compute"]
     show_default=True,
     metavar="N|RULE",
     help="N axes, rounded up to the next exact rule, or lebedev:DEGREE, design:DEGREE, "
-    "product:DEGREE, fibonacci:N, equal-angle:STEP, equal-angle-full:STEP.",
+    "icosahedral:DEGREE, product:DEGREE, fibonacci:N, equal-angle:STEP, equal-angle-full:STEP.",
 )
 @click.option(
     "--tolerance",
@@ -80,6 +92,13 @@ __all__ = ["compute"]
     show_default=True,
     metavar="X",
     help="Target standard error of alpha_vs_axial, for every variant, when something is auto.",
+)
+@click.option(
+    "--max-chords",
+    default=1e11,
+    show_default=True,
+    metavar="N",
+    help="An auto scan stops before it cuts more chords from grains than this, in each frame.",
 )
 @click.option("--axis", default="z", show_default=True, metavar="x|y|z|X,Y,Z", help="Loading axis.")
 @click.option(
@@ -179,7 +198,7 @@ def _write(
                 printer.write(row)
         return found
     with _usage_errors():
-        done = result.finished_rows(asked, len(settings.variants)) if resume else []
+        done = result.finished_rows(asked, settings.rows_per_frame) if resume else []
     found = any(row["alpha_vs"] is not None for row in done)
     with result.writer(asked, resume) as writer:
         for row in watched(_rows(series, settings, done[-1] if done else None)):

@@ -33,6 +33,12 @@ class VoidFabric:
     """Σ w·sum / Σ w·count, dump's length unit."""
     replicates: FloatArray
     """The tensor of each replicate, shape (R, 3, 3)."""
+    axes: FloatArray
+    """Unit vectors of each replicate, shape (R, D, 3)."""
+    weights: FloatArray
+    """Of the direction rule, shape (D,)."""
+    mean_lengths: FloatArray
+    """ℓ of each replicate and axis, shape (R, D), dump's length unit."""
     filled: float
     """Fraction of a replicate's axes without any kept segment, given the mean of the others."""
 
@@ -47,9 +53,32 @@ class VoidFabric:
             return None
         return float(np.std(axial(self.replicates, axis), ddof=1) / np.sqrt(count))
 
+    def expected_error(self, axis: npt.ArrayLike) -> float | None:
+        """
+        The same from the scatter of the mean lengths about an even polynomial of degree 4.
+
+        Far less noisy for few replicates, as every axis counts, but it depends on the polynomial:
+        good for planning a scan. None if there are too few mean lengths.
+        """
+        count, number = self.mean_lengths.shape
+        normals = self.axes.reshape(-1, 3)
+        x, y, z = normals.T
+        terms = [x**i * y**j * z ** (4 - i - j) for i in range(5) for j in range(5 - i)]
+        if count * number < 3 * len(terms):
+            return None
+        design = np.column_stack(terms)
+        lengths = self.mean_lengths.ravel()
+        fit = np.linalg.lstsq(design, lengths, rcond=None)[0]
+        variance = np.sum((lengths - design @ fit) ** 2) / (len(lengths) - len(terms))
+        # by how much a mean length moves the axial anisotropy, a ratio of sums over the axes
+        along = 1.5 * (self.axes @ np.asarray(axis, dtype=float)) ** 2 - 0.5
+        slope = self.weights * (along - self.tensor.axial(axis))
+        slope /= (self.mean_lengths @ self.weights)[:, None]
+        return float(np.sqrt(variance * np.sum(slope**2)) / count)
+
 
 def void_fabric(
-    axes: FloatArray, weights: FloatArray, length: FloatArray, segments: IntArray
+    axes: FloatArray, weights: FloatArray, length: FloatArray, segments: FloatArray | IntArray
 ) -> VoidFabric | None:
     """
     The void fabric from the sums of a scan.
@@ -65,8 +94,9 @@ def void_fabric(
         The direction rule's weights.
     length : ndarray, shape (R, D)
         Sum of the lengths of the kept segments, dump's length unit.
-    segments : ndarray of int, shape (R, D)
-        Number of the kept segments.
+    segments : ndarray, shape (R, D)
+        Number of the kept segments. For the second moment, sums of squared lengths and of lengths
+        take the places of these two.
 
     Returns
     -------
@@ -97,5 +127,8 @@ def void_fabric(
         tensor=FabricTensor(tensors.mean(axis=0)),
         mean_length=float((weights @ total_length) / (weights @ total_segments)),
         replicates=tensors,
+        axes=axes,
+        weights=weights,
+        mean_lengths=mean,
         filled=float(empty.mean()),
     )

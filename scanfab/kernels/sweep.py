@@ -1,5 +1,5 @@
 """
-The depth-ordered sweep: void segments on all scan lines of one direction, without any list.
+The depth-ordered sweep: void segments on all scan lines of a strip, without any list.
 
 The spheres are visited in the order of their centres along the direction. A chord's middle lies at
 its sphere's depth, so on every line the chords arrive ordered by their middles, and three numbers a
@@ -8,464 +8,322 @@ yet. A chord that begins behind the running end settles the last gap and opens a
 begins earlier can only shorten the last gap. That is exact unless a chord reaches back past the
 last gap: such a line is closed (its solid never ends), and is solved again from its list of chords.
 
-Each gap is tallied twice: as it is (whole sample), and clipped to the sphere window. Infinity is
-FAR, and the void outside the first and last solid is a gap of infinite length: never counted in
-the whole, clipped in the window.
+What is counted is chosen by arguments that are None where they are not wanted, so that for each
+choice the compiler makes a loop with nothing else in it:
+
+``whole``     gaps as they are, between the first and the last solid of the line
+``measured``  with ``whole``: only gaps that start in the line's measured length, which is this long
+``window``    gaps clipped to the sphere window; lines that miss it carry NaN
+``second``    all this again for a second set of solids, from which some spheres are removed
+
+Infinity is FAR, and a gap that reaches there never counts in the whole.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from numba import njit
 
 __all__ = [
+    "BOUND",
+    "CHORDS",
+    "FAR",
+    "KEPT",
+    "LENGTH",
+    "LINES",
+    "LINE_LENGTH",
+    "SET",
+    "STATE_SIZE",
     "TALLY_SIZE",
-    "WHOLE_KEPT",
-    "WHOLE_LENGTH",
-    "WHOLE_LINES",
-    "WINDOW_KEPT",
-    "WINDOW_LENGTH",
-    "WINDOW_LINES",
-    "WINDOW_LINE_LENGTH",
-    "WINDOW_VOID",
-    "scan_axes",
+    "VOID",
+    "WHOLE",
+    "WIDTH",
+    "WINDOW",
+    "Flag",
+    "Sphere",
+    "Strip",
+    "begin",
+    "moved",
+    "settle",
+    "visit",
+    "whole_gap",
+    "window_gap",
 ]
 
 FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-Sums = tuple[float, float, float, float, float]
+Flag = Literal[True] | None
+Sums = tuple[float, float, float, float, float, float]
 
 FAR = 1e300
-SMALLEST = 5e-324
-# entries of a tally: of the whole, then of the window
-WHOLE_LENGTH, WHOLE_KEPT, WHOLE_LINES = 0, 1, 2
-WINDOW_LENGTH, WINDOW_KEPT, WINDOW_LINES = 3, 4, 5
-WINDOW_VOID, WINDOW_LINE_LENGTH = 6, 7
-TALLY_SIZE = 8
+# the compiler leaves out what adds it: unlike 0, it changes no number, not even -0
+NOTHING = -0.0
+# the state of a strip's lines fits a core's cache; its planes lie at a fixed distance, by which the
+# compiler sees that they do not overlap
+MOST_LINES = 24_576
+PLANE = np.uint64(MOST_LINES + 24)
+# first places of the planes: running end, last gap; the same for the second set of solids; and
+# half the line's length in the window, or where its measured length begins
+END, GAP_START, GAP_END = np.uint64(0), PLANE, np.uint64(2) * PLANE
+SET = np.uint64(3) * PLANE
+BOUND = np.uint64(6) * PLANE
+STATE_SIZE = int(7 * PLANE)
+# rows are visited in whole vectors, beyond their last chord, where square roots are NaN
+WIDTH = 8
+
+# entries of a tally, of the whole and, behind them, of the window; and the chords of all solids
+LENGTH, KEPT, VOID, LINES, LINE_LENGTH = range(5)
+WHOLE, WINDOW, CHORDS = 0, 5, 10
+TALLY_SIZE = 11
+
 # what lets the compiler make vector instructions of a loop with sums: any order of the terms
-REORDERED = {"reassoc", "nsz"}
-# lines whose state stays in a core's cache
-LINES_PER_STRIP = 8192
+REORDERED = {"reassoc", "contract"}
 
 
-class Spheres(NamedTuple):
-    """Projected spheres, ordered by depth."""
+class Strip(NamedTuple):
+    """
+    Lines at (first_u + row * shear + column * spacing, first_v + row * spacing).
 
-    u: FloatArray
-    v: FloatArray
-    depth: FloatArray
-    radius: FloatArray
-
-
-class Grid(NamedTuple):
-    """Lines at (first_u + column * spacing, first_v + row * spacing)."""
+    A row takes ``pitch`` places of a plane, which is ``columns`` and at least WIDTH more.
+    """
 
     spacing: float
+    per_spacing: float
     first_u: float
     first_v: float
+    shear: float
     columns: int
     rows: int
+    pitch: int
 
 
-class RowChords(NamedTuple):
-    """The chords that a sphere cuts from the lines ``first`` to ``last`` of a row."""
+class Sphere(NamedTuple):
+    """A sphere, projected."""
 
-    first: int
-    last: int
-    first_u: float
-    """Of the row's line 0, from the sphere's centre."""
-    spacing: float
-    reach2: float
-    """Square of the radius of the circle that the row's plane cuts from the sphere."""
+    u: float
+    v: float
     depth: float
+    radius: float
 
 
-class LineState(NamedTuple):
-    """Arrays of shape (rows, columns)."""
-
-    end: FloatArray
-    """Running end of the solid; FAR once a line is closed."""
-    gap_start: FloatArray
-    gap_end: FloatArray
-    half: FloatArray
-    """Half the line's length in the window, negative where it misses the window."""
-
-
-@njit(nogil=True, cache=True, inline="always")
-def tally_gap(start: float, end: float, half: float, least: float) -> Sums:
-    """
-    What a gap adds to a tally, as :func:`add` takes it; nothing if it is empty.
-
-    ``least`` is the cut-off, or the smallest number above 0.
-    """
-    length = end - start
-    kept = (length >= least) & (length < 0.5 * FAR)
-    inside = max(min(end, half) - max(start, -half), 0.0)
-    return (
-        length if kept else 0.0,
-        1.0 if kept else 0.0,
-        inside if inside >= least else 0.0,
-        1.0 if inside >= least else 0.0,
-        inside,
-    )
+@njit(nogil=True, cache=True, forceinline=True, error_model="numpy")
+def whole_gap(
+    low: float, high: float, least: float, bound: float, measured: float | None
+) -> tuple[float, float, float]:
+    """Length and number of a gap if it counts in the whole, and its length if it is too short."""
+    gap = high - low
+    if measured is None:
+        gap = gap if gap < 0.5 * FAR else 0.0
+    else:
+        # NaN: a place behind the last line
+        gap = gap if low - bound >= 0.0 else 0.0
+        gap = gap if low - bound < measured else 0.0
+        gap = gap if gap < 0.5 * FAR else 0.0
+    kept = gap >= least
+    return gap if kept else 0.0, 1.0 if kept else 0.0, gap
 
 
-@njit(nogil=True, cache=True, fastmath=REORDERED, error_model="numpy")
-def sweep_row(
-    end: FloatArray,
-    gap_start: FloatArray,
-    gap_end: FloatArray,
-    half: FloatArray,
-    chords: RowChords,
+@njit(nogil=True, cache=True, forceinline=True, error_model="numpy")
+def window_gap(
+    low: float, high: float, least: float, half: float, whole: Flag
+) -> tuple[float, float, float]:
+    """Length and number of a gap's part in the window if it is kept, and its length anyhow."""
+    high = high if high < half else half
+    if whole is not None:
+        # else no line begins before the window
+        low = low if low > -half else -half
+    gap = high - low
+    kept = gap >= least
+    return gap if kept else 0.0, 1.0 if kept else 0.0, gap if gap > 0.0 else 0.0
+
+
+@njit(nogil=True, cache=True, forceinline=True, error_model="numpy")
+def counted(
+    settles: bool,
+    low: float,
+    high: float,
     least: float,
+    bound: float,
+    whole: Flag,
+    window: Flag,
+    measured: float | None,
 ) -> Sums:
-    """
-    Visit the chords that one sphere cuts from one row of lines; the sums of the settled gaps.
+    """What a gap adds to the tallies of the whole and of the window, if it is settled."""
+    length = kept = void = NOTHING
+    inside = inside_kept = inside_void = NOTHING
+    # no gap is longer
+    least = least if settles else 2.0 * FAR
+    if whole is not None:
+        length, kept, gap = whole_gap(low, high, least, bound, measured)
+        if measured is not None:
+            void = gap if settles else 0.0
+    if window is not None:
+        inside, inside_kept, gap = window_gap(low, high, least, bound, whole)
+        inside_void = gap if settles else 0.0
+    return length, kept, void, inside, inside_kept, inside_void
 
-    The compiler makes vector instructions of this loop because rows are contiguous, indices cannot
-    be negative, and there are choices instead of branches.
-    """
-    a = b = c = d = e = 0.0
-    for i in range(np.uint64(chords.first), np.uint64(chords.last)):
-        du = chords.first_u + chords.spacing * np.int64(i)
-        half_chord = np.sqrt(max(chords.reach2 - du * du, 0.0))
-        start = chords.depth - half_chord
-        solid, low, high = end[i], gap_start[i], gap_end[i]
-        opens = start > solid
-        sums = tally_gap(low if opens else 0.0, high if opens else 0.0, half[i], least)
-        a += sums[0]
-        b += sums[1]
-        c += sums[2]
-        d += sums[3]
-        e += sums[4]
-        low = solid if opens else low
-        high = start if opens else min(high, start)
-        gap_start[i] = low
-        gap_end[i] = high
-        # a gap shortened to less than nothing: the chord reaches back past it
-        end[i] = FAR if high < low else max(solid, chords.depth + half_chord)
-    return a, b, c, d, e
+
+@njit(nogil=True, cache=True, forceinline=True, error_model="numpy")
+def moved(
+    start: float, stop: float, end: float, low: float, high: float
+) -> tuple[float, float, float]:
+    """The state of a line after a chord; a chord of NaN leaves it as it is."""
+    opens = start > end
+    # the sum keeps the compiler from storing this with a mask, which is slow to read again
+    low = (end if opens else low) + 0.0
+    high = FAR if opens else high
+    high = start if start < high else high
+    end = stop if stop > end else end
+    # a gap shortened to less than nothing: the chord reaches back past it
+    return (FAR if high < low else end), low, high
 
 
 @njit(nogil=True, cache=True, fastmath=REORDERED, error_model="numpy")
-def settle_row(
-    end: FloatArray, gap_start: FloatArray, gap_end: FloatArray, half: FloatArray, least: float
-) -> Sums:
-    """The sums of every line's last gap and of the void behind its last solid, if not closed."""
-    a = b = c = d = e = 0.0
-    for i in range(np.uint64(end.size)):
-        closed = end[i] == FAR
-        last = tally_gap(
-            0.0 if closed else gap_start[i], 0.0 if closed else gap_end[i], half[i], least
-        )
-        behind = tally_gap(0.0 if closed else end[i], 0.0 if closed else FAR, half[i], least)
-        a += last[0] + behind[0]
-        b += last[1] + behind[1]
-        c += last[2] + behind[2]
-        d += last[3] + behind[3]
-        e += last[4] + behind[4]
-    return a, b, c, d, e
+def begin(lines: FloatArray, strip: Strip, radius: float, second: Flag, whole: Flag) -> None:
+    """Lines that have met nothing yet, in a window of this radius."""
+    for row in range(strip.rows):
+        v = strip.first_v + row * strip.spacing
+        half2 = radius * radius - v * v
+        at = np.uint64(row * strip.pitch)
+        for j in range(np.uint64(strip.pitch)):
+            i = at + j
+            u = strip.first_u + strip.spacing * np.int32(j)
+            half = np.sqrt(half2 - u * u)
+            end = -FAR if whole is not None else -half
+            lines[i + BOUND] = half
+            lines[i + END] = end
+            lines[i + GAP_START] = -FAR
+            lines[i + GAP_END] = -FAR
+            if second is not None:
+                lines[i + SET + END] = end
+                lines[i + SET + GAP_START] = -FAR
+                lines[i + SET + GAP_END] = -FAR
+        for column in range(strip.columns, strip.pitch):
+            # no lines: nothing is ever greater or less than NaN
+            k = at + np.uint64(column)
+            lines[k + BOUND] = lines[k + END] = lines[k + SET + END] = np.nan
 
 
-@njit(nogil=True, cache=True, inline="always")
-def add(tally: FloatArray, sums: Sums) -> None:
-    """Add the sums over gaps to a tally."""
-    tally[WHOLE_LENGTH] += sums[0]
-    tally[WHOLE_KEPT] += sums[1]
-    tally[WINDOW_LENGTH] += sums[2]
-    tally[WINDOW_KEPT] += sums[3]
-    tally[WINDOW_VOID] += sums[4]
-
-
-@njit(nogil=True, cache=True, inline="always")
-def span(centre: float, reach: float, first: float, spacing: float, count: int) -> tuple[int, int]:
-    """Range of the lines within ``reach`` of a centre, along one side of the grid."""
-    low = int(np.ceil((centre - reach - first) / spacing))
-    high = int(np.floor((centre + reach - first) / spacing)) + 1
-    return max(low, 0), min(high, count)
-
-
-@njit(nogil=True, cache=True, inline="always")
-def row_chords(spheres: Spheres, k: int, grid: Grid, row: int) -> RowChords:
-    """The chords of sphere k in a row; ``first >= last`` if there are none."""
-    dv = grid.first_v + row * grid.spacing - spheres.v[k]
-    reach2 = spheres.radius[k] * spheres.radius[k] - dv * dv
-    reach = np.sqrt(max(reach2, 0.0))
-    first, last = span(spheres.u[k], reach, grid.first_u, grid.spacing, grid.columns)
-    return RowChords(
-        first, last, grid.first_u - spheres.u[k], grid.spacing, reach2, spheres.depth[k]
-    )
-
-
-@njit(nogil=True, cache=True)
-def sweep(
-    spheres: Spheres,
-    chosen: IntArray,
-    grid: Grid,
-    state: LineState,
+@njit(nogil=True, cache=True, fastmath=REORDERED, error_model="numpy")
+def visit(
+    lines: FloatArray,
+    strip: Strip,
+    sphere: Sphere,
     least: float,
     tally: FloatArray,
-) -> int:
-    """Visit the chosen spheres in their order; returns the number of closed lines."""
-    for k in chosen:
-        first_row, last_row = span(
-            spheres.v[k], spheres.radius[k], grid.first_v, grid.spacing, grid.rows
-        )
-        for row in range(first_row, last_row):
-            chords = row_chords(spheres, k, grid, row)
-            if chords.first < chords.last:
-                sums = sweep_row(
-                    state.end[row],
-                    state.gap_start[row],
-                    state.gap_end[row],
-                    state.half[row],
-                    chords,
-                    least,
-                )
-                add(tally, sums)
-    closed = 0
-    for row in range(grid.rows):
-        end, half = state.end[row], state.half[row]
-        add(tally, settle_row(end, state.gap_start[row], state.gap_end[row], half, least))
-        for column in range(grid.columns):
-            closed += end[column] == FAR
-            tally[WHOLE_LINES] += end[column] > -FAR
-            tally[WINDOW_LINES] += half[column] > 0.0
-            tally[WINDOW_LINE_LENGTH] += max(2.0 * half[column], 0.0)
+    second: Flag,
+    whole: Flag,
+    window: Flag,
+    measured: float | None,
+) -> None:
+    """
+    Visit the chords that a sphere cuts from a strip, and tally the gaps that they settle.
+
+    The compiler makes vector instructions of the inner loop because rows are contiguous, indices
+    cannot be negative, planes cannot overlap, and there are choices instead of branches.
+    """
+    a = b = c = d = e = f = 0.0
+    a2 = b2 = c2 = d2 = e2 = f2 = 0.0
+    chords = 0
+    from_v = strip.first_v - sphere.v
+    first_row = max(int(np.ceil((-sphere.radius - from_v) * strip.per_spacing)), 0)
+    last_row = int(np.floor((sphere.radius - from_v) * strip.per_spacing)) + 1
+    for row in range(first_row, min(last_row, strip.rows)):
+        dv = from_v + row * strip.spacing
+        reach2 = sphere.radius * sphere.radius - dv * dv
+        reach = np.sqrt(max(reach2, 0.0))
+        from_u = strip.first_u + row * strip.shear - sphere.u
+        first = max(int(np.ceil((-reach - from_u) * strip.per_spacing)), 0)
+        last = min(int(np.floor((reach - from_u) * strip.per_spacing)) + 1, strip.columns)
+        chords += max(last - first, 0)
+        vectors = (last - first + WIDTH - 1) // WIDTH
+        from_u += first * strip.spacing
+        at = np.uint64(row * strip.pitch + first)
+        for j in range(np.uint64(vectors * WIDTH)):
+            i = at + j
+            du = from_u + strip.spacing * np.int32(j)
+            half_chord = np.sqrt(reach2 - du * du)
+            start = sphere.depth - half_chord
+            stop = sphere.depth + half_chord
+            bound = lines[i + BOUND]
+            end, low, high = lines[i + END], lines[i + GAP_START], lines[i + GAP_END]
+            sums = counted(start > end, low, high, least, bound, whole, window, measured)
+            a, b, c = a + sums[0], b + sums[1], c + sums[2]
+            d, e, f = d + sums[3], e + sums[4], f + sums[5]
+            end, low, high = moved(start, stop, end, low, high)
+            lines[i + END], lines[i + GAP_START], lines[i + GAP_END] = end, low, high
+            if second is not None:
+                k = i + SET
+                end, low, high = lines[k + END], lines[k + GAP_START], lines[k + GAP_END]
+                sums = counted(start > end, low, high, least, bound, whole, window, measured)
+                a2, b2, c2 = a2 + sums[0], b2 + sums[1], c2 + sums[2]
+                d2, e2, f2 = d2 + sums[3], e2 + sums[4], f2 + sums[5]
+                end, low, high = moved(start, stop, end, low, high)
+                lines[k + END], lines[k + GAP_START], lines[k + GAP_END] = end, low, high
+    tally[0, CHORDS] += chords
+    add(tally, 0, (a, b, c, d, e, f))
+    if second is not None:
+        add(tally, 1, (a2, b2, c2, d2, e2, f2))
+
+
+@njit(nogil=True, cache=True, inline="always")
+def add(tally: FloatArray, which: int, sums: Sums) -> None:
+    """Add sums over gaps to the tally of a set of solids, shape (2, TALLY_SIZE)."""
+    tally[which, WHOLE + LENGTH] += sums[0]
+    tally[which, WHOLE + KEPT] += sums[1]
+    tally[which, WHOLE + VOID] += sums[2]
+    tally[which, WINDOW + LENGTH] += sums[3]
+    tally[which, WINDOW + KEPT] += sums[4]
+    tally[which, WINDOW + VOID] += sums[5]
+
+
+@njit(nogil=True, cache=True, fastmath=REORDERED, error_model="numpy")
+def settle(
+    lines: FloatArray,
+    strip: Strip,
+    which: int,
+    least: float,
+    tally: FloatArray,
+    whole: Flag,
+    window: Flag,
+    measured: float | None,
+) -> float:
+    """
+    Tally every line's last gap, and in the window the void behind its last solid.
+
+    Returns the number of closed lines, of which nothing is tallied here but that they are there.
+    """
+    a = b = c = d = e = f = 0.0
+    met = half_length = closed = 0.0
+    crossing = np.int64(0)
+    state = SET * np.uint64(which)
+    for i in range(np.uint64(strip.rows * strip.pitch)):
+        k = i + state
+        end, low, high = lines[k + END], lines[k + GAP_START], lines[k + GAP_END]
+        bound = lines[i + BOUND]
+        closed += 1.0 if end == FAR else 0.0
+        sums = counted(end < FAR, low, high, least, bound, whole, window, measured)
+        a, b, c = a + sums[0], b + sums[1], c + sums[2]
+        d, e, f = d + sums[3], e + sums[4], f + sums[5]
+        if window is not None:
+            start = end if end < FAR else bound
+            behind = window_gap(start, FAR, least, bound, whole)
+            d, e, f = d + behind[0], e + behind[1], f + behind[2]
+            crossing += np.int64(bound > 0.0)
+            half_length += bound if bound > 0.0 else 0.0
+        if whole is not None:
+            if measured is None:
+                met += 1.0 if end > -FAR else 0.0
+            else:
+                met += 1.0 if bound < FAR else 0.0
+    add(tally, which, (a, b, c, d, e, f))
+    if whole is not None:
+        tally[which, WHOLE + LINES] += met
+    if measured is not None:
+        tally[which, WHOLE + LINE_LENGTH] += met * measured
+    if window is not None:
+        tally[which, WINDOW + LINES] += crossing
+        tally[which, WINDOW + LINE_LENGTH] += 2.0 * half_length
     return closed
-
-
-@njit(nogil=True, cache=True)
-def sweep_line(
-    starts: FloatArray, ends: FloatArray, half: float, least: float, tally: FloatArray
-) -> None:
-    """
-    The sweep of one line, as far as it goes.
-
-    Chords ordered by their middles: what the sweep tallies, and nothing more once the line is
-    closed. Chords ordered by their starts: exact, as none of them can reach back.
-    """
-    end, gap_start, gap_end = -FAR, -FAR, -FAR
-    for k in range(starts.size):
-        if starts[k] > end:
-            add(tally, tally_gap(gap_start, gap_end, half, least))
-            gap_start, gap_end = end, starts[k]
-        else:
-            gap_end = min(gap_end, starts[k])
-            if gap_end < gap_start:
-                return
-        end = max(end, ends[k])
-    add(tally, tally_gap(gap_start, gap_end, half, least))
-    add(tally, tally_gap(end, FAR, half, least))
-
-
-@njit(nogil=True, cache=True)
-def list_chords(
-    spheres: Spheres,
-    chosen: IntArray,
-    grid: Grid,
-    number: IntArray,
-    filled: IntArray,
-    chords: FloatArray,
-) -> None:
-    """
-    List the chords of the lines that have a number >= 0, in the order of depth.
-
-    ``filled[number]`` is the place of a line's next chord in ``chords`` (shape (M, 2)); with no
-    room there (M = 0) the chords are only counted.
-    """
-    for k in chosen:
-        first_row, last_row = span(
-            spheres.v[k], spheres.radius[k], grid.first_v, grid.spacing, grid.rows
-        )
-        for row in range(first_row, last_row):
-            found = row_chords(spheres, k, grid, row)
-            for column in range(found.first, found.last):
-                line = number[row, column]
-                if line < 0:
-                    continue
-                if chords.shape[0] > 0:
-                    du = found.first_u + found.spacing * column
-                    half_chord = np.sqrt(max(found.reach2 - du * du, 0.0))
-                    chords[filled[line], 0] = found.depth - half_chord
-                    chords[filled[line], 1] = found.depth + half_chord
-                filled[line] += 1
-
-
-@njit(nogil=True, cache=True)
-def solve_closed(
-    spheres: Spheres,
-    chosen: IntArray,
-    grid: Grid,
-    state: LineState,
-    closed: int,
-    least: float,
-    tally: FloatArray,
-) -> None:
-    """Replace what the sweep tallied on closed lines by what their lists of chords give."""
-    number = np.full(state.end.shape, -1)
-    half = np.empty(closed)
-    line = 0
-    for row in range(grid.rows):
-        for column in range(grid.columns):
-            if state.end[row, column] == FAR:
-                number[row, column] = line
-                half[line] = state.half[row, column]
-                line += 1
-    count = np.zeros(closed, np.int64)
-    list_chords(spheres, chosen, grid, number, count, np.empty((0, 2)))
-    stop = np.cumsum(count)
-    chords = np.empty((stop[-1], 2))
-    list_chords(spheres, chosen, grid, number, stop - count, chords)
-    wrong = np.zeros(TALLY_SIZE)
-    right = np.zeros(TALLY_SIZE)
-    for line in range(closed):
-        starts = chords[stop[line] - count[line] : stop[line], 0]
-        ends = chords[stop[line] - count[line] : stop[line], 1]
-        sweep_line(starts, ends, half[line], least, wrong)
-        order = np.argsort(starts)
-        sweep_line(starts[order], ends[order], half[line], least, right)
-    tally += right - wrong
-
-
-@njit(nogil=True, cache=True)
-def line_state(grid: Grid, window_radius: float) -> LineState:
-    """Lines that have met nothing yet."""
-    shape = (grid.rows, grid.columns)
-    half = np.full(shape, -1.0)
-    for row in range(grid.rows):
-        v = grid.first_v + row * grid.spacing
-        for column in range(grid.columns):
-            u = grid.first_u + column * grid.spacing
-            half2 = window_radius * window_radius - u * u - v * v
-            if half2 > 0.0:
-                half[row, column] = np.sqrt(half2)
-    return LineState(np.full(shape, -FAR), np.full(shape, -FAR), np.full(shape, -FAR), half)
-
-
-@njit(nogil=True, cache=True)
-def cover(
-    low_u: float, high_u: float, low_v: float, high_v: float, offset: FloatArray, spacing: float
-) -> Grid:
-    """The lines ((i + offset_u) * spacing, (j + offset_v) * spacing) that meet a rectangle."""
-    column = int(np.ceil(low_u / spacing - offset[0]))
-    row = int(np.ceil(low_v / spacing - offset[1]))
-    columns = int(np.floor(high_u / spacing - offset[0])) - column + 1
-    rows = int(np.floor(high_v / spacing - offset[1])) - row + 1
-    return Grid(
-        spacing,
-        (column + offset[0]) * spacing,
-        (row + offset[1]) * spacing,
-        max(columns, 0),
-        max(rows, 0),
-    )
-
-
-@njit(nogil=True, cache=True)
-def sort_into_strips(
-    spheres: Spheres, grid: Grid, rows_per_strip: int
-) -> tuple[IntArray, IntArray]:
-    """
-    The spheres that each strip of rows meets, in their order.
-
-    Returns the start of each strip's list (one entry more than there are strips) and the lists.
-    """
-    strips = -(-grid.rows // rows_per_strip)
-    start = np.zeros(strips + 1, np.int64)
-    chosen = np.empty(0, np.int64)
-    for fill in range(2):
-        place = start[:-1].copy()
-        for k in range(spheres.u.size):
-            first, last = span(
-                spheres.v[k], spheres.radius[k], grid.first_v, grid.spacing, grid.rows
-            )
-            if first < last:
-                for strip in range(first // rows_per_strip, (last - 1) // rows_per_strip + 1):
-                    if fill:
-                        chosen[place[strip]] = k
-                    place[strip] += 1
-        if not fill:
-            start[1:] = np.cumsum(place)
-            chosen = np.empty(start[-1], np.int64)
-    return start, chosen
-
-
-@njit(nogil=True, cache=True)
-def scan_solids(
-    spheres: Spheres, grid: Grid, window_radius: float, cutoff: float, tally: FloatArray
-) -> None:
-    """Scan along one direction, strip by strip so that the lines' state stays in cache."""
-    least = max(cutoff, SMALLEST)
-    rows_per_strip = max(LINES_PER_STRIP // max(grid.columns, 1), 1)
-    start, chosen = sort_into_strips(spheres, grid, rows_per_strip)
-    for strip in range(start.size - 1):
-        first_row = strip * rows_per_strip
-        part = Grid(
-            grid.spacing,
-            grid.first_u,
-            grid.first_v + first_row * grid.spacing,
-            grid.columns,
-            min(rows_per_strip, grid.rows - first_row),
-        )
-        state = line_state(part, window_radius)
-        met = chosen[start[strip] : start[strip + 1]]
-        closed = sweep(spheres, met, part, state, least, tally)
-        if closed > 0:
-            solve_closed(spheres, met, part, state, closed, least, tally)
-
-
-@njit(nogil=True, cache=True)
-def scan_axes(
-    position: FloatArray,
-    radius: FloatArray,
-    removed: npt.NDArray[np.bool_],
-    solids: tuple[bool, bool],
-    whole: bool,
-    frames: FloatArray,
-    offsets: FloatArray,
-    spacing: float,
-    cutoff: float,
-    window_radius: float,
-    tallies: FloatArray,
-) -> None:
-    """
-    Scan a packing along several axes.
-
-    Parameters
-    ----------
-    position, radius : shapes (N, 3), (N,)
-        Spheres; the window's centre is the origin.
-    removed : shape (N,)
-        Spheres that are not solid in the second set of solids.
-    solids : two bool
-        Whether to scan the set of all spheres, and the set of those not removed.
-    whole : bool
-        Whether lines outside the window count too.
-    frames : shape (D, 3, 3)
-        Orthonormal rows u, v, n of each axis: the lines run along n.
-    offsets : shape (D, 2)
-        Shift of each axis' grid, in units of the spacing.
-    window_radius : float
-        Radius of the sphere window; 0 for none.
-    tallies : shape (D, 2, TALLY_SIZE)
-        Zeros; the results for each axis and set of solids.
-    """
-    for axis in range(frames.shape[0]):
-        projected = position @ frames[axis].T
-        u, v, depth = projected[:, 0], projected[:, 1], projected[:, 2]
-        order = np.argsort(depth)
-        low_u, high_u = -window_radius, window_radius
-        low_v, high_v = -window_radius, window_radius
-        if whole and u.size > 0:
-            low_u, high_u = min(np.min(u - radius), low_u), max(np.max(u + radius), high_u)
-            low_v, high_v = min(np.min(v - radius), low_v), max(np.max(v + radius), high_v)
-        grid = cover(low_u, high_u, low_v, high_v, offsets[axis], spacing)
-        for chosen in range(2):
-            if solids[chosen]:
-                if chosen == 1:
-                    order = order[~removed[order]]
-                spheres = Spheres(u[order], v[order], depth[order], radius[order])
-                scan_solids(spheres, grid, window_radius, cutoff, tallies[axis, chosen])

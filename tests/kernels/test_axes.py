@@ -1,11 +1,11 @@
-"""The depth-ordered sweep equals its slow twin on random packings of every awkward kind."""
+"""A scan along an axis equals its slow twin on random packings of every awkward kind."""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scanfab.kernels import sweep as kernel
+from scanfab.kernels import axes, sweep
 from scanfab.scan import line_frames
 from tests import naive
 from tests.lattices import ball_points, poisson_spheres, rotation
@@ -72,24 +72,46 @@ KINDS = [
 ]
 
 
-def fast_tallies(spheres, removed, frame, offset, spacing, cutoff, window, whole=True):
+def fast_tallies(
+    spheres,
+    removed,
+    frame,
+    offset,
+    spacing,
+    cutoff,
+    window,
+    *,
+    whole=True,
+    clipped=True,
+    second=True,
+):
     """What the kernel tallies with all spheres, and with those that are not removed."""
     position, radius = spheres
-    tallies = np.zeros((1, 2, kernel.TALLY_SIZE))
-    kernel.scan_axes(
+    tallies = np.zeros((1, 2, sweep.TALLY_SIZE))
+    axes.scan_axes(
         np.ascontiguousarray(position, dtype=float),
         np.asarray(radius, dtype=float),
         removed,
-        (True, True),
-        whole,
         np.ascontiguousarray(frame[None]),
         offset[None],
         spacing,
         cutoff,
         window,
         tallies,
+        second or None,
+        whole or None,
+        clipped or None,
     )
-    return naive.Tally(*tallies[0, 0]), naive.Tally(*tallies[0, 1])
+    return named(tallies[0, 0]), named(tallies[0, 1])
+
+
+def named(tally):
+    """The twin's names for the entries of a tally."""
+    whole, window = tally[sweep.WHOLE :], tally[sweep.WINDOW :]
+    return naive.Tally(
+        *whole[[sweep.LENGTH, sweep.KEPT, sweep.LINES]],
+        *window[[sweep.LENGTH, sweep.KEPT, sweep.LINES, sweep.VOID, sweep.LINE_LENGTH]],
+    )
 
 
 def assert_equal(fast, slow):
@@ -135,14 +157,23 @@ def check_random_packing(kind, random):
 def suspect_lines(spheres, frame, offset, spacing, window):
     """How many lines the sweep of all spheres leaves to be solved again."""
     position, radius = spheres
-    u, v, depth = (position @ frame.T).T
-    order = np.argsort(depth)
-    reach = np.abs(position).max() * 2 + radius.max() + window
-    grid = kernel.cover(-reach, reach, -reach, reach, offset, spacing)
-    state = kernel.line_state(grid, window)
-    sorted_spheres = kernel.Spheres(u[order], v[order], depth[order], radius[order])
-    tally = np.zeros(kernel.TALLY_SIZE)
-    return kernel.sweep(sorted_spheres, np.arange(len(order)), grid, state, 1e-300, tally)
+    reach = np.linalg.norm(position, axis=1).max() + radius.max() + window
+    grid = axes.cover(-reach, reach, -reach, reach, offset, spacing)
+    projected = axes.project(position, radius, np.zeros(len(radius), bool), frame, grid)
+    pitch = grid.columns + sweep.WIDTH
+    strip = sweep.Strip(
+        spacing, 1 / spacing, grid.first_u, grid.first_v, 0.0, grid.columns, grid.rows, pitch
+    )
+    assert grid.rows * pitch <= sweep.MOST_LINES
+    state, tally, every = (
+        np.empty(sweep.STATE_SIZE),
+        np.zeros((2, sweep.TALLY_SIZE)),
+        np.arange(len(projected.u)),
+    )
+    flags = None, True, True
+    sweep.begin(state, strip, window, *flags[:2])
+    axes.visit_all(state, strip, projected, every, window, 1e-300, tally, *flags, None)
+    return sweep.settle(state, strip, 0, 1e-300, tally, *flags[1:], None)
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
@@ -181,14 +212,14 @@ def test_a_chord_that_reaches_back_past_the_last_gap_makes_its_line_suspect():
     position = np.array([[0.0, 0, 0], [0, 0, 1.0], [0, 0, 1.05]])
     spheres = position, np.array([0.2, 0.2, 2.0])
     frame, offset = np.eye(3), np.array([0.3, 0.4])
-    assert suspect_lines(spheres, frame, offset, 0.05, 1.5) > 20
+    assert suspect_lines(spheres, frame, offset, 0.1, 1.5) > 5
     assert_fast_equals_naive(spheres, np.zeros(3, bool), frame, offset, 0.05, [0.0, 0.3], 1.5)
 
 
 def test_only_lines_that_need_it_are_suspect():
     """Grains in a row with gaps between them: each chord lies behind the one before."""
     spheres = np.array([[0.0, 0, z] for z in range(5)]), np.full(5, 0.4)
-    assert suspect_lines(spheres, np.eye(3), np.array([0.3, 0.4]), 0.05, 1.5) == 0
+    assert suspect_lines(spheres, np.eye(3), np.array([0.3, 0.4]), 0.1, 1.5) == 0
 
 
 @pytest.mark.parametrize("kind", [overlapping, size_ratio_fifty, covering_the_window])
@@ -202,47 +233,69 @@ def test_random_packings_have_suspect_lines(kind):
     assert found >= 10
 
 
-def test_window_alone_gives_the_same_as_with_the_whole_sample():
+def test_less_that_is_wanted_is_the_same():
+    """Each choice of what is tallied is a loop of its own."""
     for seed in range(100):
         random = np.random.default_rng(seed)
         spheres = overlapping(random)
         removed = random.random(len(spheres.radius)) < 0.3
         line = removed, rotation(random), random.random(2), 0.3, 0.2, 1.2
-        for both, alone in zip(
-            fast_tallies(spheres, *line),
-            fast_tallies(spheres, *line, whole=False),
-            strict=True,
-        ):
-            assert both[3:] == pytest.approx(alone[3:], rel=1e-12)
+        all_of_it = fast_tallies(spheres, *line)
+        window = fast_tallies(spheres, *line, whole=False)
+        whole = fast_tallies(spheres, *line, clipped=False)
+        first = fast_tallies(spheres, *line, second=False)
+        for number in range(2):
+            assert window[number][3:] == pytest.approx(all_of_it[number][3:], rel=1e-12)
+            assert whole[number][:3] == pytest.approx(all_of_it[number][:3], rel=1e-12)
+            assert not any(window[number][:3])
+            assert not any(whole[number][3:])
+        assert first[0] == pytest.approx(all_of_it[0], rel=1e-12)
+        assert not any(first[1])
+        alone = fast_tallies(spheres, *line, second=False, whole=False)
+        assert alone[0][3:] == pytest.approx(all_of_it[0][3:], rel=1e-12)
 
 
-def test_sets_of_solids_that_nobody_asks_for_stay_zero():
-    position, radius = scattered(np.random.default_rng(0))
-    for solids in [(True, False), (False, True)]:
-        tallies = np.zeros((1, 2, kernel.TALLY_SIZE))
-        kernel.scan_axes(
-            position,
-            radius,
-            np.zeros(12, bool),
-            solids,
-            True,
-            np.eye(3)[None],
-            np.array([[0.2, 0.7]]),
-            0.2,
-            0.1,
-            2.0,
-            tallies,
-        )
-        assert [bool(tally.any()) for tally in tallies[0]] == list(solids)
+def test_rows_that_fit_no_strip_are_cut():
+    """A wide sample: more columns than a strip holds."""
+    position = np.array([[-700.0, 0, 0], [0, 0, 0], [700, 0, 1], [0.5, 0, 5]])
+    spheres = position, np.array([3.0, 2, 3, 2])
+    grid = np.eye(3), np.array([0.3, 0.4])
+    assert sweep.MOST_LINES < 1400 / 0.05
+    fine = fast_tallies(spheres, np.zeros(4, bool), *grid, 0.05, 0.1, 2.0)[0]
+    near = position[[1, 3]], spheres[1][[1, 3]]
+    fine_near = fast_tallies(near, np.zeros(2, bool), *grid, 0.05, 0.1, 2.0)[0]
+    ends = fine.whole_lines - fine_near.whole_lines
+    assert ends == pytest.approx(2 * np.pi * 9 / 0.05**2, rel=0.01)
+    assert fine[:2] == pytest.approx(fine_near[:2])
+    assert fine[3:] == pytest.approx(fine_near[3:])
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        [],
+        [1.0],
+        [2.0, 2.0, 2.0],
+        np.random.default_rng(0).normal(size=1000),
+        np.repeat([3.0, 1.0, 2.0], 500) + np.tile([0, 1e-16, 2e-16], 500),
+        np.append(np.random.default_rng(1).random(2000) * 1e-9, 1e6),
+    ],
+)
+def test_order_of_depths(values):
+    values = np.array(values, dtype=float)
+    order = axes.order_of(values)
+    assert sorted(order) == list(range(len(values)))
+    assert np.all(np.diff(values[order]) >= 0)
 
 
 def test_sweep_equals_the_slow_twin_uncompiled():
     """As plain Python the kernel also finds an index out of range."""
     code = (
         "import numpy as np\n"
-        "from scanfab.kernels import sweep\n"
-        "from tests.kernels import test_sweep as here\n"
-        "assert not hasattr(sweep.scan_axes, 'py_func')\n"
+        "from scanfab.kernels import axes\n"
+        "from tests.kernels import test_axes as here\n"
+        "assert not hasattr(axes.scan_axes, 'py_func')\n"
+        "np.seterr(invalid='ignore')\n"
         "for kind in here.KINDS:\n"
         "    for seed in range(4):\n"
         "        here.check_random_packing(kind, np.random.default_rng(seed))\n"

@@ -1,0 +1,128 @@
+"""
+The sample's own scatter: delete-one jackknife over blocks of the sample.
+
+Leaving out one of eight blocks in turn, and asking how much the anisotropy moves, says how far
+another sample of the same material would differ; the error of the scan says nothing of that.
+Efron and Stein (1981), doi:10.1214/aos/1176345462.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.fabric.tensor import axial
+from scanfab.fabric.void import void_fabric
+
+__all__ = ["BLOCKS", "Jackknife", "contact_jackknife", "jackknife_error", "void_jackknife"]
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+
+# octants
+BLOCKS = 8
+
+
+class Jackknife(NamedTuple):
+    """An axial anisotropy without each of the blocks."""
+
+    shift: FloatArray
+    """By how much leaving out a block moves the anisotropy, shape (8,), dimensionless."""
+    error: float
+    """The standard error that follows, dimensionless."""
+
+
+def jackknife_error(values: FloatArray) -> float:
+    """
+    Standard error from the values without each of B blocks: √((B - 1)/B Σ (θ_b - θ̄)²).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab.fabric.jackknife import jackknife_error
+    >>> x = np.array([1.0, 2.0, 4.0])
+    >>> means = (x.sum() - x) / 2
+    >>> bool(np.isclose(jackknife_error(means), x.std(ddof=1) / np.sqrt(3)))
+    True
+    """
+    return float(np.sqrt(_variance(np.asarray(values, dtype=np.float64))))
+
+
+def _variance(values: FloatArray) -> FloatArray:
+    """Along the first axis."""
+    count = len(values)
+    spread: FloatArray = np.sum((values - values.mean(axis=0)) ** 2, axis=0)
+    return spread * (count - 1) / count
+
+
+def contact_jackknife(
+    normals: npt.ArrayLike, blocks: npt.ArrayLike, axis: npt.ArrayLike
+) -> Jackknife | None:
+    """
+    The contact fabric's axial anisotropy without the contacts of each block.
+
+    Parameters
+    ----------
+    normals : array_like, shape (M, 3)
+        Unit normals.
+    blocks : array_like of int, shape (M,)
+        The block of each contact's point, from 0.
+    axis : array_like, shape (3,)
+        Loading axis, a unit vector.
+
+    Returns
+    -------
+    Jackknife or None
+        None if one block holds all contacts.
+    """
+    along = 1.5 * (np.asarray(normals, dtype=np.float64) @ np.asarray(axis)) ** 2 - 0.5
+    places = np.asarray(blocks, dtype=np.int64)
+    number = np.bincount(places, minlength=BLOCKS)
+    if np.any(number == len(along)):
+        return None
+    rest = (along.sum() - np.bincount(places, along, minlength=BLOCKS)) / (len(along) - number)
+    return Jackknife(rest - along.mean(), jackknife_error(rest))
+
+
+def void_jackknife(
+    axes: FloatArray,
+    weights: FloatArray,
+    full: tuple[FloatArray, FloatArray],
+    without: list[tuple[FloatArray, FloatArray]],
+    axis: npt.ArrayLike,
+) -> Jackknife | None:
+    """
+    The void fabric's axial anisotropy without the segments of each block.
+
+    Parameters
+    ----------
+    axes, weights
+        As for :func:`scanfab.void_fabric`.
+    full : two ndarray, shapes (R, D)
+        Sums of lengths and numbers of all segments.
+    without : list of the same
+        Without each block.
+    axis : array_like, shape (3,)
+        Loading axis, a unit vector.
+
+    Returns
+    -------
+    Jackknife or None
+        None if there is no void fabric without some block. What the scan's own noise adds to the
+        scatter between blocks is known from its replicates, and taken off the error.
+    """
+    fabrics = [void_fabric(axes, weights, *sums) for sums in (full, *without)]
+    if any(fabric is None for fabric in fabrics):
+        return None
+    values = np.array([axial(fabric.replicates, axis) for fabric in fabrics if fabric is not None])
+    means = values.mean(axis=1)
+    variance = float(_variance(means[1:]))
+    count = values.shape[1]
+    if count > 1:
+        # of one replicate: the sample's scatter, and R times the noise that the mean has
+        single = float(_variance(values[1:]).mean())
+        variance = max((count * variance - single) / (count - 1), 0.0)
+    return Jackknife(means[1:] - means[0], float(np.sqrt(variance)))
