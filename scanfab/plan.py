@@ -59,7 +59,6 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
         "rmean": float(radii.mean()),
         "rmax": float(radii.max()),
     }
-    _refuse_periodic_whole(settings, sample)
     half_extent = 0.5 * smallest_extent(sample.packing, grains)
     window = _window(settings, sample, half_extent) if settings.needs_window else None
     if window is not None:
@@ -84,19 +83,6 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     if auto:
         replicates = REPLICATES
     return Plan(window, cutoff, cutoffs, rule, asked * math.sqrt(replicates), replicates, auto)
-
-
-def _refuse_periodic_whole(settings: Settings, sample: Sample) -> None:
-    cell = sample.packing.cell
-    if cell is None or not cell.is_periodic:
-        return
-    if not cell.is_orthogonal:
-        raise SettingsError("tilted periodic cells are not supported yet")
-    if settings.needs_whole:
-        raise SettingsError(
-            f"variants {settings.variants}: a periodic cell has no first and last solid, so the "
-            f"whole-sample variants a and b are not supported there yet: use --variants cd"
-        )
 
 
 def _window(settings: Settings, sample: Sample, half_extent: float) -> SphereWindow:

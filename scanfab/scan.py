@@ -13,10 +13,12 @@ from scipy.spatial.transform import Rotation
 from scanfab.directions import DirectionRule
 from scanfab.errors import SettingsError
 from scanfab.kernels import sweep
-from scanfab.kernels.axes import scan_axes
+from scanfab.kernels.axes import scan_axes, scan_cell
+from scanfab.kernels.periodic import CellGrains
 
 __all__ = [
     "MAX_LINES",
+    "CellGrains",
     "ScanSums",
     "Solids",
     "is_affordable",
@@ -49,6 +51,8 @@ class Solids:
     """Spheres that the variants b and d leave out, shape (N,)."""
     window_radius: float = 0.0
     """Radius of the sphere window; 0 for none."""
+    medium: CellGrains | None = None
+    """The grains of a periodic packing, each once, for its whole, which has no edge."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +78,8 @@ class ScanSums:
     """Length of the lines in the window, shape (R, 4, D); 0 for the whole."""
     chords: IntArray
     """Chords that all spheres together cut from the lines, shape (R,)."""
+    channels: IntArray
+    """Lines of the whole that meet no grain however far they go, shape (R, 4, D)."""
 
     @property
     def replicates(self) -> int:
@@ -199,46 +205,81 @@ def _scan_frames(
     variants: str,
 ) -> ScanSums:
     """One replicate: given line frames (D, 3, 3) and shifts (D, 2)."""
-    tallies = np.zeros((len(frames), 2, sweep.TALLY_SIZE))
     first, second = ("a" in variants or "c" in variants), ("b" in variants or "d" in variants)
-    # without a or c, the solids of b and d are the only ones
-    solid = slice(None) if first else ~solids.removed
-    scan_axes(
-        np.ascontiguousarray(solids.position[solid]),
-        solids.radius[solid],
-        solids.removed[solid],
-        np.ascontiguousarray(frames),
-        offsets,
-        spacing,
-        cutoff,
-        solids.window_radius,
-        tallies,
-        True if first and second else None,
-        True if "a" in variants or "b" in variants else None,
-        True if "c" in variants or "d" in variants else None,
-    )
+    whole, window = ("a" in variants or "b" in variants), ("c" in variants or "d" in variants)
+    tallies = np.zeros((len(frames), 2, sweep.TALLY_SIZE))
+    both = True if first and second else None
+    if solids.medium is not None and whole:
+        _scan_medium(solids.medium, frames, offsets, spacing, cutoff, tallies, first, both)
+        whole = False
+    if whole or window:
+        # without a or c, the solids of b and d are the only ones
+        solid = slice(None) if first else ~solids.removed
+        scan_axes(
+            np.ascontiguousarray(solids.position[solid]),
+            solids.radius[solid],
+            solids.removed[solid],
+            np.ascontiguousarray(frames),
+            offsets,
+            spacing,
+            cutoff,
+            solids.window_radius,
+            tallies,
+            both,
+            True if whole else None,
+            True if window else None,
+        )
     if not first:
         tallies = tallies[:, ::-1]
     return _by_variant(frames[:, 2], tallies, variants)
 
 
+def _scan_medium(
+    medium: CellGrains,
+    frames: FloatArray,
+    offsets: FloatArray,
+    spacing: float,
+    cutoff: float,
+    tallies: FloatArray,
+    first: bool,
+    both: sweep.Flag,
+) -> None:
+    """The whole of a periodic packing."""
+    if not first:
+        solid = ~medium.removed
+        medium = medium._replace(
+            position=medium.position[solid],
+            radius=medium.radius[solid],
+            removed=medium.removed[solid],
+        )
+    if len(medium.radius):
+        axes = np.ascontiguousarray(frames[:, 2])
+        scan_cell(medium, axes, offsets, spacing, cutoff, tallies, both)
+
+
 def _by_variant(axes: FloatArray, tallies: FloatArray, variants: str) -> ScanSums:
     """The sums of one replicate from its tallies by axis and set of solids."""
+    wanted = np.array([variant in variants for variant in "abcd"])
 
-    def of(entry: int) -> FloatArray:
-        groups = [tallies[..., sweep.WHOLE + entry], tallies[..., sweep.WINDOW + entry]]
+    def of(whole: int, window: int | None) -> FloatArray:
+        groups = [tallies[..., whole], 0.0 * tallies[..., 0]]
+        if window is not None:
+            groups[1] = tallies[..., window]
         values = np.concatenate(groups, axis=1).T[None]
-        wanted = np.array([variant in variants for variant in "abcd"])
         return np.where(wanted[:, None], values, 0.0)
+
+    def entry(number: int) -> FloatArray:
+        return of(sweep.WHOLE + number, sweep.WINDOW + number)
 
     return ScanSums(
         axes=axes[None],
-        length=of(sweep.LENGTH),
-        segments=of(sweep.KEPT).astype(np.int64),
-        lines=of(sweep.LINES).astype(np.int64),
-        void=of(sweep.VOID),
-        line_length=of(sweep.LINE_LENGTH),
+        length=entry(sweep.LENGTH),
+        segments=entry(sweep.KEPT).astype(np.int64),
+        lines=entry(sweep.LINES).astype(np.int64),
+        void=entry(sweep.VOID),
+        line_length=entry(sweep.LINE_LENGTH),
         chords=np.array([tallies[:, :, sweep.CHORDS].sum()]).astype(np.int64),
+        channels=of(sweep.CHANNELS, None).astype(np.int64),
     )
 
 
@@ -249,6 +290,8 @@ def is_affordable(solids: Solids, spacing: float) -> bool:
 
 def _most_lines(solids: Solids, spacing: float) -> float:
     reach = solids.window_radius
+    if solids.medium is not None:
+        reach = max(reach, float(np.linalg.norm(solids.medium.vectors, axis=1).max()))
     if len(solids.position):
         reach = max(reach, float((np.linalg.norm(solids.position, axis=1) + solids.radius).max()))
     return (2.0 * reach / spacing + 1.0) ** 2

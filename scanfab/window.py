@@ -30,34 +30,35 @@ class SphereWindow:
 
     def distance(self, points: FloatArray, packing: Packing) -> FloatArray:
         """Distance of points from the centre, nearest image, shape (N,)."""
-        branch = points - self.center
-        if packing.cell is not None and packing.is_periodic:
-            branch = branch + packing.cell.nearest_image(branch) @ packing.cell.vectors
-        distance: FloatArray = np.linalg.norm(branch, axis=1)
+        distance: FloatArray = np.linalg.norm(self.branches(points, packing), axis=1)
         return distance
 
     def __str__(self) -> str:
         return f"RV (radius {self.radius:g} about {np.round(self.center, 9).tolist()})"
 
-    def check_inside(self, packing: Packing) -> None:
+    def check_fits(self, packing: Packing) -> None:
         """
-        Make sure that the window lies inside the periodic cell.
+        Make sure that no two images of a grain have their centres in the window.
 
         Raises
         ------
         SettingsError
-            If it reaches through a periodic face.
+            If it is wider than a period.
         """
         if packing.cell is None or not packing.is_periodic:
             return
-        reach = self.radius / packing.cell.heights
-        center = packing.cell.fractional(self.center)
-        outside = (center < reach) | (center > 1.0 - reach)
-        if np.any(outside & np.array(packing.cell.periodic)):
+        narrowest = float(packing.cell.heights[np.array(packing.cell.periodic)].min())
+        if self.radius > 0.5 * narrowest:
             raise SettingsError(
-                f"the {self} reaches through a periodic face of the cell: "
-                f"choose a smaller --rv or another --rv-center"
+                f"the {self} is wider than the periodic cell ({narrowest:g}): choose a smaller --rv"
             )
+
+    def branches(self, points: FloatArray, packing: Packing) -> FloatArray:
+        """From the centre to the nearest image of each point, shape (N, 3)."""
+        branch = points - self.center
+        if packing.cell is not None and packing.is_periodic:
+            branch = branch + packing.cell.nearest_image(branch) @ packing.cell.vectors
+        return branch
 
 
 def smallest_extent(packing: Packing, grains: BoolArray) -> float:

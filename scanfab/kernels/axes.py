@@ -9,18 +9,29 @@ import numpy.typing as npt
 from numba import njit
 
 from scanfab.kernels.lines import Spheres, solve_closed, sort_by, span, sphere_at
+from scanfab.kernels.periodic import CellGrains, Prism, images_in, next_solid, prism_along
 from scanfab.kernels.sweep import (
+    BOUND,
+    CHANNELS,
+    END,
+    FAR,
+    KEPT,
+    LENGTH,
     MOST_LINES,
+    SET,
     STATE_SIZE,
+    VOID,
+    WHOLE,
     WIDTH,
     Flag,
     Strip,
     begin,
+    measure_from,
     settle,
     visit,
 )
 
-__all__ = ["Grid", "cover", "order_of", "project", "scan_axes"]
+__all__ = ["Grid", "cover", "order_of", "project", "scan_axes", "scan_cell"]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -242,6 +253,7 @@ def scan_strips(
     whole: Flag,
     window: Flag,
     measured: float | None,
+    medium: tuple[CellGrains, Prism] | None,
 ) -> None:
     """Scan a grid strip by strip, so that the lines' state stays in cache."""
     least = max(cutoff, SMALLEST)
@@ -262,6 +274,8 @@ def scan_strips(
         )
         met = chosen[start[number] : start[number + 1]]
         begin(lines, strip, window_radius, second, whole)
+        if medium is not None:
+            measure_from(lines, strip, medium[1].rise_u, medium[1].rise_v)
         visit_all(
             lines, strip, spheres, met, window_radius, least, tally, second, whole, window, measured
         )
@@ -281,6 +295,43 @@ def scan_strips(
                     window,
                     measured,
                 )
+            if medium is not None:
+                follow(lines, strip, which, medium[0], medium[1], least, tally)
+
+
+@njit(nogil=True, cache=True)
+def follow(
+    lines: FloatArray,
+    strip: Strip,
+    which: int,
+    grains: CellGrains,
+    prism: Prism,
+    least: float,
+    tally: FloatArray,
+) -> None:
+    """Tally the gaps that start in the measured length and end beyond what was listed of it."""
+    for row in range(strip.rows):
+        v = strip.first_v + row * strip.spacing
+        for column in range(strip.columns):
+            u = strip.first_u + row * strip.shear + column * strip.spacing
+            place = np.uint64(row * strip.pitch + column)
+            bound = lines[place + BOUND]
+            end = lines[place + SET * np.uint64(which) + END]
+            is_empty = end == -FAR
+            if not is_empty and not bound <= end < bound + prism.length:
+                continue
+            start = next_solid(grains, prism, which == 1, u, v, bound if is_empty else end)
+            if start == FAR:
+                tally[which, CHANNELS] += 1.0
+                tally[which, WHOLE + VOID] += (
+                    prism.length if is_empty else bound + prism.length - end
+                )
+            elif not is_empty:
+                gap = start - end
+                tally[which, WHOLE + VOID] += gap
+                if gap >= least:
+                    tally[which, WHOLE + LENGTH] += gap
+                    tally[which, WHOLE + KEPT] += 1.0
 
 
 @njit(nogil=True, cache=True)
@@ -350,4 +401,74 @@ def scan_axes(
                 whole,
                 window,
                 None,
+                None,
             )
+
+
+@njit(nogil=True, cache=True)
+def cell_grid(
+    grains: CellGrains, normal: FloatArray, offset: FloatArray, spacing: float
+) -> tuple[Prism, Spheres, Grid]:
+    """The lines along a direction through a periodic medium, and the images that they may meet."""
+    prism = prism_along(normal, grains.vectors, grains.periodic)
+    found, extent = images_in(grains, prism)
+    order = order_of(found.depth)
+    spheres = Spheres(
+        found.u[order],
+        found.v[order],
+        found.depth[order],
+        found.radius[order],
+        found.removed[order],
+    )
+    face = cover(extent[2], extent[3], extent[0], extent[1], offset, spacing)
+    skew = prism.skew_u / prism.base_v
+    grid = Grid(
+        spacing,
+        face.first_u + skew * face.first_v,
+        face.first_v,
+        skew * spacing,
+        face.columns,
+        face.rows,
+    )
+    return prism, spheres, grid
+
+
+@njit(nogil=True, cache=True)
+def scan_cell(
+    grains: CellGrains,
+    normals: FloatArray,
+    offsets: FloatArray,
+    spacing: float,
+    cutoff: float,
+    tallies: FloatArray,
+    second: Flag,
+) -> None:
+    """
+    Scan a periodic medium along several directions: the whole of it, that has no edge.
+
+    ``normals`` has shape (D, 3), the rest is as in :func:`scan_axes`.
+    """
+    lines = np.empty(STATE_SIZE)
+    for axis in range(normals.shape[0]):
+        prism, spheres, grid = cell_grid(grains, normals[axis], offsets[axis], spacing)
+        most = MOST_LINES - WIDTH
+        for first in range(0, grid.columns, most):
+            part = Grid(
+                spacing,
+                grid.first_u + first * spacing,
+                grid.first_v,
+                grid.shear,
+                min(most, grid.columns - first),
+                grid.rows,
+            )
+            tally = tallies[axis]
+            # along an axis that is not periodic a line runs from the first solid to the last
+            if grains.periodic[prism.third]:
+                scan_strips(
+                    lines, spheres, part, 0.0, cutoff, tally, second, True, None, prism.length,
+                    (grains, prism),
+                )  # fmt: skip
+            else:
+                scan_strips(
+                    lines, spheres, part, 0.0, cutoff, tally, second, True, None, None, None
+                )

@@ -149,9 +149,9 @@ def sweep_line(
     whole: Flag,
     window: Flag,
     measured: float | None,
-) -> None:
+) -> float:
     """
-    The sweep of one line, as far as it goes.
+    The sweep of one line, as far as it goes; where its last solid ends.
 
     Chords ordered by their middles: what the sweep tallies, and nothing more once the line is
     closed. Chords ordered by their starts: exact, as none of them can reach back.
@@ -167,7 +167,10 @@ def sweep_line(
             add(tally, which, counted(True, low, high, least, bound, whole, window, measured))
             if is_last and window is not None:
                 add(tally, which, counted(True, end, FAR, least, bound, whole, window, measured))
+        if is_last:
+            return end
         end, low, high = moved(start, stop, end, low, high)
+    return end
 
 
 @njit(nogil=True, cache=True)
@@ -186,24 +189,26 @@ def solve_closed(
 ) -> None:
     """Replace what the sweep tallied on closed lines by what their lists of chords give."""
     number = np.full((strip.rows, strip.columns), -1)
-    bounds = np.empty(closed)
+    places = np.empty(closed, np.uint64)
     line = 0
     for row in range(strip.rows):
         for column in range(strip.columns):
             place = np.uint64(row * strip.pitch + column)
             if lines[place + SET * np.uint64(which) + END] == FAR:
                 number[row, column] = line
-                bounds[line] = lines[place + BOUND]
+                places[line] = place
                 line += 1
     start, chords = chords_of(spheres, chosen, which, strip, number, closed)
     wrong = np.zeros((2, TALLY_SIZE))
     right = np.zeros((2, TALLY_SIZE))
     for line in range(closed):
         met = chords[start[line] : start[line + 1]]
-        sweep_line(met, bounds[line], least, wrong, which, whole, window, measured)
+        bound = lines[places[line] + BOUND]
+        sweep_line(met, bound, least, wrong, which, whole, window, measured)
         order = np.arange(met.shape[0])
         sort_by(met[:, 0], order)
         met = met[order]
-        sweep_line(met, bounds[line], least, right, which, whole, window, measured)
+        end = sweep_line(met, bound, least, right, which, whole, window, measured)
+        lines[places[line] + SET * np.uint64(which) + END] = end
     for entry in range(TALLY_SIZE):
         tally[which, entry] += right[which, entry] - wrong[which, entry]

@@ -29,6 +29,7 @@ from numba import njit
 
 __all__ = [
     "BOUND",
+    "CHANNELS",
     "CHORDS",
     "FAR",
     "KEPT",
@@ -46,6 +47,7 @@ __all__ = [
     "Sphere",
     "Strip",
     "begin",
+    "measure_from",
     "moved",
     "settle",
     "visit",
@@ -73,10 +75,11 @@ STATE_SIZE = int(7 * PLANE)
 # rows are visited in whole vectors, beyond their last chord, where square roots are NaN
 WIDTH = 8
 
-# entries of a tally, of the whole and, behind them, of the window; and the chords of all solids
+# entries of a tally, of the whole and, behind them, of the window; and the chords of all solids;
+# and the lines that stay in a channel of a periodic medium
 LENGTH, KEPT, VOID, LINES, LINE_LENGTH = range(5)
-WHOLE, WINDOW, CHORDS = 0, 5, 10
-TALLY_SIZE = 11
+WHOLE, WINDOW, CHORDS, CHANNELS = 0, 5, 10, 11
+TALLY_SIZE = 12
 
 # what lets the compiler make vector instructions of a loop with sums: any order of the terms
 REORDERED = {"reassoc", "contract"}
@@ -206,6 +209,17 @@ def begin(lines: FloatArray, strip: Strip, radius: float, second: Flag, whole: F
             lines[k + BOUND] = lines[k + END] = lines[k + SET + END] = np.nan
 
 
+@njit(nogil=True, cache=True)
+def measure_from(lines: FloatArray, strip: Strip, rise_u: float, rise_v: float) -> None:
+    """Let the measured length of each line begin on a plane through the origin."""
+    for row in range(strip.rows):
+        v = strip.first_v + row * strip.spacing
+        for column in range(strip.columns):
+            u = strip.first_u + row * strip.shear + column * strip.spacing
+            place = np.uint64(row * strip.pitch + column)
+            lines[place + BOUND] = rise_u * u + rise_v * v
+
+
 @njit(nogil=True, cache=True, fastmath=REORDERED, error_model="numpy")
 def visit(
     lines: FloatArray,
@@ -314,15 +328,14 @@ def settle(
             crossing += np.int64(bound > 0.0)
             half_length += bound if bound > 0.0 else 0.0
         if whole is not None:
-            if measured is None:
-                met += 1.0 if end > -FAR else 0.0
-            else:
-                met += 1.0 if bound < FAR else 0.0
+            met += 1.0 if end > -FAR else 0.0
+            if measured is not None:
+                crossing += np.int64(bound < FAR)
     add(tally, which, (a, b, c, d, e, f))
     if whole is not None:
         tally[which, WHOLE + LINES] += met
     if measured is not None:
-        tally[which, WHOLE + LINE_LENGTH] += met * measured
+        tally[which, WHOLE + LINE_LENGTH] += crossing * measured
     if window is not None:
         tally[which, WINDOW + LINES] += crossing
         tally[which, WINDOW + LINE_LENGTH] += 2.0 * half_length

@@ -1,0 +1,264 @@
+"""
+Scan lines through a periodic medium, of which the cell is one period.
+
+The lines of a direction n start on a face of the cell, spread evenly over it, and run to the
+opposite face: face and direction span a prism that fills space as the cell does. A gap counts if it
+starts in the prism, and is followed to its end through the images. The face is the one that n
+crosses most steeply; along an axis that is not periodic the lines run from the first solid to the
+last, and a face is as large as the grains need.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from scanfab.kernels.lines import Spheres
+from scanfab.kernels.sweep import FAR
+
+__all__ = ["CellGrains", "Prism", "images_in", "next_solid", "prism_along"]
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+# a line that has met nothing along so many cells stays in a channel
+MOST_CELLS = 64
+# how far beyond the prism solids are listed at once, in mean radii; longer gaps are followed alone
+BEYOND = 10.0
+
+
+class CellGrains(NamedTuple):
+    """Grains of a periodic medium, each once."""
+
+    position: FloatArray
+    """Shape (N, 3)."""
+    radius: FloatArray
+    removed: BoolArray
+    vectors: FloatArray
+    """Rows: the cell's edges."""
+    periodic: BoolArray
+
+
+class Prism(NamedTuple):
+    """
+    The lines' prism in the frame u, v, n: edges (base_u, 0) and (skew_u, base_v), along n ``length``.
+
+    A point has the height (n - rise_u * u - rise_v * v) / length; 0 to 1 is the prism.
+    """
+
+    frame: FloatArray
+    first: int
+    """Which of the cell's edges is (base_u, 0), which the other of the face, which leads away."""
+    second: int
+    third: int
+    base_u: float
+    skew_u: float
+    base_v: float
+    rise_u: float
+    rise_v: float
+    length: float
+    slope: float
+    """By how much the height changes over a length of 1, at most."""
+
+
+@njit(nogil=True, cache=True)
+def dot(a: FloatArray, b: FloatArray) -> float:
+    """Scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(nogil=True, cache=True)
+def cross(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Vector product."""
+    found = np.empty(3)
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        found[i] = a[j] * b[k] - a[k] * b[j]
+    return found
+
+
+@njit(nogil=True, cache=True)
+def prism_along(normal: FloatArray, vectors: FloatArray, periodic: BoolArray) -> Prism:
+    """The prism of the lines along a direction."""
+    third, steepest = 0, -1.0
+    for k in range(3):
+        face = cross(vectors[(k + 1) % 3], vectors[(k + 2) % 3])
+        steepness = abs(dot(face, normal)) / np.sqrt(dot(face, face))
+        if steepness > steepest:
+            third, steepest = k, steepness
+    first, second = (third + 1) % 3, (third + 2) % 3
+    if periodic[second] and not periodic[first]:
+        first, second = second, first
+    a, b, c = vectors[first], vectors[second], vectors[third]
+    frame = np.empty((3, 3))
+    frame[2] = normal
+    frame[0] = a - dot(a, normal) * normal
+    base_u = np.sqrt(dot(frame[0], frame[0]))
+    frame[0] /= base_u
+    frame[1] = cross(normal, frame[0])
+    if dot(b, frame[1]) < 0.0:
+        frame[1] = -frame[1]
+    skew_u, base_v = dot(b, frame[0]), dot(b, frame[1])
+    rise_u = dot(a, normal) / base_u
+    rise_v = (dot(b, normal) - rise_u * skew_u) / base_v
+    length = abs(dot(c, normal) - rise_u * dot(c, frame[0]) - rise_v * dot(c, frame[1]))
+    slope = np.sqrt(1.0 + rise_u * rise_u + rise_v * rise_v) / length
+    return Prism(frame, first, second, third, base_u, skew_u, base_v, rise_u, rise_v, length, slope)
+
+
+@njit(nogil=True, cache=True)
+def shifts(position: float, reach: float, low: float, high: float, step: float) -> tuple[int, int]:
+    """The whole numbers k for which position + k * step is within reach of low to high."""
+    return (
+        int(np.ceil((low - reach - position) / step)),
+        int(np.floor((high + reach - position) / step)) + 1,
+    )
+
+
+@njit(nogil=True, cache=True)
+def fill_images(
+    grains: CellGrains, prism: Prism, beyond: float, extent: FloatArray, spheres: Spheres
+) -> int:
+    """
+    The images of grains that may meet a line of the prism, or their number if there is no room.
+
+    ``extent`` (least and greatest v, least and greatest u along the skew) bounds the face where an
+    axis is not periodic; where ``spheres`` is empty it is found.
+    """
+    frame = prism.frame
+    a, b, c = (
+        grains.vectors[prism.first],
+        grains.vectors[prism.second],
+        grains.vectors[prism.third],
+    )
+    along_a, along_b = dot(a, frame[2]), dot(b, frame[2])
+    step = 1.0
+    if dot(c, frame[2]) - prism.rise_u * dot(c, frame[0]) - prism.rise_v * dot(c, frame[1]) < 0.0:
+        step = -1.0
+    skew = prism.skew_u / prism.base_v
+    wide = np.sqrt(1.0 + skew * skew)
+    count = 0
+    for g in range(grains.radius.size):
+        x, r = grains.position[g], grains.radius[g]
+        u0, v0, n0 = dot(x, frame[0]), dot(x, frame[1]), dot(x, frame[2])
+        height = (n0 - prism.rise_u * u0 - prism.rise_v * v0) / prism.length
+        reach = r * prism.slope
+        layer = 0, 1
+        if grains.periodic[prism.third]:
+            layer = shifts(height, reach, 0.0, 1.0 + beyond, 1.0)
+        for i in range(layer[0], layer[1]):
+            k = i * step
+            u1 = u0 + k * dot(c, frame[0])
+            v1 = v0 + k * dot(c, frame[1])
+            n1 = n0 + k * dot(c, frame[2])
+            over = 0, 1
+            if grains.periodic[prism.second]:
+                over = shifts(v1, r, 0.0, prism.base_v, prism.base_v)
+            for j in range(over[0], over[1]):
+                u2, v2, n2 = u1 + j * prism.skew_u, v1 + j * prism.base_v, n1 + j * along_b
+                aside = u2 - skew * v2
+                across = 0, 1
+                if grains.periodic[prism.first]:
+                    across = shifts(aside, r * wide, 0.0, prism.base_u, prism.base_u)
+                for q in range(across[0], across[1]):
+                    if spheres.u.size > 0:
+                        spheres.u[count] = u2 + q * prism.base_u
+                        spheres.v[count] = v2
+                        spheres.depth[count] = n2 + q * along_a
+                        spheres.radius[count] = r
+                        spheres.removed[count] = grains.removed[g]
+                    else:
+                        extent[0], extent[1] = min(extent[0], v2 - r), max(extent[1], v2 + r)
+                        extent[2] = min(extent[2], aside - r * wide)
+                        extent[3] = max(extent[3], aside + r * wide)
+                    count += 1
+    return count
+
+
+@njit(nogil=True, cache=True)
+def images_in(grains: CellGrains, prism: Prism) -> tuple[Spheres, FloatArray]:
+    """
+    The images of grains that may meet a line of the prism, projected, in no order.
+
+    And the bounds of the lines: least and greatest v, least and greatest u along the skew.
+    """
+    mean = 0.0
+    for radius in grains.radius:
+        mean += radius / grains.radius.size
+    beyond = BEYOND * mean / prism.length
+    extent = np.array([np.inf, -np.inf, np.inf, -np.inf])
+    nothing = np.empty(0)
+    empty = Spheres(nothing, nothing, nothing, nothing, np.empty(0, np.bool_))
+    count = fill_images(grains, prism, beyond, extent, empty)
+    found = Spheres(
+        np.empty(count),
+        np.empty(count),
+        np.empty(count),
+        np.empty(count),
+        np.empty(count, np.bool_),
+    )
+    if count > 0:
+        fill_images(grains, prism, beyond, extent, found)
+    if grains.periodic[prism.second]:
+        extent[0], extent[1] = 0.0, prism.base_v
+    if grains.periodic[prism.first]:
+        extent[2], extent[3] = 0.0, prism.base_u
+    return found, extent
+
+
+@njit(nogil=True, cache=True)
+def next_solid(
+    grains: CellGrains, prism: Prism, second: bool, u: float, v: float, after: float
+) -> float:
+    """
+    Where the line through (u, v) enters the next solid behind a depth, which lies in void.
+
+    FAR if it stays in a channel. ``second``: of the grains that are not removed.
+    """
+    frame = prism.frame
+    a, b, c = (
+        grains.vectors[prism.first],
+        grains.vectors[prism.second],
+        grains.vectors[prism.third],
+    )
+    rise_c = dot(c, frame[2]) - prism.rise_u * dot(c, frame[0]) - prism.rise_v * dot(c, frame[1])
+    step = 1.0 if rise_c > 0.0 else -1.0
+    largest = 0.0
+    for radius in grains.radius:
+        largest = max(largest, radius)
+    margin = largest * prism.slope
+    place = (after - prism.rise_u * u - prism.rise_v * v) / prism.length - margin
+    found = FAR
+    for cells in range(MOST_CELLS):
+        if cells > 0 and (found - after) / prism.length + 2.0 * margin < cells:
+            break
+        for g in range(grains.radius.size):
+            if second and grains.removed[g]:
+                continue
+            x, r = grains.position[g], grains.radius[g]
+            u0, v0, n0 = dot(x, frame[0]), dot(x, frame[1]), dot(x, frame[2])
+            height = (n0 - prism.rise_u * u0 - prism.rise_v * v0) / prism.length
+            k = np.ceil(place + cells - height) * step
+            u1 = u0 + k * dot(c, frame[0]) - u
+            v1 = v0 + k * dot(c, frame[1]) - v
+            n1 = n0 + k * dot(c, frame[2])
+            over = 0, 1
+            if grains.periodic[prism.second]:
+                over = shifts(v1, r, 0.0, 0.0, prism.base_v)
+            for j in range(over[0], over[1]):
+                v2 = v1 + j * prism.base_v
+                reach2 = r * r - v2 * v2
+                u2, n2 = u1 + j * prism.skew_u, n1 + j * dot(b, frame[2])
+                across = 0, 1
+                if grains.periodic[prism.first]:
+                    across = shifts(u2, np.sqrt(max(reach2, 0.0)), 0.0, 0.0, prism.base_u)
+                for q in range(across[0], across[1]):
+                    u3 = u2 + q * prism.base_u
+                    if reach2 > u3 * u3:
+                        depth, half = n2 + q * dot(a, frame[2]), np.sqrt(reach2 - u3 * u3)
+                        if depth + half > after:
+                            found = min(found, depth - half)
+    return found
