@@ -82,6 +82,8 @@ class GrainTable(NamedTuple):
     cell: Cell | None
     contacts: ContactList | None = None
     """Contacts that the grain file itself lists."""
+    wall_contacts: IntArray | None = None
+    """Number of contacts with walls of each grain, shape (N,), if the grain file lists them."""
 
 
 class JoinedContacts(NamedTuple):
