@@ -206,7 +206,8 @@ def read_series(
     columns : dict, optional
         Standard names to the file's own, such as ``{"radius": "c_rad"}``.
     contact_columns : str, optional
-        Keywords of LIGGGHTS' ``compute pair/gran/local``.
+        Keywords of LIGGGHTS' ``compute pair/gran/local``, or LAMMPS' columns by their meaning:
+        ``"id1=c_ids[1],id2=c_ids[2]"``.
     radius : float, optional
         Radius for dumps without one, dump's length unit.
     cell : tuple of float, optional
