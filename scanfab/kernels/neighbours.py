@@ -110,8 +110,9 @@ def move_into_frame(position: FloatArray, frame: Frame, moved: FloatArray, turns
 def _bin(frame: Frame, shape: IntArray, x: float, y: float, z: float, axis: int) -> int:
     inverse = frame.inverse
     fraction = x * inverse[0, axis] + y * inverse[1, axis] + z * inverse[2, axis] - frame.low[axis]
-    last: int = shape[axis] - 1
-    return min(max(int(fraction * shape[axis]), 0), last)
+    # what lies outside belongs to the outermost bins
+    place: int = int(min(max(fraction * shape[axis], 0.0), shape[axis] - 1.0))
+    return place
 
 
 @njit(nogil=True, cache=True)

@@ -33,7 +33,7 @@ HEADER_BYTES = 1 << 16
 COUNT_KEY = re.compile(rb"^ITEM: NUMBER OF (\S+)[ \t]*\r?$", re.MULTILINE)
 
 # also spaces of latin1, as numpy has them
-BLANK = re.compile(rb"^[\s\x1c-\x1f\x85\xa0]*\n", re.MULTILINE)
+BLANK = re.compile(rb"^[\s\x1c-\x1f\x85\xa0]*(?:\n|\Z)", re.MULTILINE)
 
 # LAMMPS writes units and time before the step
 BEFORE_STEP = re.compile(rb"(?:^ITEM: (?:UNITS|TIME)[ \t]*\r?\n[^\n]*\n)+\Z", re.MULTILINE)

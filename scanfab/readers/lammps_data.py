@@ -25,6 +25,9 @@ STEP = re.compile(rb"timestep = (\d{1,18})\b")
 # its third column is the diameter; the image flags may be missing
 SPHERE = ("id", "type", "diameter", "density", "x", "y", "z")
 FLAGS = ("ix", "iy", "iz")
+# a line that is not blank or a comment, as numpy has them
+FILLED = re.compile(rb"^[ \t\r\f\v\x1c-\x1f\x85\xa0]*[^#\s\x1c-\x1f\x85\xa0]", re.MULTILINE)
+
 # a section is a line that starts with a word, behind the header
 SECTION = re.compile(rb"^[ \t]*([A-Z][A-Za-z ]*?)[ \t]*(?:#[ \t]*(\S+)[^\n]*)?\r?$", re.MULTILINE)
 
@@ -82,7 +85,7 @@ def _count(path: Path, header: list[str]) -> int:
 
 def _values(path: Path, data: bytes, begin: int, end: int, count: int) -> FloatArray:
     rows = data[begin:end]
-    if not rows.strip():
+    if FILLED.search(rows) is None:
         if count:
             raise ReadError(f"{path}: the header counts {count} atoms, found none")
         return np.zeros((0, len(SPHERE)))

@@ -94,7 +94,7 @@ class VtkReader:
                 (index.parent / entry.attrib["file"], float(entry.attrib["timestep"]))
                 for entry in root.iter("DataSet")
             ]
-        except (ElementTree.ParseError, KeyError, ValueError) as error:
+        except (ElementTree.ParseError, LookupError, ValueError) as error:
             raise ReadError(f"{index}: cannot be read as a list of VTK files: {error}") from None
         kinds: dict[str, FileKind] = {}
         found = []

@@ -186,5 +186,5 @@ def _count_lines_and_values(path: Path) -> tuple[int, int | None]:
         # blocks, bytes of a full block, bytes of the last one if it is not full
         blocks, full, last = struct.unpack("<3I", base64.b64decode(data[:16]))
         return lines, (blocks * full if last == 0 else (blocks - 1) * full + last) // 8
-    except (ElementTree.ParseError, StopIteration, KeyError, ValueError, struct.error) as error:
+    except (ElementTree.ParseError, StopIteration, LookupError, ValueError, struct.error) as error:
         raise ReadError(f"{path}: cannot be read as VTKRecorder's file: {error}") from None

@@ -117,7 +117,7 @@ class _Scene:
                         continue
                     tags.pop()
                     self._take(tags, element)
-        except (ElementTree.ParseError, ValueError, OverflowError) as error:
+        except (ElementTree.ParseError, LookupError, ValueError, OverflowError) as error:
             raise ReadError(
                 f"{self.path}: cannot be read as a simulation that YADE saved (O.save): {error}"
             ) from None

@@ -190,6 +190,22 @@ def test_a_grain_of_many_cells_is_a_mistake_of_units():
         find_contacts(Packing([[0.5, 0.5, 0.5]], 100.0, cell=Cell([1.0, 1.0, 1.0])))
 
 
+@pytest.mark.parametrize("far", [1e3, 1e9, 1e60])
+@pytest.mark.parametrize("cell", [None, Cell([1.0, 1.1, 5.0], (True, True, False))])
+def test_grains_that_flew_away_leave_the_bins_small(far, cell):
+    """In bins that span all, 20000² / 2 pairs would be looked at; the far ones touch each other."""
+    random = np.random.default_rng(4)
+    position = random.random((20_000, 3))
+    position[::5000, 2] = far
+    position[1::5000] = position[::5000] + np.array([0.01, 0.0, 0.0])
+    pairs, _ = overlapping_pairs(position, np.full(20_000, 0.02), 1.0, cell)
+    near = np.flatnonzero(position[:, 2] <= 1)
+    among, _ = overlapping_pairs(position[near], np.full(len(near), 0.02), 1.0, cell)
+    assert (position[pairs, 2] <= 1).all(axis=1).sum() == len(among)
+    found = {tuple(pair) for pair in pairs[(position[pairs, 2] > 1).all(axis=1)].tolist()}
+    assert {(k, k + 1) for k in range(0, 20_000, 5000)} <= found
+
+
 def test_size_ratio_of_a_thousand_takes_little_memory_and_time():
     """All dust in the bins of one boulder would be 20000² / 2 pairs to look at."""
     random = np.random.default_rng(2)
