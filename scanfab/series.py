@@ -238,6 +238,10 @@ def read_series(
         return Series(name, grains, (), "geometric", options)
     if contacts in ("auto", "file"):
         if contacts == "file" and not own:
+            if not getattr(grains.reader, "lists_contacts", False):
+                raise ReadError(
+                    f"{name}: --contacts file was asked for, but there is no contact file"
+                )
             return Series(name, grains, (), "grains", options)
         checked = tuple(family.check() for family in own)
         return Series(name, grains, checked, "auto" if contacts == "auto" else "path", options)

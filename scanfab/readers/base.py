@@ -101,7 +101,7 @@ class Reader(Protocol):
 
     All methods raise ReadError, with the file and what was expected, and nothing else. A reader of
     a format that any program may write can say so with an attribute ``generic = True``: it is asked
-    after the others.
+    after the others. One whose grain files may list contacts says ``lists_contacts = True``.
     """
 
     name: str

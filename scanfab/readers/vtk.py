@@ -33,6 +33,7 @@ class VtkReader:
     description = "any VTK point cloud with a radius; contacts as lines (also .pvd series)"
     extensions: tuple[str, ...] = (".vtk", ".vtp", ".vtu", ".pvd", ".xdmf", ".xmf")
     generic = True
+    lists_contacts = True
     # whether one end of a contact may be a wall, which is not in the grain file
     walls = True
 
