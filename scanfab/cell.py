@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from itertools import product
 
 import numpy as np
 import numpy.typing as npt
 
 from scanfab.errors import PackingError
+from scanfab.lattice import Lattice, reduced_lattice
 
 __all__ = ["Cell"]
 
@@ -41,8 +43,6 @@ class Cell:
     >>> cell.wrap([[2.5, -0.5, 9.0]])
     array([[0.5, 2.5, 9. ]])
     """
-
-    __slots__ = ("origin", "periodic", "vectors")
 
     def __init__(
         self,
@@ -104,19 +104,49 @@ class Cell:
         )
         return fractions
 
-    def wrap(self, position: npt.ArrayLike) -> FloatArray:
-        """Positions moved into the cell along its periodic vectors, shape (N, 3)."""
+    def place(self, position: npt.ArrayLike) -> tuple[FloatArray, IntArray]:
+        """
+        Positions moved into the cell, and by how many lattice vectors each had left it.
+
+        Parameters
+        ----------
+        position : array_like, shape (N, 3)
+            Dump's length unit.
+
+        Returns
+        -------
+        position : ndarray, shape (N, 3)
+            Inside the cell along its periodic vectors.
+        turns : ndarray of int, shape (N, 3)
+            Lattice vectors from there to where it was; 0 along vectors that do not repeat.
+        """
         position = np.asarray(position, dtype=np.float64)
         turns = np.where(self.periodic, np.floor(self.fractional(position)), 0.0)
         wrapped: FloatArray = position - turns @ self.vectors
         # a position a rounding error below a face lands on the opposite face: the same place
         on_face = np.where(self.periodic, np.floor(self.fractional(wrapped)), 0.0)
         wrapped -= on_face @ self.vectors
-        return wrapped
+        return wrapped, (turns + on_face).astype(np.int64)
+
+    def wrap(self, position: npt.ArrayLike) -> FloatArray:
+        """Positions moved into the cell along its periodic vectors, shape (N, 3)."""
+        return self.place(position)[0]
+
+    @cached_property
+    def lattice(self) -> Lattice:
+        """The periodic vectors, reduced: the same lattice by vectors that are short."""
+        return reduced_lattice(self.vectors, self.periodic)
+
+    @property
+    def short_vectors(self) -> FloatArray:
+        """The cell by its reduced periodic vectors and its other ones, shape (3, 3)."""
+        vectors = self.vectors.copy()
+        vectors[np.flatnonzero(self.periodic)] = self.lattice.vectors
+        return vectors
 
     def nearest_image(self, branch: npt.ArrayLike) -> IntArray:
         """
-        The lattice translation that makes each branch vector shortest.
+        The lattice translation that makes each branch vector shortest, in any cell.
 
         Parameters
         ----------
@@ -127,16 +157,8 @@ class Cell:
         -------
         ndarray of int, shape (M, 3)
             Numbers of lattice vectors to add to each branch; 0 along vectors that do not repeat.
-
-        Raises
-        ------
-        PackingError
-            If the cell is tilted.
         """
-        if not self.is_orthogonal:
-            raise PackingError("nearest images in a tilted cell are not supported yet")
-        turns = np.rint(np.asarray(branch, dtype=np.float64) / np.diagonal(self.vectors))
-        return np.where(self.periodic, -turns, 0.0).astype(np.int64)
+        return self.lattice.nearest(np.asarray(branch, dtype=np.float64))
 
     def images(
         self, position: FloatArray, margin: float

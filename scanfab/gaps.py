@@ -142,6 +142,13 @@ def scan_gaps(
     def one(replicate: int) -> tuple[FloatArray, FloatArray]:
         turned, offsets = turned_frames(rule, frames, seed, replicate)
         sums = np.zeros((len(rule), 2, 2, kernel.BLOCKS, len(least), 3))
+        in_lines = wanted
+        if solids.medium is not None:
+            normals = np.ascontiguousarray(turned[:, 2])
+            kernel.tally_cell_gaps(
+                solids.medium, normals, offsets, spacing, affine, least, wanted, sums
+            )
+            in_lines = wanted & [False, False, True, True]
         kernel.tally_gaps(
             np.ascontiguousarray(solids.position),
             solids.radius,
@@ -152,7 +159,7 @@ def scan_gaps(
             solids.window_radius,
             affine,
             least,
-            wanted,
+            in_lines,
             sums,
         )
         # what reaches a cut-off reaches all below it

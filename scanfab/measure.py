@@ -7,12 +7,14 @@ import warnings
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from scanfab.adaptive import scan_to_tolerance
+from scanfab.cell import Cell
 from scanfab.directions import direction_rule
 from scanfab.errors import ScanfabWarning
 from scanfab.fabric.contact import axial_error, contact_fabric
@@ -21,7 +23,7 @@ from scanfab.fabric.tensor import COMPONENTS, FabricTensor
 from scanfab.fabric.void import VoidFabric, void_fabric
 from scanfab.gaps import Blocks, GapSums, scan_gaps
 from scanfab.plan import Plan
-from scanfab.scan import ScanSums, Solids
+from scanfab.scan import CellGrains, ScanSums, Solids
 from scanfab.settings import AUTO_RULE, Settings
 from scanfab.table import COLUMNS, Row
 from scanfab.variants import VARIANTS, Sample, Variant
@@ -87,10 +89,10 @@ class Measurement:
 def measure(sample: Sample, plan: Plan, settings: Settings) -> Measurement:
     """Scan one frame that has grains."""
     if plan.window is not None:
-        plan.window.check_inside(sample.packing)
+        plan.window.check_fits(sample.packing)
     solids, origin = _solids(sample, plan, settings)
     sums, plan = scan_to_tolerance(solids, plan, settings)
-    blocks = _blocks(sample, plan, origin)
+    blocks = _blocks(sample, plan)
     lines: dict[str, Any] = {
         "cutoffs": plan.cutoffs,
         "blocks": tuple(Blocks(one.matrix, one.shift + one.matrix @ origin) for one in blocks),
@@ -121,30 +123,65 @@ def _solids(sample: Sample, plan: Plan, settings: Settings) -> tuple[Solids, Flo
     packing, window = sample.packing, plan.window
     position, radius = packing.position[sample.grains], packing.radius[sample.grains]
     removed = sample.rattlers[sample.grains]
-    if packing.cell is not None and packing.is_periodic:
-        ghosts, row, _ = packing.cell.images(position, float(radius.max()))
-        position = np.concatenate([position, ghosts])
-        radius = np.concatenate([radius, radius[row]])
-        removed = np.concatenate([removed, removed[row]])
     origin = position.mean(axis=0) if window is None else window.center
     position = position - origin
-    if window is None:
-        return Solids(position, radius, removed), origin
+    reach = 0.0 if window is None else window.radius
+    if packing.cell is not None and packing.is_periodic:
+        medium = CellGrains(
+            np.ascontiguousarray(position),
+            radius,
+            removed,
+            packing.cell.short_vectors,
+            np.array(packing.cell.periodic),
+        )
+        images, row = _reaching_in(position, radius, reach, packing.cell)
+        return Solids(images, radius[row], removed[row], reach, medium), origin
     if not settings.needs_whole:
-        near = np.linalg.norm(position, axis=1) < window.radius + radius
+        near = np.linalg.norm(position, axis=1) < reach + radius
         position, radius, removed = position[near], radius[near], removed[near]
-    return Solids(position, radius, removed, window.radius), origin
+    return Solids(position, radius, removed, reach), origin
 
 
-def _blocks(sample: Sample, plan: Plan, origin: FloatArray) -> tuple[Blocks, Blocks]:
-    """The octants about the middle of the sample, and about the window's centre."""
-    position = sample.packing.position[sample.grains]
+def _reaching_in(
+    position: FloatArray, radius: FloatArray, reach: float, cell: Cell
+) -> tuple[FloatArray, IntArray]:
+    """All images that reach into the sphere about the origin, and the grains that they repeat."""
+    nearest = position + cell.nearest_image(position) @ cell.vectors
+    lattice = cell.lattice
+    most = np.floor((reach + radius.max(initial=0.0)) / lattice.heights + 1.0).astype(int)
+    images, rows = [np.zeros((0, 3))], [np.zeros(0, np.int64)]
+    for steps in product(*(range(-n, n + 1) for n in most)):
+        moved = nearest + np.array(steps, dtype=np.float64) @ lattice.vectors
+        chosen = np.flatnonzero(np.linalg.norm(moved, axis=1) < reach + radius)
+        images.append(moved[chosen])
+        rows.append(chosen)
+    return np.concatenate(images), np.concatenate(rows)
+
+
+def _blocks(sample: Sample, plan: Plan) -> tuple[Blocks, Blocks]:
+    """The octants about the middle of the sample (of the cell), and about the window's centre."""
+    packing = sample.packing
+    position = packing.position[sample.grains]
     low, high = position.min(axis=0), position.max(axis=0)
-    radius = float(sample.packing.radius.max())
+    radius = float(packing.radius.max())
     whole = Blocks.about(0.5 * (low + high), float((high - low).max()) + radius)
+    if packing.cell is not None and packing.is_periodic:
+        whole = _cell_blocks(packing.cell, position)
     if plan.window is None:
         return whole, whole
     return whole, Blocks.about(plan.window.center, plan.window.radius + radius)
+
+
+def _cell_blocks(cell: Cell, position: FloatArray) -> Blocks:
+    """Halves of the periods; along the other vectors, of what the grains take."""
+    matrix = np.linalg.inv(cell.vectors).T
+    shift = -matrix @ cell.origin
+    along = cell.fractional(position)
+    low, high = along.min(axis=0), along.max(axis=0)
+    # far less than a period, about the middle
+    scale = np.where(cell.periodic, 1.0, 0.25 / (1.0 + high - low))
+    middle = np.where(cell.periodic, 0.0, 0.5 - scale * 0.5 * (low + high))
+    return Blocks(scale[:, None] * matrix, scale * shift + middle)
 
 
 def _block_spacing(sums: ScanSums, plan: Plan, settings: Settings) -> float:
@@ -231,6 +268,7 @@ class _Columns:
             "alpha_vs_axial": value,
             "alpha_vs_axial_se": fabric.axial_error(axis) if fabric else None,
             **_scatter_columns("alpha_vs_axial", value, scatter),
+            **_axis_columns("gvs", fabric.tensor if fabric else None),
         }
 
     def _void_scatter(self) -> Jackknife | None:
@@ -252,7 +290,12 @@ class _Columns:
         value = tensor.axial(axis) if tensor else None
         scatter: Jackknife | None = None
         if tensor:
-            places = self.measurement.blocks[self.variant.in_window].of(contacts.point[chosen])
+            points = contacts.point[chosen]
+            if self.variant.in_window:
+                window = self.plan.window
+                assert window is not None
+                points = window.center + window.branches(points, self.sample.packing)
+            places = self.measurement.blocks[self.variant.in_window].of(points)
             scatter = contact_jackknife(normals, places, axis)
         return {
             "contacts": len(normals),
@@ -261,10 +304,22 @@ class _Columns:
             "alpha_c_axial": value,
             "alpha_c_axial_se": axial_error(normals, axis),
             **_scatter_columns("alpha_c_axial", value, scatter),
+            **_axis_columns("gc", tensor),
+            "coaxiality_deg": (
+                self.fabric.tensor.angle_to(tensor) if self.fabric and tensor else None
+            ),
         }
 
     def warn_of_few_segments(self, where: str) -> None:
-        """Say where there is no void fabric, or a doubtful one."""
+        """Say where there is no void fabric, or a doubtful one, or lines without a grain."""
+        channels = int(self.sums.channels[:, self.which].sum())
+        if channels:
+            lines = channels + int(self.sums.lines[:, self.which].sum())
+            warnings.warn(
+                f"{where}: {channels} of {lines} lines stay in a channel and meet no grain",
+                ScanfabWarning,
+                stacklevel=4,
+            )
         if self.segments == 0:
             message = f"no void segment reaches the cut-off {self.plan.cutoffs[self.place]:g}"
         elif self.fabric is None:
@@ -284,6 +339,12 @@ def _tensor_columns(prefix: str, tensor: FabricTensor | None) -> dict[str, float
         tensor.components().items() if tensor else ((name, None) for name in COMPONENTS)
     )
     return {f"{prefix}_{name}": value for name, value in values}
+
+
+def _axis_columns(prefix: str, tensor: FabricTensor | None) -> dict[str, float | None]:
+    """Direction of the largest principal value."""
+    axis = [None] * 3 if tensor is None else tensor.major_axis.tolist()
+    return {f"{prefix}_axis_{name}": one for name, one in zip("xyz", axis, strict=True)}
 
 
 def _scatter_columns(

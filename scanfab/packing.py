@@ -2,62 +2,22 @@
 
 from __future__ import annotations
 
-import warnings
+import copy
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.cast import cast, grains_named
 from scanfab.cell import Cell
-from scanfab.errors import PackingError, ScanfabWarning
+from scanfab.contact_list import ContactList, Contacts, Spheres, resolve_contacts
+from scanfab.errors import PackingError
 
 __all__ = ["ContactList", "Contacts", "Packing"]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
-ContactSource = Literal["file", "geometric"]
-
-
-class ContactList(NamedTuple):
-    """Contacts as a source names them, before the packing works out their geometry."""
-
-    pairs: npt.ArrayLike
-    """Rows of the two grains, shape (M, 2)."""
-    image: npt.ArrayLike | None = None
-    """Lattice translation of the second grain, shape (M, 3); nearest image by default."""
-    force: npt.ArrayLike | None = None
-    """Force on the second grain, shape (M, 3), dump's force unit."""
-    source: ContactSource = "file"
-    """Where the list comes from."""
-
-
-@dataclass(frozen=True, eq=False)
-class Contacts:
-    """
-    The contacts of a packing, each pair of grains (with its periodic image) once.
-
-    The normal is the unit branch vector from the first to the second centre; the point is the
-    middle of the overlap on the branch. Both come from positions and radii, whatever the file
-    stores, so that every format gives the same answer.
-    """
-
-    pairs: IntArray
-    """Rows of the two grains, shape (M, 2)."""
-    image: IntArray
-    """Lattice translation of the second grain, shape (M, 3)."""
-    normal: FloatArray
-    """Unit normals, shape (M, 3), dimensionless."""
-    point: FloatArray
-    """Contact points, shape (M, 3), dump's length unit; next to the first grain."""
-    force: FloatArray | None
-    """Force on the second grain, shape (M, 3), dump's force unit; None if the dump has none."""
-    source: ContactSource
-    """``file`` or ``geometric``."""
-
-    def __len__(self) -> int:
-        return len(self.pairs)
 
 
 class Packing:
@@ -110,35 +70,32 @@ class Packing:
         step: int | None = None,
         time: float | None = None,
     ) -> None:
-        centres = _cast("position", position, np.float64, (None, 3))
+        centres = cast("position", position, np.float64, (None, 3))
         count = len(centres)
         radii = np.asarray(radius)
-        self.radius: FloatArray = _cast(
+        self.radius: FloatArray = cast(
             "radius", np.full(count, radii) if radii.ndim == 0 else radii, np.float64, (count,)
         )
-        self.id: IntArray = _cast("id", np.arange(count) if id is None else id, np.int64, (count,))
+        self.id: IntArray = cast("id", np.arange(count) if id is None else id, np.int64, (count,))
         _check_grains(centres, self.radius, self.id)
-        self.position: FloatArray = centres if cell is None else cell.wrap(centres)
+        turns: IntArray | None = None
+        self.position: FloatArray = centres
+        if cell is not None:
+            self.position, turns = cell.place(centres)
         self.position.flags.writeable = False
         self.columns: dict[str, npt.NDArray[Any]] = {
-            name: _cast(name, values, None, (count, ...))
-            for name, values in (columns or {}).items()
+            name: cast(name, values, None, (count, ...)) for name, values in (columns or {}).items()
         }
-        self.wall_contacts: IntArray = _cast(
-            "wall_contacts",
-            np.zeros(count, np.int64) if wall_contacts is None else wall_contacts,
-            np.int64,
-            (count,),
+        self.wall_contacts: IntArray = _wall_contacts(
+            np.zeros(count, np.int64) if wall_contacts is None else wall_contacts, count
         )
         self.cell = cell
         self.step = None if step is None else int(step)
         self.time = None if time is None else float(time)
-        if np.any(self.wall_contacts < 0):
-            raise PackingError("wall_contacts: expected 0 or more for each grain")
         self.contacts: Contacts | None = None
         if contacts is not None:
             listed = contacts if isinstance(contacts, ContactList) else ContactList(contacts)
-            self.contacts = self._resolve(listed)
+            self.contacts = resolve_contacts(listed, self._spheres(turns))
 
     def __len__(self) -> int:
         return len(self.radius)
@@ -153,154 +110,50 @@ class Packing:
         return self.cell is not None and self.cell.is_periodic
 
     def with_contacts(
-        self, contacts: ContactList, wall_contacts: npt.ArrayLike | None = None
+        self, contacts: ContactList | Contacts, wall_contacts: npt.ArrayLike | None = None
     ) -> Packing:
-        """The same grains with another list of contacts."""
-        return Packing(
-            self.position,
-            self.radius,
-            id=self.id,
-            columns=self.columns,
-            contacts=contacts,
-            wall_contacts=self.wall_contacts if wall_contacts is None else wall_contacts,
-            cell=self.cell,
-            step=self.step,
-            time=self.time,
-        )
+        """
+        The same grains with other contacts.
 
-    def _resolve(self, listed: ContactList) -> Contacts:
-        """Geometry of the listed contacts, each pair and image once."""
-        pairs = _cast("contacts", listed.pairs, np.int64, (None, 2))
-        if pairs.size and (pairs.min() < 0 or pairs.max() >= len(self)):
-            wrong = int(np.flatnonzero(np.any((pairs < 0) | (pairs >= len(self)), axis=1))[0])
-            raise PackingError(
-                f"contact {wrong} names the rows {pairs[wrong].tolist()}, "
-                f"but there are {len(self)} grains (rows from 0)"
-            )
-        first, second = pairs.T
-        branch = self.position[second] - self.position[first]
-        if listed.image is not None:
-            image = _cast("image", listed.image, np.int64, (len(pairs), 3))
-        elif self.cell is not None and self.cell.is_periodic:
-            image = self.cell.nearest_image(branch)
-        else:
-            image = np.zeros((len(pairs), 3), np.int64)
-        if self.cell is not None:
-            branch = branch + image @ self.cell.vectors
-        keep = _first_of_each(pairs, image)
-        force = None
-        if listed.force is not None:
-            force = _cast("force", listed.force, np.float64, (len(pairs), 3))[keep]
-        pairs, image, branch = pairs[keep], image[keep], branch[keep]
-        length: FloatArray = np.linalg.norm(branch, axis=1)
-        itself = (pairs[:, 0] == pairs[:, 1]) & ~image.any(axis=1)
-        if np.any(itself):
-            raise PackingError(f"{_grains(self.id[pairs[:, 0]], itself)}: in contact with itself")
-        if np.any(length == 0):
-            self._warn_of_same_centre(pairs[length == 0])
-            some = length > 0
-            pairs, image, branch, length = pairs[some], image[some], branch[some], length[some]
-            force = None if force is None else force[some]
-        if listed.source == "file":
-            self._refuse_long_contacts(pairs, length)
-        normal = branch / length[:, None]
-        radius = self.radius[pairs]
-        middle = 0.5 * (length + radius[:, 0] - radius[:, 1])
-        point = self.position[pairs[:, 0]] + middle[:, None] * normal
-        return Contacts(pairs, image, normal, point, force, listed.source)
+        Parameters
+        ----------
+        contacts : ContactList or Contacts
+            Images in a list are from the wrapped positions. Contacts that are worked out already
+            are taken as they are.
+        wall_contacts : array_like of int, shape (N,), optional
+            Those of this packing by default.
+        """
+        other = copy.copy(self)
+        if wall_contacts is not None:
+            other.wall_contacts = _wall_contacts(wall_contacts, len(self))
+        if isinstance(contacts, ContactList):
+            contacts = resolve_contacts(contacts, self._spheres(None))
+        other.contacts = contacts
+        return other
 
-    def _warn_of_same_centre(self, pairs: IntArray) -> None:
-        one, two = self.id[pairs[0]]
-        warnings.warn(
-            f"the grains {one} and {two} have the same centre ({len(pairs)} such pairs): a contact "
-            f"between them has no direction and is left out",
-            ScanfabWarning,
-            stacklevel=4,
-        )
-
-    def _refuse_long_contacts(self, pairs: IntArray, length: FloatArray) -> None:
-        """An error if the centres of a listed contact are too far apart for a contact."""
-        radius = self.radius[pairs]
-        # a gap of half a grain, by the smaller of the two
-        excess = length - radius.sum(axis=1) - radius.min(axis=1)
-        if np.any(excess > 0):
-            worst = int(np.argmax(excess))
-            one, two = self.id[pairs[worst]]
-            advice = (
-                "is this the contact list of another step?"
-                if self.is_periodic
-                else "if the sample is periodic, name its cell (--cell and --periodic); "
-                "otherwise the contact list belongs to another step"
-            )
-            raise PackingError(
-                f"the grains {one} and {two} are listed as a contact, but their centres are "
-                f"{length[worst]:g} apart and their radii add up to {radius[worst].sum():g}: "
-                f"{advice}"
-            )
+    def _spheres(self, turns: IntArray | None) -> Spheres:
+        return Spheres(self.position, self.radius, self.id, self.cell, turns)
 
 
-def _cast(
-    name: str, values: npt.ArrayLike, dtype: type | None, shape: tuple[Any, ...]
-) -> npt.NDArray[Any]:
-    """An array of the given type and shape (None: any length; ...: any further dimensions)."""
-    try:
-        array = np.asarray(values)
-        if array.size == 0 and shape[0] is None:
-            array = np.zeros((0, *shape[1:]))  # an empty list
-        cast = array.astype(dtype, copy=True) if dtype is not None else array.copy()
-    except (TypeError, ValueError) as error:
-        raise PackingError(f"{name}: expected numbers of shape {_spell(shape)}: {error}") from None
-    wanted = shape[:-1] if shape[-1] is ... else shape
-    fits = len(cast.shape) >= len(wanted) if shape[-1] is ... else len(cast.shape) == len(wanted)
-    lengths = zip(cast.shape, wanted, strict=False)
-    if not fits or any(want is not None and have != want for have, want in lengths):
-        raise PackingError(f"{name}: expected shape {_spell(shape)}, found {cast.shape}")
-    if dtype is np.int64 and array.dtype.kind == "f" and not np.array_equal(array, cast):
-        raise PackingError(f"{name}: expected whole numbers")
-    cast.flags.writeable = False
-    return cast
-
-
-def _spell(shape: tuple[Any, ...]) -> str:
-    return "(" + ", ".join("N" if n is None else "..." if n is ... else str(n) for n in shape) + ")"
+def _wall_contacts(values: npt.ArrayLike, count: int) -> IntArray:
+    numbers: IntArray = cast("wall_contacts", values, np.int64, (count,))
+    if np.any(numbers < 0):
+        raise PackingError("wall_contacts: expected 0 or more for each grain")
+    return numbers
 
 
 def _check_grains(position: FloatArray, radius: FloatArray, id: IntArray) -> None:
     """Finite numbers, positive radii, unique ids."""
     infinite = ~(np.isfinite(position).all(axis=1) & np.isfinite(radius))
     if infinite.any():
-        raise PackingError(f"{_grains(id, infinite)}: position and radius must be finite numbers")
+        raise PackingError(
+            f"{grains_named(id, infinite)}: position and radius must be finite numbers"
+        )
     if np.any(radius <= 0):
-        raise PackingError(f"{_grains(id, radius <= 0)}: the radius must be larger than zero")
+        raise PackingError(f"{grains_named(id, radius <= 0)}: the radius must be larger than zero")
     unique, counts = np.unique(id, return_counts=True)
     if unique.size < id.size:
         raise PackingError(
             f"the id {unique[np.argmax(counts > 1)]} occurs twice: "
             f"{unique.size} ids for {id.size} grains"
         )
-
-
-def _grains(id: IntArray, wrong: npt.NDArray[np.bool_]) -> str:
-    """'grain 7' or '3 grains, first 7'."""
-    first = id[np.argmax(wrong)]
-    number = np.count_nonzero(wrong)
-    return f"grain {first}" if number == 1 else f"{number} grains, the first is {first}"
-
-
-def _first_of_each(pairs: IntArray, image: IntArray) -> npt.NDArray[np.intp]:
-    """Rows of the first mention of each contact, whichever grain is named first."""
-    swapped = pairs[:, 0] > pairs[:, 1]
-    turned = np.where(swapped[:, None], -image, image)
-    # a grain and its own image: the contact with the opposite image is the same one
-    itself = pairs[:, 0] == pairs[:, 1]
-    lead = np.where(turned[:, 0] != 0, turned[:, 0], turned[:, 1])
-    lead = np.where(lead != 0, lead, turned[:, 2])
-    turned = np.where((itself & (lead < 0))[:, None], -turned, turned)
-    # one number for each contact: rows, then image
-    reach = int(np.abs(turned).max(initial=0))
-    code = (turned + reach) @ (2 * reach + 1) ** np.arange(3)
-    key = (pairs.min(axis=1) * (pairs.max(initial=0) + 1) + pairs.max(axis=1)) * (
-        2 * reach + 1
-    ) ** 3 + code
-    _, first = np.unique(key, return_index=True)
-    return np.sort(first)

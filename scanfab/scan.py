@@ -208,7 +208,7 @@ def _scan_frames(
     first, second = ("a" in variants or "c" in variants), ("b" in variants or "d" in variants)
     whole, window = ("a" in variants or "b" in variants), ("c" in variants or "d" in variants)
     tallies = np.zeros((len(frames), 2, sweep.TALLY_SIZE))
-    both = True if first and second else None
+    both: sweep.Flag = True if first and second else None
     if solids.medium is not None and whole:
         _scan_medium(solids.medium, frames, offsets, spacing, cutoff, tallies, first, both)
         whole = False

@@ -60,11 +60,16 @@ class Frame:
         grains = self.reader.read_grains(self.snapshot, options)
         joined = [reader.read_contacts(snapshot, options, grains) for reader, snapshot in files]
         listed = [part.contacts for part in joined if part.contacts is not None]
-        if self.series.contacts_from == "auto" and grains.contacts is not None:
+        with_own = self.series.contacts_from in ("auto", "grains")
+        if with_own and grains.contacts is not None:
             listed.append(grains.contacts)
         if len(listed) > 1:
             paths = " and ".join(str(snapshot.path) for _, snapshot in files)
             raise ReadError(f"two contact lists for one frame: {paths}: choose with --contacts")
+        if self.series.contacts_from == "grains" and not listed:
+            raise ReadError(
+                f"{self.snapshot.path}: --contacts file was asked for, but there is no contact file"
+            )
         step = self.name_step if self.snapshot.step is None else self.snapshot.step
         try:
             return Packing(
@@ -73,7 +78,7 @@ class Frame:
                 id=grains.id,
                 columns=grains.columns,
                 contacts=listed[0] if listed else None,
-                wall_contacts=_wall_contacts(grains, joined),
+                wall_contacts=_wall_contacts(grains, joined, with_own),
                 cell=grains.cell,
                 step=step,
                 time=self.snapshot.time,
@@ -114,7 +119,8 @@ class Series:
     """As the user named it."""
     grains: Family
     contacts: tuple[Family, ...] = ()
-    contacts_from: Literal["auto", "geometric", "path"] = "auto"
+    contacts_from: Literal["auto", "geometric", "path", "grains"] = "auto"
+    """``grains``: from the grain files themselves."""
     options: ReadOptions = field(default_factory=ReadOptions)
 
     def __iter__(self) -> Iterator[Frame]:
@@ -200,7 +206,8 @@ def read_series(
     columns : dict, optional
         Standard names to the file's own, such as ``{"radius": "c_rad"}``.
     contact_columns : str, optional
-        Keywords of LIGGGHTS' ``compute pair/gran/local``.
+        Keywords of LIGGGHTS' ``compute pair/gran/local``, or LAMMPS' columns by their meaning:
+        ``"id1=c_ids[1],id2=c_ids[2]"``.
     radius : float, optional
         Radius for dumps without one, dump's length unit.
     cell : tuple of float, optional
@@ -231,7 +238,11 @@ def read_series(
         return Series(name, grains, (), "geometric", options)
     if contacts in ("auto", "file"):
         if contacts == "file" and not own:
-            raise ReadError(f"{name}: --contacts file was asked for, but there is no contact file")
+            if not getattr(grains.reader, "lists_contacts", False):
+                raise ReadError(
+                    f"{name}: --contacts file was asked for, but there is no contact file"
+                )
+            return Series(name, grains, (), "grains", options)
         checked = tuple(family.check() for family in own)
         return Series(name, grains, checked, "auto" if contacts == "auto" else "path", options)
     return Series(name, grains, _named_contacts(contacts, format), "path", options)
@@ -361,8 +372,10 @@ def _same_step(
     return next((one for one in snapshots if one.step == grains.step), None)
 
 
-def _wall_contacts(grains: GrainTable, joined: list[JoinedContacts]) -> Any:
-    return sum((part.wall_contacts for part in joined), np.zeros(len(grains.radius), np.int64))
+def _wall_contacts(grains: GrainTable, joined: list[JoinedContacts], with_own: bool) -> Any:
+    own = grains.wall_contacts if with_own else None
+    first = np.zeros(len(grains.radius), np.int64) if own is None else own
+    return sum((part.wall_contacts for part in joined), first)
 
 
 def _common_folder(paths: list[Path]) -> str:

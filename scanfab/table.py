@@ -71,6 +71,13 @@ class Row:
     alpha_c_axial_without_6: float | None
     alpha_c_axial_without_7: float | None
     alpha_c_axial_without_8: float | None
+    gvs_axis_x: float | None
+    gvs_axis_y: float | None
+    gvs_axis_z: float | None
+    gc_axis_x: float | None
+    gc_axis_y: float | None
+    gc_axis_z: float | None
+    coaxiality_deg: float | None
 
 
 COLUMNS: tuple[str, ...] = tuple(field.name for field in fields(Row))
@@ -87,7 +94,7 @@ MEANINGS: dict[str, str] = {
     "contacts": "contacts between grains that enter gc_*",
     "contacts_from": "file or geometric",
     "coordination": "mean number of contacts of the grains counted in grains, boundary's included",
-    "solid_fraction": "of this variant's solids in the RV, by the scan; empty for the whole",
+    "solid_fraction": "of this variant's solids in the RV or periodic cell; else empty",
     "directions": "axes of the direction rule, in each replicate",
     "replicates": "number of replicates",
     "lines": "scan lines that meet the window (for the whole: any solid)",
@@ -131,6 +138,13 @@ MEANINGS: dict[str, str] = {
     "alpha_c_axial_without_6": "likewise",
     "alpha_c_axial_without_7": "likewise",
     "alpha_c_axial_without_8": "likewise",
+    "gvs_axis_x": "direction of the void fabric's largest principal value, a unit vector",
+    "gvs_axis_y": "likewise",
+    "gvs_axis_z": "likewise",
+    "gc_axis_x": "direction of the contact fabric's largest principal value, a unit vector",
+    "gc_axis_y": "likewise",
+    "gc_axis_z": "likewise",
+    "coaxiality_deg": "angle between these two directions, 0 to 90 degrees",
 }
 """What each column holds; lengths are in the dump's unit."""
 

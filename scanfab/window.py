@@ -47,10 +47,11 @@ class SphereWindow:
         """
         if packing.cell is None or not packing.is_periodic:
             return
-        narrowest = float(packing.cell.heights[np.array(packing.cell.periodic)].min())
-        if self.radius > 0.5 * narrowest:
+        shortest = packing.cell.lattice.shortest
+        if self.radius > 0.5 * shortest:
             raise SettingsError(
-                f"the {self} is wider than the periodic cell ({narrowest:g}): choose a smaller --rv"
+                f"the {self} is wider than the cell's shortest period ({shortest:g}): "
+                f"choose a smaller --rv"
             )
 
     def branches(self, points: FloatArray, packing: Packing) -> FloatArray:

@@ -95,6 +95,68 @@ def yade_lines(path: Path, ends, vectors=None, **scalars) -> Path:
     )
 
 
+def small_save(contacts: Sequence[tuple[int, int, Sequence[int], int]] | None = None) -> str:
+    """
+    What YADE's O.save writes as XML, reduced to what is read, for three spheres and a wall.
+
+    The spheres have the ids 0 to 2 and stand in a row through the face of a tilted cell;
+    ``contacts``: both ids, cellDist, iterMadeReal.
+    """
+    if contacts is None:
+        contacts = ((0, 1, (0, 0, 0), 5), (2, 0, (1, 0, 0), 7), (1, 3, (0, 0, 0), 9))
+    bodies = [_body(id, x, id == 0) for id, x in enumerate((0.1, 0.29, 0.92))] + [_wall(3)]
+    intrs = "".join(_interaction(*contact) for contact in contacts)
+    bodies[0] = bodies[0].replace("</px></item>", f"<intrs>{intrs}</intrs></px></item>")
+    size = ((1.0, 0.25, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 3.0))
+    numbers = "".join(
+        f"<m{row}{column}>{size[row][column]}</m{row}{column}>"
+        for row in range(3)
+        for column in range(3)
+    )
+    return (
+        '<?xml version="1.0" encoding="UTF-8" standalone="yes" ?>\n'
+        "<!DOCTYPE boost_serialization>\n"
+        '<boost_serialization signature="serialization::archive" version="18">\n<scene><px>'
+        "<iter>30</iter><time>1.5e-3</time><isPeriodic>1</isPeriodic>\n"
+        f"<bodies><px><body><count>4</count>\n{''.join(bodies)}</body></px></bodies>\n"
+        f"<cell><px><hSize>{numbers}</hSize></px></cell>\n"
+        "</px></scene>\n</boost_serialization>\n"
+    )
+
+
+def _xyz(name: str, values: Sequence[object]) -> str:
+    inner = "".join(f"<{axis}>{value}</{axis}>" for axis, value in zip("xyz", values, strict=True))
+    return f"<{name}>{inner}</{name}>"
+
+
+def _body(id: int, x: float, first: bool) -> str:
+    # a class is named where it comes first
+    named = 'class_id="62" class_name="yade::Sphere"' if first else 'class_id_reference="62"'
+    return (
+        f"<item><px><id>{id}</id><groupMask>{id + 1}</groupMask>"
+        f"<state><px><se3>{_xyz('position', (x, 0.5, 0.5))}</se3></px></state>"
+        f"<shape><px {named}><radius>0.1</radius></px></shape></px></item>\n"
+    )
+
+
+def _wall(id: int) -> str:
+    return (
+        f"<item><px><id>{id}</id><groupMask>1</groupMask>"
+        f"<state><px><se3>{_xyz('position', (0, 0, 0))}</se3></px></state>"
+        '<shape><px class_id="63" class_name="yade::Box"></px></shape></px></item>\n'
+    )
+
+
+def _interaction(one: int, two: int, shift: Sequence[int], real: int) -> str:
+    return (
+        f"<item><first>{two}</first><second><px><id1>{one}</id1><id2>{two}</id2>"
+        f"<iterMadeReal>{real}</iterMadeReal><geom><px>{_xyz('normal', (1, 0, 0))}</px></geom>"
+        f"<phys><px><NormPhys>{_xyz('normalForce', (2, 0, 0))}</NormPhys>"
+        f"{_xyz('shearForce', (0, 3, 0))}</px></phys>{_xyz('cellDist', shift)}"
+        "</px></second></item>\n"
+    )
+
+
 def _points(position) -> str:
     return f"POINTS {len(position)} double\n" + _rows(position)
 

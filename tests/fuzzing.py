@@ -20,11 +20,20 @@ from scanfab.readers.base import GrainTable, ReadOptions
 from scanfab.readers.mesh import read_bounds
 from scanfab.readers.registry import reader_for, reader_named
 from scanfab.series import Series
-from tests.dumps import PAIRS, ROWS, dump_text, local_text, pairs_text, yade_lines, yade_spheres
+from tests.dumps import (
+    PAIRS,
+    ROWS,
+    dump_text,
+    local_text,
+    pairs_text,
+    small_save,
+    yade_lines,
+    yade_spheres,
+)
 from tests.truth import FLOOR, PERIODIC, YADE
 
-READERS = ("liggghts", "vtk", "yade")
-NAMES = ("f_1.txt", "f_1.vtk", "f_1.vtp", "f_1.vtu", "f_1.pvd", "f_1.xdmf", "f_1.txt.gz")
+READERS = ("lammps", "liggghts", "vtk", "yade")
+NAMES = ("f_1.txt", "f_1.vtk", "f_1.vtp", "f_1.vtu", "f_1.pvd", "f_1.xdmf", "f_1.txt.gz", "f_1.xml")
 OPTIONS = (
     ReadOptions(),
     ReadOptions(radius=0.1),
@@ -34,6 +43,8 @@ OPTIONS = (
     ReadOptions(contact_columns="id force", periodic="z"),
     ReadOptions(columns={"radius": "type", "id": "id"}),
     ReadOptions(columns={"x": "y"}, radius=0.1),
+    ReadOptions(contact_columns="id1=c_con[1],id2=c_con[2]", periodic="xy"),
+    ReadOptions(contact_columns="id1=c_con[1],id2=c_con[2],fx=c_con[3],fy=c_con[4],fz=c_con[5]"),
 )
 # of the sample files: larger ones make each execution slow
 MOST_BYTES = 17_000
@@ -221,6 +232,7 @@ def _family(path: Path, format: str, kind) -> Family:
 def companion_grains(format: str) -> tuple[GrainTable, Family]:
     """Sound grains to read contacts with: the table, and the file."""
     path = {
+        "lammps": FLOOR / "shuffled.txt",
         "liggghts": FLOOR / "shuffled.txt",
         "vtk": FLOOR / "grains_30000.vtp",
         "yade": YADE / "id-spheres-00000000.vtk.gz",
@@ -232,7 +244,12 @@ def companion_grains(format: str) -> tuple[GrainTable, Family]:
 
 def seeds(format: str, folder: Path) -> list[Seed]:
     """Sound files to damage: tiny ones, made in the folder, before those of sample_data."""
-    made = {"liggghts": _liggghts_files, "vtk": _vtk_files, "yade": _yade_files}[format](folder)
+    made = {
+        "lammps": _lammps_files,
+        "liggghts": _liggghts_files,
+        "vtk": _vtk_files,
+        "yade": _yade_files,
+    }[format](folder)
     samples = [
         path
         for place in (FLOOR, PERIODIC, YADE)
@@ -248,7 +265,32 @@ def seeds(format: str, folder: Path) -> list[Seed]:
 def _is_for(format: str, path: Path) -> bool:
     if format == "vtk":
         return path.name.removesuffix(".gz")[-4:] in (".vtk", ".vtp", ".vtu")
+    if format == "lammps":
+        return path.suffix == ".txt" and YADE not in path.parents
     return (YADE in path.parents) == (format == "yade")
+
+
+def _lammps_files(folder: Path) -> list[Path]:
+    """Both tilted headers, items before the step, a list of pairs, a data file."""
+    general = ((1, 0.5, 0, -1), (-0.25, 1, 0, 2), (0, 0.125, 1, 3))
+    rows = "".join(f"{i} {t} {2 * r} 2500 {x} {y} {z}\n" for i, t, x, y, z, r in ROWS)
+    files = {
+        "units.lammpstrj": dump_text(before="ITEM: UNITS\nsi\nITEM: TIME\n0.5\n"),
+        "tilted.lammpstrj": dump_text(
+            flags=" xy xz yz pp pp ff", box=((0, 2.7, 1.2), (0, 1, 0), (0, 1, 0.3))
+        ),
+        "general.lammpstrj": dump_text(flags=" abc origin pp pp ff", box=general),
+        "pairs.local": local_text([(*pair, 0.1, 1.5, 0, 0) for pair in PAIRS]),
+        "grains.data": (
+            "LAMMPS data file via write_data, timestep = 12\n\n3 atoms\n\n0 1 xlo xhi\n"
+            f"0 2 ylo yhi\n-1 3 zlo zhi\n0.5 0 0.25 xy xz yz\n\nAtoms # sphere\n\n{rows}\n"
+            "Velocities\n\n1 0 0 0 0 0 0\n"
+        ),
+    }
+    paths = [folder / name for name in files]
+    for path in paths:
+        path.write_text(files[path.name])
+    return paths
 
 
 def _liggghts_files(folder: Path) -> list[Path]:
@@ -282,10 +324,13 @@ def _yade_files(folder: Path) -> list[Path]:
     text.write_text(head + "0 0 0 1 2 3\n2 0 0 1 4 5\n")
     pack = folder / "pack.txt"
     pack.write_text("##PERIODIC:: 4 4 4\n0 0 0 1 -1\n2 0 0 1 -1\n")
+    save = folder / "save.xml"
+    save.write_text(small_save())
     vectors = {"normalForce": [[1, 0, 0]] * 2, "shearForce": [[0, 1, 0]] * 2}
     return [
         text,
         pack,
+        save,
         yade_spheres(folder / "spheres.vtk", grains.position[:3], [1, 1, 1], id=[0, 1, 2]),
         yade_lines(folder / "lines.vtk", ends, vectors, id1=[0, 1], id2=[1, 2]),
         *_recorders(folder, "forceN"),

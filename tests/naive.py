@@ -1,7 +1,7 @@
 """Slow, obvious twins of every kernel and formula: what the fast ones must equal."""
 
 from itertools import pairwise, product
-from math import ceil, sqrt
+from math import ceil, floor, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -99,25 +99,48 @@ def tally(gaps, cutoff):
     )
 
 
-def contacts(position, radius, tolerance=0.0, edges=None, periodic=(True, True, True)):
+def shifts_within(reach, branch, vectors, periodic):
+    """All shifts by whole periodic vectors that may bring a branch within reach."""
+    rows = [k for k in range(3) if periodic[k]]
+    if not rows:
+        return [(0, 0, 0)]
+    # planes of the lattice, in its span: open vectors do not bound it
+    inverse = np.linalg.pinv(vectors[rows])
+    layers = [range(1)] * 3
+    for k, along, per_length in zip(
+        rows, branch @ inverse, np.linalg.norm(inverse, axis=0), strict=True
+    ):
+        most = reach * per_length + 1e-9
+        layers[k] = range(ceil(-along - most), floor(-along + most) + 1)
+    return list(product(*layers))
+
+
+def nearest_length(branch, vectors, periodic):
+    """The shortest length of a branch with all shifts that are not longer than itself."""
+    lattice = vectors[list(periodic)]
+    if len(lattice):
+        branch = branch - np.rint(branch @ np.linalg.pinv(lattice)) @ lattice
+    shifts = shifts_within(np.linalg.norm(branch), branch, vectors, periodic)
+    return min(np.linalg.norm(branch + shift @ vectors) for shift in shifts)
+
+
+def contacts(position, radius, tolerance=0.0, vectors=None, periodic=(True, True, True)):
     """
     Contacts by geometry, of all pairs with all images: a set of (first, second, image).
 
     Each contact once, named from its lower row; one with an own image by the image whose first
-    shift is positive. ``edges`` are those of an orthogonal cell.
+    shift is positive. ``vectors`` are those of the cell, or its edges.
     """
-    reach = 2 * max(radius, default=0.0) * (1 + tolerance)
-    edges = np.full(3, np.inf) if edges is None else np.where(periodic, edges, np.inf)
-    layers = [range(-n, n + 1) for n in (ceil(reach / edge) + 1 for edge in edges)]
-    shifts = [s for s in product(*layers) if not any(np.isinf(edges[np.nonzero(s)]))]
+    periodic = (False,) * 3 if vectors is None else periodic
+    vectors = np.zeros((3, 3)) if vectors is None else np.asarray(vectors, dtype=float)
+    vectors = np.diag(vectors) if vectors.ndim == 1 else vectors
     found = set()
     for i, j in product(range(len(position)), repeat=2):
-        for shift in shifts:
-            if i > j or (i == j and shift <= (0, 0, 0)):
+        branch, reach = position[j] - position[i], (radius[i] + radius[j]) * (1 + tolerance)
+        for shift in shifts_within(reach, branch, vectors, periodic) if i <= j else ():
+            if i == j and shift <= (0, 0, 0):
                 continue
-            moved = position[j] + np.where(np.isinf(edges), 0.0, np.nan_to_num(edges) * shift)
-            distance = np.linalg.norm(moved - position[i])
-            if distance < (radius[i] + radius[j]) * (1 + tolerance):
+            if np.linalg.norm(branch + shift @ vectors) < reach:
                 found.add((i, j, shift))
     return found
 

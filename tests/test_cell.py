@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from scanfab.cell import Cell
 from scanfab.errors import PackingError
+from tests import naive
 
 EDGES = np.array([2.0, 3.0, 4.0])
 TILTED = np.array([[2.0, 0, 0], [0.7, 3, 0], [-0.5, 0.4, 4]])
@@ -122,9 +124,64 @@ def test_the_nearest_image_is_in_the_same_cell_along_vectors_that_do_not_repeat(
     np.testing.assert_array_equal(image, [[-1, 0, 0]])
 
 
-def test_nearest_images_in_a_tilted_cell_are_refused():
-    with pytest.raises(PackingError, match="tilted cell are not supported yet"):
-        Cell(TILTED).nearest_image([[1, 1, 1]])
+def random_cell(random):
+    """Strongly tilted, flat or long cells, with any mix of vectors that repeat."""
+    vectors = np.diag(random.uniform(0.5, 4.0, 3))
+    vectors[[1, 2, 2], [0, 0, 1]] = random.uniform(-1.6, 1.6, 3) * vectors[0, 0]
+    if random.random() < 0.3:
+        vectors = vectors @ Rotation.random(rng=random).as_matrix()
+    return Cell(vectors, tuple(random.random(3) < 0.7), random.uniform(-5, 5, 3))
+
+
+def test_the_nearest_image_is_the_shortest_in_any_cell():
+    random = np.random.default_rng(5)
+    for _ in range(100):
+        cell = random_cell(random)
+        branches = random.normal(size=(5, 3)) * random.choice([0.3, 3.0, 30.0])
+        image = cell.nearest_image(branches)
+        assert not image[:, ~np.array(cell.periodic)].any()
+        found = np.linalg.norm(branches + image @ cell.vectors, axis=1)
+        shortest = [naive.nearest_length(b, cell.vectors, cell.periodic) for b in branches]
+        np.testing.assert_allclose(found, shortest, rtol=1e-12, atol=1e-12)
+
+
+def test_the_nearest_image_in_a_cell_tilted_by_more_than_its_length():
+    """Rounding the fractions (-0.02, 0, 0.4) would answer (0, 0, 0), of length 0.77, not 0.52."""
+    cell = Cell([[1, 0, 0], [0, 1, 0], [1.7, 0, 1]])
+    np.testing.assert_array_equal(cell.nearest_image([[0.66, 0, 0.4]]), [[-1, 0, 0]])
+
+
+def test_a_reduced_lattice_is_the_same_lattice_by_shorter_vectors():
+    random = np.random.default_rng(6)
+    for _ in range(100):
+        cell = random_cell(random)
+        lattice = cell.lattice
+        np.testing.assert_allclose(lattice.combination @ cell.vectors, lattice.vectors)
+        # whole combinations of each other: the same points
+        whole = lattice.combination[:, list(cell.periodic)]
+        assert abs(round(np.linalg.det(whole))) == 1
+        lengths = np.linalg.norm(lattice.vectors, axis=1)
+        for k, signs in product(range(len(whole)), product((-1, 0, 1), repeat=len(whole))):
+            if signs[k]:
+                other = np.linalg.norm(np.array(signs) @ lattice.vectors)
+                assert other >= lengths[k] * (1 - 1e-6)
+
+
+def test_the_shortest_translation_of_a_lattice():
+    assert Cell([[1, 0, 0], [5, 3, 0], [0, 0, 2]]).lattice.shortest == 1.0
+    assert Cell(EDGES, (False, False, False)).lattice.shortest == np.inf
+
+
+def test_positions_are_their_places_and_their_turns():
+    random = np.random.default_rng(7)
+    for _ in range(50):
+        cell = random_cell(random)
+        position = random.normal(size=(20, 3)) * 10
+        place, turns = cell.place(position)
+        np.testing.assert_allclose(place + turns @ cell.vectors, position, atol=1e-11)
+        fractions = cell.fractional(place)[:, list(cell.periodic)]
+        assert np.all((fractions > -1e-12) & (fractions < 1 + 1e-12))
+        assert not turns[:, ~np.array(cell.periodic)].any()
 
 
 @pytest.mark.parametrize("margin", [0.0, 0.3, 1.0, 2.5, 5.0])

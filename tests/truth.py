@@ -13,6 +13,8 @@ PERIODIC = SAMPLE_DATA / "liggghts_formats" / "periodic"
 YADE = SAMPLE_DATA / "yade_formats"
 TRIAXIAL = SAMPLE_DATA / "yade_triaxial"
 BOX = SAMPLE_DATA / "liggghts_box"
+CELL = SAMPLE_DATA / "liggghts_periodic"
+SHEAR = SAMPLE_DATA / "lammps_shear"
 
 COMPONENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 
@@ -64,6 +66,14 @@ def assert_same_vectors(found, expected, *, atol: float) -> None:
     np.testing.assert_allclose(
         [found[key] for key in keys], [expected[key] for key in keys], rtol=0, atol=atol
     )
+
+
+def lammps_fabric(packing) -> list[float]:
+    """LAMMPS' compute fabric contact: 15/2 of the deviator of the mean of n n, xx to yz."""
+    tensor = np.mean([np.outer(n, n) for n in packing.contacts.normal], axis=0)
+    deviator = 7.5 * (tensor - np.eye(3) * np.trace(tensor) / 3)
+    places = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
+    return [deviator[place] for place in places]
 
 
 def off_by(packing, position) -> np.ndarray:

@@ -173,7 +173,8 @@ _READING: list[Callable[[Command], Command]] = [
     click.option(
         "--contact-columns",
         metavar="KEYWORDS",
-        help='Columns of a dump local: LIGGGHTS keywords, "pos id force".',
+        help='Columns of a dump local: LIGGGHTS keywords "pos id force", '
+        'or LAMMPS names "id1=NAME,id2=NAME".',
     ),
     click.option(
         "--radius",

@@ -77,6 +77,19 @@ class FabricTensor:
         return self._eigen[1]
 
     @property
+    def major_axis(self) -> FloatArray:
+        """Unit vector of the largest principal value, shape (3,); of n and -n the upper one."""
+        axis = self.principal_axes[0]
+        leading = axis[np.flatnonzero(np.abs(axis) > 1e-12)[-1]]
+        upper: FloatArray = axis * np.sign(leading)
+        return upper
+
+    def angle_to(self, other: FabricTensor) -> float:
+        """Angle between the major axes of two tensors, 0 to 90 degrees."""
+        cosine = abs(float(self.major_axis @ other.major_axis))
+        return float(np.degrees(np.arccos(min(cosine, 1.0))))
+
+    @property
     def alpha(self) -> float:
         """α: largest minus smallest principal value; never negative, so noise raises it."""
         return float(self.principal_values[0] - self.principal_values[2])

@@ -44,9 +44,10 @@ class CellGrains(NamedTuple):
 
 class Prism(NamedTuple):
     """
-    The lines' prism in the frame u, v, n: edges (base_u, 0) and (skew_u, base_v), along n ``length``.
+    The lines' prism in the frame u, v, n, with the edges (base_u, 0) and (skew_u, base_v).
 
-    A point has the height (n - rise_u * u - rise_v * v) / length; 0 to 1 is the prism.
+    Its length along n is ``length``. A point has the height (n - rise_u * u - rise_v * v) / length,
+    which is 0 to 1 in the prism.
     """
 
     frame: FloatArray
@@ -67,7 +68,7 @@ class Prism(NamedTuple):
 @njit(nogil=True, cache=True)
 def dot(a: FloatArray, b: FloatArray) -> float:
     """Scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
 @njit(nogil=True, cache=True)
@@ -210,6 +211,37 @@ def images_in(grains: CellGrains, prism: Prism) -> tuple[Spheres, FloatArray]:
 
 
 @njit(nogil=True, cache=True)
+def entry(
+    grains: CellGrains, prism: Prism, u: float, v: float, depth: float, r: float, after: float
+) -> float:
+    """
+    Where the axis u = v = 0 enters the images, in the plane of the face, of a sphere at a place.
+
+    Of those that it leaves behind a depth, the first; FAR if there is none.
+    """
+    normal = prism.frame[2]
+    found = FAR
+    over = 0, 1
+    if grains.periodic[prism.second]:
+        over = shifts(v, r, 0.0, 0.0, prism.base_v)
+    for j in range(over[0], over[1]):
+        v1, u1 = v + j * prism.base_v, u + j * prism.skew_u
+        reach2 = r * r - v1 * v1
+        across = 0, 1
+        if grains.periodic[prism.first]:
+            across = shifts(u1, np.sqrt(max(reach2, 0.0)), 0.0, 0.0, prism.base_u)
+        for q in range(across[0], across[1]):
+            u2 = u1 + q * prism.base_u
+            if reach2 > u2 * u2:
+                half = np.sqrt(reach2 - u2 * u2)
+                middle = depth + j * dot(grains.vectors[prism.second], normal)
+                middle += q * dot(grains.vectors[prism.first], normal)
+                if middle + half > after:
+                    found = min(found, middle - half)
+    return found
+
+
+@njit(nogil=True, cache=True)
 def next_solid(
     grains: CellGrains, prism: Prism, second: bool, u: float, v: float, after: float
 ) -> float:
@@ -218,12 +250,7 @@ def next_solid(
 
     FAR if it stays in a channel. ``second``: of the grains that are not removed.
     """
-    frame = prism.frame
-    a, b, c = (
-        grains.vectors[prism.first],
-        grains.vectors[prism.second],
-        grains.vectors[prism.third],
-    )
+    frame, c = prism.frame, grains.vectors[prism.third]
     rise_c = dot(c, frame[2]) - prism.rise_u * dot(c, frame[0]) - prism.rise_v * dot(c, frame[1])
     step = 1.0 if rise_c > 0.0 else -1.0
     largest = 0.0
@@ -233,7 +260,8 @@ def next_solid(
     place = (after - prism.rise_u * u - prism.rise_v * v) / prism.length - margin
     found = FAR
     for cells in range(MOST_CELLS):
-        if cells > 0 and (found - after) / prism.length + 2.0 * margin < cells:
+        # spheres that are so far away begin behind what was found
+        if (found - after) / prism.length + 2.0 * margin < cells:
             break
         for g in range(grains.radius.size):
             if second and grains.removed[g]:
@@ -245,20 +273,5 @@ def next_solid(
             u1 = u0 + k * dot(c, frame[0]) - u
             v1 = v0 + k * dot(c, frame[1]) - v
             n1 = n0 + k * dot(c, frame[2])
-            over = 0, 1
-            if grains.periodic[prism.second]:
-                over = shifts(v1, r, 0.0, 0.0, prism.base_v)
-            for j in range(over[0], over[1]):
-                v2 = v1 + j * prism.base_v
-                reach2 = r * r - v2 * v2
-                u2, n2 = u1 + j * prism.skew_u, n1 + j * dot(b, frame[2])
-                across = 0, 1
-                if grains.periodic[prism.first]:
-                    across = shifts(u2, np.sqrt(max(reach2, 0.0)), 0.0, 0.0, prism.base_u)
-                for q in range(across[0], across[1]):
-                    u3 = u2 + q * prism.base_u
-                    if reach2 > u3 * u3:
-                        depth, half = n2 + q * dot(a, frame[2]), np.sqrt(reach2 - u3 * u3)
-                        if depth + half > after:
-                            found = min(found, depth - half)
+            found = min(found, entry(grains, prism, u1, v1, n1, r, after))
     return found

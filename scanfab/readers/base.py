@@ -82,6 +82,8 @@ class GrainTable(NamedTuple):
     cell: Cell | None
     contacts: ContactList | None = None
     """Contacts that the grain file itself lists."""
+    wall_contacts: IntArray | None = None
+    """Number of contacts with walls of each grain, shape (N,), if the grain file lists them."""
 
 
 class JoinedContacts(NamedTuple):
@@ -99,7 +101,7 @@ class Reader(Protocol):
 
     All methods raise ReadError, with the file and what was expected, and nothing else. A reader of
     a format that any program may write can say so with an attribute ``generic = True``: it is asked
-    after the others.
+    after the others. One whose grain files may list contacts says ``lists_contacts = True``.
     """
 
     name: str

@@ -18,8 +18,9 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.cell import Cell
-from scanfab.errors import ReadError, ScanfabWarning
+from scanfab.errors import PackingError, ReadError, ScanfabWarning
 from scanfab.readers.base import Snapshot
+from scanfab.readers.box import box_of_bounds, box_vectors
 from scanfab.readers.columns import MOST
 from scanfab.readers.files import plain
 
@@ -32,7 +33,7 @@ HEADER_BYTES = 1 << 16
 COUNT_KEY = re.compile(rb"^ITEM: NUMBER OF (\S+)[ \t]*\r?$", re.MULTILINE)
 
 # also spaces of latin1, as numpy has them
-BLANK = re.compile(rb"^[\s\x1c-\x1f\x85\xa0]*\n", re.MULTILINE)
+BLANK = re.compile(rb"^[\s\x1c-\x1f\x85\xa0]*(?:\n|\Z)", re.MULTILINE)
 
 # LAMMPS writes units and time before the step
 BEFORE_STEP = re.compile(rb"(?:^ITEM: (?:UNITS|TIME)[ \t]*\r?\n[^\n]*\n)+\Z", re.MULTILINE)
@@ -272,27 +273,22 @@ def _cell(where: str, sections: dict[str, list[str]]) -> Cell | None:
     if key is None:
         return None
     words = key.removeprefix("BOX BOUNDS").split()
+    is_general = words[:2] == ["abc", "origin"]
+    is_tilted = words[:3] == ["xy", "xz", "yz"]
+    width = 4 if is_general else 3 if is_tilted else 2
     try:
         bounds = np.array([line.split() for line in sections[key][:3]], dtype=np.float64)
     except ValueError:
         bounds = np.zeros(0)
-    tilted = words[:3] == ["xy", "xz", "yz"]
-    if bounds.shape != (3, 3 if tilted else 2):
-        raise ReadError(
-            f"{where}: ITEM: {key}: expected three lines of {3 if tilted else 2} numbers"
-        )
+    if bounds.shape != (3, width):
+        raise ReadError(f"{where}: ITEM: {key}: expected three lines of {width} numbers")
     if not np.all(np.abs(bounds) < MOST):
         return None
     flags = [word == "pp" for word in words[-3:]] if len(words) >= 3 else [False] * 3
-    low, high = bounds[:, 0].copy(), bounds[:, 1].copy()
-    xy, xz, yz = bounds[:, 2] if tilted else (0.0, 0.0, 0.0)
-    # the bounds of a tilted box are those of the box around it
-    low[0] -= min(0.0, xy, xz, xy + xz)
-    high[0] -= max(0.0, xy, xz, xy + xz)
-    low[1] -= min(0.0, yz)
-    high[1] -= max(0.0, yz)
-    edge = high - low
-    if np.any(edge <= 0):
+    vectors, origin = (
+        (bounds[:, :3], bounds[:, 3]) if is_general else box_vectors(*box_of_bounds(bounds))
+    )
+    try:
+        return Cell(vectors, (flags[0], flags[1], flags[2]), origin)
+    except PackingError:
         return None
-    vectors = [[edge[0], 0, 0], [xy, edge[1], 0], [xz, yz, edge[2]]]
-    return Cell(vectors, (flags[0], flags[1], flags[2]), low)

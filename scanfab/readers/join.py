@@ -41,6 +41,7 @@ def join_ids(
     force: FloatArray | None,
     *,
     walls: bool,
+    image: IntArray | None = None,
 ) -> JoinedContacts:
     """
     Join contacts that name grains by id.
@@ -57,6 +58,8 @@ def join_ids(
         Force on the second grain.
     walls : bool
         Whether one of the two ids may be a wall's, which is no grain.
+    image : ndarray of int, shape (M, 3), optional
+        Lattice translation of the second grain, from the positions of the table.
 
     Raises
     ------
@@ -68,8 +71,7 @@ def join_ids(
     rows = rows_of_ids(grains, ids)
     return _join(
         path,
-        rows,
-        force,
+        ContactList(rows, image, force),
         walls,
         lambda contact, end: f"names the grain {ids[contact, end]}",
         len(grains.radius),
@@ -111,8 +113,7 @@ def join_positions(
             _refuse_images(path, grains, rows.reshape(-1, 2), ends)
     return _join(
         path,
-        rows.reshape(-1, 2),
-        force,
+        ContactList(rows.reshape(-1, 2), force=force),
         True,
         lambda contact, end: f"ends at {ends[contact, end].tolist()}, where no grain is",
         len(grains.radius),
@@ -170,13 +171,13 @@ def _grains_at(grains: GrainTable, points: FloatArray) -> IntArray:
 
 def _join(
     path: Path,
-    rows: IntArray,
-    force: FloatArray | None,
+    listed: ContactList,
     walls: bool,
     describe: Callable[[int, int], str],
     count: int,
 ) -> JoinedContacts:
     """Tell contacts of two grains from contacts with a wall (one row is -1) and from errors."""
+    rows = np.asarray(listed.pairs)
     unknown = rows < 0
     wrong = unknown.all(axis=1) if walls else unknown.any(axis=1)
     if wrong.any():
@@ -189,7 +190,8 @@ def _join(
         )
     both = ~unknown.any(axis=1)
     with_wall = rows[~both].max(axis=1)
-    return JoinedContacts(
-        ContactList(rows[both], force=None if force is None else force[both]),
-        count_walls(with_wall, count),
+    image, force = (
+        None if values is None else np.asarray(values)[both]
+        for values in (listed.image, listed.force)
     )
+    return JoinedContacts(ContactList(rows[both], image, force), count_walls(with_wall, count))

@@ -15,9 +15,10 @@ import numpy.typing as npt
 
 from scanfab.errors import ReadError
 from scanfab.readers.base import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
-from scanfab.readers.columns import grain_table, has_radius
 from scanfab.readers.dump import DumpBlock, index_dump, read_block, row_word
+from scanfab.readers.dump_grains import dump_kind, read_dump_grains
 from scanfab.readers.files import first_bytes
+from scanfab.readers.ids import MOST_ROWS, are_ids, are_whole, refuse_rounded_ids
 from scanfab.readers.join import count_walls, join_ids, rows_of_ids
 from scanfab.readers.mesh import Mesh
 from scanfab.readers.vtk import VtkReader
@@ -45,10 +46,6 @@ PAIR_VALUES = {
     "ms_id": 2,
     "heatFlux": 1,
 }
-
-
-# of the rows of a contact file: enough to know a column by its values
-MOST = 0.5
 
 
 class LiggghtsVtkReader(VtkReader):
@@ -86,11 +83,7 @@ class LiggghtsReader:
         head = first_bytes(path, 1 << 16)
         if not _is_text(head):
             return self._vtk.kind(path)
-        if row_word(head) != "ATOMS":
-            return "contacts"
-        names = re.search(rb"^ITEM: ATOMS(.*)$", head, re.MULTILINE)
-        columns = names[1].decode("utf-8", "replace").split() if names else []
-        return "grains" if has_radius(columns) else "points"
+        return dump_kind(head)
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """By ``ITEM: TIMESTEP``; a VTK file is one."""
@@ -100,12 +93,7 @@ class LiggghtsReader:
         """Columns in any order and any subset that suffices; of repeated names the first counts."""
         if not _is_text(first_bytes(snapshot.path)):
             return self._vtk.read_grains(snapshot, options)
-        block = read_block(snapshot)
-        columns = {
-            name: block.values[:, place] for place, name in reversed(list(enumerate(block.names)))
-        }
-        ordered = {name: columns[name] for name in block.names}
-        return grain_table(snapshot.path, ordered, block.cell, options, f", step {snapshot.step}")
+        return read_dump_grains(snapshot, options)
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
@@ -125,7 +113,7 @@ class LiggghtsReader:
             return join_ids(path, grains, pairs, None, walls=False)
         if grains.id is None:
             raise ReadError(f"{path}: names grains by id, but the grain file has no ids")
-        _refuse_rounded_ids(path, block.values, grains)
+        refuse_rounded_ids(path, block.values, grains)
         place, force = _given_places(path, options.contact_columns, block)
         if place is None:
             place = _pair_column(block.values, grains)
@@ -137,10 +125,11 @@ class LiggghtsReader:
             raise ReadError(
                 f"{path}: cannot tell which columns are the two ids of a contact: the ids may "
                 f"belong to another step; or name the keywords of the compute with "
-                f'--contact-columns "pos id force ..."'
+                f'--contact-columns "pos id force ..."; a dump of LAMMPS is read with '
+                f"--format lammps"
             )
         listed = block.values[:, place : place + 2]
-        if not (_are_whole(listed) and np.all(np.abs(listed) < 2.0**53)):
+        if not (are_whole(listed) and np.all(np.abs(listed) < 2.0**53)):
             raise ReadError(f"{path}: expected ids in the columns {place + 1} and {place + 2}")
         ids = listed.astype(np.int64)
         # the file has the force on the first grain
@@ -190,8 +179,8 @@ def _pair_column(values: FloatArray, grains: GrainTable) -> int | None:
         place
         for place in range(values.shape[1] - 2)
         if np.isin(values[:, place + 2], (0, 1)).all()
-        and _are_ids(values[:, place], grains)
-        and _are_ids(values[:, place + 1], grains)
+        and are_ids(values[:, place], grains)
+        and are_ids(values[:, place + 1], grains)
         and np.all(values[:, place] != values[:, place + 1])
     ]
     return candidates[0] if len(candidates) == 1 else None
@@ -205,7 +194,7 @@ def _force_column(values: FloatArray, place: int, grains: GrainTable) -> int | N
         return None
     first, second = rows_of_ids(grains, values[:, place : place + 2]).T
     branch = grains.position[second] - grains.position[first]
-    if grains.cell is not None and grains.cell.is_orthogonal:
+    if grains.cell is not None:
         branch = branch + grains.cell.nearest_image(branch) @ grains.cell.vectors
     pushed = np.sum(force * branch, axis=1) < 0
     # damping makes the force of a few contacts attractive
@@ -216,13 +205,13 @@ def _force_column(values: FloatArray, place: int, grains: GrainTable) -> int | N
 def _wall_column(values: FloatArray, grains: GrainTable) -> int | None:
     """The grains' ids of a wall/gran/local file: behind wall and triangle, and a listed centre."""
     for place in range(5, values.shape[1]):
-        if not _are_ids(values[:, place], grains) or not _are_whole(values[:, place - 2 : place]):
+        if not are_ids(values[:, place], grains) or not are_whole(values[:, place - 2 : place]):
             continue
         rows = rows_of_ids(grains, values[:, place])
         centres, size = grains.position[rows], grains.radius[rows]
         for start in range(place - 4):
             distance = np.linalg.norm(values[:, start : start + 3] - centres, axis=1)
-            if np.mean(distance < 0.01 * size) > MOST:
+            if np.mean(distance < 0.01 * size) > MOST_ROWS:
                 return place
     return None
 
@@ -236,26 +225,3 @@ def _wall_contacts(path: Path, ids: FloatArray, grains: GrainTable) -> IntArray:
             f"do both files belong to the same step?"
         )
     return count_walls(rows, len(grains.radius))
-
-
-def _are_whole(values: FloatArray) -> bool:
-    return bool(np.all(values == np.rint(values)))
-
-
-def _are_ids(values: FloatArray, grains: GrainTable) -> bool:
-    """Whether nearly all are ids of grains: a wrong one among them is reported by its name."""
-    return _are_whole(values) and bool(np.mean(rows_of_ids(grains, values) >= 0) > MOST)
-
-
-def _refuse_rounded_ids(path: Path, values: FloatArray, grains: GrainTable) -> None:
-    """%g keeps six digits: from a million on ids may be rounded."""
-    assert grains.id is not None
-    longer = grains.id[grains.id >= 1_000_000]
-    digits = 10 ** (np.floor(np.log10(np.maximum(longer, 1))).astype(np.int64) - 5)
-    longer = longer[longer % digits != 0]
-    large = np.any(values >= 1e6, axis=0) & np.all(values == np.rint(values), axis=0)
-    if longer.size and large.any() and not np.isin(values[:, large], longer).any():
-        raise ReadError(
-            f"{path}: ids above 999999 are rounded to six digits, so contacts name wrong grains: "
-            f'write them with dump_modify ... format "%.0f ..."'
-        )

@@ -33,6 +33,7 @@ class VtkReader:
     description = "any VTK point cloud with a radius; contacts as lines (also .pvd series)"
     extensions: tuple[str, ...] = (".vtk", ".vtp", ".vtu", ".pvd", ".xdmf", ".xmf")
     generic = True
+    lists_contacts = True
     # whether one end of a contact may be a wall, which is not in the grain file
     walls = True
 
@@ -94,7 +95,7 @@ class VtkReader:
                 (index.parent / entry.attrib["file"], float(entry.attrib["timestep"]))
                 for entry in root.iter("DataSet")
             ]
-        except (ElementTree.ParseError, KeyError, ValueError) as error:
+        except (ElementTree.ParseError, LookupError, ValueError) as error:
             raise ReadError(f"{index}: cannot be read as a list of VTK files: {error}") from None
         kinds: dict[str, FileKind] = {}
         found = []

@@ -1,4 +1,4 @@
-"""YADE: its text exports, ``SpherePack.save``, ``VTKExporter`` and ``VTKRecorder``."""
+"""YADE: text exports, ``SpherePack.save``, ``VTKExporter``, ``VTKRecorder`` and ``O.save``."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from scanfab.readers.columns import MOST, grain_table
 from scanfab.readers.files import first_bytes, plain
 from scanfab.readers.mesh import Mesh
 from scanfab.readers.vtk import VtkReader
+from scanfab.readers.yade_save import is_binary_save, is_save, read_save, snapshot_of_save
 
 __all__ = ["YadeReader"]
 
@@ -35,23 +36,37 @@ class YadeReader(VtkReader):
     """Reader plugin for what YADE exports."""
 
     name = "yade"
-    description = "YADE export.VTKExporter, VTKRecorder, export.text, export.textExt"
-    extensions = (".vtk", ".vtu", ".vtp", ".txt")
+    description = "YADE export.VTKExporter, VTKRecorder, export.text, export.textExt, O.save (XML)"
+    extensions = (".vtk", ".vtu", ".vtp", ".txt", ".xml", ".yade")
     generic = False
 
     def recognises(self, path: Path) -> bool:
         """YADE's own first lines, or the arrays of VTKRecorder's interactions."""
         head = first_bytes(path)
-        return head.startswith((EXPORTER_HEAD, *TEXT_HEADS)) or (
-            b"<VTKFile" in head and b'Name="forceN"' in head
+        return (
+            head.startswith((EXPORTER_HEAD, *TEXT_HEADS))
+            or (b"<VTKFile" in head and b'Name="forceN"' in head)
+            or is_save(path)
+            or is_binary_save(path)
         )
 
     def kind(self, path: Path) -> FileKind:
-        """A text export holds grains."""
-        return "grains" if _is_text(path) else super().kind(path)
+        """A text export and a saved simulation hold grains."""
+        if is_binary_save(path):
+            raise ReadError(
+                f"{path}: YADE's binary format can be read by the same build of YADE only: load it "
+                f"there, and save it as XML: O.save('name.xml.bz2')"
+            )
+        return "grains" if _is_text(path) or is_save(path) else super().kind(path)
+
+    def snapshots(self, path: Path) -> list[Snapshot]:
+        """One; a saved simulation says which step it is."""
+        return [snapshot_of_save(path)] if is_save(path) else super().snapshots(path)
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         """Text columns by the names of the first line; VTK arrays by their own."""
+        if is_save(snapshot.path):
+            return read_save(snapshot, options)
         if not _is_text(snapshot.path):
             return super().read_grains(snapshot, options)
         path = snapshot.path
@@ -68,6 +83,11 @@ class YadeReader(VtkReader):
         """Lines between centres; a wall's end is where no grain is."""
         if _is_text(snapshot.path):
             raise ReadError(f"{snapshot.path}: YADE's text export holds no contacts")
+        if is_save(snapshot.path):
+            raise ReadError(
+                f"{snapshot.path}: a saved simulation is no contact list for other grains: "
+                f"compute it by itself"
+            )
         _refuse_lost_lines(snapshot.path)
         return super().read_contacts(snapshot, options, grains)
 
@@ -166,5 +186,5 @@ def _count_lines_and_values(path: Path) -> tuple[int, int | None]:
         # blocks, bytes of a full block, bytes of the last one if it is not full
         blocks, full, last = struct.unpack("<3I", base64.b64decode(data[:16]))
         return lines, (blocks * full if last == 0 else (blocks - 1) * full + last) // 8
-    except (ElementTree.ParseError, StopIteration, KeyError, ValueError, struct.error) as error:
+    except (ElementTree.ParseError, StopIteration, LookupError, ValueError, struct.error) as error:
         raise ReadError(f"{path}: cannot be read as VTKRecorder's file: {error}") from None

@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scanfab import Cell, Packing, find_contacts
-from scanfab.kernels.neighbours import bin_spheres, overlapping_pairs
+from scanfab import Cell, Packing, PackingError, find_contacts
+from scanfab.contacts import overlapping_pairs
+from scanfab.kernels.neighbours import Frame, Grid, Pairs, fill_grid, pairs_within, sort_pairs
 from tests import naive
 from tests.uncompiled import run_uncompiled
 
@@ -29,12 +30,13 @@ def assert_open_contacts_equal(position, radius, tolerance):
     assert canonical(packing.contacts) == naive.contacts(position, radius, tolerance)
 
 
-def assert_periodic_contacts_equal(position, radius, edges, periodic, origin=(0, 0, 0)):
-    packing = Packing(position, radius, cell=Cell(edges, periodic, origin))
+def assert_periodic_contacts_equal(position, radius, vectors, periodic, origin=(0, 0, 0)):
+    packing = Packing(position, radius, cell=Cell(vectors, periodic, origin))
     found = find_contacts(packing).contacts
     assert canonical(found) == naive.contacts(
-        packing.position, packing.radius, 0.0, np.array(edges), periodic
+        packing.position, packing.radius, 0.0, vectors, periodic
     )
+    assert sorted(found.pairs.tolist()) == found.pairs.tolist()
 
 
 def check_random_open(random):
@@ -53,6 +55,33 @@ def check_random_periodic(random):
     position = origin + random.uniform(-1, 2, (count, 3)) * edges
     radius = random.uniform(0.02, 1.0, count) * random.choice([0.3, 1.0])
     assert_periodic_contacts_equal(position, radius, edges, periodic, origin)
+
+
+def random_vectors(random):
+    """Thin cells, most of them tilted: as LAMMPS writes them, or any three vectors."""
+    vectors = np.diag(random.uniform(0.8, 3.0, 3))
+    if random.random() < 0.5:
+        vectors[[1, 2, 2], [0, 0, 1]] = random.uniform(-2.5, 2.5, 3) * vectors[0, 0]
+        return vectors
+    while True:
+        vectors = random.normal(size=(3, 3)) * random.uniform(0.5, 2.0)
+        if abs(np.linalg.det(vectors)) > 0.3:
+            return vectors
+
+
+def check_random_tilted(random):
+    """Any mix of open vectors; grains from dust to some that touch their own images."""
+    vectors, count = random_vectors(random), random.integers(1, 7)
+    periodic, origin = tuple(random.random(3) < 0.7), random.uniform(-5, 5, 3)
+    position = origin + random.uniform(-1, 2, (count, 3)) @ vectors
+    radius = random.uniform(0.02, 1.0, count) * random.choice([0.1, 0.3, 0.7])
+    radius *= random.choice([1.0, 0.01], count)
+    assert_periodic_contacts_equal(position, radius, vectors, periodic, origin)
+
+
+def test_contacts_in_tilted_cells_equal_the_slow_twin():
+    for seed in range(200):
+        check_random_tilted(np.random.default_rng(seed))
 
 
 def test_open_contacts_equal_the_slow_twin():
@@ -118,13 +147,76 @@ def test_two_grains_may_touch_through_several_images():
     assert canonical(contacts) == {(0, 1, (0, 0, 0)), (0, 1, (-1, 0, 0))}
 
 
+OPEN = Frame(np.eye(3) / 4, np.zeros(3), np.zeros((3, 3)), np.zeros(3, np.bool_))
+
+
+def filled(position, radius, shape):
+    """A grid over the cube from 0 to 4."""
+    count, bins = len(position), np.array(shape)
+    grid = Grid(
+        np.empty((count, 4)),
+        np.empty(count, np.int32),
+        np.zeros(np.prod(bins) + 1, np.int64),
+        bins,
+        np.ones(3, np.int64),
+    )
+    fill_grid(position, radius, np.arange(count, dtype=np.int32), OPEN, grid)
+    return grid
+
+
 def test_pairs_beyond_the_room_are_counted_but_not_written():
-    position, radius = np.zeros((4, 3)), np.ones(4)
-    pairs = np.full((2, 2), -1)
-    shape = np.ones(3, np.int64)
-    found = overlapping_pairs(position, radius, 1.0, 4, np.zeros(3), 2.0, shape, pairs)
-    assert found == 6
-    assert pairs.tolist() == [[0, 1], [0, 2]]
+    grid = filled(np.full((4, 3), 1.0), np.ones(4), (1, 1, 1))
+    pairs = Pairs(np.full((2, 2), -1, np.int32), np.full((2, 3), 7, np.int16))
+    assert pairs_within(grid, OPEN, 1.0, pairs, 0) == 6
+    assert pairs.rows.tolist() == [[0, 1], [0, 2]]
+    assert not pairs.image.any()
+
+
+def test_pairs_are_sorted_by_first_and_then_by_second():
+    random = np.random.default_rng(0)
+    pairs = Pairs(
+        random.integers(0, 9, (50, 2)).astype(np.int32),
+        random.integers(-1, 2, (50, 3)).astype(np.int16),
+    )
+    rows, image = np.empty((50, 2), np.int64), np.empty((50, 3), np.int64)
+    sort_pairs(pairs, 9, rows, image)
+    assert rows.tolist() == sorted(pairs.rows.tolist())
+    before = np.hstack([pairs.rows, pairs.image]).tolist()
+    assert sorted(np.hstack([rows, image]).tolist()) == sorted(before)
+
+
+def test_a_grain_of_many_cells_is_a_mistake_of_units():
+    with pytest.raises(PackingError, match="spans 200 periodic cells: have the cell and the radii"):
+        find_contacts(Packing([[0.5, 0.5, 0.5]], 100.0, cell=Cell([1.0, 1.0, 1.0])))
+
+
+@pytest.mark.parametrize("far", [1e3, 1e9, 1e60])
+@pytest.mark.parametrize("cell", [None, Cell([1.0, 1.1, 5.0], (True, True, False))])
+def test_grains_that_flew_away_leave_the_bins_small(far, cell):
+    """In bins that span all, 20000² / 2 pairs would be looked at; the far ones touch each other."""
+    random = np.random.default_rng(4)
+    position = random.random((20_000, 3))
+    position[::5000, 2] = far
+    position[1::5000] = position[::5000] + np.array([0.01, 0.0, 0.0])
+    pairs, _ = overlapping_pairs(position, np.full(20_000, 0.02), 1.0, cell)
+    near = np.flatnonzero(position[:, 2] <= 1)
+    among, _ = overlapping_pairs(position[near], np.full(len(near), 0.02), 1.0, cell)
+    assert (position[pairs, 2] <= 1).all(axis=1).sum() == len(among)
+    found = {tuple(pair) for pair in pairs[(position[pairs, 2] > 1).all(axis=1)].tolist()}
+    assert {(k, k + 1) for k in range(0, 20_000, 5000)} <= found
+
+
+def test_size_ratio_of_a_thousand_takes_little_memory_and_time():
+    """All dust in the bins of one boulder would be 20000² / 2 pairs to look at."""
+    random = np.random.default_rng(2)
+    position = random.random((20_000, 3))
+    radius = np.full(20_000, 2e-4)
+    radius[:3] = 0.2
+    pairs, _ = overlapping_pairs(position, radius)
+    gaps = np.linalg.norm(position[:3, None] - position, axis=2) - (radius[:3, None] + radius)
+    with_boulders = {(min(i, j), max(i, j)) for i, j in np.argwhere(gaps < 0).tolist() if i != j}
+    found = [tuple(pair) for pair in pairs.tolist()]
+    assert with_boulders == {pair for pair in found if pair[0] < 3}
 
 
 def test_more_contacts_than_the_first_guess_has_room_for():
@@ -134,15 +226,15 @@ def test_more_contacts_than_the_first_guess_has_room_for():
 
 
 def test_bins_list_every_sphere_once_in_its_bin():
-    random = np.random.default_rng(0)
-    position = random.random((200, 3)) * [3, 2, 1]
-    shape = np.array([6, 4, 2])
-    start, order = bin_spheres(position, np.zeros(3), 0.5, shape)
-    assert sorted(order) == list(range(200))
+    position = np.random.default_rng(0).random((200, 3)) * 4
+    shape = (6, 4, 2)
+    grid = filled(position, np.ones(200), shape)
+    assert sorted(grid.row) == list(range(200))
+    np.testing.assert_array_equal(grid.spheres[:, :3], position[grid.row])
     for x, y, z in np.ndindex(*shape):
         place = (x * 4 + y) * 2 + z
-        inside = position[order[start[place] : start[place + 1]]]
-        assert np.all(np.floor(inside / 0.5) == [x, y, z])
+        inside = grid.spheres[grid.start[place] : grid.start[place + 1], :3]
+        assert np.all(np.floor(inside / 4 * shape) == [x, y, z])
 
 
 def test_contacts_equal_the_slow_twin_uncompiled():
@@ -150,9 +242,10 @@ def test_contacts_equal_the_slow_twin_uncompiled():
         "import numpy as np\n"
         "from scanfab.kernels import neighbours\n"
         "from tests.kernels import test_neighbours as here\n"
-        "assert not hasattr(neighbours.overlapping_pairs, 'py_func')\n"
+        "assert not hasattr(neighbours.pairs_within, 'py_func')\n"
         "for seed in range(15):\n"
         "    here.check_random_open(np.random.default_rng(seed))\n"
         "    here.check_random_periodic(np.random.default_rng(seed))\n"
+        "    here.check_random_tilted(np.random.default_rng(seed))\n"
     )
     run_uncompiled(code)

@@ -174,7 +174,7 @@ def test_a_missing_box_is_no_cell(tmp_path):
         (((0, 1), (0, 1)), " ff ff ff"),
         (((0, "one"), (0, 1), (0, 1)), " ff ff ff"),
         (((0, 1), (0, 1), (0, 1)), " xy xz yz pp pp pp"),
-        (((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0)), " abc origin pp pp pp"),
+        (((1, 0, 0), (0, 1, 0), (0, 0, 1)), " abc origin pp pp pp"),
     ],
 )
 def test_a_box_that_cannot_be_read_names_what_is_expected(tmp_path, box, flags):

@@ -1,0 +1,49 @@
+"""Arrays as the package wants them: cast and checked once, at the border."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.errors import PackingError
+
+__all__ = ["cast", "grains_named"]
+
+IntArray = npt.NDArray[np.int64]
+
+
+def cast(
+    name: str, values: npt.ArrayLike, dtype: type | None, shape: tuple[Any, ...]
+) -> npt.NDArray[Any]:
+    """An array of the given type and shape (None: any length; ...: any further dimensions)."""
+    try:
+        array = np.asarray(values)
+        if array.size == 0 and shape[0] is None:
+            array = np.zeros((0, *shape[1:]))  # an empty list
+        numbers = array.astype(dtype, copy=True) if dtype is not None else array.copy()
+    except (TypeError, ValueError) as error:
+        raise PackingError(f"{name}: expected numbers of shape {_spell(shape)}: {error}") from None
+    wanted = shape[:-1] if shape[-1] is ... else shape
+    fits = (
+        len(numbers.shape) >= len(wanted) if shape[-1] is ... else len(numbers.shape) == len(wanted)
+    )
+    lengths = zip(numbers.shape, wanted, strict=False)
+    if not fits or any(want is not None and have != want for have, want in lengths):
+        raise PackingError(f"{name}: expected shape {_spell(shape)}, found {numbers.shape}")
+    if dtype is np.int64 and array.dtype.kind == "f" and not np.array_equal(array, numbers):
+        raise PackingError(f"{name}: expected whole numbers")
+    numbers.flags.writeable = False
+    return numbers
+
+
+def _spell(shape: tuple[Any, ...]) -> str:
+    return "(" + ", ".join("N" if n is None else "..." if n is ... else str(n) for n in shape) + ")"
+
+
+def grains_named(id: IntArray, wrong: npt.NDArray[np.bool_]) -> str:
+    """'grain 7' or '3 grains, first 7'."""
+    first = id[np.argmax(wrong)]
+    number = np.count_nonzero(wrong)
+    return f"grain {first}" if number == 1 else f"{number} grains, the first is {first}"

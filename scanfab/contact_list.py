@@ -1,0 +1,222 @@
+"""Contacts as a source lists them, and what a packing makes of them."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.cast import cast, grains_named
+from scanfab.cell import Cell
+from scanfab.errors import PackingError, ScanfabWarning
+
+__all__ = ["ContactList", "Contacts", "Spheres", "resolve_contacts", "warn_of_same_centre"]
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+ContactSource = Literal["file", "geometric"]
+
+
+class ContactList(NamedTuple):
+    """Contacts as a source names them, before the packing works out their geometry."""
+
+    pairs: npt.ArrayLike
+    """Rows of the two grains, shape (M, 2)."""
+    image: npt.ArrayLike | None = None
+    """
+    Lattice translation of the second grain, shape (M, 3), from the positions as they are given,
+    wrapped or not; nearest image by default.
+    """
+    force: npt.ArrayLike | None = None
+    """Force on the second grain, shape (M, 3), dump's force unit."""
+    source: ContactSource = "file"
+    """Where the list comes from."""
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """
+    The contacts of a packing, each pair of grains (with its periodic image) once.
+
+    The normal is the unit branch vector from the first to the second centre; the point is the
+    middle of the overlap on the branch. Both come from positions and radii, whatever the file
+    stores, so that every format gives the same answer.
+    """
+
+    pairs: IntArray
+    """Rows of the two grains, shape (M, 2)."""
+    image: IntArray
+    """Lattice translation of the second grain, shape (M, 3)."""
+    normal: FloatArray
+    """Unit normals, shape (M, 3), dimensionless."""
+    point: FloatArray
+    """Contact points, shape (M, 3), dump's length unit; next to the first grain."""
+    force: FloatArray | None
+    """Force on the second grain, shape (M, 3), dump's force unit; None if the dump has none."""
+    source: ContactSource
+    """``file`` or ``geometric``."""
+
+    def __len__(self) -> int:
+        return len(self.pairs)
+
+
+class Spheres(NamedTuple):
+    """What the geometry of contacts follows from."""
+
+    position: FloatArray
+    """Shape (N, 3), inside the cell, dump's length unit."""
+    radius: FloatArray
+    """Shape (N,), dump's length unit."""
+    id: IntArray
+    """Shape (N,), for messages."""
+    cell: Cell | None
+    turns: IntArray | None = None
+    """Shape (N, 3): lattice vectors to where each grain was given; None: where it is."""
+
+
+def resolve_contacts(listed: ContactList, spheres: Spheres) -> Contacts:
+    """
+    Geometry of listed contacts, each pair and image once.
+
+    Raises
+    ------
+    PackingError
+        If a contact names a row that does not exist, or cannot be one.
+    """
+    count = len(spheres.radius)
+    pairs = cast("contacts", listed.pairs, np.int64, (None, 2))
+    if pairs.size and (pairs.min() < 0 or pairs.max() >= count):
+        wrong = int(np.flatnonzero(np.any((pairs < 0) | (pairs >= count), axis=1))[0])
+        raise PackingError(
+            f"contact {wrong} names the rows {pairs[wrong].tolist()}, "
+            f"but there are {count} grains (rows from 0)"
+        )
+    force = None
+    if listed.force is not None:
+        force = cast("force", listed.force, np.float64, (len(pairs), 3))
+    image = _images(listed, pairs, spheres)
+    branch = spheres.position[pairs[:, 1]] - spheres.position[pairs[:, 0]]
+    if spheres.cell is not None:
+        branch = branch + image @ spheres.cell.vectors
+    length: FloatArray = np.linalg.norm(branch, axis=1)
+    _refuse_itself(pairs, image, spheres)
+    if listed.source == "file":
+        _refuse_long(pairs, length, spheres)
+    keep = _first_of_each(pairs, image)
+    same = length[keep] == 0
+    if np.any(same):
+        warn_of_same_centre(pairs[keep][same], spheres.id)
+        keep = keep[~same]
+    pairs, image, branch, length = pairs[keep], image[keep], branch[keep], length[keep]
+    normal = branch / length[:, None]
+    radius = spheres.radius[pairs]
+    middle = 0.5 * (length + radius[:, 0] - radius[:, 1])
+    point = spheres.position[pairs[:, 0]] + middle[:, None] * normal
+    force = None if force is None else force[keep]
+    return Contacts(pairs, image, normal, point, force, listed.source)
+
+
+def _images(listed: ContactList, pairs: IntArray, spheres: Spheres) -> IntArray:
+    """Lattice translations of the second grains, from positions inside the cell."""
+    cell = spheres.cell
+    if listed.image is not None:
+        image: IntArray = cast("image", listed.image, np.int64, (len(pairs), 3))
+        if np.any(image[:, ~np.array((False,) * 3 if cell is None else cell.periodic)]):
+            raise PackingError("image: a contact passes a face that is not periodic")
+        if spheres.turns is None:
+            return image
+        return image + spheres.turns[pairs[:, 1]] - spheres.turns[pairs[:, 0]]
+    if cell is None or not cell.is_periodic:
+        return np.zeros((len(pairs), 3), np.int64)
+    branch = spheres.position[pairs[:, 1]] - spheres.position[pairs[:, 0]]
+    image = cell.nearest_image(branch)
+    _refuse_ambiguous(pairs, branch + image @ cell.vectors, spheres)
+    return image
+
+
+def _refuse_ambiguous(pairs: IntArray, branch: FloatArray, spheres: Spheres) -> None:
+    """An error if a pair touches through two images, of which the list cannot mean both."""
+    assert spheres.cell is not None
+    reach = spheres.radius[pairs].sum(axis=1)
+    close = np.flatnonzero(spheres.cell.lattice.shortest < 2 * reach)
+    close = close[pairs[close, 0] != pairs[close, 1]]
+    if close.size == 0:
+        return
+    for step in spheres.cell.lattice.steps:
+        touches = np.linalg.norm(branch[close] + step, axis=1) < reach[close]
+        if touches.any():
+            one, two = spheres.id[pairs[close[np.argmax(touches)]]]
+            raise PackingError(
+                f"the grains {one} and {two} touch through more than one image, and the contact "
+                f"list does not say through which: the cell is too thin for this format; find the "
+                f"contacts by geometry (--contacts geometric)"
+            )
+
+
+def _refuse_itself(pairs: IntArray, image: IntArray, spheres: Spheres) -> None:
+    itself = (pairs[:, 0] == pairs[:, 1]) & ~image.any(axis=1)
+    if not np.any(itself):
+        return
+    advice = ""
+    if spheres.cell is not None and spheres.cell.is_periodic:
+        advice = (
+            "; if it touches its own image, the list does not say which one: find the contacts by "
+            "geometry (--contacts geometric)"
+        )
+    raise PackingError(
+        f"{grains_named(spheres.id[pairs[:, 0]], itself)}: in contact with itself{advice}"
+    )
+
+
+def _refuse_long(pairs: IntArray, length: FloatArray, spheres: Spheres) -> None:
+    """An error if the centres of a listed contact are too far apart for a contact."""
+    radius = spheres.radius[pairs]
+    # a gap of half a grain, by the smaller of the two
+    excess = length - radius.sum(axis=1) - radius.min(axis=1)
+    if not np.any(excess > 0):
+        return
+    worst = int(np.argmax(excess))
+    one, two = spheres.id[pairs[worst]]
+    advice = (
+        "is this the contact list of another step?"
+        if spheres.cell is not None and spheres.cell.is_periodic
+        else "if the sample is periodic, name its cell (--cell and --periodic); "
+        "otherwise the contact list belongs to another step"
+    )
+    raise PackingError(
+        f"the grains {one} and {two} are listed as a contact, but their centres are "
+        f"{length[worst]:g} apart and their radii add up to {radius[worst].sum():g}: {advice}"
+    )
+
+
+def warn_of_same_centre(pairs: IntArray, id: IntArray) -> None:
+    """Say that contacts between grains of one centre are left out."""
+    one, two = id[pairs[0]]
+    warnings.warn(
+        f"the grains {one} and {two} have the same centre ({len(pairs)} such pairs): a contact "
+        f"between them has no direction and is left out",
+        ScanfabWarning,
+        stacklevel=4,
+    )
+
+
+def _first_of_each(pairs: IntArray, image: IntArray) -> npt.NDArray[np.intp]:
+    """Rows of the first mention of each contact, whichever grain is named first."""
+    swapped = pairs[:, 0] > pairs[:, 1]
+    turned = np.where(swapped[:, None], -image, image)
+    # a grain and its own image: the contact with the opposite image is the same one
+    itself = pairs[:, 0] == pairs[:, 1]
+    lead = np.where(turned[:, 0] != 0, turned[:, 0], turned[:, 1])
+    lead = np.where(lead != 0, lead, turned[:, 2])
+    turned = np.where((itself & (lead < 0))[:, None], -turned, turned)
+    # one number for each contact: rows, then image
+    reach = int(np.abs(turned).max(initial=0))
+    code = (turned + reach) @ (2 * reach + 1) ** np.arange(3)
+    key = (pairs.min(axis=1) * (pairs.max(initial=0) + 1) + pairs.max(axis=1)) * (
+        2 * reach + 1
+    ) ** 3 + code
+    _, first = np.unique(key, return_index=True)
+    return np.sort(first)

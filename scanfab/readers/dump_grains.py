@@ -1,0 +1,30 @@
+"""Grains in the text dumps of LIGGGHTS and LAMMPS, which are the same for both."""
+
+from __future__ import annotations
+
+import re
+
+from scanfab.readers.base import FileKind, GrainTable, ReadOptions, Snapshot
+from scanfab.readers.columns import grain_table, has_radius
+from scanfab.readers.dump import read_block, row_word
+
+__all__ = ["dump_kind", "read_dump_grains"]
+
+
+def dump_kind(head: bytes) -> FileKind:
+    """Grains are ATOMS; whatever else a text dump counts are contacts."""
+    if row_word(head) != "ATOMS":
+        return "contacts"
+    names = re.search(rb"^ITEM: ATOMS(.*)$", head, re.MULTILINE)
+    columns = names[1].decode("utf-8", "replace").split() if names else []
+    return "grains" if has_radius(columns) else "points"
+
+
+def read_dump_grains(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+    """Columns in any order and any subset that suffices; of repeated names the first counts."""
+    block = read_block(snapshot)
+    columns = {
+        name: block.values[:, place] for place, name in reversed(list(enumerate(block.names)))
+    }
+    ordered = {name: columns[name] for name in block.names}
+    return grain_table(snapshot.path, ordered, block.cell, options, f", step {snapshot.step}")

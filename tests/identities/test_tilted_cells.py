@@ -1,0 +1,147 @@
+"""Contacts do not depend on how a periodic packing is described: by which vectors, from where."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab import Cell, ContactList, Packing, PackingError, contact_fabric, find_contacts
+from tests.lattices import face_centred_cubic, shaken_cubic
+from tests.truth import CELL as LIGGGHTS
+
+TOLERANCE = 1e-4
+# of a face-centred cubic lattice of unit cubes: one grain a cell
+PRIMITIVE = 0.5 * np.array([[0.0, 1, 1], [1, 0, 1], [1, 1, 0]])
+NEARLY = 1 / np.sqrt(8)
+
+
+def unimodular(random):
+    """Whole combinations of three vectors that span the same lattice."""
+    matrix = np.eye(3, dtype=int)
+    for _ in range(4):
+        one, two = random.choice(3, 2, replace=False)
+        matrix[one] += random.integers(-2, 3) * matrix[two]
+    return matrix
+
+
+def assert_face_centred(packing):
+    """Twelve contacts a grain, and no direction before the others."""
+    contacts = packing.contacts
+    assert len(contacts) == 6 * len(packing)
+    ends = np.bincount(contacts.pairs.ravel(), minlength=len(packing))
+    assert set(ends.tolist()) == {12}
+    tensor = contact_fabric(contacts.normal).matrix
+    assert np.abs(tensor - np.eye(3) / 3).max() < 1e-9
+
+
+def test_a_primitive_cell_of_one_grain_has_six_contacts_with_its_images():
+    packing = find_contacts(Packing([[0.2, 0.3, 0.4]], NEARLY, cell=Cell(PRIMITIVE)), TOLERANCE)
+    assert_face_centred(packing)
+    assert np.all(packing.contacts.pairs == 0)
+
+
+def test_a_lattice_has_the_same_contacts_by_any_vectors():
+    random = np.random.default_rng(0)
+    for _ in range(30):
+        cell = Cell(unimodular(random) @ PRIMITIVE, origin=random.normal(size=3))
+        position = random.normal(size=(1, 3)) * 3
+        assert_face_centred(find_contacts(Packing(position, NEARLY, cell=cell), TOLERANCE))
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_cubes_in_sheared_cells_have_the_same_contacts(count):
+    random = np.random.default_rng(1)
+    for _ in range(5):
+        cell = Cell(unimodular(random) * float(count))
+        assert_face_centred(
+            find_contacts(Packing(*face_centred_cubic(count), cell=cell), TOLERANCE)
+        )
+
+
+def named(packing):
+    """Contacts by their grains and normals, which no description of the cell changes."""
+    contacts = packing.contacts
+    sign = np.where(contacts.pairs[:, 0] < contacts.pairs[:, 1], 1.0, -1.0)
+    rows = np.column_stack([np.sort(contacts.pairs, axis=1), sign[:, None] * contacts.normal])
+    return rows[np.lexsort(np.round(rows, 6).T[::-1])]
+
+
+@pytest.fixture(scope="module")
+def sheared():
+    """125 unequal grains in a cell that is tilted by more than its length."""
+    spheres = shaken_cubic(np.random.default_rng(2), 5)
+    return spheres, np.array([[5.0, 0, 0], [6.5, 5, 0], [-2.0, 7.1, 5]])
+
+
+def test_shifting_and_wrapping_again_leaves_the_contacts(sheared):
+    spheres, vectors = sheared
+    before = find_contacts(Packing(*spheres, cell=Cell(vectors)))
+    assert len(before.contacts) > 150
+    random = np.random.default_rng(3)
+    for shift in random.normal(size=(5, 3)) * 20:
+        moved = Packing(*spheres.moved(shift), cell=Cell(vectors, origin=random.normal(size=3)))
+        np.testing.assert_allclose(named(find_contacts(moved)), named(before), atol=1e-9)
+
+
+def test_other_vectors_of_the_lattice_leave_the_contacts(sheared):
+    spheres, vectors = sheared
+    before = find_contacts(Packing(*spheres, cell=Cell(vectors)))
+    random = np.random.default_rng(4)
+    for _ in range(5):
+        other = Packing(*spheres, cell=Cell(unimodular(random) @ vectors))
+        np.testing.assert_allclose(named(find_contacts(other)), named(before), atol=1e-9)
+
+
+def test_a_list_without_images_has_those_that_geometry_finds(sheared):
+    spheres, vectors = sheared
+    found = find_contacts(Packing(*spheres, cell=Cell(vectors)))
+    listed = Packing(*spheres, cell=Cell(vectors), contacts=found.contacts.pairs)
+    np.testing.assert_array_equal(listed.contacts.image, found.contacts.image)
+
+
+def test_images_are_told_from_positions_as_they_are_given(sheared):
+    """The third grain is given two cells away from the first, which it touches."""
+    _, vectors = sheared
+    cell = Cell(vectors)
+    position = np.array([[1, 1, 1], [1, 1, 2.9], [2.9, 1, 1]])
+    away = np.array([[0, 0, 0], [0, 0, 0], [0, -1, 2]])
+    listed = ContactList([[0, 1], [0, 2]], image=[[0, 0, 0], [0, 1, -2]])
+    packing = Packing(position + away @ vectors, 1.0, cell=cell, contacts=listed)
+    np.testing.assert_allclose(packing.contacts.normal, [[0, 0, 1], [1, 0, 0]], atol=1e-12)
+
+
+def test_a_list_that_cannot_say_which_image_it_means_is_refused():
+    cell = Cell([2.0, 10.0, 10.0])
+    grains = [[0.5, 5, 5], [1.5, 5, 5]]
+    assert len(find_contacts(Packing(grains, 0.51, cell=cell)).contacts) == 2
+    with pytest.raises(PackingError, match=r"0 and 1 touch through more than one image.*geometric"):
+        Packing(grains, 0.51, cell=cell, contacts=[[0, 1]])
+
+
+def test_a_list_of_a_grain_and_itself_is_refused():
+    with pytest.raises(PackingError, match=r"itself.*does not say which one.*--contacts geometric"):
+        Packing([[0.5, 5, 5]], 1.1, cell=Cell([2.0, 10, 10]), contacts=[[0, 0]])
+
+
+def test_an_image_through_a_face_that_does_not_repeat_is_refused():
+    listed = ContactList([[0, 1]], image=[[0, 0, 1]])
+    with pytest.raises(PackingError, match="passes a face that is not periodic"):
+        Packing(
+            [[1, 1, 1], [1, 1, 2]], 0.6, cell=Cell([4, 4, 4], (True, True, False)), contacts=listed
+        )
+
+
+@pytest.mark.parametrize("step", [30000, 60000, 90000, 120000, 150000])
+def test_liggghts_counts_the_same_contacts_of_each_grain(step):
+
+    packing = scanfab.read(
+        LIGGGHTS / f"dump_{step}.txt.gz", contacts=LIGGGHTS / f"contacts_{step}.txt.gz"
+    )
+    flags = np.loadtxt(LIGGGHTS / f"contacts_{step}.txt.gz", skiprows=9)[:, 8]
+    through = packing.contacts.image.any(axis=1)
+    for one in (packing, find_contacts(packing)):
+        ends = np.bincount(one.contacts.pairs.ravel(), minlength=len(packing))
+        np.testing.assert_array_equal(ends, packing.columns["c_ca"])
+    assert through.sum() == np.count_nonzero(flags)
+    assert np.mean(np.sum(packing.contacts.force * packing.contacts.normal, axis=1) > 0) > 0.9
