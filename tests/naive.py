@@ -168,3 +168,38 @@ def axial(tensor, axis):
     """a·G·a - (1 - a·G·a)/2, written out."""
     along = sum(axis[i] * tensor[i][j] * axis[j] for i, j in product(range(3), repeat=2))
     return along - (1 - along) / 2
+
+
+def periodic_gaps(position, radius, vectors, periods, foot, direction, measured):
+    """
+    Gaps of one line through a periodic medium, from a long list of images.
+
+    With a measured length, those that start in it; else all between the first and last solid.
+    """
+    if len(radius) == 0:
+        return []
+    # far enough for the longest gaps that such samples have
+    low, high = (-3.0, max(measured, 1.0) + 150.0) if measured else (-60.0, 60.0)
+    heights = 1 / np.linalg.norm(np.linalg.inv(vectors), axis=0)
+    around = [
+        np.arange(-n, n + 1) if period else np.zeros(1)
+        for n, period in zip(np.ceil(radius.max() / heights).astype(int) + 2, periods, strict=True)
+    ]
+    steps = np.arange(low, high, 0.5 * heights.min())
+    cells = np.floor((foot + steps[:, None] * direction - position[0]) @ np.linalg.inv(vectors))
+    cells = np.unique(np.where(periods, cells, 0.0), axis=0)
+    spread = np.array(list(product(*around)))
+    shifts = np.unique((cells[:, None] + spread).reshape(-1, 3), axis=0)
+    home = position - np.where(
+        periods, np.floor((position - position[0]) @ np.linalg.inv(vectors)), 0.0
+    ) @ vectors
+    images = (home[None] + (shifts @ vectors)[:, None]).reshape(-1, 3)
+    radii = np.tile(radius, len(shifts))
+    depth = (images - foot) @ direction
+    inside = (depth > low) & (depth < high)
+    solids = union(chords(images[inside], radii[inside], foot, direction))
+    return [
+        after[0] - before[1]
+        for before, after in pairwise(solids)
+        if not measured or 0 <= before[1] < measured
+    ]

@@ -236,7 +236,8 @@ def entry(
                 half = np.sqrt(reach2 - u2 * u2)
                 middle = depth + j * dot(grains.vectors[prism.second], normal)
                 middle += q * dot(grains.vectors[prism.first], normal)
-                if middle + half > after:
+                # not by its end: that of the solid left behind is there, to rounding
+                if middle > after:
                     found = min(found, middle - half)
     return found
 

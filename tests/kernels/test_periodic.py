@@ -1,0 +1,165 @@
+"""Lines through a periodic medium equal a slow twin with explicit images, and known answers."""
+
+import numpy as np
+import pytest
+
+from scanfab.kernels import axes, periodic, sweep
+from scanfab.kernels.periodic import CellGrains
+from tests import naive
+from tests.uncompiled import run_uncompiled
+
+PERIODS = [(1, 1, 1), (1, 1, 0), (0, 1, 1), (1, 0, 1), (1, 0, 0), (0, 0, 1)]
+
+
+def random_cell(random):
+    """Edges of unlike lengths, tilted by up to more than a length."""
+    vectors = np.diag(random.uniform(1.5, 4.0, 3))
+    vectors[1, 0], vectors[2, 0], vectors[2, 1] = random.uniform(-3.0, 3.0, 3)
+    turn = np.linalg.qr(random.normal(size=(3, 3)))[0]
+    return vectors @ turn
+
+
+def random_medium(random, periods=(1, 1, 1)):
+    count = random.integers(1, 12)
+    vectors = random_cell(random)
+    position = random.uniform(-1, 2, (count, 3)) @ vectors
+    radius = random.uniform(0.2, 0.9, count)
+    removed = random.random(count) < 0.3
+    return CellGrains(position, radius, removed, vectors, np.array(periods, dtype=bool))
+
+
+def direction(random):
+    normal = random.normal(size=3)
+    return normal / np.linalg.norm(normal)
+
+
+def lines_of(medium, normal, offset, spacing):
+    """Where the kernel's lines start, and how long they are measured (0: from end to end)."""
+    prism, _, grid = axes.cell_grid(medium, normal, offset, spacing)
+    feet = []
+    for row in range(grid.rows):
+        for column in range(grid.columns):
+            u = grid.first_u + row * grid.shear + column * grid.spacing
+            v = grid.first_v + row * grid.spacing
+            depth = prism.rise_u * u + prism.rise_v * v
+            feet.append(u * prism.frame[0] + v * prism.frame[1] + depth * prism.frame[2])
+    measured = prism.length if medium.periodic[prism.third] else 0.0
+    return np.array(feet), measured
+
+
+def tallies_of(medium, normal, offset, spacing, cutoff, second=True):
+    tallies = np.zeros((1, 2, sweep.TALLY_SIZE))
+    axes.scan_cell(
+        medium, normal[None], offset[None], spacing, cutoff, tallies, second or None
+    )
+    return tallies[0]
+
+
+def check_equals_naive(random, periods):
+    medium, normal = random_medium(random, periods), direction(random)
+    offset, spacing, cutoff = random.random(2), random.uniform(0.3, 0.9), random.choice([0.0, 0.4])
+    feet, measured = lines_of(medium, normal, offset, spacing)
+    fast = tallies_of(medium, normal, offset, spacing, cutoff)
+    for which, kept in enumerate([np.ones(len(medium.radius), bool), ~medium.removed]):
+        gaps = [
+            gap
+            for foot in feet
+            for gap in naive.periodic_gaps(
+                medium.position[kept],
+                medium.radius[kept],
+                medium.vectors,
+                periods,
+                foot,
+                normal,
+                measured,
+            )
+        ]
+        long_enough = [gap for gap in gaps if gap >= max(cutoff, 1e-300)]
+        assert fast[which, sweep.KEPT] == len(long_enough)
+        assert fast[which, sweep.LENGTH] == pytest.approx(sum(long_enough), rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("periods", PERIODS, ids=str)
+def test_gaps_equal_those_of_explicit_images(periods):
+    for seed in range(8):
+        check_equals_naive(np.random.default_rng([seed, *periods]), periods)
+
+
+def test_lines_spread_evenly_over_the_face_and_fill_the_cell():
+    """Number of lines times their measured length times the area of each: the cell's volume."""
+    random = np.random.default_rng(1)
+    for _ in range(20):
+        medium, normal = random_medium(random), direction(random)
+        volumes = []
+        for _ in range(20):
+            tally = tallies_of(medium, normal, random.random(2), 0.1, 0.0)[0]
+            volumes.append(tally[sweep.LINE_LENGTH] * 0.1**2)
+        volume = abs(np.linalg.det(medium.vectors))
+        assert np.mean(volumes) == pytest.approx(volume, rel=0.02)
+
+
+def test_every_direction_crosses_its_face_steeply():
+    """So that a line leaves the cell after little more than its height."""
+    random = np.random.default_rng(2)
+    for _ in range(50):
+        normal = direction(random)
+        prism = periodic.prism_along(normal, np.diag([1.0, 2.0, 3.0]), np.ones(3, bool))
+        assert prism.length <= np.sqrt(3) * 3.0 + 1e-9
+        assert prism.frame @ prism.frame.T == pytest.approx(np.eye(3), abs=1e-12)
+        assert prism.base_v > 0
+
+
+def test_without_overlap_the_mean_gap_is_that_of_stereology():
+    """Porosity / (N_V π⟨r²⟩) at cut-off 0, in every direction without channels."""
+    random = np.random.default_rng(3)
+    vectors = np.array([[3.0, 0, 0], [1.0, 3, 0], [-1.0, 0.5, 3]])
+    grid = np.stack(np.meshgrid(*3 * [np.arange(3.0)], indexing="ij"), -1).reshape(-1, 3) / 3
+    position = grid @ vectors + random.uniform(-0.04, 0.04, (27, 3))
+    radius = random.uniform(0.25, 0.42, 27)
+    medium = CellGrains(position, radius, np.zeros(27, bool), vectors, np.ones(3, bool))
+    volume = abs(np.linalg.det(vectors))
+    porosity = 1 - 4 / 3 * np.pi * np.sum(radius**3) / volume
+    expected = porosity * volume / (np.pi * np.sum(radius**2))
+    total = sum(
+        tallies_of(medium, direction(random), random.random(2), 0.04, 0.0, None)[0]
+        for _ in range(60)
+    )
+    assert total[sweep.LENGTH] / total[sweep.KEPT] == pytest.approx(expected, rel=0.01)
+    assert total[sweep.VOID] / total[sweep.LINE_LENGTH] == pytest.approx(porosity, rel=0.01)
+
+
+def test_simple_cubic_along_an_edge():
+    """d - 4h/3 with h = min(r, (d - c)/2); lines in channels are counted."""
+    medium = CellGrains(
+        np.array([[0.2, 0.7, 0.4]]), np.array([0.4]), np.zeros(1, bool), np.eye(3), np.ones(3, bool)
+    )
+    normal = np.array([0.0, 0.0, 1.0])
+    for cutoff in (0.0, 0.3, 0.5):
+        tally = tallies_of(medium, normal, np.array([0.3, 0.8]), 0.002, cutoff, None)[0]
+        height = min(0.4, (1 - cutoff) / 2)
+        assert tally[sweep.LENGTH] / tally[sweep.KEPT] == pytest.approx(
+            1 - 4 / 3 * height, rel=2e-3
+        )
+        lines = tally[sweep.LINES] + tally[sweep.CHANNELS]
+        assert tally[sweep.CHANNELS] / lines == pytest.approx(1 - np.pi * 0.4**2, rel=5e-3)
+
+
+def test_grain_that_fills_its_cell_leaves_no_gap():
+    medium = CellGrains(
+        np.zeros((1, 3)), np.array([0.9]), np.zeros(1, bool), np.eye(3), np.ones(3, bool)
+    )
+    tally = tallies_of(medium, np.array([0.6, 0.0, 0.8]), np.array([0.1, 0.2]), 0.05, 0.0)[0]
+    assert tally[sweep.KEPT] == 0
+    assert tally[sweep.VOID] == pytest.approx(0, abs=1e-9)
+    assert tally[sweep.LINES] > 300
+
+
+def test_gaps_equal_those_of_explicit_images_uncompiled():
+    run_uncompiled(
+        "import numpy as np\n"
+        "from tests.kernels import test_periodic as here\n"
+        "np.seterr(invalid='ignore')\n"
+        "for periods in here.PERIODS:\n"
+        "    for seed in range(3):\n"
+        "        here.check_equals_naive(np.random.default_rng([seed, *periods]), periods)\n"
+    )
