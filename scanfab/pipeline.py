@@ -7,7 +7,7 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -38,9 +38,27 @@ from scanfab.strain import StrainFile, axial_length
 from scanfab.table import Row, Table
 from scanfab.variants import VARIANTS, Sample, Variant
 
-__all__ = ["compute", "compute_rows"]
+__all__ = ["FrameResult", "compute", "compute_rows"]
 
 FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class FrameResult:
+    """The rows of one frame, and what they were made from, for those who want to see it."""
+
+    source: str
+    number: int
+    sample: Sample
+    plan: Plan | None
+    """As it was in the end; None if no frame up to this one has grains."""
+    solids: Solids | None
+    """What the lines met; None if nothing was scanned."""
+    sums: ScanSums | None
+    rows: list[Row]
+
+
+Observer = Callable[[FrameResult], None]
 
 
 def compute(source: Packing | Series, **options: Any) -> Table:
@@ -77,7 +95,13 @@ def compute(source: Packing | Series, **options: Any) -> Table:
     return Table(compute_rows(source, Settings.make(**options)))
 
 
-def compute_rows(source: Packing | Series, settings: Settings, *, start: int = 0) -> Iterator[Row]:
+def compute_rows(
+    source: Packing | Series,
+    settings: Settings,
+    *,
+    start: int = 0,
+    observe: Observer | None = None,
+) -> Iterator[Row]:
     """
     The rows of :func:`compute`, in the order of the frames, each as soon as it may come.
 
@@ -87,10 +111,12 @@ def compute_rows(source: Packing | Series, settings: Settings, *, start: int = 0
         As for :func:`compute`.
     start : int, optional
         Leave out the frames before this one, which an earlier run has computed.
+    observe : callable, optional
+        Called with the :class:`FrameResult` of each frame, by the thread that computed it.
     """
     if not isinstance(source, Packing | Series):
         raise SettingsError(f"compute: expected a Packing or a Series, found {source!r}")
-    run = _Run(source, settings, start)
+    run = _Run(source, settings, start, observe)
     jobs = run.jobs()
     with _Pool(settings.workers) as pool:
         for rows in pool.in_order(jobs):
@@ -106,11 +132,18 @@ class _Run:
     they do not depend on one another.
     """
 
-    def __init__(self, source: Packing | Series, settings: Settings, start: int) -> None:
+    def __init__(
+        self,
+        source: Packing | Series,
+        settings: Settings,
+        start: int,
+        observe: Observer | None,
+    ) -> None:
         self.source = source
         self.settings = settings
         self.name = "" if isinstance(source, Packing) else source.name
         self.start = start
+        self.observe = observe
         self.plan: Plan | None = None
         self.strains = _Strains(settings)
         self.particles = 0
@@ -169,7 +202,10 @@ class _Run:
     def _rows(self, number: int, sample: Sample, threads: int) -> list[Row]:
         settings = replace(self.settings, workers=threads)
         strain = self.strains.at(number, sample)
-        return list(_frame_rows(self.name, number, sample, self.plan, settings, strain))
+        result = _frame_result(self.name, number, sample, self.plan, settings, strain)
+        if self.observe is not None:
+            self.observe(result)
+        return result.rows
 
 
 class _Pool:
@@ -277,14 +313,14 @@ def boundary_hint(sample: Sample, settings: Settings) -> str | None:
     )
 
 
-def _frame_rows(
+def _frame_result(
     name: str,
     number: int,
     sample: Sample,
     plan: Plan | None,
     settings: Settings,
     strain: float | None,
-) -> Iterator[Row]:
+) -> FrameResult:
     packing = sample.packing
     frame: dict[str, Any] = {
         "source": name,
@@ -294,19 +330,24 @@ def _frame_rows(
         "strain": strain,
         "contacts_from": sample.contacts.source,
     }
+    solids: Solids | None = None
     sums: ScanSums | None = None
     if plan is not None and sample.grains.any():
         if plan.window is not None:
             plan.window.check_inside(packing)
-        sums, plan = scan_to_tolerance(_solids(sample, plan, settings), plan, settings)
-    for variant in settings.variants:
-        yield Row(
+        solids = _solids(sample, plan, settings)
+        sums, plan = scan_to_tolerance(solids, plan, settings)
+    rows = [
+        Row(
             **frame,
             variant=variant,
             **_sample_columns(sample, plan, VARIANTS[variant]),
             **_scan_columns(sums, plan, variant, settings, number),
             **_contact_columns(sample, plan, VARIANTS[variant], settings),
         )
+        for variant in settings.variants
+    ]
+    return FrameResult(name, number, sample, plan, solids, sums, rows)
 
 
 def _solids(sample: Sample, plan: Plan, settings: Settings) -> Solids:
