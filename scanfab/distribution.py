@@ -115,9 +115,7 @@ def _basis(directions: FloatArray, degree: int) -> FloatArray:
 
 
 def _monomials(directions: FloatArray, degree: int) -> FloatArray:
-    powers = [
-        (i, j, degree - i - j) for i in range(degree + 1) for j in range(degree + 1 - i)
-    ]
+    powers = [(i, j, degree - i - j) for i in range(degree + 1) for j in range(degree + 1 - i)]
     values: FloatArray = np.prod(directions[..., None, :] ** np.array(powers), axis=-1)
     return values
 

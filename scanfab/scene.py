@@ -67,9 +67,7 @@ def scene_of(sample: Sample, window: SphereWindow | None) -> Scene:
     """The grains of a frame and its RV."""
     chosen = sample.grains if sample.grains.any() else np.ones(len(sample.packing), bool)
     center = sample.packing.position[chosen].mean(axis=0) if window is None else window.center
-    return Scene(
-        grains_of(sample, window), center, None if window is None else window.radius
-    )
+    return Scene(grains_of(sample, window), center, None if window is None else window.radius)
 
 
 def grains_of(sample: Sample, window: SphereWindow | None) -> Grains:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -101,7 +102,7 @@ def _reach(point: FloatArray, window_radius: float) -> float | None:
     """Half the length of a line in the window; None without a window."""
     if window_radius == 0:
         return None
-    return float(np.sqrt(max(window_radius**2 - point @ point, 0.0)))
+    return math.sqrt(max(window_radius**2 - float(point @ point), 0.0))
 
 
 def _cut(start: FloatArray, stop: FloatArray, reach: float | None) -> tuple[FloatArray, BoolArray]:
@@ -131,7 +132,8 @@ def grid_points(reach: float, lines: int) -> FloatArray:
     spacing = reach * np.sqrt(np.pi / lines)
     steps = np.arange(-np.floor(reach / spacing), np.floor(reach / spacing) + 1) * spacing
     points = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
-    return points[np.linalg.norm(points, axis=1) < reach]
+    inside: FloatArray = points[np.linalg.norm(points, axis=1) < reach]
+    return inside
 
 
 def sample_segments(
