@@ -115,7 +115,9 @@ class VtkFolder:
         self._collections[kind].add(file, _time(result))
 
 
-def scan_line_sample(result: FrameResult, variant: str, axis: Vector, lines: int = LINES) -> Segments:
+def scan_line_sample(
+    result: FrameResult, variant: str, axis: Vector, lines: int = LINES
+) -> Segments:
     """A few scan lines along the loading axis and across it, in the dump's coordinates."""
     solids, plan = result.solids, result.plan
     assert solids is not None

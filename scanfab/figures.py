@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from scanfab.compare import SummaryRow, compare_tables
-from scanfab.writers.plot_table import Fit, plot_table
+from scanfab.writers.plot_table import TABLE_FIGURES, Fit, plot_table
 
-__all__ = ["fits_of", "plot_rows"]
+__all__ = ["TABLE_FIGURES", "fits_of", "plot_rows"]
 
 
 def plot_rows(

@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.segments import Segments
+from scanfab.segments import Segments, cut_lines
 from scanfab.variants import Sample
 from scanfab.window import SphereWindow
 
-__all__ = ["ContactLines", "Grains", "Scene", "contact_lines", "grains_of", "scene_of"]
+__all__ = [
+    "ContactLines",
+    "Grains",
+    "Scene",
+    "contact_lines",
+    "grains_of",
+    "scene_of",
+    "section_lines",
+]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
+
+# between the lines of a section and the plane across the axis, degrees
+LINE_ANGLE = 30.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +79,31 @@ def scene_of(sample: Sample, window: SphereWindow | None) -> Scene:
     chosen = sample.grains if sample.grains.any() else np.ones(len(sample.packing), bool)
     center = sample.packing.position[chosen].mean(axis=0) if window is None else window.center
     return Scene(grains_of(sample, window), center, None if window is None else window.radius)
+
+
+def section_lines(scene: Scene, axis: npt.ArrayLike) -> Segments:
+    """
+    Parallel scan lines, inclined to the axis, in a plane through the centre that holds the axis.
+
+    In the dump's coordinates; clipped to the RV, if there is one.
+    """
+    grains = scene.grains
+    solid = ~grains.boundary
+    up = np.asarray(axis, dtype=np.float64)
+    depth = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
+    depth /= np.linalg.norm(depth)
+    across = np.cross(depth, up)
+    turn = np.radians(LINE_ANGLE)
+    along = np.cos(turn) * across + np.sin(turn) * up
+    frame = np.stack([np.cross(depth, along), depth, along])
+    position = grains.position[solid] - scene.center
+    radius = grains.radius[solid]
+    reach = scene.window_radius or float(np.linalg.norm(position, axis=1).max(initial=0.0))
+    spacing = max(2.5 * float(radius.mean()), reach / 40) if len(radius) else reach
+    steps = np.arange(-reach + 0.5 * spacing, reach, spacing) if spacing > 0 else np.zeros(0)
+    points = np.column_stack([steps, np.zeros_like(steps)])
+    found = cut_lines(position, radius, frame, points, scene.window_radius or 0.0)
+    return replace(found, ends=found.ends + scene.center)
 
 
 def grains_of(sample: Sample, window: SphereWindow | None) -> Grains:

@@ -14,7 +14,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["COLOURS", "PLOT_FORMATS", "check_plot_file", "new_figure", "plain", "save_figure"]
+__all__ = [
+    "COLOURS",
+    "PLOT_FORMATS",
+    "check_folder",
+    "check_plot_file",
+    "new_figure",
+    "plain",
+    "save_figure",
+]
 
 PLOT_FORMATS = {
     ".png": "pixels, 300 per inch",
@@ -61,6 +69,11 @@ def check_plot_file(path: Path) -> None:
             f"{path}: figures can be written as {', '.join(PLOT_FORMATS)}, "
             f"not as {path.suffix or 'a file without a suffix'}"
         )
+    check_folder(path)
+
+
+def check_folder(path: Path) -> None:
+    """SettingsError if there is no folder that a file of this name can be written to."""
     if not path.parent.is_dir():
         raise SettingsError(f"{path}: there is no folder {path.parent} to write to")
     if not os.access(path.parent, os.W_OK):

@@ -28,6 +28,9 @@ TABLE_FIGURES = {
     "correlation": "void against contact anisotropy, with the fitted line and the paper's slope",
 }
 
+# in inches
+SIZES = {"evolution": (7.0, 3.0), "normalised": (7.0, 3.0), "correlation": (5.0, 3.0)}
+PAGE = (7.0, 7.6)
 PAPER_SLOPE = 0.096
 # without rattlers: open and larger, so that a curve that coincides with its twin is still seen
 LOOKS: dict[str, dict[str, Any]] = {
@@ -79,12 +82,7 @@ def plot_table(
     SettingsError
         If there is nothing to draw.
     """
-    width, height = (
-        {"evolution": (7.0, 3.0), "normalised": (7.0, 3.0), "correlation": (5.0, 3.0)}[name]
-        if name
-        else (7.0, 7.6)
-    )
-    with new_figure(width, height) as figure:
+    with new_figure(*(SIZES[name] if name else PAGE)) as figure:
         draw_table(figure, rows, fits, name)
         save_figure(figure, path)
 

@@ -123,9 +123,7 @@ def distribution_mesh(directions: FloatArray, mean_length: FloatArray, weight: F
     return mesh
 
 
-def ellipsoid_mesh(
-    tensors: Mapping[str, FloatArray], center: FloatArray, size: float
-) -> Any:
+def ellipsoid_mesh(tensors: Mapping[str, FloatArray], center: FloatArray, size: float) -> Any:
     """
     Fabric tensors as ellipsoids side by side along x; isotropy gives spheres of radius ``size``.
 
@@ -136,7 +134,7 @@ def ellipsoid_mesh(
     parts = []
     for kind, matrix in enumerate(tensors.values()):
         ball = pyvista.Icosphere(radius=1.0, nsub=3)
-        place = center + [2.5 * size * (kind - 0.5 * (len(tensors) - 1)), 0, 0]
+        place = center + 2.5 * size * (kind - 0.5 * (len(tensors) - 1)) * np.eye(3)[0]
         ball.points = np.asarray(ball.points) @ (3.0 * size * matrix) + place
         ball.point_data["kind"] = np.full(ball.n_points, kind)
         parts.append(ball)
@@ -145,7 +143,7 @@ def ellipsoid_mesh(
 
 
 def tensor_points(tensors: Mapping[str, FloatArray], center: FloatArray) -> Any:
-    """One point in the middle of the sample with 9-component arrays, for the Tensor Glyph filter."""
+    """One point in the middle of the sample, 9-component arrays: for the Tensor Glyph filter."""
     import pyvista
 
     mesh = pyvista.PolyData(center[None])
