@@ -41,8 +41,8 @@ def _bias(name: str) -> str:
     if bias < SOME_BIAS:
         return ""
     return (
-        f"The scan directions ({name}) are not spread evenly: a sample without any anisotropy would "
-        f"get α = {bias:.2g}. Changes of α between frames mean more than its value."
+        f"The scan directions ({name}) are not spread evenly: a sample without any anisotropy "
+        f"would get α = {bias:.2g}. Changes of α between frames mean more than its value."
     )
 
 
@@ -51,8 +51,8 @@ def _missing(rows: Sequence[Mapping[str, Any]]) -> str:
     if not empty:
         return ""
     return (
-        f"{empty} of {len(rows)} rows have no void fabric: no void segment was long enough, or some "
-        f"direction kept none."
+        f"{empty} of {len(rows)} rows have no void fabric: no void segment was long enough, or "
+        f"some direction kept none."
     )
 
 
@@ -89,22 +89,23 @@ def _scan_errors(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _few_grains(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Variants that rest on so few grains that another sample would look different."""
-    found = []
+    """Sources of so few grains that another sample would look different."""
+    small: dict[str, list[str]] = {}
     for (source, variant), group in _groups(rows).items():
         grains = min((row["grains"] for row in group if row.get("grains")), default=0)
         errors = [row.get("alpha_vs_axial_sample_se") for row in group]
         known = [float(error) for error in errors if error is not None]
         scatter = max(known) if known else SCATTER / max(grains, 1) ** 0.5
         if grains and scatter > NOTABLE * _signal(group):
-            source_of = "standard error of the sample" if known else "as a rule of thumb"
-            found.append(
-                f"Variant {variant} of {source} rests on {grains} grains: another sample of the "
-                f"same material would differ by about {scatter:.1g} in α_vs ({source_of}), "
-                f"against a largest value of {_signal(group):.2g}. More lines cannot help, only "
-                f"more grains."
+            small.setdefault(source, []).append(
+                f"by about {scatter:.1g} in variant {variant} ({grains} grains, "
+                f"largest value {_signal(group):.2g})"
             )
-    return found
+    return [
+        f"{source} has few grains. Another sample of the same material would differ in α_vs "
+        f"{'; '.join(parts)}. More lines cannot help, only more grains."
+        for source, parts in small.items()
+    ]
 
 
 def _few_frames(rows: Sequence[Mapping[str, Any]]) -> str:

@@ -22,6 +22,7 @@ from scanfab.segments import sample_segments
 from scanfab.series import Series
 from scanfab.settings import Settings
 from scanfab.variants import VARIANTS
+from scanfab.writers.plot import DPI
 from scanfab.writers.plot_frame import (
     CutoffCurve,
     LengthSample,
@@ -95,6 +96,7 @@ def plot_frames(
     settings: Settings,
     rows: Sequence[Mapping[str, Any]],
     figure: str,
+    dpi: int = DPI,
 ) -> None:
     """
     Draw the first and the last frame of a table that have a void fabric.
@@ -110,6 +112,8 @@ def plot_frames(
         The table.
     figure : str
         See :func:`parse_figure`.
+    dpi : int, optional
+        Pixels an inch.
 
     Raises
     ------
@@ -120,13 +124,13 @@ def plot_frames(
     variant = "c" if "c" in settings.variants else settings.variants[0]
     results = _results(series, settings, rows, variant)
     if name == "rose":
-        plot_rose(path, [_rose(one, variant, angles, settings) for one in results])
+        plot_rose(path, [_rose(one, variant, angles, settings) for one in results], dpi)
     elif name == "projection":
-        plot_projection(path, [_projection(one, variant) for one in results])
+        plot_projection(path, [_projection(one, variant) for one in results], dpi)
     elif name == "histogram":
-        plot_histogram(path, [_lengths(one, variant) for one in results])
+        plot_histogram(path, [_lengths(one, variant) for one in results], dpi)
     else:
-        plot_cutoffs(path, [_cutoffs(one, variant, settings) for one in results])
+        plot_cutoffs(path, [_cutoffs(one, variant, settings) for one in results], dpi)
 
 
 def _results(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import io
+import math
 import tempfile
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
@@ -135,15 +136,15 @@ def _results(summary: Iterable[Any], rows: Sequence[Mapping[str, Any]]) -> list[
             if (row["source"], row["variant"]) == (one.source, one.variant)
             and row["alpha_vs_axial"] is not None
         ]
-        last = group[-1] if group else {}
+        first, last = (group[0], group[-1]) if group else ({}, {})
         lines.append(
             [
                 one.source,
                 one.variant,
                 str(one.frames),
-                _spell(group[0]["alpha_vs_axial"]) if group else "-",
+                _with_error(first.get("alpha_vs_axial"), first.get("alpha_vs_axial_se")),
                 _with_error(last.get("alpha_vs_axial"), last.get("alpha_vs_axial_se")),
-                _spell(last.get("alpha_c_axial")),
+                _with_error(last.get("alpha_c_axial"), last.get("alpha_c_axial_se")),
                 _with_error(one.slope, one.slope_se),
                 _spell(one.r2),
             ]
@@ -152,7 +153,13 @@ def _results(summary: Iterable[Any], rows: Sequence[Mapping[str, Any]]) -> list[
 
 
 def _with_error(value: float | None, error: float | None) -> str:
-    return _spell(value) + ("" if value is None or error is None else f" ± {error:.1g}")
+    """A small number, with two digits of its error if that is known."""
+    if value is None:
+        return "-"
+    if error is None or error <= 0:
+        return f"{value:.5f}"
+    digits = max(0, 1 - math.floor(math.log10(error)))
+    return f"{value:.{digits}f} ± {error:.{digits}f}"
 
 
 def _spell(value: Any) -> str:
@@ -196,7 +203,9 @@ def _table_pictures(rows: Sequence[Mapping[str, Any]]) -> list[Picture]:
                 return []
             stream = io.BytesIO()
             figure.savefig(stream, format="svg", metadata={"Date": None})
-        pictures.append(Picture(_data_url("image/svg+xml", stream.getvalue()), caption))
+        pictures.append(
+            Picture(_data_url("image/svg+xml", stream.getvalue()), caption[0].upper() + caption[1:])
+        )
     return pictures
 
 
@@ -293,9 +302,10 @@ def _frame_picture(
     # the series may be named otherwise if it was opened from another folder
     own = [{**row, "source": series.name} for row in rows if row["source"] == rows[0]["source"]]
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / f"{name}.svg"
-        plot_frames(path, series, settings, own, name)
-        return Picture(_data_url("image/svg+xml", path.read_bytes()), caption)
+        # pixels, as the disks are pixels anyway, and few of them
+        path = Path(folder) / f"{name}.png"
+        plot_frames(path, series, settings, own, name, dpi=130)
+        return Picture(_data_url("image/png", path.read_bytes()), caption)
 
 
 def _check_inputs(manifest: Mapping[str, Any]) -> None:

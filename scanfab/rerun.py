@@ -13,7 +13,7 @@ from scanfab.manifest import asked_for
 from scanfab.series import Series, open_sources
 from scanfab.settings import Settings
 
-__all__ = ["read_manifest", "repeat_command", "reopen", "restored_settings", "spelt_settings"]
+__all__ = ["read_manifest", "reopen", "repeat_command", "restored_settings", "spelt_settings"]
 
 READING = ("format", "columns", "contact_columns", "radius", "cell", "periodic", "contacts")
 

@@ -25,7 +25,7 @@
     const pen = canvas.getContext("2d");
     const disks = data.kinds.map((kind) => shaded(kind.colour));
     const shown = data.kinds.map(() => true);
-    const state = { turn: 0.5, tilt: 0.35, zoom: 1, cut: false };
+    const state = { turn: 0.5, tilt: 0.35, zoom: 1.3, cut: false };
     let waiting = false;
 
     function draw() {

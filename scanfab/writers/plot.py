@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "COLOURS",
+    "DPI",
     "PLOT_FORMATS",
     "check_folder",
     "check_plot_file",
@@ -29,6 +30,9 @@ PLOT_FORMATS = {
     ".svg": "vectors, for pages of the web and for editing",
     ".pdf": "vectors, for print",
 }
+
+# pixels an inch, also of coloured disks in files of vectors
+DPI = 300
 
 # of Okabe and Ito (2008); each variant also has a marker and a line of its own
 COLOURS = {
@@ -56,7 +60,6 @@ STYLE: Any = {
     "lines.linewidth": 1.1,
     "lines.markersize": 3.5,
     "errorbar.capsize": 1.5,
-    "savefig.dpi": 300,
     # the same input gives the same bytes
     "svg.hashsalt": "scanfab",
 }
@@ -93,13 +96,13 @@ def new_figure(width: float, height: float) -> Iterator[Figure]:
         yield Figure(figsize=(width, height), layout="constrained")
 
 
-def save_figure(figure: Figure, path: Path) -> None:
+def save_figure(figure: Figure, path: Path, dpi: int = DPI) -> None:
     """Write PNG, SVG or PDF, by the suffix; the file is complete or untouched."""
     part = path.with_name(f"{path.name}.part")
     kind = path.suffix.lower().lstrip(".")
     dates = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
     try:
-        figure.savefig(part, format=kind, metadata=dates[kind])
+        figure.savefig(part, format=kind, dpi=dpi, metadata=dates[kind])
         os.replace(part, path)
     finally:
         part.unlink(missing_ok=True)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.writers.plot import COLOURS, new_figure, save_figure, widen
+from scanfab.writers.plot import COLOURS, DPI, new_figure, save_figure, widen
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -122,7 +122,7 @@ def disk() -> tuple[FloatArray, FloatArray]:
     return rho[..., None] * along, directions
 
 
-def plot_rose(path: Path, roses: Sequence[Rose]) -> None:
+def plot_rose(path: Path, roses: Sequence[Rose], dpi: int = DPI) -> None:
     """Roses of void lengths and contact normals, a row for each frame."""
     with new_figure(7.0, 3.3 * len(roses) + 0.3) as figure:
         panels = figure.subplots(len(roses), 2, squeeze=False, subplot_kw={"projection": "polar"})
@@ -139,7 +139,7 @@ def plot_rose(path: Path, roses: Sequence[Rose]) -> None:
             ):
                 axes.set_title(f"{what}, {rose.title}", fontsize=8, pad=10)
         _ring_legend(figure, roses[0].void)
-        save_figure(figure, path)
+        save_figure(figure, path, dpi)
 
 
 def _reach(ring: Ring) -> float:
@@ -195,7 +195,7 @@ def _ring_legend(figure: Figure, rings: Sequence[Ring]) -> None:
     )
 
 
-def plot_projection(path: Path, frames: Sequence[Projection]) -> None:
+def plot_projection(path: Path, frames: Sequence[Projection], dpi: int = DPI) -> None:
     """The directional distributions on equal-area disks, a row for each frame."""
     with new_figure(6.4, 2.75 * len(frames) + 0.2) as figure:
         panels = figure.subplots(len(frames), 2, squeeze=False)
@@ -211,7 +211,7 @@ def plot_projection(path: Path, frames: Sequence[Projection]) -> None:
             if drawn is not None:
                 bar = figure.colorbar(drawn, ax=panels[:, column], shrink=0.8, pad=0.03)
                 bar.set_label("deviation from the mean over directions in %")
-        save_figure(figure, path)
+        save_figure(figure, path, dpi)
 
 
 def _disk(axes: Axes, value: FloatArray | None, largest: float) -> Any:
@@ -243,7 +243,7 @@ def _disk(axes: Axes, value: FloatArray | None, largest: float) -> Any:
     )
 
 
-def plot_histogram(path: Path, samples: Sequence[LengthSample]) -> None:
+def plot_histogram(path: Path, samples: Sequence[LengthSample], dpi: int = DPI) -> None:
     """Density of void segment lengths, with the cut-off; an outline for each frame."""
     with new_figure(3.4, 2.9) as figure:
         axes = figure.subplots()
@@ -266,10 +266,10 @@ def plot_histogram(path: Path, samples: Sequence[LengthSample]) -> None:
         axes.set(yscale="log", xlim=(0, longest), ylabel="probability density")
         axes.set(xlabel=r"void segment length / $r_{min}$")
         axes.legend(loc="upper right")
-        save_figure(figure, path)
+        save_figure(figure, path, dpi)
 
 
-def plot_cutoffs(path: Path, curves: Sequence[CutoffCurve]) -> None:
+def plot_cutoffs(path: Path, curves: Sequence[CutoffCurve], dpi: int = DPI) -> None:
     """Void anisotropy over the cut-off, a curve for each frame."""
     with new_figure(3.4, 2.9) as figure:
         axes = figure.subplots()
@@ -287,4 +287,4 @@ def plot_cutoffs(path: Path, curves: Sequence[CutoffCurve]) -> None:
         axes.set(xlabel=r"cut-off / $r_{min}$", ylabel=r"void fabric  $10^{3}\,\alpha_{vs}$")
         widen(axes, 1.0)
         figure.legend(loc="outside upper center", ncols=3, columnspacing=1.2)
-        save_figure(figure, path)
+        save_figure(figure, path, dpi)

@@ -24,7 +24,7 @@ FloatArray = npt.NDArray[np.float64]
 
 TABLE_FIGURES = {
     "evolution": "void and contact anisotropy over the strain",
-    "normalised": "the same, each curve divided by its own largest absolute value",
+    "normalised": "both over the strain, each curve divided by its own largest absolute value",
     "correlation": "void against contact anisotropy, with the fitted line and the paper's slope",
 }
 
@@ -111,7 +111,7 @@ def draw_table(
         draw = {"evolution": _evolution, "normalised": _normalised}[name]
         draw(figure.subplots(1, 2), curves, abscissa)
     if name != "correlation":
-        _legend(figure, curves)
+        _legend(figure, curves, "" if name == "normalised" else _note(curves))
 
 
 def _evolution(panels: Sequence[Axes], curves: Sequence[Curve], abscissa: str) -> None:
@@ -261,7 +261,7 @@ def _name(curve: Curve, several: bool) -> str:
     return f"{curve.variant}, {plain(curve.source)}" if several else curve.variant
 
 
-def _legend(figure: Figure, curves: Sequence[Curve]) -> None:
+def _legend(figure: Figure, curves: Sequence[Curve], note: str) -> None:
     """Above the panels, so that it covers no data."""
     from matplotlib.lines import Line2D
 
@@ -273,13 +273,12 @@ def _legend(figure: Figure, curves: Sequence[Curve]) -> None:
         handles.append(Line2D([], [], **look))
         meaning = "" if several else f": {meanings.get(curve.variant, '')}"
         labels.append(f"variant {_name(curve, several)}{meaning}")
-    note = _note(curves)
     figure.legend(
         handles,
         labels,
         loc="outside upper center",
         ncols=min(len(handles), 2 if several else 4),
-        title=note,
+        title=note or None,
         title_fontproperties={"size": 7},
     )
 

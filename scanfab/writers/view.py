@@ -72,7 +72,7 @@ def show_scene(
     if screenshot is not None:
         check_drawing()
     quiet_vtk()
-    plotter = pyvista.Plotter(
+    plotter: Any = pyvista.Plotter(
         off_screen=screenshot is not None, window_size=list(SIZE), title=title or "scanfab"
     )
     up = np.asarray(axis, dtype=np.float64)

@@ -214,11 +214,11 @@ def _add(data: Any, arrays: Mapping[str, npt.ArrayLike]) -> None:
         data[name] = np.ascontiguousarray(values)
 
 
-def _triangles(directions: FloatArray) -> npt.NDArray[np.int64]:
+def _triangles(directions: FloatArray) -> Any:
     """Triangles between points on a sphere, all seen counter-clockwise from outside."""
     from scipy.spatial import ConvexHull
 
-    corners: npt.NDArray[np.int64] = ConvexHull(directions).simplices.astype(np.int64)
+    corners = ConvexHull(directions).simplices.astype(np.int64)
     a, b, c = directions[corners].transpose(1, 0, 2)
     inward = np.einsum("ti,ti->t", np.cross(b - a, c - a), a) < 0
     corners[inward] = corners[inward, ::-1]
