@@ -68,12 +68,17 @@ def fit_even(axes: FloatArray, values: FloatArray, weights: FloatArray) -> EvenF
     2.0
     """
     root = np.sqrt(weights / weights.sum())
-    for degree in range(HIGHEST_DEGREE, 0, -2):
-        matrix = _basis(axes, degree) * root[:, None]
-        if len(matrix) >= matrix.shape[1] and np.linalg.cond(matrix) < WORST_COVERAGE:
-            coefficients = np.linalg.lstsq(matrix, values * root, rcond=None)[0]
-            return EvenFunction(degree, coefficients)
-    return EvenFunction(0, np.array([float(np.sum(root**2 * values))]))
+    degree = HIGHEST_DEGREE
+    while degree and not _is_covered(axes, root, degree):
+        degree -= 2
+    matrix = _basis(axes, degree) * root[:, None]
+    return EvenFunction(degree, np.linalg.lstsq(matrix, values * root, rcond=None)[0])
+
+
+def _is_covered(axes: FloatArray, root: FloatArray, degree: int) -> bool:
+    """Whether the axes are enough, and even enough, for a fit of this degree."""
+    matrix = _basis(axes, degree) * root[:, None]
+    return len(matrix) >= matrix.shape[1] and bool(np.linalg.cond(matrix) < WORST_COVERAGE)
 
 
 def mean_length_function(

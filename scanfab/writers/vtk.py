@@ -7,7 +7,6 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 import numpy.typing as npt
@@ -187,7 +186,7 @@ class Collection:
         """One more file, in the folder of the collection."""
         self.entries[file] = time
         lines = [
-            f'    <DataSet timestep="{time!r}" file={quoteattr(escape(file))}/>'
+            f'    <DataSet timestep="{time!r}" file="{file}"/>'
             for file, time in sorted(self.entries.items(), key=lambda entry: (entry[1], entry[0]))
         ]
         text = (
@@ -211,7 +210,8 @@ def _lines(ends: FloatArray) -> Any:
 
 def _add(data: Any, arrays: Mapping[str, npt.ArrayLike]) -> None:
     for name, values in arrays.items():
-        data[name] = np.ascontiguousarray(values)
+        if np.size(values):  # pyvista takes no empty arrays
+            data[name] = np.ascontiguousarray(values)
 
 
 def _triangles(directions: FloatArray) -> Any:
