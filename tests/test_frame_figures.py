@@ -39,7 +39,7 @@ def caught(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("figure", "suffix"), zip(FRAME_FIGURES, [*BYTES, ".png"], strict=True), ids=FRAME_FIGURES
+    ("figure", "suffix"), list(zip(FRAME_FIGURES, [*BYTES, ".png"], strict=True)), ids=FRAME_FIGURES
 )
 def test_every_figure_of_the_sample_is_drawn(series, computed, tmp_path, figure, suffix):
     path = tmp_path / f"figure{suffix}"
