@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from scanfab.errors import ReadError
+from scanfab.errors import ReadError, SettingsError
 from scanfab.manifest import asked_for
 from scanfab.series import Series, open_sources
 from scanfab.settings import Settings
@@ -34,10 +34,23 @@ def read_manifest(table: Path) -> dict[str, Any] | None:
         found = json.loads(path.read_text("utf-8"))
     except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
         raise ReadError(f"{path}: cannot be read as JSON: {error}") from None
-    settings = found.get("settings") if isinstance(found, dict) else None
-    if not isinstance(settings, dict) or not isinstance(settings.get("sources"), list):
+    if not _is_manifest(found):
         raise ReadError(f"{path}: expected a manifest of scanfab compute, found something else")
     return dict(found)
+
+
+def _is_manifest(found: Any) -> bool:
+    """Whether the parts are of the right kinds; settings are checked where they are used."""
+    if not isinstance(found, dict) or not isinstance(found.get("settings"), dict):
+        return False
+    inputs = found.get("inputs", [])
+    return (
+        isinstance(found["settings"].get("sources"), list)
+        and isinstance(inputs, list)
+        and all(isinstance(one, dict) for one in inputs)
+        and isinstance(found.get("versions", {}), dict)
+        and isinstance(found.get("warnings", []), list)
+    )
 
 
 def repeat_command(asked: Mapping[str, Any], output: str | None = None) -> str:
@@ -99,9 +112,11 @@ def restored_settings(asked: Mapping[str, Any]) -> Settings:
         If one of them cannot be used any more.
     """
     known = Settings.__dataclass_fields__
-    return Settings.make(
-        **{name: value for name, value in spelt_settings(asked).items() if name in known}
-    )
+    spelt = {name: value for name, value in spelt_settings(asked).items() if name in known}
+    try:
+        return Settings.make(**spelt)
+    except (AttributeError, TypeError, ValueError) as error:
+        raise SettingsError(f"the settings of the manifest cannot be used: {error}") from None
 
 
 def spelt_settings(asked: Mapping[str, Any]) -> dict[str, Any]:
@@ -109,7 +124,12 @@ def spelt_settings(asked: Mapping[str, Any]) -> dict[str, Any]:
     spelt = {}
     for name, value in asked.items():
         if name not in ("scanfab", "sources") and value is not None and value != []:
-            spelt[name] = _spell(name, value)
+            try:
+                spelt[name] = _spell(name, value)
+            except (KeyError, IndexError, TypeError, ValueError):
+                raise ReadError(
+                    f"the manifest's setting {name!r} cannot be understood: {value!r}"
+                ) from None
     return spelt
 
 
@@ -117,6 +137,8 @@ def _spell(name: str, value: Any) -> Any:
     if name == "frames" and isinstance(value, list):
         parts = value[:2] if value[2] is None else value
         return ":".join("" if part is None else str(part) for part in parts)
+    if name == "columns" and not isinstance(value, dict):
+        raise TypeError
     if name == "axis" and isinstance(value, list):
         return ",".join(map(_number, value))
     if isinstance(value, dict) and {"value", "unit"} <= set(value):

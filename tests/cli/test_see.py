@@ -164,7 +164,9 @@ def can_draw() -> bool:
     return True
 
 
-@pytest.mark.skipif(not can_draw(), reason="VTK cannot draw here (libegl1 or libosmesa6 is missing)")
+@pytest.mark.skipif(
+    not can_draw(), reason="VTK cannot draw here (libegl1 or libosmesa6 is missing)"
+)
 @pytest.mark.parametrize("words", [[], ["--cut"], ["--axis", "x", "--rv", "0.5"]])
 def test_view_writes_a_picture_of_several_colours(tmp_path, words, monkeypatch):
     image = pytest.importorskip("PIL.Image")
