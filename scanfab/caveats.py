@@ -7,6 +7,7 @@ from typing import Any
 
 from scanfab.directions import direction_rule
 from scanfab.errors import SettingsError
+from scanfab.tabular import numbers_of
 
 __all__ = ["caveats_of"]
 
@@ -72,8 +73,7 @@ def _scan_errors(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """Variants whose scan is too coarse for their signal."""
     found = []
     for (source, variant), group in _groups(rows).items():
-        errors = [row.get("alpha_vs_axial_se") for row in group]
-        known = [float(error) for error in errors if error is not None]
+        known = numbers_of(group, "alpha_vs_axial_se")
         if not known:
             found.append(
                 f"Variant {variant} of {source} has no standard error of the scan: "
@@ -92,9 +92,8 @@ def _few_grains(rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """Sources of so few grains that another sample would look different."""
     small: dict[str, list[str]] = {}
     for (source, variant), group in _groups(rows).items():
-        grains = min((row["grains"] for row in group if row.get("grains")), default=0)
-        errors = [row.get("alpha_vs_axial_sample_se") for row in group]
-        known = [float(error) for error in errors if error is not None]
+        grains = int(min(numbers_of(group, "grains"), default=0))
+        known = numbers_of(group, "alpha_vs_axial_sample_se")
         scatter = max(known) if known else SCATTER / max(grains, 1) ** 0.5
         if grains and scatter > NOTABLE * _signal(group):
             small.setdefault(source, []).append(

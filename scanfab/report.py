@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import io
-import math
 import tempfile
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
@@ -18,37 +17,22 @@ from scanfab.errors import ScanfabError, ScanfabWarning, SettingsError
 from scanfab.figures import fits_of
 from scanfab.frame_figures import plot_frames
 from scanfab.frame_view import scene_at
-from scanfab.rerun import read_manifest, reopen, repeat_command, restored_settings, spelt_settings
+from scanfab.report_tables import (
+    frame_table,
+    input_table,
+    overview,
+    results_table,
+    settings_table,
+)
+from scanfab.rerun import read_manifest, reopen, repeat_command, restored_settings
 from scanfab.scene import section_lines
-from scanfab.tabular import read_rows
-from scanfab.writers.page import Content, Part, Picture, Section, render_page, view_data
+from scanfab.tabular import numbers_of, read_rows
+from scanfab.writers.page import Content, Picture, Section, render_page, view_data
 
 __all__ = ["has_void_fabric", "make_report"]
 
-# frames of a source and variant that the tables show
-MOST_FRAMES = 12
-MOST_INPUTS = 20
 # standard error that is good enough for pictures
 ROUGH = 1e-3
-
-SETTING_MEANINGS = {
-    "variants": "a whole sample, b without rattlers, c RV, d RV without rattlers",
-    "rv": "radius of the RV over half the smallest extent of the grains",
-    "rv_radius": "radius of the RV, dump's unit",
-    "rv_center": "centre of the RV, dump's unit",
-    "boundary": "particles that are boundary, not grains",
-    "cutoff": "shortest void segment that counts (rmin: smallest grain radius)",
-    "spacing": "distance between neighbouring scan lines",
-    "directions": "rule of the scan directions",
-    "tolerance": "wanted standard error of the scan",
-    "min_contacts": "a grain with fewer contacts is a rattler",
-    "contact_tolerance": "relative tolerance of contacts by geometry",
-    "axis": "loading axis",
-    "strain": "where the axial strain comes from",
-    "frames": "which frames",
-    "seed": "of the random numbers",
-    "contacts": "where the contacts come from",
-}
 
 
 @dataclass(frozen=True)
@@ -86,12 +70,12 @@ def make_report(tables: Sequence[Path]) -> str:
     sections = [_section(one, told) for one in inputs]
     return render_page(
         Content(
-            summary=[_overview(one) for one in inputs],
-            results=_results(comparison.summary, rows),
+            summary=[overview(one.path, one.rows) for one in inputs],
+            results=results_table(comparison.summary, rows),
             pictures=[*_table_pictures(rows), *(p for one in sections for p in one.pictures)],
             warnings=list(dict.fromkeys([*told, *caveats_of(rows, _asked(inputs))])),
             sections=sections,
-            frames=_frame_table(rows),
+            frames=frame_table(rows),
         )
     )
 
@@ -104,88 +88,6 @@ def has_void_fabric(tables: Sequence[Path]) -> bool:
 
 def _asked(inputs: Iterable[_Input]) -> list[Mapping[str, Any]]:
     return [one.manifest["settings"] for one in inputs if one.manifest is not None]
-
-
-def _overview(one: _Input) -> str:
-    """What was measured, in a sentence."""
-    if not one.rows:
-        return f"{one.path}: an empty table."
-    sources = list(dict.fromkeys(str(row["source"]) for row in one.rows))
-    frames = len({(row["source"], row["frame"]) for row in one.rows})
-    variants = ", ".join(sorted({str(row["variant"]) for row in one.rows}))
-    grains = [row["grains"] for row in one.rows if row.get("grains") is not None]
-    strains = [row["strain"] for row in one.rows if row["strain"] is not None]
-    parts = [
-        f"{frames} {'frame' if frames == 1 else 'frames'} of {', '.join(sources)}",
-        f"variants {variants}",
-    ]
-    if grains:
-        parts.append(f"{min(grains)} to {max(grains)} grains")
-    if strains:
-        parts.append(f"axial strain {100 * min(strains):.3g} to {100 * max(strains):.3g} %")
-    return "; ".join(parts) + "."
-
-
-def _results(summary: Iterable[Any], rows: Sequence[Mapping[str, Any]]) -> list[list[str]]:
-    """One line for each source and variant."""
-    lines = []
-    for one in summary:
-        group = [
-            row
-            for row in rows
-            if (row["source"], row["variant"]) == (one.source, one.variant)
-            and row["alpha_vs_axial"] is not None
-        ]
-        first, last = (group[0], group[-1]) if group else ({}, {})
-        lines.append(
-            [
-                one.source,
-                one.variant,
-                str(one.frames),
-                _with_error(first.get("alpha_vs_axial"), first.get("alpha_vs_axial_se")),
-                _with_error(last.get("alpha_vs_axial"), last.get("alpha_vs_axial_se")),
-                _with_error(last.get("alpha_c_axial"), last.get("alpha_c_axial_se")),
-                _with_error(one.slope, one.slope_se),
-                _spell(one.r2),
-            ]
-        )
-    return lines
-
-
-def _with_error(value: float | None, error: float | None) -> str:
-    """A small number, with two digits of its error if that is known."""
-    if value is None:
-        return "-"
-    if error is None or error <= 0:
-        return f"{value:.5f}"
-    digits = max(0, 1 - math.floor(math.log10(error)))
-    return f"{value:.{digits}f} ± {error:.{digits}f}"
-
-
-def _spell(value: Any) -> str:
-    if value is None:
-        return "-"
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
-
-
-def _frame_table(rows: Sequence[Mapping[str, Any]]) -> Part:
-    """The columns that matter most, of some frames."""
-    columns = [
-        "source", "frame", "strain", "variant", "grains", "rattlers", "contacts", "coordination",
-        "solid_fraction", "segments", "mean_length", "alpha_vs", "alpha_vs_axial",
-        "alpha_vs_axial_se", "alpha_vs_axial_sample_se", "alpha_c_axial",
-    ]  # fmt: skip
-    columns = [name for name in columns if any(row.get(name) is not None for row in rows)]
-    numbers = list(dict.fromkeys((row["source"], row["frame"]) for row in rows))
-    step = -(-len(numbers) // MOST_FRAMES)
-    shown = {*numbers[::step], numbers[-1]}
-    lines = [
-        [_spell(row.get(name)) for name in columns]
-        for row in rows
-        if (row["source"], row["frame"]) in shown
-    ]
-    note = "" if len(shown) == len(numbers) else f"{len(shown)} of {len(numbers)} frames are shown."
-    return Part(columns, lines, note)
 
 
 def _table_pictures(rows: Sequence[Mapping[str, Any]]) -> list[Picture]:
@@ -234,9 +136,9 @@ def _section(one: _Input, told: list[str]) -> Section:
     return Section(
         title=str(one.path),
         command=repeat_command(asked, one.path.name),
-        settings=_settings(asked),
+        settings=settings_table(asked),
         versions=[(str(k), str(v)) for k, v in (one.manifest.get("versions") or {}).items()],
-        inputs=_inputs(one.manifest),
+        inputs=input_table(one.manifest),
         view=view,
         view_title=_view_title(one),
         no_view=no_view,
@@ -265,14 +167,9 @@ class _told(warnings.catch_warnings):  # noqa: N801
 
 def _last_frame(rows: Sequence[Mapping[str, Any]]) -> int:
     """The last frame of the first source, if possible with a void fabric."""
-    source = rows[0]["source"]
-    numbers = [row["frame"] for row in rows if row["source"] == source]
-    filled = [
-        row["frame"]
-        for row in rows
-        if row["source"] == source and row["alpha_vs_axial"] is not None
-    ]
-    return int(max(filled or numbers))
+    own = [row for row in rows if row["source"] == rows[0]["source"]]
+    filled = [row for row in own if row["alpha_vs_axial"] is not None]
+    return int(max(numbers_of(filled, "frame") or numbers_of(own, "frame"), default=0))
 
 
 def _look(one: _Input, asked: Mapping[str, Any]) -> tuple[Any, list[Picture]]:
@@ -314,41 +211,6 @@ def _check_inputs(manifest: Mapping[str, Any]) -> None:
         path = Path(str(one.get("path")))
         if path.exists() and path.stat().st_size != one.get("size"):
             raise SettingsError(f"{path} has changed since the table was computed")
-
-
-def _settings(asked: Mapping[str, Any]) -> list[tuple[str, str, str]]:
-    """Name, value and meaning of each setting."""
-    spelt = spelt_settings(asked)
-    names = [name for name in asked if name not in ("scanfab", "sources")]
-    return [
-        (
-            name.replace("_", "-"),
-            _plain(spelt.get(name, "auto" if name in ("spacing", "directions") else "-")),
-            SETTING_MEANINGS.get(name, ""),
-        )
-        for name in names
-        if name in spelt or name in SETTING_MEANINGS
-    ]
-
-
-def _plain(value: Any) -> str:
-    if isinstance(value, tuple):
-        return ", ".join(map(str, value))
-    if isinstance(value, dict):
-        return ", ".join(f"{key}={item}" for key, item in value.items())
-    return str(value)
-
-
-def _inputs(manifest: Mapping[str, Any]) -> Part:
-    """The files with size and hash, not more than fit."""
-    files = list(manifest.get("inputs") or [])
-    lines = [
-        [str(one.get("path")), str(one.get("size")), str(one.get("sha256"))]
-        for one in files[:MOST_INPUTS]
-    ]
-    more = len(files) - len(lines)
-    note = f"and {more} more, in the manifest" if more else ""
-    return Part(["file", "bytes", "SHA-256"], lines, note)
 
 
 def _view_title(one: _Input) -> str:

@@ -143,8 +143,10 @@ def _spell(name: str, value: Any) -> Any:
         return ",".join(map(_number, value))
     if isinstance(value, dict) and {"value", "unit"} <= set(value):
         return f"{_number(value['value'])}{value['unit']}"
+    if name == "boundary":
+        return tuple(str(rule["text"]) for rule in value)
     if isinstance(value, list):
-        return tuple(part["text"] if isinstance(part, dict) else part for part in value)
+        return tuple(value)
     return value
 
 

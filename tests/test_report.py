@@ -15,7 +15,7 @@ from scanfab.cli.main import run
 from scanfab.errors import ReadError, SettingsError
 from scanfab.report import make_report
 from scanfab.scene import Scene
-from scanfab.writers.page import MOST_GRAINS, view_data
+from scanfab.writers.page import MOST_GRAINS, Picture, view_data
 from tests.conftest import ROOT
 from tests.dumps import write
 from tests.tables import curve
@@ -39,6 +39,12 @@ def copied(computed, tmp_path, monkeypatch):
     for end in ("", ".manifest.json"):
         shutil.copy(f"{computed.table}{end}", f"{table}{end}")
     return table
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Without the figures that take another scan."""
+    monkeypatch.setattr("scanfab.report._frame_picture", lambda *_: Picture("data:,", "none"))
 
 
 def change(table: Path, **changes):
@@ -83,7 +89,7 @@ def test_it_needs_nothing_from_elsewhere(copied):
     assert "http" not in re.sub(r'content="default-src[^"]*"|http-equiv', "", page)
 
 
-def test_the_view_holds_the_grains_of_the_last_frame(copied, computed):
+def test_the_view_holds_the_grains_of_the_last_frame(copied, computed, quick):
     page = make_report([copied])
     data = json.loads(re.search(r'id="data-1">(.*?)</script>', page, re.S)[1])
     assert len(data["spheres"]) == 800
@@ -260,6 +266,19 @@ def test_a_damaged_manifest_is_an_error_that_names_it(copied):
         {"seed": "x"},
     ],
 )
-def test_a_manifest_of_odd_values_is_no_traceback(copied, changes, tmp_path):
+def test_a_manifest_of_odd_values_is_no_traceback(copied, changes, tmp_path, quick):
     change(copied, **changes)
     assert run(["report", str(copied), "-o", str(tmp_path / "r.html")]) in (0, 1)
+
+
+@pytest.mark.parametrize("word", ["x", True, [], {}, float("nan"), -1])
+def test_odd_values_in_columns_that_are_not_needed_are_passed_over(table, tmp_path, word):
+    odd = ("grains", "alpha_c_axial_se", "alpha_vs_axial_sample_se", "alpha_c_axial_sample_se")
+    path = table([{**row, **dict.fromkeys(odd, word)} for row in curve()])
+    assert "<h1>" in make_report([path])
+    plot = tmp_path / "x.png"
+    assert run(["compare", str(path), "--plot", str(plot)]) == 0
+
+
+def test_frames_without_a_number_are_no_error(table):
+    assert "<h1>" in make_report([table([{**row, "frame": None} for row in curve()])])

@@ -8,7 +8,6 @@ import shlex
 import pytest
 
 from scanfab.cli.compute import compute
-from scanfab.cli.options import reading_arguments
 from scanfab.errors import ReadError
 from scanfab.manifest import asked_for
 from scanfab.rerun import read_manifest, reopen, repeat_command, restored_settings

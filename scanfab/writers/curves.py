@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.tabular import number_of
+
 __all__ = ["Curve", "abscissa_label", "curves_of"]
 
 FloatArray = npt.NDArray[np.float64]
@@ -64,8 +66,9 @@ def _curve(
     source: str, variant: str, group: Sequence[Mapping[str, Any]], use_strain: bool
 ) -> Curve:
     def column(name: str) -> FloatArray:
-        values = [row.get(name) for row in group]
-        return np.array([np.nan if value is None else value for value in values], np.float64)
+        values = [number_of(row, name) for row in group]
+        array = np.array([np.nan if value is None else value for value in values], np.float64)
+        return np.where(array < 0, np.nan, array) if name.endswith("_se") else array
 
     sample = column("alpha_c_axial_sample_se")
     return Curve(

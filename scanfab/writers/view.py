@@ -24,7 +24,7 @@ ADVICE = (
     "install one of them: on Debian or Ubuntu apt-get install libegl1 libgl1 libosmesa6, or "
     "apt-get install xvfb and run the command under xvfb-run"
 )
-SIZE = (1000, 900)
+SIZE = (1200, 900)
 
 
 def check_screen() -> None:
@@ -88,7 +88,9 @@ def show_scene(
     look = toward if scene.lines is not None else toward + 0.45 * side + 0.35 * up
     plotter.camera_position = [scene.center + look, scene.center, up]
     plotter.reset_camera()
-    plotter.camera.zoom(1.25)
+    plotter.camera.zoom(1.2)
+    # to the right, beside the legend
+    plotter.camera.SetWindowCenter(-0.16, 0.0)
     plotter.enable_anti_aliasing("ssaa")
     plotter.add_axes(line_width=3)
     if screenshot is None:
