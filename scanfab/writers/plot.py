@@ -62,6 +62,8 @@ STYLE: Any = {
     "errorbar.capsize": 1.5,
     # the same input gives the same bytes
     "svg.hashsalt": "scanfab",
+    # whole fonts, as publishers want them
+    "pdf.fonttype": 42,
 }
 
 

@@ -258,6 +258,7 @@ def plot_histogram(path: Path, samples: Sequence[LengthSample], dpi: int = DPI) 
                 color=look["color"],
                 ls=look["ls"],
                 lw=1.1,
+                baseline=None,
                 label=f"{sample.title}: {100 * dropped:.0f} % dropped",
             )
         cutoff = samples[-1].cutoff

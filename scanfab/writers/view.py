@@ -88,9 +88,9 @@ def show_scene(
     look = toward if scene.lines is not None else toward + 0.45 * side + 0.35 * up
     plotter.camera_position = [scene.center + look, scene.center, up]
     plotter.reset_camera()
-    plotter.camera.zoom(1.2)
+    plotter.camera.zoom(1.12)
     # to the right, beside the legend
-    plotter.camera.SetWindowCenter(-0.16, 0.0)
+    plotter.camera.SetWindowCenter(-0.2, 0.0)
     plotter.enable_anti_aliasing("ssaa")
     plotter.add_axes(line_width=3)
     if screenshot is None:
