@@ -170,7 +170,8 @@ def _fields(rows: list[Row]) -> dict[str, Any]:
     for name in asdict(rows[0]):
         values = [getattr(row, name) for row in rows]
         if name in TEXT_FIELDS:
-            columns[name] = values
+            # VTK's texts are ASCII
+            columns[name] = [str(v).encode("ascii", "backslashreplace").decode() for v in values]
         else:
             columns[name] = np.array(
                 [np.nan if value is None else value for value in values], np.float64

@@ -11,6 +11,7 @@ from scanfab.pipeline import compute_rows
 from scanfab.settings import Settings
 from scanfab.table import COLUMNS
 from scanfab.writers.vtk import Collection
+from tests.dumps import cubic_rows, dump_text, write
 from tests.lattices import shaken_cubic
 
 pyvista = pytest.importorskip("pyvista")
@@ -163,3 +164,21 @@ def test_a_resumed_collection_keeps_its_frames(tmp_path):
     assert list(Collection(path, go_on=True).entries.values()) == [0.25, 0.5]
     Collection(path).add("c.vtp", 1.0)
     assert list(Collection(path, go_on=True).entries) == ["c.vtp"]
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabWarning")
+def test_a_frame_without_grains_and_a_name_beyond_ascii(tmp_path):
+    folder = tmp_path / 'grüße<&">'
+    folder.mkdir()
+    for step, rows in enumerate((cubic_rows(), [], cubic_rows())):
+        write(folder / f"dump_{step}.txt", dump_text(rows, step=step))
+    settings = Settings.make(variants="c", directions=9, spacing="0.5rmin", cutoff="0.2rmin")
+    vtk = tmp_path / "vtk"
+    series = scanfab.read_series(folder)
+    assert len(list(compute_rows(series, settings, observe=VtkFolder(vtk, settings.axis)))) == 3
+    empty = pyvista.read(vtk / "grains_000001.vtp")
+    assert empty.n_points == 0
+    assert empty.field_data["grains"][0] == 0
+    assert empty.field_data["source"][0].endswith(r'gr\xfc\xdfe<&">')
+    assert pyvista.get_reader(vtk / "grains.pvd").time_values == [0.0, 1.0, 2.0]
+    assert pyvista.get_reader(vtk / "distribution-c.pvd").time_values == [0.0, 2.0]
