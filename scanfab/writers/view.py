@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -67,15 +69,18 @@ def show_scene(
     ScanfabError
         If nothing can be drawn on this machine.
     """
-    import pyvista
-
     if screenshot is not None:
         check_drawing()
-    quiet_vtk()
+    with _quiet_vtk():
+        _show(scene, np.asarray(axis, dtype=np.float64), title, screenshot)
+
+
+def _show(scene: Scene, up: FloatArray, title: str, screenshot: Path | None) -> None:
+    import pyvista
+
     plotter: Any = pyvista.Plotter(
         off_screen=screenshot is not None, window_size=list(SIZE), title=title or "scanfab"
     )
-    up = np.asarray(axis, dtype=np.float64)
     toward = np.cross(np.eye(3)[np.argmin(np.abs(up))], up)
     toward /= np.linalg.norm(toward)
     _add_grains(plotter, scene, toward)
@@ -105,12 +110,18 @@ def show_scene(
         plotter.close()
 
 
-def quiet_vtk() -> None:
+@contextmanager
+def _quiet_vtk() -> Iterator[None]:
     """VTK tells of each way to draw that it tries and this machine lacks: not of use."""
-    from vtkmodules.vtkCommonCore import vtkLogger, vtkObject
+    from vtkmodules.vtkCommonCore import vtkLogger
 
-    vtkObject.GlobalWarningDisplayOff()
+    before = vtkLogger.GetCurrentVerbosityCutoff()
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
+    try:
+        yield
+    finally:
+        # the reader of VTK files listens to it
+        vtkLogger.SetStderrVerbosity(before)
 
 
 def check_drawing() -> None:
