@@ -16,7 +16,10 @@ from scanfab.settings import Settings
 
 __all__ = ["asked_for", "manifest"]
 
-PACKAGES = ("scanfab", "numpy", "numba", "scipy", "meshio", "pyvista", "click", "rich", "h5py")
+PACKAGES = (
+    "scanfab", "numpy", "numba", "scipy", "meshio", "pyvista", "click", "rich", "h5py",
+    "matplotlib", "jinja2",
+)  # fmt: skip
 
 
 def asked_for(
@@ -42,7 +45,9 @@ def asked_for(
     return {"scanfab": version("scanfab"), "sources": list(sources), **_plain(reading), **chosen}
 
 
-def manifest(asked: dict[str, Any], series: Iterable[Series]) -> dict[str, Any]:
+def manifest(
+    asked: dict[str, Any], series: Iterable[Series], warnings: Sequence[str] = ()
+) -> dict[str, Any]:
     """
     The manifest of a finished result.
 
@@ -52,6 +57,8 @@ def manifest(asked: dict[str, Any], series: Iterable[Series]) -> dict[str, Any]:
         From :func:`asked_for`.
     series : iterable of Series
         What was read.
+    warnings : sequence of str, optional
+        What the user was told.
     """
     files = {path for one in series for path in one.files()}
     return {
@@ -65,6 +72,7 @@ def manifest(asked: dict[str, Any], series: Iterable[Series]) -> dict[str, Any]:
             {"path": str(path), "size": path.stat().st_size, "sha256": _hash(path)}
             for path in sorted(files)
         ],
+        "warnings": list(warnings),
     }
 
 

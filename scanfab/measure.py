@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -28,7 +28,7 @@ from scanfab.settings import AUTO_RULE, Settings
 from scanfab.table import COLUMNS, Row
 from scanfab.variants import VARIANTS, Sample, Variant
 
-__all__ = ["Measurement", "frame_rows", "measure"]
+__all__ = ["FrameResult", "Measurement", "frame_result", "measure"]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -40,15 +40,69 @@ BLOCK_REPLICATES = 8
 BLOCK_SEGMENTS = 500_000
 
 
-def frame_rows(
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """What the scans of one frame say."""
+
+    sample: Sample
+    plan: Plan
+    """With the rule and the spacing as they were in the end."""
+    solids: Solids
+    """What the lines met."""
+    sums: ScanSums
+    gaps: GapSums | None
+    """All gaps of the same lines, where more than one cut-off or moment is asked for."""
+    blocked: GapSums
+    """Gaps of fewer lines, by the octant of their middle."""
+    blocks: tuple[Blocks, Blocks]
+    """Octants of the whole sample and of the window, of places in the dump's coordinates."""
+
+    def spheres_of(self, variant: Variant) -> tuple[FloatArray, FloatArray, float]:
+        """
+        What a few lines of a variant meet, to be looked at.
+
+        Positions (N, 3) and radii (N,) of its solids, and the radius of the sphere about the origin
+        that its lines are clipped to, 0 for none. Of a periodic whole that is a part.
+        """
+        solids, medium = self.solids, self.solids.medium
+        position, radius, removed = solids.position, solids.radius, solids.removed
+        reach = solids.window_radius if variant.in_window else 0.0
+        cell = self.sample.packing.cell
+        if medium is not None and cell is not None and not variant.in_window:
+            reach = 0.5 * float(np.linalg.norm(medium.vectors, axis=1).max())
+            position, row = _reaching_in(medium.position, medium.radius, reach, cell)
+            radius, removed = medium.radius[row], medium.removed[row]
+        solid = ~removed if variant.without_rattlers else np.ones(len(radius), bool)
+        return position[solid], radius[solid], reach
+
+
+@dataclass(frozen=True, eq=False)
+class FrameResult:
+    """The rows of one frame, and what they were made from, for those who want to see it."""
+
+    source: str
+    number: int
+    sample: Sample
+    measurement: Measurement | None
+    """None if there is nothing to scan."""
+    rows: list[Row]
+
+    @property
+    def scanned(self) -> Measurement:
+        """The measurement of a frame that has grains."""
+        assert self.measurement is not None
+        return self.measurement
+
+
+def frame_result(
     name: str,
     number: int,
     sample: Sample,
     plan: Plan | None,
     settings: Settings,
     strain: float | None,
-) -> Iterator[Row]:
-    """The rows of one frame; of its scan they say nothing if there are no grains."""
+) -> FrameResult:
+    """Scan one frame; of a frame without grains there are rows without numbers."""
     frame: dict[str, Any] = {
         "source": name,
         "frame": number,
@@ -58,32 +112,20 @@ def frame_rows(
         "contacts_from": sample.contacts.source,
     }
     if plan is None or not sample.grains.any():
-        for variant in settings.variants:
-            for _ in settings.cutoffs or (settings.cutoff,):
-                yield Row(**frame, variant=variant, **_nothing())
-        return
+        empty = [
+            Row(**frame, variant=variant, **_nothing())
+            for variant in settings.variants
+            for _ in settings.cutoffs or (settings.cutoff,)
+        ]
+        return FrameResult(name, number, sample, None, empty)
     measurement = measure(sample, plan, settings)
+    rows = []
     for variant in settings.variants:
         for place in range(len(plan.cutoffs)):
             row = _Columns(measurement, VARIANTS[variant], place, settings)
             row.warn_of_few_segments(f"frame {number}, variant {variant}")
-            yield Row(**frame, variant=variant, **row.columns())
-
-
-@dataclass(frozen=True, eq=False)
-class Measurement:
-    """What the scans of one frame say."""
-
-    sample: Sample
-    plan: Plan
-    """With the rule and the spacing as they were in the end."""
-    sums: ScanSums
-    gaps: GapSums | None
-    """All gaps of the same lines, where more than one cut-off or moment is asked for."""
-    blocked: GapSums
-    """Gaps of fewer lines, by the octant of their middle."""
-    blocks: tuple[Blocks, Blocks]
-    """Octants of the whole sample and of the window, of places in the dump's coordinates."""
+            rows.append(Row(**frame, variant=variant, **row.columns()))
+    return FrameResult(name, number, sample, measurement, rows)
 
 
 def measure(sample: Sample, plan: Plan, settings: Settings) -> Measurement:
@@ -111,7 +153,7 @@ def measure(sample: Sample, plan: Plan, settings: Settings) -> Measurement:
         replicates=range(BLOCK_REPLICATES),
         **lines,
     )
-    return Measurement(sample, plan, sums, gaps, blocked, blocks)
+    return Measurement(sample, plan, solids, sums, gaps, blocked, blocks)
 
 
 def _solids(sample: Sample, plan: Plan, settings: Settings) -> tuple[Solids, FloatArray]:

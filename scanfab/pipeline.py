@@ -21,7 +21,7 @@ from scanfab.errors import (
     SettingsError,
     SkippedFrameWarning,
 )
-from scanfab.measure import frame_rows
+from scanfab.measure import FrameResult, frame_result
 from scanfab.packing import Packing
 from scanfab.plan import Plan, make_plan
 from scanfab.series import Series
@@ -30,7 +30,10 @@ from scanfab.strain import StrainFile, axial_length
 from scanfab.table import Row, Table
 from scanfab.variants import Sample
 
-__all__ = ["compute", "compute_rows"]
+__all__ = ["FrameResult", "compute", "compute_rows"]
+
+
+Observer = Callable[[FrameResult], None]
 
 
 def compute(source: Packing | Series, **options: Any) -> Table:
@@ -67,7 +70,13 @@ def compute(source: Packing | Series, **options: Any) -> Table:
     return Table(compute_rows(source, Settings.make(**options)))
 
 
-def compute_rows(source: Packing | Series, settings: Settings, *, start: int = 0) -> Iterator[Row]:
+def compute_rows(
+    source: Packing | Series,
+    settings: Settings,
+    *,
+    start: int = 0,
+    observe: Observer | None = None,
+) -> Iterator[Row]:
     """
     The rows of :func:`compute`, in the order of the frames, each as soon as it may come.
 
@@ -77,10 +86,12 @@ def compute_rows(source: Packing | Series, settings: Settings, *, start: int = 0
         As for :func:`compute`.
     start : int, optional
         Leave out the frames before this one, which an earlier run has computed.
+    observe : callable, optional
+        Called with the :class:`FrameResult` of each frame, by the thread that computed it.
     """
     if not isinstance(source, Packing | Series):
         raise SettingsError(f"compute: expected a Packing or a Series, found {source!r}")
-    run = _Run(source, settings, start)
+    run = _Run(source, settings, start, observe)
     jobs = run.jobs()
     with _Pool(settings.workers) as pool:
         for rows in pool.in_order(jobs):
@@ -96,11 +107,18 @@ class _Run:
     they do not depend on one another.
     """
 
-    def __init__(self, source: Packing | Series, settings: Settings, start: int) -> None:
+    def __init__(
+        self,
+        source: Packing | Series,
+        settings: Settings,
+        start: int,
+        observe: Observer | None,
+    ) -> None:
         self.source = source
         self.settings = settings
         self.name = "" if isinstance(source, Packing) else source.name
         self.start = start
+        self.observe = observe
         self.plan: Plan | None = None
         self.strains = _Strains(settings)
         self.particles = 0
@@ -159,7 +177,10 @@ class _Run:
     def _rows(self, number: int, sample: Sample, threads: int) -> list[Row]:
         settings = replace(self.settings, workers=threads)
         strain = self.strains.at(number, sample)
-        return list(frame_rows(self.name, number, sample, self.plan, settings, strain))
+        result = frame_result(self.name, number, sample, self.plan, settings, strain)
+        if self.observe is not None:
+            self.observe(result)
+        return result.rows
 
 
 class _Pool:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 import sys
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 from scanfab.errors import ReadError
 
-__all__ = ["read_rows"]
+__all__ = ["number_of", "numbers_of", "read_rows"]
 
 TEXT_COLUMNS = ("source", "variant", "contacts_from")
 
@@ -54,6 +56,19 @@ def read_rows(path: Path | str) -> list[dict[str, Any]]:
         lines = [line for line in text.split("\n") if line.strip()]
         return _objects(path, [_parse(path, line) for line in lines])
     return _read_csv(path, text)
+
+
+def number_of(row: Mapping[str, Any], name: str) -> float | None:
+    """A row's number in a column that need not exist; None for anything else there."""
+    value = row.get(name)
+    if isinstance(value, int | float) and math.isfinite(value):
+        return float(value)
+    return None
+
+
+def numbers_of(rows: Iterable[Mapping[str, Any]], name: str) -> list[float]:
+    """The numbers of such a column."""
+    return [value for row in rows if (value := number_of(row, name)) is not None]
 
 
 def _parse(path: Path | str, text: str) -> Any:

@@ -190,9 +190,11 @@ def periodic_gaps(position, radius, vectors, periods, foot, direction, measured)
     cells = np.unique(np.where(periods, cells, 0.0), axis=0)
     spread = np.array(list(product(*around)))
     shifts = np.unique((cells[:, None] + spread).reshape(-1, 3), axis=0)
-    home = position - np.where(
-        periods, np.floor((position - position[0]) @ np.linalg.inv(vectors)), 0.0
-    ) @ vectors
+    home = (
+        position
+        - np.where(periods, np.floor((position - position[0]) @ np.linalg.inv(vectors)), 0.0)
+        @ vectors
+    )
     images = (home[None] + (shifts @ vectors)[:, None]).reshape(-1, 3)
     radii = np.tile(radius, len(shifts))
     depth = (images - foot) @ direction

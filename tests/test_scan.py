@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scanfab import Packing, SettingsError, compute, direction_rule, scan_lines
-from scanfab.scan import MAX_LINES, ScanSums, turned_frames, line_frames
+from scanfab.scan import MAX_LINES, ScanSums, line_frames, turned_frames
 from tests import naive
 from tests.lattices import Spheres, poisson_spheres, separate_spheres, shaken_cubic
 from tests.scanning import fabric, solids_of

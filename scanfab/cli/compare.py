@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from scanfab.cli.options import output_option
+from scanfab.cli.options import check_plot, output_option, plot_option
 
 if TYPE_CHECKING:
     from scanfab.compare import Comparison
@@ -35,12 +35,20 @@ BARS = " ▁▂▃▄▅▆▇█"
     "--strain-max", type=float, metavar="X", help="Leave frames beyond this strain out of the fits."
 )
 @output_option
+@plot_option
+@click.option(
+    "--figure",
+    metavar="NAME",
+    help="Which figure: evolution, normalised or correlation (default: all on one page).",
+)
 def compare(
     tables: tuple[str, ...],
     summary: bool,
     differences: bool,
     strain_max: float | None,
     output: Path | None,
+    plot: Path | None,
+    figure: str | None,
 ) -> int:
     """
     Set the variants of fabric tables side by side.
@@ -52,9 +60,11 @@ def compare(
     from scanfab.cli.console import reported_warnings
     from scanfab.compare import compare_tables
     from scanfab.errors import SettingsError
+    from scanfab.figures import TABLE_FIGURES, plot_rows
     from scanfab.tabular import read_rows
     from scanfab.writers.rows import check_suffix
 
+    check_plot(plot, figure, TABLE_FIGURES)
     if summary and differences:
         raise click.UsageError("--summary and --differences are two tables: ask for one of them")
     try:
@@ -79,6 +89,8 @@ def compare(
             _print(comparison)
         else:
             _write_csv(chosen)
+        if plot is not None:
+            plot_rows(plot, rows, figure, strain_max)
     return 0 if any(row.alpha_vs_axial is not None for row in comparison.frames) else 1
 
 

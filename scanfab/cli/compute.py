@@ -6,6 +6,7 @@ import json
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,15 +14,18 @@ import click
 
 from scanfab.cli.options import (
     SourceCommand,
+    check_plot,
     fill_from_file,
     frame_options,
     open_series,
     output_option,
+    plot_option,
     reading_arguments,
     reading_options,
 )
 
 if TYPE_CHECKING:
+    from scanfab.pipeline import Observer
     from scanfab.series import Series
     from scanfab.settings import Settings
     from scanfab.table import Row
@@ -127,6 +131,21 @@ __all__ = ["compute"]
     help="Settings, seed, versions, inputs with size and hash, as JSON (with -o FILE also "
     "FILE.manifest.json without asking).",
 )
+@click.option(
+    "--vtk",
+    "vtk_folder",
+    type=click.Path(file_okay=False, path_type=Path),
+    metavar="DIR",
+    help="Write files for ParaView of each frame that is computed now.",
+)
+@plot_option
+@click.option(
+    "--figure",
+    metavar="NAME",
+    help="Which figure: of the table evolution, normalised or correlation (default: all on one "
+    "page); of the first and last frame rose (or rose:30,60,90 for these polar angles), "
+    "projection, histogram or cutoffs.",
+)
 @click.pass_context
 def compute(
     ctx: click.Context,
@@ -135,6 +154,9 @@ def compute(
     output: Path | None,
     resume: bool,
     manifest_path: Path | None,
+    vtk_folder: Path | None,
+    plot: Path | None,
+    figure: str | None,
     **options: Any,
 ) -> int:
     """
@@ -154,8 +176,11 @@ def compute(
 
     options = fill_from_file(ctx, sources, options)
     reading = reading_arguments(options)
+    if options.get("cutoffs") and (vtk_folder is not None or plot is not None):
+        raise click.UsageError("--vtk and --plot are of one cut-off: leave out --cutoffs")
     if resume and output is None:
         raise click.UsageError("--resume goes with -o FILE")
+    _check_figure(plot, figure)
     with reported_warnings() as told:
         try:
             settings = Settings.make(**options)
@@ -164,46 +189,130 @@ def compute(
             raise click.UsageError(str(error)) from None
         asked = asked_for(sources, reading, settings)
         series = open_series(sources, reading)
-        found = _write(series, settings, asked, result, resume)
+        if figure is not None and _is_of_frames(figure) and len(series) > 1:
+            raise click.UsageError(f"--figure {figure} draws one series: name one source")
+        run = _Run(series, settings, vtk_folder, resume, keep=plot is not None)
+        _write(run, asked, result)
         for path in _manifests(output, manifest_path):
-            _write_manifest(path, asked, series)
-    return 0 if found and not told.skipped else 1
+            _write_manifest(path, asked, series, told.texts)
+        if plot is not None:
+            _draw(plot, figure, run)
+    return 0 if run.found and not told.skipped else 1
 
 
-def _write(
-    series: list[Series],
-    settings: Settings,
-    asked: dict[str, Any],
-    result: ResultFile | None,
-    resume: bool,
-) -> bool:
-    """Write the rows as they come; whether any of them has a void fabric."""
-    from scanfab.cli.console import print_table, with_progress
-    from scanfab.writers.rows import CsvWriter
+def _check_figure(plot: Path | None, figure: str | None) -> None:
+    if plot is None and figure is None:
+        return
+    from scanfab.figures import TABLE_FIGURES
+    from scanfab.frame_figures import FRAME_FIGURES, parse_figure
 
-    found = False
+    check_plot(plot, figure, [*TABLE_FIGURES, *FRAME_FIGURES])
+    if figure is not None and _is_of_frames(figure):
+        with _usage_errors():
+            parse_figure(figure)
 
-    def watched(rows: Iterator[Row]) -> Iterator[Row]:
-        nonlocal found
-        for row in with_progress(rows):
-            found = found or row.alpha_vs is not None
+
+def _is_of_frames(figure: str) -> bool:
+    from scanfab.figures import TABLE_FIGURES
+
+    return figure not in TABLE_FIGURES
+
+
+def _draw(plot: Path, figure: str | None, run: _Run) -> None:
+    from scanfab.figures import plot_rows
+    from scanfab.frame_figures import plot_frames
+
+    if not run.found:
+        click.echo(f"scanfab: {plot} is not drawn: no row has a void fabric", err=True)
+    elif figure is not None and _is_of_frames(figure):
+        plot_frames(plot, run.series[0], run.settings, run.kept, figure)
+    else:
+        plot_rows(plot, run.kept, figure)
+
+
+class _Run:
+    """The series under way, and what becomes of their rows."""
+
+    def __init__(
+        self,
+        series: list[Series],
+        settings: Settings,
+        vtk_folder: Path | None,
+        resume: bool,
+        keep: bool,
+    ) -> None:
+        self.series = series
+        self.settings = settings
+        self.resume = resume
+        self.found = False
+        """Whether any row has a void fabric."""
+        self.kept: list[dict[str, Any]] = []
+        """The rows, if they are wanted."""
+        self._keep = keep
+        self._observers = _vtk_folders(vtk_folder, series, settings, resume)
+
+    def before(self, done: list[dict[str, Any]]) -> None:
+        """Rows of an earlier run."""
+        self.found = any(row["alpha_vs"] is not None for row in done)
+        self.kept = list(done) if self._keep else []
+
+    def rows(self, last: dict[str, Any] | None) -> Iterator[Row]:
+        """The rows behind the last one that an earlier run has written."""
+        from scanfab.cli.console import with_progress
+
+        for row in with_progress(self._rows(last)):
+            self.found = self.found or row.alpha_vs is not None
+            if self._keep:
+                self.kept.append(asdict(row))
             yield row
+
+    def _rows(self, last: dict[str, Any] | None) -> Iterator[Row]:
+        from scanfab.pipeline import compute_rows
+
+        names = [one.name for one in self.series]
+        first = names.index(last["source"]) if last is not None else 0
+        for one, observe in list(zip(self.series, self._observers, strict=True))[first:]:
+            start = last["frame"] + 1 if last is not None and one.name == last["source"] else 0
+            yield from compute_rows(one, self.settings, start=start, observe=observe)
+
+
+def _vtk_folders(
+    folder: Path | None, series: list[Series], settings: Settings, resume: bool
+) -> list[Observer | None]:
+    """What writes the ParaView files of each series, in folders of their own if several."""
+    if folder is None:
+        return [None] * len(series)
+    from scanfab.export import VtkFolder
+
+    folders = [folder / f"series-{number}" for number in range(1, len(series) + 1)]
+    with _usage_errors():
+        return [
+            VtkFolder(one, settings.axis, resume)
+            for one in (folders if len(series) > 1 else [folder])
+        ]
+
+
+def _write(run: _Run, asked: dict[str, Any], result: ResultFile | None) -> None:
+    """Write the rows as they come."""
+    from scanfab.cli.console import print_table
+    from scanfab.writers.rows import CsvWriter
 
     if result is None:
         if sys.stdout.isatty():
-            print_table(list(watched(_rows(series, settings, None))))
+            print_table(list(run.rows(None)))
         else:
             printer = CsvWriter(sys.stdout)
-            for row in watched(_rows(series, settings, None)):
+            for row in run.rows(None):
                 printer.write(row)
-        return found
-    with _usage_errors():
-        done = result.finished_rows(asked, settings.rows_per_frame) if resume else []
-    found = any(row["alpha_vs"] is not None for row in done)
-    with result.writer(asked, resume) as writer:
-        for row in watched(_rows(series, settings, done[-1] if done else None)):
+        return
+    done: list[dict[str, Any]] = []
+    if run.resume:
+        with _usage_errors():
+            done = result.finished_rows(asked, run.settings.rows_per_frame)
+    run.before(done)
+    with result.writer(asked, run.resume) as writer:
+        for row in run.rows(done[-1] if done else None):
             writer.write(row)
-    return found
 
 
 @contextmanager
@@ -216,24 +325,15 @@ def _usage_errors() -> Iterator[None]:
         raise click.UsageError(str(error)) from None
 
 
-def _rows(series: list[Series], settings: Settings, last: dict[str, Any] | None) -> Iterator[Row]:
-    """The rows behind the last one that an earlier run has written."""
-    from scanfab.pipeline import compute_rows
-
-    names = [one.name for one in series]
-    first = names.index(last["source"]) if last is not None else 0
-    for one in series[first:]:
-        start = last["frame"] + 1 if last is not None and one.name == last["source"] else 0
-        yield from compute_rows(one, settings, start=start)
-
-
 def _manifests(output: Path | None, asked: Path | None) -> list[Path]:
     paths = [] if output is None else [output.with_name(output.name + ".manifest.json")]
     return paths if asked is None else [*paths, asked]
 
 
-def _write_manifest(path: Path, asked: dict[str, Any], series: list[Series]) -> None:
+def _write_manifest(
+    path: Path, asked: dict[str, Any], series: list[Series], warnings: list[str]
+) -> None:
     from scanfab.manifest import manifest
 
-    text = json.dumps(manifest(asked, series), indent=1, ensure_ascii=False)
+    text = json.dumps(manifest(asked, series, warnings), indent=1, ensure_ascii=False)
     path.write_text(text + "\n", encoding="utf-8")

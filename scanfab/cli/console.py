@@ -38,18 +38,21 @@ class Told:
     skipped = 0
     """Frames that were skipped."""
 
+    def __init__(self) -> None:
+        self.texts: list[str] = []
+        """Each text once."""
+
 
 @contextmanager
 def reported_warnings() -> Iterator[Told]:
     """Warnings of scanfab as single lines on standard error, each text once."""
-    seen: set[str] = set()
     told = Told()
 
     def show(message: Any, category: type[Warning], *rest: Any, **more: Any) -> None:
         text = str(message)
         told.skipped += issubclass(category, SkippedFrameWarning)
-        if issubclass(category, ScanfabWarning) and text not in seen:
-            seen.add(text)
+        if issubclass(category, ScanfabWarning) and text not in told.texts:
+            told.texts.append(text)
             click.echo(f"scanfab: warning: {text}", err=True)
 
     with warnings.catch_warnings():

@@ -12,6 +12,7 @@ def formats() -> None:
     """List every reader and writer, its extensions, and the package it comes from."""
     from scanfab.cli.console import reported_warnings
     from scanfab.readers.registry import installed_readers
+    from scanfab.writers.plot import PLOT_FORMATS
     from scanfab.writers.rows import FILE_FORMATS
 
     with reported_warnings():
@@ -22,6 +23,14 @@ def formats() -> None:
     lines += [
         ("writer", suffix.lstrip("."), suffix, "scanfab", description)
         for suffix, description in FILE_FORMATS.items()
+    ]
+    lines += [
+        ("figure", suffix.lstrip("."), suffix, "scanfab", description)
+        for suffix, description in PLOT_FORMATS.items()
+    ]
+    lines += [
+        ("folder", "paraview", ".vtp .pvd", "scanfab", "what compute --vtk writes"),
+        ("page", "html", ".html", "scanfab", "what report writes"),
     ]
     titles = ("kind", "name", "extensions", "package", "description")
     widths = [max(len(line[k]) for line in [titles, *lines]) for k in range(4)]

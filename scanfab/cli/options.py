@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,10 +16,13 @@ if TYPE_CHECKING:
 
 __all__ = [
     "SourceCommand",
+    "check_plot",
     "fill_from_file",
     "frame_options",
+    "grain_options",
     "open_series",
     "output_option",
+    "plot_option",
     "reading_arguments",
     "reading_options",
 ]
@@ -58,6 +61,13 @@ def frame_options(command: Command) -> Command:
     return command
 
 
+def grain_options(command: Command) -> Command:
+    """Add the same options without the choice of frames."""
+    for option in reversed(_FRAMES[:-1]):
+        command = option(command)
+    return command
+
+
 output_option = click.option(
     "-o",
     "output",
@@ -66,6 +76,32 @@ output_option = click.option(
     help="Result file: .csv .tsv .json .jsonl .parquet (default: CSV on standard output, or a "
     "readable table on a terminal).",
 )
+
+
+plot_option = click.option(
+    "--plot",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Draw to a file: .png .svg .pdf.",
+)
+
+
+def check_plot(plot: Path | None, figure: str | None, figures: Iterable[str]) -> None:
+    """A usage error if no such figure can be drawn to such a file."""
+    from scanfab.errors import SettingsError
+    from scanfab.writers.plot import check_plot_file
+
+    if plot is None:
+        if figure is not None:
+            raise click.UsageError("--figure goes with --plot FILE")
+        return
+    name = "rose" if figure is not None and figure.startswith("rose:") else figure
+    if name is not None and name not in figures:
+        raise click.UsageError(f"--figure: expected {', '.join(figures)}, found {figure!r}")
+    try:
+        check_plot_file(plot)
+    except SettingsError as error:
+        raise click.UsageError(f"--plot: {error}") from None
 
 
 def reading_arguments(options: dict[str, Any]) -> dict[str, Any]:

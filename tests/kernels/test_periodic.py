@@ -49,9 +49,7 @@ def lines_of(medium, normal, offset, spacing):
 
 def tallies_of(medium, normal, offset, spacing, cutoff, second=True):
     tallies = np.zeros((1, 2, sweep.TALLY_SIZE))
-    axes.scan_cell(
-        medium, normal[None], offset[None], spacing, cutoff, tallies, second or None
-    )
+    axes.scan_cell(medium, normal[None], offset[None], spacing, cutoff, tallies, second or None)
     return tallies[0]
 
 

@@ -1,0 +1,134 @@
+"""
+The directional distribution of a scan: an even function on the sphere fitted to the mean lengths.
+
+On the unit sphere the homogeneous polynomials of an even degree are exactly the sums of the even
+harmonics up to that degree, so monomials are all that is needed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.directions import direction_rule
+
+__all__ = ["EvenFunction", "fit_even", "mean_length_function", "sphere_points"]
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+HIGHEST_DEGREE = 6
+# how unevenly directions may cover the sphere for a fit: the ratio of largest to smallest
+# singular value, 1 for even coverage
+WORST_COVERAGE = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class EvenFunction:
+    """f(n) = f(-n) on the unit sphere: even harmonics up to a degree."""
+
+    degree: int
+    coefficients: FloatArray
+    """Of functions that are orthonormal on the sphere, the mean of whose squares is 1."""
+
+    def __call__(self, directions: npt.ArrayLike) -> FloatArray:
+        """Values at unit vectors, shape (..., 3) to (...)."""
+        values: FloatArray = _basis(np.asarray(directions), self.degree) @ self.coefficients
+        return values
+
+
+def fit_even(axes: FloatArray, values: FloatArray, weights: FloatArray) -> EvenFunction:
+    """
+    Weighted least-squares fit of an even function.
+
+    Parameters
+    ----------
+    axes : ndarray, shape (M, 3)
+        Unit vectors.
+    values : ndarray, shape (M,)
+        In any unit.
+    weights : ndarray, shape (M,)
+        Proportional to the inverse variance of each value.
+
+    Returns
+    -------
+    EvenFunction
+        Of the highest degree, at most 6, that the axes are enough for.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab.distribution import fit_even, sphere_points
+    >>> n = sphere_points()[0]
+    >>> f = fit_even(n, 1 + n[:, 2] ** 2, np.ones(len(n)))
+    >>> round(float(f([0, 0, 1])), 12)
+    2.0
+    """
+    root = np.sqrt(weights / weights.sum())
+    degree = HIGHEST_DEGREE
+    while degree and not _is_covered(axes, root, degree):
+        degree -= 2
+    matrix = _basis(axes, degree) * root[:, None]
+    return EvenFunction(degree, np.linalg.lstsq(matrix, values * root, rcond=None)[0])
+
+
+def _is_covered(axes: FloatArray, root: FloatArray, degree: int) -> bool:
+    """Whether the axes are enough, and even enough, for a fit of this degree."""
+    matrix = _basis(axes, degree) * root[:, None]
+    return len(matrix) >= matrix.shape[1] and bool(np.linalg.cond(matrix) < WORST_COVERAGE)
+
+
+def mean_length_function(
+    axes: FloatArray, length: FloatArray, segments: IntArray
+) -> EvenFunction | None:
+    """
+    ℓ(n), fitted to the sums of a scan.
+
+    Parameters
+    ----------
+    axes : ndarray, shape (R, D, 3)
+        Unit vectors of each replicate.
+    length, segments : ndarray, shape (R, D)
+        Sum of the lengths (dump's unit) and number of one variant's kept segments.
+
+    Returns
+    -------
+    EvenFunction or None
+        In the dump's length unit; None if no segment is kept.
+    """
+    kept = segments > 0
+    if not kept.any():
+        return None
+    number = segments[kept].astype(np.float64)
+    return fit_even(axes[kept], length[kept] / number, number)
+
+
+@cache
+def sphere_points() -> tuple[FloatArray, FloatArray]:
+    """Points all over the unit sphere, shape (974, 3), and their quadrature weights, sum 1."""
+    rule = direction_rule("lebedev:53")
+    return np.concatenate([rule.axes, -rule.axes]), np.tile(0.5 * rule.weights, 2)
+
+
+def _basis(directions: FloatArray, degree: int) -> FloatArray:
+    """Orthonormal even functions up to a degree, shape (..., 3) to (..., functions)."""
+    values: FloatArray = _monomials(directions, degree) @ _orthonormal(degree)
+    return values
+
+
+def _monomials(directions: FloatArray, degree: int) -> FloatArray:
+    powers = [(i, j, degree - i - j) for i in range(degree + 1) for j in range(degree + 1 - i)]
+    values: FloatArray = np.prod(directions[..., None, :] ** np.array(powers), axis=-1)
+    return values
+
+
+@cache
+def _orthonormal(degree: int) -> FloatArray:
+    """The matrix that makes the monomials orthonormal on the sphere."""
+    points, weights = sphere_points()
+    triangle = np.linalg.qr(_monomials(points, degree) * np.sqrt(weights)[:, None], mode="r")
+    inverse: FloatArray = np.linalg.inv(triangle)
+    return inverse

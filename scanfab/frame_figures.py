@@ -1,0 +1,332 @@
+"""Figures of the first and the last frame of a series: what they need is scanned here."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.directions import DirectionRule
+from scanfab.distribution import mean_length_function, sphere_points
+from scanfab.errors import SettingsError
+from scanfab.fabric.contact import contact_fabric
+from scanfab.fabric.void import void_fabric
+from scanfab.measure import FrameResult
+from scanfab.pipeline import compute_rows
+from scanfab.scan import ScanSums, Solids, line_frames, scan_lines
+from scanfab.segments import sample_segments
+from scanfab.series import Series
+from scanfab.settings import Settings
+from scanfab.variants import VARIANTS
+from scanfab.writers.plot import DPI
+from scanfab.writers.plot_frame import (
+    CutoffCurve,
+    LengthSample,
+    Projection,
+    Ring,
+    Rose,
+    disk,
+    plot_cutoffs,
+    plot_histogram,
+    plot_projection,
+    plot_rose,
+)
+
+__all__ = ["FRAME_FIGURES", "parse_figure", "plot_frames"]
+
+FloatArray = npt.NDArray[np.float64]
+
+FRAME_FIGURES = {
+    "rose": "mean void length and contact normals over θ; rose:30,60,90 chooses φ in degrees",
+    "projection": "both over all directions, on an equal-area disk",
+    "histogram": "lengths of the void segments, with the cut-off",
+    "cutoffs": "void anisotropy over the cut-off",
+}
+
+POLAR_ANGLES = (90.0, 60.0, 30.0)
+REPLICATES = 16
+# segments for each direction of a rose: mean lengths to about half a per cent
+ROSE_SEGMENTS = 20_000
+THETA_STEP = 15.0
+CONTACT_STEP = 30.0
+# of the kernel exp(k (n·m)²) that smooths contact normals: half its height at 19 degrees
+CONCENTRATION = 6.5
+HISTOGRAM_LINES = 6_000
+CUTOFFS = (0.0, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0)
+
+
+def parse_figure(text: str) -> tuple[str, tuple[float, ...]]:
+    """
+    The name of a figure of frames, and the polar angles of a rose in degrees.
+
+    Raises
+    ------
+    SettingsError
+        If there is no such figure.
+
+    Examples
+    --------
+    >>> from scanfab.frame_figures import parse_figure
+    >>> parse_figure("rose:45,90")
+    ('rose', (45.0, 90.0))
+    """
+    name, colon, argument = text.partition(":")
+    if name not in FRAME_FIGURES or (colon and name != "rose"):
+        raise SettingsError(f"figure: expected {', '.join(FRAME_FIGURES)}, found {text!r}")
+    if not colon:
+        return name, POLAR_ANGLES
+    words = argument.split(",")
+    if len(words) > 4 or not all(re.fullmatch(r"\d+(\.\d+)?", word) for word in words):
+        raise SettingsError(
+            f"figure: expected one to four polar angles such as rose:30,60,90, found {text!r}"
+        )
+    angles = tuple(float(word) for word in words)
+    if not all(0 < angle <= 90 for angle in angles):
+        raise SettingsError(f"figure: polar angles lie above 0 and up to 90, found {text!r}")
+    return name, angles
+
+
+def plot_frames(
+    path: Path,
+    series: Series,
+    settings: Settings,
+    rows: Sequence[Mapping[str, Any]],
+    figure: str,
+    dpi: int = DPI,
+) -> None:
+    """
+    Draw the first and the last frame of a table that have a void fabric.
+
+    Parameters
+    ----------
+    path : Path
+        ``.png``, ``.svg`` or ``.pdf``.
+    series, settings
+        What the table was computed from. The variant is c, if it is among the settings', else
+        the first.
+    rows : sequence of mapping
+        The table.
+    figure : str
+        See :func:`parse_figure`.
+    dpi : int, optional
+        Pixels an inch.
+
+    Raises
+    ------
+    SettingsError
+        If there is nothing to draw.
+    """
+    name, angles = parse_figure(figure)
+    variant = "c" if "c" in settings.variants else settings.variants[0]
+    results = _results(series, settings, rows, variant)
+    if name == "rose":
+        plot_rose(path, [_rose(one, variant, angles, settings) for one in results], dpi)
+    elif name == "projection":
+        plot_projection(path, [_projection(one, variant) for one in results], dpi)
+    elif name == "histogram":
+        plot_histogram(path, [_lengths(one, variant) for one in results], dpi)
+    else:
+        plot_cutoffs(path, [_cutoffs(one, variant, settings) for one in results], dpi)
+
+
+def _results(
+    series: Series, settings: Settings, rows: Sequence[Mapping[str, Any]], variant: str
+) -> list[FrameResult]:
+    """The first and the last frame, computed again for one variant."""
+    numbers = [
+        row["frame"]
+        for row in rows
+        if row["source"] == series.name
+        and row["variant"] == variant
+        and row["alpha_vs_axial"] is not None
+    ]
+    if not numbers:
+        raise SettingsError(
+            f"there is nothing to draw: no frame has a void fabric of variant {variant}"
+        )
+    results: list[FrameResult] = []
+    for number in sorted({min(numbers), max(numbers)}):
+        one = replace(settings, frames=slice(number, number + 1), variants=variant)
+        for _ in compute_rows(series, one, observe=results.append):
+            pass
+    return results
+
+
+def _title(result: FrameResult) -> str:
+    strain = result.rows[0].strain
+    return (
+        f"frame {result.number}" if strain is None else rf"$\varepsilon_a$ = {100 * strain:.1f} %"
+    )
+
+
+def _parts(result: FrameResult) -> tuple[Solids, ScanSums, float, float]:
+    """Solids, sums, cut-off and smallest radius of a frame that has a void fabric."""
+    scanned = result.scanned
+    smallest = float(result.sample.packing.radius[result.sample.grains].min())
+    return scanned.solids, scanned.sums, scanned.plan.cutoff, smallest
+
+
+def _normals(result: FrameResult, variant: str) -> FloatArray:
+    window = result.scanned.plan.window
+    chosen = result.sample.fabric_contacts(VARIANTS[variant], window)
+    return result.sample.contacts.normal[chosen]
+
+
+def _rose(result: FrameResult, variant: str, angles: Sequence[float], settings: Settings) -> Rose:
+    rings = {phi: _azimuths(phi) for phi in angles}
+    axes = np.concatenate([_vectors(theta, phi) for phi, theta in rings.items()])
+    value, error = _mean_lengths(result, variant, axes, settings)
+    place, void = 0, []
+    for phi, theta in rings.items():
+        here = slice(place, place + len(theta))
+        place += len(theta)
+        void.append(_around(phi, theta, value[here], error[here]))
+    normals = _normals(result, variant)
+    contact = [_contact_ring(normals, phi) for phi in angles] if len(normals) else []
+    return Rose(_title(result), void, contact)
+
+
+def _azimuths(phi: float) -> FloatArray:
+    """At the equator θ and θ + 180° are one line."""
+    return np.arange(0.0, 180.0 if phi == 90 else 360.0, THETA_STEP)
+
+
+def _around(phi: float, theta: FloatArray, value: FloatArray, error: FloatArray) -> Ring:
+    if phi == 90:
+        theta = np.concatenate([theta, theta + 180.0])
+        value, error = np.tile(value, 2), np.tile(error, 2)
+    return Ring(phi, theta, value, error)
+
+
+def _vectors(theta: FloatArray, phi: float) -> FloatArray:
+    azimuth, polar = np.radians(theta), np.radians(phi)
+    flat = np.sin(polar)
+    return np.column_stack(
+        [flat * np.cos(azimuth), flat * np.sin(azimuth), np.full(len(theta), np.cos(polar))]
+    )
+
+
+def _mean_lengths(
+    result: FrameResult, variant: str, axes: FloatArray, settings: Settings
+) -> tuple[FloatArray, FloatArray]:
+    """ℓ of each axis over the mean of all directions, and its standard error, shape (D,)."""
+    solids, sums, cutoff, _ = _parts(result)
+    length, segments = sums.kept(variant)
+    # as many lines as give the wanted number of segments
+    found = segments.mean()
+    spacing = result.scanned.plan.spacing * np.sqrt(found * REPLICATES / ROSE_SEGMENTS)
+    rule = DirectionRule("rose", axes, np.full(len(axes), 1 / len(axes)), None, turned=False)
+    rose = scan_lines(
+        solids,
+        rule,
+        spacing=float(spacing),
+        cutoff=cutoff,
+        variants=variant,
+        replicates=range(REPLICATES),
+        seed=settings.seed,
+        workers=settings.workers,
+    )
+    sums_of, numbers = rose.kept(variant)
+    mean = length.sum() / segments.sum()
+    with np.errstate(invalid="ignore", divide="ignore"):
+        value = sums_of.sum(axis=0) / numbers.sum(axis=0) / mean
+        scatter = np.nanstd(sums_of / numbers, axis=0, ddof=1) / mean
+    return value, scatter / np.sqrt(REPLICATES)
+
+
+def _contact_ring(normals: FloatArray, phi: float) -> Ring:
+    """Contact normals near a polar angle by azimuth, over what isotropy would give."""
+    both = np.concatenate([normals, -normals])
+    polar = np.degrees(np.arccos(np.clip(both[:, 2], -1, 1)))
+    azimuth = np.degrees(np.arctan2(both[:, 1], both[:, 0])) % 360.0
+    low, high = max(phi - 15.0, 0.0), phi + 15.0
+    near = (polar >= low) & (polar < high)
+    edges = np.arange(0.0, 361.0, CONTACT_STEP)
+    count, _ = np.histogram(azimuth[near], edges)
+    band = np.cos(np.radians(low)) - np.cos(np.radians(high))
+    expected = len(both) * band / 2 * CONTACT_STEP / 360.0
+    tensor = contact_fabric(normals)
+    assert tensor is not None
+    deviator = 7.5 * (tensor.matrix - np.eye(3) / 3)
+
+    def density(theta: FloatArray) -> FloatArray:
+        """Second-order density of the contact fabric, after Kanatani (1984)."""
+        directions = _vectors(theta, phi)
+        values: FloatArray = 1 + np.einsum("ni,ij,nj->n", directions, deviator, directions)
+        return values
+
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    return Ring(phi, middle, count / expected, np.sqrt(count) / expected, density)
+
+
+def _projection(result: FrameResult, variant: str) -> Projection:
+    _, sums, _, _ = _parts(result)
+    _, directions = disk()
+    mean_length = mean_length_function(sums.axes, *sums.kept(variant))
+    assert mean_length is not None
+    points, weights = sphere_points()
+    mean = float(weights @ mean_length(points))
+    normals = _normals(result, variant)
+    return Projection(
+        _title(result),
+        100 * (mean_length(directions) / mean - 1),
+        100 * (_smoothed_density(normals, directions) - 1) if len(normals) else None,
+    )
+
+
+def _smoothed_density(normals: FloatArray, directions: FloatArray) -> FloatArray:
+    """Density of the normals (n or -n) about each direction, over that of isotropic ones."""
+    points, weights = sphere_points()
+    isotropic = float(weights @ np.exp(CONCENTRATION * points[:, 2] ** 2))
+    flat = directions.reshape(-1, 3)
+    density: FloatArray = np.array(
+        [np.exp(CONCENTRATION * (normals @ one) ** 2).mean() for one in flat]
+    )
+    return density.reshape(directions.shape[:-1]) / isotropic
+
+
+def _lengths(result: FrameResult, variant: str) -> LengthSample:
+    _, _, cutoff, smallest = _parts(result)
+    position, radius, reach = result.scanned.spheres_of(VARIANTS[variant])
+    points, _ = sphere_points()
+    frames = line_frames(points[: len(points) // 2 : 20])
+    found = sample_segments(position, radius, frames, HISTOGRAM_LINES, reach)
+    return LengthSample(_title(result), found.length[found.void] / smallest, cutoff / smallest)
+
+
+def _cutoffs(result: FrameResult, variant: str, settings: Settings) -> CutoffCurve:
+    solids, _, chosen, smallest = _parts(result)
+    alpha, error = [], []
+    for cutoff in CUTOFFS:
+        fabric = _fabric_at(result, solids, cutoff * smallest, variant, settings)
+        alpha.append(np.nan if fabric is None else fabric[0])
+        error.append(np.nan if fabric is None or fabric[1] is None else fabric[1])
+    return CutoffCurve(
+        _title(result), np.array(CUTOFFS), np.array(alpha), np.array(error), chosen / smallest
+    )
+
+
+def _fabric_at(
+    result: FrameResult, solids: Solids, cutoff: float, variant: str, settings: Settings
+) -> tuple[float, float | None] | None:
+    """The axial anisotropy and its standard error at another cut-off, by the same lines."""
+    plan = result.scanned.plan
+    sums = scan_lines(
+        solids,
+        plan.rule,
+        spacing=plan.spacing,
+        cutoff=cutoff,
+        variants=variant,
+        replicates=range(min(result.scanned.sums.replicates, 4 * REPLICATES)),
+        seed=settings.seed,
+        workers=settings.workers,
+    )
+    fabric = void_fabric(sums.axes, plan.rule.weights, *sums.kept(variant))
+    if fabric is None:
+        return None
+    return fabric.tensor.axial(settings.axis), fabric.axial_error(settings.axis)

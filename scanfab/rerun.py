@@ -1,0 +1,170 @@
+"""From a manifest back to what was asked for: the command that repeats it, and its source."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from scanfab.errors import ReadError, SettingsError
+from scanfab.manifest import asked_for
+from scanfab.series import Series, open_sources
+from scanfab.settings import Settings
+
+__all__ = ["read_manifest", "reopen", "repeat_command", "restored_settings", "spelt_settings"]
+
+READING = ("format", "columns", "contact_columns", "radius", "cell", "periodic", "contacts")
+
+
+def read_manifest(table: Path) -> dict[str, Any] | None:
+    """
+    The manifest beside a table; None if there is none.
+
+    Raises
+    ------
+    ReadError
+        If it is not a manifest.
+    """
+    path = table.with_name(table.name + ".manifest.json")
+    if not path.is_file():
+        return None
+    try:
+        found = json.loads(path.read_text("utf-8"))
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        raise ReadError(f"{path}: cannot be read as JSON: {error}") from None
+    if not _is_manifest(found):
+        raise ReadError(f"{path}: expected a manifest of scanfab compute, found something else")
+    return dict(found)
+
+
+def _is_manifest(found: Any) -> bool:
+    """Whether the parts are of the right kinds; settings are checked where they are used."""
+    if not isinstance(found, dict) or not isinstance(found.get("settings"), dict):
+        return False
+    inputs = found.get("inputs", [])
+    return (
+        isinstance(found["settings"].get("sources"), list)
+        and isinstance(inputs, list)
+        and all(isinstance(one, dict) for one in inputs)
+        and isinstance(found.get("versions", {}), dict)
+        and isinstance(found.get("warnings", []), list)
+    )
+
+
+def repeat_command(asked: Mapping[str, Any], output: str | None = None) -> str:
+    """
+    The command line that repeats a computation, quoted for a shell.
+
+    Parameters
+    ----------
+    asked : mapping
+        The ``settings`` of a manifest.
+    output : str, optional
+        The table.
+
+    Examples
+    --------
+    >>> from scanfab.manifest import asked_for
+    >>> from scanfab.rerun import repeat_command
+    >>> from scanfab.settings import Settings
+    >>> repeat_command(asked_for(["dumps"], {}, Settings.make(boundary="type=2", seed=3)))
+    'scanfab compute dumps --boundary type=2 --seed 3'
+    """
+    usual = spelt_settings(asked_for((), {"contacts": "auto"}, Settings.make()))
+    words = ["scanfab", "compute", *map(str, asked["sources"])]
+    for name, value in spelt_settings(asked).items():
+        if usual.get(name) != value:
+            option = f"--{name.replace('_', '-')}"
+            words += _words(option, name, value)
+    if output is not None:
+        words += ["-o", output]
+    return shlex.join(words)
+
+
+def reopen(asked: Mapping[str, Any]) -> Series:
+    """
+    The first series that a manifest names.
+
+    Raises
+    ------
+    ReadError
+        If it cannot be read again.
+    """
+    sources = [str(source) for source in asked["sources"]]
+    if "-" in sources:
+        raise ReadError("the frames came by standard input, which cannot be read again")
+    missing = [source for source in sources if not Path(source).exists()]
+    if missing:
+        raise ReadError(f"the source {missing[0]} is not there any more")
+    spelt = spelt_settings(asked)
+    return open_sources(sources, **{name: spelt[name] for name in READING if name in spelt})[0]
+
+
+def restored_settings(asked: Mapping[str, Any]) -> Settings:
+    """
+    The settings of a manifest.
+
+    Raises
+    ------
+    SettingsError
+        If one of them cannot be used any more.
+    """
+    known = Settings.__dataclass_fields__
+    spelt = {name: value for name, value in spelt_settings(asked).items() if name in known}
+    try:
+        return Settings.make(**spelt)
+    except (AttributeError, TypeError, ValueError) as error:
+        raise SettingsError(f"the settings of the manifest cannot be used: {error}") from None
+
+
+def spelt_settings(asked: Mapping[str, Any]) -> dict[str, Any]:
+    """The settings of a manifest that are not empty, as users write them."""
+    spelt = {}
+    for name, value in asked.items():
+        if name not in ("scanfab", "sources") and value is not None and value != []:
+            try:
+                spelt[name] = _spell(name, value)
+            except (KeyError, IndexError, TypeError, ValueError):
+                raise ReadError(
+                    f"the manifest's setting {name!r} cannot be understood: {value!r}"
+                ) from None
+    return spelt
+
+
+def _spell(name: str, value: Any) -> Any:
+    if name == "frames" and isinstance(value, list):
+        parts = value[:2] if value[2] is None else value
+        return ":".join("" if part is None else str(part) for part in parts)
+    if name == "columns" and not isinstance(value, dict):
+        raise TypeError
+    if name == "axis" and isinstance(value, list):
+        return ",".join(map(_number, value))
+    if isinstance(value, dict) and {"value", "unit"} <= set(value):
+        return f"{_number(value['value'])}{value['unit']}"
+    if name == "boundary":
+        return tuple(str(rule["text"]) for rule in value)
+    if isinstance(value, list):
+        return tuple(value)
+    return value
+
+
+def _words(option: str, name: str, value: Any) -> list[str]:
+    """An option as words of a command line."""
+    if name == "columns":
+        return [option, ",".join(f"{key}={column}" for key, column in value.items())]
+    if isinstance(value, bool):
+        return [option] if value else []
+    if name == "boundary":
+        return [word for rule in value for word in (option, rule)]
+    if isinstance(value, tuple):
+        return [option, *map(_number, value)]
+    # a value that starts with a dash would be taken for an option
+    text = _number(value) if isinstance(value, float) else str(value)
+    return [f"{option}={text}"] if text.startswith("-") else [option, text]
+
+
+def _number(value: float) -> str:
+    """As short as reads back the same."""
+    return f"{value:g}" if float(f"{value:g}") == value else repr(float(value))

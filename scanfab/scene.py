@@ -1,0 +1,142 @@
+"""What there is to see in a frame, as plain arrays: grains, contacts, lines; for every viewer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.segments import Segments, cut_lines
+from scanfab.variants import Sample
+from scanfab.window import SphereWindow
+
+__all__ = [
+    "ContactLines",
+    "Grains",
+    "Scene",
+    "contact_lines",
+    "grains_of",
+    "scene_of",
+    "section_lines",
+]
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+
+# between the lines of a section and the plane across the axis, degrees
+LINE_ANGLE = 30.0
+
+
+@dataclass(frozen=True, eq=False)
+class Grains:
+    """All particles of a frame, N rows; lengths in the dump's unit."""
+
+    position: FloatArray
+    radius: FloatArray
+    id: IntArray
+    contacts: IntArray
+    """Number of contacts of each, those with boundary particles and walls included."""
+    rattler: BoolArray
+    boundary: BoolArray
+    in_window: BoolArray
+    """Whether the centre lies in the RV; false for all without an RV."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContactLines:
+    """All contacts of a frame as branch vectors, M rows; lengths in the dump's unit."""
+
+    ends: FloatArray
+    """Both centres, shape (M, 2, 3); the second next to the first through periodic faces."""
+    normal: FloatArray
+    force: FloatArray | None
+    """On the second grain, shape (M, 3), dump's unit."""
+    boundary: BoolArray
+    """Whether a boundary particle takes part."""
+    in_window: BoolArray
+    """Whether the contact point lies in the RV."""
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """One frame to be looked at."""
+
+    grains: Grains
+    center: FloatArray
+    """Of the RV, or of the grains without an RV, shape (3,)."""
+    window_radius: float | None
+    """None without an RV."""
+    lines: Segments | None = None
+    """A few scan lines, in the dump's coordinates."""
+    cutoff: float = 0.0
+    """Void segments that are shorter are dropped, dump's unit."""
+
+
+def scene_of(sample: Sample, window: SphereWindow | None) -> Scene:
+    """The grains of a frame and its RV."""
+    chosen = sample.grains if sample.grains.any() else np.ones(len(sample.packing), bool)
+    center = sample.packing.position[chosen].mean(axis=0) if window is None else window.center
+    return Scene(grains_of(sample, window), center, None if window is None else window.radius)
+
+
+def section_lines(scene: Scene, axis: npt.ArrayLike) -> Segments:
+    """
+    Parallel scan lines, inclined to the axis, in a plane through the centre that holds the axis.
+
+    In the dump's coordinates; clipped to the RV, if there is one.
+    """
+    grains = scene.grains
+    solid = ~grains.boundary
+    up = np.asarray(axis, dtype=np.float64)
+    depth = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
+    depth /= np.linalg.norm(depth)
+    across = np.cross(depth, up)
+    turn = np.radians(LINE_ANGLE)
+    along = np.cos(turn) * across + np.sin(turn) * up
+    frame = np.stack([np.cross(depth, along), depth, along])
+    position = grains.position[solid] - scene.center
+    radius = grains.radius[solid]
+    reach = scene.window_radius or float(np.linalg.norm(position, axis=1).max(initial=0.0))
+    spacing = max(2.5 * float(radius.mean()), reach / 40) if len(radius) else reach
+    steps = np.arange(-reach + 0.5 * spacing, reach, spacing) if spacing > 0 else np.zeros(0)
+    points = np.column_stack([steps, np.zeros_like(steps)])
+    found = cut_lines(position, radius, frame, points, scene.window_radius or 0.0)
+    return replace(found, ends=found.ends + scene.center)
+
+
+def grains_of(sample: Sample, window: SphereWindow | None) -> Grains:
+    """The particles of a frame, with what the sample knows of them."""
+    packing = sample.packing
+    everything = np.ones(len(sample.contacts), bool)
+    return Grains(
+        position=packing.position,
+        radius=packing.radius,
+        id=packing.id,
+        contacts=sample.contact_numbers(everything),
+        rattler=sample.rattlers,
+        boundary=sample.boundary,
+        in_window=_inside(packing.position, sample, window),
+    )
+
+
+def contact_lines(sample: Sample, window: SphereWindow | None) -> ContactLines:
+    """The contacts of a frame as lines between centres."""
+    packing, contacts = sample.packing, sample.contacts
+    first, second = packing.position[contacts.pairs].transpose(1, 0, 2)
+    if packing.cell is not None:
+        second = second + contacts.image @ packing.cell.vectors
+    return ContactLines(
+        ends=np.stack([first, second], axis=1),
+        normal=contacts.normal,
+        force=contacts.force,
+        boundary=np.asarray(sample.boundary[contacts.pairs].any(axis=1)),
+        in_window=_inside(contacts.point, sample, window),
+    )
+
+
+def _inside(points: FloatArray, sample: Sample, window: SphereWindow | None) -> BoolArray:
+    if window is None or len(points) == 0:
+        return np.zeros(len(points), bool)
+    return window.contains(points, sample.packing)

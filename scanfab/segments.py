@@ -1,0 +1,159 @@
+"""A few scan lines cut into their solid and void segments, exactly, by sorting their chords."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["Segments", "cut_lines", "grid_points", "sample_segments"]
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Segments:
+    """Pieces of scan lines; lengths in the dump's unit, positions as those of the spheres."""
+
+    ends: FloatArray
+    """Both end points, shape (K, 2, 3)."""
+    void: BoolArray
+    """Whether a piece lies outside all solids, shape (K,)."""
+    line: IntArray
+    """Number of the line that a piece belongs to, shape (K,)."""
+
+    @property
+    def length(self) -> FloatArray:
+        """Shape (K,)."""
+        length: FloatArray = np.linalg.norm(self.ends[:, 1] - self.ends[:, 0], axis=1)
+        return length
+
+    @classmethod
+    def concatenate(cls, parts: Iterable[Segments]) -> Segments:
+        """The pieces of several sets of lines, which are numbered on."""
+        ends, void, line, first = [np.zeros((0, 2, 3))], [np.zeros(0, bool)], [np.arange(0)], 0
+        for part in parts:
+            ends.append(part.ends)
+            void.append(part.void)
+            line.append(part.line + first)
+            first += int(part.line.max(initial=-1)) + 1
+        return cls(np.concatenate(ends), np.concatenate(void), np.concatenate(line))
+
+
+def cut_lines(
+    position: FloatArray,
+    radius: FloatArray,
+    frame: FloatArray,
+    points: FloatArray,
+    window_radius: float = 0.0,
+) -> Segments:
+    """
+    Cut parallel lines into solid and void segments.
+
+    This is for hundreds of lines, to be looked at; the scan itself does millions.
+
+    Parameters
+    ----------
+    position : ndarray, shape (N, 3)
+        Centres of the solids; the window, if any, is centred at the origin.
+    radius : ndarray, shape (N,)
+        Their radii, dump's length unit.
+    frame : ndarray, shape (3, 3)
+        Orthonormal rows u, v, n; the lines run along n.
+    points : ndarray, shape (L, 2)
+        Where the lines pierce the plane through the origin, along u and v.
+    window_radius : float, optional
+        Clip the lines to a sphere, whose surface bounds the first and last segment; 0: only what
+        lies between the first and the last solid of a line counts.
+
+    Returns
+    -------
+    Segments
+        In the order of the lines, and along each line.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab.segments import cut_lines
+    >>> cut_lines(np.zeros((1, 3)), np.ones(1), np.eye(3), np.zeros((1, 2)), 3.0).length
+    array([2., 2., 2.])
+    """
+    across, depth = position @ frame[:2].T, position @ frame[2]
+    ends, void, line = [np.zeros((0, 2, 3))], [np.zeros(0, bool)], [np.arange(0)]
+    for number, point in enumerate(points):
+        square = radius**2 - np.sum((across - point) ** 2, axis=1)
+        hit = square > 0
+        half = np.sqrt(square[hit])
+        bounds, is_void = _cut(depth[hit] - half, depth[hit] + half, _reach(point, window_radius))
+        places = np.empty((*bounds.shape, 3))
+        places[..., :2], places[..., 2] = point, bounds
+        ends.append(places @ frame)
+        void.append(is_void)
+        line.append(np.full(len(bounds), number))
+    return Segments(np.concatenate(ends), np.concatenate(void), np.concatenate(line))
+
+
+def _reach(point: FloatArray, window_radius: float) -> float | None:
+    """Half the length of a line in the window; None without a window."""
+    if window_radius == 0:
+        return None
+    return math.sqrt(max(window_radius**2 - float(point @ point), 0.0))
+
+
+def _cut(start: FloatArray, stop: FloatArray, reach: float | None) -> tuple[FloatArray, BoolArray]:
+    """Solid and void pieces of one line, (K, 2) bounds and (K,) flags, from its chords."""
+    if reach is not None:
+        # what lies outside the window is solid
+        start = np.concatenate([[-np.inf, reach], start])
+        stop = np.concatenate([[-reach, np.inf], stop])
+    if len(start) == 0:
+        return np.zeros((0, 2)), np.zeros(0, bool)
+    order = np.argsort(start)
+    start, stop = start[order], np.maximum.accumulate(stop[order])
+    gap = np.flatnonzero(start[1:] > stop[:-1])
+    # solid runs alternate with gaps
+    bounds = np.concatenate([start[:1], np.column_stack([stop[gap], start[gap + 1]]).ravel()])
+    bounds = np.concatenate([bounds, stop[-1:]])
+    if reach is not None:
+        bounds = np.clip(bounds, -reach, reach)
+    pieces = np.column_stack([bounds[:-1], bounds[1:]])
+    is_void = np.arange(len(pieces)) % 2 == 1
+    some = pieces[:, 1] > pieces[:, 0]
+    return pieces[some], is_void[some]
+
+
+def grid_points(reach: float, lines: int) -> FloatArray:
+    """A square grid of about so many points in a circle of this radius, shape (L, 2)."""
+    spacing = reach * np.sqrt(np.pi / lines)
+    steps = np.arange(-np.floor(reach / spacing), np.floor(reach / spacing) + 1) * spacing
+    points = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
+    inside: FloatArray = points[np.linalg.norm(points, axis=1) < reach]
+    return inside
+
+
+def sample_segments(
+    position: FloatArray,
+    radius: FloatArray,
+    frames: FloatArray,
+    lines: int,
+    window_radius: float = 0.0,
+) -> Segments:
+    """
+    Cut about so many lines, a grid of them for each of several line frames (D, 3, 3).
+
+    Parameters as for :func:`cut_lines`.
+    """
+    reach = window_radius
+    if reach == 0 and len(position):
+        reach = float((np.linalg.norm(position, axis=1) + radius).max())
+    if reach == 0:
+        return Segments.concatenate([])
+    points = grid_points(reach, max(lines // len(frames), 1))
+    return Segments.concatenate(
+        cut_lines(position, radius, frame, points, window_radius) for frame in frames
+    )

@@ -1,0 +1,123 @@
+"""What all figures share: style, colours that the colour-blind can tell apart, files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from scanfab.errors import SettingsError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = [
+    "COLOURS",
+    "DPI",
+    "PLOT_FORMATS",
+    "check_folder",
+    "check_plot_file",
+    "new_figure",
+    "plain",
+    "save_figure",
+]
+
+PLOT_FORMATS = {
+    ".png": "pixels, 300 per inch",
+    ".svg": "vectors, for pages of the web and for editing",
+    ".pdf": "vectors, for print",
+}
+
+# pixels an inch, also of coloured disks in files of vectors
+DPI = 300
+
+# of Okabe and Ito (2008); each variant also has a marker and a line of its own
+COLOURS = {
+    "blue": "#0072B2",
+    "orange": "#E69F00",
+    "vermilion": "#D55E00",
+    "green": "#009E73",
+    "purple": "#CC79A7",
+    "sky": "#56B4E9",
+    "black": "#000000",
+}
+
+# sized for print: one column is 3.4 inches wide, two are 7
+STYLE: Any = {
+    "font.size": 8,
+    "axes.labelsize": 8,
+    "axes.titlesize": 8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.linewidth": 0.7,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "legend.fontsize": 7,
+    "legend.frameon": False,
+    "lines.linewidth": 1.1,
+    "lines.markersize": 3.5,
+    "errorbar.capsize": 1.5,
+    # the same input gives the same bytes
+    "svg.hashsalt": "scanfab",
+    # whole fonts, as publishers want them
+    "pdf.fonttype": 42,
+}
+
+
+def check_plot_file(path: Path) -> None:
+    """SettingsError if no figure can be written to a file of this name."""
+    if path.suffix.lower() not in PLOT_FORMATS:
+        raise SettingsError(
+            f"{path}: figures can be written as {', '.join(PLOT_FORMATS)}, "
+            f"not as {path.suffix or 'a file without a suffix'}"
+        )
+    check_folder(path)
+
+
+def check_folder(path: Path) -> None:
+    """SettingsError if there is no folder that a file of this name can be written to."""
+    if not path.parent.is_dir():
+        raise SettingsError(f"{path}: there is no folder {path.parent} to write to")
+    if not os.access(path.parent, os.W_OK):
+        raise SettingsError(f"{path}: the folder {path.parent} cannot be written to")
+
+
+@contextmanager
+def new_figure(width: float, height: float) -> Iterator[Figure]:
+    """A figure of so many inches in the common style, drawn and saved inside the block."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    # whatever matplotlibrc the user has
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(STYLE)
+        yield Figure(figsize=(width, height), layout="constrained")
+
+
+def save_figure(figure: Figure, path: Path, dpi: int = DPI) -> None:
+    """Write PNG, SVG or PDF, by the suffix; the file is complete or untouched."""
+    part = path.with_name(f"{path.name}.part")
+    kind = path.suffix.lower().lstrip(".")
+    dates = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
+    try:
+        figure.savefig(part, format=kind, dpi=dpi, metadata=dates[kind])
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def plain(text: str) -> str:
+    """A text from a file as a label: a dollar would start a formula."""
+    return text.replace("$", r"\$")
+
+
+def widen(axes: Axes, smallest: float) -> None:
+    """Make the y axis span at least this much, so that noise does not look like a signal."""
+    low, high = axes.get_ylim()
+    if high - low < smallest:
+        middle = 0.5 * (low + high)
+        axes.set_ylim(middle - 0.5 * smallest, middle + 0.5 * smallest)

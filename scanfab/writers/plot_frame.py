@@ -1,0 +1,291 @@
+"""Figures of single frames: roses, projections, lengths of void segments, cut-offs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.writers.plot import COLOURS, DPI, new_figure, save_figure, widen
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.projections.polar import PolarAxes
+
+__all__ = [
+    "CutoffCurve",
+    "LengthSample",
+    "Projection",
+    "Ring",
+    "Rose",
+    "disk",
+    "plot_cutoffs",
+    "plot_histogram",
+    "plot_projection",
+    "plot_rose",
+]
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+RINGS: tuple[dict[str, Any], ...] = (
+    {"color": COLOURS["vermilion"], "marker": "^", "ls": "-"},
+    {"color": COLOURS["blue"], "marker": "o", "ls": "--"},
+    {"color": COLOURS["green"], "marker": "D", "ls": "-."},
+    {"color": COLOURS["purple"], "marker": "s", "ls": ":"},
+)
+FRAMES: tuple[dict[str, Any], ...] = (
+    {"color": COLOURS["blue"], "marker": "o", "ls": "--", "markerfacecolor": "white"},
+    {"color": COLOURS["vermilion"], "marker": "^", "ls": "-"},
+)
+# rings and rays of the disk that a hemisphere is projected on
+DISK = (41, 121)
+
+
+@dataclass(frozen=True, eq=False)
+class Ring:
+    """Values around one polar angle, relative to the mean over all directions."""
+
+    phi: float
+    """Polar angle, degrees."""
+    theta: FloatArray
+    """Azimuths, degrees."""
+    value: FloatArray
+    error: FloatArray
+    """Standard error."""
+    curve: Callable[[FloatArray], FloatArray] | None = None
+    """A smooth curve beside them: value at azimuths in degrees."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rose:
+    """One frame: mean void length and contact normals over the azimuth."""
+
+    title: str
+    void: Sequence[Ring]
+    contact: Sequence[Ring]
+
+
+@dataclass(frozen=True, eq=False)
+class Projection:
+    """One frame: deviation from the mean over all directions, per cent, at :func:`disk`."""
+
+    title: str
+    void: FloatArray
+    contact: FloatArray | None
+
+
+@dataclass(frozen=True, eq=False)
+class LengthSample:
+    """One frame: void segments, in units of the smallest radius."""
+
+    title: str
+    length: FloatArray
+    cutoff: float
+
+
+@dataclass(frozen=True, eq=False)
+class CutoffCurve:
+    """One frame: anisotropy over the cut-off, which is in units of the smallest radius."""
+
+    title: str
+    cutoff: FloatArray
+    alpha: FloatArray
+    error: FloatArray
+    chosen: float
+
+
+def disk() -> tuple[FloatArray, FloatArray]:
+    """
+    The equal-area (Lambert) projection of the upper hemisphere.
+
+    Returns
+    -------
+    ndarray, shape (41, 121, 2)
+        Places on the disk of radius 1: z in the middle, x to the right, y up.
+    ndarray, shape (41, 121, 3)
+        The unit vectors that belong there.
+    """
+    rho, theta = np.meshgrid(
+        np.linspace(0, 1, DISK[0]), np.linspace(0, 2 * np.pi, DISK[1]), indexing="ij"
+    )
+    polar = 2 * np.arcsin(rho / np.sqrt(2))
+    along = np.stack([np.cos(theta), np.sin(theta)], axis=-1)
+    directions = np.concatenate(
+        [np.sin(polar)[..., None] * along, np.cos(polar)[..., None]], axis=-1
+    )
+    return rho[..., None] * along, directions
+
+
+def plot_rose(path: Path, roses: Sequence[Rose], dpi: int = DPI) -> None:
+    """Roses of void lengths and contact normals, a row for each frame."""
+    with new_figure(7.0, 3.3 * len(roses) + 0.3) as figure:
+        panels = figure.subplots(len(roses), 2, squeeze=False, subplot_kw={"projection": "polar"})
+        for column, kind in enumerate(("void", "contact")):
+            rings = [ring for rose in roses for ring in getattr(rose, kind)]
+            reach = max((_reach(ring) for ring in rings), default=0.02)
+            for row, rose in enumerate(roses):
+                _rose(panels[row, column], getattr(rose, kind), reach)
+        for row, rose in enumerate(roses):
+            for axes, what in zip(
+                panels[row],
+                (r"mean void length $\ell/\bar\ell$", r"contact normals, density $/$ isotropic"),
+                strict=True,
+            ):
+                axes.set_title(f"{what}, {rose.title}", fontsize=8, pad=10)
+        _ring_legend(figure, roses[0].void)
+        save_figure(figure, path, dpi)
+
+
+def _reach(ring: Ring) -> float:
+    """How far the values are from 1, noise of single points left out."""
+    return max(0.02, float(np.nanmax(np.abs(ring.value - 1.0), initial=0.0)))
+
+
+def _rose(axes: PolarAxes, rings: Sequence[Ring], reach: float) -> None:
+    around = np.linspace(0, 360, 181)
+    for ring, look in zip(rings, RINGS, strict=False):
+        theta, value, error = ring.theta, ring.value, ring.error
+        if ring.curve is None:
+            # closed, as the last point is followed by the first
+            theta, value, error = (np.append(a, a[:1]) for a in (theta, value, error))
+        line = look["ls"] if ring.curve is None else "none"
+        axes.errorbar(
+            np.radians(theta), value, yerr=error, elinewidth=0.5, capsize=0, **{**look, "ls": line}
+        )
+        if ring.curve is not None:
+            axes.plot(np.radians(around), ring.curve(around), color=look["color"], ls=look["ls"])
+    axes.plot(np.radians(around), np.ones(181), color="0.4", lw=0.6)
+    low = max(0.0, 1.0 - 2.0 * reach)
+    axes.set_ylim(low, 1.0 + 1.15 * reach)
+    step = _round_down(reach)
+    ticks = [1.0 - step, 1.0, 1.0 + step]
+    box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.8}
+    axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks], fontsize=6, bbox=box)
+    axes.set_rlabel_position(100)
+    axes.set_xticks(np.radians(np.arange(0, 360, 45)))
+    axes.grid(color="0.85", lw=0.5)
+    axes.spines["polar"].set_color("0.7")
+
+
+def _round_down(value: float) -> float:
+    """1, 2 or 5 times a power of ten, not above the value."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(max(step for step in (power, 2 * power, 5 * power) if step <= value))
+
+
+def _ring_legend(figure: Figure, rings: Sequence[Ring]) -> None:
+    from matplotlib.lines import Line2D
+
+    handles = [Line2D([], [], **look) for _, look in zip(rings, RINGS, strict=False)]
+    labels = [rf"polar angle $\varphi$ = {ring.phi:g}°" for ring in rings]
+    note = r"over the azimuth $\theta$ from x; radii do not start at 0; bars: one standard error"
+    figure.legend(
+        handles,
+        labels,
+        loc="outside lower center",
+        ncols=len(labels),
+        title=note,
+        title_fontproperties={"size": 7},
+    )
+
+
+def plot_projection(path: Path, frames: Sequence[Projection], dpi: int = DPI) -> None:
+    """The directional distributions on equal-area disks, a row for each frame."""
+    with new_figure(6.4, 2.75 * len(frames) + 0.2) as figure:
+        panels = figure.subplots(len(frames), 2, squeeze=False)
+        for column, kind in enumerate(("void", "contact")):
+            values = [getattr(frame, kind) for frame in frames]
+            known = [value for value in values if value is not None]
+            largest = max((float(np.abs(value).max()) for value in known), default=1.0)
+            drawn = None
+            for axes, frame, value in zip(panels[:, column], frames, values, strict=True):
+                what = "mean void length" if kind == "void" else "contact normals"
+                axes.set_title(f"{what}, {frame.title}", fontsize=8)
+                drawn = _disk(axes, value, max(largest, 0.1)) or drawn
+            if drawn is not None:
+                bar = figure.colorbar(drawn, ax=panels[:, column], shrink=0.8, pad=0.03)
+                bar.set_label("deviation from the mean over directions in %")
+        save_figure(figure, path, dpi)
+
+
+def _disk(axes: Axes, value: FloatArray | None, largest: float) -> Any:
+    axes.set(aspect="equal", xlim=(-1.25, 1.25), ylim=(-1.25, 1.25))
+    axes.set_axis_off()
+    around = np.linspace(0, 2 * np.pi, 181)
+    for polar in (30, 60, 90):
+        rho = np.sqrt(2) * np.sin(np.radians(polar) / 2)
+        style: dict[str, Any] = {"color": "0.35", "lw": 0.4 if polar < 90 else 0.8}
+        axes.plot(rho * np.cos(around), rho * np.sin(around), **style)
+        if polar < 90:
+            axes.text(rho * 0.7, -rho * 0.7, f"{polar}°", fontsize=6, color="0.25")
+    for label, x, y in (("x", 1.1, 0), ("y", 0, 1.1), ("z", 0, 0)):
+        axes.text(x, y, label, ha="center", va="center", fontsize=8)
+    if value is None:
+        axes.text(0, -0.3, "no contacts", ha="center")
+        return None
+    places, _ = disk()
+    return axes.pcolormesh(
+        places[..., 0],
+        places[..., 1],
+        value,
+        cmap="PuOr_r",
+        vmin=-largest,
+        vmax=largest,
+        shading="gouraud",
+        rasterized=True,
+        zorder=0,
+    )
+
+
+def plot_histogram(path: Path, samples: Sequence[LengthSample], dpi: int = DPI) -> None:
+    """Density of void segment lengths, with the cut-off; an outline for each frame."""
+    with new_figure(3.4, 2.9) as figure:
+        axes = figure.subplots()
+        longest = max(float(np.quantile(sample.length, 0.999)) for sample in samples)
+        edges = np.linspace(0, longest, 41)
+        for sample, look in zip(samples, FRAMES, strict=False):
+            density, _ = np.histogram(sample.length, edges, density=True)
+            dropped = np.mean(sample.length < sample.cutoff)
+            axes.stairs(
+                density,
+                edges,
+                color=look["color"],
+                ls=look["ls"],
+                lw=1.1,
+                baseline=None,
+                label=f"{sample.title}: {100 * dropped:.0f} % dropped",
+            )
+        cutoff = samples[-1].cutoff
+        axes.axvspan(0, cutoff, color="0.92", zorder=0)
+        axes.axvline(cutoff, color="k", lw=0.9, ls=":", label="cut-off")
+        axes.set(yscale="log", xlim=(0, longest), ylabel="probability density")
+        axes.set(xlabel=r"void segment length / $r_{min}$")
+        axes.legend(loc="upper right")
+        save_figure(figure, path, dpi)
+
+
+def plot_cutoffs(path: Path, curves: Sequence[CutoffCurve], dpi: int = DPI) -> None:
+    """Void anisotropy over the cut-off, a curve for each frame."""
+    with new_figure(3.4, 2.9) as figure:
+        axes = figure.subplots()
+        for curve, look in zip(curves, FRAMES, strict=False):
+            axes.errorbar(
+                curve.cutoff,
+                1e3 * curve.alpha,
+                yerr=1e3 * np.nan_to_num(curve.error),
+                label=curve.title,
+                elinewidth=0.7,
+                **look,
+            )
+        axes.axvline(curves[-1].chosen, color="k", lw=0.9, ls=":", label="cut-off of the table")
+        axes.axhline(0, color="0.6", lw=0.6, zorder=0)
+        axes.set(xlabel=r"cut-off / $r_{min}$", ylabel=r"void fabric  $10^{3}\,\alpha_{vs}$")
+        widen(axes, 1.0)
+        figure.legend(loc="outside upper center", ncols=3, columnspacing=1.2)
+        save_figure(figure, path, dpi)

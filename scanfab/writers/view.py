@@ -1,0 +1,257 @@
+"""The 3D view of a frame, in a window or as a picture file."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.errors import ScanfabError
+from scanfab.scene import Grains, Scene
+from scanfab.writers.plot import COLOURS
+
+__all__ = ["check_screen", "show_scene"]
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+ADVICE = (
+    "install one of them: on Debian or Ubuntu apt-get install libegl1 libgl1 libosmesa6, or "
+    "apt-get install xvfb and run the command under xvfb-run"
+)
+SIZE = (1200, 900)
+
+
+def check_screen() -> None:
+    """
+    Make sure that there is a screen for a window.
+
+    Raises
+    ------
+    ScanfabError
+        If there is none.
+    """
+    if sys.platform.startswith("linux") and not (
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    ):
+        raise ScanfabError(
+            "this machine has no screen for a window (DISPLAY is not set): "
+            "write a picture with --screenshot FILE.png"
+        )
+
+
+def show_scene(
+    scene: Scene, axis: npt.ArrayLike, title: str = "", screenshot: Path | None = None
+) -> None:
+    """
+    Show the grains of a frame, its RV, and scan lines in a section if the scene has lines.
+
+    Parameters
+    ----------
+    scene : Scene
+        With ``lines``, the grains in front of the RV's centre are left out, so that they are seen.
+    axis : array_like, shape (3,)
+        Is upright.
+    title : str, optional
+        Of the window.
+    screenshot : Path, optional
+        Write a PNG file instead of opening a window.
+
+    Raises
+    ------
+    ScanfabError
+        If nothing can be drawn on this machine.
+    """
+    if screenshot is not None:
+        check_drawing()
+    with _quiet_vtk():
+        _show(scene, np.asarray(axis, dtype=np.float64), title, screenshot)
+
+
+def _show(scene: Scene, up: FloatArray, title: str, screenshot: Path | None) -> None:
+    import pyvista
+
+    plotter: Any = pyvista.Plotter(
+        off_screen=screenshot is not None, window_size=list(SIZE), title=title or "scanfab"
+    )
+    toward = np.cross(np.eye(3)[np.argmin(np.abs(up))], up)
+    toward /= np.linalg.norm(toward)
+    _add_grains(plotter, scene, toward)
+    if scene.window_radius is not None:
+        _add_window(plotter, scene, toward)
+    if scene.lines is not None:
+        _add_lines(plotter, scene)
+    _add_legend(plotter, scene)
+    side = np.cross(up, toward)
+    look = toward if scene.lines is not None else toward + 0.45 * side + 0.35 * up
+    plotter.camera_position = [scene.center + look, scene.center, up]
+    plotter.reset_camera()
+    plotter.camera.zoom(1.12)
+    # to the right, beside the legend
+    plotter.camera.SetWindowCenter(-0.2, 0.0)
+    plotter.enable_anti_aliasing("ssaa")
+    plotter.add_axes(line_width=3)
+    if screenshot is None:
+        plotter.show()
+        return
+    part = screenshot.with_name(f"{screenshot.stem}.part.png")
+    try:
+        plotter.screenshot(str(part))
+        os.replace(part, screenshot)
+    finally:
+        part.unlink(missing_ok=True)
+        plotter.close()
+
+
+@contextmanager
+def _quiet_vtk() -> Iterator[None]:
+    """VTK tells of each way to draw that it tries and this machine lacks: not of use."""
+    from vtkmodules.vtkCommonCore import vtkLogger
+
+    before = vtkLogger.GetCurrentVerbosityCutoff()
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
+    try:
+        yield
+    finally:
+        # the reader of VTK files listens to it
+        vtkLogger.SetStderrVerbosity(before)
+
+
+def check_drawing() -> None:
+    """
+    Make sure that VTK can draw without a screen, in a process of its own: where it cannot, it may
+    crash instead of saying so.
+
+    Raises
+    ------
+    ScanfabError
+        If it cannot; says what to install.
+    """
+    code = (
+        "from vtkmodules.vtkRenderingCore import vtkRenderWindow; "
+        "import vtkmodules.vtkRenderingOpenGL2; "
+        "w = vtkRenderWindow(); w.SetOffScreenRendering(1); w.SetSize(8, 8); "
+        "w.Render()"
+    )
+    command = [sys.executable, "-c", code]
+    if subprocess.run(command, capture_output=True, check=False).returncode != 0:
+        raise ScanfabError(f"VTK finds no OpenGL, EGL or OSMesa library to draw with: {ADVICE}")
+
+
+def classes(grains: Grains, has_window: bool) -> dict[str, tuple[str, BoolArray]]:
+    """What is told apart by colour: name, colour, and which grains."""
+    grain = ~grains.boundary
+    held = grain & ~grains.rattler
+    if not has_window:
+        found = {"grain": (COLOURS["sky"], held)}
+    else:
+        found = {
+            "grain in the RV": (COLOURS["sky"], held & grains.in_window),
+            "grain outside": ("#A9AFB5", held & ~grains.in_window),
+        }
+    found["rattler"] = (COLOURS["orange"], grain & grains.rattler)
+    return {name: value for name, value in found.items() if value[1].any()}
+
+
+def _add_grains(plotter: Any, scene: Scene, toward: FloatArray) -> None:
+    """Balls; if the scene has lines, cut by the plane through the centre."""
+    grains = scene.grains
+    height = (grains.position - scene.center) @ toward
+    for colour, chosen in classes(grains, scene.window_radius is not None).values():
+        if scene.lines is not None:
+            chosen = chosen & (height < grains.radius)
+        if not chosen.any():
+            continue
+        balls = _balls(grains.position[chosen], grains.radius[chosen])
+        if scene.lines is not None:
+            balls = balls.clip(normal=toward, origin=scene.center)
+            _add_section(
+                plotter, grains, chosen & (height > -grains.radius), height, toward, colour
+            )
+        plotter.add_mesh(balls, color=colour, smooth_shading=True, ambient=0.15, specular=0.2)
+
+
+def _balls(position: FloatArray, radius: FloatArray) -> Any:
+    import pyvista
+
+    cloud = pyvista.PolyData(position)
+    cloud.point_data["diameter"] = 2.0 * radius
+    # fewer triangles for large samples
+    fineness = 24 if len(radius) < 5_000 else 12
+    ball = pyvista.Sphere(radius=0.5, theta_resolution=fineness, phi_resolution=fineness)
+    return cloud.glyph(geom=ball, scale="diameter", orient=False)
+
+
+def _add_section(
+    plotter: Any,
+    grains: Grains,
+    chosen: BoolArray,
+    height: FloatArray,
+    toward: FloatArray,
+    colour: str,
+) -> None:
+    """The disks in which the plane cuts grains, paler than the balls behind."""
+    import pyvista
+
+    if not chosen.any():
+        return
+    cloud = pyvista.PolyData(grains.position[chosen] - height[chosen, None] * toward)
+    cloud.point_data["diameter"] = 2.0 * np.sqrt(grains.radius[chosen] ** 2 - height[chosen] ** 2)
+    disk = pyvista.Disc(inner=0.0, outer=0.5, normal=toward, c_res=48)
+    disks = cloud.glyph(geom=disk, scale="diameter", orient=False)
+    pale = 0.45 * np.array(pyvista.Color(colour).float_rgb) + 0.55
+    plotter.add_mesh(disks, color=pale.tolist(), lighting=False)
+
+
+def _add_window(plotter: Any, scene: Scene, toward: FloatArray) -> None:
+    """The RV's surface; in a section its outline."""
+    import pyvista
+
+    center, radius = tuple(scene.center), scene.window_radius
+    assert radius is not None
+    if scene.lines is None:
+        surface = pyvista.Icosphere(radius=radius, center=center, nsub=5)
+        plotter.add_mesh(surface, color=COLOURS["blue"], opacity=0.12, smooth_shading=True)
+        return
+    outline = pyvista.Disc(
+        center=center, inner=radius, outer=1.008 * radius, normal=toward, c_res=180
+    )
+    plotter.add_mesh(outline, color=COLOURS["blue"], lighting=False)
+
+
+def _add_lines(plotter: Any, scene: Scene) -> None:
+    """Void segments as tubes: kept and dropped."""
+    import pyvista
+
+    lines = scene.lines
+    assert lines is not None
+    kept = lines.void & (lines.length >= scene.cutoff)
+    thickness = 0.14 * float(scene.grains.radius[~scene.grains.boundary].mean())
+    for chosen, colour in ((kept, "black"), (lines.void & ~kept, "vermilion")):
+        if chosen.any():
+            segments = pyvista.line_segments_from_points(lines.ends[chosen].reshape(-1, 3))
+            tubes = segments.tube(radius=thickness)
+            plotter.add_mesh(tubes, color=COLOURS[colour], lighting=False)
+
+
+def _add_legend(plotter: Any, scene: Scene) -> None:
+    entries = [
+        [f" {name}", colour]
+        for name, (colour, _) in classes(scene.grains, scene.window_radius is not None).items()
+    ]
+    if scene.lines is not None:
+        entries += [
+            [" void segment: kept", COLOURS["black"]],
+            [" shorter: dropped", COLOURS["vermilion"]],
+        ]
+    if entries:
+        plotter.add_legend(
+            entries, face="circle", bcolor=None, size=(0.3, 0.032 * len(entries)), loc="upper left"
+        )

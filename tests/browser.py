@@ -1,0 +1,115 @@
+"""A real browser for tests: Chromium by its driver, asked over HTTP with nothing but urllib."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import socket
+import subprocess
+import tempfile
+import time
+import urllib.error
+import urllib.request
+from typing import Any
+
+FLAGS = (
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--disable-dev-shm-usage",
+    "--window-size=1200,1000",
+)
+LEFT = 0
+
+
+def missing() -> str:
+    """What is missing for a browser; empty if nothing is."""
+    wanted = {"chromium": ("chromium", "chromium-browser"), "chromium-driver": ("chromedriver",)}
+    lacking = [name for name, programs in wanted.items() if not any(map(shutil.which, programs))]
+    return f"install {' and '.join(lacking)}" if lacking else ""
+
+
+class Browser:
+    """One window; use it in a with block."""
+
+    def __enter__(self) -> Browser:
+        self._profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
+        with socket.socket() as free:
+            free.bind(("127.0.0.1", 0))
+            port = free.getsockname()[1]
+        self._driver = subprocess.Popen(
+            ["chromedriver", f"--port={port}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        self._url = f"http://127.0.0.1:{port}"
+        self._wait_for_driver()
+        binary = shutil.which("chromium") or shutil.which("chromium-browser")
+        options = {"binary": binary, "args": [*FLAGS, f"--user-data-dir={self._profile.name}"]}
+        wanted = {
+            "goog:chromeOptions": options,
+            "goog:loggingPrefs": {"browser": "ALL", "performance": "ALL"},
+        }
+        answer = self._ask("POST", "/session", {"capabilities": {"alwaysMatch": wanted}})
+        self._url += f"/session/{answer['sessionId']}"
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        try:
+            self._ask("DELETE", "")
+        finally:
+            self._driver.terminate()
+            self._driver.wait(10)
+            self._profile.cleanup()
+
+    def _wait_for_driver(self) -> None:
+        for _ in range(200):
+            try:
+                if self._ask("GET", "/status")["ready"]:
+                    return
+            except urllib.error.URLError:
+                time.sleep(0.05)
+        raise RuntimeError("chromedriver does not answer")
+
+    def _ask(self, method: str, path: str, body: dict[str, Any] | None = None) -> Any:
+        data = None if body is None else json.dumps(body).encode()
+        request = urllib.request.Request(self._url + path, data=data, method=method)
+        request.add_header("Content-Type", "application/json")
+        with urllib.request.urlopen(request, timeout=60) as answer:
+            return json.load(answer)["value"]
+
+    def open(self, url: str) -> None:
+        """Load a page."""
+        self._ask("POST", "/url", {"url": url})
+
+    def run(self, script: str) -> Any:
+        """What a script returns."""
+        return self._ask("POST", "/execute/sync", {"script": script, "args": []})
+
+    def log(self, kind: str) -> list[dict[str, Any]]:
+        """What ``browser`` (the console) or ``performance`` (the network) has told since."""
+        found: list[dict[str, Any]] = self._ask("POST", "/se/log", {"type": kind})
+        return found
+
+    def requests(self) -> list[str]:
+        """The addresses that the page has asked for since."""
+        messages = [json.loads(entry["message"])["message"] for entry in self.log("performance")]
+        return [
+            message["params"]["request"]["url"]
+            for message in messages
+            if message["method"] == "Network.requestWillBeSent"
+        ]
+
+    def drag(self, x: int, y: int, dx: int, dy: int) -> None:
+        """Press at a place of the window, move, and let go."""
+        moves = [
+            {"type": "pointerMove", "duration": 0, "x": x, "y": y},
+            {"type": "pointerDown", "button": LEFT},
+            {"type": "pointerMove", "duration": 100, "x": x + dx, "y": y + dy},
+            {"type": "pointerUp", "button": LEFT},
+        ]
+        mouse = {"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}}
+        self._ask("POST", "/actions", {"actions": [{**mouse, "actions": moves}]})

@@ -1,0 +1,38 @@
+"""What several tests look at: one table of a real test with its ParaView files, made once."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from scanfab.cli.main import run
+from scanfab.tabular import read_rows
+
+ROOT = Path(__file__).parents[1]
+SAMPLE = "sample_data/yade_triaxial"
+
+
+class Computed(NamedTuple):
+    """A finished computation of three frames."""
+
+    table: Path
+    vtk: Path
+    rows: list
+
+
+@pytest.fixture(scope="session")
+def computed(tmp_path_factory) -> Computed:
+    """The sample's first, fourth and last frame; sources are relative to the repository."""
+    folder = tmp_path_factory.mktemp("computed")
+    table, vtk = folder / "fabric.csv", folder / "vtk"
+    before = Path.cwd()
+    os.chdir(ROOT)
+    try:
+        words = ["compute", SAMPLE, "--boundary", "mask=3", "--tolerance", "5e-4"]
+        assert run([*words, "--frames", "0::3", "-o", str(table), "--vtk", str(vtk)]) == 0
+    finally:
+        os.chdir(before)
+    return Computed(table, vtk, read_rows(table))

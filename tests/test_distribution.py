@@ -1,0 +1,65 @@
+"""The even fit: exact for even harmonics up to its degree, careful where directions are few."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scanfab.directions import direction_rule
+from scanfab.distribution import fit_even, mean_length_function, sphere_points
+
+
+def even(n):
+    """Of degree 6."""
+    x, y, z = np.moveaxis(n, -1, 0)
+    return 1.0 + 0.3 * z**2 - 0.2 * x * y + 0.1 * x**2 * z**2 + 0.05 * z**6
+
+
+@pytest.mark.parametrize("rule", ["lebedev:17", "product:13", "fibonacci:200"])
+def test_even_polynomials_of_degree_six_come_back(rule):
+    axes = direction_rule(rule).axes
+    function = fit_even(axes, even(axes), np.random.default_rng(0).uniform(1, 2, len(axes)))
+    points, _ = sphere_points()
+    assert function.degree == 6
+    assert function(points) == pytest.approx(even(points), abs=1e-10)
+    assert function(-points) == pytest.approx(function(points), abs=1e-12)
+
+
+@pytest.mark.parametrize(("rule", "degree"), [("design:9", 4), ("lebedev:3", 0), ("lebedev:5", 2)])
+def test_few_directions_take_a_low_degree(rule, degree):
+    axes = direction_rule(rule).axes
+    assert fit_even(axes, np.ones(len(axes)), np.ones(len(axes))).degree <= degree
+
+
+def test_directions_of_half_the_sphere_do_not_run_wild():
+    axes = direction_rule("equal-angle:10").axes
+    noise = 1 + 0.01 * np.random.default_rng(1).standard_normal(len(axes))
+    function = fit_even(axes, noise, np.ones(len(axes)))
+    assert np.abs(function(sphere_points()[0]) - 1).max() < 0.05
+
+
+def test_weights_are_inverse_variances():
+    axes = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 1.0]])
+    assert fit_even(axes, np.array([1.0, 4.0]), np.array([2.0, 1.0]))(axes[0]) == pytest.approx(2)
+
+
+def test_directions_without_a_segment_are_left_out():
+    axes = direction_rule("lebedev:17").axes[None]
+    segments = np.ones(axes.shape[:2], int)
+    segments[0, 3] = 0
+    function = mean_length_function(axes, 2.0 * segments, segments)
+    assert function is not None
+    assert function(axes) == pytest.approx(np.full(segments.shape, 2.0))
+
+
+def test_no_segment_at_all_is_no_function():
+    zero = np.zeros((1, 3), int)
+    assert mean_length_function(np.eye(3)[None], zero * 1.0, zero) is None
+
+
+def test_the_points_are_a_rule_for_the_whole_sphere():
+    points, weights = sphere_points()
+    assert weights.sum() == pytest.approx(1)
+    second = np.einsum("p,pi,pj->ij", weights, points, points)
+    assert second == pytest.approx(np.eye(3) / 3, abs=1e-13)
+    assert weights @ points[:, 2] ** 8 == pytest.approx(1 / 9)

@@ -1,0 +1,149 @@
+"""Figures of frames: what is drawn is what the scan and the table say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab import frame_figures
+from scanfab.errors import SettingsError
+from scanfab.frame_figures import FRAME_FIGURES, parse_figure, plot_frames
+from scanfab.settings import Settings
+from scanfab.writers import plot_frame
+from scanfab.writers.plot_frame import disk
+from tests.conftest import ROOT, SAMPLE
+from tests.writers.test_plot_table import BYTES
+
+pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.errors.ScanfabWarning")
+SETTINGS = Settings.make(boundary="mask=3", tolerance=5e-4)
+
+
+@pytest.fixture
+def series(monkeypatch):
+    monkeypatch.chdir(ROOT)
+    return scanfab.read_series(SAMPLE)
+
+
+@pytest.fixture
+def caught(monkeypatch):
+    """What goes to the figure."""
+    found = {}
+    for name in FRAME_FIGURES:
+        monkeypatch.setattr(
+            frame_figures,
+            f"plot_{name}",
+            lambda path, data, dpi, name=name: found.update({name: data}),
+        )
+    return found
+
+
+@pytest.mark.parametrize(
+    ("figure", "suffix"), list(zip(FRAME_FIGURES, [*BYTES, ".png"], strict=True)), ids=FRAME_FIGURES
+)
+def test_every_figure_of_the_sample_is_drawn(series, computed, tmp_path, figure, suffix):
+    path = tmp_path / f"figure{suffix}"
+    plot_frames(path, series, SETTINGS, computed.rows, figure)
+    assert path.read_bytes().startswith(BYTES[suffix])
+
+
+def row_of(computed, frame):
+    return next(r for r in computed.rows if (r["frame"], r["variant"]) == (frame, "c"))
+
+
+def test_the_curve_of_cut_offs_goes_through_the_table(series, computed, caught, tmp_path):
+    plot_frames(tmp_path / "x.png", series, SETTINGS, computed.rows, "cutoffs")
+    for curve, frame in zip(caught["cutoffs"], (0, 6), strict=True):
+        row = row_of(computed, frame)
+        (place,) = np.flatnonzero(curve.cutoff == 1.0)
+        assert curve.chosen == pytest.approx(1.0)
+        near = 4 * np.hypot(curve.error[place], row["alpha_vs_axial_se"])
+        assert abs(curve.alpha[place] - row["alpha_vs_axial"]) < near
+
+
+def test_lengths_have_the_mean_of_the_table(series, computed, caught, tmp_path):
+    plot_frames(tmp_path / "x.png", series, SETTINGS, computed.rows, "histogram")
+    for sample, frame in zip(caught["histogram"], (0, 6), strict=True):
+        row = row_of(computed, frame)
+        kept = sample.length[sample.length >= sample.cutoff]
+        assert len(sample.length) > 10_000
+        assert kept.mean() == pytest.approx(row["mean_length"] / row["cutoff"], rel=0.03)
+
+
+def test_the_projection_is_the_distribution(series, computed, caught, tmp_path):
+    plot_frames(tmp_path / "x.png", series, SETTINGS, computed.rows, "projection")
+    first, last = caught["projection"]
+    # in the middle is z, along which the sample was compressed
+    assert last.void[0, 0] > 4 > np.abs(first.void[0, 0])
+    assert last.void[-1].max() < -1
+    assert last.contact[0, 0] > 10
+    # second harmonic of the fabric tensor: mean of (l/mean - 1)(3 z^2 - 1)/2 is alpha_vs_axial
+    row = row_of(computed, 6)
+    _, n = disk()
+    weight = np.repeat(np.linspace(0, 1, n.shape[0])[:, None], n.shape[1] - 1, axis=1)
+    value = 0.01 * last.void[:, :-1] * (1.5 * n[:, :-1, 2] ** 2 - 0.5)
+    assert np.average(value, weights=weight) == pytest.approx(row["alpha_vs_axial"], rel=0.05)
+
+
+def test_the_rose_is_longer_near_the_axis(series, computed, caught, tmp_path):
+    plot_frames(tmp_path / "x.png", series, SETTINGS, computed.rows, "rose:20,90")
+    first, last = caught["rose"]
+    assert [ring.phi for ring in last.void] == [20, 90]
+    steep, flat = last.void
+    assert steep.value.min() > 1.0 > flat.value.max()
+    assert len(flat.theta) == len(steep.theta) == 24
+    assert flat.value[:12] == pytest.approx(flat.value[12:])
+    assert 0 < steep.error.max() < 0.02
+    assert np.abs(first.void[0].value - 1).max() < 0.05
+    steep, flat = last.contact
+    assert steep.value.mean() > 1.1
+    assert flat.value.mean() < 0.9
+    assert steep.curve(np.array([0.0])) > 1.1
+
+
+def test_contact_rings_of_isotropic_normals_are_one():
+    normals = np.random.default_rng(0).standard_normal((200_000, 3))
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    for phi in (30.0, 90.0):
+        ring = frame_figures._contact_ring(normals, phi)
+        assert np.all(np.abs(ring.value - 1) < 5 * ring.error)
+        assert ring.value.mean() == pytest.approx(1, abs=0.02)
+    _, directions = disk()
+    assert frame_figures._smoothed_density(normals, directions[::10, ::10]) == pytest.approx(
+        np.ones(directions[::10, ::10].shape[:2]), abs=0.02
+    )
+
+
+def test_the_disk_is_equal_area():
+    places, directions = disk()
+    assert np.linalg.norm(directions, axis=-1) == pytest.approx(np.ones(directions.shape[:2]))
+    # the cap within polar angle p has the share 1 - cos p of the hemisphere, as of the disk
+    rho = np.linalg.norm(places, axis=-1)
+    assert rho**2 == pytest.approx(1 - directions[..., 2], abs=1e-12)
+
+
+def test_one_frame_and_other_variants(series, computed, tmp_path, caught):
+    rows = [row for row in computed.rows if row["frame"] == 3]
+    settings = Settings.make(boundary="mask=3", tolerance=1e-3, variants="b")
+    plot_frames(tmp_path / "x.png", series, settings, rows, "histogram")
+    assert len(caught["histogram"]) == 1
+
+
+def test_ticks_are_round():
+    assert plot_frame._round_down(0.0731) == pytest.approx(0.05)
+    assert plot_frame._round_down(0.72) == pytest.approx(0.5)
+    assert plot_frame._round_down(0.1) == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    "text", ["pie", "rose:", "rose:0", "rose:91", "rose:x", "histogram:3", "rose:1,2,3,4,5"]
+)
+def test_figures_that_do_not_exist_are_an_error(text):
+    with pytest.raises(SettingsError, match="figure: "):
+        parse_figure(text)
+
+
+def test_a_table_without_void_fabric_is_an_error(series, computed, tmp_path):
+    rows = [{**row, "alpha_vs_axial": None} for row in computed.rows]
+    with pytest.raises(SettingsError, match="no frame has a void fabric of variant c"):
+        plot_frames(tmp_path / "x.png", series, SETTINGS, rows, "rose")

@@ -1,0 +1,284 @@
+"""The report's content: what it says with and without manifest and source, and how large it is."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from html import unescape
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from scanfab.cli.main import run
+from scanfab.errors import ReadError, SettingsError
+from scanfab.report import make_report
+from scanfab.scene import Scene
+from scanfab.writers.page import MOST_GRAINS, Picture, view_data
+from tests.conftest import ROOT
+from tests.dumps import write
+from tests.tables import curve
+
+pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.errors.ScanfabWarning")
+
+
+@pytest.fixture
+def table(tmp_path):
+    def make(rows, name="t.jsonl"):
+        return write(tmp_path / name, "".join(json.dumps(row) + "\n" for row in rows))
+
+    return make
+
+
+@pytest.fixture
+def copied(computed, tmp_path, monkeypatch):
+    """The sample's table and manifest in a folder of their own, opened from the repository."""
+    monkeypatch.chdir(ROOT)
+    table = tmp_path / "fabric.csv"
+    for end in ("", ".manifest.json"):
+        shutil.copy(f"{computed.table}{end}", f"{table}{end}")
+    return table
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Without the figures that take another scan."""
+    monkeypatch.setattr("scanfab.report._frame_picture", lambda *_: Picture("data:,", "none"))
+
+
+def change(table: Path, **changes):
+    path = Path(f"{table}.manifest.json")
+    manifest = json.loads(path.read_text())
+    for name, value in changes.items():
+        target = manifest if name in manifest else manifest["settings"]
+        target[name] = value
+    path.write_text(json.dumps(manifest))
+
+
+def words_of(page):
+    """What a reader sees."""
+    text = re.sub(r"<(script|style).*?</\1>", " ", page, flags=re.S)
+    return re.sub(r"\s+", " ", unescape(re.sub(r"<[^>]*>", " ", text)))
+
+
+def test_the_sample_is_told_in_full(copied):
+    page = make_report([copied])
+    text = words_of(page)
+    assert "3 frames of sample_data/yade_triaxial; variants a, b, c, d;" in text
+    assert "axial strain 0 to 15 %" in text
+    assert (
+        "scanfab compute sample_data/yade_triaxial --boundary mask=3 --tolerance 0.0005 "
+        "--frames 0::3 -o fabric.csv" in text
+    )
+    assert "boundary mask=3 particles that are boundary" in text
+    assert re.search(r"numpy \d+\.\d+", text)
+    assert "triaxial-spheres-00000006.vtk.gz" in text
+    assert "sample_data/yade_triaxial has few grains" in text
+    assert page.count("<canvas") == 1
+    assert page.count("data:image/") == 5
+    assert len(page) < 1_000_000
+
+
+def test_it_needs_nothing_from_elsewhere(copied):
+    page = make_report([copied])
+    addresses = re.findall(r"(?:src|href)\s*=\s*[\"']?([^\"'>\s]*)", page)
+    assert addresses
+    assert all(one.startswith("data:") for one in addresses)
+    assert "@import" not in page
+    assert "http" not in re.sub(r'content="default-src[^"]*"|http-equiv', "", page)
+
+
+def test_the_view_holds_the_grains_of_the_last_frame(copied, computed, quick):
+    page = make_report([copied])
+    data = json.loads(re.search(r'id="data-1">(.*?)</script>', page, re.S)[1])
+    assert len(data["spheres"]) == 800
+    inside = sum(x * x + y * y + z * z < data["rv"] ** 2 for x, y, z, *_ in data["spheres"])
+    rows = {row["variant"]: row for row in computed.rows if row["frame"] == 6}
+    assert inside == pytest.approx(rows["c"]["grains"], abs=2)
+    rattlers = sum(kind == 2 for *_, kind in data["spheres"])
+    assert rattlers == rows["a"]["rattlers"]
+    assert any(piece[6] for piece in data["pieces"])
+    assert not all(piece[6] for piece in data["pieces"])
+
+
+def test_a_large_sample_is_thinned():
+    import numpy as np
+
+    from scanfab.scene import Grains
+
+    count = 3 * MOST_GRAINS
+    position = np.random.default_rng(0).uniform(-1, 1, (count, 3))
+    no = np.zeros(count, bool)
+    grains = Grains(position, np.full(count, 0.01), np.arange(count), no * 1, no, no, no)
+    data = view_data(Scene(grains, np.zeros(3), None), (0, 0, 1))
+    assert len(data["spheres"]) == MOST_GRAINS
+    assert data["left_out"] == 2 * MOST_GRAINS
+    assert max(abs(number) for sphere in data["spheres"] for number in sphere) <= 1000
+
+
+def test_without_a_manifest_it_says_so(table):
+    text = words_of(make_report([table(curve())]))
+    assert "There is no t.jsonl.manifest.json beside" in text
+    assert "the frames are not known, so there is no view" in text
+    assert "0.05" in text
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"sources": ["gone"]}, "The view is left out: the source gone is not there any more."),
+        ({"sources": ["-"]}, "The view is left out: the frames came by standard input"),
+        ({"boundary": [{"text": "mask"}]}, "The view is left out: boundary: expected COLUMN=VALUE"),
+        ({"rv": 0.0}, "The view is left out: rv: expected a fraction above 0"),
+    ],
+)
+def test_a_source_that_cannot_be_read_again_is_told(copied, changes, message):
+    change(copied, **changes)
+    page = make_report([copied])
+    assert message in words_of(page)
+    assert "<canvas" not in page
+    # the figures of the table are there
+    assert page.count("data:image/") == 3
+
+
+def test_a_source_that_has_changed_is_told(copied):
+    manifest = json.loads(Path(f"{copied}.manifest.json").read_text())
+    manifest["inputs"][0]["size"] += 1
+    change(copied, inputs=manifest["inputs"])
+    assert "has changed since the table was computed" in words_of(make_report([copied]))
+
+
+def test_warnings_of_the_run_and_of_the_rule_are_told(copied):
+    change(copied, sources=["gone"], directions="equal-angle:10", warnings=["what a day"])
+    text = words_of(make_report([copied]))
+    assert "what a day" in text
+    assert "a sample without any anisotropy would get α = 0.43" in text
+
+
+def test_a_hundred_frames_stay_light(table):
+    rows = [
+        {**row, "frame": frame, "strain": 0.002 * frame, "variant": variant, "grains": 5000}
+        for frame in range(100)
+        for variant in "abcd"
+        for row in curve()[frame % 5 : frame % 5 + 1]
+    ]
+    page = make_report([table(rows)])
+    assert len(page) < 800_000
+    assert "12 of 100 frames are shown" in words_of(page)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_few_frames_are_no_error(table, count):
+    text = words_of(make_report([table(curve()[:count])]))
+    assert "fewer than three frames" in text
+
+
+def test_a_table_without_void_fabric_is_told(table, tmp_path, capsys):
+    path = table([{**row, "alpha_vs_axial": None} for row in curve()])
+    page = tmp_path / "r.html"
+    assert run(["report", str(path), "-o", str(page)]) == 1
+    assert "no row of the tables has a void fabric" in capsys.readouterr().err
+    assert "There is nothing to draw" in words_of(page.read_text("utf-8"))
+
+
+def test_text_is_escaped_everywhere(table):
+    """The page's structure does not depend on what the names are."""
+
+    class Tags(HTMLParser):
+        def __init__(self, page):
+            super().__init__()
+            self.found = []
+            self.feed(page)
+
+        def handle_starttag(self, tag, attrs):
+            self.found.append((tag, sorted(name for name, _ in attrs)))
+
+    def page(source):
+        path = table(curve(source))
+        asked = {"sources": [source], source: source, "contacts": source, "cutoff": source}
+        manifest = {"settings": asked, "versions": {source: source}, "warnings": [source]}
+        Path(f"{path}.manifest.json").write_text(json.dumps(manifest))
+        return make_report([path])
+
+    harmless = Tags(page("x")).found
+    for hostile in (
+        "<img src=x onerror=alert(1)>",
+        "\"'><b>",
+        "</script><b>",
+        "{{ 7 * 7 }}",
+        "&lt;",
+    ):
+        text = page(hostile)
+        assert Tags(text).found == harmless
+        assert hostile in words_of(text) or hostile.replace("<b>", "") in words_of(text)
+
+
+def test_an_empty_table_is_an_error(table, tmp_path, capsys):
+    path = write(tmp_path / "t.csv", "source,frame,strain,variant,alpha_vs_axial,alpha_c_axial\n")
+    with pytest.raises(SettingsError, match="there is nothing to report"):
+        make_report([path])
+    page = tmp_path / "r.html"
+    page.write_text("precious")
+    assert run(["report", str(path), "-o", str(page)]) == 1
+    assert "nothing to report" in capsys.readouterr().err
+    assert page.read_text() == "precious"
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["-o", "r.pdf"], "reports are HTML"),
+        (["-o", "nowhere/r.html"], "there is no folder"),
+        ([], "Missing option '-o'"),
+    ],
+)
+def test_wrong_usage(table, words, message, capsys):
+    assert run(["report", str(table(curve())), *words]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_a_damaged_manifest_is_an_error_that_names_it(copied):
+    Path(f"{copied}.manifest.json").write_text("{")
+    with pytest.raises(ReadError, match=r"fabric\.csv\.manifest\.json"):
+        make_report([copied])
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"frames": [1]},
+        {"frames": "x"},
+        {"boundary": [{}]},
+        {"boundary": [3]},
+        {"cutoff": {"value": "x", "unit": 3}},
+        {"cutoff": []},
+        {"axis": ["x"]},
+        {"rv": {}},
+        {"columns": "x"},
+        {"variants": 3},
+        {"inputs": 3},
+        {"inputs": [3]},
+        {"versions": 3},
+        {"warnings": 3},
+        {"sources": [3]},
+        {"directions": 3},
+        {"seed": "x"},
+    ],
+)
+def test_a_manifest_of_odd_values_is_no_traceback(copied, changes, tmp_path, quick):
+    change(copied, **changes)
+    assert run(["report", str(copied), "-o", str(tmp_path / "r.html")]) in (0, 1)
+
+
+@pytest.mark.parametrize("word", ["x", True, [], {}, float("nan"), -1])
+def test_odd_values_in_columns_that_are_not_needed_are_passed_over(table, tmp_path, word):
+    odd = ("grains", "alpha_c_axial_se", "alpha_vs_axial_sample_se", "alpha_c_axial_sample_se")
+    path = table([{**row, **dict.fromkeys(odd, word)} for row in curve()])
+    assert "<h1>" in make_report([path])
+    plot = tmp_path / "x.png"
+    assert run(["compare", str(path), "--plot", str(plot)]) == 0
+
+
+def test_frames_without_a_number_are_no_error(table):
+    assert "<h1>" in make_report([table([{**row, "frame": None} for row in curve()])])
