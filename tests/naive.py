@@ -170,16 +170,15 @@ def axial(tensor, axis):
     return along - (1 - along) / 2
 
 
-def periodic_gaps(position, radius, vectors, periods, foot, direction, measured):
+def periodic_gaps(position, radius, vectors, periods, foot, direction, measured, longest=150.0):
     """
-    Gaps of one line through a periodic medium, from a long list of images.
+    Gaps of one line through a periodic medium, from a list of images as far as the longest gap.
 
     With a measured length, those that start in it; else all between the first and last solid.
     """
     if len(radius) == 0:
         return []
-    # far enough for the longest gaps that such samples have
-    low, high = (-3.0, max(measured, 1.0) + 150.0) if measured else (-60.0, 60.0)
+    low, high = (-3.0, max(measured, 1.0) + longest) if measured else (-60.0, 60.0)
     heights = 1 / np.linalg.norm(np.linalg.inv(vectors), axis=0)
     around = [
         np.arange(-n, n + 1) if period else np.zeros(1)

@@ -372,25 +372,10 @@ def test_a_class_that_encloses_the_rest_is_a_warning():
     assert table[0].grains == 125
 
 
-@pytest.mark.parametrize("variants", ["abcd", "a", "bd"])
-def test_the_whole_of_a_periodic_sample_is_refused(variants):
+def test_an_rv_wider_than_the_cell_is_refused():
     packing = packing_of(heap(), cell=Cell([8.0, 8.0, 8.0]))
-    with pytest.raises(SettingsError, match=r"no first and last solid.*use --variants cd"):
-        scanfab.compute(packing, variants=variants, **SCAN)
-
-
-def test_a_tilted_periodic_cell_is_refused():
-    packing = packing_of(heap(), cell=Cell([[8, 0, 0], [1, 8, 0], [0, 0, 8]]), contacts=None)
-    with pytest.raises(scanfab.ScanfabError, match="tilted"):
-        scanfab.compute(packing, variants="cd", **SCAN)
-
-
-def test_an_rv_through_a_periodic_face_is_refused():
-    packing = packing_of(heap(), cell=Cell([8.0, 8.0, 8.0]))
-    with pytest.raises(SettingsError, match="reaches through a periodic face"):
+    with pytest.raises(SettingsError, match="wider than the cell's shortest period"):
         scanfab.compute(packing, variants="c", rv_radius=4.5, **SCAN)
-    with pytest.raises(SettingsError, match="another --rv-center"):
-        scanfab.compute(packing, variants="c", rv_radius=2.0, rv_center=(1, 4, 4), **SCAN)
 
 
 def test_a_box_that_does_not_repeat_changes_nothing():

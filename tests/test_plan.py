@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from scanfab import Cell, Packing, ScanfabWarning, Settings, SettingsError, compute, find_contacts
+from scanfab import Cell, Packing, ScanfabWarning, Settings, compute, find_contacts
 from scanfab.plan import FEWEST_LINES, REPLICATES, make_plan
 from scanfab.settings import AUTO_RULE
 from scanfab.variants import Sample
@@ -143,11 +143,9 @@ def test_rule_with_a_bias_warns_of_it(packing):
         plan_of(packing, directions="fibonacci:100")
 
 
-def test_whole_variants_of_a_periodic_cell_are_refused(packing):
+def test_rv_of_a_periodic_cell_is_a_fraction_of_its_height(packing):
     periodic = Packing(packing.position, packing.radius, cell=Cell([6.0, 6, 6]))
-    with pytest.raises(SettingsError, match="use --variants cd"):
-        plan_of(periodic, variants="ac")
-    assert plan_of(periodic, variants="cd").window.radius == pytest.approx(0.7 * 3)
+    assert plan_of(periodic, variants="ac").window.radius == pytest.approx(0.7 * 3)
 
 
 def test_cell_that_does_not_repeat_is_no_obstacle(packing):

@@ -67,35 +67,35 @@ def test_only_periodic_vectors_of_a_cell_give_center_and_extent():
 
 
 @pytest.mark.parametrize(
-    ("center", "radius", "inside"),
+    ("center", "radius", "fits"),
     [
         ((4.0, 6.0, 6.0), 2.999, True),
         ((4.0, 6.0, 6.0), 3.001, False),
-        ((0.5, 6.0, 6.0), 1.6, False),
-        ((4.0, 9.0, 6.0), 1.1, False),
-        ((40.0, 6.0, 6.0), 1.0, False),
+        # across a face, and in another image of the cell
+        ((0.5, 6.0, 6.0), 1.6, True),
+        ((40.0, 6.0, 6.0), 1.0, True),
     ],
 )
-def test_window_must_not_reach_through_a_periodic_face(center, radius, inside):
+def test_window_must_not_meet_its_own_image(center, radius, fits):
     packing = Packing([[0, 3, 4]], 1.0, cell=CELL)
     window = SphereWindow(np.array(center), radius)
-    if inside:
-        window.check_inside(packing)
+    if fits:
+        window.check_fits(packing)
     else:
-        with pytest.raises(SettingsError, match="reaches through a periodic face of the cell"):
-            window.check_inside(packing)
+        with pytest.raises(SettingsError, match="wider than the cell's shortest period"):
+            window.check_fits(packing)
 
 
 def test_window_may_reach_beyond_faces_that_do_not_repeat():
     packing = Packing([[0, 3, 4]], 1.0, cell=Cell([10.0, 8, 6], periodic=(True, False, False)))
-    SphereWindow(np.array([5.0, 0.0, 0.0]), 4.9).check_inside(packing)
-    SphereWindow(np.array([5.0, 0.0, 0.0]), 4.9).check_inside(four_grains())
+    SphereWindow(np.array([5.0, 0.0, 0.0]), 4.9).check_fits(packing)
+    SphereWindow(np.array([5.0, 0.0, 0.0]), 4.9).check_fits(four_grains())
 
 
-def test_window_through_a_periodic_face_stops_the_computation():
+def test_window_wider_than_the_cell_stops_the_computation():
     packing = Packing(*shaken_cubic(np.random.default_rng(0), 4), cell=Cell([4.0, 4, 4]))
-    with pytest.raises(SettingsError, match="choose a smaller --rv or another --rv-center"):
-        compute(packing, variants="c", rv_center=(1.0, 2.0, 2.0))
+    with pytest.raises(SettingsError, match="choose a smaller --rv"):
+        compute(packing, variants="c", rv=1.1)
 
 
 def test_room_around_the_window_is_to_the_nearest_surface_that_is_no_periodic_face():

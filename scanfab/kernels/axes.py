@@ -321,6 +321,11 @@ def follow(
             if not is_empty and not bound <= end < bound + prism.length:
                 continue
             start = next_solid(grains, prism, which == 1, u, v, bound if is_empty else end)
+            if start == FAR and not (
+                grains.periodic[0] and grains.periodic[1] and grains.periodic[2]
+            ):
+                # it leaves through a face that does not repeat
+                continue
             if start == FAR:
                 tally[which, CHANNELS] += 1.0
                 tally[which, WHOLE + VOID] += (

@@ -24,8 +24,9 @@ __all__ = ["CellGrains", "Prism", "images_in", "next_solid", "prism_along"]
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
-# a line that has met nothing along so many cells stays in a channel
+# a line that has met nothing along so many cells stays in a channel; more where cells are small
 MOST_CELLS = 64
+MOST_GRAINS = 4000
 # how far beyond the prism solids are listed at once, in mean radii; longer gaps are followed alone
 BEYOND = 10.0
 
@@ -260,7 +261,7 @@ def next_solid(
     margin = largest * prism.slope
     place = (after - prism.rise_u * u - prism.rise_v * v) / prism.length - margin
     found = FAR
-    for cells in range(MOST_CELLS):
+    for cells in range(max(MOST_CELLS, MOST_GRAINS // max(grains.radius.size, 1))):
         # spheres that are so far away begin behind what was found
         if (found - after) / prism.length + 2.0 * margin < cells:
             break

@@ -210,8 +210,7 @@ FORMATS = {
 
 
 def answer(packing):
-    variants = "cd" if packing.is_periodic else "abcd"
-    return scanfab.compute(packing, variants=variants, **SCAN)
+    return scanfab.compute(packing, **SCAN)
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,180 @@
+"""The whole of a periodic packing: the medium without an edge."""
+
+import numpy as np
+import pytest
+
+from scanfab import Cell, Packing, ScanfabWarning, compute
+from tests import naive
+
+LOOK = {"variants": "ab", "tolerance": 1.0, "contact_tolerance": 1e-4, "seed": 3}
+CRYSTAL = {**LOOK, "variants": "a"}
+BASES = {
+    "simple cubic": [[0, 0, 0]],
+    "body-centred": [[0, 0, 0], [0.5, 0.5, 0.5]],
+    "face-centred": [[0, 0, 0], [0.5, 0.5, 0], [0.5, 0, 0.5], [0, 0.5, 0.5]],
+}
+TOUCHING = {"simple cubic": 0.5, "body-centred": 3**0.5 / 4, "face-centred": 2**0.5 / 4}
+# the face-centred crystal by its cube, by that sheared by whole edges, and by its smallest cell
+CELLS = {
+    "cube": (np.eye(3), BASES["face-centred"]),
+    "sheared": (np.array([[1.0, 0, 0], [2, 1, 0], [-1, 1, 1]]), BASES["face-centred"]),
+    "primitive": (np.array([[0.5, 0.5, 0], [0.5, 0, 0.5], [0, 0.5, 0.5]]), [[0, 0, 0]]),
+}
+
+
+def crystal(basis, radius, vectors=None):
+    vectors = np.eye(3) if vectors is None else vectors
+    return Packing(np.array(basis, dtype=float) + 0.1, radius, cell=Cell(vectors))
+
+
+def loose(seed=4, count=150):
+    """Grains in a tilted cell that overlap a little, some of them without contacts."""
+    random = np.random.default_rng(seed)
+    vectors = np.array([[5.0, 0, 0], [2.4, 4.5, 0], [-1.0, 0.7, 5.2]])
+    return random.random((count, 3)) @ vectors, random.uniform(0.3, 0.6, count), vectors
+
+
+def agree(one, other, columns=("alpha_vs_axial",)):
+    """Within the standard errors of both scans; 4.5 of them, for all rows."""
+    for column in columns:
+        error = np.hypot(one["alpha_vs_axial_se"], other["alpha_vs_axial_se"])
+        assert np.all(np.abs(one[column] - other[column]) < 4.5 * error), column
+
+
+@pytest.mark.parametrize("name", BASES)
+def test_crystals_have_the_mean_length_of_stereology(name):
+    """Without overlap, at cut-off 0: porosity / (N_V π r²)."""
+    radius = 0.96 * TOUCHING[name]
+    packing = crystal(BASES[name], radius)
+    row = compute(packing, spacing=0.01, directions=60, cutoff=0.0, **CRYSTAL)[0]
+    count = len(BASES[name])
+    porosity = 1 - count * 4 / 3 * np.pi * radius**3
+    assert row.mean_length == pytest.approx(porosity / (count * np.pi * radius**2), rel=0.02)
+    assert row.solid_fraction == pytest.approx(1 - porosity, rel=0.02)
+    assert row.rattlers == count
+
+
+@pytest.mark.parametrize("name", CELLS)
+def test_a_crystal_does_not_know_its_cell(name):
+    vectors, basis = CELLS[name]
+    radius = 0.99 * TOUCHING["face-centred"]
+    packing = crystal(basis, radius, vectors)
+    row = compute(packing, spacing=0.01, directions=60, cutoff="0.1rmin", **CRYSTAL)[0]
+    # FCC by its cube, in directions and lines of another seed
+    other = compute(
+        crystal(BASES["face-centred"], radius),
+        spacing=0.01,
+        directions=60,
+        cutoff="0.1rmin",
+        **{**CRYSTAL, "seed": 8},
+    )[0]
+    assert row.mean_length == pytest.approx(other.mean_length, rel=0.02)
+    assert row.alpha_vs_axial == pytest.approx(
+        other.alpha_vs_axial, abs=5 * (row.alpha_vs_axial_se + other.alpha_vs_axial_se)
+    )
+    assert row.coordination == other.coordination == 0
+
+
+def test_shifted_and_wrapped_grains_are_the_same_medium():
+    position, radius, vectors = loose()
+    options = {**LOOK, "tolerance": 2e-3}
+    before = compute(Packing(position, radius, cell=Cell(vectors)), **options)
+    shifted = Packing(position + np.array([3.3, -7.1, 2.2]), radius, cell=Cell(vectors))
+    turns = np.random.default_rng(1).integers(-2, 3, position.shape) @ vectors
+    wrapped = Packing(position + turns, radius, cell=Cell(vectors))
+    other = Packing(
+        position, radius, cell=Cell(np.array([[1, 0, 0], [1, 1, 0], [0, 1, 1]]) @ vectors)
+    )
+    for packing in (shifted, wrapped, other):
+        after = compute(packing, **{**options, "seed": 11})
+        agree(before, after)
+        assert list(after["rattlers"]) == list(before["rattlers"])
+        assert after["alpha_c"] == pytest.approx(before["alpha_c"])
+        assert after["mean_length"] == pytest.approx(before["mean_length"], rel=0.01)
+        assert after["solid_fraction"] == pytest.approx(before["solid_fraction"], abs=0.01)
+
+
+def test_a_turned_cell_turns_the_fabric():
+    position, radius, vectors = loose()
+    turn = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]
+    axis = turn.T @ [0, 0, 1]
+    before = compute(Packing(position, radius, cell=Cell(vectors)), **{**LOOK, "tolerance": 1e-3})
+    after = compute(
+        Packing(position @ turn, radius, cell=Cell(vectors @ turn)),
+        **{**LOOK, "tolerance": 1e-3, "axis": tuple(axis), "seed": 5},
+    )
+    agree(before, after)
+    assert after["alpha_c"] == pytest.approx(before["alpha_c"])
+
+
+def test_freely_overlapping_spheres_have_their_known_mean_length():
+    """ℓ = c + 1/β for every cut-off, over many packings."""
+    vectors = np.array([[5.0, 0, 0], [1.5, 5, 0], [1.0, -1.2, 6]])
+    volume = abs(np.linalg.det(vectors))
+    cutoffs, expected = np.array([0.0, 0.3, 0.8]), 200
+    beta = expected / volume * np.pi * (0.45**2 + 0.3**2 / 12)
+    sums, counts = np.zeros(3), np.zeros(3)
+    for seed in range(60):
+        random = np.random.default_rng(seed)
+        number = random.poisson(expected)
+        packing = Packing(
+            random.random((number, 3)) @ vectors,
+            random.uniform(0.3, 0.6, number),
+            cell=Cell(vectors),
+        )
+        table = compute(
+            packing, variants="a", cutoffs="0,0.3,0.8", spacing=0.25, directions=9, seed=seed
+        )
+        sums += table["mean_length"] * table["segments"]
+        counts += table["segments"]
+    assert sums / counts - cutoffs == pytest.approx(np.full(3, 1 / beta), rel=0.03)
+
+
+def test_gaps_that_start_anywhere_are_the_gaps_of_the_medium():
+    """Random lines followed through explicit images: the same mean length and anisotropy."""
+    position, radius, vectors = loose(5, 110)
+    packing = Packing(position, radius, cell=Cell(vectors))
+    row = compute(packing, variants="a", tolerance=1e-3)[0]
+    random = np.random.default_rng(2)
+    gaps = []
+    for _ in range(600):
+        normal = random.normal(size=3)
+        normal /= np.linalg.norm(normal)
+        foot = random.random(3) @ vectors
+        found = naive.periodic_gaps(position, radius, vectors, (1, 1, 1), foot, normal, 6.0, 20.0)
+        gaps += [gap for gap in found if gap >= row.cutoff]
+    error = np.std(gaps) / np.sqrt(len(gaps))
+    assert np.mean(gaps) == pytest.approx(row.mean_length, abs=5 * error)
+    assert error < 0.03 * row.mean_length
+
+
+def test_lines_in_channels_are_counted_in_a_warning():
+    """Simple cubic along its edges, which the literal rules look along."""
+    packing = crystal(BASES["simple cubic"], 0.3)
+    with pytest.warns(ScanfabWarning, match="lines stay in a channel and meet no grain"):
+        compute(
+            packing, variants="a", directions="equal-angle-full:90", spacing=0.1, cutoff=0.0,
+            tolerance=10.0,
+        )  # fmt: skip
+
+
+def test_open_axes_end_at_the_first_and_last_solid():
+    """A layer of touching grains below another: no gap is above or below them."""
+    packing = Packing(
+        [[0.5, 0.5, 0.0], [0.5, 0.5, 2.0]], 0.5, cell=Cell([1.0, 1, 9], (True, True, False))
+    )
+    row = compute(
+        packing, variants="a", directions=50, spacing=0.01, cutoff=0.0, tolerance=1,
+        contact_tolerance=1e-4,
+    )[0]  # fmt: skip
+    assert row.solid_fraction is None
+    assert 0.5 < row.mean_length < 2.5
+
+
+def test_periodic_whole_and_rv_agree_in_a_large_sample():
+    position, radius, vectors = loose(6, 900)
+    big = Packing(position * 1.8, radius, cell=Cell(1.8 * vectors))
+    table = compute(big, variants="ac", rv=0.98, tolerance=1e-3)
+    # clipping lowers the mean length by some percent
+    assert table["mean_length"][1] == pytest.approx(table["mean_length"][0], rel=0.25)
+    assert table["solid_fraction"][1] == pytest.approx(table["solid_fraction"][0], abs=0.04)
