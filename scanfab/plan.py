@@ -73,7 +73,8 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
             stacklevel=2,
         )
     cutoff = settings.cutoff.resolve(lengths)
-    cutoffs = tuple(sorted({one.resolve(lengths) for one in settings.cutoffs})) or (cutoff,)
+    # as many as were asked for, also if two are equal: every frame has the same number of rows
+    cutoffs = tuple(sorted(one.resolve(lengths) for one in settings.cutoffs)) or (cutoff,)
     if settings.spacing is None:
         spacing = _auto_spacing(settings, len(rule), reach, lengths)
         return Plan(window, cutoff, cutoffs, rule, spacing, REPLICATES, "replicates")

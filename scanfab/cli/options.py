@@ -22,6 +22,7 @@ __all__ = [
     "output_option",
     "reading_arguments",
     "reading_options",
+    "sample_options",
 ]
 
 Command = Callable[..., Any]
@@ -53,7 +54,12 @@ def reading_options(command: Command) -> Command:
 
 def frame_options(command: Command) -> Command:
     """Add the options that tell boundary, rattlers and the frames to take."""
-    for option in reversed(_FRAMES):
+    return sample_options(_FRAMES(command))
+
+
+def sample_options(command: Command) -> Command:
+    """Add the options that tell boundary and rattlers."""
+    for option in reversed(_SAMPLE):
         command = option(command)
     return command
 
@@ -195,7 +201,7 @@ _READING: list[Callable[[Command], Command]] = [
         "or by geometry (default: file if there is one, else geometric).",
     ),
 ]
-_FRAMES: list[Callable[[Command], Command]] = [
+_SAMPLE: list[Callable[[Command], Command]] = [
     click.option(
         "--contact-tolerance",
         default=0.0,
@@ -216,10 +222,10 @@ _FRAMES: list[Callable[[Command], Command]] = [
         metavar="N",
         help="A grain with fewer contacts is a rattler.",
     ),
-    click.option(
-        "--frames", metavar="A:B:C", help="Which frames, as a Python slice (default: all)."
-    ),
 ]
+_FRAMES = click.option(
+    "--frames", metavar="A:B:C", help="Which frames, as a Python slice (default: all)."
+)
 _READING_NAMES = (
     "format", "columns", "contact_columns", "radius", "cell", "periodic", "contacts",
 )  # fmt: skip

@@ -8,6 +8,7 @@ Efron and Stein (1981), doi:10.1214/aos/1176345462.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -31,8 +32,8 @@ class Jackknife(NamedTuple):
 
     shift: FloatArray
     """By how much leaving out a block moves the anisotropy, shape (8,), dimensionless."""
-    error: float
-    """The standard error that follows, dimensionless."""
+    error: float | None
+    """The standard error that follows, dimensionless; None if the scan's noise hides it."""
 
 
 def jackknife_error(values: FloatArray) -> float:
@@ -112,7 +113,8 @@ def void_jackknife(
     -------
     Jackknife or None
         None if there is no void fabric without some block. What the scan's own noise adds to the
-        scatter between blocks is known from its replicates, and taken off the error.
+        scatter between blocks is known from its replicates, and taken off the error; where nothing
+        is left, the error is None: too few lines to see it, which is no proof that there is none.
     """
     fabrics = [void_fabric(axes, weights, *sums) for sums in (full, *without)]
     if any(fabric is None for fabric in fabrics):
@@ -124,5 +126,5 @@ def void_jackknife(
     if count > 1:
         # of one replicate: the sample's scatter, and R times the noise that the mean has
         single = float(_variance(values[1:]).mean())
-        variance = max((count * variance - single) / (count - 1), 0.0)
-    return Jackknife(means[1:] - means[0], float(np.sqrt(variance)))
+        variance = (count * variance - single) / (count - 1)
+    return Jackknife(means[1:] - means[0], math.sqrt(variance) if variance > 0 else None)
