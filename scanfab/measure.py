@@ -90,7 +90,7 @@ def measure(sample: Sample, plan: Plan, settings: Settings) -> Measurement:
         plan.window.check_inside(sample.packing)
     solids, origin = _solids(sample, plan, settings)
     sums, plan = scan_to_tolerance(solids, plan, settings)
-    blocks = _blocks(sample, plan, origin)
+    blocks = _blocks(sample, plan, settings)
     lines: dict[str, Any] = {
         "cutoffs": plan.cutoffs,
         "blocks": tuple(Blocks(one.matrix, one.shift + one.matrix @ origin) for one in blocks),
@@ -136,15 +136,16 @@ def _solids(sample: Sample, plan: Plan, settings: Settings) -> tuple[Solids, Flo
     return Solids(position, radius, removed, window.radius), origin
 
 
-def _blocks(sample: Sample, plan: Plan, origin: FloatArray) -> tuple[Blocks, Blocks]:
+def _blocks(sample: Sample, plan: Plan, settings: Settings) -> tuple[Blocks, Blocks]:
     """The octants about the middle of the sample, and about the window's centre."""
     position = sample.packing.position[sample.grains]
     low, high = position.min(axis=0), position.max(axis=0)
     radius = float(sample.packing.radius.max())
-    whole = Blocks.about(0.5 * (low + high), float((high - low).max()) + radius)
+    reach = float(np.linalg.norm(high - low)) + radius
+    whole = Blocks.about(0.5 * (low + high), reach, settings.axis)
     if plan.window is None:
         return whole, whole
-    return whole, Blocks.about(plan.window.center, plan.window.radius + radius)
+    return whole, Blocks.about(plan.window.center, plan.window.radius + radius, settings.axis)
 
 
 def _block_spacing(sums: ScanSums, plan: Plan, settings: Settings) -> float:

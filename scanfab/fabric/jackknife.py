@@ -17,7 +17,14 @@ import numpy.typing as npt
 from scanfab.fabric.tensor import axial
 from scanfab.fabric.void import void_fabric
 
-__all__ = ["BLOCKS", "Jackknife", "contact_jackknife", "jackknife_error", "void_jackknife"]
+__all__ = [
+    "BLOCKS",
+    "Jackknife",
+    "contact_jackknife",
+    "jackknife_error",
+    "variance_without_noise",
+    "void_jackknife",
+]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -121,10 +128,29 @@ def void_jackknife(
         return None
     values = np.array([axial(fabric.replicates, axis) for fabric in fabrics if fabric is not None])
     means = values.mean(axis=1)
-    variance = float(_variance(means[1:]))
-    count = values.shape[1]
-    if count > 1:
-        # of one replicate: the sample's scatter, and R times the noise that the mean has
-        single = float(_variance(values[1:]).mean())
-        variance = (count * variance - single) / (count - 1)
+    variance = variance_without_noise(values[1:])
     return Jackknife(means[1:] - means[0], math.sqrt(variance) if variance > 0 else None)
+
+
+def variance_without_noise(values: FloatArray) -> float:
+    """
+    Jackknife variance of the mean over replicates, without what their own noise adds.
+
+    Parameters
+    ----------
+    values : ndarray, shape (B, R)
+        Without each of B blocks, in each of R replicates, which have the blocks in common.
+
+    Returns
+    -------
+    float
+        Unbiased, so negative at times where the noise is the larger part. With one replicate the
+        noise is not known and stays in.
+    """
+    count = values.shape[1]
+    of_mean = float(_variance(values.mean(axis=1)))
+    if count == 1:
+        return of_mean
+    # of one replicate: the sample's scatter, and R times the noise that the mean has
+    of_single = float(_variance(values).mean())
+    return (count * of_mean - of_single) / (count - 1)
