@@ -12,7 +12,7 @@ from scanfab.fabric.jackknife import (
 )
 from scanfab.gaps import Blocks, scan_gaps
 from tests import naive
-from tests.lattices import poisson_spheres
+from tests.lattices import Spheres, poisson_spheres
 from tests.scanning import solids_of
 
 AXIS = np.array([0.6, 0.0, 0.8])
@@ -140,22 +140,21 @@ def test_noise_that_hides_the_scatter_leaves_no_error():
     assert all(error is None or error > 0 for error in errors)
 
 
-def sample_of_voids(seed, axis):
-    """α_axial of Poisson spheres in a window, the scan's noise, and the jackknife variance."""
+def values_of_voids(spheres, axis, blocks_axis=None, **options):
+    """α_axial in each replicate with all segments, and without each octant: shape (9, R)."""
     window, rule = 8.0, direction_rule("icosahedral:9")
-    spheres = poisson_spheres(np.random.default_rng([seed, 11]), 0.3, window)
+    blocks = Blocks.about(np.zeros(3), 2 * window, axis if blocks_axis is None else blocks_axis)
     sums = scan_gaps(
         solids_of(spheres, window),
         rule,
-        spacing=1.0,
         cutoffs=[0.5],
-        blocks=(Blocks.about(np.zeros(3), 2 * window, axis),) * 2,
+        blocks=(blocks, blocks),
         variants="c",
         replicates=range(8),
-        seed=seed,
+        **options,
     )
     every, without = sums.kept("c"), [sums.kept("c", without=block) for block in range(8)]
-    values = np.array(
+    return np.array(
         [
             [
                 naive.axial(naive.void_tensor(axes, rule.weights, over / under), axis)
@@ -164,19 +163,34 @@ def sample_of_voids(seed, axis):
             for one in (every, *without)
         ]
     )
+
+
+def test_octants_about_one_sphere_do_not_differ_along_the_axis():
+    """
+    Segments at a window's surface are cut in another way along it than across.
+
+    So octants must be mirror images of one another with respect to the axis; else their difference
+    counts as scatter of the sample, of which there is none here.
+    """
+    oblique, one = np.array([0.6, 0.0, 0.8]), Spheres(np.zeros((1, 3)), np.full(1, 4.0))
+    values = values_of_voids(one, oblique, spacing=0.4)
+    off = values[1:] - values[1:].mean(axis=0)
+    error = off.std(axis=1, ddof=1) / np.sqrt(off.shape[1])
+    assert np.all(np.abs(off.mean(axis=1)) < 4 * error)
+    along_z = values_of_voids(one, oblique, (0, 0, 1), spacing=0.4)[1:].mean(axis=1)
+    assert np.ptp(along_z) > 20 * error.max()
+
+
+def sample_of_voids(seed):
+    """α_axial of Poisson spheres in a window, the scan's noise, and the jackknife variance."""
+    spheres = poisson_spheres(np.random.default_rng([seed, 11]), 0.3, 8.0)
+    values = values_of_voids(spheres, (0, 0, 1), spacing=1.0, seed=seed)
     return values[0].mean(), values[0].var(ddof=1) / 8, variance_without_noise(values[1:])
 
 
-@pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), (0.6, 0.0, 0.8)], ids=["z", "oblique"])
-def test_jackknife_is_the_scatter_between_independent_samples(axis):
-    """
-    Mean jackknife variance over 150 samples, and variance of α between them.
-
-    At the window's surface segments are cut in another way along it than across. With octants that
-    are no mirror images of one another with respect to the axis this would count as scatter: nine
-    times too much.
-    """
-    alpha, noise, jackknife = np.array([sample_of_voids(seed, axis) for seed in range(150)]).T
+def test_jackknife_is_the_scatter_between_independent_samples():
+    """Mean jackknife variance over 150 samples, and variance of α between them."""
+    alpha, noise, jackknife = np.array([sample_of_voids(seed) for seed in range(150)]).T
     between = alpha.var(ddof=1) - noise.mean()
     assert noise.mean() < 0.3 * between
     # relative errors: of a variance of 150 numbers 12 %, of the mean of 150 variances of 8 some 5 %
