@@ -121,12 +121,14 @@ class _Calibrator:
     def all(self) -> Calibration:
         """The ladders, what they say, and what follows."""
         cutoffs = list(self._cutoffs())
-        if all(row.alpha_vs_axial is None for row in cutoffs):
-            raise SettingsError(
-                f"frame {self.number}: no cut-off leaves a void fabric: the sample of "
-                f"{int(self.sample.grains.sum())} grains is too small for it, or the RV holds no "
-                f"void"
-            )
+        with_fabric = {row.variant for row in cutoffs if row.alpha_vs_axial is not None}
+        for variant in self.settings.variants:
+            if variant not in with_fabric:
+                raise SettingsError(
+                    f"frame {self.number}: no cut-off leaves a void fabric in variant {variant}: "
+                    f"the sample ({int(self.sample.grains.sum())} grains) is too small for it, or "
+                    f"there is no void"
+                )
         ladders = {
             "spacing": judged(self._spacings(), with_sample=False),
             "directions": judged(self._directions(), with_sample=False),

@@ -36,6 +36,8 @@ FRAME_COLUMNS = ("source", "frame", "step", "time", "strain", "variant", "contac
 # of the scan for the sample's scatter: its own noise is known, and taken off
 BLOCK_REPLICATES = 8
 BLOCK_SEGMENTS = 500_000
+# where grains overlap many times there are far more chords than segments, and all are listed
+BLOCK_CHORDS = 30_000_000
 
 
 def frame_rows(
@@ -155,7 +157,9 @@ def _block_spacing(sums: ScanSums, plan: Plan, settings: Settings) -> float:
     wanted = min(fewest, BLOCK_SEGMENTS)
     axes = len(plan.rule) * sums.replicates
     per_axis = BLOCK_REPLICATES * len(direction_rule(AUTO_RULE)) / axes
-    return plan.spacing * math.sqrt(per_axis * fewest / wanted)
+    chords = float(sums.chords.sum()) * wanted / fewest
+    wider = max(chords / BLOCK_CHORDS, 1.0)
+    return plan.spacing * math.sqrt(per_axis * fewest / wanted * wider)
 
 
 class _Columns:

@@ -30,9 +30,7 @@ def gaps_of(solids, **options):
 @pytest.mark.parametrize("place", range(len(CUTOFFS)))
 def test_all_octants_together_are_the_scan_of_the_same_lines(solids, place):
     gaps = gaps_of(solids, seed=3)
-    sums = scan_lines(
-        solids, RULE, spacing=0.3, cutoff=CUTOFFS[place], replicates=range(3), seed=3
-    )
+    sums = scan_lines(solids, RULE, spacing=0.3, cutoff=CUTOFFS[place], replicates=range(3), seed=3)
     assert np.array_equal(gaps.axes, sums.axes)
     for variant in "abcd":
         length, number = gaps.kept(variant, place)

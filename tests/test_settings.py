@@ -282,3 +282,15 @@ def test_rows_of_a_frame_are_those_of_all_variants_and_cutoffs():
     assert Settings.make(variants="c", cutoffs="0:3rmin:0.1rmin").rows_per_frame == 31
     assert not Settings.make().lists_gaps
     assert Settings.make(moment=2).lists_gaps
+
+
+@pytest.mark.parametrize("rule", ["fibonacci:1", "fibonacci:2", "equal-angle-full:90"])
+def test_directions_in_one_plane_are_refused(rule):
+    with pytest.raises(SettingsError, match=f"directions: the . axes of {rule} lie in one plane"):
+        Settings.make(directions=rule)
+    with pytest.raises(SettingsError, match="lie in one plane"):
+        Settings.make(directions=direction_rule(rule))
+
+
+def test_three_directions_across_one_another_will_do():
+    assert len(Settings.make(directions=1).directions) == 3

@@ -88,9 +88,7 @@ def test_second_moment_is_that_of_the_slow_twin():
     packing = find_contacts(Packing(*shaken_cubic(np.random.default_rng(0), 5)))
     rule, spacing, cutoff = direction_rule("lebedev:5"), 0.6, 0.3
     options = {"rv_radius": 1.5, "rv_center": (2.5, 2.5, 2.5), "variants": "c"}
-    row = compute(
-        packing, directions=rule, spacing=spacing, cutoff=cutoff, moment=2, **options
-    )[0]
+    row = compute(packing, directions=rule, spacing=spacing, cutoff=cutoff, moment=2, **options)[0]
     assert row.replicates == 1
     frames, offsets = turned_frames(rule, line_frames(rule.axes), 0, 0)
     over, under = np.zeros(len(rule)), np.zeros(len(rule))
