@@ -112,9 +112,7 @@ def test_a_doubtful_step_is_not_steady(doubt):
 
 
 def test_one_grain_is_refused():
-    with pytest.raises(
-        SettingsError, match="no cut-off leaves a void fabric in variant c: the sample .1 gr"
-    ):
+    with pytest.raises(SettingsError, match=r"fabric in variant c: the sample \(1 gr"):
         calibrate(Packing([[0.0, 0, 0]], [1.0]))
 
 

@@ -110,7 +110,7 @@ def test_octants_about_an_oblique_axis_have_it_as_one_of_their_axes():
     axis = np.array([0.6, 0.0, 0.8])
     blocks = Blocks.about(np.array([1.0, 2.0, 3.0]), 5.0, axis)
     places = np.random.default_rng(0).uniform(-2, 2, (200, 3))
-    found = blocks.of(places + [1.0, 2.0, 3.0])
+    found = blocks.of(places + np.array([1.0, 2.0, 3.0]))
     assert set(found) == set(range(8))
     # the last four lie on the far side of the plane normal to the axis
     assert np.array_equal(found >= 4, places @ axis >= 0)

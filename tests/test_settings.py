@@ -255,25 +255,25 @@ def test_cutoffs_may_be_listed_in_different_units():
     ],
 )
 def test_cutoffs_that_mean_nothing_are_refused_by_name(text):
-    with pytest.raises(SettingsError, match="^cutoffs: "):
+    with pytest.raises(SettingsError, match=r"^cutoffs: "):
         Settings.make(cutoffs=text)
 
 
 @pytest.mark.parametrize("moment", [0, 3, 1.5, "x"])
 def test_there_are_two_moments(moment):
-    with pytest.raises(SettingsError, match="^moment: expected"):
+    with pytest.raises(SettingsError, match=r"^moment: expected"):
         Settings.make(moment=moment)
 
 
 @pytest.mark.parametrize("chords", [0, -1, "many", float("nan")])
 def test_a_budget_of_chords_is_a_number_of_at_least_one(chords):
-    with pytest.raises(SettingsError, match="^max-chords: expected"):
+    with pytest.raises(SettingsError, match=r"^max-chords: expected"):
         Settings.make(max_chords=chords)
 
 
 @pytest.mark.parametrize("tolerance", [0, -1e-4, float("inf"), float("nan")])
 def test_a_tolerance_that_no_scan_meets_is_refused(tolerance):
-    with pytest.raises(SettingsError, match="^tolerance: expected a number above 0"):
+    with pytest.raises(SettingsError, match=r"^tolerance: expected a number above 0"):
         Settings.make(tolerance=tolerance)
 
 

@@ -153,4 +153,4 @@ def variance_without_noise(values: FloatArray) -> float:
         return of_mean
     # of one replicate: the sample's scatter, and R times the noise that the mean has
     of_single = float(_variance(values).mean())
-    return (count * of_mean - of_single) / (count - 1)
+    return float((count * of_mean - of_single) / (count - 1))

@@ -55,7 +55,7 @@ def test_target_out_of_reach_is_told_with_the_error_that_was_reached(answer):
 
 
 def test_directions_that_meet_nothing_give_rows_without_a_fabric(answer):
-    """An RV in the gap between grains, larger than the cut-off by nothing."""
+    """No gap is as long as the cut-off."""
     code, rows, err = answer("--cutoff", "100", "--directions", "20", "--spacing", "0.1")
     assert code == 1
     assert [row["alpha_vs"] for row in rows] == [""] * 4

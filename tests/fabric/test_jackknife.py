@@ -64,7 +64,7 @@ def test_contacts_in_one_octant_alone_have_no_error():
 
 
 def test_contact_jackknife_of_independent_contacts_is_their_scatter():
-    """Blocks of independent contacts: the mean variance is that of one contact over their number."""
+    """Blocks of independent contacts: the variance of one contact over their number."""
     random = np.random.default_rng(3)
     variance = [
         contact_jackknife(unit_vectors(random, 400), random.integers(0, 8, 400), AXIS).error ** 2
