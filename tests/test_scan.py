@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scanfab import Packing, SettingsError, compute, direction_rule, scan_lines
-from scanfab.scan import MAX_LINES, ScanSums, _replicate, line_frames
+from scanfab.scan import MAX_LINES, ScanSums, line_frames, turned_frames
 from tests import naive
 from tests.lattices import Spheres, poisson_spheres, separate_spheres, shaken_cubic
 from tests.scanning import fabric, solids_of
@@ -35,7 +35,7 @@ def test_frames_are_orthonormal_and_right_handed():
 def test_scan_equals_the_slow_twin_for_all_variants(solids):
     """Its lines are those of the replicate's frames and shifts."""
     sums = scan_lines(solids, RULE, spacing=0.6, cutoff=0.3, replicates=[3], seed=5)
-    frames, offsets = _replicate(RULE, line_frames(RULE.axes), 5, 3)
+    frames, offsets = turned_frames(RULE, line_frames(RULE.axes), 5, 3)
     for number, (frame, offset) in enumerate(zip(frames, offsets, strict=True)):
         keep = ~solids.removed
         tallies = [
