@@ -6,6 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from scanfab.calibration import Calibration, calibrate
     from scanfab.cell import Cell
     from scanfab.compare import compare_tables
     from scanfab.contacts import find_contacts
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 # numpy, numba and the readers are loaded by the first name that needs them
 _HOME = {
     "COLUMNS": "table",
+    "Calibration": "calibration",
     "Cell": "cell",
     "ContactList": "packing",
     "Contacts": "packing",
@@ -51,6 +53,7 @@ _HOME = {
     "Table": "table",
     "UnknownFormatError": "errors",
     "VoidFabric": "fabric.void",
+    "calibrate": "calibration",
     "compare_tables": "compare",
     "compute": "pipeline",
     "contact_fabric": "fabric.contact",
@@ -65,6 +68,7 @@ _HOME = {
 
 __all__ = [
     "COLUMNS",
+    "Calibration",
     "Cell",
     "ContactList",
     "Contacts",
@@ -84,6 +88,7 @@ __all__ = [
     "Table",
     "UnknownFormatError",
     "VoidFabric",
+    "calibrate",
     "compare_tables",
     "compute",
     "contact_fabric",

@@ -84,12 +84,28 @@ def _within_budget(plan: Plan, solids: Solids, settings: Settings) -> Plan:
     if chords <= settings.max_chords:
         return plan
     if plan.auto == "replicates":
-        return replace(plan, spacing=plan.spacing * math.sqrt(chords / settings.max_chords))
+        wider = plan.spacing * math.sqrt(chords / settings.max_chords)
+        if wider > _width(solids):
+            raise SettingsError(
+                f"max-chords: {settings.max_chords:g} leave less than one line for each of "
+                f"{plan.replicates} replicates of {len(plan.rule)} directions: allow more, or take "
+                f"fewer --directions"
+            )
+        return replace(plan, spacing=wider)
     raise SettingsError(
         f"spacing: {plan.replicates} replicates of {len(plan.rule)} directions would cut "
         f"{chords:.2g} chords from the grains, more than --max-chords {settings.max_chords:g}: "
         f"choose a wider spacing"
     )
+
+
+def _width(solids: Solids) -> float:
+    """Of the window, or of the sample where there is none."""
+    if solids.window_radius > 0:
+        return 2.0 * solids.window_radius
+    low = (solids.position - solids.radius[:, None]).min(axis=0)
+    high = (solids.position + solids.radius[:, None]).max(axis=0)
+    return float((high - low).max())
 
 
 def _too_few_lines(sums: ScanSums, settings: Settings) -> bool:

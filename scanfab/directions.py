@@ -58,6 +58,11 @@ class DirectionRule:
         values = np.linalg.eigvalsh(self.isotropic_tensor)
         return float(values[-1] - values[0])
 
+    @property
+    def is_flat(self) -> bool:
+        """Whether all axes lie in one plane, or along one line."""
+        return bool(np.linalg.eigvalsh(self.isotropic_tensor)[0] < 1e-9)
+
 
 def direction_rule(text: str) -> DirectionRule:
     """

@@ -39,9 +39,17 @@ class Blocks:
     """t, shape (3,), dimensionless."""
 
     @classmethod
-    def about(cls, center: FloatArray, reach: float) -> Blocks:
-        """The octants about a centre, of places within a reach of it; dump's length unit."""
-        matrix = np.eye(3) / (4.0 * reach)
+    def about(cls, center: FloatArray, reach: float, axis: npt.ArrayLike = (0, 0, 1)) -> Blocks:
+        """
+        The octants about a centre, of places within a reach of it; dump's length unit.
+
+        One of the axes that part them is the given one: then they are mirror images of one another
+        with respect to it, as they must be in order to differ by chance alone.
+        """
+        along = np.asarray(axis, dtype=np.float64)
+        # about x, y or z the octants are those of the coordinates
+        parting = np.eye(3) if np.count_nonzero(along) == 1 else line_frames(along[None])[0]
+        matrix = parting / (4.0 * reach)
         return cls(matrix, 0.5 - matrix @ center)
 
     def of(self, places: FloatArray) -> IntArray:

@@ -38,6 +38,8 @@ FRAME_COLUMNS = ("source", "frame", "step", "time", "strain", "variant", "contac
 # of the scan for the sample's scatter: its own noise is known, and taken off
 BLOCK_REPLICATES = 8
 BLOCK_SEGMENTS = 500_000
+# where grains overlap many times there are far more chords than segments, and all are listed
+BLOCK_CHORDS = 30_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +136,7 @@ def measure(sample: Sample, plan: Plan, settings: Settings) -> Measurement:
         plan.window.check_fits(sample.packing)
     solids, origin = _solids(sample, plan, settings)
     sums, plan = scan_to_tolerance(solids, plan, settings)
-    blocks = _blocks(sample, plan)
+    blocks = _blocks(sample, plan, settings)
     lines: dict[str, Any] = {
         "cutoffs": plan.cutoffs,
         "blocks": tuple(Blocks(one.matrix, one.shift + one.matrix @ origin) for one in blocks),
@@ -200,18 +202,19 @@ def _reaching_in(
     return np.concatenate(images), np.concatenate(rows)
 
 
-def _blocks(sample: Sample, plan: Plan) -> tuple[Blocks, Blocks]:
+def _blocks(sample: Sample, plan: Plan, settings: Settings) -> tuple[Blocks, Blocks]:
     """The octants about the middle of the sample (of the cell), and about the window's centre."""
     packing = sample.packing
     position = packing.position[sample.grains]
     low, high = position.min(axis=0), position.max(axis=0)
     radius = float(packing.radius.max())
-    whole = Blocks.about(0.5 * (low + high), float((high - low).max()) + radius)
+    reach = float(np.linalg.norm(high - low)) + radius
+    whole = Blocks.about(0.5 * (low + high), reach, settings.axis)
     if packing.cell is not None and packing.is_periodic:
         whole = _cell_blocks(packing.cell, position)
     if plan.window is None:
         return whole, whole
-    return whole, Blocks.about(plan.window.center, plan.window.radius + radius)
+    return whole, Blocks.about(plan.window.center, plan.window.radius + radius, settings.axis)
 
 
 def _cell_blocks(cell: Cell, position: FloatArray) -> Blocks:
@@ -233,7 +236,9 @@ def _block_spacing(sums: ScanSums, plan: Plan, settings: Settings) -> float:
     wanted = min(fewest, BLOCK_SEGMENTS)
     axes = len(plan.rule) * sums.replicates
     per_axis = BLOCK_REPLICATES * len(direction_rule(AUTO_RULE)) / axes
-    return plan.spacing * math.sqrt(per_axis * fewest / wanted)
+    chords = float(sums.chords.sum()) * wanted / fewest
+    wider = max(chords / BLOCK_CHORDS, 1.0)
+    return plan.spacing * math.sqrt(per_axis * fewest / wanted * wider)
 
 
 class _Columns:

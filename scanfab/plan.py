@@ -72,11 +72,18 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
             stacklevel=2,
         )
     cutoff = settings.cutoff.resolve(lengths)
-    cutoffs = tuple(sorted({one.resolve(lengths) for one in settings.cutoffs})) or (cutoff,)
+    # as many as were asked for, also if two are equal: every frame has the same number of rows
+    cutoffs = tuple(sorted(one.resolve(lengths) for one in settings.cutoffs)) or (cutoff,)
     if settings.spacing is None:
         spacing = _auto_spacing(settings, len(rule), reach, lengths)
         return Plan(window, cutoff, cutoffs, rule, spacing, REPLICATES, "replicates")
     asked = settings.spacing.resolve(lengths)
+    if asked > 2.0 * reach:
+        what = "sample" if window is None else "RV"
+        raise SettingsError(
+            f"spacing: {asked:g} between lines is more than the {what} is wide ({2.0 * reach:g}): "
+            f"choose a smaller one, for instance 1rmin ({lengths['rmin']:g})"
+        )
     lines = math.pi * reach**2 / asked**2
     replicates = int(min(max(lines / FEWEST_LINES, 1), REPLICATES))
     auto = "directions" if settings.directions is None else ""

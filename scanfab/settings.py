@@ -112,9 +112,15 @@ def _vector(name: str, values: Sequence[float]) -> Vector:
 
 
 def _rule(directions: str | int | DirectionRule) -> DirectionRule | None:
-    if isinstance(directions, DirectionRule):
-        return directions
-    return None if directions == "auto" else direction_rule(str(directions))
+    if directions == "auto":
+        return None
+    rule = directions if isinstance(directions, DirectionRule) else direction_rule(str(directions))
+    if rule.is_flat:
+        raise SettingsError(
+            f"directions: the {len(rule)} axes of {rule.name} lie in one plane, across which they "
+            f"say nothing: take more of them"
+        )
+    return rule
 
 
 def parse_axis(text: str | Vector) -> Vector:

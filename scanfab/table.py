@@ -122,7 +122,8 @@ MEANINGS: dict[str, str] = {
     "alpha_c_axial_se": "its standard error if contacts were independent",
     "alpha_vs_axial_sample_se": "the sample's own scatter, by a jackknife over eight octants",
     "alpha_c_axial_sample_se": "likewise",
-    "alpha_vs_axial_without_1": "alpha_vs_axial without the segments of octant 1 (-x, -y, -z)",
+    "alpha_vs_axial_without_1": "alpha_vs_axial without the segments of octant 1 (-x, -y, -z; for "
+    "an oblique loading axis the octants are turned so that one of their axes lies along it)",
     "alpha_vs_axial_without_2": "likewise, octant 2, where x counts fastest",
     "alpha_vs_axial_without_3": "likewise",
     "alpha_vs_axial_without_4": "likewise",

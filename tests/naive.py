@@ -17,6 +17,13 @@ class Gaps(NamedTuple):
     window_line_length: float
 
 
+class Segment(NamedTuple):
+    """One void segment: its length, and the place of its middle."""
+
+    length: float
+    middle: np.ndarray
+
+
 class Tally(NamedTuple):
     """What a scan adds up, in the order of the kernel's tally."""
 
@@ -53,34 +60,74 @@ def union(intervals):
 
 
 def gaps_between(solids):
-    """Lengths between neighbouring solids of a union."""
-    return [after[0] - before[1] for before, after in pairwise(solids)]
+    """Ends of what lies between neighbouring solids of a union."""
+    return [(before[1], after[0]) for before, after in pairwise(solids)]
 
 
 def gaps_within(solids, low, high):
-    """Lengths of what a union leaves free between two ends, which act as solids."""
+    """Ends of what a union leaves free between two ends, which act as solids."""
     inside = [(start, end) for start, end in solids if end > low and start < high]
     walls = [(low, low), *((max(s, low), min(e, high)) for s, e in inside), (high, high)]
-    return [length for length in gaps_between(walls) if length > 0]
+    return [(start, end) for start, end in gaps_between(walls) if end > start]
+
+
+def lengths(intervals):
+    """Of intervals."""
+    return [end - start for start, end in intervals]
+
+
+def grid_lines(position, radius, frame, offset, spacing, window_radius):
+    """The lines of a square grid along the third row of a frame (rows u, v, n): x, y, solids."""
+    u, v, direction = frame
+    surfaces = np.linalg.norm(position, axis=1) + radius
+    number = ceil(max([window_radius, *surfaces]) / spacing) + 1
+    for i, j in product(range(-number, number + 1), repeat=2):
+        x, y = (i + offset[0]) * spacing, (j + offset[1]) * spacing
+        yield x, y, union(chords(position, radius, x * u + y * v, direction))
 
 
 def scan(position, radius, frame, offset, spacing, window_radius):
     """All gaps on the square grid of lines along the third row of a frame (rows u, v, n)."""
-    u, v, direction = frame
-    surfaces = np.linalg.norm(position, axis=1) + radius
-    number = ceil(max([window_radius, *surfaces]) / spacing) + 1
     whole, whole_lines, window, window_lines, line_length = [], 0, [], 0, 0.0
-    for i, j in product(range(-number, number + 1), repeat=2):
-        x, y = (i + offset[0]) * spacing, (j + offset[1]) * spacing
-        solids = union(chords(position, radius, x * u + y * v, direction))
-        whole += gaps_between(solids)
+    for x, y, solids in grid_lines(position, radius, frame, offset, spacing, window_radius):
+        whole += lengths(gaps_between(solids))
         whole_lines += bool(solids)
         if x * x + y * y < window_radius**2:
             half = sqrt(window_radius**2 - x * x - y * y)
-            window += gaps_within(solids, -half, half)
+            window += lengths(gaps_within(solids, -half, half))
             window_lines += 1
             line_length += 2 * half
     return Gaps(whole, whole_lines, window, window_lines, line_length)
+
+
+def void_segments(position, radius, frame, offset, spacing, window_radius):
+    """The void segments on a grid of lines: those of the whole sample, those of the window."""
+    u, v, direction = frame
+    whole, window = [], []
+    for x, y, solids in grid_lines(position, radius, frame, offset, spacing, window_radius):
+        half = sqrt(max(window_radius**2 - x * x - y * y, 0.0))
+        kinds = [(whole, gaps_between(solids))]
+        if half > 0:
+            kinds.append((window, gaps_within(solids, -half, half)))
+        for found, gaps in kinds:
+            for start, end in gaps:
+                middle = x * u + y * v + 0.5 * (start + end) * direction
+                found.append(Segment(end - start, middle))
+    return whole, window
+
+
+def octant(place, center):
+    """The octant of a place about a centre, from 0, x counting fastest."""
+    return sum(2**i for i in range(3) if place[i] >= center[i])
+
+
+def gap_sums(segments, cutoff, center):
+    """Number, length and squared length of the kept segments, by octant: shape (8, 3)."""
+    sums = np.zeros((8, 3))
+    for length, middle in segments:
+        if length >= cutoff and length > 0:
+            sums[octant(middle, center)] += 1, length, length**2
+    return sums
 
 
 def tally(gaps, cutoff):

@@ -124,6 +124,12 @@ def test_fixed_spacing_that_needs_more_chords_than_allowed_is_refused(packing):
         compute(packing, spacing=0.02, max_chords=1e4)
 
 
+@pytest.mark.parametrize("variants", ["ab", "abcd"])
+def test_budget_without_a_line_for_every_direction_is_refused(packing, variants):
+    with pytest.raises(SettingsError, match="max-chords: 100 leave less than one line for each of"):
+        compute(packing, max_chords=100, variants=variants)
+
+
 def test_chords_of_a_scan_are_those_of_all_grains(packing):
     """Their number is the grains' projected area over the area of a line."""
     solids = solids_of(packing, 0.0)

@@ -49,6 +49,62 @@ def test_frames_give_the_slope_no_standard_error():
     assert summary_of(curve()).slope_se is None
 
 
+def with_octants(rows):
+    """Rows with values without each octant, which octant k changes in its own way."""
+    return [
+        {
+            **row,
+            **{f"alpha_vs_axial_without_{k}": row["alpha_vs_axial"] * (1 + 0.01 * k * frame)
+               for k in range(1, 9)},
+            **{f"alpha_c_axial_without_{k}": row["alpha_c_axial"] + 0.001 * k * frame
+               for k in range(1, 9)},
+        }
+        for frame, row in enumerate(rows)
+    ]  # fmt: skip
+
+
+def test_octants_left_out_in_all_frames_give_the_slope_its_standard_error():
+    """√(7/8 Σ (slope_k - mean)²), the slopes by least squares of the values without octant k."""
+    slopes = []
+    for k in range(1, 9):
+        void = [one * (1 + 0.01 * k * frame) for frame, one in enumerate(VOID)]
+        contact = [one + 0.001 * k * frame for frame, one in enumerate(CONTACT)]
+        slopes.append(np.polyfit(contact, void, 1)[0])
+    expected = math.sqrt(7 * np.var(slopes))
+    assert expected > 1e-3
+    row = summary_of(with_octants(curve()))
+    assert row.slope_se == pytest.approx(expected, rel=1e-9)
+    assert row.slope == pytest.approx(summary_of(curve()).slope, rel=1e-12)
+
+
+def test_octants_of_frames_beyond_the_largest_strain_do_not_count():
+    rows = with_octants(curve())
+    assert summary_of(rows, strain_max=0.02).slope_se == pytest.approx(
+        summary_of(rows[:3]).slope_se, rel=1e-12
+    )
+
+
+def test_octants_that_are_alike_give_no_error_at_all():
+    same = {f"{name}_without_{k}": name for name in ("alpha_vs_axial", "alpha_c_axial")
+            for k in range(1, 9)}  # fmt: skip
+    rows = [{**row, **{name: row[whole] for name, whole in same.items()}} for row in curve()]
+    assert summary_of(rows).slope_se == pytest.approx(0.0, abs=1e-15)
+
+
+@pytest.mark.parametrize("column", ["alpha_vs_axial_without_3", "alpha_c_axial_without_8"])
+def test_a_frame_without_octants_leaves_the_slope_without_error(column):
+    rows = with_octants(curve())
+    rows[1][column] = None
+    assert summary_of(rows).slope_se is None
+    rows = [{name: value for name, value in row.items() if name != column} for row in rows]
+    assert summary_of(rows).slope_se is None
+    assert summary_of(rows).slope is not None
+
+
+def test_under_three_frames_there_is_no_error_either():
+    assert summary_of(with_octants(curve())[:2]).slope_se is None
+
+
 def test_the_peak_is_the_largest_absolute_value():
     row = summary_of(curve())
     assert (row.peak, row.peak_strain, row.final) == (-0.05, 0.02, -0.03)

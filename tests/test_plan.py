@@ -1,11 +1,20 @@
 """The plan: settings turned into lengths, lines and replicates by the first frame."""
 
 import math
+import warnings
 
 import numpy as np
 import pytest
 
-from scanfab import Cell, Packing, ScanfabWarning, Settings, compute, find_contacts
+from scanfab import (
+    Cell,
+    Packing,
+    ScanfabWarning,
+    Settings,
+    SettingsError,
+    compute,
+    find_contacts,
+)
 from scanfab.plan import FEWEST_LINES, REPLICATES, make_plan
 from scanfab.settings import AUTO_RULE
 from scanfab.variants import Sample
@@ -44,7 +53,7 @@ def test_fixed_scan_shares_its_lines_among_sixteen_replicates(packing):
     assert plan.auto == ""
 
 
-@pytest.mark.parametrize("spacing", [0.1, 0.3, 0.5, 0.8, 1.5, 10.0])
+@pytest.mark.parametrize("spacing", [0.1, 0.3, 0.5, 0.8, 1.5, 4.0])
 def test_no_replicate_of_a_fixed_scan_gets_fewer_than_thirty_lines(packing, spacing):
     plan = plan_of(packing, spacing=spacing, directions="lebedev:11")
     area = math.pi * plan.window.radius**2
@@ -155,3 +164,27 @@ def test_cell_that_does_not_repeat_is_no_obstacle(packing):
     plan = plan_of(walls)
     assert plan.window.center == pytest.approx(plan_of(packing).window.center)
     assert plan.window.radius == pytest.approx(plan_of(packing).window.radius)
+
+
+@pytest.mark.parametrize("variants", ["a", "cd"])
+def test_spacing_wider_than_the_sample_is_refused(packing, variants):
+    match = r"spacing: 100 between lines is more than the (sample|RV) is wide \(\d.*1rmin \(0\.4"
+    with pytest.raises(SettingsError, match=match):
+        plan_of(packing, spacing=100.0, directions=20, variants=variants)
+    with pytest.raises(SettingsError, match=match):
+        plan_of(packing, spacing=100.0, variants=variants)
+
+
+@pytest.mark.parametrize(("tolerance", "warns"), [(0.08, False), (0.07, True)])
+def test_bias_of_a_rule_counts_over_a_tenth_of_the_tolerance(packing, tolerance, warns):
+    """That of 100 Fibonacci directions is 0.0075."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        plan_of(packing, directions="fibonacci:100", tolerance=tolerance)
+    found = [str(one.message) for one in caught if "isotropic" in str(one.message)]
+    assert bool(found) == warns
+
+
+def test_exact_rules_have_no_bias_to_warn_of(packing):
+    for rule in ("7", "lebedev:11", "design:9", "icosahedral:9", "product:5"):
+        assert plan_of(packing, directions=rule, tolerance=1e-12).rule.bias < 1e-13

@@ -211,3 +211,86 @@ def test_an_option_that_does_not_exist_is_an_error():
 def test_settings_cannot_be_changed():
     with pytest.raises(dataclasses.FrozenInstanceError):
         Settings.make().rv = 0.5
+
+
+@pytest.mark.parametrize(
+    ("text", "values", "unit"),
+    [
+        ("0:3rmin:0.1rmin", [round(0.1 * k, 12) for k in range(31)], "rmin"),
+        ("0:1rmean:0.5rmean", [0, 0.5, 1], "rmean"),
+        ("0.5:1:0.2", [0.5, 0.7, 0.9], ""),
+        ("1rmin", [1], "rmin"),
+        ("2rmax:2rmax:1rmax", [2], "rmax"),
+    ],
+)
+def test_cutoffs_are_a_range_of_lengths_with_both_ends(text, values, unit):
+    cutoffs = Settings.make(cutoffs=text).cutoffs
+    assert [one.value for one in cutoffs] == values
+    assert {one.unit for one in cutoffs if one.value} <= {unit}
+
+
+def test_cutoffs_may_be_listed_in_different_units():
+    cutoffs = Settings.make(cutoffs="0.001,1rmin, 2rmean").cutoffs
+    assert [(one.value, one.unit) for one in cutoffs] == [(0.001, ""), (1, "rmin"), (2, "rmean")]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        ",",
+        "1rmin,",
+        "0:1rmin",
+        "0:1rmin:0",
+        "0:1rmin:-0.1rmin",
+        "0:1rmin:0.1",
+        "0:3rmin:0.1rmean",
+        "2rmin:1rmin:0.1rmin",
+        "0:1:1e-9",
+        "a:b:c",
+        "-1rmin,1rmin",
+        "nan",
+        "0:inf:1",
+        "0:1:1:1",
+    ],
+)
+def test_cutoffs_that_mean_nothing_are_refused_by_name(text):
+    with pytest.raises(SettingsError, match=r"^cutoffs: "):
+        Settings.make(cutoffs=text)
+
+
+@pytest.mark.parametrize("moment", [0, 3, 1.5, "x"])
+def test_there_are_two_moments(moment):
+    with pytest.raises(SettingsError, match=r"^moment: expected"):
+        Settings.make(moment=moment)
+
+
+@pytest.mark.parametrize("chords", [0, -1, "many", float("nan")])
+def test_a_budget_of_chords_is_a_number_of_at_least_one(chords):
+    with pytest.raises(SettingsError, match=r"^max-chords: expected"):
+        Settings.make(max_chords=chords)
+
+
+@pytest.mark.parametrize("tolerance", [0, -1e-4, float("inf"), float("nan")])
+def test_a_tolerance_that_no_scan_meets_is_refused(tolerance):
+    with pytest.raises(SettingsError, match=r"^tolerance: expected a number above 0"):
+        Settings.make(tolerance=tolerance)
+
+
+def test_rows_of_a_frame_are_those_of_all_variants_and_cutoffs():
+    assert Settings.make().rows_per_frame == 4
+    assert Settings.make(variants="c", cutoffs="0:3rmin:0.1rmin").rows_per_frame == 31
+    assert not Settings.make().lists_gaps
+    assert Settings.make(moment=2).lists_gaps
+
+
+@pytest.mark.parametrize("rule", ["fibonacci:1", "fibonacci:2", "equal-angle-full:90"])
+def test_directions_in_one_plane_are_refused(rule):
+    with pytest.raises(SettingsError, match=f"directions: the . axes of {rule} lie in one plane"):
+        Settings.make(directions=rule)
+    with pytest.raises(SettingsError, match="lie in one plane"):
+        Settings.make(directions=direction_rule(rule))
+
+
+def test_three_directions_across_one_another_will_do():
+    assert len(Settings.make(directions=1).directions) == 3

@@ -17,6 +17,7 @@ COMMANDS = {
     "compute": "the fabric table: one row per frame and variant",
     "compare": "variants side by side, normalised curves, correlation with contact fabric",
     "inspect": "what the reader sees, nothing computed",
+    "calibrate": "how many lines are enough: ladders of settings, and those it recommends",
     "report": "one file to hand on: settings, tables, figures, a view that can be turned",
     "view": "a frame in 3D",
     "formats": "every reader and writer, its extensions, and the package it comes from",

@@ -19,12 +19,12 @@ __all__ = [
     "check_plot",
     "fill_from_file",
     "frame_options",
-    "grain_options",
     "open_series",
     "output_option",
     "plot_option",
     "reading_arguments",
     "reading_options",
+    "sample_options",
 ]
 
 Command = Callable[..., Any]
@@ -56,14 +56,12 @@ def reading_options(command: Command) -> Command:
 
 def frame_options(command: Command) -> Command:
     """Add the options that tell boundary, rattlers and the frames to take."""
-    for option in reversed(_FRAMES):
-        command = option(command)
-    return command
+    return sample_options(_FRAMES(command))
 
 
-def grain_options(command: Command) -> Command:
-    """Add the same options without the choice of frames."""
-    for option in reversed(_FRAMES[:-1]):
+def sample_options(command: Command) -> Command:
+    """Add the options that tell boundary and rattlers."""
+    for option in reversed(_SAMPLE):
         command = option(command)
     return command
 
@@ -232,7 +230,7 @@ _READING: list[Callable[[Command], Command]] = [
         "or by geometry (default: file if there is one, else geometric).",
     ),
 ]
-_FRAMES: list[Callable[[Command], Command]] = [
+_SAMPLE: list[Callable[[Command], Command]] = [
     click.option(
         "--contact-tolerance",
         default=0.0,
@@ -253,10 +251,10 @@ _FRAMES: list[Callable[[Command], Command]] = [
         metavar="N",
         help="A grain with fewer contacts is a rattler.",
     ),
-    click.option(
-        "--frames", metavar="A:B:C", help="Which frames, as a Python slice (default: all)."
-    ),
 ]
+_FRAMES = click.option(
+    "--frames", metavar="A:B:C", help="Which frames, as a Python slice (default: all)."
+)
 _READING_NAMES = (
     "format", "columns", "contact_columns", "radius", "cell", "periodic", "contacts",
 )  # fmt: skip

@@ -10,10 +10,10 @@ import click
 from scanfab.cli.options import (
     SourceCommand,
     fill_from_file,
-    grain_options,
     open_series,
     reading_arguments,
     reading_options,
+    sample_options,
 )
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ __all__ = ["view"]
     type=click.Path(exists=True, allow_dash=True),
 )
 @reading_options
-@grain_options
+@sample_options
 @click.option(
     "--frame",
     default=0,

@@ -8,6 +8,7 @@ Efron and Stein (1981), doi:10.1214/aos/1176345462.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,14 @@ import numpy.typing as npt
 from scanfab.fabric.tensor import axial
 from scanfab.fabric.void import void_fabric
 
-__all__ = ["BLOCKS", "Jackknife", "contact_jackknife", "jackknife_error", "void_jackknife"]
+__all__ = [
+    "BLOCKS",
+    "Jackknife",
+    "contact_jackknife",
+    "jackknife_error",
+    "variance_without_noise",
+    "void_jackknife",
+]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -31,8 +39,8 @@ class Jackknife(NamedTuple):
 
     shift: FloatArray
     """By how much leaving out a block moves the anisotropy, shape (8,), dimensionless."""
-    error: float
-    """The standard error that follows, dimensionless."""
+    error: float | None
+    """The standard error that follows, dimensionless; None if the scan's noise hides it."""
 
 
 def jackknife_error(values: FloatArray) -> float:
@@ -112,17 +120,37 @@ def void_jackknife(
     -------
     Jackknife or None
         None if there is no void fabric without some block. What the scan's own noise adds to the
-        scatter between blocks is known from its replicates, and taken off the error.
+        scatter between blocks is known from its replicates, and taken off the error; where nothing
+        is left, the error is None: too few lines to see it, which is no proof that there is none.
     """
     fabrics = [void_fabric(axes, weights, *sums) for sums in (full, *without)]
     if any(fabric is None for fabric in fabrics):
         return None
     values = np.array([axial(fabric.replicates, axis) for fabric in fabrics if fabric is not None])
     means = values.mean(axis=1)
-    variance = float(_variance(means[1:]))
+    variance = variance_without_noise(values[1:])
+    return Jackknife(means[1:] - means[0], math.sqrt(variance) if variance > 0 else None)
+
+
+def variance_without_noise(values: FloatArray) -> float:
+    """
+    Jackknife variance of the mean over replicates, without what their own noise adds.
+
+    Parameters
+    ----------
+    values : ndarray, shape (B, R)
+        Without each of B blocks, in each of R replicates, which have the blocks in common.
+
+    Returns
+    -------
+    float
+        Unbiased, so negative at times where the noise is the larger part. With one replicate the
+        noise is not known and stays in.
+    """
     count = values.shape[1]
-    if count > 1:
-        # of one replicate: the sample's scatter, and R times the noise that the mean has
-        single = float(_variance(values[1:]).mean())
-        variance = max((count * variance - single) / (count - 1), 0.0)
-    return Jackknife(means[1:] - means[0], float(np.sqrt(variance)))
+    of_mean = float(_variance(values.mean(axis=1)))
+    if count == 1:
+        return of_mean
+    # of one replicate: the sample's scatter, and R times the noise that the mean has
+    of_single = float(_variance(values).mean())
+    return float((count * of_mean - of_single) / (count - 1))

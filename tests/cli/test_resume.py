@@ -108,11 +108,11 @@ def test_every_format_is_the_same_when_resumed(compute, stopped, tmp_path, suffi
 
 def test_finished_frames_are_not_computed_again(compute, stopped, short_series, monkeypatch):
     output, computed = stopped(), []
-    from scanfab import pipeline
+    from scanfab import measure
 
-    scan = pipeline.scan_to_tolerance
+    scan = measure.scan_to_tolerance
     monkeypatch.setattr(
-        pipeline, "scan_to_tolerance", lambda *words: computed.append(1) or scan(*words)
+        measure, "scan_to_tolerance", lambda *words: computed.append(1) or scan(*words)
     )
     assert compute(output, "--resume") == 0
     assert len(computed) == 2

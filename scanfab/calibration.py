@@ -1,0 +1,295 @@
+"""How many lines are enough: ladders of spacing, directions, cut-off and RV for one frame."""
+
+from __future__ import annotations
+
+import math
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+from scanfab.directions import direction_rule
+from scanfab.errors import PackingError, ScanfabWarning, SettingsError
+from scanfab.ladders import (
+    PAPER_CUTOFF,
+    PAPER_SPACING,
+    StepRow,
+    first_steady,
+    judged,
+    largest,
+    sentence,
+    sentence_of_recommended,
+)
+from scanfab.measure import frame_result
+from scanfab.packing import Packing
+from scanfab.pipeline import boundary_hint, chosen_frames, classify, no_such_frames
+from scanfab.plan import Plan, make_plan
+from scanfab.series import Series
+from scanfab.settings import AUTO_RULE, Length, Settings
+from scanfab.table import Row
+from scanfab.variants import Sample
+
+__all__ = ["Calibration", "calibrate"]
+
+# in r_min, down to the spacing of the 2017 paper
+SPACINGS = (4.0, 2.0, 1.0, 0.5, 0.2, 0.1)
+# of the ladder of directions, in r_min: 16 replicates with lines r_min apart
+FIXED_SPACING = 0.25
+DEGREES = (5, 9, 11, 17, 23, 31, 41)
+CUTOFFS = tuple(0.25 * k for k in range(13))
+# fractions of half the smallest extent
+RV_FRACTIONS = (0.4, 0.5, 0.6, 0.67, 0.7, 0.8)
+# what a scan may add to the sample's own error: a quarter of it adds 3 %
+OF_SAMPLE = 0.25
+MOST_DIRECTIONS = 2905
+ROUNDS = 5
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What :func:`calibrate` finds."""
+
+    rows: tuple[StepRow, ...]
+    """All steps of all ladders, then the recommended settings."""
+    findings: tuple[str, ...]
+    """One sentence for each ladder, and one for the recommended settings."""
+    options: dict[str, str]
+    """The recommended settings by the names of their options."""
+
+
+def calibrate(
+    source: Packing | Series, settings: Settings | None = None, *, frame: int = -1
+) -> Calibration:
+    """
+    How the void fabric of one frame changes with the settings of the scan.
+
+    Parameters
+    ----------
+    source : Packing or Series
+        Lengths relative to radii and the RV come from the first frame of the series that has
+        grains, as for :func:`scanfab.compute`.
+    settings : Settings, optional
+        ``directions`` are those of the ladder of spacings, ``spacing`` that of the ladder of
+        directions; the cut-offs and RVs are scanned to the ``tolerance``. Variants c and d by
+        default.
+    frame : int, optional
+        Which frame, the last by default.
+
+    Returns
+    -------
+    Calibration
+        A row for each step and variant, what they show in words, and recommended settings: the
+        widest spacing and the fewest directions from which nothing changes any more, and then as
+        many directions as bring the scan's error below a quarter of the sample's own (or to the
+        tolerance, if that is larger).
+
+    Raises
+    ------
+    SettingsError
+        If there is no such frame, or no step has a void fabric.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab import Packing, Settings, calibrate
+    >>> grid = np.stack(np.meshgrid(*3 * [np.arange(6.0)]), axis=-1).reshape(-1, 3)
+    >>> found = calibrate(Packing(grid, 0.5), Settings.make(variants="c", tolerance=0.01, rv=0.6))
+    >>> sorted({row.ladder for row in found.rows})
+    ['cutoff', 'directions', 'recommended', 'rv', 'spacing']
+    """
+    settings = settings or Settings.make(variants="cd")
+    if settings.lists_gaps:
+        raise SettingsError("calibrate: cutoffs and moment have no meaning for its ladders")
+    return _Calibrator(source, settings, frame).all()
+
+
+class _Calibrator:
+    """One frame, and the plan-making first frame of its series."""
+
+    def __init__(self, source: Packing | Series, settings: Settings, frame: int) -> None:
+        self.name = "" if isinstance(source, Packing) else source.name
+        self.settings = settings
+        self.first, self.number, self.sample = _samples(source, settings, frame)
+        radius = self.first.packing.radius[self.first.grains]
+        self.r_min = float(radius.min())
+        # its warnings concern every step
+        make_plan(settings, self.first)
+        hint = boundary_hint(self.first, settings)
+        if hint is not None:
+            warnings.warn(hint, ScanfabWarning, stacklevel=3)
+
+    def all(self) -> Calibration:
+        """The ladders, what they say, and what follows."""
+        cutoffs = list(self._cutoffs())
+        with_fabric = {row.variant for row in cutoffs if row.alpha_vs_axial is not None}
+        for variant in self.settings.variants:
+            if variant not in with_fabric:
+                raise SettingsError(
+                    f"frame {self.number}: no cut-off leaves a void fabric in variant {variant}: "
+                    f"the sample ({int(self.sample.grains.sum())} grains) is too small for it, or "
+                    f"there is no void"
+                )
+        ladders = {
+            "spacing": judged(self._spacings(), with_sample=False),
+            "directions": judged(self._directions(), with_sample=False),
+            "cutoff": cutoffs,
+            "rv": judged(self._rvs(), with_sample=True) if self.settings.needs_window else [],
+        }
+        sample = largest(cutoffs, "alpha_vs_axial_sample_se", self._default_cutoff())
+        target = max(self.settings.tolerance, OF_SAMPLE * (sample or 0.0))
+        best, options = self._recommended(ladders["spacing"], ladders["directions"], target)
+        findings = [sentence(ladder, rows) for ladder, rows in ladders.items() if rows]
+        findings.append(sentence_of_recommended(best, target, sample))
+        rows = [row for ladder in ladders.values() for row in ladder]
+        return Calibration((*rows, *best), tuple(findings), options)
+
+    def _default_cutoff(self) -> float:
+        cutoff = self.settings.cutoff
+        return cutoff.value if cutoff.unit == "rmin" else PAPER_CUTOFF
+
+    def _spacings(self) -> Iterator[StepRow]:
+        rule = self.settings.directions or direction_rule(AUTO_RULE)
+        for value in SPACINGS:
+            step = replace(self.settings, spacing=Length(value, "rmin"), directions=rule)
+            yield from self._step("spacing", value, step)
+
+    def _directions(self) -> Iterator[StepRow]:
+        spacing = self.settings.spacing or Length(FIXED_SPACING, "rmin")
+        for degree in DEGREES:
+            rule = direction_rule(f"lebedev:{degree}")
+            step = replace(self.settings, spacing=spacing, directions=rule)
+            yield from self._step("directions", len(rule), step)
+
+    def _cutoffs(self) -> Iterator[StepRow]:
+        cutoffs = tuple(Length(value, "rmin") for value in CUTOFFS)
+        yield from self._step("cutoff", None, replace(self.settings, cutoffs=cutoffs))
+
+    def _rvs(self) -> Iterator[StepRow]:
+        variants = "".join(variant for variant in self.settings.variants if variant in "cd")
+        for value in RV_FRACTIONS:
+            step = replace(self.settings, rv=value, rv_radius=None, variants=variants)
+            yield from self._step("rv", value, step)
+
+    def _step(self, ladder: str, value: float | None, settings: Settings) -> Iterator[StepRow]:
+        """The rows of one step; none if its settings do not fit the sample."""
+        begun = time.perf_counter()
+        try:
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                plan = make_plan(settings, self.first)
+                self._check_budget(ladder, plan)
+                words = (self.name, self.number, self.sample, plan, settings, None)
+                rows = frame_result(*words).rows
+        except SettingsError as error:
+            if ladder in ("cutoff", "recommended"):
+                raise
+            warnings.warn(f"{ladder} {value:g} left out: {error}", ScanfabWarning, stacklevel=2)
+            return
+        seconds = time.perf_counter() - begun
+        for row in rows:
+            yield self._row(row, ladder, value, plan, seconds, _notes(caught, row))
+
+    def _check_budget(self, ladder: str, plan: Plan) -> None:
+        """Refuse a step of fixed lines that would cut more chords than allowed."""
+        area = math.pi * float((self.sample.packing.radius[self.sample.grains] ** 2).sum())
+        chords = area / plan.spacing**2 * plan.replicates * len(plan.rule)
+        if ladder in ("spacing", "directions") and chords > self.settings.max_chords:
+            raise SettingsError(
+                f"it would cut {chords:.2g} chords from the grains, more than --max-chords "
+                f"{self.settings.max_chords:g}"
+            )
+
+    def _row(
+        self,
+        row: Row,
+        ladder: str,
+        value: float | None,
+        plan: Plan,
+        seconds: float,
+        note: str,
+    ) -> StepRow:
+        if value is None:
+            assert row.cutoff is not None
+            value = round(row.cutoff / self.r_min, 9)
+        return StepRow(
+            source=self.name,
+            frame=self.number,
+            ladder=ladder,
+            value=value,
+            variant=row.variant,
+            rule=plan.rule.name,
+            degree=plan.rule.degree,
+            rule_bias=plan.rule.bias,
+            directions=row.directions,
+            replicates=row.replicates,
+            spacing=row.spacing,
+            cutoff=row.cutoff,
+            rv_radius=plan.window.radius if plan.window and row.variant in "cd" else None,
+            segments=row.segments,
+            seconds=seconds,
+            mean_length=row.mean_length,
+            alpha_vs_axial=row.alpha_vs_axial,
+            alpha_vs_axial_se=row.alpha_vs_axial_se,
+            alpha_vs_axial_sample_se=row.alpha_vs_axial_sample_se,
+            steady=None,
+            note=note,
+        )
+
+    def _recommended(
+        self, spacings: list[StepRow], directions: list[StepRow], target: float
+    ) -> tuple[list[StepRow], dict[str, str]]:
+        """Steady spacing and directions, and more of the latter until the error is met."""
+        spacing = min(first_steady(spacings) or PAPER_SPACING, FIXED_SPACING)
+        rule = direction_rule(str(int(first_steady(directions) or len(direction_rule(AUTO_RULE)))))
+        rows: list[StepRow] = []
+        for _ in range(ROUNDS):
+            settings = replace(self.settings, spacing=Length(spacing, "rmin"), directions=rule)
+            rows = list(self._step("recommended", len(rule), settings))
+            error = largest(rows, "alpha_vs_axial_se")
+            if error is None or error <= target:
+                break
+            wanted = len(rule) * 1.1 * (error / target) ** 2
+            if wanted > MOST_DIRECTIONS:
+                spacing = float(f"{spacing * math.sqrt(MOST_DIRECTIONS / wanted):.2g}")
+            rule = direction_rule(str(min(math.ceil(wanted), MOST_DIRECTIONS)))
+        return rows, {"spacing": f"{spacing:g}rmin", "directions": rule.name}
+
+
+def _samples(
+    source: Packing | Series, settings: Settings, frame: int
+) -> tuple[Sample, int, Sample]:
+    """The first frame that has grains, and the wanted one with its number."""
+    if isinstance(source, Packing):
+        reads: list[Callable[[], Packing]] = [lambda: source]
+    elif isinstance(source, Series):
+        reads = [one.read for one in source]
+    else:
+        raise SettingsError(f"calibrate: expected a Packing or a Series, found {source!r}")
+    wanted = slice(frame, frame + 1 if frame != -1 else None)
+    chosen = list(chosen_frames(source, wanted)) if isinstance(source, Series) else [0, -1]
+    number = chosen[0] if chosen else len(reads)
+    if number >= len(reads) or (isinstance(source, Packing) and frame not in (0, -1)):
+        raise no_such_frames(wanted)
+    first: Sample | None = None
+    for place, read in enumerate(reads):
+        sample = classify(read(), settings)
+        if first is None and sample.grains.any():
+            first = sample
+        if place >= number and first is not None:
+            break
+    if first is None:
+        raise PackingError("no frame has any grains: there is nothing to calibrate")
+    sample = sample if place == number else classify(reads[number](), settings)
+    if not sample.grains.any():
+        raise PackingError(f"frame {number} has no grains: choose another frame")
+    return first, number, sample
+
+
+def _notes(caught: list[warnings.WarningMessage], row: Row) -> str:
+    """The scan's own warnings about one row."""
+    about = f"variant {row.variant}: "
+    texts = [str(one.message) for one in caught if issubclass(one.category, ScanfabWarning)]
+    own = [text.split(about, 1)[1] for text in texts if about in text]
+    return "; ".join(
+        dict.fromkeys(own + [text for text in texts if "before the tolerance" in text])
+    )

@@ -1,0 +1,229 @@
+"""scanfab calibrate: how many lines are enough."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.core import ParameterSource
+
+from scanfab.cli.options import (
+    SourceCommand,
+    fill_from_file,
+    open_series,
+    output_option,
+    reading_arguments,
+    reading_options,
+    sample_options,
+)
+
+if TYPE_CHECKING:
+    from scanfab.calibration import Calibration
+    from scanfab.ladders import StepRow
+
+__all__ = ["calibrate"]
+
+# what compute has no use for, or what is recommended instead
+OWN = (
+    "source", "frame", "output", "plot", "variants", "spacing", "directions", "tolerance",
+    "max_chords",
+)  # fmt: skip
+TITLES = {
+    "spacing": "spacing / r_min",
+    "directions": "directions",
+    "cutoff": "cut-off / r_min",
+    "rv": "RV / half extent",
+    "recommended": "recommended",
+}
+
+
+@click.command(cls=SourceCommand)
+@click.argument("source", metavar="SOURCE", type=click.Path(exists=True, allow_dash=True))
+@reading_options
+@sample_options
+@click.option(
+    "--frame", default=-1, metavar="K", help="Which frame, as in the fabric table (default: last)."
+)
+@click.option("--variants", default="cd", show_default=True, help="Which variants to compute.")
+@click.option(
+    "--rv",
+    default=0.7,
+    show_default=True,
+    metavar="FRACTION",
+    help="Radius of the sphere RV, but for the ladder of RVs.",
+)
+@click.option("--rv-radius", type=float, metavar="L", help="The same in the dump's units.")
+@click.option(
+    "--rv-center", nargs=3, type=float, metavar="X Y Z", help="Centre of the RV (default: middle)."
+)
+@click.option(
+    "--cutoff",
+    default="1rmin",
+    show_default=True,
+    metavar="L",
+    help="Shortest void segment kept, but for the ladder of cut-offs.",
+)
+@click.option(
+    "--spacing",
+    default="auto",
+    metavar="L",
+    help="Of the ladder of directions (default: 0.25rmin).",
+)
+@click.option(
+    "--directions",
+    default="auto",
+    metavar="N|RULE",
+    help="Of the ladder of spacings (default: icosahedral:9).",
+)
+@click.option(
+    "--tolerance",
+    default=1e-4,
+    show_default=True,
+    metavar="X",
+    help="Standard error of the scan for the ladders of cut-offs and RVs, and the least to ask of "
+    "the recommended settings.",
+)
+@click.option(
+    "--max-chords",
+    default=1e10,
+    show_default=True,
+    metavar="N",
+    help="Steps that would cut more chords from grains than this are left out.",
+)
+@click.option("--axis", default="z", show_default=True, metavar="x|y|z|X,Y,Z", help="Loading axis.")
+@click.option("--seed", default=0, show_default=True, metavar="N", help="Of the random numbers.")
+@click.option("--workers", type=int, metavar="N", help="Parallel workers (default: all cores).")
+@output_option
+@click.option(
+    "--plot",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="The ladders as a figure: .png .svg .pdf.",
+)
+@click.pass_context
+def calibrate(
+    ctx: click.Context,
+    /,
+    source: str,
+    output: Path | None,
+    plot: Path | None,
+    frame: int,
+    **options: Any,
+) -> int:
+    """
+    Show how the void fabric of one frame changes with spacing, directions, cut-off and RV.
+
+    Each step with its error from the scan, the sample's own, and the time; then from where on
+    nothing changes any more, and the settings that follow, as a command line. The spacings go down
+    to r_min/10, which the 2017 paper takes.
+
+    On a terminal a readable table; else the steps as CSV, and what they show on standard error.
+    """
+    from scanfab.calibration import calibrate as calibrate_series
+    from scanfab.cli.console import reported_warnings
+    from scanfab.errors import SettingsError
+    from scanfab.ladders import StepRow
+    from scanfab.settings import Settings
+    from scanfab.writers.plot_calibration import check_figure, plot_calibration
+    from scanfab.writers.results import ResultFile
+
+    options = fill_from_file(ctx, (source,), options)
+    reading = reading_arguments(options)
+    with reported_warnings():
+        try:
+            settings = Settings.make(**options)
+            result = None if output is None else ResultFile(output, StepRow)
+            if plot is not None:
+                check_figure(plot)
+        except SettingsError as error:
+            raise click.UsageError(str(error)) from None
+        (series,) = open_series((source,), reading)
+        found = calibrate_series(series, settings, frame=frame)
+        command = _command_line(ctx, source, found.options)
+        if result is not None:
+            with result.writer({}) as writer:
+                for row in found.rows:
+                    writer.write(row)
+        if plot is not None:
+            plot_calibration(found.rows, plot)
+        _show(found, command, as_rows=result is None and not sys.stdout.isatty())
+    return 0
+
+
+def _command_line(ctx: click.Context, source: str, recommended: dict[str, str]) -> str:
+    """The recommended compute, with what the user said of source and sample."""
+    words = ["scanfab", "compute", source]
+    for parameter in ctx.command.params:
+        name = str(parameter.name)
+        given = ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE
+        if name in OWN or not given:
+            continue
+        value = ctx.params[name]
+        for one in value if parameter.multiple else [value]:
+            spelt = one.split() if name == "cell" else one if isinstance(one, tuple) else [one]
+            words += [parameter.opts[0], *map(str, spelt)]
+    words += ["--variants", ctx.params["variants"]]
+    for name, value in recommended.items():
+        words += [f"--{name}", value]
+    return shlex.join(words)
+
+
+def _show(found: Calibration, command: str, as_rows: bool) -> None:
+    """What was found: on a terminal all of it, else rows on one stream and words on the other."""
+    if as_rows:
+        from scanfab.writers.rows import CsvWriter
+
+        writer = CsvWriter(sys.stdout)
+        for row in found.rows:
+            writer.write(row)
+    elif sys.stdout.isatty():
+        _print(found.rows)
+    for sentence in found.findings:
+        click.echo(sentence, err=as_rows)
+    click.echo(command, err=as_rows)
+
+
+def _print(rows: tuple[StepRow, ...]) -> None:
+    """One table for each ladder."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console()
+    for ladder, steps in groupby(rows, key=lambda row: row.ladder):
+        table = Table(box=None, header_style="bold", pad_edge=False)
+        titles = ("variant", "rule", "bias", "segments", "time", "α_vs axial", "± scan", "± sample")
+        for title in (TITLES[ladder], *titles, "steady"):
+            table.add_column(title, justify="right", no_wrap=True)
+        for row in steps:
+            table.add_row(*_cells(row))
+        console.print(table)
+        console.print()
+
+
+def _cells(row: StepRow) -> list[str]:
+    steady = {None: "", 0: "no", 1: "yes"}[row.steady]
+    return [
+        f"{row.value:g}",
+        row.variant,
+        row.rule,
+        f"{row.rule_bias:.2g}" if row.rule_bias > 1e-12 else "0",
+        _spell(row.segments),
+        f"{row.seconds:.2g} s",
+        *(
+            _spell(value)
+            for value in (
+                row.alpha_vs_axial,
+                row.alpha_vs_axial_se,
+                row.alpha_vs_axial_sample_se,
+            )
+        ),
+        steady + (" (!)" if row.note else ""),
+    ]
+
+
+def _spell(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,202 @@
+"""Ladders of a calibration: their rows, from where on they are steady, and what they say."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby
+
+__all__ = [
+    "PAPER_CUTOFF",
+    "PAPER_SPACING",
+    "STEP_MEANINGS",
+    "StepRow",
+    "first_steady",
+    "judged",
+    "largest",
+    "sentence",
+    "sentence_of_recommended",
+]
+
+# of the 2017 paper, in r_min; its RV as fractions of the sample's radius
+PAPER_SPACING = 0.1
+PAPER_CUTOFF = 1.0
+PAPER_RV = "0.67 to 0.7"
+# two values agree if they differ by no more than this many of their common standard errors
+AGREEING = 2.0
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class StepRow:
+    """One step of a ladder for one variant; lengths in the dump's unit."""
+
+    source: str
+    frame: int
+    ladder: str
+    value: float
+    variant: str
+    rule: str
+    degree: int | None
+    rule_bias: float
+    directions: int | None
+    replicates: int | None
+    spacing: float | None
+    cutoff: float | None
+    rv_radius: float | None
+    segments: int | None
+    seconds: float
+    mean_length: float | None
+    alpha_vs_axial: float | None
+    alpha_vs_axial_se: float | None
+    alpha_vs_axial_sample_se: float | None
+    steady: int | None
+    note: str
+
+
+STEP_MEANINGS: dict[str, str] = {
+    "source": "the series as given",
+    "frame": "index in the series, from 0",
+    "ladder": "what is changed: spacing, directions, cutoff, rv; or recommended",
+    "value": "spacing or cut-off in r_min, number of directions, RV radius as a fraction of half "
+    "the smallest extent",
+    "variant": "as in the fabric table",
+    "rule": "the direction rule",
+    "degree": "polynomials to this degree it integrates exactly; empty for none",
+    "rule_bias": "alpha_vs that the rule gives an isotropic sample",
+    "directions": "axes of the rule, in each replicate",
+    "replicates": "number of replicates",
+    "spacing": "distance between neighbouring lines of one direction, all replicates together",
+    "cutoff": "shortest void segment kept",
+    "rv_radius": "radius of the RV; empty for the whole sample",
+    "segments": "void segments kept",
+    "seconds": "time of the step, all variants (and all cut-offs) together",
+    "mean_length": "mean length of the kept segments",
+    "alpha_vs_axial": "signed anisotropy of the void fabric along the loading axis",
+    "alpha_vs_axial_se": "its standard error from the scan",
+    "alpha_vs_axial_sample_se": "the sample's own scatter, by a jackknife over eight octants",
+    "steady": "1 if this step and all later ones of the ladder agree within twice their common "
+    "standard errors (of the scan; for rv also of the sample), else 0; empty for a cut-off, on "
+    "which alpha_vs depends by definition",
+    "note": "what makes the step doubtful",
+}
+"""What each column of a calibration holds; lengths are in the dump's unit."""
+
+
+def judged(rows: Iterator[StepRow], *, with_sample: bool) -> list[StepRow]:
+    """The rows of a ladder with ``steady`` filled in, variant by variant."""
+    found: list[StepRow] = []
+    for row in reversed(list(rows)):
+        later = [one for one in found if one.variant == row.variant]
+        steady = _is_sound(row) and all(
+            one.steady and _agree(row, one, with_sample) for one in later
+        )
+        found.append(replace(row, steady=int(steady)))
+    return found[::-1]
+
+
+def _is_sound(row: StepRow) -> bool:
+    return row.alpha_vs_axial is not None and row.alpha_vs_axial_se is not None and not row.note
+
+
+def _agree(one: StepRow, other: StepRow, with_sample: bool) -> bool:
+    """Whether two values differ by no more than twice their common standard error."""
+    if one.alpha_vs_axial is None or other.alpha_vs_axial is None:
+        return False
+    errors = [row.alpha_vs_axial_se or 0.0 for row in (one, other)]
+    if with_sample:
+        errors += [row.alpha_vs_axial_sample_se or 0.0 for row in (one, other)]
+    return abs(one.alpha_vs_axial - other.alpha_vs_axial) <= AGREEING * math.hypot(*errors)
+
+
+def first_steady(rows: Sequence[StepRow]) -> float | None:
+    """The first value of a ladder at which all variants are steady; None if there is none."""
+    steps = (list(step) for _, step in groupby(rows, key=lambda row: row.value))
+    return next((step[0].value for step in steps if all(row.steady for row in step)), None)
+
+
+def largest(rows: Sequence[StepRow], name: str, value: float | None = None) -> float | None:
+    """The largest of the variants, of the step with this value or of all."""
+    chosen = [row for row in rows if value is None or row.value == value] or rows
+    found: list[float | None] = [getattr(row, name) for row in chosen]
+    return max((one for one in found if one is not None), default=None)
+
+
+def _of_spacing(rows: Sequence[StepRow]) -> str:
+    steady, finest = first_steady(rows), [row for row in rows if row.value == PAPER_SPACING]
+    said = "spacing: " + (
+        "no step agrees with all finer ones"
+        if steady is None
+        else f"from {steady:g} r_min on nothing changes within the errors"
+    )
+    if not finest:
+        return f"{said}; the paper's r_min/10 would take too many lines here"
+    widest = [row for row in rows if row.value == steady] or finest
+    return (
+        f"{said}; the paper's r_min/10 has an error of {_spell(finest, 'alpha_vs_axial_se')} with "
+        f"{finest[0].directions} directions and takes {finest[0].seconds:.2g} s, "
+        f"{widest[0].value:g} r_min {_spell(widest, 'alpha_vs_axial_se')} "
+        f"and {widest[0].seconds:.2g} s"
+    )
+
+
+def _of_directions(rows: Sequence[StepRow]) -> str:
+    steady = first_steady(rows)
+    if steady is None:
+        return "directions: no step agrees with all later ones"
+    return f"directions: from {steady:g} on nothing changes within the errors"
+
+
+def _of_cutoff(rows: Sequence[StepRow]) -> str:
+    variant = rows[0].variant
+    known = {
+        row.value: row.alpha_vs_axial
+        for row in rows
+        if row.variant == variant and row.alpha_vs_axial is not None
+    }
+    best = max(known, key=lambda value: abs(known[value]))
+    said = (
+        f"cut-off: it decides what is measured; in {variant} the anisotropy is largest "
+        f"({known[best]:.2g}) at {best:g} r_min"
+    )
+    paper = known.get(PAPER_CUTOFF)
+    if paper is None or known[best] == 0:
+        return said
+    return f"{said}; at the paper's 1 r_min it is {paper / known[best]:.0%} of that"
+
+
+def _of_rv(rows: Sequence[StepRow]) -> str:
+    steady = first_steady(rows)
+    if steady is None:
+        return f"RV: it matters which is taken, also at the paper's {PAPER_RV}"
+    return (
+        f"RV: from {steady:g} on it does not matter within the sample's error "
+        f"(the paper: {PAPER_RV})"
+    )
+
+
+SENTENCES = {
+    "spacing": _of_spacing,
+    "directions": _of_directions,
+    "cutoff": _of_cutoff,
+    "rv": _of_rv,
+}
+
+
+def sentence(ladder: str, rows: Sequence[StepRow]) -> str:
+    """What a ladder shows, in one sentence."""
+    return SENTENCES[ladder](rows)
+
+
+def sentence_of_recommended(rows: Sequence[StepRow], target: float, sample: float | None) -> str:
+    """What the recommended settings reach."""
+    own = "unknown" if sample is None else f"{sample:.2g}"
+    return (
+        f"recommended: scan's error {_spell(rows, 'alpha_vs_axial_se')} (wanted {target:.2g}; the "
+        f"sample's own is {own}) in {rows[0].seconds:.2g} s"
+    )
+
+
+def _spell(rows: Sequence[StepRow], name: str) -> str:
+    value = largest(rows, name)
+    return "unknown" if value is None else f"{value:.2g}"

@@ -1,0 +1,87 @@
+"""scanfab calibrate: rows or a table, words, and a command line that runs."""
+
+from __future__ import annotations
+
+import csv
+import io
+import shlex
+
+import pytest
+
+from scanfab.cli.main import run
+from scanfab.ladders import STEP_MEANINGS
+from tests.dumps import cubic_rows, dump_text, write
+from tests.truth import TRIAXIAL
+
+QUICK = ("--boundary", "mask=3", "--tolerance", "2e-3", "--max-chords", "3e7", "--workers", "1")
+
+
+@pytest.fixture
+def calibrate(capsys):
+    def ask(*words, code=0):
+        assert run(["calibrate", *map(str, words)]) == code
+        out, err = capsys.readouterr()
+        assert "Traceback" not in err
+        return out, err
+
+    return ask
+
+
+def test_rows_on_one_stream_and_words_on_the_other(calibrate, capsys, tmp_path):
+    figure = tmp_path / "ladders.png"
+    out, err = calibrate(TRIAXIAL, *QUICK, "--plot", figure)
+    rows = list(csv.DictReader(io.StringIO(out)))
+    assert list(rows[0]) == list(STEP_MEANINGS)
+    assert {row["frame"] for row in rows} == {"6"}
+    assert figure.stat().st_size > 10_000
+    assert "cut-off: it decides what is measured" in err
+    command = shlex.split(err.strip().splitlines()[-1])
+    assert command[:3] == ["scanfab", "compute", str(TRIAXIAL)]
+    assert command[3:7] == ["--boundary", "mask=3", "--workers", "1"]
+    assert run([*command[1:], "--frames", "6"]) == 0
+    printed = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
+    best = [row for row in rows if row["ladder"] == "recommended"]
+    for name in ("variant", "alpha_vs_axial", "alpha_vs_axial_se", "segments"):
+        assert [row[name] for row in printed] == [row[name] for row in best]
+
+
+def test_with_a_file_the_words_are_the_output(calibrate, tmp_path):
+    table = tmp_path / "steps.csv"
+    out, _ = calibrate(TRIAXIAL, *QUICK, "--frame", "3", "--variants", "c", "-o", table)
+    rows = list(csv.DictReader(table.open(encoding="utf-8")))
+    assert {(row["frame"], row["variant"]) for row in rows} == {("3", "c")}
+    assert len(out.splitlines()) == 6
+    assert "--variants c --spacing" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "message", "code"),
+    [
+        (("--frame", "7"), "the series has no frame in 7:8", 1),
+        (("--frame", "-9"), "the series has no frame in -9:-8", 1),
+        (("--tolerance", "0"), "tolerance: expected a number above 0", 2),
+        (("--plot", "ladders.doc"), "figures can be written as .png", 2),
+        (("--plot", "nowhere/ladders.png"), "there is no folder", 2),
+        (("-o", "steps.doc"), "results can be written as .csv", 2),
+        (("--directions", "fibonacci:1"), "lie in one plane", 2),
+        (("--rv", "3"), "beyond the sample", 1),
+    ],
+)
+def test_bad_input_is_one_message(calibrate, words, message, code):
+    out, err = calibrate(TRIAXIAL, "--boundary", "mask=3", *words, code=code)
+    assert out == ""
+    assert message in err
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        (cubic_rows()[:1], "in variant c: the sample (1 grains) is too small for it"),
+        ([], "no frame has any grains: there is nothing to calibrate"),
+    ],
+)
+def test_a_dump_of_one_grain_or_none_is_one_message(calibrate, tmp_path, rows, message):
+    write(tmp_path / "dump_0.txt", dump_text(rows, box=((0, 4),) * 3))
+    out, err = calibrate(tmp_path, code=1)
+    assert out == ""
+    assert message in err

@@ -1,0 +1,126 @@
+"""scanfab compute --cutoffs and --moment: rows for each cut-off from one pass, also resumed."""
+
+from __future__ import annotations
+
+import csv
+import io
+
+import numpy as np
+import pytest
+
+from scanfab import Packing, compute, direction_rule, find_contacts
+from scanfab.cli.main import run
+from scanfab.scan import line_frames, turned_frames
+from scanfab.table import COLUMNS
+from scanfab.writers.rows import CsvWriter
+from tests import naive
+from tests.lattices import shaken_cubic
+from tests.truth import TRIAXIAL
+
+FILES = sorted(str(path) for path in TRIAXIAL.glob("*0000000[012].vtk.gz"))
+LINES = ("--directions", "lebedev:5", "--spacing", "0.7rmin", "--boundary", "mask=3")
+OF_THE_SCAN = [name for name in COLUMNS if name != "cutoff"]
+
+
+@pytest.fixture
+def command(capsys):
+    def ask(*words, code=0):
+        assert run(["compute", *FILES, *LINES, "--seed", "3", *map(str, words)]) == code
+        return list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
+
+    return ask
+
+
+def test_row_at_a_cutoff_is_that_of_a_plain_run_with_the_same_lines(command):
+    rows = command("--cutoffs", "0:3rmin:0.1rmin", "--frames", "1")
+    assert [row["variant"] for row in rows] == sorted("abcd" * 31)
+    cutoffs = sorted({float(row["cutoff"]) for row in rows})
+    assert len(cutoffs) == 31
+    for place, plain in ((10, "1rmin"), (0, "0"), (25, "2.5rmin")):
+        found = rows[place::31]
+        expected = command("--cutoff", plain, "--frames", "1")
+        for one, other in zip(found, expected, strict=True):
+            assert float(one["cutoff"]) == pytest.approx(float(other["cutoff"]))
+            for name in OF_THE_SCAN:
+                if name.startswith("alpha_vs_axial_") and name != "alpha_vs_axial_se":
+                    continue  # of the smaller scan, whose lines depend on the kept segments
+                assert_same(one[name], other[name], name)
+
+
+def assert_same(one, other, name):
+    try:
+        assert float(one) == pytest.approx(float(other), rel=1e-9, abs=1e-12), name
+    except ValueError:
+        assert one == other, name
+
+
+def test_more_is_kept_at_shorter_cutoffs(command):
+    rows = command("--cutoffs", "2rmin,0,1rmin", "--frames", "1", "--variants", "c")
+    assert [float(row["cutoff"]) for row in rows] == sorted(float(row["cutoff"]) for row in rows)
+    segments = [int(row["segments"]) for row in rows]
+    assert segments[0] > segments[1] > segments[2] > 0
+
+
+@pytest.mark.parametrize("cutoffs", ["0:1rmin:0.5rmin", "1rmin,0.0005,1rmin"])
+def test_a_resumed_run_finds_the_rows_of_all_cutoffs(command, cutoffs, tmp_path, monkeypatch):
+    """Equal cut-offs too: every frame has as many rows as were asked for."""
+    words = ("--cutoffs", cutoffs, "--variants", "cd")
+    whole, output = tmp_path / "whole.csv", tmp_path / "table.csv"
+    command(*words, "-o", whole)
+    assert len(whole.read_text().splitlines()) == 1 + 3 * 2 * 3
+    written, write = [], CsvWriter.write
+
+    def interrupted(self, row):
+        written.append(row)
+        if len(written) == 10:
+            raise KeyboardInterrupt
+        write(self, row)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(CsvWriter, "write", interrupted)
+        command(*words, "-o", output, code=130)
+    command(*words, "-o", output, "--resume")
+    assert output.read_bytes() == whole.read_bytes()
+
+
+def test_second_moment_is_that_of_the_slow_twin():
+    """ℓ² = Σ l² / Σ l over all lines of a direction, and the tensor of those."""
+    packing = find_contacts(Packing(*shaken_cubic(np.random.default_rng(0), 5)))
+    rule, spacing, cutoff = direction_rule("lebedev:5"), 0.6, 0.3
+    options = {"rv_radius": 1.5, "rv_center": (2.5, 2.5, 2.5), "variants": "c"}
+    row = compute(packing, directions=rule, spacing=spacing, cutoff=cutoff, moment=2, **options)[0]
+    assert row.replicates == 1
+    frames, offsets = turned_frames(rule, line_frames(rule.axes), 0, 0)
+    over, under = np.zeros(len(rule)), np.zeros(len(rule))
+    for axis in range(len(rule)):
+        _, window = naive.void_segments(
+            packing.position - 2.5, packing.radius, frames[axis], offsets[axis], spacing, 1.5
+        )
+        lengths = np.array([one.length for one in window if one.length >= cutoff])
+        over[axis], under[axis] = np.sum(lengths**2), np.sum(lengths)
+    tensor = naive.void_tensor(frames[:, 2], rule.weights, over / under)
+    assert row.gvs_xy == pytest.approx(tensor[0, 1], abs=1e-12)
+    assert row.alpha_vs_axial == pytest.approx(naive.axial(tensor, (0, 0, 1)), abs=1e-12)
+    assert row.mean_length == pytest.approx((rule.weights @ over) / (rule.weights @ under))
+
+
+def test_second_moment_is_longer_than_the_first(command):
+    first, second = (
+        command("--moment", moment, "--variants", "c", "--frames", "0")[0] for moment in (1, 2)
+    )
+    assert float(second["mean_length"]) > float(first["mean_length"])
+    assert second["segments"] == first["segments"]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--cutoffs", "0:1rmin"), "cutoffs: expected FROM:TO:STEP"),
+        (("--cutoffs", "0:1rmin:0"), "cutoffs: expected FROM:TO:STEP"),
+        (("--cutoffs", "-1"), "cutoffs: expected lengths of 0 or more"),
+        (("--moment", "3"), "moment: expected 1 or 2"),
+    ],
+)
+def test_what_means_nothing_is_wrong_usage(words, message, capsys):
+    assert run(["compute", *FILES, *words]) == 2
+    assert message in capsys.readouterr().err

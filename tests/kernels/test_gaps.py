@@ -1,0 +1,109 @@
+"""The scan that lists its gaps equals its slow twin: by octant, by cut-off, with squares."""
+
+import numpy as np
+import pytest
+
+from scanfab.gaps import Blocks
+from scanfab.kernels import gaps
+from scanfab.scan import line_frames
+from tests import naive
+from tests.kernels.test_axes import KINDS, overlapping
+from tests.lattices import rotation
+from tests.uncompiled import run_uncompiled
+
+RUNS_OF_A_KIND = 60
+REACH = 30.0
+
+
+def fast_sums(spheres, removed, frame, offset, spacing, window, cutoffs, centers, wanted=(1,) * 4):
+    """What the kernel tallies: shape (set of solids, whole or window, octant, bin, sum)."""
+    position, radius = spheres
+    sums = np.zeros((1, 2, 2, gaps.BLOCKS, len(cutoffs), 3))
+    gaps.tally_gaps(
+        np.ascontiguousarray(position, dtype=float),
+        np.asarray(radius, dtype=float),
+        removed,
+        np.ascontiguousarray(frame[None]),
+        offset[None],
+        spacing,
+        window,
+        np.array([Blocks.about(center, REACH).affine() for center in centers]),
+        np.array(cutoffs),
+        np.array(wanted, bool),
+        sums,
+    )
+    return sums[0]
+
+
+def slow_sums(spheres, removed, frame, offset, spacing, window, cutoffs, centers):
+    """The same from the list of all segments, each in the bin of the largest cut-off it reaches."""
+    position, radius = spheres
+    sums = np.zeros((2, 2, 8, len(cutoffs), 3))
+    for which, solid in enumerate([np.ones(len(radius), bool), ~removed]):
+        grid = position[solid], radius[solid], frame, offset, spacing, window
+        for kind, segments in enumerate(naive.void_segments(*grid)):
+            reached = [naive.gap_sums(segments, cutoff, centers[kind]) for cutoff in cutoffs]
+            for k, least in enumerate(reached):
+                sums[which, kind, :, k] = least - (reached[k + 1] if k + 1 < len(reached) else 0)
+    return sums
+
+
+def check_random_packing(kind, random):
+    """One packing of a kind, with random window, grid, cut-offs, octants and removed grains."""
+    position, radius = kind(random)
+    frame = line_frames(np.eye(3))[0] if random.random() < 0.2 else rotation(random)
+    line = (
+        (position + random.uniform(-0.5, 0.5, 3), radius),
+        random.random(len(radius)) < random.choice([0.0, 0.3, 1.0]),
+        frame,
+        random.random(2),
+        np.exp(random.uniform(np.log(0.4), np.log(2.5))),
+        random.choice([0.0, random.uniform(0.3, 3.0)], p=[0.1, 0.9]),
+        np.sort(random.uniform(0.003, 2.0, random.integers(1, 5))),
+        random.uniform(-1.0, 1.0, (2, 3)),
+    )
+    fast, slow = fast_sums(*line), slow_sums(*line)
+    assert np.array_equal(fast[..., 0], np.round(slow[..., 0]))
+    np.testing.assert_allclose(fast, slow, rtol=1e-9, atol=1e-9)
+    return slow[..., 0].sum(axis=3)
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
+def test_listed_gaps_equal_the_slow_twin(kind):
+    runs = [np.random.default_rng([seed, 7]) for seed in range(RUNS_OF_A_KIND)]
+    found = sum(check_random_packing(kind, random) for random in runs)
+    if kind.__name__ != "nothing":
+        # whole and window, with and without the removed grains; every octant
+        assert np.all(found.sum(axis=2) > 0)
+        assert np.all(found.sum(axis=(0, 1)) > 0)
+
+
+def test_only_wanted_variants_are_tallied():
+    random = np.random.default_rng(0)
+    spheres = overlapping(random)
+    removed = random.random(len(spheres.radius)) < 0.3
+    line = spheres, removed, rotation(random), random.random(2), 0.1, 2.0, [0.0]
+    centers = np.zeros((2, 3))
+    every = fast_sums(*line, centers)
+    assert np.all(every.sum(axis=(2, 3, 4)) > 0)
+    for variant in range(4):
+        wanted = np.arange(4) == variant
+        alone = fast_sums(*line, centers, wanted)
+        place = variant % 2, variant // 2
+        np.testing.assert_allclose(alone[place], every[place], rtol=1e-12)
+        alone[place] = 0.0
+        assert not alone.any()
+
+
+def test_listed_gaps_equal_the_slow_twin_uncompiled():
+    """As plain Python the kernel also finds an index out of range."""
+    run_uncompiled(
+        "import numpy as np\n"
+        "from scanfab.kernels import gaps\n"
+        "from tests.kernels import test_gaps as here\n"
+        "assert not hasattr(gaps.tally_gaps, 'py_func')\n"
+        "np.seterr(invalid='ignore')\n"
+        "for kind in here.KINDS:\n"
+        "    for seed in range(3):\n"
+        "        here.check_random_packing(kind, np.random.default_rng(seed))\n"
+    )

@@ -1,0 +1,153 @@
+"""Calibration: ladders, from where on they are steady, and recommended settings that hold."""
+
+import math
+
+import numpy as np
+import pytest
+
+from scanfab import (
+    Packing,
+    PackingError,
+    ScanfabWarning,
+    Settings,
+    SettingsError,
+    calibrate,
+    compute,
+    find_contacts,
+)
+from scanfab.ladders import STEP_MEANINGS, StepRow, first_steady, judged
+from tests.lattices import shaken_cubic
+
+QUICK = {"tolerance": 2e-3, "variants": "cd", "rv": 0.6, "workers": 1}
+
+
+@pytest.fixture(scope="module")
+def packing():
+    return find_contacts(Packing(*shaken_cubic(np.random.default_rng(0), 7)))
+
+
+@pytest.fixture(scope="module")
+def found(packing):
+    return calibrate(packing, Settings.make(**QUICK))
+
+
+def ladder(found, name, variant="c"):
+    return [row for row in found.rows if row.ladder == name and row.variant == variant]
+
+
+def test_every_column_has_a_meaning():
+    assert list(STEP_MEANINGS) == list(StepRow.__dataclass_fields__)
+
+
+def test_ladders_go_from_coarse_to_fine(found):
+    assert [row.value for row in ladder(found, "spacing")] == [4, 2, 1, 0.5, 0.2, 0.1]
+    directions = ladder(found, "directions")
+    assert [row.value for row in directions] == [row.directions for row in directions]
+    assert [row.degree for row in directions] == [5, 9, 11, 17, 23, 31, 41]
+    assert [row.value for row in ladder(found, "cutoff")] == [0.25 * k for k in range(13)]
+    assert [row.value for row in ladder(found, "rv", "d")] == [0.4, 0.5, 0.6, 0.67, 0.7, 0.8]
+    errors = [row.alpha_vs_axial_se for row in ladder(found, "spacing")[-3:]]
+    assert errors[0] > errors[1] > errors[2]
+
+
+def test_a_step_is_a_computation_with_its_settings(packing, found):
+    options = {**QUICK, "spacing": "0.5rmin", "directions": "icosahedral:9"}
+    expected = compute(packing, **options)
+    for one, row in zip(expected, [ladder(found, "spacing", v)[3] for v in "cd"], strict=True):
+        assert row.alpha_vs_axial == one.alpha_vs_axial
+        assert row.alpha_vs_axial_se == one.alpha_vs_axial_se
+        assert row.spacing == pytest.approx(0.5 * packing.radius.min())
+        assert (row.segments, row.mean_length) == (one.segments, one.mean_length)
+
+
+def test_recommended_settings_reach_their_error(packing, found):
+    best = [row for row in found.rows if row.ladder == "recommended"]
+    at_cutoff = [row for row in found.rows if row.ladder == "cutoff" and row.value == 1.0]
+    sample = max(row.alpha_vs_axial_sample_se or 0.0 for row in at_cutoff)
+    target = max(QUICK["tolerance"], 0.25 * sample)
+    assert max(row.alpha_vs_axial_se for row in best) <= target
+    table = compute(packing, **QUICK, **found.options)
+    assert table["alpha_vs_axial_se"].tolist() == [row.alpha_vs_axial_se for row in best]
+
+
+def test_each_ladder_and_the_settings_have_a_sentence(found):
+    assert [text.split(":")[0] for text in found.findings] == [
+        "spacing", "directions", "cut-off", "RV", "recommended",
+    ]  # fmt: skip
+    assert "the paper's r_min/10" in found.findings[0]
+    assert "the paper's 1 r_min" in found.findings[2]
+
+
+def test_whole_sample_has_no_ladder_of_rvs(packing):
+    found = calibrate(packing, Settings.make(**{**QUICK, "variants": "a", "tolerance": 0.02}))
+    assert {row.ladder for row in found.rows} == {"spacing", "directions", "cutoff", "recommended"}
+    assert {row.rv_radius for row in found.rows} == {None}
+
+
+def step(value, alpha, error, **more):
+    words = {"value": value, "variant": "c", "alpha_vs_axial": alpha, "alpha_vs_axial_se": error}
+    return StepRow(**{**dict.fromkeys(STEP_MEANINGS), "note": "", **words, **more})
+
+
+def test_steady_is_what_agrees_with_all_later_steps_within_twice_their_errors():
+    steps = [step(k, alpha, 0.001) for k, alpha in enumerate([0.013, 0.0095, 0.012, 0.0105, 0.01])]
+    # 2 √2 x 0.001 = 0.0028: 0.013 is too far from the last, 0.0095 from none
+    assert [row.steady for row in judged(iter(steps), with_sample=False)] == [0, 1, 1, 1, 1]
+    far = [step(9, 0.0129, 0.001), *steps[:2], steps[4]]
+    assert [row.steady for row in judged(iter(far), with_sample=False)] == [0, 0, 1, 1]
+
+
+def test_sample_error_counts_where_the_sample_changes():
+    steps = [step(k, a, 0.001, alpha_vs_axial_sample_se=0.005) for k, a in enumerate([0.02, 0.01])]
+    assert first_steady(judged(iter(steps), with_sample=True)) == 0
+    assert first_steady(judged(iter(steps), with_sample=False)) == 1
+
+
+@pytest.mark.parametrize(
+    "doubt", [{"alpha_vs_axial_se": None}, {"note": "few"}, {"alpha_vs_axial": None}]
+)
+def test_a_doubtful_step_is_not_steady(doubt):
+    steps = [step(0, 0.01, 0.001), step(1, 0.01, 0.001, **doubt), step(2, 0.01, 0.001)]
+    assert first_steady(judged(iter(steps), with_sample=False)) == 2
+
+
+def test_one_grain_is_refused():
+    with pytest.raises(SettingsError, match=r"fabric in variant c: the sample \(1 gr"):
+        calibrate(Packing([[0.0, 0, 0]], [1.0]))
+
+
+def test_no_grain_is_refused():
+    with pytest.raises(PackingError, match="no frame has any grains"):
+        calibrate(Packing(np.zeros((0, 3)), np.zeros(0)))
+
+
+@pytest.mark.parametrize("frame", [1, 7, -2])
+def test_a_frame_that_is_not_there_is_refused(packing, frame):
+    with pytest.raises(SettingsError, match=f"frames: the series has no frame in {frame}:"):
+        calibrate(packing, Settings.make(**QUICK), frame=frame)
+
+
+def test_cutoffs_and_moments_are_refused(packing):
+    with pytest.raises(SettingsError, match="cutoffs and moment have no meaning"):
+        calibrate(packing, Settings.make(moment=2))
+
+
+def test_steps_beyond_the_budget_are_left_out_with_a_word(packing):
+    chords = np.pi * np.sum(packing.radius**2) * 16 / (0.2 * packing.radius.min()) ** 2
+    settings = Settings.make(**{**QUICK, "tolerance": 0.02, "max_chords": 1.05 * chords})
+    with pytest.warns(ScanfabWarning) as told:
+        few = calibrate(packing, settings)
+    assert [row.value for row in ladder(few, "spacing")] == [4, 2, 1, 0.5, 0.2]
+    assert any("spacing 0.1 left out: it would cut" in str(one.message) for one in told)
+    assert "would take too many lines" in few.findings[0]
+
+
+def test_figure_has_four_panels_with_labels(found, tmp_path):
+    from scanfab.writers.plot_calibration import plot_calibration
+
+    for suffix, start in ((".png", b"\x89PNG"), (".svg", b"<?xml"), (".pdf", b"%PDF")):
+        plot_calibration(found.rows, tmp_path / f"ladders{suffix}")
+        assert (tmp_path / f"ladders{suffix}").read_bytes().startswith(start)
+    with pytest.raises(SettingsError, match=r"figures can be written as \.png"):
+        plot_calibration(found.rows, tmp_path / "ladders.doc")
+    assert math.isfinite(found.rows[-1].seconds)

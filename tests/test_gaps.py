@@ -1,0 +1,124 @@
+"""The gap scan: the lines of the scan, kept apart by octant and cut-off."""
+
+import numpy as np
+import pytest
+
+from scanfab import direction_rule, scan_lines
+from scanfab.gaps import Blocks, scan_gaps
+from scanfab.scan import line_frames, turned_frames
+from tests import naive
+from tests.lattices import poisson_spheres
+from tests.scanning import ratio, solids_of
+
+RULE = direction_rule("lebedev:5")
+CUTOFFS = [0.0, 0.3, 0.8, 1.7]
+ORIGIN = Blocks.about(np.zeros(3), 20.0), Blocks.about(np.zeros(3), 20.0)
+
+
+@pytest.fixture(scope="module")
+def solids():
+    random = np.random.default_rng(0)
+    spheres = poisson_spheres(random, 0.15, 4.0)
+    return solids_of(spheres, 3.0, random.random(len(spheres.radius)) < 0.2)
+
+
+def gaps_of(solids, **options):
+    words = {"spacing": 0.3, "cutoffs": CUTOFFS, "blocks": ORIGIN, "replicates": range(3)}
+    return scan_gaps(solids, RULE, **{**words, **options})
+
+
+@pytest.mark.parametrize("place", range(len(CUTOFFS)))
+def test_all_octants_together_are_the_scan_of_the_same_lines(solids, place):
+    gaps = gaps_of(solids, seed=3)
+    sums = scan_lines(solids, RULE, spacing=0.3, cutoff=CUTOFFS[place], replicates=range(3), seed=3)
+    assert np.array_equal(gaps.axes, sums.axes)
+    for variant in "abcd":
+        length, number = gaps.kept(variant, place)
+        expected_length, expected_number = sums.kept(variant)
+        assert np.array_equal(number, expected_number)
+        assert number.min() > 0
+        np.testing.assert_allclose(length, expected_length, rtol=1e-10)
+
+
+def test_octants_left_out_add_up_to_seven_times_all(solids):
+    gaps = gaps_of(solids)
+    for moment in (1, 2):
+        every = gaps.kept("c", 1, moment)
+        without = [gaps.kept("c", 1, moment, without=block) for block in range(8)]
+        for k in range(2):
+            np.testing.assert_allclose(sum(one[k] for one in without), 7 * every[k], rtol=1e-10)
+
+
+def test_octant_left_out_is_that_of_the_slow_twin(solids):
+    """The second moment too: Σ l² and Σ l of the segments with their middle elsewhere."""
+    frames, offsets = turned_frames(RULE, line_frames(RULE.axes), 0, 0)
+    gaps = gaps_of(solids, spacing=0.8, replicates=range(1))
+    _, window = naive.void_segments(
+        solids.position, solids.radius, frames[2], offsets[2], 0.8, solids.window_radius
+    )
+    for place, cutoff in enumerate(CUTOFFS):
+        sums = naive.gap_sums(window, cutoff, np.zeros(3))
+        for block in range(8):
+            rest = np.delete(sums, block, axis=0).sum(axis=0)
+            over, under = gaps.kept("c", place, without=block)
+            assert (under[0, 2], over[0, 2]) == pytest.approx(tuple(rest[:2]))
+            over, under = gaps.kept("c", place, moment=2, without=block)
+            assert (under[0, 2], over[0, 2]) == pytest.approx(tuple(rest[1:]))
+
+
+def test_threads_change_nothing(solids):
+    one, three = gaps_of(solids), gaps_of(solids, workers=3)
+    assert np.array_equal(one.square, three.square)
+    assert np.array_equal(one.number, three.number)
+
+
+def test_variants_that_are_not_wanted_have_no_sums(solids):
+    gaps = gaps_of(solids, variants="bc")
+    assert not gaps.number[:, [0, 3]].any()
+    assert gaps.number[:, 1].any()
+    np.testing.assert_allclose(gaps.length[:, 2], gaps_of(solids).length[:, 2])
+
+
+def test_poisson_spheres_have_their_mean_length_at_every_cut_off_of_one_pass():
+    """
+    ℓ = c + A1/(A0 + βA1) at c = 0, 0.5, 1, 1.5.
+
+    A0 = 1 - c²/4R², A1 = 4R/3 - c + c³/12R²; c + 1/β where the window R is infinite.
+    """
+    cutoffs, window, density = np.array([0.0, 0.5, 1.0, 1.5]), 8.0, 0.2
+    beta = density * np.pi * 13 / 12
+    length, number = [], []
+    for seed in range(400):
+        spheres = poisson_spheres(np.random.default_rng([seed, 7]), density, window)
+        gaps = gaps_of(
+            solids_of(spheres, window),
+            spacing=0.8,
+            cutoffs=cutoffs,
+            variants="c",
+            replicates=[seed],
+        )
+        length.append(gaps.length[0, 2].sum(axis=(0, 1)))
+        number.append(gaps.number[0, 2].sum(axis=(0, 1)))
+    estimate = ratio(np.array(length), np.array(number))
+    a0 = 1 - cutoffs**2 / (4 * window**2)
+    a1 = 4 * window / 3 - cutoffs + cutoffs**3 / (12 * window**2)
+    assert np.all(estimate.error < 4e-3 * estimate.value)
+    assert estimate.agrees(cutoffs + a1 / (a0 + beta * a1), within=8e-3)
+
+
+def test_octants_about_an_oblique_axis_have_it_as_one_of_their_axes():
+    axis = np.array([0.6, 0.0, 0.8])
+    blocks = Blocks.about(np.array([1.0, 2.0, 3.0]), 5.0, axis)
+    places = np.random.default_rng(0).uniform(-2, 2, (200, 3))
+    found = blocks.of(places + np.array([1.0, 2.0, 3.0]))
+    assert set(found) == set(range(8))
+    # the last four lie on the far side of the plane normal to the axis
+    assert np.array_equal(found >= 4, places @ axis >= 0)
+
+
+@pytest.mark.parametrize("axis", [(0, 0, 1), (1, 0, 0), (0, -1, 0)])
+def test_octants_about_a_coordinate_are_those_of_the_coordinates(axis):
+    center = np.array([0.1, 0.2, 0.3])
+    places = np.random.default_rng(1).uniform(-2, 2, (100, 3))
+    expected = [naive.octant(place, center) for place in places]
+    assert Blocks.about(center, 3.0, axis).of(places).tolist() == expected

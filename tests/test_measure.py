@@ -1,0 +1,110 @@
+"""The sample's own scatter in the table: contacts without each octant, and what it is empty for."""
+
+import math
+
+import numpy as np
+import pytest
+
+from scanfab import Packing, Settings, compute, find_contacts
+from scanfab.gaps import Blocks
+from scanfab.plan import make_plan
+from scanfab.variants import VARIANTS, Sample
+from tests import naive
+from tests.lattices import shaken_cubic
+
+LINES = {"directions": "lebedev:5", "spacing": 0.15}
+
+
+@pytest.fixture(scope="module")
+def packing():
+    return find_contacts(Packing(*shaken_cubic(np.random.default_rng(0), 6)))
+
+
+@pytest.fixture(scope="module")
+def table(packing):
+    return compute(packing, **LINES)
+
+
+def without(row, name):
+    return np.array([getattr(row, f"{name}_without_{block}") for block in range(1, 9)])
+
+
+def test_contacts_are_left_out_by_the_octant_of_their_point(packing, table):
+    sample = Sample(packing, np.zeros(len(packing), bool))
+    plan = make_plan(Settings.make(**LINES), sample)
+    low, high = packing.position.min(axis=0), packing.position.max(axis=0)
+    for row in table:
+        variant = VARIANTS[row.variant]
+        chosen = sample.fabric_contacts(variant, plan.window)
+        center = plan.window.center if variant.in_window else (low + high) / 2
+        octants = [naive.octant(point, center) for point in packing.contacts.point[chosen]]
+        normals = packing.contacts.normal[chosen]
+        expected = [
+            naive.axial(naive.contact_tensor(normals[np.array(octants) != block]), (0, 0, 1))
+            for block in range(8)
+        ]
+        assert without(row, "alpha_c_axial") == pytest.approx(np.array(expected), abs=1e-12)
+        scatter = sum((one - np.mean(expected)) ** 2 for one in expected)
+        assert row.alpha_c_axial_sample_se == pytest.approx(math.sqrt(7 / 8 * scatter))
+
+
+def test_values_without_octants_scatter_about_the_whole(table):
+    for row in table:
+        values = without(row, "alpha_vs_axial")
+        assert np.ptp(values) > 0
+        assert abs(values.mean() - row.alpha_vs_axial) < np.ptp(values)
+
+
+def test_more_lines_cannot_tell_more_of_the_material(packing):
+    """Four times the lines: half the scan's error, the same scatter of the 216 grains."""
+    lines = {"directions": "lebedev:17", "variants": "c"}
+    coarse, fine = (compute(packing, **lines, spacing=spacing)[0] for spacing in (0.16, 0.08))
+    assert fine.alpha_vs_axial_se < 0.7 * coarse.alpha_vs_axial_se
+    assert fine.alpha_vs_axial_sample_se > 4 * fine.alpha_vs_axial_se
+    ratio = fine.alpha_vs_axial_sample_se / coarse.alpha_vs_axial_sample_se
+    assert ratio == pytest.approx(1.0, abs=0.3)
+
+
+def test_turned_with_its_axis_the_sample_has_the_same_octants(packing):
+    """x, y, z renamed: the octants about the loading axis go along."""
+    renamed = find_contacts(Packing(np.roll(packing.position, 1, axis=1), packing.radius))
+    row = compute(packing, **LINES, variants="c")[0]
+    other = compute(renamed, **LINES, variants="c", axis="x")[0]
+    assert other.alpha_c_axial_sample_se == pytest.approx(row.alpha_c_axial_sample_se)
+    ours, theirs = (np.sort(without(one, "alpha_c_axial")) for one in (row, other))
+    assert theirs == pytest.approx(ours, abs=1e-12)
+
+
+def test_octants_about_an_oblique_axis_are_parted_along_it(packing):
+    axis = np.array([0.6, 0.0, 0.8])
+    row = compute(packing, **LINES, variants="c", axis=tuple(axis))[0]
+    sample = Sample(packing, np.zeros(len(packing), bool))
+    plan = make_plan(Settings.make(**LINES), sample)
+    chosen = sample.fabric_contacts(VARIANTS["c"], plan.window)
+    normals = packing.contacts.normal[chosen]
+    side = (packing.contacts.point[chosen] - plan.window.center) @ axis >= 0
+    # the contacts of each half are those of four octants: what they add to the sum agrees
+    along = 1.5 * (normals @ axis) ** 2 - 0.5
+    values = without(row, "alpha_c_axial")
+    octants = Blocks.about(plan.window.center, 20.0, axis).of(packing.contacts.point[chosen])
+    for block in range(8):
+        assert np.all(side[octants == block] == (block >= 4))
+        assert values[block] == pytest.approx(along[octants != block].mean())
+
+
+def test_two_grains_have_no_scatter():
+    pair = find_contacts(Packing([[0.0, 0, 0], [1.0, 0, 0]], [0.6, 0.6]))
+    with pytest.warns(match="in some direction no void segment is kept"):
+        row = compute(pair, **LINES, variants="a", cutoff=0.0)[0]
+    assert row.alpha_c_axial is not None
+    assert row.alpha_c_axial_sample_se is None
+    assert without(row, "alpha_c_axial").tolist() == [None] * 8
+
+
+def test_frame_without_a_void_fabric_has_no_columns_of_octants():
+    with pytest.warns(match="no void segment reaches the cut-off"):
+        row = compute(
+            find_contacts(Packing([[0.0, 0, 0]], [1.0])), **LINES, variants="c", contact_tolerance=0
+        )[0]
+    assert row.alpha_vs_axial_sample_se is None
+    assert set(without(row, "alpha_vs_axial").tolist()) == {None}
