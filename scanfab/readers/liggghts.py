@@ -8,6 +8,7 @@ write their values in an order of their own, whatever the order of the keywords.
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +16,8 @@ import numpy.typing as npt
 
 from scanfab.errors import ReadError
 from scanfab.readers.base import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
-from scanfab.readers.columns import grain_table, has_radius
-from scanfab.readers.dump import DumpBlock, index_dump, read_block, row_word
+from scanfab.readers.columns import grain_table, has_radius, needed_columns
+from scanfab.readers.dump import DumpBlock, index_dump, read_block, read_columns, row_word
 from scanfab.readers.files import first_bytes
 from scanfab.readers.join import count_walls, join_ids, rows_of_ids
 from scanfab.readers.mesh import Mesh
@@ -100,12 +101,8 @@ class LiggghtsReader:
         """Columns in any order and any subset that suffices; of repeated names the first counts."""
         if not _is_text(first_bytes(snapshot.path)):
             return self._vtk.read_grains(snapshot, options)
-        block = read_block(snapshot)
-        columns = {
-            name: block.values[:, place] for place, name in reversed(list(enumerate(block.names)))
-        }
-        ordered = {name: columns[name] for name in block.names}
-        return grain_table(snapshot.path, ordered, block.cell, options, f", step {snapshot.step}")
+        columns, cell = read_columns(snapshot, partial(needed_columns, options=options))
+        return grain_table(snapshot.path, columns, cell, options, f", step {snapshot.step}")
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
