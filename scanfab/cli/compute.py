@@ -126,7 +126,7 @@ def compute(
     Variants: a whole sample; b whole sample, rattlers removed; c representative volume (RV); d RV,
     rattlers removed. Lengths are in the dump's own units.
     """
-    from scanfab.cli.console import reported_warnings
+    from scanfab.cli.console import announce_compiling, reported_warnings
     from scanfab.errors import SettingsError
     from scanfab.manifest import asked_for
     from scanfab.settings import Settings
@@ -145,6 +145,7 @@ def compute(
             raise click.UsageError(str(error)) from None
         asked = asked_for(sources, reading, settings)
         series = open_series(sources, reading)
+        announce_compiling()
         found = _write(series, settings, asked, result, resume)
         for path in _manifests(output, manifest_path):
             _write_manifest(path, asked, series)
