@@ -190,12 +190,10 @@ class Packing:
         self.columns: Mapping[str, npt.NDArray[Any]] = (
             columns if isinstance(columns, LazyColumns) else _cast_columns(columns or {}, count)
         )
-        self.wall_contacts: IntArray = _cast(
-            "wall_contacts",
-            np.zeros(count, np.int64) if wall_contacts is None else wall_contacts,
-            np.int64,
-            (count,),
-        )
+        if wall_contacts is None:
+            wall_contacts = np.zeros(count, np.int64)
+            wall_contacts.flags.writeable = False
+        self.wall_contacts: IntArray = _cast("wall_contacts", wall_contacts, np.int64, (count,))
         self.cell = cell
         self.step = None if step is None else int(step)
         self.time = None if time is None else float(time)

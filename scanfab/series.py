@@ -362,6 +362,8 @@ def _same_step(
 
 
 def _wall_contacts(grains: GrainTable, joined: list[JoinedContacts]) -> Any:
+    if not joined:
+        return None
     return sum((part.wall_contacts for part in joined), np.zeros(len(grains.radius), np.int64))
 
 

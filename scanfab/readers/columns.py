@@ -222,6 +222,7 @@ def whole_numbers(path: Path, values: npt.ArrayLike, where: str = "") -> npt.NDA
     whole = numbers.astype(np.int64) if sound else np.zeros(0, np.int64)
     if not sound or np.any(whole != numbers):
         raise ReadError(f"{path}{where}: ids must be whole numbers")
+    whole.flags.writeable = False  # so that the packing need not copy it
     return whole
 
 

@@ -63,49 +63,47 @@ def read_regular(table: TextTable, places: Sequence[int]) -> list[FloatArray] | 
     list of ndarray or None
         An array of shape (count,) for each place.
     """
+    behind = _ends_with_blank(table)
     with ThreadPoolExecutor(1) as pool:
         # numpy and polars both let go of Python's lock
-        words = pool.submit(_count_words, table)
-        columns = _parse(table, places)
-        # no line has fewer words than columns, so none has more
-        return columns if words.result() == table.count * table.width else None
+        spaces = pool.submit(_count_spaces, table)
+        columns = _parse(table, places, behind)
+        expected = table.count * (table.width + behind), table.count * behind
+        return columns if spaces.result() == expected else None
 
 
-def _count_words(table: TextTable) -> int:
+def _count_spaces(table: TextTable) -> tuple[int, int]:
     """
-    The number of words; 0 if white space is more than the following.
+    The number of blanks, line ends and other white space, and how often one follows another.
 
-    One blank between two words, maybe one at the end of a line, and as many line feeds as rows.
-    Then what polars takes for columns are the words of a line.
+    If both are what single blanks make, and no line lacks its last word, no line has a word more
+    either, and what polars takes for columns are the words of the line.
     """
     piece = np.empty(PIECE + 1, np.uint8)
     piece[0] = LINE_END
-    left, blanks, lines, at_end = table.stop - table.start, 0, 0, 0
+    left, spaces, pairs = table.stop - table.start, 0, 0
     with open(table.path, "rb", buffering=0) as file:
         file.seek(table.start)
         while left > 0:
             size = file.readinto(piece[1 : 1 + min(left, PIECE)].data)
             if not size:
-                return 0
-            text = piece[: size + 1]
-            space, blank, end = text <= BLANK, text == BLANK, text == LINE_END
-            found = np.count_nonzero(blank[1:]), np.count_nonzero(end[1:])
-            if sum(found) != np.count_nonzero(space[1:]) or np.any(space[:-1] & blank[1:]):
-                return 0
-            blanks, lines = blanks + int(found[0]), lines + int(found[1])
-            at_end += int(np.count_nonzero(blank[:-1] & end[1:]))
+                break
+            space = piece[: size + 1] <= BLANK
+            spaces += int(np.count_nonzero(space[1:]))
+            pairs += int(np.count_nonzero(space[:-1] & space[1:]))
             left -= size
             piece[0] = piece[size]
-    return blanks - at_end + lines if piece[0] == LINE_END and lines == table.count else 0
+    # a last line without its end may lack digits
+    return (spaces, pairs) if piece[0] == LINE_END else (-1, -1)
 
 
-def _parse(table: TextTable, places: Sequence[int]) -> list[FloatArray] | None:
+def _parse(table: TextTable, places: Sequence[int], behind: bool) -> list[FloatArray] | None:
     """The columns as polars sees them; None if a line has too few, or a word is no number."""
     import polars
 
     names = [f"{place}" for place in range(table.width)]
     schema: dict[str, Any] = dict.fromkeys(names, polars.Float64)
-    if _ends_with_blank(table):
+    if behind:
         schema["behind"] = polars.String
     wanted = list(dict.fromkeys([*(names[place] for place in places), names[-1]]))
     # a file is parsed where it lies; a part of it has to be taken out
@@ -120,7 +118,7 @@ def _parse(table: TextTable, places: Sequence[int]) -> list[FloatArray] | None:
                 schema=schema,
                 skip_lines=table.lines_before if whole else 0,
                 n_rows=table.count,
-                truncate_ragged_lines=True,  # words are counted elsewhere
+                truncate_ragged_lines=True,  # blanks are counted elsewhere
                 glob=False,
             )
             .select(wanted)
