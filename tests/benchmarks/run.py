@@ -1,7 +1,7 @@
 """
 All benchmarks by one command; see docs/performance.md.
 
-python tests/benchmarks/run.py [--only chords reading ...] [--repeats 5] [--largest] [--write]
+python tests/benchmarks/run.py [--only chords reading ...] [--repeats 5] [--largest] [-w]
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", choices=GROUPS, default=GROUPS)
     parser.add_argument("--repeats", type=int, default=5, help="runs of which the median counts")
     parser.add_argument("--largest", action="store_true", help="ten million grains too")
-    parser.add_argument("--write", action="store_true", help="renew the tables of the page")
+    parser.add_argument("-w", "--write", action="store_true", help="renew the tables of the page")
     given = parser.parse_args()
     sys.path[0] = str(ROOT)  # not this folder, whose modules have common names
     timing = import_module("tests.benchmarks.timing")
