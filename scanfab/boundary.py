@@ -114,8 +114,11 @@ def enclosing_class(packing: Packing) -> str | None:
     low, high = packing.position.min(axis=0), packing.position.max(axis=0)
     scaled = (packing.position - 0.5 * (low + high)) / np.maximum(high - low, 1e-300)
     distances = np.linalg.norm(scaled, axis=1), np.abs(scaled).max(axis=1)
-    for name, values in packing.columns.items():
-        if name.lower() not in CLASS_COLUMNS or values.ndim != 1 or values.dtype.kind not in "iuf":
+    for name in packing.columns:
+        if name.lower() not in CLASS_COLUMNS:
+            continue
+        values = packing.columns[name]
+        if values.ndim != 1 or values.dtype.kind not in "iuf":
             continue
         classes = np.unique(values)
         if not 2 <= classes.size <= 20:
@@ -141,10 +144,11 @@ def _column(packing: Packing, name: str) -> npt.NDArray[Any]:
         "radius": packing.radius,
         **dict(zip("xyz", packing.position.T, strict=True)),
     }
-    for key, values in packing.columns.items():
-        if values.ndim == 1:
-            known.setdefault(key, values)
+    if name not in known and name in packing.columns and packing.columns[name].ndim == 1:
+        known[name] = packing.columns[name]
     if name not in known:
+        others = (key for key, values in packing.columns.items() if values.ndim == 1)
+        known = dict.fromkeys([*known, *others], packing.radius)
         raise SettingsError(
             f"boundary: there is no column {name!r}; the columns are {', '.join(known)}"
         )

@@ -22,7 +22,9 @@ def cast(
         array = np.asarray(values)
         if array.size == 0 and shape[0] is None:
             array = np.zeros((0, *shape[1:]))  # an empty list
-        numbers = array.astype(dtype, copy=True) if dtype is not None else array.copy()
+        # nobody can change an array that is read-only and no view of another
+        shared = array.flags.owndata and not array.flags.writeable
+        numbers = array.astype(array.dtype if dtype is None else dtype, copy=not shared)
     except (TypeError, ValueError) as error:
         raise PackingError(f"{name}: expected numbers of shape {_spell(shape)}: {error}") from None
     wanted = shape[:-1] if shape[-1] is ... else shape

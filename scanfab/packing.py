@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -14,10 +15,75 @@ from scanfab.cell import Cell
 from scanfab.contact_list import ContactList, Contacts, Spheres, resolve_contacts
 from scanfab.errors import PackingError
 
-__all__ = ["ContactList", "Contacts", "Packing"]
+__all__ = ["ContactList", "Contacts", "LazyColumns", "Packing", "lies_within"]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
+
+
+class LazyColumns(MutableMapping[str, npt.NDArray[Any]]):
+    """
+    Columns of a large dump by name, each read when it is first asked for.
+
+    Parameters
+    ----------
+    names : sequence of str
+        All of them, in the order of the dump.
+    ready : mapping of str to ndarray
+        Those that have been read.
+    load : callable
+        Reads a column by its name.
+    """
+
+    def __init__(
+        self,
+        names: Sequence[str],
+        ready: Mapping[str, npt.NDArray[Any]],
+        load: Callable[[str], npt.NDArray[Any]],
+    ) -> None:
+        self._found: dict[str, npt.NDArray[Any] | None] = dict.fromkeys(names)
+        self._load = load
+        for name, values in ready.items():
+            self[name] = values
+
+    def __getitem__(self, name: str) -> npt.NDArray[Any]:
+        values = self._found[name]
+        if values is None:
+            values = self._load(name)
+            self[name] = values
+        return values
+
+    def __setitem__(self, name: str, values: npt.NDArray[Any]) -> None:
+        values.flags.writeable = False
+        self._found[name] = values
+
+    def __delitem__(self, name: str) -> None:
+        del self._found[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._found)
+
+    def __len__(self) -> int:
+        return len(self._found)
+
+    def copy(self) -> LazyColumns:
+        """Another mapping to the same arrays."""
+        ready = {name: values for name, values in self._found.items() if values is not None}
+        return LazyColumns(list(self), ready, self._load)
+
+
+def lies_within(cell: Cell, position: FloatArray, low: float, high: float) -> bool:
+    """
+    Whether all positions surely have low <= fraction < high along the cell's periodic vectors.
+
+    The fractions are linear, so the corners of the box around the positions settle it. False if
+    only those lie outside, or if a position is not a number.
+    """
+    if not cell.is_periodic or len(position) == 0:
+        return True
+    sides = [(column.min(), column.max()) for column in position.T]
+    fractions = cell.fractional(list(product(*sides)))[:, list(cell.periodic)]
+    return bool(np.all((fractions >= low) & (fractions < high)))
 
 
 class Packing:
@@ -80,15 +146,16 @@ class Packing:
         _check_grains(centres, self.radius, self.id)
         turns: IntArray | None = None
         self.position: FloatArray = centres
-        if cell is not None:
+        if cell is not None and not lies_within(cell, centres, 0.0, 1.0):
             self.position, turns = cell.place(centres)
         self.position.flags.writeable = False
-        self.columns: dict[str, npt.NDArray[Any]] = {
-            name: cast(name, values, None, (count, ...)) for name, values in (columns or {}).items()
-        }
-        self.wall_contacts: IntArray = _wall_contacts(
-            np.zeros(count, np.int64) if wall_contacts is None else wall_contacts, count
+        self.columns: Mapping[str, npt.NDArray[Any]] = (
+            columns if isinstance(columns, LazyColumns) else _cast_columns(columns or {}, count)
         )
+        if wall_contacts is None:
+            wall_contacts = np.zeros(count, np.int64)
+            wall_contacts.flags.writeable = False
+        self.wall_contacts: IntArray = _wall_contacts(wall_contacts, count)
         self.cell = cell
         self.step = None if step is None else int(step)
         self.time = None if time is None else float(time)
@@ -142,18 +209,34 @@ def _wall_contacts(values: npt.ArrayLike, count: int) -> IntArray:
     return numbers
 
 
+def _cast_columns(columns: Mapping[str, npt.ArrayLike], count: int) -> dict[str, npt.NDArray[Any]]:
+    return {name: cast(name, values, None, (count, ...)) for name, values in columns.items()}
+
+
 def _check_grains(position: FloatArray, radius: FloatArray, id: IntArray) -> None:
     """Finite numbers, positive radii, unique ids."""
-    infinite = ~(np.isfinite(position).all(axis=1) & np.isfinite(radius))
-    if infinite.any():
+    if not (np.isfinite(position).all() and np.isfinite(radius).all()):
+        infinite = ~(np.isfinite(position).all(axis=1) & np.isfinite(radius))
         raise PackingError(
             f"{grains_named(id, infinite)}: position and radius must be finite numbers"
         )
     if np.any(radius <= 0):
         raise PackingError(f"{grains_named(id, radius <= 0)}: the radius must be larger than zero")
-    unique, counts = np.unique(id, return_counts=True)
-    if unique.size < id.size:
+    if not _are_unique(id):
+        unique, counts = np.unique(id, return_counts=True)
         raise PackingError(
             f"the id {unique[np.argmax(counts > 1)]} occurs twice: "
             f"{unique.size} ids for {id.size} grains"
         )
+
+
+def _are_unique(id: IntArray) -> bool:
+    """Whether no number occurs twice; without sorting if they lie close together, as ids do."""
+    if id.size == 0:
+        return True
+    low, high = int(id.min()), int(id.max())
+    if high - low >= 8 * id.size:
+        return bool(np.unique(id).size == id.size)
+    seen = np.zeros(high - low + 1, np.bool_)
+    seen[id - low] = True
+    return bool(np.count_nonzero(seen) == id.size)

@@ -374,6 +374,8 @@ def _same_step(
 
 def _wall_contacts(grains: GrainTable, joined: list[JoinedContacts], with_own: bool) -> Any:
     own = grains.wall_contacts if with_own else None
+    if not joined:
+        return own
     first = np.zeros(len(grains.radius), np.int64) if own is None else own
     return sum((part.wall_contacts for part in joined), first)
 

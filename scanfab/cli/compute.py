@@ -167,7 +167,7 @@ def compute(
     Variants: a whole sample; b whole sample, rattlers removed; c representative volume (RV); d RV,
     rattlers removed. Lengths are in the dump's own units.
     """
-    from scanfab.cli.console import reported_warnings
+    from scanfab.cli.console import announce_compiling, reported_warnings
     from scanfab.errors import SettingsError
     from scanfab.manifest import asked_for
     from scanfab.settings import Settings
@@ -191,6 +191,7 @@ def compute(
         series = open_series(sources, reading)
         if figure is not None and _is_of_frames(figure) and len(series) > 1:
             raise click.UsageError(f"--figure {figure} draws one series: name one source")
+        announce_compiling()
         run = _Run(series, settings, vtk_folder, resume, keep=plot is not None)
         _write(run, asked, result)
         for path in _manifests(output, manifest_path):

@@ -13,7 +13,7 @@ import click
 from scanfab.errors import ScanfabWarning, SkippedFrameWarning
 from scanfab.table import Row
 
-__all__ = ["print_table", "reported_warnings", "with_progress"]
+__all__ = ["announce_compiling", "print_table", "reported_warnings", "with_progress"]
 
 # title of each column on a terminal, and the width of terminal from which it is shown
 SHOWN = {
@@ -62,6 +62,20 @@ def reported_warnings() -> Iterator[Told]:
         yield told
 
 
+def announce_compiling() -> None:
+    """A line on standard error if the scan has to be compiled first."""
+    from scanfab.kernels.cache import is_kept, when_compiling
+
+    kept = (
+        "once for each user and version"
+        if is_kept()
+        else "and cannot be kept: NUMBA_CACHE_DIR may name a folder that can be written to"
+    )
+    when_compiling(
+        lambda: click.echo(f"scanfab: compiling the scan, some ten seconds; {kept}", err=True)
+    )
+
+
 def with_progress(rows: Iterable[Row]) -> Iterator[Row]:
     """The same rows, with a line of progress on standard error if it is a terminal."""
     if not sys.stderr.isatty():
@@ -72,7 +86,7 @@ def with_progress(rows: Iterable[Row]) -> Iterator[Row]:
 
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("first frame (the scan is compiled when it first runs)")
+        task = progress.add_task("first frame")
         for row in rows:
             progress.update(task, description=f"{row.source}: frame {row.frame} done")
             yield row

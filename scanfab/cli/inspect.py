@@ -42,7 +42,7 @@ def inspect(ctx: click.Context, /, sources: tuple[str, ...], as_json: bool, **op
 
     Nothing is computed; contacts are found by geometry where no file lists them.
     """
-    from scanfab.cli.console import reported_warnings
+    from scanfab.cli.console import announce_compiling, reported_warnings
     from scanfab.errors import SettingsError
     from scanfab.inspection import inspect_series
     from scanfab.settings import Settings
@@ -57,6 +57,7 @@ def inspect(ctx: click.Context, /, sources: tuple[str, ...], as_json: bool, **op
         found = settings_file(sources)
         if found is not None:
             click.echo(f"scanfab: options from {found}", err=True)
+        announce_compiling()
         for series in open_series(sources, reading):
             for report in inspect_series(series, settings):
                 if as_json:

@@ -92,6 +92,8 @@ def _leave_at_once(code: int) -> None:
     from scanfab.readers.files import remove_copies
 
     remove_copies()
+    if "scanfab.kernels.cache" in sys.modules:
+        sys.modules["scanfab.kernels.cache"].remove_unkept()
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError):  # a full disk, a closed pipe: told already
             stream.flush()

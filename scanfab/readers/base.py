@@ -77,7 +77,7 @@ class GrainTable(NamedTuple):
     """Shape (N,), dump's length unit."""
     id: IntArray | None
     """Shape (N,); None if the dump has none."""
-    columns: dict[str, npt.NDArray[Any]]
+    columns: Mapping[str, npt.NDArray[Any]]
     """What else the dump says of each grain, by its own names."""
     cell: Cell | None
     contacts: ContactList | None = None

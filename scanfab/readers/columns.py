@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, MutableMapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.boundary import CLASS_COLUMNS
 from scanfab.cell import Cell
 from scanfab.errors import ReadError
+from scanfab.packing import LazyColumns, lies_within
 from scanfab.readers.base import GrainTable, ReadOptions
 
-__all__ = ["MOST", "grain_table", "has_radius", "user_cell", "whole_numbers"]
+__all__ = [
+    "MOST",
+    "grain_table",
+    "has_radius",
+    "needed_columns",
+    "user_cell",
+    "whole_numbers",
+]
 
 FloatArray = npt.NDArray[np.float64]
 Columns = Mapping[str, npt.NDArray[Any]]
@@ -35,6 +44,14 @@ def has_radius(names: Sequence[str]) -> bool:
     """Whether some column is a radius or a diameter."""
     lower = {name.lower() for name in names}
     return bool(lower & {*RADIUS_NAMES, *DIAMETER_NAMES})
+
+
+def needed_columns(names: Sequence[str], options: ReadOptions) -> list[str]:
+    """Those of a dump's columns that :func:`grain_table` or most users ask for."""
+    places = {place for names, _ in POSITION_NAMES for place in names.split()}
+    known = {*places, *RADIUS_NAMES, *DIAMETER_NAMES, *ID_NAMES, *CLASS_COLUMNS}
+    own = set(options.columns.values())
+    return [name for name in dict.fromkeys(names) if name.lower() in known or name in own]
 
 
 def grain_table(
@@ -62,11 +79,12 @@ def grain_table(
     ReadError
         If coordinates or radii cannot be found.
     """
-    rest = dict(columns)
+    rest = columns.copy() if isinstance(columns, LazyColumns) else dict(columns)
     named = _named_by_user(path, rest, options)
     cell = user_cell(path, cell, options)
     position = _position(path, rest, named, cell, where)
     _refuse_far(path, position, cell, where)
+    position.flags.writeable = False  # so that the packing need not copy it
     radius = _radius(path, rest, named, len(position), options, where)
     id = named.get("id", _take(rest, ID_NAMES))
     return GrainTable(
@@ -102,7 +120,9 @@ def user_cell(path: Path, cell: Cell | None, options: ReadOptions) -> Cell | Non
     return Cell(cell.vectors, periodic, cell.origin)
 
 
-def _named_by_user(path: Path, rest: dict[str, Any], options: ReadOptions) -> dict[str, Any]:
+def _named_by_user(
+    path: Path, rest: MutableMapping[str, Any], options: ReadOptions
+) -> dict[str, Any]:
     """Columns that the user named, taken out of the rest."""
     named = {}
     for standard, own in options.columns.items():
@@ -118,7 +138,7 @@ def _named_by_user(path: Path, rest: dict[str, Any], options: ReadOptions) -> di
 
 
 def _position(
-    path: Path, rest: dict[str, Any], named: dict[str, Any], cell: Cell | None, where: str
+    path: Path, rest: MutableMapping[str, Any], named: dict[str, Any], cell: Cell | None, where: str
 ) -> FloatArray:
     if "position" in rest:
         return _lengths(path, rest.pop("position"), "a coordinate", where)
@@ -148,7 +168,7 @@ def _position(
 
 def _refuse_far(path: Path, position: FloatArray, cell: Cell | None, where: str) -> None:
     """An error if rounding would be all that is left of a position once it is in the cell."""
-    if cell is None or not cell.is_periodic:
+    if cell is None or lies_within(cell, position, -MOST_TURNS, MOST_TURNS):
         return
     turns = np.abs(cell.fractional(position[np.isfinite(position).all(axis=1)]))
     if np.any(turns > MOST_TURNS):
@@ -160,7 +180,7 @@ def _refuse_far(path: Path, position: FloatArray, cell: Cell | None, where: str)
 
 def _radius(
     path: Path,
-    rest: dict[str, Any],
+    rest: MutableMapping[str, Any],
     named: dict[str, Any],
     count: int,
     options: ReadOptions,
@@ -183,9 +203,9 @@ def _radius(
     )
 
 
-def _take(rest: dict[str, Any], names: Sequence[str], keep: bool = False) -> Any:
+def _take(rest: MutableMapping[str, Any], names: Sequence[str], keep: bool = False) -> Any:
     """The first column that has one of the names; taken out of the rest unless kept."""
-    lower = {name.lower(): name for name in reversed(rest)}
+    lower = {name.lower(): name for name in reversed(list(rest))}
     for name in names:
         if name in lower:
             return rest[lower[name]] if keep else rest.pop(lower[name])
@@ -197,11 +217,13 @@ def whole_numbers(path: Path, values: npt.ArrayLike, where: str = "") -> npt.NDA
     numbers = np.asarray(values)
     if numbers.dtype.kind not in "biuf" or numbers.ndim != 1:
         raise ReadError(f"{path}{where}: ids must be whole numbers")
-    # a larger one has more digits than a double or an int64 holds
-    sound = np.abs(numbers.astype(np.float64)) < 2.0**62
-    if not np.all(sound & (numbers == np.rint(numbers))):
+    # a larger one has more digits than a double or an int64 holds; comparisons with NaN are false
+    sound = numbers.size == 0 or (numbers.min() > -(2.0**62) and numbers.max() < 2.0**62)
+    whole = numbers.astype(np.int64) if sound else np.zeros(0, np.int64)
+    if not sound or np.any(whole != numbers):
         raise ReadError(f"{path}{where}: ids must be whole numbers")
-    return numbers.astype(np.int64)
+    whole.flags.writeable = False  # so that the packing need not copy it
+    return whole
 
 
 def _lengths(path: Path, values: npt.ArrayLike, what: str, where: str) -> FloatArray:
@@ -209,7 +231,9 @@ def _lengths(path: Path, values: npt.ArrayLike, what: str, where: str) -> FloatA
     array = np.asarray(values)
     if array.dtype.kind not in "biuf":
         raise ReadError(f"{path}{where}: expected numbers for {what}, found {array.dtype}")
-    lengths = array.astype(np.float64)
-    if np.any(np.isfinite(lengths) & (np.abs(lengths) > MOST)):
+    lengths = array.astype(np.float64, copy=False)
+    # two passes without a temporary array settle it for sound dumps
+    usual = lengths.size == 0 or (lengths.min() >= -MOST and lengths.max() <= MOST)
+    if not usual and np.any(np.isfinite(lengths) & (np.abs(lengths) > MOST)):
         raise ReadError(f"{path}{where}: {what} above {MOST:g} cannot be a length")
     return lengths

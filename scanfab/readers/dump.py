@@ -10,8 +10,9 @@ import io
 import mmap
 import re
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,17 +20,20 @@ import numpy.typing as npt
 
 from scanfab.cell import Cell
 from scanfab.errors import PackingError, ReadError, ScanfabWarning
+from scanfab.packing import LazyColumns
 from scanfab.readers.base import Snapshot
 from scanfab.readers.box import box_of_bounds, box_vectors
 from scanfab.readers.columns import MOST
 from scanfab.readers.files import plain
+from scanfab.readers.regular import LARGE, TextTable, read_regular
 
-__all__ = ["DumpBlock", "index_dump", "read_block", "row_word"]
+__all__ = ["DumpBlock", "index_dump", "read_block", "read_columns", "row_word"]
 
 FloatArray = npt.NDArray[np.float64]
 
 # a snapshot's header never comes near this size, whatever the number of columns
 HEADER_BYTES = 1 << 16
+STEP_KEY = b"ITEM: TIMESTEP"
 COUNT_KEY = re.compile(rb"^ITEM: NUMBER OF (\S+)[ \t]*\r?$", re.MULTILINE)
 
 # also spaces of latin1, as numpy has them
@@ -103,40 +107,112 @@ def read_block(snapshot: Snapshot) -> DumpBlock:
     ReadError
         If the header or a line is not as it should be; names the line.
     """
-    path = snapshot.path
-    with open(plain(path), "rb") as stream:
-        stream.seek(snapshot.start)
-        size = None if snapshot.stop is None else snapshot.stop - snapshot.start
-        block = stream.read() if size is None else stream.read(size)
-    where = f"{path}" if snapshot.step is None else f"{path}, step {snapshot.step}"
-    sections, body = _sections(where, block)
+    where, sections, body = _header(snapshot)
     count = _count(where, sections)
-    names = body.names
-    values = _values(path, snapshot, block, body, count)
-    if names and count and values.shape[1] != len(names):
-        raise ReadError(
-            f"{where}: the header names {len(names)} columns, the lines have {values.shape[1]}"
-        )
-    if not count:
-        values = np.zeros((0, len(names)))
-    return DumpBlock(snapshot.step, snapshot.time, _cell(where, sections), names, values)
+    columns = _regular(snapshot, body, count, range(len(body.names)))
+    values = _tolerant(snapshot, body, count) if columns is None else np.column_stack(columns)
+    return DumpBlock(snapshot.step, snapshot.time, _cell(where, sections), body.names, values)
+
+
+def read_columns(
+    snapshot: Snapshot, needed: Callable[[Sequence[str]], Sequence[str]]
+) -> tuple[LazyColumns, Cell | None]:
+    """
+    The columns of a snapshot by name, and its cell; of repeated names the first counts.
+
+    Of a large snapshot only the columns are parsed that ``needed`` chooses from their names; the
+    others wait until they are asked for.
+
+    Raises
+    ------
+    ReadError
+        If the header or a line is not as it should be; names the line.
+    """
+    where, sections, body = _header(snapshot)
+    count, cell = _count(where, sections), _cell(where, sections)
+    chosen = [body.names.index(name) for name in needed(body.names)]
+    found = _regular(snapshot, body, count, chosen)
+    if found is None:
+        values = _tolerant(snapshot, body, count)
+        chosen = [body.names.index(name) for name in dict.fromkeys(body.names)]
+        found = [values[:, place] for place in chosen]
+    ready = {body.names[place]: values for place, values in zip(chosen, found, strict=True)}
+    return LazyColumns(body.names, ready, partial(_read_column, snapshot)), cell
+
+
+def _read_column(snapshot: Snapshot, name: str) -> FloatArray:
+    where, sections, body = _header(snapshot)
+    count, place = _count(where, sections), body.names.index(name)
+    found = _regular(snapshot, body, count, [place])
+    return _tolerant(snapshot, body, count)[:, place] if found is None else found[0]
 
 
 @dataclass(frozen=True)
 class _Body:
     names: list[str]
     start: int
+    """Bytes from the start of the snapshot to its first row."""
+    lines: int
+    """Lines from the start of the snapshot to its first row."""
+
+
+def _header(snapshot: Snapshot) -> tuple[str, dict[str, list[str]], _Body]:
+    """How messages name the snapshot, the sections of its header, and its body."""
+    step = "" if snapshot.step is None else f", step {snapshot.step}"
+    where = f"{snapshot.path}{step}"
+    with open(plain(snapshot.path), "rb") as stream:
+        stream.seek(snapshot.start)
+        head = stream.read(HEADER_BYTES)
+    if snapshot.stop is not None:
+        head = head[: snapshot.stop - snapshot.start]
+    return where, *_sections(where, head)
+
+
+def _regular(
+    snapshot: Snapshot, body: _Body, count: int, places: Sequence[int]
+) -> list[FloatArray] | None:
+    """Columns of a large snapshot with one blank between two words; None if it is not so."""
+    path = plain(snapshot.path)
+    stop = path.stat().st_size if snapshot.stop is None else snapshot.stop
+    start = snapshot.start + body.start
+    # a row has at least a digit and a blank for each column
+    possible = body.names and 2 * count * len(body.names) <= stop - start
+    if not possible or stop - start < LARGE:
+        return None
+    lines = body.lines + (_lines_before(snapshot) if snapshot.start else 0)
+    return read_regular(TextTable(path, start, stop, lines, len(body.names), count), places)
+
+
+def _tolerant(snapshot: Snapshot, body: _Body, count: int) -> FloatArray:
+    """All numbers of a snapshot with any white space; says what is wrong in which line."""
+    path, names = snapshot.path, body.names
+    if count == 0:
+        return np.zeros((0, len(names)))
+    with open(plain(path), "rb") as stream:
+        stream.seek(snapshot.start)
+        size = None if snapshot.stop is None else snapshot.stop - snapshot.start
+        block = stream.read() if size is None else stream.read(size)
+    values = _values(path, snapshot, block, body, count)
+    if names and values.shape[1] != len(names):
+        raise ReadError(
+            f"{path}, step {snapshot.step}: the header names {len(names)} columns, the lines have "
+            f"{values.shape[1]}"
+        )
+    return values
 
 
 def _starts(data: mmap.mmap) -> list[int]:
     """Where snapshots begin: UNITS and TIME may stand before TIMESTEP."""
-    starts, place = [], data.find(b"ITEM: TIMESTEP")
-    while place >= 0:
-        if place == 0 or data[place - 1 : place] in (b"\n", b"\xbf"):
+    starts = []
+    # a single byte is found much faster than a word, and rows hold no colon
+    colon = data.find(b":")
+    while colon >= 0:
+        place = max(colon - len(b"ITEM"), 0)
+        begins = place == 0 or data[place - 1 : place] in (b"\n", b"\xbf")
+        if begins and data[place : place + len(STEP_KEY)] == STEP_KEY:
             before = BEFORE_STEP.search(data[max(place - 300, 0) : place])
             starts.append(place - len(before[0]) if before else place)
-        place = data.find(b"\nITEM: TIMESTEP", place + 1)
-        place += place >= 0
+        colon = data.find(b":", colon + 1)
     return starts
 
 
@@ -169,7 +245,7 @@ def _sections(where: str, block: bytes) -> tuple[dict[str, list[str]], _Body]:
     """The header's sections by key, and the body: the first section whose key has no known word."""
     sections: dict[str, list[str]] = {}
     word, place = None, 0
-    for line in block[:HEADER_BYTES].splitlines(keepends=True):
+    for lines, line in enumerate(block[:HEADER_BYTES].splitlines(keepends=True), start=1):
         place += len(line)
         text = line.decode("utf-8", "replace").strip().removeprefix("\ufeff")
         if not text.startswith("ITEM:"):
@@ -180,7 +256,7 @@ def _sections(where: str, block: bytes) -> tuple[dict[str, list[str]], _Body]:
         if key.startswith("NUMBER OF "):
             word = key.removeprefix("NUMBER OF ")
         elif word is not None and key.split()[:1] == [word]:
-            return sections, _Body(key.split()[1:], place)
+            return sections, _Body(key.split()[1:], place, lines)
         sections[key] = []
     raise ReadError(f"{where}: the header is incomplete: no ITEM: {word or 'ATOMS'} line")
 
@@ -198,16 +274,14 @@ def _count(where: str, sections: dict[str, list[str]]) -> int:
 
 def _values(path: Path, snapshot: Snapshot, block: bytes, body: _Body, count: int) -> FloatArray:
     """The numbers of the body; columns of text come out as NaN."""
-    if count == 0:
-        return np.zeros((0, len(body.names)))
-    available = block.count(b"\n", body.start) + 1
+    available = block.count(b"\n", body.start)
     if count > available:
         raise ReadError(
             f"{path}, step {snapshot.step}: the header counts {count} rows, but the file ends "
-            f"after about {available - 1}: the snapshot is incomplete"
+            f"after {available} complete lines: the snapshot is incomplete"
         )
-    # numpy warns of lines without a word
-    rows = BLANK.sub(b"", block[body.start :])
+    # a line without an end may lack digits; numpy warns of lines without a word
+    rows = BLANK.sub(b"", block[body.start : block.rfind(b"\n") + 1])
     if not rows.strip():
         raise ReadError(
             f"{path}, step {snapshot.step}: the header counts {count} rows, found none: "

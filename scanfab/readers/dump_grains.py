@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 
 from scanfab.readers.base import FileKind, GrainTable, ReadOptions, Snapshot
-from scanfab.readers.columns import grain_table, has_radius
-from scanfab.readers.dump import read_block, row_word
+from scanfab.readers.columns import grain_table, has_radius, needed_columns
+from scanfab.readers.dump import read_columns, row_word
 
 __all__ = ["dump_kind", "read_dump_grains"]
 
@@ -22,9 +23,5 @@ def dump_kind(head: bytes) -> FileKind:
 
 def read_dump_grains(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
     """Columns in any order and any subset that suffices; of repeated names the first counts."""
-    block = read_block(snapshot)
-    columns = {
-        name: block.values[:, place] for place, name in reversed(list(enumerate(block.names)))
-    }
-    ordered = {name: columns[name] for name in block.names}
-    return grain_table(snapshot.path, ordered, block.cell, options, f", step {snapshot.step}")
+    columns, cell = read_columns(snapshot, partial(needed_columns, options=options))
+    return grain_table(snapshot.path, columns, cell, options, f", step {snapshot.step}")

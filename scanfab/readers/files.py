@@ -12,6 +12,7 @@ import tempfile
 import zlib
 from collections import OrderedDict
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any
 
@@ -93,7 +94,11 @@ def temporary_copy(stream: IO[bytes], name: str) -> Path:
 def remove_copies() -> None:
     """Delete all temporary copies, at the end of the process."""
     for folder in _folder:
-        shutil.rmtree(folder, ignore_errors=True)
+        # under another name no thread that is still reading can put a copy into it
+        last = f"{folder}-removed"
+        with suppress(OSError):
+            os.rename(folder, last)
+        shutil.rmtree(last, ignore_errors=True)
 
 
 def _opener(path: Path) -> Callable[..., Any]:

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import KDTree
 
 from scanfab.errors import ReadError
 from scanfab.packing import ContactList
@@ -127,6 +126,8 @@ def _refuse_images(path: Path, grains: GrainTable, rows: IntArray, ends: FloatAr
     An image has two coordinates in common with its grain (in a cell that is not tilted), and lies
     at the distance of a contact; a wall's reference point does so by chance at most.
     """
+    from scipy.spatial import KDTree
+
     one = np.flatnonzero((rows < 0).sum(axis=1) == 1)
     if len(one) == 0 or len(grains.radius) < 2:
         return
@@ -156,6 +157,8 @@ def count_walls(rows: IntArray, count: int) -> IntArray:
 
 def _grains_at(grains: GrainTable, points: FloatArray) -> IntArray:
     """Rows of the grains whose centres are at the points; -1 where there is none."""
+    from scipy.spatial import KDTree
+
     position, radius, row = grains.position, grains.radius, np.arange(len(grains.position))
     if grains.cell is not None and grains.cell.is_periodic:
         points, position = grains.cell.wrap(points), grains.cell.wrap(position)

@@ -6,9 +6,17 @@ import numpy as np
 import pytest
 
 from scanfab.errors import ReadError, ScanfabWarning
+from scanfab.readers import dump
 from scanfab.readers.base import Snapshot
 from scanfab.readers.dump import index_dump, read_block, row_word
 from tests.dumps import ROWS, dump_text, write
+
+
+@pytest.fixture(autouse=True, params=["small", "large"])
+def size(request, monkeypatch):
+    """Every file as a small one, and as one large enough for the parser of regular tables."""
+    if request.param == "large":
+        monkeypatch.setattr(dump, "LARGE", 0)
 
 
 def only_block(path):
@@ -61,9 +69,13 @@ def test_a_byte_order_mark_does_not_matter(tmp_path):
     assert only_block(path).step == 3
 
 
-def test_the_last_line_of_a_single_snapshot_needs_no_end(tmp_path):
-    block = block_of(tmp_path, dump_text().rstrip())
-    np.testing.assert_array_equal(block.values, ROWS)
+def test_a_last_line_without_its_end_may_lack_digits(tmp_path):
+    whole = dump_text(end="\n")
+    for cut in (whole[:-1], whole[:-2]):
+        with pytest.raises(ReadError, match=r"counts 3 rows.*after 2 complete lines.*incomplete"):
+            block_of(tmp_path, cut)
+    with pytest.raises(ReadError, match=r"counts 3 rows, found 2: the snapshot is incomplete"):
+        block_of(tmp_path, whole[:-1].replace("\n2 1", "\n\n2 1"))
 
 
 def test_no_atoms_is_an_empty_block_with_its_names(tmp_path):

@@ -1,0 +1,144 @@
+"""
+Long tables of text with one blank between two words: parsed by polars, and only where it is needed.
+
+What is not regular (runs of blanks, tabs, words, lines of another width) is left to the tolerant
+parser of the format, which reads it or says what is wrong in which line.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["LARGE", "TextTable", "read_regular"]
+
+FloatArray = npt.NDArray[np.float64]
+
+# bytes; a smaller table is parsed before polars is loaded
+LARGE = 8 << 20
+# bytes that stay in a core's cache, with arrays that the allocator has at hand
+PIECE = 1 << 16
+BLANK, LINE_END = 32, 10
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """Where a table stands in an uncompressed file."""
+
+    path: Path
+    start: int
+    """First byte of the first row."""
+    stop: int
+    """Byte behind the last row."""
+    lines_before: int
+    """Lines of the file before the first row."""
+    width: int
+    """Number of columns."""
+    count: int
+    """Number of rows."""
+
+
+def read_regular(table: TextTable, places: Sequence[int]) -> list[FloatArray] | None:
+    """
+    Some columns of a table; None if it is not regular.
+
+    Every number is the double nearest to the text, as Python's float() has it.
+
+    Parameters
+    ----------
+    table : TextTable
+        What to read.
+    places : sequence of int
+        The columns, from 0.
+
+    Returns
+    -------
+    list of ndarray or None
+        An array of shape (count,) for each place.
+    """
+    behind = _ends_with_blank(table)
+    with ThreadPoolExecutor(1) as pool:
+        # numpy and polars both let go of Python's lock
+        spaces = pool.submit(_count_spaces, table)
+        columns = _parse(table, places, behind)
+        expected = table.count * (table.width + behind), table.count * behind
+        return columns if spaces.result() == expected else None
+
+
+def _count_spaces(table: TextTable) -> tuple[int, int]:
+    """
+    The number of blanks, line ends and other white space, and how often one follows another.
+
+    If both are what single blanks make, and no line lacks its last word, no line has a word more
+    either, and what polars takes for columns are the words of the line.
+    """
+    piece = np.empty(PIECE + 1, np.uint8)
+    piece[0] = LINE_END
+    left, spaces, pairs = table.stop - table.start, 0, 0
+    with open(table.path, "rb", buffering=0) as file:
+        file.seek(table.start)
+        while left > 0:
+            size = file.readinto(piece[1 : 1 + min(left, PIECE)].data)
+            if not size:
+                break
+            space = piece[: size + 1] <= BLANK
+            spaces += int(np.count_nonzero(space[1:]))
+            pairs += int(np.count_nonzero(space[:-1] & space[1:]))
+            left -= size
+            piece[0] = piece[size]
+    # a last line without its end may lack digits
+    return (spaces, pairs) if piece[0] == LINE_END else (-1, -1)
+
+
+def _parse(table: TextTable, places: Sequence[int], behind: bool) -> list[FloatArray] | None:
+    """The columns as polars sees them; None if a line has too few, or a word is no number."""
+    import polars
+
+    names = [f"{place}" for place in range(table.width)]
+    schema: dict[str, Any] = dict.fromkeys(names, polars.Float64)
+    if behind:
+        schema["behind"] = polars.String
+    wanted = list(dict.fromkeys([*(names[place] for place in places), names[-1]]))
+    # a file is parsed where it lies; a part of it has to be taken out
+    whole = table.stop == os.path.getsize(table.path)
+    try:
+        frame = (
+            polars.scan_csv(
+                table.path if whole else _bytes(table),
+                has_header=False,
+                separator=" ",
+                quote_char=None,
+                schema=schema,
+                skip_lines=table.lines_before if whole else 0,
+                n_rows=table.count,
+                truncate_ragged_lines=True,  # blanks are counted elsewhere
+                glob=False,
+            )
+            .select(wanted)
+            .collect()
+        )
+    except polars.exceptions.PolarsError:
+        return None
+    if frame.height < table.count or any(frame.null_count().row(0)):
+        return None
+    return [frame[names[place]].to_numpy() for place in places]
+
+
+def _ends_with_blank(table: TextTable) -> bool:
+    """Whether the first row does: polars sees an empty word behind it."""
+    with open(table.path, "rb") as file:
+        file.seek(table.start)
+        return file.readline().endswith(b" \n")
+
+
+def _bytes(table: TextTable) -> bytes:
+    with open(table.path, "rb") as file:
+        file.seek(table.start)
+        return file.read(table.stop - table.start)

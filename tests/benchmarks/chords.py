@@ -1,0 +1,279 @@
+"""The sweep of one direction against its floor, a list per line, and Embree."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+import tempfile
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+from numba import njit
+
+from scanfab.directions import DirectionRule
+from scanfab.scan import Solids, line_frames, scan_lines
+from tests.benchmarks.packings import PAPER, dense
+from tests.benchmarks.timing import interleaved, table
+
+HERE = Path(__file__).parent
+SPACING = 0.05
+CUTOFF = 0.5
+AXIS = np.array([[0.36, 0.48, 0.8]])
+RULE = DirectionRule("one", AXIS, np.ones(1), None, turned=False)
+EMBREE_LIMIT = 110.0
+
+
+def rv_solids() -> Solids:
+    """The grains of the paper's sample that reach into the RV of 0.7."""
+    position, radius = dense(PAPER)
+    extent = (position + radius[:, None]).max(axis=0) - (position - radius[:, None]).min(axis=0)
+    window = 0.7 * 0.5 * extent.min()
+    near = np.linalg.norm(position, axis=1) < window + radius
+    removed = np.random.default_rng(1).random(near.sum()) < 0.1
+    return Solids(position[near], radius[near], removed, float(window))
+
+
+def sweep(solids, variants="c", directions=1, workers=1):
+    """One replicate a direction."""
+    return scan_lines(
+        solids,
+        RULE,
+        spacing=SPACING,
+        cutoff=CUTOFF,
+        variants=variants,
+        replicates=range(directions),
+        workers=workers,
+    )
+
+
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=True)
+def chord_rows(v, radius, first, spacing, lines):
+    """Rows that a sphere meets."""
+    low = int(np.ceil((v - radius - first) / spacing))
+    high = int(np.floor((v + radius - first) / spacing)) + 1
+    return max(low, 0), min(high, lines)
+
+
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=True)
+def chord_span(u, reach, wide, first, spacing):
+    """Lines of a row that a sphere meets inside the window."""
+    left, right = max(u - reach, -wide), min(u + reach, wide)
+    if left >= right:
+        return 0, 0
+    return int(np.ceil((left - first) / spacing)), int(np.floor((right - first) / spacing)) + 1
+
+
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=True)
+def roots(u, reach2, first, spacing, low, high):
+    """The floor of a row."""
+    total = 0.0
+    for i in range(np.uint64(low), np.uint64(high)):
+        du = first - u + spacing * np.int64(i)
+        total += np.sqrt(max(reach2 - du * du, 0.0))
+    return total
+
+
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=True)
+def floor(u, v, radius, first, spacing, lines, window):
+    """The square roots of all chords on the lines that meet the window, and how many there are."""
+    total, count = 0.0, 0
+    for k in range(u.size):
+        low, high = chord_rows(v[k], radius[k], first, spacing, lines)
+        for row in range(low, high):
+            y = first + row * spacing
+            reach2 = radius[k] * radius[k] - (y - v[k]) * (y - v[k])
+            wide = np.sqrt(max(window * window - y * y, 0.0))
+            start, stop = chord_span(u[k], np.sqrt(max(reach2, 0.0)), wide, first, spacing)
+            if start < stop:
+                total += roots(u[k], reach2, first, spacing, start, stop)
+                count += stop - start
+    return total, count
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def list_chords(u, v, depth, radius, first, spacing, lines, window, filled, starts, ends):
+    """Put each line's chords behind one another; with no room for them, only count."""
+    for k in range(u.size):
+        low, high = chord_rows(v[k], radius[k], first, spacing, lines)
+        for row in range(low, high):
+            y = first + row * spacing
+            reach2 = radius[k] * radius[k] - (y - v[k]) * (y - v[k])
+            wide = np.sqrt(max(window * window - y * y, 0.0))
+            left, right = chord_span(u[k], np.sqrt(max(reach2, 0.0)), wide, first, spacing)
+            for line in range(row * lines + left, row * lines + right):
+                if starts.size > 0:
+                    du = first - u[k] + spacing * (line - row * lines)
+                    half = np.sqrt(max(reach2 - du * du, 0.0))
+                    starts[filled[line]] = depth[k] - half
+                    ends[filled[line]] = depth[k] + half
+                filled[line] += 1
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def merge(starts, ends, half, cutoff):
+    """Length and number of the kept gaps of a line."""
+    length, kept, solid = 0.0, 0, -half
+    for k in np.argsort(starts):
+        gap = min(starts[k], half) - solid
+        if gap >= cutoff:
+            length, kept = length + gap, kept + 1
+        solid = max(solid, ends[k])
+    if half - solid >= cutoff:
+        length, kept = length + half - solid, kept + 1
+    return length, kept
+
+
+@njit(nogil=True, cache=True, error_model="numpy")
+def list_per_line(u, v, depth, radius, first, spacing, lines, window, cutoff):
+    """Lists of the chords of every line, sorted and merged; length and number of kept gaps."""
+    filled, none = np.zeros(lines * lines, np.int64), np.empty(0)
+    list_chords(u, v, depth, radius, first, spacing, lines, window, filled, none, none)
+    stops = np.cumsum(filled)
+    filled = stops - filled
+    starts, ends = np.empty(stops[-1]), np.empty(stops[-1])
+    list_chords(u, v, depth, radius, first, spacing, lines, window, filled, starts, ends)
+    length, kept, begin = 0.0, 0, 0
+    for line in range(lines * lines):
+        x, y = first + line % lines * spacing, first + line // lines * spacing
+        half2 = window * window - x * x - y * y
+        if half2 > 0.0:
+            part = slice(begin, stops[line])
+            found = merge(starts[part], ends[part], np.sqrt(half2), cutoff)
+            length, kept = length + found[0], kept + found[1]
+        begin = stops[line]
+    return length, kept
+
+
+class Projected:
+    """The spheres along the axis, and the grid over the window."""
+
+    def __init__(self, solids: Solids) -> None:
+        u, v, depth = line_frames(AXIS)[0] @ solids.position.T
+        order = np.argsort(depth)
+        self.u, self.v, self.depth = u[order], v[order], depth[order]
+        self.radius = solids.radius[order]
+        self.lines = int(2 * solids.window_radius / SPACING)
+        self.grid = (-0.5 * self.lines * SPACING, SPACING, self.lines, solids.window_radius)
+
+    def floor(self, part: slice = slice(None)):
+        return floor(self.u[part], self.v[part], self.radius[part], *self.grid)
+
+    def floor_in_threads(self, threads: int):
+        with ThreadPoolExecutor(threads) as pool:
+            return list(pool.map(lambda _: self.floor(), range(threads)))
+
+    def list_per_line(self):
+        return list_per_line(self.u, self.v, self.depth, self.radius, *self.grid, CUTOFF)
+
+
+def floor_in_c(projected: Projected, folder: Path):
+    """The same loop compiled by gcc; None if there is none."""
+    if shutil.which("gcc") is None:
+        return None
+    library = folder / "floor.so"
+    # the order of a sum may be any, as for Numba
+    flags = ["-O3", "-march=native", "-fno-math-errno", "-fassociative-math", "-fno-signed-zeros"]
+    flags += ["-fno-trapping-math", "-ffinite-math-only", "-shared", "-fPIC"]
+    command = ["gcc", *flags, str(HERE / "floor.c"), "-o", str(library), "-lm"]
+    subprocess.run(command, check=True)
+    function = ctypes.CDLL(str(library)).floor_c
+    double = ctypes.c_double
+    function.restype = double
+    arrays = [a.ctypes.data_as(ctypes.c_void_p) for a in (projected.u, projected.v)]
+    arrays.append(projected.radius.ctypes.data_as(ctypes.c_void_p))
+    first, spacing, lines, window = projected.grid
+    rest = (double(first), double(spacing), ctypes.c_long(lines), double(window))
+    return lambda: function(ctypes.c_long(projected.u.size), *arrays, *rest)
+
+
+def embree(projected: Projected, folder: Path):
+    """Nanoseconds a chord of Embree, or why it was not measured."""
+    program = folder / "embree"
+    source = str(HERE / "embree.cpp")
+    flags = ["-O3", "-march=native", source, "-o", str(program), "-lembree3"]
+    if shutil.which("g++") is None:
+        return "no g++"
+    if subprocess.run(["g++", *flags], capture_output=True, check=False).returncode:
+        return "Embree 3 is not installed (Debian: libembree-dev)"
+    spheres = np.column_stack([projected.u, projected.v, projected.depth, projected.radius])
+    spheres.astype(np.float32).tofile(folder / "spheres")
+    words = [str(word) for word in (*projected.grid, CUTOFF)]
+    done = subprocess.run(
+        [str(program), str(folder / "spheres"), *words], capture_output=True, text=True, check=True
+    )
+    seconds, hits, kept = (float(word) for word in done.stdout.split())
+    return seconds, int(hits), int(kept)
+
+
+def run(repeats: int) -> dict[str, str]:
+    """The sections ``chords``, ``variants`` and ``threads``."""
+    solids = rv_solids()
+    projected = Projected(solids)
+    count = projected.floor()[1]
+    with tempfile.TemporaryDirectory() as name:
+        return {
+            "chords": _chords(solids, projected, count, Path(name), repeats),
+            "variants": _variants(solids, repeats),
+            "threads": _threads(solids, projected, repeats),
+        }
+
+
+def _chords(solids, projected, count, folder, repeats):
+    ways = {
+        "scanfab, variant c": lambda: sweep(solids),
+        "floor: only the square roots (Numba)": projected.floor,
+        "list per line, sorted and merged (Numba)": projected.list_per_line,
+    }
+    in_c = floor_in_c(projected, folder)
+    if in_c is not None:
+        ways["the same floor in C, gcc -O3 -march=native"] = in_c
+    rays: list[tuple[float, int, int]] = []
+    said = embree(projected, folder)
+    if not isinstance(said, str):
+        ways["Embree 3, 16 rays a packet, all hits"] = lambda: rays.append(
+            embree(projected, folder)
+        )
+    seconds = interleaved(ways, repeats, clock=time.process_time)
+    if rays:  # without the time to load and build
+        seconds["Embree 3, 16 rays a packet, all hits"] = float(np.median([r[0] for r in rays]))
+    base = seconds["floor: only the square roots (Numba)"]
+    rows = [
+        (name, f"{1e9 * value / count:.2f}", f"{value / base:.2f}")
+        for name, value in sorted(seconds.items(), key=lambda item: item[1])
+    ]
+    if isinstance(said, str):
+        rows.append(("Embree 3", f"skipped: {said}", "-"))
+    elif 1e9 * seconds["Embree 3, 16 rays a packet, all hits"] / count > EMBREE_LIMIT:
+        rows.append((f"(Embree is badly used above {EMBREE_LIMIT:.0f} ns)", "", ""))
+    note = f"\n\n{len(solids.radius):,} grains reach into the RV; {count:,} chords."
+    return table(["way", "ns a chord", "of the floor"], rows) + note
+
+
+def _variants(solids, repeats):
+    position, radius = dense(PAPER)
+    removed = np.random.default_rng(1).random(PAPER) < 0.1
+    whole = Solids(position, radius, removed, solids.window_radius)
+    seconds = interleaved(
+        {variants: lambda v=variants: sweep(whole, v) for variants in ("a", "abcd")},
+        repeats,
+        clock=time.process_time,
+    )
+    rows = [(name, f"{value / seconds['a']:.2f}") for name, value in seconds.items()]
+    return table(["variants in one pass", "time of a alone"], rows)
+
+
+def _threads(solids, projected, repeats):
+    ways = {
+        "scanfab 1": lambda: sweep(solids, directions=1),
+        "scanfab 2": lambda: sweep(solids, directions=2, workers=2),
+        "floor 1": lambda: projected.floor_in_threads(1),
+        "floor 2": lambda: projected.floor_in_threads(2),
+    }
+    seconds = interleaved(ways, repeats)
+    gain = {name: 2 * seconds[f"{name} 1"] / seconds[f"{name} 2"] for name in ("scanfab", "floor")}
+    rows = [(name, f"{value:.2f}") for name, value in gain.items()]
+    rows.append(("scanfab / floor", f"{gain['scanfab'] / gain['floor']:.2f}"))
+    return table(["two threads", "of one"], rows)

@@ -1,0 +1,56 @@
+"""
+Dense packings of the paper's sizes: radii uniform from 0.5 to 1.5, solid fraction 0.6.
+
+Random centres in a small periodic cell, pushed apart where grains overlap until little overlap is
+left; a larger packing is made of copies of the cell, of which the cube in the middle is kept.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+import scanfab
+
+PAPER = 13_723
+CELL = 1_250
+SOLID_FRACTION = 0.6
+STEPS = 200
+
+
+@cache
+def relaxed_cell() -> tuple[np.ndarray, np.ndarray, float]:
+    """Positions, radii and edge of the periodic cell."""
+    random = np.random.default_rng(0)
+    radius = random.uniform(0.5, 1.5, CELL)
+    edge = float(np.cbrt(4 / 3 * np.pi * np.sum(radius**3) / SOLID_FRACTION))
+    position = edge * random.random((CELL, 3))
+    cell = scanfab.Cell([edge] * 3)
+    for _ in range(STEPS):
+        packing = scanfab.find_contacts(scanfab.Packing(position, radius, cell=cell))
+        contacts = packing.contacts
+        one, two = contacts.pairs.T
+        branch = packing.position[two] - packing.position[one] + edge * contacts.image
+        overlap = radius[one] + radius[two] - np.linalg.norm(branch, axis=1)
+        push = 0.5 * overlap[:, None] * contacts.normal
+        position = packing.position.copy()
+        np.add.at(position, one, -push)
+        np.add.at(position, two, push)
+    return position, radius, edge
+
+
+def dense(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Positions about the origin, and radii."""
+    position, radius, edge = relaxed_cell()
+    copies = int(np.ceil(np.cbrt(count / CELL))) + 1
+    steps = edge * np.stack(np.meshgrid(*3 * [np.arange(copies)]), axis=-1).reshape(-1, 1, 3)
+    position = (position + steps).reshape(-1, 3) - 0.5 * copies * edge
+    radius = np.tile(radius, copies**3)
+    order = np.argpartition(np.abs(position).max(axis=1), count - 1)[:count]
+    return position[order], radius[order]
+
+
+def dense_packing(count: int) -> scanfab.Packing:
+    """With its contacts, found by geometry."""
+    return scanfab.find_contacts(scanfab.Packing(*dense(count)))

@@ -1,0 +1,64 @@
+"""
+All benchmarks by one command; see docs/performance.md.
+
+python tests/benchmarks/run.py [--only chords reading ...] [--repeats 5] [--largest] [-w]
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import platform
+import subprocess
+import sys
+from importlib import import_module
+from importlib.metadata import version
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+GROUPS = ("chords", "scaling", "startup", "reading")
+PACKAGES = ("scanfab", "numpy", "numba", "polars")
+
+
+def machine() -> str:
+    """Date, processor and versions."""
+    name = platform.processor() or platform.machine()
+    cpus = "?"
+    if sys.platform == "linux":
+        lines = subprocess.run(["lscpu"], capture_output=True, text=True, check=True).stdout
+        found = dict(line.split(":", 1) for line in lines.splitlines() if ":" in line)
+        name, cpus = found.get("Model name", name).strip(), found.get("CPU(s)", "?").strip()
+    versions = ", ".join(f"{package} {version(package)}" for package in PACKAGES)
+    return (
+        f"{datetime.date.today()}, {name}, {cpus} cores, Python {platform.python_version()}, "
+        f"{versions}."
+    )
+
+
+def measure(group: str, repeats: int, largest: bool) -> dict[str, str]:
+    """The sections of a group of benchmarks."""
+    run = import_module(f"tests.benchmarks.{group}").run
+    found: dict[str, str] = run(repeats, largest) if group == "scaling" else run(repeats)
+    return found
+
+
+def main() -> None:
+    """Measure, print, and with --write renew the page."""
+    parser = argparse.ArgumentParser(description="Measure the ratios of docs/performance.md.")
+    parser.add_argument("--only", nargs="+", choices=GROUPS, default=GROUPS)
+    parser.add_argument("--repeats", type=int, default=5, help="runs of which the median counts")
+    parser.add_argument("--largest", action="store_true", help="ten million grains too")
+    parser.add_argument("-w", "--write", action="store_true", help="renew the tables of the page")
+    given = parser.parse_args()
+    sys.path[0] = str(ROOT)  # not this folder, whose modules have common names
+    timing = import_module("tests.benchmarks.timing")
+    for group in given.only:
+        for name, text in measure(group, given.repeats, given.largest).items():
+            dated = f"{machine()}\n\n{text}"
+            print(f"\n## {name}\n\n{dated}", flush=True)
+            if given.write:
+                timing.write_section(name, dated)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,57 @@
+"""Medians of interleaved runs, and the tables of docs/performance.md."""
+
+from __future__ import annotations
+
+import gc
+import re
+import statistics
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+ENOUGH = 10.0
+PAGE = Path(__file__).parents[2] / "docs" / "performance.md"
+
+
+def interleaved(
+    ways: Mapping[str, Callable[[], object]],
+    repeats: int,
+    warm: bool = True,
+    clock: Callable[[], float] = time.perf_counter,
+) -> dict[str, float]:
+    """
+    Median seconds of each way: one run of each in turn, so that all share the machine's moods.
+
+    Ways that take milliseconds have more turns, until the median is not a matter of luck. What runs
+    in one thread is measured by ``time.process_time``: other work on the machine matters less.
+    """
+    if warm:
+        for way in ways.values():
+            way()
+    seconds: dict[str, list[float]] = {name: [] for name in ways}
+    began, turns = time.perf_counter(), 0
+    while turns < repeats or (warm and time.perf_counter() - began < ENOUGH):
+        turns += 1
+        for name, way in ways.items():
+            gc.collect()
+            start = clock()
+            way()
+            seconds[name].append(clock() - start)
+    return {name: statistics.median(values) for name, values in seconds.items()}
+
+
+def table(titles: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    """A Markdown table."""
+    lines = [titles, ["---"] * len(titles), *rows]
+    return "\n".join("| " + " | ".join(map(str, line)) + " |" for line in lines)
+
+
+def write_section(name: str, text: str) -> None:
+    """Replace what stands between the markers of a section of the page."""
+    page = PAGE.read_text(encoding="utf-8")
+    begin, end = f"<!-- {name} -->\n", f"\n<!-- end of {name} -->"
+    pattern = re.compile(re.escape(begin) + ".*?" + re.escape(end), re.DOTALL)
+    changed, count = pattern.subn(lambda _: begin + text + end, page)
+    if count != 1:
+        raise SystemExit(f"{PAGE}: expected one section {name}, found {count}")
+    PAGE.write_text(changed, encoding="utf-8")

@@ -1,0 +1,157 @@
+"""Where compiled kernels are kept, what users are told, and runs that can keep nothing."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import pytest
+
+import scanfab.kernels.sweep
+from scanfab.kernels import cache
+from tests.dumps import cubic_rows, dump_text, write
+
+ROOT = Path(__file__).parents[2]
+# the contacts need a kernel, and only a small one
+PROGRAM = [
+    sys.executable,
+    "-c",
+    "import sys; from scanfab.cli.main import main; main(['inspect', *sys.argv[1:]])",
+]
+SAID = "scanfab: compiling the scan"
+NOWHERE = "/proc/none"
+
+
+@pytest.fixture
+def dump(tmp_path):
+    return write(tmp_path / "grains.dump", dump_text(cubic_rows(), box=((0, 4),) * 3))
+
+
+def start(dump, cache_home, *, package=ROOT, **environment):
+    """A process that needs a kernel."""
+    inherited = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
+    temporary = dump.parent / "temporary"
+    temporary.mkdir(exist_ok=True)
+    return subprocess.Popen(
+        [*PROGRAM, str(dump)],
+        env={
+            **inherited,
+            "PYTHONPATH": str(package),
+            "PYTHONDONTWRITEBYTECODE": "1",
+            "TMPDIR": str(temporary),
+            "XDG_CACHE_HOME": str(cache_home),
+            **environment,
+        },
+        cwd=package,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def words_of(process):
+    """What a process says on standard error; it must end well."""
+    _, words = process.communicate(timeout=300)
+    assert process.returncode == 0, words
+    assert "Traceback" not in words
+    return words
+
+
+def kept_in(folder):
+    return sorted(path.name for path in Path(folder).rglob("*.nb?"))
+
+
+only_linux = pytest.mark.skipif(sys.platform != "linux", reason="needs XDG_CACHE_HOME and /proc")
+
+
+@only_linux
+def test_the_first_run_says_that_it_compiles_and_the_second_need_not(dump, tmp_path):
+    home = tmp_path / "cache"
+    first = words_of(start(dump, home))
+    assert first.count(SAID) == 1
+    assert "once for each user and version" in first
+    assert len(kept_in(home)) >= 2
+    assert SAID not in words_of(start(dump, home))
+    assert list((tmp_path / "temporary").iterdir()) == []
+
+
+@only_linux
+def test_eight_processes_that_start_cold_all_succeed(dump, tmp_path):
+    home = tmp_path / "cache"
+    processes = [start(dump, home) for _ in range(8)]
+    for process in processes:
+        words_of(process)
+    assert SAID not in words_of(start(dump, home))
+
+
+@only_linux
+def test_a_package_that_nobody_can_write_to_is_no_obstacle(dump, tmp_path):
+    package = tmp_path / "package"
+    shutil.copytree(
+        ROOT / "scanfab", package / "scanfab", ignore=shutil.ignore_patterns("__pycache__")
+    )
+    # not even root makes a folder where a file is
+    (package / "scanfab" / "kernels" / "__pycache__").write_text("")
+    home = tmp_path / "cache"
+    assert SAID in words_of(start(dump, home, package=package))
+    assert SAID not in words_of(start(dump, home, package=package))
+    assert kept_in(package) == []
+
+
+@only_linux
+@pytest.mark.parametrize("given", [{}, {"NUMBA_CACHE_DIR": NOWHERE}])
+def test_without_a_home_it_compiles_for_itself_and_leaves_nothing(dump, tmp_path, given):
+    words = words_of(start(dump, NOWHERE, HOME=NOWHERE, **given))
+    assert "cannot be kept: NUMBA_CACHE_DIR may name" in words
+    assert list((tmp_path / "temporary").iterdir()) == []
+
+
+@only_linux
+def test_a_failed_run_leaves_nothing_either(dump, tmp_path):
+    process = start(write(dump, dump_text(cubic_rows()).replace("0.", "x", 20)), NOWHERE)
+    process.communicate(timeout=300)
+    assert process.returncode == 1
+    assert list((tmp_path / "temporary").iterdir()) == []
+
+
+def test_numbas_own_variable_counts(dump, tmp_path):
+    home = tmp_path / "cache"
+    words_of(start(dump, tmp_path / "unused", NUMBA_CACHE_DIR=str(home)))
+    assert kept_in(home)
+    assert not (tmp_path / "unused").exists()
+
+
+def test_functions_of_others_are_kept_where_they_were():
+    assert scanfab.kernels.sweep
+    assert os.environ.get("NUMBA_CACHE_DIR", "") == numba.config.CACHE_DIR
+
+
+def test_another_kernel_means_another_folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(cache, "__file__", str(tmp_path / "cache.py"))
+    folders = set()
+    for text in ("a", "b", "a"):
+        (tmp_path / "kernel.py").write_text(text)
+        folders.add(cache._usual_folder())
+    assert len(folders) == 2
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs permissions")
+def test_a_folder_that_others_can_write_to_is_not_trusted(tmp_path):
+    folder = tmp_path / "cache"
+    assert cache._is_private(folder)
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+    folder.chmod(0o777)
+    assert not cache._is_private(folder)
+
+
+def test_a_full_disk_is_seen_before_kernels_are_compiled(tmp_path, monkeypatch):
+    def full(**_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(cache.tempfile, "TemporaryFile", full)
+    assert not cache._is_writable(tmp_path)

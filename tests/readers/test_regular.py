@@ -1,0 +1,151 @@
+"""The parser of long regular tables against the tolerant one: the same numbers, or none."""
+
+from __future__ import annotations
+
+import random
+import struct
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab.errors import ReadError
+from scanfab.readers import dump, regular
+from scanfab.readers.regular import TextTable, read_regular
+from tests.dumps import ROWS, dump_text, write
+
+WIDTH = 3
+
+
+def columns_of(path, text, places=(0, 2), count=2):
+    """What the parser says of the columns of a file that is nothing but rows."""
+    path.write_bytes(text)
+    return read_regular(TextTable(path, 0, len(text), 0, WIDTH, count), places)
+
+
+@pytest.mark.parametrize("end", [b" \n", b"\n"])
+def test_regular_rows_are_read(tmp_path, end):
+    found = columns_of(tmp_path / "a", b"1 2 3" + end + b"4 5 6" + end)
+    np.testing.assert_array_equal(found, [[1, 4], [3, 6]])
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        pytest.param(b"1 2 3 \n4  5 6 \n", id="two blanks"),
+        pytest.param(b"1 2 3 \n  5 6 \n", id="a value blanked out"),
+        pytest.param(b"1 2 3 \n4 5 6  7 \n", id="a word behind two blanks"),
+        pytest.param(b" 1 2 3 \n4 5 6 \n", id="leading blank"),
+        pytest.param(b"1\t2 2 3 \n4 5 6 \n", id="tab"),
+        pytest.param(b"1 2 3 \r\n4 5 6 \r\n", id="CRLF"),
+        pytest.param(b"1 2 3 \n4 5 6", id="no line end"),
+        pytest.param(b"1 2 3 \n4 5 \n", id="word missing"),
+        pytest.param(b"1 2 3 \n4 5 6 7\n", id="word too many"),
+        pytest.param(b"1 2 3\n4 5 6 7 8\n", id="words too many"),
+        pytest.param(b"1 2 3 \n4 5 six \n", id="word"),
+        pytest.param(b'1 2 3 \n"4" 5 6 \n', id="quotes"),
+        pytest.param(b"1 2 3 \n\n4 5 6 \n", id="blank line"),
+        pytest.param(b"1 2 3 \n", id="row missing"),
+        pytest.param(b"1 2 3 \n4 5 6 \n7 8 9 \n", id="row too many"),
+        pytest.param(b"1 2 3 4\n5 6 \n", id="word in the line before"),
+    ],
+)
+def test_what_is_not_regular_is_left_to_the_tolerant_parser(tmp_path, text):
+    assert columns_of(tmp_path / "a", text) is None
+
+
+def test_irregularities_are_seen_across_pieces(tmp_path, monkeypatch):
+    monkeypatch.setattr(regular, "PIECE", 4)
+    text = b"1 2 3 \n4 5 6 \n"
+    assert columns_of(tmp_path / "a", text) is not None
+    for place in range(len(text)):
+        spoilt = text[:place] + b" " + text[place:]
+        assert columns_of(tmp_path / "a", spoilt) is None, place
+
+
+def number(generator):
+    """The text of a number as programs write them."""
+    bits = struct.unpack("d", struct.pack("Q", generator.getrandbits(64)))[0]
+    value = generator.gauss(0, 1) * 10 ** generator.randint(-30, 30)
+    shape = generator.choice(["%g", "%.17g", "%.20e", "%.1f"])
+    return generator.choice([repr(bits), f"{bits:.17g}", shape % value, "-nan", "inf"])
+
+
+def test_every_number_is_the_nearest_double(tmp_path):
+    generator = random.Random(0)
+    words = [number(generator) for _ in range(3 * 20_000)]
+    rows = [" ".join(words[k : k + 3]) for k in range(0, len(words), 3)]
+    found = columns_of(tmp_path / "a", ("\n".join(rows) + "\n").encode(), (0, 1, 2), len(rows))
+    right = np.array([float(word) for word in words]).reshape(-1, 3).T
+    np.testing.assert_array_equal(found, right)
+
+
+def test_ids_are_exact_up_to_two_to_the_53(tmp_path):
+    text = b"%d 0 %d \n%d 0 0 \n" % (2**53, 2**53 - 1, 2**53 - 2)
+    found = columns_of(tmp_path / "a", text)
+    assert [int(id) for id in [*found[0], found[1][0]]] == [2**53, 2**53 - 2, 2**53 - 1]
+
+
+@pytest.mark.parametrize("seed", range(300))
+def test_damaged_tables_give_the_numbers_of_the_tolerant_parser(tmp_path, seed):
+    generator = random.Random(seed)
+    text = bytearray(b"".join(b"%d 0.5 1e-3 \n" % k for k in range(1, 6)))
+    for _ in range(generator.randint(1, 3)):
+        place = generator.randrange(len(text))
+        size = generator.choice([0, 1, 1, 5])
+        text[place : place + size] = generator.choice([b"", b" ", b"\n", b"7", b"x", b".", b"\t"])
+    places = (0, 1, 2)
+    found = columns_of(tmp_path / "a", bytes(text), places, count=5)
+    if found is not None:
+        right = np.loadtxt(tmp_path / "a", ndmin=2, max_rows=5, comments=None)
+        np.testing.assert_array_equal(np.transpose(found), right)
+
+
+@pytest.fixture
+def large(monkeypatch):
+    """All dumps count as large."""
+    monkeypatch.setattr(dump, "LARGE", 0)
+
+
+def counted(monkeypatch):
+    """The columns that are parsed, call by call."""
+    calls = []
+
+    def read(table, places):
+        calls.append(list(places))
+        return read_regular(table, places)
+
+    monkeypatch.setattr(dump, "read_regular", read)
+    return calls
+
+
+@pytest.mark.usefixtures("large")
+def test_other_columns_are_parsed_when_they_are_asked_for(tmp_path, monkeypatch):
+    calls = counted(monkeypatch)
+    rows = [(*row, 0.25 * row[0]) for row in ROWS]
+    text = dump_text(rows, "id type x y z radius vz")
+    packing = scanfab.read(write(tmp_path / "a.dump", dump_text(step=1) + text), frame=1)
+    assert list(packing.columns) == ["type", "vz"]
+    assert calls == [[0, 1, 2, 3, 4, 5]]
+    np.testing.assert_array_equal(packing.columns["vz"], [0.25, 0.5, 0.75])
+    np.testing.assert_array_equal(packing.columns["vz"], [0.25, 0.5, 0.75])
+    assert calls[1:] == [[6]]
+    with pytest.raises(ValueError, match="read-only"):
+        packing.columns["vz"][0] = 1
+
+
+@pytest.mark.usefixtures("large")
+def test_a_word_in_a_column_that_is_asked_for_later_names_its_line(tmp_path):
+    rows = [(*ROWS[0], 1.0), (*ROWS[1], "oops"), (*ROWS[2], 1.0)]
+    text = dump_text([(*row[:6], row[6], 0) for row in rows], "id type x y z radius vz c")
+    packing = scanfab.read(write(tmp_path / "a.dump", text))
+    with pytest.raises(ReadError, match=r"line 11: expected a number, found 'oops'"):
+        packing.columns["vz"]
+
+
+@pytest.mark.parametrize("count", [10**15, 10**30])
+@pytest.mark.usefixtures("large")
+def test_a_count_beyond_the_file_is_refused_at_once(tmp_path, count):
+    text = dump_text().replace("ATOMS\n3\n", f"ATOMS\n{count}\n")
+    with pytest.raises(ReadError, match=f"counts {count} rows.*incomplete"):
+        scanfab.read(write(tmp_path / "a.dump", text))
