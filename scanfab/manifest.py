@@ -18,7 +18,7 @@ __all__ = ["asked_for", "manifest"]
 
 PACKAGES = (
     "scanfab", "numpy", "numba", "scipy", "meshio", "pyvista", "click", "rich", "h5py",
-    "matplotlib", "jinja2",
+    "matplotlib", "jinja2", "polars",
 )  # fmt: skip
 
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial.transform import Rotation
 
 from scanfab.directions import DirectionRule
 from scanfab.errors import SettingsError
@@ -191,9 +190,23 @@ def turned_frames(
     of the spacing (shape (D, 2)).
     """
     random = np.random.default_rng([seed, replicate])
-    rotation = Rotation.random(rng=random).as_matrix()
+    rotation = _random_rotation(random)
     offsets = random.random((len(rule), 2))
     return (frames @ rotation.T if rule.turned else frames), offsets
+
+
+def _random_rotation(random: np.random.Generator) -> FloatArray:
+    """A rotation matrix out of all, each as likely: from a random unit quaternion."""
+    # SciPy has this too, but takes as long to import as a small frame to compute
+    quaternion = random.normal(size=4)
+    x, y, z, w = quaternion / np.linalg.norm(quaternion)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def _scan_frames(

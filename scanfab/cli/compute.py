@@ -198,7 +198,7 @@ def compute(
             _write_manifest(path, asked, series, told.texts)
         if plot is not None:
             _draw(plot, figure, run)
-    return 0 if run.found and not told.skipped else 1
+    return 0 if run.found and not told.skipped and not run.skipped else 1
 
 
 def _check_figure(plot: Path | None, figure: str | None) -> None:
@@ -247,6 +247,8 @@ class _Run:
         self.resume = resume
         self.found = False
         """Whether any row has a void fabric."""
+        self.skipped = False
+        """Whether an earlier run has skipped frames."""
         self.kept: list[dict[str, Any]] = []
         """The rows, if they are wanted."""
         self._keep = keep
@@ -255,7 +257,22 @@ class _Run:
     def before(self, done: list[dict[str, Any]]) -> None:
         """Rows of an earlier run."""
         self.found = any(row["alpha_vs"] is not None for row in done)
+        self.skipped = self._has_gaps(done)
         self.kept = list(done) if self._keep else []
+
+    def _has_gaps(self, done: list[dict[str, Any]]) -> bool:
+        """Whether an earlier run has skipped frames between those that it has written."""
+        from scanfab.pipeline import chosen_frames
+
+        for one in self.series:
+            written = {row["frame"] for row in done if row["source"] == one.name}
+            if not written:
+                continue
+            chosen = chosen_frames(one, self.settings.frames)
+            due = range(chosen.start, max(written) + 1, chosen.step)
+            if len(due) > len(written):
+                return True
+        return False
 
     def rows(self, last: dict[str, Any] | None) -> Iterator[Row]:
         """The rows behind the last one that an earlier run has written."""

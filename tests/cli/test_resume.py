@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import signal
 import sys
 import threading
@@ -156,6 +157,30 @@ def test_a_part_whose_settings_are_lost_is_refused(compute, stopped, capsys):
     Path(f"{output}.manifest.json.part").unlink()
     assert compute(output, "--resume") == 2
     assert "was made with other settings" in capsys.readouterr().err
+
+
+def test_frames_that_an_earlier_run_skipped_are_not_forgotten(short_series, tmp_path, monkeypatch):
+    """Exit code 1, as without the interruption."""
+    damaged = shutil.copytree(short_series, tmp_path / "damaged")
+    second = sorted(path for path in damaged.iterdir() if path.is_file())[1]
+    second.write_text("ITEM: TIMESTEP\n")
+    output, rows, write = tmp_path / "table.csv", [], CsvWriter.write
+    words = ["compute", str(damaged), *FAST, "--on-error", "skip", "-o", str(output)]
+
+    def interrupted(self, row):
+        rows.append(row)
+        if len(rows) == 5:
+            raise KeyboardInterrupt
+        write(self, row)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(CsvWriter, "write", interrupted)
+        assert run(words) == 130
+    _wait_for_frames_under_way()
+    assert run([*words, "--resume"]) == 1
+    whole = tmp_path / "whole.csv"
+    assert run([*words[:-1], str(whole)]) == 1
+    assert output.read_bytes() == whole.read_bytes()
 
 
 def test_resume_needs_a_file(short_series, capsys):
