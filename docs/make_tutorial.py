@@ -44,7 +44,9 @@ def page_with_outputs(page: str, folder: Path) -> str:
                 check=False,
             )
             shown = command.replace("\\\n", "\\\n> ")
-            parts.append(f"$ {shown}\n{done.stdout}")
+            # said once on each machine
+            output = re.sub(r"^scanfab: compiling .*\n", "", done.stdout, flags=re.MULTILINE)
+            parts.append(f"$ {shown}\n{output}")
         return "```console\n" + "".join(parts) + "```"
 
     return BLOCK.sub(run, page)

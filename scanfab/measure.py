@@ -298,6 +298,9 @@ class _Columns:
 
     def _solid_fraction(self) -> float | None:
         """1 - void length / line length in the window, weighted like the directions."""
+        cell = self.sample.packing.cell
+        if not self.variant.in_window and not (cell is not None and all(cell.periodic)):
+            return None
         weights = self.plan.rule.weights
         length = float(weights @ self.sums.line_length[:, self.which].sum(axis=0))
         if length == 0:

@@ -82,6 +82,8 @@ def lies_within(cell: Cell, position: FloatArray, low: float, high: float) -> bo
     if not cell.is_periodic or len(position) == 0:
         return True
     sides = [(column.min(), column.max()) for column in position.T]
+    if not np.all(np.isfinite(sides)):
+        return False
     fractions = cell.fractional(list(product(*sides)))[:, list(cell.periodic)]
     return bool(np.all((fractions >= low) & (fractions < high)))
 

@@ -26,7 +26,7 @@ BoolArray = npt.NDArray[np.bool_]
 
 # a line that has met nothing along so many cells stays in a channel; more where cells are small
 MOST_CELLS = 64
-MOST_GRAINS = 4000
+MOST_GRAINS = 1000
 # how far beyond the prism solids are listed at once, in mean radii; longer gaps are followed alone
 BEYOND = 10.0
 
@@ -244,6 +244,28 @@ def entry(
 
 
 @njit(nogil=True, cache=True)
+def way_out(grains: CellGrains, frame: FloatArray, u: float, v: float) -> float:
+    """The depth at which a line leaves the sample through a face that does not repeat, or FAR."""
+    last = FAR
+    for k in range(3):
+        if grains.periodic[k]:
+            continue
+        face = cross(grains.vectors[(k + 1) % 3], grains.vectors[(k + 2) % 3])
+        face /= np.sqrt(dot(face, face))
+        low, high = FAR, -FAR
+        for g in range(grains.radius.size):
+            place = dot(grains.position[g], face)
+            low, high = min(low, place - grains.radius[g]), max(high, place + grains.radius[g])
+        here = u * dot(frame[0], face) + v * dot(frame[1], face)
+        rise = dot(frame[2], face)
+        if rise > 0.0:
+            last = min(last, (high - here) / rise)
+        elif rise < 0.0:
+            last = min(last, (low - here) / rise)
+    return last
+
+
+@njit(nogil=True, cache=True)
 def next_solid(
     grains: CellGrains, prism: Prism, second: bool, u: float, v: float, after: float
 ) -> float:
@@ -260,10 +282,11 @@ def next_solid(
         largest = max(largest, radius)
     margin = largest * prism.slope
     place = (after - prism.rise_u * u - prism.rise_v * v) / prism.length - margin
+    last = way_out(grains, frame, u, v) + 2.0 * largest
     found = FAR
     for cells in range(max(MOST_CELLS, MOST_GRAINS // max(grains.radius.size, 1))):
-        # spheres that are so far away begin behind what was found
-        if (found - after) / prism.length + 2.0 * margin < cells:
+        # spheres that are so far away begin behind what was found, or outside the sample
+        if (min(found, last) - after) / prism.length + 2.0 * margin < cells:
             break
         for g in range(grains.radius.size):
             if second and grains.removed[g]:

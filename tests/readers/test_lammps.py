@@ -310,7 +310,11 @@ def test_a_data_file_holds_no_contacts(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("\n700\n", "\n701\n", "the header counts 701 rows, found 700"),
+        (
+            "\n700\n",
+            "\n701\n",
+            "the header counts 701 rows, but the file ends after 700 complete lines",
+        ),
         ("\n700\n", "\n999999999999\n", "the header counts 999999999999 rows"),
         ("0.0013", "text", r"line \d+: expected a number, found 'text'"),
         ("0.0013", "nan", "position and radius must be finite numbers"),
