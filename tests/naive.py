@@ -217,15 +217,8 @@ def axial(tensor, axis):
     return along - (1 - along) / 2
 
 
-def periodic_gaps(position, radius, vectors, periods, foot, direction, measured, longest=150.0):
-    """
-    Gaps of one line through a periodic medium, from a list of images as far as the longest gap.
-
-    With a measured length, those that start in it; else all between the first and last solid.
-    """
-    if len(radius) == 0:
-        return []
-    low, high = (-3.0, max(measured, 1.0) + longest) if measured else (-60.0, 60.0)
+def periodic_solids(position, radius, vectors, periods, foot, direction, low, high):
+    """The union of the solids on a line through a periodic medium, from low to high and around."""
     heights = 1 / np.linalg.norm(np.linalg.inv(vectors), axis=0)
     around = [
         np.arange(-n, n + 1) if period else np.zeros(1)
@@ -236,16 +229,25 @@ def periodic_gaps(position, radius, vectors, periods, foot, direction, measured,
     cells = np.unique(np.where(periods, cells, 0.0), axis=0)
     spread = np.array(list(product(*around)))
     shifts = np.unique((cells[:, None] + spread).reshape(-1, 3), axis=0)
-    home = (
-        position
-        - np.where(periods, np.floor((position - position[0]) @ np.linalg.inv(vectors)), 0.0)
-        @ vectors
-    )
+    turns = np.floor((position - position[0]) @ np.linalg.inv(vectors))
+    home = position - np.where(periods, turns, 0.0) @ vectors
     images = (home[None] + (shifts @ vectors)[:, None]).reshape(-1, 3)
     radii = np.tile(radius, len(shifts))
     depth = (images - foot) @ direction
     inside = (depth > low) & (depth < high)
-    solids = union(chords(images[inside], radii[inside], foot, direction))
+    return union(chords(images[inside], radii[inside], foot, direction))
+
+
+def periodic_gaps(position, radius, vectors, periods, foot, direction, measured, longest=150.0):
+    """
+    Gaps of one line through a periodic medium, from a list of images as far as the longest gap.
+
+    With a measured length, those that start in it; else all between the first and last solid.
+    """
+    if len(radius) == 0:
+        return []
+    low, high = (-3.0, max(measured, 1.0) + longest) if measured else (-60.0, 60.0)
+    solids = periodic_solids(position, radius, vectors, periods, foot, direction, low, high)
     return [
         after[0] - before[1]
         for before, after in pairwise(solids)

@@ -148,6 +148,26 @@ def test_gaps_that_start_anywhere_are_the_gaps_of_the_medium():
     assert error < 0.03 * row.mean_length
 
 
+def test_solid_runs_are_as_many_as_void_segments():
+    """At cut-off 0: mean solid run = ℓ (1 - porosity) / porosity."""
+    position, radius, vectors = loose(7, 110)
+    row = compute(
+        Packing(position, radius, cell=Cell(vectors)), variants="a", cutoff=0.0, tolerance=1e-3
+    )[0]
+    random, runs = np.random.default_rng(4), []
+    for _ in range(500):
+        normal = random.normal(size=3)
+        normal /= np.linalg.norm(normal)
+        foot = random.random(3) @ vectors
+        line = naive.periodic_solids(position, radius, vectors, (1, 1, 1), foot, normal, -5.0, 20.0)
+        runs += [end - start for start, end in line if 0 <= start < 8.0]
+    porosity = 1 - row.solid_fraction
+    error = np.std(runs) / np.sqrt(len(runs))
+    expected = row.mean_length * (1 - porosity) / porosity
+    assert np.mean(runs) == pytest.approx(expected, abs=5 * error)
+    assert error < 0.03 * expected
+
+
 def test_lines_in_channels_are_counted_in_a_warning():
     """Simple cubic along its edges, which the literal rules look along."""
     packing = crystal(BASES["simple cubic"], 0.3)

@@ -165,3 +165,17 @@ def test_the_binary_format_is_refused_with_advice(tmp_path):
 def test_a_save_is_no_contact_list_for_others():
     with pytest.raises(ReadError, match="expected contacts, found none"):
         scanfab.read(YADE / "periodic_pack.txt", contacts=PERIODIC)
+
+
+def test_contact_fabric_is_what_yade_computes_itself():
+    """utils.fabricTensor() of YADE 2023.02a, after O.load of the same file."""
+    packing = scanfab.read(PERIODIC)
+    yades = [
+        [0.3447425639495811933, 0.01556076543761630675, 0.01238750215078152084],
+        [0.01556076543761630675, 0.3262522875107742859, -0.009056572267288032566],
+        [0.01238750215078152084, -0.009056572267288032566, 0.3290051485396444098],
+    ]
+    # YADE takes the normals of the last step, scanfab the saved positions
+    assert scanfab.contact_fabric(packing.contacts.normal).matrix == pytest.approx(
+        np.array(yades), abs=5e-7
+    )
