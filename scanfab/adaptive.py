@@ -131,9 +131,10 @@ def _missing_work(sums: ScanSums, plan: Plan, settings: Settings) -> float:
         elif segments.any() and plan.auto == "replicates" and sums.replicates < 256:
             # a direction without any segment may still get one
             return GROWTH
-    if missing <= 1.0:
-        return missing
-    # the replicates' own scatter decides, but it is too noisy to say how much is missing
+    # the replicates' own scatter is what is reported, but too noisy to decide alone: a scan that
+    # stops at the first low value of it would claim too small an error
+    if max(missing, expected) <= 1.0:
+        return 1.0
     return max(1.05 * expected, min(missing, 1.1))
 
 
