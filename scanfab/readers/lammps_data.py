@@ -122,7 +122,7 @@ def _cell(path: Path, header: list[str]) -> Cell | None:
     """The box, from its low and high corner and its tilt, or from three vectors."""
     found: dict[str, list[float]] = {}
     for line in header[1:]:
-        numbers = re.match(r"((?:\s*[-+.\deE]+)+)\s+([a-z][a-z ]*)", line)
+        numbers = re.match(r"\s*([-+.\deE][-+.\deE\s]*)\s([a-z][a-z ]*)", line)
         if numbers is not None:
             try:
                 found[numbers[2].strip()] = [float(word) for word in numbers[1].split()]

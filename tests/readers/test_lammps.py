@@ -337,3 +337,12 @@ def test_a_truncated_dump_is_an_error(tmp_path, part):
     path.write_bytes(data[: int(part * len(data))])
     with pytest.raises(scanfab.ScanfabError):
         scanfab.read(path, format="lammps")
+
+
+def test_a_header_of_many_digits_is_read_at_once(tmp_path):
+    """Its lines once took longer by a factor of two for each digit."""
+    path = tmp_path / "grains.data"
+    head = "LAMMPS data file via write_data\n\n1 atoms\n"
+    path.write_text(f"{head}0 {'9' * 4000}\n\nAtoms # sphere\n\n")
+    with pytest.raises(ReadError):
+        scanfab.read(path)
