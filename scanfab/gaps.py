@@ -154,7 +154,7 @@ def scan_gaps(
         if solids.medium is not None:
             normals = np.ascontiguousarray(turned[:, 2])
             kernel.tally_cell_gaps(
-                solids.medium, normals, offsets, spacing, affine, least, wanted, sums
+                solids.medium, normals, offsets, spacing, affine[0], least, wanted, sums
             )
             in_lines = wanted & [False, False, True, True]
         kernel.tally_gaps(

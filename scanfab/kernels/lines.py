@@ -6,12 +6,11 @@ For the lines that the sweep cannot solve, and where the gaps themselves are wan
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 import numpy.typing as npt
 from numba import njit
 
+from scanfab.kernels.projection import Spheres, sort_by, span, sphere_at
 from scanfab.kernels.sweep import (
     BOUND,
     END,
@@ -19,69 +18,16 @@ from scanfab.kernels.sweep import (
     SET,
     TALLY_SIZE,
     Flag,
-    Sphere,
     Strip,
     add,
     counted,
     moved,
 )
 
-__all__ = [
-    "Spheres",
-    "chords_of",
-    "list_chords",
-    "solve_closed",
-    "sort_by",
-    "span",
-    "sphere_at",
-    "sweep_line",
-]
+__all__ = ["chords_of", "solids_of", "solve_closed"]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
-BoolArray = npt.NDArray[np.bool_]
-
-
-class Spheres(NamedTuple):
-    """Projected spheres, ordered by depth; some are not in the second set of solids."""
-
-    u: FloatArray
-    v: FloatArray
-    depth: FloatArray
-    radius: FloatArray
-    removed: BoolArray
-
-
-@njit(nogil=True, cache=True, inline="always")
-def sphere_at(spheres: Spheres, k: int) -> Sphere:
-    """Sphere k."""
-    return Sphere(spheres.u[k], spheres.v[k], spheres.depth[k], spheres.radius[k])
-
-
-@njit(nogil=True, cache=True, inline="always")
-def span(
-    centre: float, reach: float, first: float, per_spacing: float, count: int
-) -> tuple[int, int]:
-    """Range of the lines within ``reach`` of a centre, along one side of the grid."""
-    low = int(np.ceil((centre - reach - first) * per_spacing))
-    high = int(np.floor((centre + reach - first) * per_spacing)) + 1
-    return max(low, 0), min(high, count)
-
-
-@njit(nogil=True, cache=True)
-def sort_by(values: FloatArray, members: IntArray) -> None:
-    """Order some indices by their values, in place (Shell's sort, which suits few of them)."""
-    gap = 1
-    while gap < members.size // 9:
-        gap = 3 * gap + 1
-    while gap > 0:
-        for i in range(gap, members.size):
-            moving, j = members[i], i
-            while j >= gap and values[members[j - gap]] > values[moving]:
-                members[j] = members[j - gap]
-                j -= gap
-            members[j] = moving
-        gap //= 3
 
 
 @njit(nogil=True, cache=True)
@@ -98,28 +44,28 @@ def list_chords(
     List the chords of the lines that have a number >= 0, in the order of depth.
 
     ``number`` has shape (rows, columns). ``filled[number]`` is the place of a line's next chord in
-    ``chords`` (shape (M, 2)); with no room there (M = 0) the chords are only counted.
+    ``chords`` (shape (2, M)); with no room there (M = 0) the chords are only counted.
     """
     for k in chosen:
         if which == 1 and spheres.removed[k]:
             continue
         u, v, depth, radius = sphere_at(spheres, k)
-        rows = span(v, radius, strip.first_v, strip.per_spacing, strip.rows)
+        rows = span(v, radius, strip.first_v, strip.per_spacing, 0, strip.rows)
         for row in range(rows[0], rows[1]):
             dv = strip.first_v + row * strip.spacing - v
             reach2 = radius * radius - dv * dv
             reach = np.sqrt(max(reach2, 0.0))
             first_u = strip.first_u + row * strip.shear
-            columns = span(u, reach, first_u, strip.per_spacing, strip.columns)
+            columns = span(u, reach, first_u, strip.per_spacing, strip.low[row], strip.high[row])
             for column in range(columns[0], columns[1]):
                 line = number[row, column]
                 du = first_u + column * strip.spacing - u
                 if line < 0 or reach2 < du * du:
                     continue
-                if chords.shape[0] > 0:
+                if chords.shape[1] > 0:
                     half_chord = np.sqrt(reach2 - du * du)
-                    chords[filled[line], 0] = depth - half_chord
-                    chords[filled[line], 1] = depth + half_chord
+                    chords[0, filled[line]] = depth - half_chord
+                    chords[1, filled[line]] = depth + half_chord
                 filled[line] += 1
 
 
@@ -128,20 +74,41 @@ def chords_of(
     spheres: Spheres, chosen: IntArray, which: int, strip: Strip, number: IntArray, count: int
 ) -> tuple[IntArray, FloatArray]:
     """The chords of numbered lines: the start of each line's list (and the end), and the lists."""
-    counted = np.zeros(count, np.int64)
-    list_chords(spheres, chosen, which, strip, number, counted, np.empty((0, 2)))
-    start = np.zeros(count + 1, np.int64)
+    # lists begin where those before them end, so the first filling leaves the second its places
+    stop = np.zeros(count + 2, np.int64)
+    list_chords(spheres, chosen, which, strip, number, stop[2:], np.empty((2, 0)))
     for line in range(count):
-        start[line + 1] = start[line] + counted[line]
-    chords = np.empty((start[-1], 2))
-    if start[-1] > 0:
-        list_chords(spheres, chosen, which, strip, number, start[:-1].copy(), chords)
-    return start, chords
+        stop[line + 2] += stop[line + 1]
+    chords = np.empty((2, stop[count + 1]))
+    if chords.shape[1] > 0:
+        list_chords(spheres, chosen, which, strip, number, stop[1:], chords)
+    return stop, chords
+
+
+@njit(nogil=True, cache=True)
+def solids_of(chords: FloatArray, order: IntArray, solids: FloatArray) -> int:
+    """
+    The union of a line's chords, shape (2, K), into the first places of ``solids``; their number.
+
+    ``order`` is room for K numbers.
+    """
+    for k in range(order.size):
+        order[k] = k
+    sort_by(chords[0], order)
+    count = 0
+    for k in order:
+        if count > 0 and chords[0, k] <= solids[1, count - 1]:
+            solids[1, count - 1] = max(solids[1, count - 1], chords[1, k])
+        else:
+            solids[0, count], solids[1, count] = chords[0, k], chords[1, k]
+            count += 1
+    return count
 
 
 @njit(nogil=True, cache=True)
 def sweep_line(
     chords: FloatArray,
+    order: IntArray,
     bound: float,
     least: float,
     tally: FloatArray,
@@ -151,7 +118,7 @@ def sweep_line(
     measured: float | None,
 ) -> float:
     """
-    The sweep of one line, as far as it goes; where its last solid ends.
+    The sweep of one line's chords in an order, as far as it goes; where its last solid ends.
 
     Chords ordered by their middles: what the sweep tallies, and nothing more once the line is
     closed. Chords ordered by their starts: exact, as none of them can reach back.
@@ -159,10 +126,10 @@ def sweep_line(
     end, low, high = -FAR, -FAR, -FAR
     if whole is None:
         end = -bound
-    for k in range(chords.shape[0] + 1):
-        is_last = k == chords.shape[0]
-        start = FAR if is_last else chords[k, 0]
-        stop = FAR if is_last else chords[k, 1]
+    for k in range(order.size + 1):
+        is_last = k == order.size
+        start = FAR if is_last else chords[0, order[k]]
+        stop = FAR if is_last else chords[1, order[k]]
         if end < FAR and start > end:
             add(tally, which, counted(True, low, high, least, bound, whole, window, measured))
             if is_last and window is not None:
@@ -202,13 +169,11 @@ def solve_closed(
     wrong = np.zeros((2, TALLY_SIZE))
     right = np.zeros((2, TALLY_SIZE))
     for line in range(closed):
-        met = chords[start[line] : start[line + 1]]
+        order = np.arange(start[line], start[line + 1])
         bound = lines[places[line] + BOUND]
-        sweep_line(met, bound, least, wrong, which, whole, window, measured)
-        order = np.arange(met.shape[0])
-        sort_by(met[:, 0], order)
-        met = met[order]
-        end = sweep_line(met, bound, least, right, which, whole, window, measured)
+        sweep_line(chords, order, bound, least, wrong, which, whole, window, measured)
+        sort_by(chords[0], order)
+        end = sweep_line(chords, order, bound, least, right, which, whole, window, measured)
         lines[places[line] + SET * np.uint64(which) + END] = end
     for entry in range(TALLY_SIZE):
         tally[which, entry] += right[which, entry] - wrong[which, entry]

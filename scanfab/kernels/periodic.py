@@ -16,17 +16,14 @@ import numpy as np
 import numpy.typing as npt
 from numba import njit
 
-from scanfab.kernels.lines import Spheres
-from scanfab.kernels.sweep import FAR
+from scanfab.kernels.grid import Grid, cover
+from scanfab.kernels.projection import Spheres, order_of
 
-__all__ = ["CellGrains", "Prism", "images_in", "next_solid", "prism_along"]
+__all__ = ["CellGrains", "Prism", "cell_grid", "cross", "dot", "prism_along", "shifts"]
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
-# a line that has met nothing along so many cells stays in a channel; more where cells are small
-MOST_CELLS = 64
-MOST_GRAINS = 1000
 # how far beyond the prism solids are listed at once, in mean radii; longer gaps are followed alone
 BEYOND = 10.0
 
@@ -125,10 +122,10 @@ def fill_images(
     grains: CellGrains, prism: Prism, beyond: float, extent: FloatArray, spheres: Spheres
 ) -> int:
     """
-    The images of grains that may meet a line of the prism, or their number if there is no room.
+    The images of grains that may meet a line of the prism, as many as there is room for.
 
-    ``extent`` (least and greatest v, least and greatest u along the skew) bounds the face where an
-    axis is not periodic; where ``spheres`` is empty it is found.
+    Returns their number, also of those without room. ``extent`` (least and greatest v, least and
+    greatest u along the skew) becomes what bounds the face where an axis is not periodic.
     """
     frame = prism.frame
     a, b, c = (
@@ -137,45 +134,41 @@ def fill_images(
         grains.vectors[prism.third],
     )
     along_a, along_b = dot(a, frame[2]), dot(b, frame[2])
-    step = 1.0
-    if dot(c, frame[2]) - prism.rise_u * dot(c, frame[0]) - prism.rise_v * dot(c, frame[1]) < 0.0:
-        step = -1.0
+    c_u, c_v, c_n = dot(c, frame[0]), dot(c, frame[1]), dot(c, frame[2])
+    step = 1.0 if c_n - prism.rise_u * c_u - prism.rise_v * c_v > 0.0 else -1.0
     skew = prism.skew_u / prism.base_v
     wide = np.sqrt(1.0 + skew * skew)
+    room = spheres.u.size
     count = 0
     for g in range(grains.radius.size):
         x, r = grains.position[g], grains.radius[g]
         u0, v0, n0 = dot(x, frame[0]), dot(x, frame[1]), dot(x, frame[2])
         height = (n0 - prism.rise_u * u0 - prism.rise_v * v0) / prism.length
-        reach = r * prism.slope
         layer = 0, 1
         if grains.periodic[prism.third]:
-            layer = shifts(height, reach, 0.0, 1.0 + beyond, 1.0)
+            layer = shifts(height, r * prism.slope, 0.0, 1.0 + beyond, 1.0)
         for i in range(layer[0], layer[1]):
             k = i * step
-            u1 = u0 + k * dot(c, frame[0])
-            v1 = v0 + k * dot(c, frame[1])
-            n1 = n0 + k * dot(c, frame[2])
+            u1, v1, n1 = u0 + k * c_u, v0 + k * c_v, n0 + k * c_n
             over = 0, 1
             if grains.periodic[prism.second]:
                 over = shifts(v1, r, 0.0, prism.base_v, prism.base_v)
             for j in range(over[0], over[1]):
                 u2, v2, n2 = u1 + j * prism.skew_u, v1 + j * prism.base_v, n1 + j * along_b
                 aside = u2 - skew * v2
+                extent[0], extent[1] = min(extent[0], v2 - r), max(extent[1], v2 + r)
+                extent[2] = min(extent[2], aside - r * wide)
+                extent[3] = max(extent[3], aside + r * wide)
                 across = 0, 1
                 if grains.periodic[prism.first]:
                     across = shifts(aside, r * wide, 0.0, prism.base_u, prism.base_u)
                 for q in range(across[0], across[1]):
-                    if spheres.u.size > 0:
+                    if count < room:
                         spheres.u[count] = u2 + q * prism.base_u
                         spheres.v[count] = v2
                         spheres.depth[count] = n2 + q * along_a
                         spheres.radius[count] = r
                         spheres.removed[count] = grains.removed[g]
-                    else:
-                        extent[0], extent[1] = min(extent[0], v2 - r), max(extent[1], v2 + r)
-                        extent[2] = min(extent[2], aside - r * wide)
-                        extent[3] = max(extent[3], aside + r * wide)
                     count += 1
     return count
 
@@ -192,111 +185,48 @@ def images_in(grains: CellGrains, prism: Prism) -> tuple[Spheres, FloatArray]:
         mean += radius / grains.radius.size
     beyond = BEYOND * mean / prism.length
     extent = np.array([np.inf, -np.inf, np.inf, -np.inf])
-    nothing = np.empty(0)
-    empty = Spheres(nothing, nothing, nothing, nothing, np.empty(0, np.bool_))
-    count = fill_images(grains, prism, beyond, extent, empty)
-    found = Spheres(
-        np.empty(count),
-        np.empty(count),
-        np.empty(count),
-        np.empty(count),
-        np.empty(count, np.bool_),
-    )
-    if count > 0:
-        fill_images(grains, prism, beyond, extent, found)
+    # a good guess for small grains; where it is too low, the second round has enough
+    shell = 1.0 + beyond + 2.0 * mean * prism.slope
+    shell *= (1.0 + 2.0 * mean / prism.base_u) * (1.0 + 2.0 * mean / prism.base_v)
+    room, count = 0, int(1.1 * shell * grains.radius.size)
+    u = v = depth = radii = np.empty(0)
+    removed = np.empty(0, np.bool_)
+    while room < count:
+        room = count
+        u, v, depth, radii = np.empty(room), np.empty(room), np.empty(room), np.empty(room)
+        removed = np.empty(room, np.bool_)
+        count = fill_images(grains, prism, beyond, extent, Spheres(u, v, depth, radii, removed))
     if grains.periodic[prism.second]:
         extent[0], extent[1] = 0.0, prism.base_v
     if grains.periodic[prism.first]:
         extent[2], extent[3] = 0.0, prism.base_u
+    found = Spheres(u[:count], v[:count], depth[:count], radii[:count], removed[:count])
     return found, extent
 
 
 @njit(nogil=True, cache=True)
-def entry(
-    grains: CellGrains, prism: Prism, u: float, v: float, depth: float, r: float, after: float
-) -> float:
-    """
-    Where the axis u = v = 0 enters the images, in the plane of the face, of a sphere at a place.
-
-    Of those that it leaves behind a depth, the first; FAR if there is none.
-    """
-    normal = prism.frame[2]
-    found = FAR
-    over = 0, 1
-    if grains.periodic[prism.second]:
-        over = shifts(v, r, 0.0, 0.0, prism.base_v)
-    for j in range(over[0], over[1]):
-        v1, u1 = v + j * prism.base_v, u + j * prism.skew_u
-        reach2 = r * r - v1 * v1
-        across = 0, 1
-        if grains.periodic[prism.first]:
-            across = shifts(u1, np.sqrt(max(reach2, 0.0)), 0.0, 0.0, prism.base_u)
-        for q in range(across[0], across[1]):
-            u2 = u1 + q * prism.base_u
-            if reach2 > u2 * u2:
-                half = np.sqrt(reach2 - u2 * u2)
-                middle = depth + j * dot(grains.vectors[prism.second], normal)
-                middle += q * dot(grains.vectors[prism.first], normal)
-                # not by its end: that of the solid left behind is there, to rounding
-                if middle > after:
-                    found = min(found, middle - half)
-    return found
-
-
-@njit(nogil=True, cache=True)
-def way_out(grains: CellGrains, frame: FloatArray, u: float, v: float) -> float:
-    """The depth at which a line leaves the sample through a face that does not repeat, or FAR."""
-    last = FAR
-    for k in range(3):
-        if grains.periodic[k]:
-            continue
-        face = cross(grains.vectors[(k + 1) % 3], grains.vectors[(k + 2) % 3])
-        face /= np.sqrt(dot(face, face))
-        low, high = FAR, -FAR
-        for g in range(grains.radius.size):
-            place = dot(grains.position[g], face)
-            low, high = min(low, place - grains.radius[g]), max(high, place + grains.radius[g])
-        here = u * dot(frame[0], face) + v * dot(frame[1], face)
-        rise = dot(frame[2], face)
-        if rise > 0.0:
-            last = min(last, (high - here) / rise)
-        elif rise < 0.0:
-            last = min(last, (low - here) / rise)
-    return last
-
-
-@njit(nogil=True, cache=True)
-def next_solid(
-    grains: CellGrains, prism: Prism, second: bool, u: float, v: float, after: float
-) -> float:
-    """
-    Where the line through (u, v) enters the next solid behind a depth, which lies in void.
-
-    FAR if it stays in a channel. ``second``: of the grains that are not removed.
-    """
-    frame, c = prism.frame, grains.vectors[prism.third]
-    rise_c = dot(c, frame[2]) - prism.rise_u * dot(c, frame[0]) - prism.rise_v * dot(c, frame[1])
-    step = 1.0 if rise_c > 0.0 else -1.0
-    largest = 0.0
-    for radius in grains.radius:
-        largest = max(largest, radius)
-    margin = largest * prism.slope
-    place = (after - prism.rise_u * u - prism.rise_v * v) / prism.length - margin
-    last = way_out(grains, frame, u, v) + 2.0 * largest
-    found = FAR
-    for cells in range(max(MOST_CELLS, MOST_GRAINS // max(grains.radius.size, 1))):
-        # spheres that are so far away begin behind what was found, or outside the sample
-        if (min(found, last) - after) / prism.length + 2.0 * margin < cells:
-            break
-        for g in range(grains.radius.size):
-            if second and grains.removed[g]:
-                continue
-            x, r = grains.position[g], grains.radius[g]
-            u0, v0, n0 = dot(x, frame[0]), dot(x, frame[1]), dot(x, frame[2])
-            height = (n0 - prism.rise_u * u0 - prism.rise_v * v0) / prism.length
-            k = np.ceil(place + cells - height) * step
-            u1 = u0 + k * dot(c, frame[0]) - u
-            v1 = v0 + k * dot(c, frame[1]) - v
-            n1 = n0 + k * dot(c, frame[2])
-            found = min(found, entry(grains, prism, u1, v1, n1, r, after))
-    return found
+def cell_grid(
+    grains: CellGrains, normal: FloatArray, offset: FloatArray, spacing: float
+) -> tuple[Prism, Spheres, Grid]:
+    """The lines along a direction through a periodic medium, and the images that they may meet."""
+    prism = prism_along(normal, grains.vectors, grains.periodic)
+    found, extent = images_in(grains, prism)
+    order = order_of(found.depth)
+    spheres = Spheres(
+        found.u[order],
+        found.v[order],
+        found.depth[order],
+        found.radius[order],
+        found.removed[order],
+    )
+    face = cover(extent[2], extent[3], extent[0], extent[1], offset, spacing)
+    skew = prism.skew_u / prism.base_v
+    grid = Grid(
+        spacing,
+        face.first_u + skew * face.first_v,
+        face.first_v,
+        skew * spacing,
+        face.columns,
+        face.rows,
+    )
+    return prism, spheres, grid

@@ -56,6 +56,7 @@ __all__ = [
 ]
 
 FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
 Flag = Literal[True] | None
 Sums = tuple[float, float, float, float, float, float]
 
@@ -89,7 +90,8 @@ class Strip(NamedTuple):
     """
     Lines at (first_u + row * shear + column * spacing, first_v + row * spacing).
 
-    A row takes ``pitch`` places of a plane, which is ``columns`` and at least WIDTH more.
+    A row takes ``pitch`` places of a plane, which is ``columns`` and at least WIDTH more. Of each
+    row the columns from ``low`` to before ``high`` can count.
     """
 
     spacing: float
@@ -100,6 +102,8 @@ class Strip(NamedTuple):
     columns: int
     rows: int
     pitch: int
+    low: IntArray
+    high: IntArray
 
 
 class Sphere(NamedTuple):
@@ -249,8 +253,8 @@ def visit(
         reach2 = sphere.radius * sphere.radius - dv * dv
         reach = np.sqrt(max(reach2, 0.0))
         from_u = strip.first_u + row * strip.shear - sphere.u
-        first = max(int(np.ceil((-reach - from_u) * strip.per_spacing)), 0)
-        last = min(int(np.floor((reach - from_u) * strip.per_spacing)) + 1, strip.columns)
+        first = max(int(np.ceil((-reach - from_u) * strip.per_spacing)), strip.low[row])
+        last = min(int(np.floor((reach - from_u) * strip.per_spacing)) + 1, strip.high[row])
         chords += max(last - first, 0)
         vectors = (last - first + WIDTH - 1) // WIDTH
         from_u += first * strip.spacing

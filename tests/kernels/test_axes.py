@@ -6,6 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scanfab.kernels import axes, sweep
+from scanfab.kernels.grid import columns_in, cover, strip_of
+from scanfab.kernels.projection import order_of, project
 from scanfab.scan import line_frames
 from tests import naive
 from tests.lattices import ball_points, poisson_spheres, rotation
@@ -158,12 +160,10 @@ def suspect_lines(spheres, frame, offset, spacing, window):
     """How many lines the sweep of all spheres leaves to be solved again."""
     position, radius = spheres
     reach = np.linalg.norm(position, axis=1).max() + radius.max() + window
-    grid = axes.cover(-reach, reach, -reach, reach, offset, spacing)
-    projected = axes.project(position, radius, np.zeros(len(radius), bool), frame, grid)
+    grid = cover(-reach, reach, -reach, reach, offset, spacing)
+    projected = project(position, radius, np.zeros(len(radius), bool), frame, grid)
     pitch = grid.columns + sweep.WIDTH
-    strip = sweep.Strip(
-        spacing, 1 / spacing, grid.first_u, grid.first_v, 0.0, grid.columns, grid.rows, pitch
-    )
+    strip = strip_of(grid, *columns_in(grid, 0.0), 0, grid.rows, pitch)
     assert grid.rows * pitch <= sweep.MOST_LINES
     state, tally, every = (
         np.empty(sweep.STATE_SIZE),
@@ -283,7 +283,7 @@ def test_rows_that_fit_no_strip_are_cut():
 )
 def test_order_of_depths(values):
     values = np.array(values, dtype=float)
-    order = axes.order_of(values)
+    order = order_of(values)
     assert sorted(order) == list(range(len(values)))
     assert np.all(np.diff(values[order]) >= 0)
 

@@ -35,7 +35,7 @@ def direction(random):
 
 def lines_of(medium, normal, offset, spacing):
     """Where the kernel's lines start, and how long they are measured (0: from end to end)."""
-    prism, _, grid = axes.cell_grid(medium, normal, offset, spacing)
+    prism, _, grid = periodic.cell_grid(medium, normal, offset, spacing)
     feet = []
     for row in range(grid.rows):
         for column in range(grid.columns):

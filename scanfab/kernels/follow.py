@@ -1,0 +1,147 @@
+"""Lines through a periodic medium followed on, image by image, to the next solid."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from numba import njit
+
+from scanfab.kernels.periodic import CellGrains, Prism, cross, dot, shifts
+from scanfab.kernels.sweep import BOUND, CHANNELS, END, FAR, KEPT, LENGTH, SET, VOID, WHOLE, Strip
+
+__all__ = ["follow", "next_solid"]
+
+FloatArray = npt.NDArray[np.float64]
+
+# a line that has met nothing along so many cells stays in a channel; more where cells are small
+MOST_CELLS = 64
+MOST_GRAINS = 1000
+
+
+@njit(nogil=True, cache=True)
+def entry(
+    grains: CellGrains, prism: Prism, u: float, v: float, depth: float, r: float, after: float
+) -> float:
+    """
+    Where the axis u = v = 0 enters the images, in the plane of the face, of a sphere at a place.
+
+    Of those that it leaves behind a depth, the first; FAR if there is none.
+    """
+    normal = prism.frame[2]
+    found = FAR
+    over = 0, 1
+    if grains.periodic[prism.second]:
+        over = shifts(v, r, 0.0, 0.0, prism.base_v)
+    for j in range(over[0], over[1]):
+        v1, u1 = v + j * prism.base_v, u + j * prism.skew_u
+        reach2 = r * r - v1 * v1
+        across = 0, 1
+        if grains.periodic[prism.first]:
+            across = shifts(u1, np.sqrt(max(reach2, 0.0)), 0.0, 0.0, prism.base_u)
+        for q in range(across[0], across[1]):
+            u2 = u1 + q * prism.base_u
+            if reach2 > u2 * u2:
+                half = np.sqrt(reach2 - u2 * u2)
+                middle = depth + j * dot(grains.vectors[prism.second], normal)
+                middle += q * dot(grains.vectors[prism.first], normal)
+                # not by its end: that of the solid left behind is there, to rounding
+                if middle > after:
+                    found = min(found, middle - half)
+    return found
+
+
+@njit(nogil=True, cache=True)
+def way_out(grains: CellGrains, frame: FloatArray, u: float, v: float) -> float:
+    """The depth at which a line leaves the sample through a face that does not repeat, or FAR."""
+    last = FAR
+    for k in range(3):
+        if grains.periodic[k]:
+            continue
+        face = cross(grains.vectors[(k + 1) % 3], grains.vectors[(k + 2) % 3])
+        face /= np.sqrt(dot(face, face))
+        low, high = FAR, -FAR
+        for g in range(grains.radius.size):
+            place = dot(grains.position[g], face)
+            low, high = min(low, place - grains.radius[g]), max(high, place + grains.radius[g])
+        here = u * dot(frame[0], face) + v * dot(frame[1], face)
+        rise = dot(frame[2], face)
+        if rise > 0.0:
+            last = min(last, (high - here) / rise)
+        elif rise < 0.0:
+            last = min(last, (low - here) / rise)
+    return last
+
+
+@njit(nogil=True, cache=True)
+def next_solid(
+    grains: CellGrains, prism: Prism, second: bool, u: float, v: float, after: float
+) -> float:
+    """
+    Where the line through (u, v) enters the next solid behind a depth, which lies in void.
+
+    FAR if it stays in a channel. ``second``: of the grains that are not removed.
+    """
+    frame, c = prism.frame, grains.vectors[prism.third]
+    rise_c = dot(c, frame[2]) - prism.rise_u * dot(c, frame[0]) - prism.rise_v * dot(c, frame[1])
+    step = 1.0 if rise_c > 0.0 else -1.0
+    largest = 0.0
+    for radius in grains.radius:
+        largest = max(largest, radius)
+    margin = largest * prism.slope
+    place = (after - prism.rise_u * u - prism.rise_v * v) / prism.length - margin
+    last = way_out(grains, frame, u, v) + 2.0 * largest
+    found = FAR
+    for cells in range(max(MOST_CELLS, MOST_GRAINS // max(grains.radius.size, 1))):
+        # spheres that are so far away begin behind what was found, or outside the sample
+        if (min(found, last) - after) / prism.length + 2.0 * margin < cells:
+            break
+        for g in range(grains.radius.size):
+            if second and grains.removed[g]:
+                continue
+            x, r = grains.position[g], grains.radius[g]
+            u0, v0, n0 = dot(x, frame[0]), dot(x, frame[1]), dot(x, frame[2])
+            height = (n0 - prism.rise_u * u0 - prism.rise_v * v0) / prism.length
+            k = np.ceil(place + cells - height) * step
+            u1 = u0 + k * dot(c, frame[0]) - u
+            v1 = v0 + k * dot(c, frame[1]) - v
+            n1 = n0 + k * dot(c, frame[2])
+            found = min(found, entry(grains, prism, u1, v1, n1, r, after))
+    return found
+
+
+@njit(nogil=True, cache=True)
+def follow(
+    lines: FloatArray,
+    strip: Strip,
+    which: int,
+    grains: CellGrains,
+    prism: Prism,
+    least: float,
+    tally: FloatArray,
+) -> None:
+    """Tally the gaps that start in the measured length and end beyond what was listed of it."""
+    # else a line leaves through a face that does not repeat
+    endless = grains.periodic[0] and grains.periodic[1] and grains.periodic[2]
+    for row in range(strip.rows):
+        v = strip.first_v + row * strip.spacing
+        for column in range(strip.columns):
+            u = strip.first_u + row * strip.shear + column * strip.spacing
+            place = np.uint64(row * strip.pitch + column)
+            bound = lines[place + BOUND]
+            end = lines[place + SET * np.uint64(which) + END]
+            is_empty = end == -FAR
+            if not is_empty and not bound <= end < bound + prism.length:
+                continue
+            start = next_solid(grains, prism, which == 1, u, v, bound if is_empty else end)
+            if start < FAR:
+                if not is_empty:
+                    gap = start - end
+                    tally[which, WHOLE + VOID] += gap
+                    if gap >= least:
+                        tally[which, WHOLE + LENGTH] += gap
+                        tally[which, WHOLE + KEPT] += 1.0
+            elif endless:
+                tally[which, CHANNELS] += 1.0
+                tally[which, WHOLE + VOID] += (
+                    prism.length if is_empty else bound + prism.length - end
+                )
