@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from scanfab.kernels.compiled import inner, kernel
 from scanfab.kernels.follow import follow
 from scanfab.kernels.grid import Grid, bounds, columns_in, open_grid, part_of, strip_of
 from scanfab.kernels.lines import solve_closed
@@ -13,6 +13,7 @@ from scanfab.kernels.periodic import CellGrains, Prism, cell_grid
 from scanfab.kernels.projection import Spheres, project, sort_into_strips, sphere_at
 from scanfab.kernels.sweep import (
     MOST_LINES,
+    NOTHING,
     STATE_SIZE,
     WIDTH,
     Flag,
@@ -34,7 +35,7 @@ SMALLEST = 5e-324
 MOST_COLUMNS = MOST_LINES - WIDTH
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def visit_all(
     lines: FloatArray,
     strip: Strip,
@@ -51,22 +52,17 @@ def visit_all(
     """Visit the chosen spheres, and do for each only what it can change."""
     for k in chosen:
         sphere = sphere_at(spheres, k)
+        kept = np.nan if spheres.removed[k] else NOTHING
         if whole is not None and window is not None:
             reach = window_radius + sphere.radius
             if sphere.u * sphere.u + sphere.v * sphere.v > reach * reach:
                 # its lines miss the window
-                if second is not None and not spheres.removed[k]:
-                    visit(lines, strip, sphere, least, tally, second, whole, None, measured)
-                else:
-                    visit(lines, strip, sphere, least, tally, None, whole, None, measured)
+                visit(lines, strip, sphere, kept, least, tally, second, whole, None, measured)
                 continue
-        if second is not None and not spheres.removed[k]:
-            visit(lines, strip, sphere, least, tally, second, whole, window, measured)
-        else:
-            visit(lines, strip, sphere, least, tally, None, whole, window, measured)
+        visit(lines, strip, sphere, kept, least, tally, second, whole, window, measured)
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def scan_strips(
     lines: FloatArray,
     spheres: Spheres,
@@ -115,7 +111,7 @@ def scan_strips(
                 follow(lines, strip, which, medium[0], medium[1], least, tally)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def scan_axes(
     position: FloatArray,
     radius: FloatArray,
@@ -172,7 +168,7 @@ def scan_axes(
             )
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def scan_cell(
     grains: CellGrains,
     normals: FloatArray,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from scanfab.kernels.compiled import inner
 from scanfab.kernels.periodic import CellGrains, Prism, cross, dot, shifts
 from scanfab.kernels.sweep import BOUND, CHANNELS, END, FAR, KEPT, LENGTH, SET, VOID, WHOLE, Strip
 
@@ -18,7 +18,7 @@ MOST_CELLS = 64
 MOST_GRAINS = 1000
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def entry(
     grains: CellGrains, prism: Prism, u: float, v: float, depth: float, r: float, after: float
 ) -> float:
@@ -50,7 +50,7 @@ def entry(
     return found
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def way_out(grains: CellGrains, frame: FloatArray, u: float, v: float) -> float:
     """The depth at which a line leaves the sample through a face that does not repeat, or FAR."""
     last = FAR
@@ -72,7 +72,7 @@ def way_out(grains: CellGrains, frame: FloatArray, u: float, v: float) -> float:
     return last
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def next_solid(
     grains: CellGrains, prism: Prism, second: bool, u: float, v: float, after: float
 ) -> float:
@@ -109,7 +109,7 @@ def next_solid(
     return found
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def follow(
     lines: FloatArray,
     strip: Strip,

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from scanfab.kernels.compiled import inner, kernel
 from scanfab.kernels.follow import next_solid
 from scanfab.kernels.grid import Grid, bounds, columns_in, open_grid, strip_of
 from scanfab.kernels.lines import chords_of, solids_of
@@ -43,7 +43,7 @@ class Bins(NamedTuple):
     """Number, length, squared length, shape (BLOCKS, C, 3)."""
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def in_frame(to_block: FloatArray, frame: FloatArray) -> FloatArray:
     """An affine map of places, shape (3, 4), as one of their coordinates in a frame."""
     found = to_block.copy()
@@ -55,7 +55,7 @@ def in_frame(to_block: FloatArray, frame: FloatArray) -> FloatArray:
     return found
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def add_gap(bins: Bins, u: float, v: float, low: float, high: float) -> None:
     """Add a gap to the block of its middle and the bin of the largest cut-off that it reaches."""
     length = high - low
@@ -75,14 +75,14 @@ def add_gap(bins: Bins, u: float, v: float, low: float, high: float) -> None:
     bins.sums[block, place - 1, SQUARE] += length * length
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def add_whole(bins: Bins, u: float, v: float, solids: FloatArray, count: int) -> None:
     """Add the gaps of a line between its first and its last solid."""
     for k in range(1, count):
         add_gap(bins, u, v, solids[1, k - 1], solids[0, k])
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def add_window(bins: Bins, u: float, v: float, solids: FloatArray, count: int, half: float) -> None:
     """Add the gaps of a line within half a length of its middle."""
     for k in range(count + 1):
@@ -91,7 +91,7 @@ def add_window(bins: Bins, u: float, v: float, solids: FloatArray, count: int, h
         add_gap(bins, u, v, low, high)
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def add_measured(
     bins: Bins,
     u: float,
@@ -114,7 +114,7 @@ def add_measured(
                 add_gap(bins, u, v, end, start)
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def tally_grid(
     spheres: Spheres,
     grid: Grid,
@@ -154,7 +154,7 @@ def tally_grid(
                     add_window(window, u, v, solids, count, np.sqrt(half2))
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def tally_gaps(
     position: FloatArray,
     radius: FloatArray,
@@ -207,7 +207,7 @@ def tally_gaps(
                 )
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def tally_cell_gaps(
     grains: CellGrains,
     normals: FloatArray,

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from scanfab.kernels.compiled import inner
 from scanfab.kernels.sweep import Strip
 
 __all__ = ["Grid", "bounds", "columns_in", "cover", "open_grid", "part_of", "strip_of"]
@@ -27,7 +27,7 @@ class Grid(NamedTuple):
     rows: int
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def cover(
     low_u: float, high_u: float, low_v: float, high_v: float, offset: FloatArray, spacing: float
 ) -> Grid:
@@ -54,7 +54,7 @@ class Bounds(NamedTuple):
     reach: float
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def bounds(position: FloatArray, radius: FloatArray) -> Bounds:
     """What holds all spheres."""
     low, high = np.empty(3), np.empty(3)
@@ -72,7 +72,7 @@ def bounds(position: FloatArray, radius: FloatArray) -> Bounds:
     return Bounds(low, high, reach)
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def shadow(extent: Bounds, side: FloatArray, low: float, high: float) -> tuple[float, float]:
     """Where the spheres may be along a side of the grid, and at least from low to high."""
     middle = half = 0.0
@@ -85,7 +85,7 @@ def shadow(extent: Bounds, side: FloatArray, low: float, high: float) -> tuple[f
     )
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def open_grid(
     extent: Bounds,
     frame: FloatArray,
@@ -103,7 +103,7 @@ def open_grid(
     return cover(low_u, high_u, low_v, high_v, offset, spacing)
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def part_of(grid: Grid, first: int, most: int) -> Grid:
     """So many columns of a grid at most, from the first one wanted."""
     return Grid(
@@ -116,7 +116,7 @@ def part_of(grid: Grid, first: int, most: int) -> Grid:
     )
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def columns_in(grid: Grid, window_radius: float) -> tuple[IntArray, IntArray]:
     """
     Of each row the range of columns that may meet the sphere window; all if its radius is 0.
@@ -135,7 +135,7 @@ def columns_in(grid: Grid, window_radius: float) -> tuple[IntArray, IntArray]:
     return low, high
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def strip_of(
     grid: Grid, low: IntArray, high: IntArray, number: int, rows: int, pitch: int
 ) -> Strip:

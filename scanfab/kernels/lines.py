@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from scanfab.kernels.compiled import inner
 from scanfab.kernels.projection import Spheres, sort_by, span, sphere_at
 from scanfab.kernels.sweep import (
     BOUND,
@@ -30,7 +30,7 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def list_chords(
     spheres: Spheres,
     chosen: IntArray,
@@ -69,7 +69,7 @@ def list_chords(
                 filled[line] += 1
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def chords_of(
     spheres: Spheres, chosen: IntArray, which: int, strip: Strip, number: IntArray, count: int
 ) -> tuple[IntArray, FloatArray]:
@@ -85,7 +85,7 @@ def chords_of(
     return stop, chords
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def solids_of(chords: FloatArray, order: IntArray, solids: FloatArray) -> int:
     """
     The union of a line's chords, shape (2, K), into the first places of ``solids``; their number.
@@ -105,7 +105,7 @@ def solids_of(chords: FloatArray, order: IntArray, solids: FloatArray) -> int:
     return count
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def sweep_line(
     chords: FloatArray,
     order: IntArray,
@@ -140,7 +140,7 @@ def sweep_line(
     return end
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def solve_closed(
     lines: FloatArray,
     spheres: Spheres,

@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
+
+from scanfab.kernels.compiled import inner, kernel
 
 __all__ = [
     "Frame",
@@ -70,7 +71,7 @@ class Pairs(NamedTuple):
     """Shape (M, 3), in vectors of the frame."""
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def extents(
     position: FloatArray, directions: FloatArray, low: FloatArray, high: FloatArray
 ) -> None:
@@ -84,7 +85,7 @@ def extents(
             low[k], high[k] = min(low[k], along), max(high[k], along)
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def move_into_frame(position: FloatArray, frame: Frame, moved: FloatArray, turns: IntArray) -> bool:
     """Move positions into the frame along its lattice vectors; whether any was moved."""
     lattice, any_moved = frame.lattice, False
@@ -106,7 +107,7 @@ def move_into_frame(position: FloatArray, frame: Frame, moved: FloatArray, turns
     return any_moved
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def _bin(frame: Frame, shape: IntArray, x: float, y: float, z: float, axis: int) -> int:
     inverse = frame.inverse
     fraction = x * inverse[0, axis] + y * inverse[1, axis] + z * inverse[2, axis] - frame.low[axis]
@@ -115,7 +116,7 @@ def _bin(frame: Frame, shape: IntArray, x: float, y: float, z: float, axis: int)
     return place
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def fill_grid(
     position: FloatArray, radius: FloatArray, rows: RowArray, frame: Frame, grid: Grid
 ) -> None:
@@ -142,7 +143,7 @@ def fill_grid(
         spheres[to, 3] = radius[i]
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def _runs(frame: Frame, grid: Grid, place: tuple[int, int, int], half: bool, runs: IntArray) -> int:
     """
     Runs of spheres in the bins around a place; how many runs there are.
@@ -178,7 +179,7 @@ def _runs(frame: Frame, grid: Grid, place: tuple[int, int, int], half: bool, run
     return count
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def _room_for_runs(frame: Frame, grid: Grid) -> int:
     reach, shape = grid.reach, grid.shape
     pieces = (2 * reach[2] + 1) // shape[2] + 3
@@ -186,7 +187,7 @@ def _room_for_runs(frame: Frame, grid: Grid) -> int:
     return room
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def pairs_within(grid: Grid, frame: Frame, scale: float, pairs: Pairs, found: int) -> int:
     """Add the pairs of one grid whose distance is below (r_i + r_j) * scale; how many there are."""
     shape, start, a, lattice = grid.shape, grid.start, grid.spheres, frame.lattice
@@ -222,7 +223,7 @@ def pairs_within(grid: Grid, frame: Frame, scale: float, pairs: Pairs, found: in
     return found
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def pairs_between(
     small: Grid, large: Grid, frame: Frame, scale: float, pairs: Pairs, found: int
 ) -> int:
@@ -257,7 +258,7 @@ def pairs_between(
     return found
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def sort_pairs(pairs: Pairs, count: int, rows: IntArray, image: IntArray) -> None:
     """Pairs by first and then second row, of ``count`` spheres: two counting sorts."""
     number = rows.shape[0]
@@ -286,7 +287,7 @@ def sort_pairs(pairs: Pairs, count: int, rows: IntArray, image: IntArray) -> Non
             image[to, axis] = pairs.image[k, axis]
 
 
-@njit(nogil=True, cache=True)
+@kernel
 def contact_geometry(
     position: FloatArray,
     radius: FloatArray,

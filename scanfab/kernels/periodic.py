@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from scanfab.kernels.compiled import inner
 from scanfab.kernels.grid import Grid, cover
 from scanfab.kernels.projection import Spheres, order_of
 
@@ -63,13 +63,13 @@ class Prism(NamedTuple):
     """By how much the height changes over a length of 1, at most."""
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def dot(a: FloatArray, b: FloatArray) -> float:
     """Scalar product."""
     return float(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:
     """Vector product."""
     found = np.empty(3)
@@ -79,7 +79,7 @@ def cross(a: FloatArray, b: FloatArray) -> FloatArray:
     return found
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def prism_along(normal: FloatArray, vectors: FloatArray, periodic: BoolArray) -> Prism:
     """The prism of the lines along a direction."""
     third, steepest = 0, -1.0
@@ -108,7 +108,7 @@ def prism_along(normal: FloatArray, vectors: FloatArray, periodic: BoolArray) ->
     return Prism(frame, first, second, third, base_u, skew_u, base_v, rise_u, rise_v, length, slope)
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def shifts(position: float, reach: float, low: float, high: float, step: float) -> tuple[int, int]:
     """The whole numbers k for which position + k * step is within reach of low to high."""
     return (
@@ -117,7 +117,7 @@ def shifts(position: float, reach: float, low: float, high: float, step: float) 
     )
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def fill_images(
     grains: CellGrains, prism: Prism, beyond: float, extent: FloatArray, spheres: Spheres
 ) -> int:
@@ -173,7 +173,7 @@ def fill_images(
     return count
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def images_in(grains: CellGrains, prism: Prism) -> tuple[Spheres, FloatArray]:
     """
     The images of grains that may meet a line of the prism, projected, in no order.
@@ -204,7 +204,7 @@ def images_in(grains: CellGrains, prism: Prism) -> tuple[Spheres, FloatArray]:
     return found, extent
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def cell_grid(
     grains: CellGrains, normal: FloatArray, offset: FloatArray, spacing: float
 ) -> tuple[Prism, Spheres, Grid]:

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
 
+from scanfab.kernels.compiled import inner
 from scanfab.kernels.grid import Grid
 from scanfab.kernels.sweep import Sphere
 
@@ -28,13 +28,13 @@ class Spheres(NamedTuple):
     removed: BoolArray
 
 
-@njit(nogil=True, cache=True, inline="always")
+@inner(inline="always")
 def sphere_at(spheres: Spheres, k: int) -> Sphere:
     """Sphere k."""
     return Sphere(spheres.u[k], spheres.v[k], spheres.depth[k], spheres.radius[k])
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def project(
     position: FloatArray,
     radius: FloatArray,
@@ -65,7 +65,7 @@ def project(
     )
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def along(position: FloatArray, chosen: IntArray, side: FloatArray) -> FloatArray:
     """Coordinates of the chosen spheres along a side of the frame."""
     found = np.empty(chosen.size)
@@ -75,7 +75,7 @@ def along(position: FloatArray, chosen: IntArray, side: FloatArray) -> FloatArra
     return found
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def order_of(values: FloatArray) -> IntArray:
     """Indices that sort the values: by buckets, in linear time unless most crowd in a few."""
     count = values.size
@@ -101,7 +101,7 @@ def order_of(values: FloatArray) -> IntArray:
     return order
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def sort_by(values: FloatArray, members: IntArray) -> None:
     """Order some indices by their values, in place (Shell's sort, which suits few of them)."""
     gap = 1
@@ -117,7 +117,7 @@ def sort_by(values: FloatArray, members: IntArray) -> None:
         gap //= 3
 
 
-@njit(nogil=True, cache=True, inline="always")
+@inner(inline="always")
 def span(
     centre: float, reach: float, first: float, per_spacing: float, low: int, high: int
 ) -> tuple[int, int]:
@@ -127,7 +127,7 @@ def span(
     return max(start, low), min(stop, high)
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def sort_into_strips(
     spheres: Spheres, grid: Grid, rows_per_strip: int
 ) -> tuple[IntArray, IntArray]:

@@ -25,7 +25,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import njit
+
+from scanfab.kernels.compiled import inner
 
 __all__ = [
     "BOUND",
@@ -36,6 +37,7 @@ __all__ = [
     "LENGTH",
     "LINES",
     "LINE_LENGTH",
+    "NOTHING",
     "SET",
     "STATE_SIZE",
     "TALLY_SIZE",
@@ -115,7 +117,7 @@ class Sphere(NamedTuple):
     radius: float
 
 
-@njit(nogil=True, cache=True, forceinline=True, error_model="numpy")
+@inner(forceinline=True, error_model="numpy")
 def whole_gap(
     low: float, high: float, least: float, bound: float, measured: float | None
 ) -> tuple[float, float, float]:
@@ -132,7 +134,7 @@ def whole_gap(
     return gap if kept else 0.0, 1.0 if kept else 0.0, gap
 
 
-@njit(nogil=True, cache=True, forceinline=True, error_model="numpy")
+@inner(forceinline=True, error_model="numpy")
 def window_gap(
     low: float, high: float, least: float, half: float, whole: Flag
 ) -> tuple[float, float, float]:
@@ -146,7 +148,7 @@ def window_gap(
     return gap if kept else 0.0, 1.0 if kept else 0.0, gap if gap > 0.0 else 0.0
 
 
-@njit(nogil=True, cache=True, forceinline=True, error_model="numpy")
+@inner(forceinline=True, error_model="numpy")
 def counted(
     settles: bool,
     low: float,
@@ -172,7 +174,7 @@ def counted(
     return length, kept, void, inside, inside_kept, inside_void
 
 
-@njit(nogil=True, cache=True, forceinline=True, error_model="numpy")
+@inner(forceinline=True, error_model="numpy")
 def moved(
     start: float, stop: float, end: float, low: float, high: float
 ) -> tuple[float, float, float]:
@@ -187,7 +189,7 @@ def moved(
     return (FAR if high < low else end), low, high
 
 
-@njit(nogil=True, cache=True, fastmath=REORDERED, error_model="numpy")
+@inner(fastmath=REORDERED, error_model="numpy")
 def begin(lines: FloatArray, strip: Strip, radius: float, second: Flag, whole: Flag) -> None:
     """Lines that have met nothing yet, in a window of this radius."""
     for row in range(strip.rows):
@@ -213,7 +215,7 @@ def begin(lines: FloatArray, strip: Strip, radius: float, second: Flag, whole: F
             lines[k + BOUND] = lines[k + END] = lines[k + SET + END] = np.nan
 
 
-@njit(nogil=True, cache=True)
+@inner()
 def measure_from(lines: FloatArray, strip: Strip, rise_u: float, rise_v: float) -> None:
     """Let the measured length of each line begin on a plane through the origin."""
     for row in range(strip.rows):
@@ -224,11 +226,12 @@ def measure_from(lines: FloatArray, strip: Strip, rise_u: float, rise_v: float) 
             lines[place + BOUND] = rise_u * u + rise_v * v
 
 
-@njit(nogil=True, cache=True, fastmath=REORDERED, error_model="numpy")
+@inner(fastmath=REORDERED, error_model="numpy")
 def visit(
     lines: FloatArray,
     strip: Strip,
     sphere: Sphere,
+    kept: float,
     least: float,
     tally: FloatArray,
     second: Flag,
@@ -238,6 +241,8 @@ def visit(
 ) -> None:
     """
     Visit the chords that a sphere cuts from a strip, and tally the gaps that they settle.
+
+    ``kept`` is NaN for a sphere that is not in the second set of solids, else NOTHING.
 
     The compiler makes vector instructions of the inner loop because rows are contiguous, indices
     cannot be negative, planes cannot overlap, and there are choices instead of branches.
@@ -275,6 +280,7 @@ def visit(
             if second is not None:
                 k = i + SET
                 end, low, high = lines[k + END], lines[k + GAP_START], lines[k + GAP_END]
+                start, stop = start + kept, stop + kept
                 sums = counted(start > end, low, high, least, bound, whole, window, measured)
                 a2, b2, c2 = a2 + sums[0], b2 + sums[1], c2 + sums[2]
                 d2, e2, f2 = d2 + sums[3], e2 + sums[4], f2 + sums[5]
@@ -286,7 +292,7 @@ def visit(
         add(tally, 1, (a2, b2, c2, d2, e2, f2))
 
 
-@njit(nogil=True, cache=True, inline="always")
+@inner(inline="always")
 def add(tally: FloatArray, which: int, sums: Sums) -> None:
     """Add sums over gaps to the tally of a set of solids, shape (2, TALLY_SIZE)."""
     tally[which, WHOLE + LENGTH] += sums[0]
@@ -297,7 +303,7 @@ def add(tally: FloatArray, which: int, sums: Sums) -> None:
     tally[which, WINDOW + VOID] += sums[5]
 
 
-@njit(nogil=True, cache=True, fastmath=REORDERED, error_model="numpy")
+@inner(fastmath=REORDERED, error_model="numpy")
 def settle(
     lines: FloatArray,
     strip: Strip,

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numba import njit
 
 from scanfab.kernels import axes, sweep
 from scanfab.kernels.grid import columns_in, cover, strip_of
@@ -156,24 +157,36 @@ def check_random_packing(kind, random):
     )
 
 
-def suspect_lines(spheres, frame, offset, spacing, window):
-    """How many lines the sweep of all spheres leaves to be solved again."""
-    position, radius = spheres
-    reach = np.linalg.norm(position, axis=1).max() + radius.max() + window
-    grid = cover(-reach, reach, -reach, reach, offset, spacing)
-    projected = project(position, radius, np.zeros(len(radius), bool), frame, grid)
+@njit
+def closed_lines(position, radius, frame, grid, window):
+    """How many lines of one strip the sweep of all spheres leaves to be solved again."""
+    projected = project(position, radius, np.zeros(radius.size, np.bool_), frame, grid)
     pitch = grid.columns + sweep.WIDTH
     strip = strip_of(grid, *columns_in(grid, 0.0), 0, grid.rows, pitch)
-    assert grid.rows * pitch <= sweep.MOST_LINES
-    state, tally, every = (
-        np.empty(sweep.STATE_SIZE),
-        np.zeros((2, sweep.TALLY_SIZE)),
-        np.arange(len(projected.u)),
-    )
-    flags = None, True, True
-    sweep.begin(state, strip, window, *flags[:2])
-    axes.visit_all(state, strip, projected, every, window, 1e-300, tally, *flags, None)
-    return sweep.settle(state, strip, 0, 1e-300, tally, *flags[1:], None)
+    state, tally = np.empty(sweep.STATE_SIZE), np.zeros((2, sweep.TALLY_SIZE))
+    every = np.arange(projected.u.size)
+    sweep.begin(state, strip, window, None, True)
+    axes.visit_all(state, strip, projected, every, window, 1e-300, tally, None, True, True, None)
+    return sweep.settle(state, strip, 0, 1e-300, tally, True, True, None)
+
+
+@njit
+def square_grid(reach, offset, spacing):
+    return cover(-reach, reach, -reach, reach, offset, spacing)
+
+
+def suspect_lines(spheres, frame, offset, spacing, window):
+    """How many lines about the packing the sweep leaves to be solved again."""
+    position, radius = spheres
+    reach = np.linalg.norm(position, axis=1).max() + radius.max() + window
+    grid = square_grid(reach, offset, spacing)
+    assert grid.rows * (grid.columns + sweep.WIDTH) <= sweep.MOST_LINES
+    return closed_lines(position, radius, np.ascontiguousarray(frame), grid, window)
+
+
+@njit
+def sorted_order(values):
+    return order_of(values)
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
@@ -283,7 +296,7 @@ def test_rows_that_fit_no_strip_are_cut():
 )
 def test_order_of_depths(values):
     values = np.array(values, dtype=float)
-    order = order_of(values)
+    order = sorted_order(values)
     assert sorted(order) == list(range(len(values)))
     assert np.all(np.diff(values[order]) >= 0)
 

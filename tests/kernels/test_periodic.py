@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from numba import njit
 
 from scanfab.kernels import axes, periodic, sweep
 from scanfab.kernels.periodic import CellGrains
@@ -33,9 +34,20 @@ def direction(random):
     return normal / np.linalg.norm(normal)
 
 
+@njit
+def prism_and_grid(medium, normal, offset, spacing):
+    prism, _, grid = periodic.cell_grid(medium, normal, offset, spacing)
+    return prism, grid
+
+
+@njit
+def prism_of(normal, vectors, periods):
+    return periodic.prism_along(normal, vectors, periods)
+
+
 def lines_of(medium, normal, offset, spacing):
     """Where the kernel's lines start, and how long they are measured (0: from end to end)."""
-    prism, _, grid = periodic.cell_grid(medium, normal, offset, spacing)
+    prism, grid = prism_and_grid(medium, normal, offset, spacing)
     feet = []
     for row in range(grid.rows):
         for column in range(grid.columns):
@@ -101,7 +113,7 @@ def test_every_direction_crosses_its_face_steeply():
     random = np.random.default_rng(2)
     for _ in range(50):
         normal = direction(random)
-        prism = periodic.prism_along(normal, np.diag([1.0, 2.0, 3.0]), np.ones(3, bool))
+        prism = prism_of(normal, np.diag([1.0, 2.0, 3.0]), np.ones(3, bool))
         assert prism.length <= np.sqrt(3) * 3.0 + 1e-9
         assert prism.frame @ prism.frame.T == pytest.approx(np.eye(3), abs=1e-12)
         assert prism.base_v > 0

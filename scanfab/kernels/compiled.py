@@ -1,0 +1,34 @@
+"""How kernels are compiled: without the interpreter's lock, and kept on disk."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import numba
+
+__all__ = ["inner", "kernel"]
+
+# its types leave out some of its options
+njit: Any = numba.njit
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def kernel(function: Function) -> Function:
+    """Compile a function that is called from Python."""
+    compiled: Function = njit(nogil=True, cache=True)(function)
+    return compiled
+
+
+def inner(**options: Any) -> Callable[[Function], Function]:
+    """
+    Compile a function that only kernels call.
+
+    Without what Python needs to call it, which would take a sixth of the time to compile it all:
+    called from Python it ends the process, so tests call it in a kernel of their own.
+    """
+    compile_it: Callable[[Function], Function] = njit(
+        nogil=True, cache=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options
+    )
+    return compile_it
