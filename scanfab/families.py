@@ -6,6 +6,7 @@ import re
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatch
 from pathlib import Path
 
 from scanfab.errors import ReadError, UnknownFormatError
@@ -60,9 +61,8 @@ def sort_into_families(files: Sequence[Path], format: str | None) -> list[Family
     groups: dict[str, list[Path]] = defaultdict(list)
     for file in files:
         groups[NUMBER.sub("*", bare_name(file))].append(file)
-    return [
-        _family(members, format) for _, group in sorted(groups.items()) for members in _split(group)
-    ]
+    families = [members for _, group in sorted(groups.items()) for members in _split(group)]
+    return [_family(members, _glob(members, files), format) for members in families]
 
 
 def _numbers(file: Path) -> tuple[int, ...]:
@@ -100,7 +100,7 @@ def _place(group: list[Path]) -> int:
     return differing[-1] if differing else max(len(columns) - 1, 0)
 
 
-def _family(members: list[Path], format: str | None) -> Family:
+def _family(members: list[Path], pattern: str, format: str | None) -> Family:
     sample = max(members, key=lambda file: file.stat().st_size)
     reader: Reader | None = None
     kind: FileKind = "other"
@@ -121,15 +121,22 @@ def _family(members: list[Path], format: str | None) -> Family:
         if step in files:
             clash = f"two files for one step: {files[step]} and {file}: name one of them"
         files.setdefault(step, file)
-    return Family(_glob(members), files, reader, kind, problem, clash)
+    return Family(pattern, files, reader, kind, problem, clash)
 
 
-def _glob(members: list[Path]) -> str:
-    """The names, with a star for each number in which they differ."""
+def _glob(members: list[Path], files: Sequence[Path]) -> str:
+    """The names with a star for each number in which they differ, that match no other file."""
     texts = [NUMBER.findall(file.name) for file in members]
-    shown = iter(zip(*texts, strict=False))
 
-    def star(match: re.Match[str]) -> str:
-        return "*" if len(set(next(shown, match[0]))) > 1 else match[0]
+    def with_stars(star: str) -> str:
+        shown = iter(zip(*texts, strict=False))
+        name = NUMBER.sub(
+            lambda match: star if len(set(next(shown, match[0]))) > 1 else match[0],
+            members[0].name,
+        )
+        return str(members[0].with_name(name))
 
-    return str(members[0].with_name(NUMBER.sub(star, members[0].name)))
+    pattern = with_stars("*")
+    if any(file not in members and fnmatch(str(file), pattern) for file in files):
+        return with_stars("[0-9]*")
+    return pattern

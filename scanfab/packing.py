@@ -220,16 +220,27 @@ def _check_grains(position: FloatArray, radius: FloatArray, id: IntArray) -> Non
     if not (np.isfinite(position).all() and np.isfinite(radius).all()):
         infinite = ~(np.isfinite(position).all(axis=1) & np.isfinite(radius))
         raise PackingError(
-            f"{grains_named(id, infinite)}: position and radius must be finite numbers"
+            f"{grains_named(id, infinite)}: position and radius must be finite numbers, found "
+            f"{_values(position, radius, infinite)}"
         )
     if np.any(radius <= 0):
-        raise PackingError(f"{grains_named(id, radius <= 0)}: the radius must be larger than zero")
+        raise PackingError(
+            f"{grains_named(id, radius <= 0)}: the radius must be larger than zero, found "
+            f"{_values(position, radius, radius <= 0)}"
+        )
     if not _are_unique(id):
         unique, counts = np.unique(id, return_counts=True)
         raise PackingError(
             f"the id {unique[np.argmax(counts > 1)]} occurs twice: "
             f"{unique.size} ids for {id.size} grains"
         )
+
+
+def _values(position: FloatArray, radius: FloatArray, wrong: npt.NDArray[np.bool_]) -> str:
+    """Of the first of some grains."""
+    first = int(np.argmax(wrong))
+    place = ", ".join(f"{x:g}" for x in position[first])
+    return f"radius {radius[first]:g} at ({place})"
 
 
 def _are_unique(id: IntArray) -> bool:

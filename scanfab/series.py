@@ -295,10 +295,13 @@ def _grain_family(paths: list[Path], families: list[Family]) -> Family:
         grains = grains or [family for family in families if family.kind == kind]
     where = ", ".join(str(path) for path in paths[:3]) + (", ..." if len(paths) > 3 else "")
     if len(grains) > 1:
-        raise ReadError(
-            f"{where}: several series of grains: choose one of\n  "
-            + "\n  ".join(family.pattern for family in grains)
-        )
+        message = f"{where}: several series of grains: choose one of\n  "
+        message += "\n  ".join(family.pattern for family in grains)
+        contacts = [family.pattern for family in families if family.kind == "contacts"]
+        if contacts:
+            message += "\nand its contacts, --contacts with one of\n  "
+            message += "\n  ".join(f"'{pattern}'" for pattern in contacts)
+        raise ReadError(message)
     if not grains:
         problem = next((family.problem for family in families if family.problem), None)
         if problem is not None:

@@ -7,6 +7,7 @@ import signal
 import sys
 from contextlib import suppress
 from importlib import import_module
+from io import UnsupportedOperation
 
 import click
 
@@ -78,6 +79,7 @@ def main(args: list[str] | None = None) -> None:
         raise Terminated
 
     signal.signal(signal.SIGTERM, terminate)
+    _replace_closed_streams()
     code = run(sys.argv[1:] if args is None else args)
     # the result stands: a signal would only spoil the exit code
     for late in (signal.SIGINT, signal.SIGTERM):
@@ -85,6 +87,17 @@ def main(args: list[str] | None = None) -> None:
     if code:
         _leave_at_once(code)
     sys.exit(code)
+
+
+def _replace_closed_streams() -> None:
+    """Where the shell closed a standard stream: nothing to read, and an error to write to."""
+    # they stay open as long as the process
+    if sys.stdin is None:
+        sys.stdin = open(os.devnull)  # noqa: SIM115
+    if sys.stdout is None:
+        sys.stdout = open(os.devnull)  # noqa: SIM115
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w")  # noqa: SIM115
 
 
 def _leave_at_once(code: int) -> None:
@@ -127,6 +140,8 @@ def run(args: list[str]) -> int:
 
 
 def _describe(error: BaseException) -> str:
+    if isinstance(error, UnsupportedOperation):
+        return "standard output is closed: name a file with -o"
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.filename}: {os.strerror(error.errno or 0)}"
     return str(error) or type(error).__name__

@@ -184,6 +184,7 @@ def open_series(sources: tuple[str, ...], reading: dict[str, Any]) -> list[Serie
     """The series of a command line; ``-`` is one that comes by standard input."""
     from dataclasses import replace
 
+    from scanfab.errors import ReadError
     from scanfab.readers.files import temporary_copy
     from scanfab.series import open_sources, read_series
 
@@ -194,6 +195,8 @@ def open_series(sources: tuple[str, ...], reading: dict[str, Any]) -> list[Serie
     if len(sources) > 1:
         raise click.UsageError("standard input is a series of its own: name no other source")
     copy = temporary_copy(sys.stdin.buffer, "standard-input")
+    if copy.stat().st_size == 0:
+        raise ReadError("standard input: expected a dump, found nothing")
     return [replace(read_series(copy, **reading), name="-")]
 
 

@@ -187,6 +187,11 @@ def _radius(
     where: str,
 ) -> FloatArray:
     if options.radius is not None:
+        if "radius" in named or has_radius(list(rest)):
+            raise ReadError(
+                f"{path}{where}: --radius is for dumps without radii, but this one has them: "
+                f"leave it out"
+            )
         return np.full(count, options.radius)
     if "radius" in named:
         return _lengths(path, named["radius"], "a radius", where)

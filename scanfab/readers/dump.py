@@ -41,6 +41,8 @@ BLANK = re.compile(rb"^[\s\x1c-\x1f\x85\xa0]*(?:\n|\Z)", re.MULTILINE)
 
 # LAMMPS writes units and time before the step
 BEFORE_STEP = re.compile(rb"(?:^ITEM: (?:UNITS|TIME)[ \t]*\r?\n[^\n]*\n)+\Z", re.MULTILINE)
+# of the lower and the upper face
+BOUNDARY = re.compile("pp|[fsm][fsm]")
 STEP_OR_TIME = re.compile(rb"^ITEM: (TIMESTEP|TIME)[ \t]*\r?\n\s*(\S+)", re.MULTILINE)
 
 
@@ -293,7 +295,7 @@ def _values(path: Path, snapshot: Snapshot, block: bytes, body: _Body, count: in
         values: FloatArray = np.loadtxt(
             io.BytesIO(rows),
             dtype=np.float64,
-            max_rows=count,
+            max_rows=count + 1,
             comments=None,
             ndmin=2,
             converters=converters or None,
@@ -305,6 +307,11 @@ def _values(path: Path, snapshot: Snapshot, block: bytes, body: _Body, count: in
         raise ReadError(
             f"{path}, step {snapshot.step}: the header counts {count} rows, found {len(values)}: "
             f"the snapshot is incomplete"
+        )
+    if len(values) > count:
+        raise ReadError(
+            f"{path}, step {snapshot.step}: the header counts {count} rows, but more follow: "
+            f"one of both is damaged"
         )
     return values
 
@@ -342,7 +349,7 @@ def _lines_before(snapshot: Snapshot) -> int:
 
 
 def _cell(where: str, sections: dict[str, list[str]]) -> Cell | None:
-    """The box, periodic along the axes that are flagged pp; None if it has no volume."""
+    """The box, periodic along the axes flagged pp; None if it has no volume and does not repeat."""
     key = next((key for key in sections if key.startswith("BOX BOUNDS")), None)
     if key is None:
         return None
@@ -356,13 +363,29 @@ def _cell(where: str, sections: dict[str, list[str]]) -> Cell | None:
         bounds = np.zeros(0)
     if bounds.shape != (3, width):
         raise ReadError(f"{where}: ITEM: {key}: expected three lines of {width} numbers")
-    if not np.all(np.abs(bounds) < MOST):
-        return None
-    flags = [word == "pp" for word in words[-3:]] if len(words) >= 3 else [False] * 3
-    vectors, origin = (
-        (bounds[:, :3], bounds[:, 3]) if is_general else box_vectors(*box_of_bounds(bounds))
-    )
+    flags = _periodic(where, key, words[(2 if is_general else 3 if is_tilted else 0) :])
     try:
-        return Cell(vectors, (flags[0], flags[1], flags[2]), origin)
-    except PackingError:
-        return None
+        if not np.all(np.abs(bounds) < MOST):
+            raise PackingError(f"expected numbers below {MOST:g}")
+        vectors, origin = (
+            (bounds[:, :3], bounds[:, 3]) if is_general else box_vectors(*box_of_bounds(bounds))
+        )
+        return Cell(vectors, flags, origin)
+    except PackingError as error:
+        if not any(flags):
+            return None
+        found = "; ".join(sections[key][:3])
+        raise ReadError(
+            f"{where}: ITEM: {key}: the box repeats, but {found} is none: {error}"
+        ) from None
+
+
+def _periodic(where: str, key: str, flags: list[str]) -> tuple[bool, bool, bool]:
+    """Which axes repeat; very old files do not say, and have none that do."""
+    if not flags:
+        return False, False, False
+    if len(flags) != 3 or not all(BOUNDARY.fullmatch(flag) for flag in flags):
+        raise ReadError(
+            f"{where}: ITEM: {key}: expected three boundary flags such as pp, ff, fs or mm"
+        )
+    return flags[0] == "pp", flags[1] == "pp", flags[2] == "pp"

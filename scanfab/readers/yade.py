@@ -121,6 +121,7 @@ def _parsed(path: Path, lines: IO[bytes]) -> FloatArray:
         values: FloatArray = np.loadtxt(lines, dtype=np.float64, comments="#", ndmin=2)
     except ValueError as error:
         reason = str(error).replace("could not convert string", "expected a number, found")
+        reason = reason.partition(";")[0]
         raise ReadError(f"{path}: {reason}") from None
     return values
 

@@ -7,6 +7,8 @@ import errno
 import gzip
 import io
 import os
+import shlex
+import shutil
 import subprocess
 import sys
 import time
@@ -122,6 +124,7 @@ def test_a_number_that_is_not_finite_names_the_grain(tmp_path, refusal, value, c
     assert str(file) in message
     assert "grain 7" in message
     assert "finite" in message
+    assert value in message
 
 
 @pytest.mark.parametrize("radius", [0, -0.5])
@@ -277,6 +280,20 @@ def test_two_series_in_a_folder_are_listed(tmp_path, refusal):
     assert "several series of grains: choose one of" in message
     assert f"{tmp_path}/one_*.txt" in message
     assert f"{tmp_path}/two_0.txt" in message
+    assert "--contacts" not in message
+
+
+def test_the_globs_of_two_series_match_their_own_files_only(tmp_path, refusal):
+    for name in ("one_0.txt", "one_1.txt", "one_more_0.txt", "one_more_1.txt"):
+        grains(tmp_path, name=name)
+    write(tmp_path / "pairs_0.txt", pairs_text())
+    lines = [line.strip() for line in refusal(tmp_path).splitlines()]
+    found = [sorted(tmp_path.glob(Path(line).name)) for line in lines[1:3]]
+    assert [[file.name for file in files] for files in found] == [
+        ["one_0.txt", "one_1.txt"],
+        ["one_more_0.txt", "one_more_1.txt"],
+    ]
+    assert lines[3:] == ["and its contacts, --contacts with one of", f"'{tmp_path}/pairs_0.txt'"]
 
 
 def test_two_files_for_one_step_are_both_named(tmp_path, refusal):
@@ -476,6 +493,29 @@ def test_a_full_disk_behind_standard_output(tmp_path, command):
     assert os.strerror(errno.ENOSPC) in done.stderr
     assert "Traceback" not in done.stderr
     assert "Exception" not in done.stderr
+
+
+@pytest.mark.skipif(shutil.which("sh") is None, reason="needs a POSIX shell to close a stream")
+@pytest.mark.parametrize(
+    ("words", "stream", "message"),
+    [
+        (["compute", *SCAN, "FILE"], ">&-", "standard output is closed"),
+        (["formats"], ">&-", "standard output is closed"),
+        (["compute", "-", "--format", "liggghts"], "<&-", "standard input: expected a dump"),
+    ],
+)
+def test_a_standard_stream_that_the_shell_closed(tmp_path, words, stream, message):
+    file = grains(tmp_path)
+    command = [*PROGRAM, *(str(file) if word == "FILE" else word for word in words)]
+    done = subprocess.run(
+        ["sh", "-c", f"{shlex.join(command)} {stream}"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 @pytest.mark.parametrize("failure", ["raise ImportError('no libpfc')", "import sys; sys.exit(3)"])

@@ -110,6 +110,13 @@ def test_users_may_give_one_radius_for_all():
     np.testing.assert_array_equal(table({"position": POSITION}, radius=0.5).radius, [0.5, 0.5])
 
 
+@pytest.mark.parametrize("name", ["radius", "Diameter", "size"])
+def test_one_radius_for_all_does_not_replace_those_of_the_dump(name):
+    named = {"radius": name} if name == "size" else {}
+    with pytest.raises(ReadError, match="--radius is for dumps without radii"):
+        table({"position": POSITION, name: RADIUS}, columns=named, radius=0.5)
+
+
 def test_no_radius_is_an_error_that_names_both_ways_out():
     with pytest.raises(ReadError, match=r"step 5: no radius.*type.*--columns radius=.*--radius"):
         table({"position": POSITION, "type": RADIUS})

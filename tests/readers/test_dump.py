@@ -175,6 +175,26 @@ def test_a_box_without_volume_is_no_cell(tmp_path, box):
     assert block_of(tmp_path, dump_text(box=box)).cell is None
 
 
+@pytest.mark.parametrize("edge", [(0, 0), (1, 0), ("nan", "nan"), (0, "inf")])
+def test_a_periodic_box_must_have_a_volume(tmp_path, edge):
+    with pytest.raises(ReadError, match=r"BOX BOUNDS ff pp ff: the box repeats, but .* is none"):
+        block_of(tmp_path, dump_text(box=(edge, (0, 1), (0, 1)), flags=" ff pp ff"))
+
+
+@pytest.mark.parametrize("flags", [" zz zz zz", " pp pp", " pf pp pp", " xy xz yz pp pp"])
+def test_flags_that_nobody_knows_are_an_error(tmp_path, flags):
+    box = [(0, 1, 0)] * 3 if "xy" in flags else [(0, 1)] * 3
+    with pytest.raises(ReadError, match=r"BOX BOUNDS.*expected three boundary flags such as pp"):
+        block_of(tmp_path, dump_text(box=box, flags=flags))
+
+
+@pytest.mark.parametrize("last", ["", dump_text(step=1)])
+def test_more_rows_than_the_header_counts_are_an_error(tmp_path, last):
+    text = dump_text().replace(f"ATOMS\n{len(ROWS)}\n", f"ATOMS\n{len(ROWS) - 1}\n")
+    with pytest.raises(ReadError, match=rf"step 0: the header counts {len(ROWS) - 1} rows, but mo"):
+        read_block(index_dump(write(tmp_path / "dump", text + last))[0])
+
+
 def test_a_missing_box_is_no_cell(tmp_path):
     text = "ITEM: TIMESTEP\n0\nITEM: NUMBER OF ENTRIES\n1\nITEM: ENTRIES c_a[1]\n5\n"
     assert block_of(tmp_path, text).cell is None
