@@ -20,6 +20,10 @@ __all__ = ["scan_to_tolerance"]
 # beyond these there is more overhead than scan
 MAX_REPLICATES = 16_384
 MAX_DIRECTIONS = 3_000
+# a finer rule is exact for more of what the mean lengths do and needs fewer lines in all, but the
+# scan starts afresh: it is worth that where the one factor is missing, and grows by the other
+FINER_FROM, FINER_UP_TO = 2.0, 8.0
+FINEST = 21
 # a round multiplies the work by this at most: early estimates of the error are uncertain
 GROWTH = 4.0
 # fraction of the directions of a replicate that may keep no segment before lines are set closer
@@ -37,44 +41,72 @@ def scan_to_tolerance(solids: Solids, plan: Plan, settings: Settings) -> tuple[S
     Plan
         With the rule and the spacing of each replicate as they were in the end.
     """
-    if plan.auto:
-        plan = _within_budget(plan, solids, settings)
+    if not plan.auto:
+        return _scan(solids, plan, settings, range(plan.replicates)), plan
+    plan = _within_budget(plan, solids, settings)
     sums: ScanSums | None = None
     start, stop, spent = 0, plan.replicates, 0
     while True:
-        batch = scan_lines(
-            solids,
-            plan.rule,
-            spacing=plan.spacing,
-            cutoff=plan.cutoff,
-            variants=settings.variants,
-            replicates=range(start, stop),
-            seed=settings.seed,
-            workers=settings.workers,
-        )
+        batch = _scan(solids, plan, settings, range(start, stop))
         spent += int(batch.chords.sum())
-        sums = batch if sums is None else ScanSums.concatenate([sums, batch])
-        if not plan.auto:
-            return sums, plan
+        sums = batch if start == 0 or sums is None else ScanSums.concatenate([sums, batch])
+        # as many replicates as the budget allows
         left = (settings.max_chords - spent) / max(float(sums.chords.mean()), 1.0)
-        if start == 0 and plan.auto == "replicates" and _too_few_lines(sums, settings):
-            finer = replace(plan, spacing=0.5 * plan.spacing)
-            if is_affordable(solids, finer.spacing) and left > 4 * stop:
-                plan, sums = finer, None
-                continue
-        factor = min(_missing_work(sums, plan, settings), GROWTH)
-        if factor <= 1.0:
+        missing = _missing_work(sums, plan, settings)
+        finer = _closer_lines(sums, plan, solids, settings, left)
+        if finer is None and missing <= 1.0:
             return sums, plan
-        if plan.auto == "replicates":
-            start, stop = stop, int(min(math.ceil(factor * stop), MAX_REPLICATES, stop + left))
-            if stop > start:
-                continue
-        elif factor * stop <= left and len(plan.rule) < MAX_DIRECTIONS:
-            more = direction_rule(str(math.ceil(factor * len(plan.rule))))
-            plan, sums = replace(plan, rule=more), None
+        finer = finer or _finer_rule(plan, missing, settings, left)
+        if finer is not None:
+            plan, start, stop = finer, 0, finer.replicates
             continue
-        _warn_of_missed_tolerance(factor, spent, settings)
-        return sums, plan
+        more = min(math.ceil(min(missing, GROWTH) * stop), MAX_REPLICATES, int(stop + left))
+        if plan.auto == "directions" or more <= stop:
+            _warn_of_missed_tolerance(missing, spent, settings)
+            return sums, plan
+        start, stop = stop, more
+
+
+def _scan(solids: Solids, plan: Plan, settings: Settings, replicates: range) -> ScanSums:
+    return scan_lines(
+        solids,
+        plan.rule,
+        spacing=plan.spacing,
+        cutoff=plan.cutoff,
+        variants=settings.variants,
+        replicates=replicates,
+        seed=settings.seed,
+        workers=settings.workers,
+    )
+
+
+def _closer_lines(
+    sums: ScanSums, plan: Plan, solids: Solids, settings: Settings, left: float
+) -> Plan | None:
+    """A plan to start afresh with, if replicates have too few lines and closer ones are allowed."""
+    closer = replace(plan, spacing=0.5 * plan.spacing)
+    allowed = is_affordable(solids, closer.spacing) and left > 4 * plan.replicates
+    first = sums.replicates == plan.replicates
+    if plan.auto == "replicates" and first and allowed and _too_few_lines(sums, settings):
+        return closer
+    return None
+
+
+def _finer_rule(plan: Plan, missing: float, settings: Settings, left: float) -> Plan | None:
+    """A plan with a finer rule, if that is worth starting afresh for and there is one."""
+    if plan.auto == "directions":
+        axes = math.ceil(min(missing, GROWTH) * len(plan.rule))
+        rule = direction_rule(str(axes)) if len(plan.rule) < MAX_DIRECTIONS else plan.rule
+    elif settings.directions is None and missing >= FINER_FROM:
+        # a design of odd degree t has about ((t + 1) / 2)² axes
+        axes = math.ceil(min(missing, FINER_UP_TO) * len(plan.rule))
+        rule = direction_rule(f"design:{min(2 * math.ceil(math.sqrt(axes)) - 1, FINEST)}")
+    else:
+        return None
+    growth = len(rule) / len(plan.rule)
+    if growth <= 1.0 or growth * plan.replicates > left:
+        return None
+    return replace(plan, rule=rule)
 
 
 def _within_budget(plan: Plan, solids: Solids, settings: Settings) -> Plan:
@@ -126,7 +158,7 @@ def _missing_work(sums: ScanSums, plan: Plan, settings: Settings) -> float:
         if fabric is not None:
             error = fabric.axial_error(settings.axis) or 0.0
             missing = max(missing, (error / settings.tolerance) ** 2)
-            error = fabric.expected_error(settings.axis) or error
+            error = fabric.expected_error(settings.axis, plan.rule.degree) or error
             expected = max(expected, (error / settings.tolerance) ** 2)
         elif segments.any() and plan.auto == "replicates" and sums.replicates < 256:
             # a direction without any segment may still get one

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 from scanfab.directions import direction_rule
 from scanfab.errors import PackingError, ScanfabWarning, SettingsError
+from scanfab.frame_result import frame_result
 from scanfab.ladders import (
     PAPER_CUTOFF,
     PAPER_SPACING,
@@ -20,7 +21,6 @@ from scanfab.ladders import (
     sentence,
     sentence_of_recommended,
 )
-from scanfab.measure import frame_result
 from scanfab.packing import Packing
 from scanfab.pipeline import boundary_hint, chosen_frames, classify, no_such_frames
 from scanfab.plan import Plan, make_plan

@@ -197,3 +197,33 @@ class Cell:
             rows.append(chosen)
             images.append(np.tile(np.array(shift, dtype=np.int64), (chosen.size, 1)))
         return np.concatenate(positions), np.concatenate(rows), np.concatenate(images)
+
+    def images_near_origin(
+        self, position: FloatArray, reach: FloatArray
+    ) -> tuple[FloatArray, npt.NDArray[np.intp]]:
+        """
+        All images of points that lie within a reach of the origin.
+
+        Parameters
+        ----------
+        position : ndarray, shape (N, 3)
+            Points, dump's length unit.
+        reach : ndarray, shape (N,)
+            Distance from the origin for the images of each point, dump's length unit.
+
+        Returns
+        -------
+        position : ndarray, shape (K, 3)
+            The images.
+        row : ndarray of int, shape (K,)
+            The point that each image repeats.
+        """
+        nearest = position + self.nearest_image(position) @ self.vectors
+        most = np.floor(reach.max(initial=0.0) / self.lattice.heights + 1.0).astype(int)
+        images, rows = [np.zeros((0, 3))], [np.arange(0)]
+        for steps in product(*(range(-n, n + 1) for n in most)):
+            moved = nearest + np.array(steps, dtype=np.float64) @ self.lattice.vectors
+            chosen = np.flatnonzero(np.linalg.norm(moved, axis=1) < reach)
+            images.append(moved[chosen])
+            rows.append(chosen)
+        return np.concatenate(images), np.concatenate(rows)

@@ -16,7 +16,7 @@ from scanfab.distribution import mean_length_function, sphere_points
 from scanfab.errors import SettingsError
 from scanfab.fabric.contact import contact_fabric
 from scanfab.fabric.void import void_fabric
-from scanfab.measure import FrameResult
+from scanfab.frame_result import FrameResult
 from scanfab.pipeline import compute_rows
 from scanfab.scan import ScanSums, Solids, line_frames, scan_lines
 from scanfab.segments import sample_segments

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.cell import Cell
 from scanfab.directions import DirectionRule
 from scanfab.kernels import gaps as kernel
 from scanfab.scan import Solids, line_frames, turned_frames
@@ -51,6 +52,18 @@ class Blocks:
         parting = np.eye(3) if np.count_nonzero(along) == 1 else line_frames(along[None])[0]
         matrix = parting / (4.0 * reach)
         return cls(matrix, 0.5 - matrix @ center)
+
+    @classmethod
+    def of_cell(cls, cell: Cell, position: FloatArray) -> Blocks:
+        """Halves of a cell's periods; along its other vectors, of what the positions take."""
+        matrix = np.linalg.inv(cell.vectors).T
+        shift = -matrix @ cell.origin
+        along = cell.fractional(position)
+        low, high = along.min(axis=0), along.max(axis=0)
+        # far less than a period, about the middle
+        scale = np.where(cell.periodic, 1.0, 0.25 / (1.0 + high - low))
+        middle = np.where(cell.periodic, 0.0, 0.5 - scale * 0.5 * (low + high))
+        return cls(scale[:, None] * matrix, scale * shift + middle)
 
     def of(self, places: FloatArray) -> IntArray:
         """

@@ -21,7 +21,7 @@ from scanfab.errors import (
     SettingsError,
     SkippedFrameWarning,
 )
-from scanfab.measure import FrameResult, frame_result
+from scanfab.frame_result import FrameResult, frame_result
 from scanfab.packing import Packing
 from scanfab.plan import Plan, make_plan
 from scanfab.series import Series

@@ -15,6 +15,7 @@ from scanfab import (
     scan_lines,
 )
 from scanfab.plan import REPLICATES, make_plan
+from scanfab.settings import AUTO_RULE
 from scanfab.variants import Sample
 from tests.lattices import shaken_cubic
 from tests.scanning import solids_of
@@ -43,7 +44,7 @@ def test_rounds_of_an_auto_scan_never_draw_the_same_lines_again(packing):
     """Together they are the scan of as many replicates, numbered from 0."""
     centred = Packing(packing.position - 3.0, packing.radius)
     solids = solids_of(centred, 2.0)
-    settings = Settings.make(variants="c", tolerance=4e-4, workers=1, cutoff=0.4)
+    settings = Settings.make(variants="c", tolerance=2e-4, workers=1, cutoff=0.4)
     plan = make_plan(settings, Sample(find_contacts(centred), np.zeros(len(packing), bool)))
     sums, plan = adaptive.scan_to_tolerance(solids, plan, settings)
     again = scan_lines(
@@ -70,6 +71,18 @@ def test_smaller_tolerance_takes_more_replicates(packing):
         compute(packing, tolerance=t, variants="c")["replicates"][0] for t in (1e-2, 4e-4, 2e-4)
     ]
     assert counts[0] < counts[1] < counts[2]
+
+
+def test_much_missing_work_is_done_with_a_finer_rule_and_few_replicates(packing):
+    """What a rule integrates exactly is no error, so a cube's faces need fewer lines in all."""
+    auto = compute(packing, tolerance=4e-4, variants="a")[0]
+    assert auto.directions > len(direction_rule(AUTO_RULE))
+    same = compute(packing, tolerance=4e-4, variants="a", directions="icosahedral:9")[0]
+    assert same.directions == len(direction_rule(AUTO_RULE))
+    assert same.spacing * same.replicates**0.5 == pytest.approx(
+        auto.spacing * auto.replicates**0.5
+    )
+    assert auto.lines < 0.7 * same.lines
 
 
 def test_auto_directions_takes_more_axes_and_keeps_spacing_and_replicates(packing):

@@ -53,23 +53,33 @@ class VoidFabric:
             return None
         return float(np.std(axial(self.replicates, axis), ddof=1) / np.sqrt(count))
 
-    def expected_error(self, axis: npt.ArrayLike) -> float | None:
+    def expected_error(self, axis: npt.ArrayLike, degree: int | None = None) -> float | None:
         """
-        The same from the scatter of the mean lengths about an even polynomial of degree 4.
+        The same from the scatter of the mean lengths about an even polynomial.
 
         Far less noisy for few replicates, as every axis counts, but it depends on the polynomial:
         good for planning a scan. None if there are too few mean lengths.
+
+        Parameters
+        ----------
+        axis : array of 3 floats
+            Loading axis.
+        degree : int, optional
+            The direction rule's: what it integrates exactly is no error, so the polynomial has the
+            highest even degree, from 4 to 8, whose product with n⊗n is exact.
         """
         count, number = self.mean_lengths.shape
-        normals = self.axes.reshape(-1, 3)
-        x, y, z = normals.T
-        terms = [x**i * y**j * z ** (4 - i - j) for i in range(5) for j in range(5 - i)]
-        if count * number < 3 * len(terms):
+        even = min(max((degree or 0) // 2 * 2 - 2, 4), 8)
+        powers = [(i, j, even - i - j) for i in range(even + 1) for j in range(even + 1 - i)]
+        if count * number < 3 * len(powers):
             return None
-        design = np.column_stack(terms)
+        i, j, k = np.array(powers).T
+        x, y, z = (np.vander(one, even + 1, increasing=True) for one in self.axes.reshape(-1, 3).T)
+        design = x[:, i] * y[:, j] * z[:, k]
         lengths = self.mean_lengths.ravel()
-        fit = np.linalg.lstsq(design, lengths, rcond=None)[0]
-        variance = np.sum((lengths - design @ fit) ** 2) / (len(lengths) - len(terms))
+        # many more lengths than terms: the normal equations do, and are much faster
+        fit = np.linalg.solve(design.T @ design, design.T @ lengths)
+        variance = np.sum((lengths - design @ fit) ** 2) / (len(lengths) - len(powers))
         # by how much a mean length moves the axial anisotropy, a ratio of sums over the axes
         along = 1.5 * (self.axes @ np.asarray(axis, dtype=float)) ** 2 - 0.5
         slope = self.weights * (along - self.tensor.axial(axis))

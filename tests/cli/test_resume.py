@@ -109,11 +109,11 @@ def test_every_format_is_the_same_when_resumed(compute, stopped, tmp_path, suffi
 
 def test_finished_frames_are_not_computed_again(compute, stopped, short_series, monkeypatch):
     output, computed = stopped(), []
-    from scanfab import measure
+    from scanfab import measurement
 
-    scan = measure.scan_to_tolerance
+    scan = measurement.scan_to_tolerance
     monkeypatch.setattr(
-        measure, "scan_to_tolerance", lambda *words: computed.append(1) or scan(*words)
+        measurement, "scan_to_tolerance", lambda *words: computed.append(1) or scan(*words)
     )
     assert compute(output, "--resume") == 0
     assert len(computed) == 2

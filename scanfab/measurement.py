@@ -1,0 +1,153 @@
+"""One frame scanned: its solids, and the sums that its lines give."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.adaptive import scan_to_tolerance
+from scanfab.directions import direction_rule
+from scanfab.gaps import Blocks, GapSums, scan_gaps
+from scanfab.plan import Plan
+from scanfab.scan import CellGrains, ScanSums, Solids
+from scanfab.settings import AUTO_RULE, Settings
+from scanfab.variants import Sample, Variant
+
+__all__ = ["Measurement", "measure"]
+
+FloatArray = npt.NDArray[np.float64]
+
+# of the scan for the sample's scatter: its own noise is known, and taken off; so many segments a
+# grain make it far less than the scatter, which falls with the number of grains as it does
+BLOCK_REPLICATES = 8
+BLOCK_SEGMENTS_PER_GRAIN = 800
+BLOCK_SEGMENTS = 500_000
+# where grains overlap many times there are far more chords than segments, and all are listed
+BLOCK_CHORDS = 30_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """What the scans of one frame say."""
+
+    sample: Sample
+    plan: Plan
+    """With the rule and the spacing as they were in the end."""
+    solids: Solids
+    """What the lines met."""
+    sums: ScanSums
+    gaps: GapSums | None
+    """All gaps of the same lines, where more than one cut-off or moment is asked for."""
+    blocked: GapSums
+    """Gaps of fewer lines, by the octant of their middle."""
+    blocks: tuple[Blocks, Blocks]
+    """Octants of the whole sample and of the window, of places in the dump's coordinates."""
+
+    def spheres_of(self, variant: Variant) -> tuple[FloatArray, FloatArray, float]:
+        """
+        What a few lines of a variant meet, to be looked at.
+
+        Positions (N, 3) and radii (N,) of its solids, and the radius of the sphere about the origin
+        that its lines are clipped to, 0 for none. Of a periodic whole that is a part.
+        """
+        solids, medium = self.solids, self.solids.medium
+        position, radius, removed = solids.position, solids.radius, solids.removed
+        reach = solids.window_radius if variant.in_window else 0.0
+        cell = self.sample.packing.cell
+        if medium is not None and cell is not None and not variant.in_window:
+            reach = 0.5 * float(np.linalg.norm(medium.vectors, axis=1).max())
+            position, row = cell.images_near_origin(medium.position, medium.radius + reach)
+            radius, removed = medium.radius[row], medium.removed[row]
+        solid = ~removed if variant.without_rattlers else np.ones(len(radius), bool)
+        return position[solid], radius[solid], reach
+
+
+def measure(sample: Sample, plan: Plan, settings: Settings) -> Measurement:
+    """Scan one frame that has grains."""
+    if plan.window is not None:
+        plan.window.check_fits(sample.packing)
+    solids, origin = _solids(sample, plan, settings)
+    sums, plan = scan_to_tolerance(solids, plan, settings)
+    blocks = _blocks(sample, plan, settings)
+    lines: dict[str, Any] = {
+        "cutoffs": plan.cutoffs,
+        "blocks": tuple(Blocks(one.matrix, one.shift + one.matrix @ origin) for one in blocks),
+        "variants": settings.variants,
+        "seed": settings.seed,
+        "workers": settings.workers,
+    }
+    gaps: GapSums | None = None
+    if settings.lists_gaps:
+        every = range(sums.replicates)
+        gaps = scan_gaps(solids, plan.rule, spacing=plan.spacing, replicates=every, **lines)
+    blocked = scan_gaps(
+        solids,
+        direction_rule(AUTO_RULE),
+        spacing=_block_spacing(sums, plan, solids, settings),
+        replicates=range(BLOCK_REPLICATES),
+        **lines,
+    )
+    return Measurement(sample, plan, solids, sums, gaps, blocked, blocks)
+
+
+def _solids(sample: Sample, plan: Plan, settings: Settings) -> tuple[Solids, FloatArray]:
+    """
+    The spheres that the lines may meet: all grains, or those that reach into the RV.
+
+    And the origin of their positions in the dump's coordinates.
+    """
+    packing, window = sample.packing, plan.window
+    position, radius = packing.position[sample.grains], packing.radius[sample.grains]
+    removed = sample.rattlers[sample.grains]
+    origin = position.mean(axis=0) if window is None else window.center
+    position = position - origin
+    reach = 0.0 if window is None else window.radius
+    if packing.cell is not None and packing.is_periodic:
+        medium = CellGrains(
+            np.ascontiguousarray(position),
+            radius,
+            removed,
+            packing.cell.short_vectors,
+            np.array(packing.cell.periodic),
+        )
+        images, row = packing.cell.images_near_origin(position, radius + reach)
+        return Solids(images, radius[row], removed[row], reach, medium), origin
+    if not settings.needs_whole:
+        near = np.linalg.norm(position, axis=1) < reach + radius
+        position, radius, removed = position[near], radius[near], removed[near]
+    return Solids(position, radius, removed, reach), origin
+
+
+def _blocks(sample: Sample, plan: Plan, settings: Settings) -> tuple[Blocks, Blocks]:
+    """The octants about the middle of the sample (of the cell), and about the window's centre."""
+    packing = sample.packing
+    position = packing.position[sample.grains]
+    low, high = position.min(axis=0), position.max(axis=0)
+    radius = float(packing.radius.max())
+    reach = float(np.linalg.norm(high - low)) + radius
+    whole = Blocks.about(0.5 * (low + high), reach, settings.axis)
+    if packing.cell is not None and packing.is_periodic:
+        whole = Blocks.of_cell(packing.cell, position)
+    if plan.window is None:
+        return whole, whole
+    return whole, Blocks.about(plan.window.center, plan.window.radius + radius, settings.axis)
+
+
+def _block_spacing(sums: ScanSums, plan: Plan, solids: Solids, settings: Settings) -> float:
+    """Such that the variant with the fewest segments keeps enough, but no more than it has."""
+    kept = [int(sums.kept(variant)[1].sum()) for variant in settings.variants]
+    fewest = max(min(kept), 1)
+    grains = len(solids.radius)
+    if solids.window_radius > 0.0:
+        distance = np.linalg.norm(solids.position, axis=1)
+        grains = int(np.count_nonzero(distance < solids.window_radius))
+    wanted = min(fewest, BLOCK_SEGMENTS, BLOCK_SEGMENTS_PER_GRAIN * max(grains, 1))
+    axes = len(plan.rule) * sums.replicates
+    per_axis = BLOCK_REPLICATES * len(direction_rule(AUTO_RULE)) / axes
+    chords = float(sums.chords.sum()) * wanted / fewest
+    wider = max(chords / BLOCK_CHORDS, 1.0)
+    return plan.spacing * math.sqrt(per_axis * fewest / wanted * wider)
