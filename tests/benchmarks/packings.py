@@ -2,7 +2,7 @@
 Dense packings of the paper's sizes: radii uniform from 0.5 to 1.5, solid fraction 0.6.
 
 Random centres in a small periodic cell, pushed apart where grains overlap until little overlap is
-left; a larger packing is made of copies of the cell, of which the cube in the middle is kept.
+left; a larger packing is made of copies of the cell, of which a sphere is kept, as in the paper.
 """
 
 from __future__ import annotations
@@ -43,11 +43,12 @@ def relaxed_cell() -> tuple[np.ndarray, np.ndarray, float]:
 def dense(count: int) -> tuple[np.ndarray, np.ndarray]:
     """Positions about the origin, and radii."""
     position, radius, edge = relaxed_cell()
-    copies = int(np.ceil(np.cbrt(count / CELL))) + 1
+    # a cube around the sphere
+    copies = int(np.ceil(np.cbrt(6 / np.pi * count / CELL))) + 1
     steps = edge * np.stack(np.meshgrid(*3 * [np.arange(copies)]), axis=-1).reshape(-1, 1, 3)
     position = (position + steps).reshape(-1, 3) - 0.5 * copies * edge
     radius = np.tile(radius, copies**3)
-    order = np.argpartition(np.abs(position).max(axis=1), count - 1)[:count]
+    order = np.argpartition(np.sum(position**2, axis=1), count - 1)[:count]
     return position[order], radius[order]
 
 
