@@ -17,6 +17,7 @@ from scanfab.errors import SettingsError
 from scanfab.fabric.contact import contact_fabric
 from scanfab.fabric.void import void_fabric
 from scanfab.frame_result import FrameResult
+from scanfab.gaps import scan_gaps
 from scanfab.pipeline import compute_rows
 from scanfab.scan import ScanSums, Solids, line_frames, scan_lines
 from scanfab.segments import sample_segments
@@ -300,33 +301,24 @@ def _lengths(result: FrameResult, variant: str) -> LengthSample:
 
 
 def _cutoffs(result: FrameResult, variant: str, settings: Settings) -> CutoffCurve:
+    """Axial anisotropy and its standard error over the cut-off, all by the same lines."""
     solids, _, chosen, smallest = _parts(result)
-    alpha, error = [], []
-    for cutoff in CUTOFFS:
-        fabric = _fabric_at(result, solids, cutoff * smallest, variant, settings)
-        alpha.append(np.nan if fabric is None else fabric[0])
-        error.append(np.nan if fabric is None or fabric[1] is None else fabric[1])
-    return CutoffCurve(
-        _title(result), np.array(CUTOFFS), np.array(alpha), np.array(error), chosen / smallest
-    )
-
-
-def _fabric_at(
-    result: FrameResult, solids: Solids, cutoff: float, variant: str, settings: Settings
-) -> tuple[float, float | None] | None:
-    """The axial anisotropy and its standard error at another cut-off, by the same lines."""
-    plan = result.scanned.plan
-    sums = scan_lines(
+    scanned, rule = result.scanned, result.scanned.plan.rule
+    gaps = scan_gaps(
         solids,
-        plan.rule,
-        spacing=plan.spacing,
-        cutoff=cutoff,
+        rule,
+        spacing=scanned.plan.spacing,
+        cutoffs=[cutoff * smallest for cutoff in CUTOFFS],
+        blocks=scanned.blocks,
         variants=variant,
-        replicates=range(min(result.scanned.sums.replicates, 4 * REPLICATES)),
+        replicates=range(min(scanned.sums.replicates, 4 * REPLICATES)),
         seed=settings.seed,
         workers=settings.workers,
     )
-    fabric = void_fabric(sums.axes, plan.rule.weights, *sums.kept(variant))
-    if fabric is None:
-        return None
-    return fabric.tensor.axial(settings.axis), fabric.axial_error(settings.axis)
+    alpha, error = np.full((2, len(CUTOFFS)), np.nan)
+    for place in range(len(CUTOFFS)):
+        fabric = void_fabric(gaps.axes, rule.weights, *gaps.kept(variant, place))
+        if fabric is not None:
+            alpha[place] = fabric.tensor.axial(settings.axis)
+            error[place] = fabric.axial_error(settings.axis) or np.nan
+    return CutoffCurve(_title(result), np.array(CUTOFFS), alpha, error, chosen / smallest)

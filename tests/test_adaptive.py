@@ -79,9 +79,7 @@ def test_much_missing_work_is_done_with_a_finer_rule_and_few_replicates(packing)
     assert auto.directions > len(direction_rule(AUTO_RULE))
     same = compute(packing, tolerance=4e-4, variants="a", directions="icosahedral:9")[0]
     assert same.directions == len(direction_rule(AUTO_RULE))
-    assert same.spacing * same.replicates**0.5 == pytest.approx(
-        auto.spacing * auto.replicates**0.5
-    )
+    assert same.spacing * same.replicates**0.5 == pytest.approx(auto.spacing * auto.replicates**0.5)
     assert auto.lines < 0.7 * same.lines
 
 

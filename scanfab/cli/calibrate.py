@@ -12,14 +12,19 @@ import click
 from click.core import ParameterSource
 
 from scanfab.cli.options import (
-    SourceCommand,
-    fill_from_file,
-    open_series,
+    axis_option,
+    check_plot,
+    cutoff_option,
     output_option,
-    reading_arguments,
+    plot_option,
     reading_options,
     sample_options,
+    seed_option,
+    usage_errors,
+    window_options,
+    workers_option,
 )
+from scanfab.cli.sources import SourceCommand, fill_from_file, open_series, reading_arguments
 
 if TYPE_CHECKING:
     from scanfab.calibration import Calibration
@@ -49,24 +54,8 @@ TITLES = {
     "--frame", default=-1, metavar="K", help="Which frame, as in the fabric table (default: last)."
 )
 @click.option("--variants", default="cd", show_default=True, help="Which variants to compute.")
-@click.option(
-    "--rv",
-    default=0.7,
-    show_default=True,
-    metavar="FRACTION",
-    help="Radius of the sphere RV, but for the ladder of RVs.",
-)
-@click.option("--rv-radius", type=float, metavar="L", help="The same in the dump's units.")
-@click.option(
-    "--rv-center", nargs=3, type=float, metavar="X Y Z", help="Centre of the RV (default: middle)."
-)
-@click.option(
-    "--cutoff",
-    default="1rmin",
-    show_default=True,
-    metavar="L",
-    help="Shortest void segment kept, but for the ladder of cut-offs.",
-)
+@window_options
+@cutoff_option
 @click.option(
     "--spacing",
     default="auto",
@@ -94,16 +83,11 @@ TITLES = {
     metavar="N",
     help="Steps that would cut more chords from grains than this are left out.",
 )
-@click.option("--axis", default="z", show_default=True, metavar="x|y|z|X,Y,Z", help="Loading axis.")
-@click.option("--seed", default=0, show_default=True, metavar="N", help="Of the random numbers.")
-@click.option("--workers", type=int, metavar="N", help="Parallel workers (default: all cores).")
+@axis_option
+@seed_option
+@workers_option
 @output_option
-@click.option(
-    "--plot",
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help="The ladders as a figure: .png .svg .pdf.",
-)
+@plot_option
 @click.pass_context
 def calibrate(
     ctx: click.Context,
@@ -119,28 +103,24 @@ def calibrate(
 
     Each step with its error from the scan, the sample's own, and the time; then from where on
     nothing changes any more, and the settings that follow, as a command line. The spacings go down
-    to r_min/10, which the 2017 paper takes.
+    to r_min/10, which the 2017 paper takes. --cutoff and --rv are those of the other ladders.
 
     On a terminal a readable table; else the steps as CSV, and what they show on standard error.
     """
     from scanfab.calibration import calibrate as calibrate_series
     from scanfab.cli.console import reported_warnings
-    from scanfab.errors import SettingsError
     from scanfab.ladders import StepRow
     from scanfab.settings import Settings
-    from scanfab.writers.plot_calibration import check_figure, plot_calibration
+    from scanfab.writers.plot_calibration import plot_calibration
     from scanfab.writers.results import ResultFile
 
     options = fill_from_file(ctx, (source,), options)
     reading = reading_arguments(options)
+    check_plot(plot, None, ())
     with reported_warnings():
-        try:
+        with usage_errors():
             settings = Settings.make(**options)
             result = None if output is None else ResultFile(output, StepRow)
-            if plot is not None:
-                check_figure(plot)
-        except SettingsError as error:
-            raise click.UsageError(str(error)) from None
         (series,) = open_series((source,), reading)
         found = calibrate_series(series, settings, frame=frame)
         command = _command_line(ctx, source, found.options)

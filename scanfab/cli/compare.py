@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from scanfab.cli.options import check_plot, output_option, plot_option
+from scanfab.cli.options import check_plot, output_option, plot_option, usage_errors
 
 if TYPE_CHECKING:
     from scanfab.compare import Comparison
@@ -67,11 +67,9 @@ def compare(
     check_plot(plot, figure, TABLE_FIGURES)
     if summary and differences:
         raise click.UsageError("--summary and --differences are two tables: ask for one of them")
-    try:
-        if output is not None:
+    if output is not None:
+        with usage_errors():
             check_suffix(output)
-    except SettingsError as error:
-        raise click.UsageError(str(error)) from None
     with reported_warnings():
         rows = [row for table in tables for row in read_rows(table)]
         comparison = compare_tables(rows, strain_max=strain_max)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,16 +12,21 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from scanfab.cli.options import (
-    SourceCommand,
+    axis_option,
     check_plot,
-    fill_from_file,
-    frame_options,
-    open_series,
+    cutoff_option,
+    frames_option,
     output_option,
     plot_option,
-    reading_arguments,
     reading_options,
+    sample_options,
+    seed_option,
+    sources_argument,
+    usage_errors,
+    window_options,
+    workers_option,
 )
+from scanfab.cli.sources import SourceCommand, fill_from_file, open_series, reading_arguments
 
 if TYPE_CHECKING:
     from scanfab.pipeline import Observer
@@ -35,34 +39,13 @@ __all__ = ["compute"]
 
 
 @click.command(cls=SourceCommand)
-@click.argument(
-    "sources",
-    metavar="SOURCE...",
-    nargs=-1,
-    required=True,
-    type=click.Path(exists=True, allow_dash=True),
-)
+@sources_argument
 @reading_options
-@frame_options
+@sample_options
+@frames_option
 @click.option("--variants", default="abcd", show_default=True, help="Which variants to compute.")
-@click.option(
-    "--rv",
-    default=0.7,
-    show_default=True,
-    metavar="FRACTION",
-    help="Radius of the sphere RV, as a fraction of half the smallest extent of the grains.",
-)
-@click.option("--rv-radius", type=float, metavar="L", help="The same in the dump's units.")
-@click.option(
-    "--rv-center", nargs=3, type=float, metavar="X Y Z", help="Centre of the RV (default: middle)."
-)
-@click.option(
-    "--cutoff",
-    default="1rmin",
-    show_default=True,
-    metavar="L",
-    help="Shortest void segment kept: in the dump's units, or with rmin, rmean, rmax.",
-)
+@window_options
+@cutoff_option
 @click.option(
     "--cutoffs",
     metavar="FROM:TO:STEP|L,L,...",
@@ -104,7 +87,7 @@ __all__ = ["compute"]
     metavar="N",
     help="An auto scan stops before it cuts more chords from grains than this, in each frame.",
 )
-@click.option("--axis", default="z", show_default=True, metavar="x|y|z|X,Y,Z", help="Loading axis.")
+@axis_option
 @click.option(
     "--strain",
     default="auto",
@@ -112,8 +95,8 @@ __all__ = ["compute"]
     metavar="auto|cell|boundary|grains|FILE.csv",
     help="Where the axial strain comes from.",
 )
-@click.option("--seed", default=0, show_default=True, metavar="N", help="Of the random numbers.")
-@click.option("--workers", type=int, metavar="N", help="Parallel workers (default: all cores).")
+@seed_option
+@workers_option
 @click.option(
     "--on-error",
     default="stop",
@@ -168,7 +151,6 @@ def compute(
     rattlers removed. Lengths are in the dump's own units.
     """
     from scanfab.cli.console import announce_compiling, reported_warnings
-    from scanfab.errors import SettingsError
     from scanfab.manifest import asked_for
     from scanfab.settings import Settings
     from scanfab.table import Row
@@ -182,11 +164,9 @@ def compute(
         raise click.UsageError("--resume goes with -o FILE")
     _check_figure(plot, figure)
     with reported_warnings() as told:
-        try:
+        with usage_errors():
             settings = Settings.make(**options)
             result = None if output is None else ResultFile(output, Row)
-        except SettingsError as error:
-            raise click.UsageError(str(error)) from None
         asked = asked_for(sources, reading, settings)
         series = open_series(sources, reading)
         if figure is not None and _is_of_frames(figure) and len(series) > 1:
@@ -209,7 +189,7 @@ def _check_figure(plot: Path | None, figure: str | None) -> None:
 
     check_plot(plot, figure, [*TABLE_FIGURES, *FRAME_FIGURES])
     if figure is not None and _is_of_frames(figure):
-        with _usage_errors():
+        with usage_errors():
             parse_figure(figure)
 
 
@@ -303,7 +283,7 @@ def _vtk_folders(
     from scanfab.export import VtkFolder
 
     folders = [folder / f"series-{number}" for number in range(1, len(series) + 1)]
-    with _usage_errors():
+    with usage_errors():
         return [
             VtkFolder(one, settings.axis, resume)
             for one in (folders if len(series) > 1 else [folder])
@@ -325,22 +305,12 @@ def _write(run: _Run, asked: dict[str, Any], result: ResultFile | None) -> None:
         return
     done: list[dict[str, Any]] = []
     if run.resume:
-        with _usage_errors():
+        with usage_errors():
             done = result.finished_rows(asked, run.settings.rows_per_frame)
     run.before(done)
     with result.writer(asked, run.resume) as writer:
         for row in run.rows(done[-1] if done else None):
             writer.write(row)
-
-
-@contextmanager
-def _usage_errors() -> Iterator[None]:
-    from scanfab.errors import SettingsError
-
-    try:
-        yield
-    except SettingsError as error:
-        raise click.UsageError(str(error)) from None
 
 
 def _manifests(output: Path | None, asked: Path | None) -> list[Path]:

@@ -9,12 +9,17 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from scanfab.cli.options import (
+    frames_option,
+    reading_options,
+    sample_options,
+    sources_argument,
+    usage_errors,
+)
+from scanfab.cli.sources import (
     SourceCommand,
     fill_from_file,
-    frame_options,
     open_series,
     reading_arguments,
-    reading_options,
     settings_file,
 )
 
@@ -25,15 +30,10 @@ __all__ = ["inspect"]
 
 
 @click.command(cls=SourceCommand)
-@click.argument(
-    "sources",
-    metavar="SOURCE...",
-    nargs=-1,
-    required=True,
-    type=click.Path(exists=True, allow_dash=True),
-)
+@sources_argument
 @reading_options
-@frame_options
+@sample_options
+@frames_option
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line and frame.")
 @click.pass_context
 def inspect(ctx: click.Context, /, sources: tuple[str, ...], as_json: bool, **options: Any) -> int:
@@ -43,17 +43,14 @@ def inspect(ctx: click.Context, /, sources: tuple[str, ...], as_json: bool, **op
     Nothing is computed; contacts are found by geometry where no file lists them.
     """
     from scanfab.cli.console import announce_compiling, reported_warnings
-    from scanfab.errors import SettingsError
     from scanfab.inspection import inspect_series
     from scanfab.settings import Settings
 
     options = fill_from_file(ctx, sources, options)
     reading = reading_arguments(options)
     with reported_warnings():
-        try:
+        with usage_errors():
             settings = Settings.make(**options)
-        except SettingsError as error:
-            raise click.UsageError(str(error)) from None
         found = settings_file(sources)
         if found is not None:
             click.echo(f"scanfab: options from {found}", err=True)

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from scanfab.cli.options import usage_errors
+
 __all__ = ["report"]
 
 
@@ -33,14 +35,11 @@ def report(tables: tuple[Path, ...], output: Path) -> int:
     come from TABLE.manifest.json beside it; without it, the report says that they are not known.
     """
     from scanfab.cli.console import reported_warnings
-    from scanfab.errors import SettingsError
     from scanfab.report import has_void_fabric, make_report
     from scanfab.writers.page import check_page_file, save_page
 
-    try:
+    with usage_errors():
         check_page_file(output)
-    except SettingsError as error:
-        raise click.UsageError(str(error)) from None
     with reported_warnings():
         save_page(output, make_report(tables))
         found = has_void_fabric(tables)

@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from scanfab.cli.options import (
-    SourceCommand,
-    fill_from_file,
-    open_series,
-    reading_arguments,
+    axis_option,
+    cutoff_option,
     reading_options,
     sample_options,
+    sources_argument,
+    usage_errors,
+    window_options,
 )
+from scanfab.cli.sources import SourceCommand, fill_from_file, open_series, reading_arguments
 
 if TYPE_CHECKING:
     from scanfab.series import Series
@@ -24,13 +26,7 @@ __all__ = ["view"]
 
 
 @click.command(cls=SourceCommand)
-@click.argument(
-    "sources",
-    metavar="SOURCE...",
-    nargs=-1,
-    required=True,
-    type=click.Path(exists=True, allow_dash=True),
-)
+@sources_argument
 @reading_options
 @sample_options
 @click.option(
@@ -40,25 +36,9 @@ __all__ = ["view"]
     metavar="K",
     help="Which frame; negative: from the end.",
 )
-@click.option(
-    "--rv",
-    default=0.7,
-    show_default=True,
-    metavar="FRACTION",
-    help="Radius of the sphere RV, as a fraction of half the smallest extent of the grains.",
-)
-@click.option("--rv-radius", type=float, metavar="L", help="The same in the dump's units.")
-@click.option(
-    "--rv-center", nargs=3, type=float, metavar="X Y Z", help="Centre of the RV (default: middle)."
-)
-@click.option(
-    "--cutoff",
-    default="1rmin",
-    show_default=True,
-    metavar="L",
-    help="Shortest void segment kept: in the dump's units, or with rmin, rmean, rmax.",
-)
-@click.option("--axis", default="z", show_default=True, metavar="x|y|z|X,Y,Z", help="Is upright.")
+@window_options
+@cutoff_option
+@axis_option
 @click.option(
     "--cut", is_flag=True, help="Leave out the grains in front, and show scan lines in the section."
 )
@@ -81,7 +61,8 @@ def view(
     """
     Show a frame in 3D: grains, rattlers, and the representative volume (RV).
 
-    SOURCE is as for scanfab compute; boundary particles are not drawn.
+    SOURCE is as for scanfab compute; boundary particles are not drawn, and the loading axis is
+    upright.
     """
     from scanfab.cli.console import reported_warnings
     from scanfab.errors import SettingsError
@@ -91,14 +72,12 @@ def view(
     options = fill_from_file(ctx, sources, options)
     reading = reading_arguments(options)
     with reported_warnings():
-        try:
+        with usage_errors():
             settings = Settings.make(variants="c", **options)
             if screenshot is not None:
                 if screenshot.suffix.lower() != ".png":
                     raise SettingsError(f"{screenshot}: screenshots are PNG files: name one .png")
                 check_folder(screenshot)
-        except SettingsError as error:
-            raise click.UsageError(str(error)) from None
         series = open_series(sources, reading)
         if len(series) > 1:
             names = ", ".join(one.name for one in series)

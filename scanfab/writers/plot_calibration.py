@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from scanfab.errors import SettingsError
+from scanfab.writers.plot import COLOURS, check_plot_file, new_figure, save_figure
 
-__all__ = ["FIGURE_FORMATS", "check_figure", "plot_calibration"]
+__all__ = ["plot_calibration"]
 
-FIGURE_FORMATS = (".png", ".svg", ".pdf")
-# Okabe and Ito (2008), told apart by everybody
-COLOURS = {"a": "#0072B2", "b": "#E69F00", "c": "#009E73", "d": "#D55E00"}
+HUES = {"a": "blue", "b": "orange", "c": "green", "d": "vermilion"}
 MARKERS = {"a": "o", "b": "s", "c": "^", "d": "v"}
 # ladder: label of the axis, whether it is logarithmic, and the paper's choice
 PANELS: dict[str, tuple[str, bool, float | None]] = {
@@ -21,17 +19,6 @@ PANELS: dict[str, tuple[str, bool, float | None]] = {
     "cutoff": ("cut-off $c/r_{min}$", False, 1.0),
     "rv": ("RV radius / half extent of the sample", False, 0.67),
 }
-
-
-def check_figure(path: Path) -> None:
-    """SettingsError if a figure cannot be written to a file of this name."""
-    if path.suffix.lower() not in FIGURE_FORMATS:
-        raise SettingsError(
-            f"{path}: figures can be written as {', '.join(FIGURE_FORMATS)}, "
-            f"not as {path.suffix or 'a file without a suffix'}"
-        )
-    if not path.parent.is_dir():
-        raise SettingsError(f"{path}: there is no folder {path.parent} to write to")
 
 
 def plot_calibration(rows: Sequence[Any], path: Path) -> None:
@@ -50,22 +37,18 @@ def plot_calibration(rows: Sequence[Any], path: Path) -> None:
     SettingsError
         If the file's name ends otherwise.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    check_figure(path)
-    # no window, and no state that other figures of the process share
-    figure = Figure(figsize=(7.0, 5.2), layout="constrained")
-    FigureCanvasAgg(figure)
-    panels = figure.subplots(2, 2).ravel()
-    for panel, ladder in zip(panels, PANELS, strict=True):
-        _draw(panel, [row for row in rows if row.ladder == ladder], ladder)
-    panels[0].legend(title="variant", fontsize="small", title_fontsize="small")
-    figure.supxlabel(
-        "bars: standard error of the scan; bands: of the sample; dotted: the choice of the paper",
-        fontsize="small",
-    )
-    figure.savefig(path, dpi=160)
+    check_plot_file(path)
+    with new_figure(7.0, 5.2) as figure:
+        panels = figure.subplots(2, 2).ravel()
+        for panel, ladder in zip(panels, PANELS, strict=True):
+            _draw(panel, [row for row in rows if row.ladder == ladder], ladder)
+        panels[0].legend(title="variant")
+        figure.supxlabel(
+            "bars: standard error of the scan; bands: of the sample; dotted: the choice of the "
+            "paper",
+            fontsize="medium",
+        )
+        save_figure(figure, path)
 
 
 def _draw(panel: Any, rows: Sequence[Any], ladder: str) -> None:
@@ -75,7 +58,7 @@ def _draw(panel: Any, rows: Sequence[Any], ladder: str) -> None:
         steps = [r for r in rows if r.variant == variant and r.alpha_vs_axial is not None]
         values = [row.value for row in steps]
         alphas = [row.alpha_vs_axial for row in steps]
-        colour = COLOURS[variant]
+        colour = COLOURS[HUES[variant]]
         own = [row.alpha_vs_axial_sample_se or 0.0 for row in steps]
         if ladder in ("cutoff", "rv"):
             low, high = (
@@ -89,9 +72,6 @@ def _draw(panel: Any, rows: Sequence[Any], ladder: str) -> None:
             label=variant,
             color=colour,
             marker=MARKERS[variant],
-            markersize=3.5,
-            linewidth=1.0,
-            capsize=2.0,
         )
     if paper is not None:
         panel.axvline(paper, color="0.6", linewidth=0.8, linestyle=":")
