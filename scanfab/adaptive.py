@@ -26,6 +26,9 @@ FINER_FROM, FINER_UP_TO = 2.0, 8.0
 FINEST = 21
 # a round multiplies the work by this at most: early estimates of the error are uncertain
 GROWTH = 4.0
+# by how much the expected error must be below the tolerance: then the error that the replicates tell
+# is seldom above it, and a scan that goes on until it is below picks few that are too small
+MARGIN = 1.1
 # fraction of the directions of a replicate that may keep no segment before lines are set closer
 MOST_EMPTY = 0.005
 
@@ -159,7 +162,7 @@ def _missing_work(sums: ScanSums, plan: Plan, settings: Settings) -> float:
             error = fabric.axial_error(settings.axis) or 0.0
             missing = max(missing, (error / settings.tolerance) ** 2)
             error = fabric.expected_error(settings.axis, plan.rule.degree) or error
-            expected = max(expected, (error / settings.tolerance) ** 2)
+            expected = max(expected, (MARGIN * error / settings.tolerance) ** 2)
         elif segments.any() and plan.auto == "replicates" and sums.replicates < 256:
             # a direction without any segment may still get one
             return GROWTH
@@ -167,7 +170,7 @@ def _missing_work(sums: ScanSums, plan: Plan, settings: Settings) -> float:
     # stops at the first low value of it would claim too small an error
     if max(missing, expected) <= 1.0:
         return 1.0
-    return max(1.05 * expected, min(missing, 1.1))
+    return max(expected, min(missing, 1.1))
 
 
 def _warn_of_missed_tolerance(factor: float, spent: int, settings: Settings) -> None:
