@@ -26,9 +26,9 @@ FINER_FROM, FINER_UP_TO = 2.0, 8.0
 FINEST = 21
 # a round multiplies the work by this at most: early estimates of the error are uncertain
 GROWTH = 4.0
-# by how much the expected error must be below the tolerance: then the error that the replicates tell
-# is seldom above it, and a scan that goes on until it is below picks few that are too small
-MARGIN = 1.1
+# by how much the expected error must be below the tolerance: then that of the replicates is seldom
+# above it, and a scan that goes on until it is below picks few that are too small
+MARGIN = 1.2
 # fraction of the directions of a replicate that may keep no segment before lines are set closer
 MOST_EMPTY = 0.005
 

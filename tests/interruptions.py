@@ -7,15 +7,40 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
+from typing import Any
 
+import pytest
+
+from scanfab.writers.rows import CsvWriter
 from tests.dumps import cubic_rows, dump_text, write
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
 PROGRAM = [sys.executable, "-c", "from scanfab.cli.main import main; main()"]
 FRAMES = 30
+
+
+@contextmanager
+def interrupted_at_row(
+    monkeypatch: pytest.MonkeyPatch, number: int, writer: type = CsvWriter
+) -> Iterator[list[Any]]:
+    """Rows of a writer are listed, and the number-th is interrupted before it is written."""
+    rows: list[Any] = []
+    write = writer.write
+
+    def interrupted(self: Any, row: Any) -> None:
+        rows.append(row)
+        if len(rows) == number:
+            raise KeyboardInterrupt
+        write(self, row)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(writer, "write", interrupted)
+        yield rows
 
 
 def write_series(folder: Path, frames: int = FRAMES) -> Path:

@@ -187,11 +187,22 @@ def _room_for_runs(frame: Frame, grid: Grid) -> int:
     return room
 
 
+@inner(inline="always")
+def _add_pair(pairs: Pairs, place: int, one: int, two: int, ix: int, iy: int, iz: int) -> None:
+    """Write down a pair, if there is room."""
+    if place < pairs.rows.shape[0]:
+        sign = 1 if one <= two else -1
+        pairs.rows[place, 0], pairs.rows[place, 1] = min(one, two), max(one, two)
+        pairs.image[place, 0] = sign * ix
+        pairs.image[place, 1] = sign * iy
+        pairs.image[place, 2] = sign * iz
+
+
 @kernel
 def pairs_within(grid: Grid, frame: Frame, scale: float, pairs: Pairs, found: int) -> int:
     """Add the pairs of one grid whose distance is below (r_i + r_j) * scale; how many there are."""
     shape, start, a, lattice = grid.shape, grid.start, grid.spheres, frame.lattice
-    row, rows, image, room = grid.row, pairs.rows, pairs.image, pairs.rows.shape[0]
+    row = grid.row
     runs = np.empty((_room_for_runs(frame, grid), 5), np.int64)
     for number in range(start.shape[0] - 1):
         first, last = start[number], start[number + 1]
@@ -212,13 +223,7 @@ def pairs_within(grid: Grid, frame: Frame, scale: float, pairs: Pairs, found: in
                 for j in range(begin, stop):
                     dx, dy, dz, most = a[j, 0] - x, a[j, 1] - y, a[j, 2] - z, (r + a[j, 3]) * scale
                     if dx * dx + dy * dy + dz * dz < most * most:
-                        if found < room:
-                            one, two = row[i], row[j]
-                            sign = 1 if one <= two else -1
-                            rows[found, 0], rows[found, 1] = min(one, two), max(one, two)
-                            image[found, 0] = sign * ix
-                            image[found, 1] = sign * iy
-                            image[found, 2] = sign * iz
+                        _add_pair(pairs, found, row[i], row[j], ix, iy, iz)
                         found += 1
     return found
 
@@ -229,7 +234,6 @@ def pairs_between(
 ) -> int:
     """Add the pairs of a sphere of one grid and one of another, whose spheres are larger."""
     shape, a, b, lattice = large.shape, small.spheres, large.spheres, frame.lattice
-    rows, image, room = pairs.rows, pairs.image, pairs.rows.shape[0]
     runs = np.empty((_room_for_runs(frame, large), 5), np.int64)
     for i in range(a.shape[0]):
         place = (
@@ -247,13 +251,7 @@ def pairs_between(
                 dx, dy, dz = b[j, 0] - x, b[j, 1] - y, b[j, 2] - z
                 most = (a[i, 3] + b[j, 3]) * scale
                 if dx * dx + dy * dy + dz * dz < most * most:
-                    if found < room:
-                        one, two = small.row[i], large.row[j]
-                        sign = 1 if one <= two else -1
-                        rows[found, 0], rows[found, 1] = min(one, two), max(one, two)
-                        image[found, 0] = sign * ix
-                        image[found, 1] = sign * iy
-                        image[found, 2] = sign * iz
+                    _add_pair(pairs, found, small.row[i], large.row[j], ix, iy, iz)
                     found += 1
     return found
 

@@ -9,12 +9,13 @@ section, and nothing is handed on that does not fit.
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["count_words", "flaw_of"]
+from scanfab.readers.flaws import FlawError
+
+__all__ = ["check_legacy", "count_words"]
 
 IntArray = npt.NDArray[np.int64]
 
@@ -53,17 +54,9 @@ HEAD = re.compile(
 )
 
 
-class _FlawError(Exception):
-    pass
-
-
-def flaw_of(file: Path) -> str | None:
-    """What does not fit in a legacy VTK file, for a message; None if all does."""
-    try:
-        _Walk(file.read_bytes()).through()
-    except _FlawError as flaw:
-        return str(flaw)
-    return None
+def check_legacy(data: bytes) -> None:
+    """Walk through a legacy VTK file; FlawError if something does not fit."""
+    _Walk(data).through()
 
 
 class _Walk:
@@ -73,7 +66,7 @@ class _Walk:
         self.data = data
         head = HEAD.match(data)
         if head is None:
-            raise _FlawError(
+            raise FlawError(
                 "expected a version, a title, and ASCII or BINARY in the first three lines"
             )
         self.place = head.end()
@@ -98,7 +91,7 @@ class _Walk:
             self._coordinates(key, words)
         elif key == "cell_types":
             if _count(words, 1) != self.cells:
-                raise _FlawError(f"CELL_TYPES has {words[1]} types for {self.cells} cells")
+                raise FlawError(f"CELL_TYPES has {words[1]} types for {self.cells} cells")
             self._numbers(*self._values(words[0], self.cells, "int"), self.cells, "int")
         elif key == "metadata":
             self._metadata()
@@ -111,7 +104,7 @@ class _Walk:
         count = _count(words, 1)
         if key == "points":
             if self.points:
-                raise _FlawError("POINTS stand there twice")
+                raise FlawError("POINTS stand there twice")
             self.points = count
         self._values(words[0], COORDINATES[key] * count, _word(words, 2))
 
@@ -119,7 +112,7 @@ class _Walk:
         """The number of rows of the attributes that follow."""
         self.rows = _count(words, 1)
         if self.rows != (self.points if key == "point_data" else self.cells):
-            raise _FlawError(
+            raise FlawError(
                 f"{words[0]} has {self.rows} rows for {self.points} points and {self.cells} cells"
             )
 
@@ -133,9 +126,9 @@ class _Walk:
                 promised += _count(words, 1)
             named += key == "NAME"
             if key == "DATA" and len(words) > 2 and _count(words, 1) != len(words) - 2:
-                raise _FlawError(f"METADATA has {len(words) - 2} of {words[1]} values")
+                raise FlawError(f"METADATA has {len(words) - 2} of {words[1]} values")
         if named != promised:
-            raise _FlawError(f"METADATA has {named} of {promised} entries")
+            raise FlawError(f"METADATA has {named} of {promised} entries")
 
     def _attribute(self, key: str, words: list[str]) -> None:
         """Values for each point or cell."""
@@ -156,7 +149,7 @@ class _Walk:
         elif key == "lookup_table":
             self._values(name, 4 * _count(words, 2), "unsigned_char")
         else:
-            raise _FlawError(f"expected the keyword of a section, found {name[:40]!r}")
+            raise FlawError(f"expected the keyword of a section, found {name[:40]!r}")
 
     def _field(self, words: list[str]) -> None:
         """Arrays of any shape, each behind a line NAME COMPONENTS TUPLES TYPE."""
@@ -166,10 +159,10 @@ class _Walk:
                 self._metadata()
                 header = self._line()
             if header is None:
-                raise _FlawError(f"{words[0]} has less than {words[2]} arrays")
+                raise FlawError(f"{words[0]} has less than {words[2]} arrays")
             components, tuples = _count(header, 1), _count(header, 2)
             if self.rows and tuples != self.rows:
-                raise _FlawError(f"{header[0][:40]!r} has {tuples} of {self.rows} rows")
+                raise FlawError(f"{header[0][:40]!r} has {tuples} of {self.rows} rows")
             self._values(header[0], components * tuples, _word(header, 3))
 
     def _cells(self, words: list[str]) -> None:
@@ -178,27 +171,27 @@ class _Walk:
         if not self.has_offsets:
             start, stop = self._values(words[0], size, "int")
             if not _is_list_of_cells(self._numbers(start, stop, size, "int"), count):
-                raise _FlawError(f"{words[0]}: {size} numbers are not {count} cells")
+                raise FlawError(f"{words[0]}: {size} numbers are not {count} cells")
             self.cells += count
             return
         numbers = []
         for keyword, length in (("OFFSETS", count), ("CONNECTIVITY", size)):
             header = self._line()
             if header is None or header[0].upper() != keyword:
-                raise _FlawError(f"{words[0]} has no {keyword}")
+                raise FlawError(f"{words[0]} has no {keyword}")
             type = _word(header, 1).lower()
             start, stop = self._values(words[0], length, type)
             numbers.append(self._numbers(start, stop, length, type))
         ends = numbers[0]
         if count and (ends[0] != 0 or ends[-1] != size or np.any(np.diff(ends) < 0)):
-            raise _FlawError(f"{words[0]}: the offsets of the cells are wrong")
+            raise FlawError(f"{words[0]}: the offsets of the cells are wrong")
         self.cells += max(count - 1, 0)
 
     def _values(self, name: str, count: int, type: str) -> tuple[int, int]:
         """Move behind so many values; where they begin and end."""
         size = SIZES.get(type.lower())
         if size is None:
-            raise _FlawError(f"{name[:40]}: there is no type {type[:40]!r}")
+            raise FlawError(f"{name[:40]}: there is no type {type[:40]!r}")
         begin = self.place
         if self.is_ascii:
             first = int(np.searchsorted(self.words, begin))
@@ -211,7 +204,7 @@ class _Walk:
             stop = begin + ((count + 7) // 8 if bits else count * size)
             found = 8 * found if bits else found
         if found < count:
-            raise _FlawError(f"{name[:40]} has {found} of {count} values")
+            raise FlawError(f"{name[:40]} has {found} of {count} values")
         self.place = stop
         return begin, stop
 
@@ -223,7 +216,7 @@ class _Walk:
         try:
             return np.fromiter(map(int, self.data[start:stop].split()), np.int64, count)
         except (ValueError, OverflowError):
-            raise _FlawError("expected whole numbers for the points of cells") from None
+            raise FlawError("expected whole numbers for the points of cells") from None
 
     def _line(self) -> list[str] | None:
         """Words of the next line that has any; None at the end."""
@@ -281,11 +274,11 @@ def _count(words: list[str], place: int) -> int:
     """A whole number in a header."""
     word = _word(words, place)
     if not re.fullmatch(r"[0-9]{1,18}", word):
-        raise _FlawError(f"{words[0][:40]}: expected a whole number, found {word[:40]!r}")
+        raise FlawError(f"{words[0][:40]}: expected a whole number, found {word[:40]!r}")
     return int(word)
 
 
 def _word(words: list[str], place: int) -> str:
     if place >= len(words):
-        raise _FlawError(f"{words[0][:40]}: the line is incomplete")
+        raise FlawError(f"{words[0][:40]}: the line is incomplete")
     return words[place]

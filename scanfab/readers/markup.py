@@ -14,15 +14,15 @@ import lzma
 import re
 import zlib
 from collections.abc import Callable
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.readers.flaws import FlawError
 from scanfab.readers.legacy import count_words
 
-__all__ = ["flaw_of_xml"]
+__all__ = ["check_xml"]
 
 IntArray = npt.NDArray[np.int64]
 
@@ -56,10 +56,6 @@ UNPACK: dict[bytes, tuple[Callable[[bytes], bytes] | None, int]] = {
 }
 
 
-class _FlawError(Exception):
-    pass
-
-
 class _Array(NamedTuple):
     """Where an array is, and how large."""
 
@@ -73,13 +69,9 @@ class _Array(NamedTuple):
     is_raw: bool
 
 
-def flaw_of_xml(file: Path) -> str | None:
-    """What does not fit in a VTK XML file, for a message; None if all does."""
-    try:
-        _Walk(file.read_bytes()).through()
-    except _FlawError as flaw:
-        return str(flaw)
-    return None
+def check_xml(data: bytes) -> None:
+    """Walk through a VTK XML file; FlawError if something does not fit."""
+    _Walk(data).through()
 
 
 class _Walk:
@@ -98,7 +90,7 @@ class _Walk:
         self.appended_is_raw = b"raw" in appended
         self.appended = data.find(b"_", len(self.head) + len(appended)) + 1
         if self.packing not in UNPACK:
-            raise _FlawError(f"there is no compressor {_text(self.packing)!r}")
+            raise FlawError(f"there is no compressor {_text(self.packing)!r}")
         self.unpack, growth = UNPACK[self.packing]
         # a value takes a byte at least
         self.most = len(data) * growth
@@ -141,7 +133,7 @@ class _Walk:
 
     def _count(self, name: bytes, word: bytes) -> int:
         if not re.fullmatch(rb"[0-9]{1,15}", word) or int(word) > self.most:
-            raise _FlawError(f"{_text(name)} cannot be {_text(word)!r}")
+            raise FlawError(f"{_text(name)} cannot be {_text(word)!r}")
         return int(word)
 
     def _array(self, tag: re.Match[bytes], words: dict[bytes, bytes], rows: int | None) -> _Array:
@@ -154,11 +146,11 @@ class _Walk:
         if type is None:
             # text, in the FieldData of other programs
             if (rows is not None and expected > self.most) or words.get(b"type") != b"String":
-                raise _FlawError(f"{name}: there is no type {_text(words.get(b'type', b''))!r}")
+                raise FlawError(f"{name}: there is no type {_text(words.get(b'type', b''))!r}")
             return _Array(0, "u1", 0, None, False)
         array = self._found(tag, words, type, expected == 0)
         if array.values < expected:
-            raise _FlawError(f"{name} has {array.values} of {expected} values")
+            raise FlawError(f"{name} has {array.values} of {expected} values")
         return array
 
     def _found(
@@ -176,20 +168,20 @@ class _Walk:
             is_raw = self.appended_is_raw
         try:
             sizes = self._sizes(place, is_raw)
-        except _FlawError:
+        except FlawError:
             if is_empty:
                 return _Array(0, type, place, [], is_raw)
             raise
         length = sum(sizes[:1]) if not self.packing else _unpacked(sizes)
         if length > self.most:
-            raise _FlawError(f"{_text(words.get(b'Name', b''))} cannot have {length} bytes")
+            raise FlawError(f"{_text(words.get(b'Name', b''))} cannot have {length} bytes")
         return _Array(length // int(type[1]), type, place, sizes, is_raw)
 
     def _content(self, place: int) -> bytes:
         """The text of an array; children hold numbers too."""
         end = self.head.find(b"</DataArray", place)
         if end < 0 or self.head.find(b"<DataArray", place, end) >= 0:
-            raise _FlawError("an array has no end")
+            raise FlawError("an array has no end")
         first, *others = self.head[place:end].split(b"<InformationKey")
         return first + b"".join(part.partition(b"</InformationKey>")[2] for part in others)
 
@@ -203,7 +195,7 @@ class _Walk:
         first = self._bytes(place, 3 * width, is_raw)
         count = int(np.frombuffer(first, self.order + self.size)[0])
         if count * width > len(self.data):
-            raise _FlawError(f"an array cannot have {count} blocks")
+            raise FlawError(f"an array cannot have {count} blocks")
         head = self._bytes(place, (3 + count) * width, is_raw)
         sizes = np.frombuffer(head, self.order + self.size)
         total = sum(int(size) for size in sizes[3:])
@@ -219,7 +211,7 @@ class _Walk:
         start = place if is_raw else self._behind_blanks(place)
         stop = start + (length if is_raw else _digits(length))
         if stop > len(self.data) or (not is_raw and self.data.find(b"<", start, stop) >= 0):
-            raise _FlawError("the bytes of an array end too early")
+            raise FlawError("the bytes of an array end too early")
         if not decode:
             return b""
         if is_raw:
@@ -227,7 +219,7 @@ class _Walk:
         try:
             return base64.b64decode(self.data[start:stop], validate=True)[:length].ljust(length)
         except binascii.Error:
-            raise _FlawError("an array is not as base64 writes it") from None
+            raise FlawError("an array is not as base64 writes it") from None
 
     def _behind_blanks(self, place: int) -> int:
         blanks = BLANKS.match(self.data, place)
@@ -240,7 +232,7 @@ class _Walk:
         ends = self._whole_numbers(offsets)[:count]
         rises = np.all(np.diff(ends, prepend=0) >= 0)
         if not rises or ends.max(initial=0) > connectivity.values:
-            raise _FlawError("the offsets of the cells are wrong")
+            raise FlawError("the offsets of the cells are wrong")
 
     def _whole_numbers(self, array: _Array) -> IntArray:
         if array.sizes is None:
@@ -248,7 +240,7 @@ class _Walk:
                 words = self._content(array.place).split()
                 return np.fromiter(map(int, words), np.int64, len(words))
             except (ValueError, OverflowError):
-                raise _FlawError("expected whole numbers for the offsets of cells") from None
+                raise FlawError("expected whole numbers for the offsets of cells") from None
         data = self._unpacked_bytes(array)
         length = len(data) - len(data) % int(array.type[1])
         with np.errstate(invalid="ignore"):
@@ -265,7 +257,7 @@ class _Walk:
             try:
                 blocks.append(self.unpack(packed[:size]))
             except (zlib.error, lzma.LZMAError) as error:
-                raise _FlawError(f"an array cannot be decompressed: {error}") from None
+                raise FlawError(f"an array cannot be decompressed: {error}") from None
             packed = packed[size:]
         return b"".join(blocks)
 

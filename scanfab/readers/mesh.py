@@ -11,7 +11,6 @@ import contextlib
 import io
 import re
 import threading
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,8 +19,10 @@ import numpy.typing as npt
 
 from scanfab.errors import ReadError
 from scanfab.readers.files import bare_name, first_bytes, plain
-from scanfab.readers.legacy import flaw_of
-from scanfab.readers.markup import flaw_of_xml
+from scanfab.readers.flaws import FlawError
+from scanfab.readers.legacy import check_legacy
+from scanfab.readers.markup import check_xml
+from scanfab.vtk_log import quiet_vtk
 
 __all__ = ["Mesh", "form_of", "read_bounds", "read_mesh"]
 
@@ -99,9 +100,11 @@ def _read_mesh(path: Path) -> Mesh:
 def _refuse_flaws(path: Path) -> None:
     """ReadError for what VTK would read beyond the end of, or take all memory for."""
     file = plain(path)
-    flaw = flaw_of(file) if first_bytes(file).startswith(b"# vtk") else flaw_of_xml(file)
-    if flaw is not None:
-        raise ReadError(f"{path}: the file is damaged or incomplete: {flaw}")
+    check = check_legacy if first_bytes(file).startswith(b"# vtk") else check_xml
+    try:
+        check(file.read_bytes())
+    except FlawError as flaw:
+        raise ReadError(f"{path}: the file is damaged or incomplete: {flaw}") from None
 
 
 class _MeshError(Exception):
@@ -185,7 +188,7 @@ def _from_pyvista(path: Path, file: Path) -> Mesh:
         suffix = ".vtk"
     elif suffix not in (".vtp", ".vtu"):
         suffix = ".vtp" if form_of(path) == "PolyData" else ".vtu"
-    with _quiet_vtk(), pyvista.VtkErrorCatcher(send_to_logging=False) as caught:
+    with quiet_vtk(), pyvista.VtkErrorCatcher(send_to_logging=False) as caught:
         try:
             reader = pyvista.get_reader(str(file), force_ext=suffix).reader
             reader.Update()
@@ -240,19 +243,6 @@ def _refuse_misfits(output: Any) -> None:
         arrays = (part.GetAbstractArray(place) for place in range(part.GetNumberOfArrays()))
         if any(array.GetNumberOfTuples() != count for array in arrays):
             raise _VtkError("an array has more or less rows than there are points or cells")
-
-
-@contextlib.contextmanager
-def _quiet_vtk() -> Iterator[None]:
-    """VTK's own log off: its errors are raised instead."""
-    from vtkmodules.vtkCommonCore import vtkLogger
-
-    before = vtkLogger.GetCurrentVerbosityCutoff()
-    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
-    try:
-        yield
-    finally:
-        vtkLogger.SetStderrVerbosity(before)
 
 
 def _from_polydata(mesh: Any) -> Mesh:
@@ -321,7 +311,7 @@ def read_bounds(path: Path) -> FloatArray | None:
     suffix = ".vtk" if first_bytes(path).startswith(b"# vtk") else ".vtr"
     with (
         _ONE_AT_A_TIME,
-        _quiet_vtk(),
+        quiet_vtk(),
         pyvista.VtkErrorCatcher(send_to_logging=False) as caught,
     ):
         try:

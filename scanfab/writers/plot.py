@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 __all__ = [
     "COLOURS",
     "DPI",
+    "LOOKS",
     "PLOT_FORMATS",
     "check_folder",
     "check_plot_file",
@@ -43,6 +44,13 @@ COLOURS = {
     "purple": "#CC79A7",
     "sky": "#56B4E9",
     "black": "#000000",
+}
+
+LOOKS: dict[str, dict[str, Any]] = {
+    "a": {"color": COLOURS["blue"], "marker": "o", "ls": "-"},
+    "b": {"color": COLOURS["orange"], "marker": "s", "ls": "--"},
+    "c": {"color": COLOURS["vermilion"], "marker": "^", "ls": "-"},
+    "d": {"color": COLOURS["green"], "marker": "D", "ls": "--"},
 }
 
 # sized for print: one column is 3.4 inches wide, two are 7

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from scanfab.writers.plot import COLOURS, check_plot_file, new_figure, save_figure
+from scanfab.writers.plot import LOOKS, check_plot_file, new_figure, save_figure
 
 __all__ = ["plot_calibration"]
 
-HUES = {"a": "blue", "b": "orange", "c": "green", "d": "vermilion"}
-MARKERS = {"a": "o", "b": "s", "c": "^", "d": "v"}
 # ladder: label of the axis, whether it is logarithmic, and the paper's choice
 PANELS: dict[str, tuple[str, bool, float | None]] = {
     "spacing": ("spacing of lines $s/r_{min}$", True, 0.1),
@@ -58,7 +56,7 @@ def _draw(panel: Any, rows: Sequence[Any], ladder: str) -> None:
         steps = [r for r in rows if r.variant == variant and r.alpha_vs_axial is not None]
         values = [row.value for row in steps]
         alphas = [row.alpha_vs_axial for row in steps]
-        colour = COLOURS[HUES[variant]]
+        colour = LOOKS[variant]["color"]
         own = [row.alpha_vs_axial_sample_se or 0.0 for row in steps]
         if ladder in ("cutoff", "rv"):
             low, high = (
@@ -70,8 +68,7 @@ def _draw(panel: Any, rows: Sequence[Any], ladder: str) -> None:
             alphas,
             yerr=[row.alpha_vs_axial_se or 0.0 for row in steps],
             label=variant,
-            color=colour,
-            marker=MARKERS[variant],
+            **LOOKS[variant],
         )
     if paper is not None:
         panel.axvline(paper, color="0.6", linewidth=0.8, linestyle=":")

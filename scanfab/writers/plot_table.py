@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from scanfab.errors import SettingsError
 from scanfab.writers.curves import Curve, abscissa_label, curves_of
-from scanfab.writers.plot import COLOURS, new_figure, plain, save_figure, widen
+from scanfab.writers.plot import LOOKS, new_figure, plain, save_figure, widen
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -33,12 +33,6 @@ SIZES = {"evolution": (7.0, 3.0), "normalised": (7.0, 3.0), "correlation": (5.0,
 PAGE = (7.0, 7.6)
 PAPER_SLOPE = 0.096
 # without rattlers: open and larger, so that a curve that coincides with its twin is still seen
-LOOKS: dict[str, dict[str, Any]] = {
-    "a": {"color": COLOURS["blue"], "marker": "o", "ls": "-"},
-    "b": {"color": COLOURS["orange"], "marker": "s", "ls": "--"},
-    "c": {"color": COLOURS["vermilion"], "marker": "^", "ls": "-"},
-    "d": {"color": COLOURS["green"], "marker": "D", "ls": "--"},
-}
 OPEN = {"b": 5.5, "d": 5.5}
 MOST_MARKERS = 25
 VOID, CONTACT = r"$\alpha_{vs}$", r"$\alpha_{c}$"

@@ -5,8 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +13,7 @@ import numpy.typing as npt
 
 from scanfab.errors import ScanfabError
 from scanfab.scene import Grains, Scene
+from scanfab.vtk_log import quiet_vtk
 from scanfab.writers.plot import COLOURS
 
 __all__ = ["check_screen", "show_scene"]
@@ -71,7 +70,7 @@ def show_scene(
     """
     if screenshot is not None:
         check_drawing()
-    with _quiet_vtk():
+    with quiet_vtk():
         _show(scene, np.asarray(axis, dtype=np.float64), title, screenshot)
 
 
@@ -108,20 +107,6 @@ def _show(scene: Scene, up: FloatArray, title: str, screenshot: Path | None) -> 
     finally:
         part.unlink(missing_ok=True)
         plotter.close()
-
-
-@contextmanager
-def _quiet_vtk() -> Iterator[None]:
-    """VTK tells of each way to draw that it tries and this machine lacks: not of use."""
-    from vtkmodules.vtkCommonCore import vtkLogger
-
-    before = vtkLogger.GetCurrentVerbosityCutoff()
-    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
-    try:
-        yield
-    finally:
-        # the reader of VTK files listens to it
-        vtkLogger.SetStderrVerbosity(before)
 
 
 def check_drawing() -> None:

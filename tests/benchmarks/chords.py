@@ -58,12 +58,16 @@ def chord_rows(v, radius, first, spacing, lines):
 
 
 @njit(nogil=True, cache=True, error_model="numpy", fastmath=True)
-def chord_span(u, reach, wide, first, spacing):
-    """Lines of a row that a sphere meets inside the window."""
+def chord_span(u, v, radius, y, first, spacing, window):
+    """Lines of a row that a sphere meets inside the window, and the square of its half chord."""
+    reach2 = radius * radius - (y - v) * (y - v)
+    reach = np.sqrt(max(reach2, 0.0))
+    wide = np.sqrt(max(window * window - y * y, 0.0))
     left, right = max(u - reach, -wide), min(u + reach, wide)
     if left >= right:
-        return 0, 0
-    return int(np.ceil((left - first) / spacing)), int(np.floor((right - first) / spacing)) + 1
+        return 0, 0, reach2
+    low = int(np.ceil((left - first) / spacing))
+    return low, int(np.floor((right - first) / spacing)) + 1, reach2
 
 
 @njit(nogil=True, cache=True, error_model="numpy", fastmath=True)
@@ -84,9 +88,7 @@ def floor(u, v, radius, first, spacing, lines, window):
         low, high = chord_rows(v[k], radius[k], first, spacing, lines)
         for row in range(low, high):
             y = first + row * spacing
-            reach2 = radius[k] * radius[k] - (y - v[k]) * (y - v[k])
-            wide = np.sqrt(max(window * window - y * y, 0.0))
-            start, stop = chord_span(u[k], np.sqrt(max(reach2, 0.0)), wide, first, spacing)
+            start, stop, reach2 = chord_span(u[k], v[k], radius[k], y, first, spacing, window)
             if start < stop:
                 total += roots(u[k], reach2, first, spacing, start, stop)
                 count += stop - start
@@ -100,9 +102,7 @@ def list_chords(u, v, depth, radius, first, spacing, lines, window, filled, star
         low, high = chord_rows(v[k], radius[k], first, spacing, lines)
         for row in range(low, high):
             y = first + row * spacing
-            reach2 = radius[k] * radius[k] - (y - v[k]) * (y - v[k])
-            wide = np.sqrt(max(window * window - y * y, 0.0))
-            left, right = chord_span(u[k], np.sqrt(max(reach2, 0.0)), wide, first, spacing)
+            left, right, reach2 = chord_span(u[k], v[k], radius[k], y, first, spacing, window)
             for line in range(row * lines + left, row * lines + right):
                 if starts.size > 0:
                     du = first - u[k] + spacing * (line - row * lines)

@@ -12,8 +12,8 @@ from scanfab import Packing, compute, direction_rule, find_contacts
 from scanfab.cli.main import run
 from scanfab.scan import line_frames, turned_frames
 from scanfab.table import COLUMNS
-from scanfab.writers.rows import CsvWriter
 from tests import naive
+from tests.interruptions import interrupted_at_row
 from tests.lattices import shaken_cubic
 from tests.truth import TRIAXIAL
 
@@ -68,16 +68,7 @@ def test_a_resumed_run_finds_the_rows_of_all_cutoffs(command, cutoffs, tmp_path,
     whole, output = tmp_path / "whole.csv", tmp_path / "table.csv"
     command(*words, "-o", whole)
     assert len(whole.read_text().splitlines()) == 1 + 3 * 2 * 3
-    written, write = [], CsvWriter.write
-
-    def interrupted(self, row):
-        written.append(row)
-        if len(written) == 10:
-            raise KeyboardInterrupt
-        write(self, row)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(CsvWriter, "write", interrupted)
+    with interrupted_at_row(monkeypatch, 10):
         command(*words, "-o", output, code=130)
     command(*words, "-o", output, "--resume")
     assert output.read_bytes() == whole.read_bytes()

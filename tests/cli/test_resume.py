@@ -13,7 +13,7 @@ import pytest
 
 from scanfab.cli.main import run
 from scanfab.writers.rows import CsvWriter, JsonLinesWriter
-from tests.interruptions import Interrupter, write_series
+from tests.interruptions import Interrupter, interrupted_at_row, write_series
 
 # about a second of scanning
 OPTIONS = ("--tolerance", "1e-3")
@@ -66,16 +66,7 @@ def stopped(compute, monkeypatch, tmp_path):
     def stop(name: str = "table.csv") -> Path:
         output = tmp_path / name
         writer = CsvWriter if name.endswith(("csv", "tsv")) else JsonLinesWriter
-        write, rows = writer.write, []
-
-        def interrupted(self, row):
-            rows.append(row)
-            if len(rows) == 6:
-                raise KeyboardInterrupt
-            write(self, row)
-
-        with monkeypatch.context() as patch:
-            patch.setattr(writer, "write", interrupted)
+        with interrupted_at_row(monkeypatch, 6, writer) as rows:
             assert compute(output) == 130
         _wait_for_frames_under_way()
         assert not output.exists()
@@ -164,17 +155,10 @@ def test_frames_that_an_earlier_run_skipped_are_not_forgotten(short_series, tmp_
     damaged = shutil.copytree(short_series, tmp_path / "damaged")
     second = sorted(path for path in damaged.iterdir() if path.is_file())[1]
     second.write_text("ITEM: TIMESTEP\n")
-    output, rows, write = tmp_path / "table.csv", [], CsvWriter.write
+    output = tmp_path / "table.csv"
     words = ["compute", str(damaged), *FAST, "--on-error", "skip", "-o", str(output)]
 
-    def interrupted(self, row):
-        rows.append(row)
-        if len(rows) == 5:
-            raise KeyboardInterrupt
-        write(self, row)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(CsvWriter, "write", interrupted)
+    with interrupted_at_row(monkeypatch, 5):
         assert run(words) == 130
     _wait_for_frames_under_way()
     assert run([*words, "--resume"]) == 1

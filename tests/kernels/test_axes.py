@@ -75,6 +75,18 @@ KINDS = [
 ]
 
 
+def line_words(spheres, removed, frame, offset, spacing):
+    """What kernels want to know of spheres and the lines along one axis."""
+    return (
+        np.ascontiguousarray(spheres[0], dtype=float),
+        np.asarray(spheres[1], dtype=float),
+        removed,
+        np.ascontiguousarray(frame[None]),
+        offset[None],
+        spacing,
+    )
+
+
 def fast_tallies(
     spheres,
     removed,
@@ -89,15 +101,9 @@ def fast_tallies(
     second=True,
 ):
     """What the kernel tallies with all spheres, and with those that are not removed."""
-    position, radius = spheres
     tallies = np.zeros((1, 2, sweep.TALLY_SIZE))
     axes.scan_axes(
-        np.ascontiguousarray(position, dtype=float),
-        np.asarray(radius, dtype=float),
-        removed,
-        np.ascontiguousarray(frame[None]),
-        offset[None],
-        spacing,
+        *line_words(spheres, removed, frame, offset, spacing),
         cutoff,
         window,
         tallies,

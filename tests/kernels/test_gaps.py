@@ -7,7 +7,7 @@ from scanfab.gaps import Blocks
 from scanfab.kernels import gaps
 from scanfab.scan import line_frames
 from tests import naive
-from tests.kernels.test_axes import KINDS, overlapping
+from tests.kernels.test_axes import KINDS, line_words, overlapping
 from tests.lattices import rotation
 from tests.uncompiled import run_uncompiled
 
@@ -17,15 +17,9 @@ REACH = 30.0
 
 def fast_sums(spheres, removed, frame, offset, spacing, window, cutoffs, centers, wanted=(1,) * 4):
     """What the kernel tallies: shape (set of solids, whole or window, octant, bin, sum)."""
-    position, radius = spheres
     sums = np.zeros((1, 2, 2, gaps.BLOCKS, len(cutoffs), 3))
     gaps.tally_gaps(
-        np.ascontiguousarray(position, dtype=float),
-        np.asarray(radius, dtype=float),
-        removed,
-        np.ascontiguousarray(frame[None]),
-        offset[None],
-        spacing,
+        *line_words(spheres, removed, frame, offset, spacing),
         window,
         np.array([Blocks.about(center, REACH).affine() for center in centers]),
         np.array(cutoffs),
