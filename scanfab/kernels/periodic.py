@@ -25,7 +25,7 @@ FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
 # how far beyond the prism solids are listed at once, in mean radii; longer gaps are followed alone
-BEYOND = 10.0
+BEYOND = 16.0
 
 
 class CellGrains(NamedTuple):
