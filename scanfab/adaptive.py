@@ -28,7 +28,7 @@ FINEST = 21
 GROWTH = 4.0
 # by how much the expected error must be below the tolerance: then that of the replicates is seldom
 # above it, and a scan that goes on until it is below picks few that are too small
-MARGIN = 1.2
+MARGIN = 1.1
 # fraction of the directions of a replicate that may keep no segment before lines are set closer
 MOST_EMPTY = 0.005
 

@@ -1,7 +1,7 @@
 """
 How often the scan's standard error covers the truth: 68 of 100 times if it is right.
 
-Usage, from the root of the repository (400 seeds take about ten minutes)::
+Usage, from the root of the repository (1600 seeds take about half an hour)::
 
     python -m tests.campaigns.coverage [--seeds N] [--workers N]
 
@@ -75,7 +75,7 @@ def last_frame(name: str):
 def main() -> int:
     """How many frames and kinds of scan lie outside."""
     parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
-    parser.add_argument("--seeds", type=int, default=400)
+    parser.add_argument("--seeds", type=int, default=1600)
     parser.add_argument("--workers", type=int, default=1)
     asked = parser.parse_args()
     warnings.simplefilter("ignore", scanfab.ScanfabWarning)
