@@ -35,6 +35,8 @@ CLASS_RATIO = 3.5
 ROOM = 1.0 + 1e-9
 # contacts a grain that the first attempt has room for
 USUAL_CONTACTS = 4
+# contacts a grain, in the mean of all, that only a mistake of units makes
+MOST_CONTACTS = 1000
 # grains that tell where the others are
 SAMPLE = 10_000
 # cells that a contact may span: a grain as large as that is a mistake of units
@@ -66,7 +68,7 @@ def find_contacts(packing: Packing, tolerance: float = 0.0) -> Packing:
     SettingsError
         If the tolerance is not a number >= 0.
     PackingError
-        If a grain is much larger than the periodic cell.
+        If a grain is much larger than the periodic cell, or thousands lie on top of one another.
 
     Examples
     --------
@@ -129,13 +131,19 @@ def overlapping_pairs(
     grids = list(_grids(moved, radius, scale, frame, vectors))
     found, room = 0, USUAL_CONTACTS * count
     while True:
-        pairs = Pairs(np.empty((room, 2), np.int32), np.empty((room, 3), np.int16))
+        most = MOST_CONTACTS * count
+        pairs = Pairs(np.empty((room, 2), np.int32), np.empty((room, 3), np.int16), most)
         found = _search(grids, frame, scale, pairs)
+        if found > most:
+            raise PackingError(
+                f"more than {MOST_CONTACTS} contacts a grain by geometry: {count} grains lie on "
+                f"top of one another; check the units of radii and positions"
+            )
         if found <= room:
             break
         room = found
     rows, image = np.empty((found, 2), np.int64), np.empty((found, 3), np.int64)
-    sort_pairs(Pairs(pairs.rows[:found], pairs.image[:found]), count, rows, image)
+    sort_pairs(Pairs(pairs.rows[:found], pairs.image[:found], most), count, rows, image)
     if any_moved:
         image += turns[rows[:, 0]] - turns[rows[:, 1]]
     return rows, _in_vectors_of(cell, image, frame)

@@ -63,12 +63,17 @@ class Grid(NamedTuple):
 
 
 class Pairs(NamedTuple):
-    """Room for pairs and the images of their second spheres; what does not fit is counted only."""
+    """
+    Room for pairs and the images of their second spheres; what does not fit is counted only.
+
+    The search ends early once there are more than ``most``.
+    """
 
     rows: RowArray
     """Shape (M, 2), the smaller row first."""
     image: ShiftArray
     """Shape (M, 3), in vectors of the frame."""
+    most: int
 
 
 @kernel
@@ -218,6 +223,8 @@ def pairs_within(grid: Grid, frame: Frame, scale: float, pairs: Pairs, found: in
             sy = ix * lattice[0, 1] + iy * lattice[1, 1] + iz * lattice[2, 1]
             sz = ix * lattice[0, 2] + iy * lattice[1, 2] + iz * lattice[2, 2]
             for i in range(first, last):
+                if found > pairs.most:
+                    return found
                 begin, stop = (i + 1, last) if k < 0 else (runs[k, 0], runs[k, 1])
                 x, y, z, r = a[i, 0] - sx, a[i, 1] - sy, a[i, 2] - sz, a[i, 3]
                 for j in range(begin, stop):
@@ -236,6 +243,8 @@ def pairs_between(
     shape, a, b, lattice = large.shape, small.spheres, large.spheres, frame.lattice
     runs = np.empty((_room_for_runs(frame, large), 5), np.int64)
     for i in range(a.shape[0]):
+        if found > pairs.most:
+            return found
         place = (
             _bin(frame, shape, a[i, 0], a[i, 1], a[i, 2], 0),
             _bin(frame, shape, a[i, 0], a[i, 1], a[i, 2], 1),

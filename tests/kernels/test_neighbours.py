@@ -166,7 +166,7 @@ def filled(position, radius, shape):
 
 def test_pairs_beyond_the_room_are_counted_but_not_written():
     grid = filled(np.full((4, 3), 1.0), np.ones(4), (1, 1, 1))
-    pairs = Pairs(np.full((2, 2), -1, np.int32), np.full((2, 3), 7, np.int16))
+    pairs = Pairs(np.full((2, 2), -1, np.int32), np.full((2, 3), 7, np.int16), 1000)
     assert pairs_within(grid, OPEN, 1.0, pairs, 0) == 6
     assert pairs.rows.tolist() == [[0, 1], [0, 2]]
     assert not pairs.image.any()
@@ -177,6 +177,7 @@ def test_pairs_are_sorted_by_first_and_then_by_second():
     pairs = Pairs(
         random.integers(0, 9, (50, 2)).astype(np.int32),
         random.integers(-1, 2, (50, 3)).astype(np.int16),
+        1000,
     )
     rows, image = np.empty((50, 2), np.int64), np.empty((50, 3), np.int64)
     sort_pairs(pairs, 9, rows, image)
@@ -223,6 +224,18 @@ def test_more_contacts_than_the_first_guess_has_room_for():
     """All pairs of 30 grains in one heap: 14.5 contacts a grain."""
     position = np.random.default_rng(0).random((30, 3))
     assert len(find_contacts(Packing(position, 1.0)).contacts) == 30 * 29 // 2
+
+
+@pytest.mark.parametrize("sizes", ["equal", "unlike"])
+def test_grains_on_top_of_one_another_are_refused_before_all_pairs_are_tried(sizes):
+    """The 5e9 pairs of 100,000 would take all memory."""
+    random = np.random.default_rng(0)
+    radius = np.ones(100_000) if sizes == "equal" else np.exp(random.uniform(0, 7, 100_000))
+    position = random.uniform(-1e-3, 1e-3, (100_000, 3))
+    with pytest.raises(PackingError, match=r"more than 1000 contacts a grain.*units"):
+        find_contacts(Packing(position, radius))
+    few = find_contacts(Packing(position[:900], radius[:900])).contacts
+    assert len(few) == 900 * 899 // 2
 
 
 def test_bins_list_every_sphere_once_in_its_bin():
