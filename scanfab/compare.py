@@ -107,7 +107,8 @@ def compare_tables(
     Raises
     ------
     SettingsError
-        If a column is missing, or holds something else than numbers.
+        If a column is missing, or holds something else than numbers, or if a frame has several rows
+        of one variant, as with several cut-offs.
 
     Examples
     --------
@@ -145,6 +146,14 @@ def _grouped(
             )
         _check_values(number, row)
         groups.setdefault((row["source"], row["variant"]), []).append(row)
+    for (source, variant), group in groups.items():
+        frames = [row["frame"] for row in group if row["frame"] is not None]
+        if len(set(frames)) < len(frames):
+            twice = next(frame for frame in frames if frames.count(frame) > 1)
+            raise SettingsError(
+                f"{source}, variant {variant}: several rows for frame {twice}: choose the rows of "
+                f"one cut-off and one run, and compare those"
+            )
     return groups
 
 

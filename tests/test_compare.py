@@ -34,6 +34,12 @@ def test_groups_are_source_and_variant():
     )
 
 
+def test_several_rows_of_a_frame_are_refused():
+    """Those of several cut-offs would make one curve of many."""
+    with pytest.raises(SettingsError, match=r"one, variant c: several rows for frame 0: .*cut-off"):
+        compare_tables([*curve("one", "d"), *curve("one", "c"), *curve("one", "c", 2.0)])
+
+
 def test_slopes_are_those_of_least_squares():
     row = summary_of(curve())
     slope, intercept = np.polyfit(CONTACT, VOID, 1)
