@@ -29,6 +29,8 @@ GROWTH = 4.0
 # by how much the expected error must be below the tolerance: then that of the replicates is seldom
 # above it, and a scan that goes on until it is below picks few that are too small
 MARGIN = 1.1
+# of the smallest radius: directions that are empty with lines so close cannot be filled
+CLOSEST = 0.05
 # fraction of the directions of a replicate that may keep no segment before lines are set closer
 MOST_EMPTY = 0.005
 
@@ -89,6 +91,7 @@ def _closer_lines(
     """A plan to start afresh with, if replicates have too few lines and closer ones are allowed."""
     closer = replace(plan, spacing=0.5 * plan.spacing)
     allowed = is_affordable(solids, closer.spacing) and left > 4 * plan.replicates
+    allowed = allowed and closer.spacing > CLOSEST * solids.radius.min(initial=np.inf)
     first = sums.replicates == plan.replicates
     if plan.auto == "replicates" and first and allowed and _too_few_lines(sums, settings):
         return closer

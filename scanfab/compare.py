@@ -152,7 +152,7 @@ def _grouped(
             twice = next(frame for frame in frames if frames.count(frame) > 1)
             raise SettingsError(
                 f"{source}, variant {variant}: several rows for frame {twice}: choose the rows of "
-                f"one cut-off and one run, and compare those"
+                f"one cut-off and of one run"
             )
     return groups
 

@@ -125,7 +125,11 @@ def _family(members: list[Path], pattern: str, format: str | None) -> Family:
 
 
 def _glob(members: list[Path], files: Sequence[Path]) -> str:
-    """The names with a star for each number in which they differ, that match no other file."""
+    """
+    The names, with a star for each number in which they differ.
+
+    If that would match other files too, the names themselves.
+    """
     texts = [NUMBER.findall(file.name) for file in members]
 
     def with_stars(star: str) -> str:
@@ -136,7 +140,9 @@ def _glob(members: list[Path], files: Sequence[Path]) -> str:
         )
         return str(members[0].with_name(name))
 
-    pattern = with_stars("*")
-    if any(file not in members and fnmatch(str(file), pattern) for file in files):
-        return with_stars("[0-9]*")
-    return pattern
+    others = set(files) - set(members)
+    for star in ("*", "[0-9]*"):
+        pattern = with_stars(star)
+        if not any(fnmatch(str(file), pattern) for file in others):
+            return pattern
+    return " ".join(map(str, members[:3])) + (" ..." if len(members) > 3 else "")

@@ -14,6 +14,7 @@ from scanfab import (
     find_contacts,
     scan_lines,
 )
+from scanfab.directions import DirectionRule
 from scanfab.plan import REPLICATES, make_plan
 from scanfab.settings import AUTO_RULE
 from scanfab.variants import Sample
@@ -81,6 +82,21 @@ def test_much_missing_work_is_done_with_a_finer_rule_and_few_replicates(packing)
     assert same.directions == len(direction_rule(AUTO_RULE))
     assert same.spacing * same.replicates**0.5 == pytest.approx(auto.spacing * auto.replicates**0.5)
     assert auto.lines < 0.7 * same.lines
+
+
+def test_directions_that_are_no_design_have_an_error_too(packing):
+    """Three axes tell little of an even polynomial, but they are a rule that users may make."""
+    rule = DirectionRule("mine", np.eye(3), np.full(3, 1 / 3), None, turned=False)
+    row = compute(packing, tolerance=1e-2, variants="c", directions=rule)[0]
+    assert 0 < row.alpha_vs_axial_se <= 1e-2
+
+
+def test_two_grains_of_which_few_lines_meet_both_do_not_hang():
+    pair = find_contacts(Packing([[0, 0, 0], [3, 0, 0]], 1.0))
+    with pytest.warns(ScanfabWarning, match="no void fabric"):
+        row = compute(pair, tolerance=1e-2, variants="a")[0]
+    assert row.segments > 0
+    assert row.alpha_vs is None
 
 
 def test_auto_directions_takes_more_axes_and_keeps_spacing_and_replicates(packing):

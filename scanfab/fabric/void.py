@@ -78,7 +78,7 @@ class VoidFabric:
         design = x[:, i] * y[:, j] * z[:, k]
         lengths = self.mean_lengths.ravel()
         # many more lengths than terms: the normal equations do, and are much faster
-        fit = np.linalg.solve(design.T @ design, design.T @ lengths)
+        fit = np.linalg.lstsq(design.T @ design, design.T @ lengths, rcond=None)[0]
         variance = np.sum((lengths - design @ fit) ** 2) / (len(lengths) - len(powers))
         # by how much a mean length moves the axial anisotropy, a ratio of sums over the axes
         along = 1.5 * (self.axes @ np.asarray(axis, dtype=float)) ** 2 - 0.5

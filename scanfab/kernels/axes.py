@@ -9,7 +9,7 @@ from scanfab.kernels.compiled import inner, kernel
 from scanfab.kernels.follow import follow
 from scanfab.kernels.grid import Grid, bounds, columns_in, open_grid, part_of, strip_of
 from scanfab.kernels.lines import solve_closed
-from scanfab.kernels.periodic import CellGrains, Prism, cell_grid
+from scanfab.kernels.periodic import CellGrains, Prism, cell_grid, measured_in
 from scanfab.kernels.projection import Spheres, project, sort_into_strips, sphere_at
 from scanfab.kernels.sweep import (
     MOST_LINES,
@@ -17,6 +17,7 @@ from scanfab.kernels.sweep import (
     STATE_SIZE,
     WIDTH,
     Flag,
+    Measured,
     Strip,
     begin,
     measure_from,
@@ -47,7 +48,7 @@ def visit_all(
     second: Flag,
     whole: Flag,
     window: Flag,
-    measured: float | None,
+    measured: Measured | None,
 ) -> None:
     """Visit the chosen spheres, and do for each only what it can change."""
     for k in chosen:
@@ -73,7 +74,7 @@ def scan_strips(
     second: Flag,
     whole: Flag,
     window: Flag,
-    measured: float | None,
+    measured: Measured | None,
     medium: tuple[CellGrains, Prism] | None,
 ) -> None:
     """Scan a grid strip by strip, so that the lines' state stays in cache."""
@@ -187,12 +188,13 @@ def scan_cell(
     for axis in range(normals.shape[0]):
         prism, spheres, grid = cell_grid(grains, normals[axis], offsets[axis], spacing)
         tally = tallies[axis]
+        measured = measured_in(grains, prism)
         for first in range(0, grid.columns, MOST_COLUMNS):
             part = part_of(grid, first, MOST_COLUMNS)
             # along an axis that is not periodic a line runs from the first solid to the last
             if grains.periodic[prism.third]:
                 scan_strips(
-                    lines, spheres, part, 0.0, cutoff, tally, second, True, None, prism.length,
+                    lines, spheres, part, 0.0, cutoff, tally, second, True, None, measured,
                     (grains, prism),
                 )  # fmt: skip
             else:

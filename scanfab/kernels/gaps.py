@@ -11,7 +11,7 @@ from scanfab.kernels.compiled import inner, kernel
 from scanfab.kernels.follow import next_solid
 from scanfab.kernels.grid import Grid, bounds, columns_in, open_grid, strip_of
 from scanfab.kernels.lines import chords_of, solids_of
-from scanfab.kernels.periodic import CellGrains, Prism, cell_grid
+from scanfab.kernels.periodic import CellGrains, Prism, cell_grid, measured_in
 from scanfab.kernels.projection import Spheres, project, sort_into_strips
 from scanfab.kernels.sweep import FAR
 
@@ -104,11 +104,13 @@ def add_measured(
 ) -> None:
     """Add the gaps of a line through a periodic medium that start in its measured length."""
     low = prism.rise_u * u + prism.rise_v * v
+    known = low + measured_in(grains, prism).known
     for k in range(1, count + 1):
         end = solids[1, k - 1]
         if low <= end < low + prism.length:
             start = solids[0, k] if k < count else FAR
-            if k == count:
+            if start >= known:
+                # not every solid that begins there is listed
                 start = next_solid(grains, prism, which == 1, u, v, end)
             if start < FAR:
                 add_gap(bins, u, v, end, start)

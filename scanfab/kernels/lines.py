@@ -18,6 +18,7 @@ from scanfab.kernels.sweep import (
     SET,
     TALLY_SIZE,
     Flag,
+    Measured,
     Strip,
     add,
     counted,
@@ -115,7 +116,7 @@ def sweep_line(
     which: int,
     whole: Flag,
     window: Flag,
-    measured: float | None,
+    measured: Measured | None,
 ) -> float:
     """
     The sweep of one line's chords in an order, as far as it goes; where its last solid ends.
@@ -130,6 +131,8 @@ def sweep_line(
         is_last = k == order.size
         start = FAR if is_last else chords[0, order[k]]
         stop = FAR if is_last else chords[1, order[k]]
+        if measured is not None and not is_last and start - bound >= measured.known:
+            continue
         if end < FAR and start > end:
             add(tally, which, counted(True, low, high, least, bound, whole, window, measured))
             if is_last and window is not None:
@@ -152,7 +155,7 @@ def solve_closed(
     tally: FloatArray,
     whole: Flag,
     window: Flag,
-    measured: float | None,
+    measured: Measured | None,
 ) -> None:
     """Replace what the sweep tallied on closed lines by what their lists of chords give."""
     number = np.full((strip.rows, strip.columns), -1)

@@ -18,8 +18,18 @@ import numpy.typing as npt
 from scanfab.kernels.compiled import inner
 from scanfab.kernels.grid import Grid, cover
 from scanfab.kernels.projection import Spheres, order_of
+from scanfab.kernels.sweep import Measured
 
-__all__ = ["CellGrains", "Prism", "cell_grid", "cross", "dot", "prism_along", "shifts"]
+__all__ = [
+    "CellGrains",
+    "Prism",
+    "cell_grid",
+    "cross",
+    "dot",
+    "measured_in",
+    "prism_along",
+    "shifts",
+]
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -174,16 +184,24 @@ def fill_images(
 
 
 @inner()
+def measured_in(grains: CellGrains, prism: Prism) -> Measured:
+    """The length of the lines in the prism, and how far from its beginning solids are listed."""
+    mean = 0.0
+    for radius in grains.radius:
+        mean += radius / grains.radius.size
+    return Measured(prism.length, prism.length + BEYOND * mean)
+
+
+@inner()
 def images_in(grains: CellGrains, prism: Prism) -> tuple[Spheres, FloatArray]:
     """
     The images of grains that may meet a line of the prism, projected, in no order.
 
     And the bounds of the lines: least and greatest v, least and greatest u along the skew.
     """
-    mean = 0.0
-    for radius in grains.radius:
-        mean += radius / grains.radius.size
-    beyond = BEYOND * mean / prism.length
+    known = measured_in(grains, prism).known
+    mean = (known - prism.length) / BEYOND
+    beyond = known / prism.length - 1.0
     extent = np.array([np.inf, -np.inf, np.inf, -np.inf])
     # a good guess for small grains; where it is too low, the second round has enough
     shell = 1.0 + beyond + 2.0 * mean * prism.slope

@@ -12,7 +12,7 @@ What is counted is chosen by arguments that are None where they are not wanted, 
 choice the compiler makes a loop with nothing else in it:
 
 ``whole``     gaps as they are, between the first and the last solid of the line
-``measured``  with ``whole``: only gaps that start in the line's measured length, which is this long
+``measured``  with ``whole``: only gaps that start in the line's measured length
 ``window``    gaps clipped to the sphere window; lines that miss it carry NaN
 ``second``    all this again for a second set of solids, from which some spheres are removed
 
@@ -46,6 +46,7 @@ __all__ = [
     "WIDTH",
     "WINDOW",
     "Flag",
+    "Measured",
     "Sphere",
     "Strip",
     "begin",
@@ -53,8 +54,6 @@ __all__ = [
     "moved",
     "settle",
     "visit",
-    "whole_gap",
-    "window_gap",
 ]
 
 FloatArray = npt.NDArray[np.float64]
@@ -108,6 +107,15 @@ class Strip(NamedTuple):
     high: IntArray
 
 
+class Measured(NamedTuple):
+    """Of a line through a periodic medium, from where its measured length begins."""
+
+    length: float
+    """Gaps that begin in it count."""
+    known: float
+    """Chords that begin behind it may not be listed, and are left out."""
+
+
 class Sphere(NamedTuple):
     """A sphere, projected."""
 
@@ -119,7 +127,7 @@ class Sphere(NamedTuple):
 
 @inner(forceinline=True, error_model="numpy")
 def whole_gap(
-    low: float, high: float, least: float, bound: float, measured: float | None
+    low: float, high: float, least: float, bound: float, measured: Measured | None
 ) -> tuple[float, float, float]:
     """Length and number of a gap if it counts in the whole, and its length if it is too short."""
     gap = high - low
@@ -128,7 +136,7 @@ def whole_gap(
     else:
         # NaN: a place behind the last line
         gap = gap if low - bound >= 0.0 else 0.0
-        gap = gap if low - bound < measured else 0.0
+        gap = gap if low - bound < measured.length else 0.0
         gap = gap if gap < 0.5 * FAR else 0.0
     kept = gap >= least
     return gap if kept else 0.0, 1.0 if kept else 0.0, gap
@@ -157,7 +165,7 @@ def counted(
     bound: float,
     whole: Flag,
     window: Flag,
-    measured: float | None,
+    measured: Measured | None,
 ) -> Sums:
     """What a gap adds to the tallies of the whole and of the window, if it is settled."""
     length = kept = void = NOTHING
@@ -237,7 +245,7 @@ def visit(
     second: Flag,
     whole: Flag,
     window: Flag,
-    measured: float | None,
+    measured: Measured | None,
 ) -> None:
     """
     Visit the chords that a sphere cuts from a strip, and tally the gaps that they settle.
@@ -271,6 +279,9 @@ def visit(
             start = sphere.depth - half_chord
             stop = sphere.depth + half_chord
             bound = lines[i + BOUND]
+            if measured is not None:
+                stop = stop if start - bound < measured.known else np.nan
+                start = start if start - bound < measured.known else np.nan
             end, low, high = lines[i + END], lines[i + GAP_START], lines[i + GAP_END]
             sums = counted(start > end, low, high, least, bound, whole, window, measured)
             a, b, c = a + sums[0], b + sums[1], c + sums[2]
@@ -312,7 +323,7 @@ def settle(
     tally: FloatArray,
     whole: Flag,
     window: Flag,
-    measured: float | None,
+    measured: Measured | None,
 ) -> float:
     """
     Tally every line's last gap, and in the window the void behind its last solid.
@@ -345,7 +356,7 @@ def settle(
     if whole is not None:
         tally[which, WHOLE + LINES] += met
     if measured is not None:
-        tally[which, WHOLE + LINE_LENGTH] += crossing * measured
+        tally[which, WHOLE + LINE_LENGTH] += crossing * measured.length
     if window is not None:
         tally[which, WINDOW + LINES] += crossing
         tally[which, WINDOW + LINE_LENGTH] += 2.0 * half_length

@@ -188,8 +188,6 @@ def _regular(
 def _tolerant(snapshot: Snapshot, body: _Body, count: int) -> FloatArray:
     """All numbers of a snapshot with any white space; says what is wrong in which line."""
     path, names = snapshot.path, body.names
-    if count == 0:
-        return np.zeros((0, len(names)))
     with open(plain(path), "rb") as stream:
         stream.seek(snapshot.start)
         size = None if snapshot.stop is None else snapshot.stop - snapshot.start
@@ -276,6 +274,8 @@ def _count(where: str, sections: dict[str, list[str]]) -> int:
 
 def _values(path: Path, snapshot: Snapshot, block: bytes, body: _Body, count: int) -> FloatArray:
     """The numbers of the body; columns of text come out as NaN."""
+    if count == 0 and not block[body.start :].strip():
+        return np.zeros((0, len(body.names)))
     available = block.count(b"\n", body.start)
     if count > available:
         raise ReadError(
@@ -366,17 +366,17 @@ def _cell(where: str, sections: dict[str, list[str]]) -> Cell | None:
     flags = _periodic(where, key, words[(2 if is_general else 3 if is_tilted else 0) :])
     try:
         if not np.all(np.abs(bounds) < MOST):
-            raise PackingError(f"expected numbers below {MOST:g}")
+            raise PackingError
         vectors, origin = (
             (bounds[:, :3], bounds[:, 3]) if is_general else box_vectors(*box_of_bounds(bounds))
         )
         return Cell(vectors, flags, origin)
-    except PackingError as error:
+    except PackingError:
         if not any(flags):
             return None
         found = "; ".join(sections[key][:3])
         raise ReadError(
-            f"{where}: ITEM: {key}: the box repeats, but {found} is none: {error}"
+            f"{where}: ITEM: {key}: the box repeats, but its bounds {found} span no volume"
         ) from None
 
 

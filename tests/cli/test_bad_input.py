@@ -296,6 +296,16 @@ def test_the_globs_of_two_series_match_their_own_files_only(tmp_path, refusal):
     assert lines[3:] == ["and its contacts, --contacts with one of", f"'{tmp_path}/pairs_0.txt'"]
 
 
+def test_files_that_no_glob_can_tell_apart_are_named(tmp_path, refusal):
+    for name in ("dump_1.txt", "dump_1_big.txt", "dump_2.txt", "dump_2_big.txt"):
+        grains(tmp_path, name=name)
+    lines = [line.strip() for line in refusal(tmp_path).splitlines()]
+    assert lines[1:] == [
+        f"{tmp_path}/dump_1.txt {tmp_path}/dump_2.txt",
+        f"{tmp_path}/dump_*_big.txt",
+    ]
+
+
 def test_two_files_for_one_step_are_both_named(tmp_path, refusal):
     for name in ("dump_7.txt", "dump_07.txt"):
         grains(tmp_path, name=name)

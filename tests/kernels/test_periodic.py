@@ -29,6 +29,16 @@ def random_medium(random, periods=(1, 1, 1)):
     return CellGrains(position, radius, removed, vectors, np.array(periods, dtype=bool))
 
 
+def sparse_medium(random, periods=(1, 1, 1)):
+    """Gaps longer than what is listed at once; a large grain begins before small ones, aside."""
+    vectors = 1.5 * random_cell(random)
+    position = random.uniform(0, 1, (40, 3)) @ vectors
+    radius = np.append(random.uniform(0.1, 0.2, 39), random.uniform(1.0, 2.0))
+    return CellGrains(
+        position, radius, random.random(40) < 0.3, vectors, np.array(periods, dtype=bool)
+    )
+
+
 def direction(random):
     normal = random.normal(size=3)
     return normal / np.linalg.norm(normal)
@@ -65,9 +75,13 @@ def tallies_of(medium, normal, offset, spacing, cutoff, second=True):
     return tallies[0]
 
 
-def check_equals_naive(random, periods):
-    medium, normal = random_medium(random, periods), direction(random)
+def check_equals_naive(random, periods, make=random_medium):
+    medium, normal = make(random, periods), direction(random)
     offset, spacing, cutoff = random.random(2), random.uniform(0.3, 0.9), random.choice([0.0, 0.4])
+    assert_equals_naive(medium, normal, offset, spacing, cutoff)
+
+
+def assert_equals_naive(medium, normal, offset, spacing, cutoff):
     feet, measured = lines_of(medium, normal, offset, spacing)
     fast = tallies_of(medium, normal, offset, spacing, cutoff)
     for which, kept in enumerate([np.ones(len(medium.radius), bool), ~medium.removed]):
@@ -78,7 +92,7 @@ def check_equals_naive(random, periods):
                 medium.position[kept],
                 medium.radius[kept],
                 medium.vectors,
-                periods,
+                medium.periodic,
                 foot,
                 normal,
                 measured,
@@ -93,6 +107,23 @@ def check_equals_naive(random, periods):
 def test_gaps_equal_those_of_explicit_images(periods):
     for seed in range(8):
         check_equals_naive(np.random.default_rng([seed, *periods]), periods)
+
+
+@pytest.mark.parametrize("periods", PERIODS, ids=str)
+def test_long_gaps_in_sparse_media_equal_those_of_explicit_images(periods):
+    for seed in range(4):
+        random = np.random.default_rng([seed, *periods, 1])
+        check_equals_naive(random, periods, sparse_medium)
+
+
+def test_a_large_grain_aside_does_not_end_a_gap_before_a_small_one():
+    """It begins before what is listed ends, but on this line behind the small one, which is not."""
+    fillers = [[4.0 + 0.4 * (k % 4), 3.0, 1.0 + 0.4 * (k // 4)] for k in range(36)]
+    position = np.array([[1.9, 0, 19.8], [1.9, 0, 3.6], [0, 0, 4.9], *fillers])
+    radius = np.array([0.15, 0.15, 2.0] + 36 * [0.15])
+    everywhere = np.ones(3, bool)
+    medium = CellGrains(position, radius, np.zeros(39, bool), np.diag([6.0, 6.0, 20.0]), everywhere)
+    assert_equals_naive(medium, np.array([0.0, 0, 1]), np.array([0.8, 0.0]), 0.5, 0.0)
 
 
 def test_lines_spread_evenly_over_the_face_and_fill_the_cell():

@@ -177,7 +177,9 @@ def test_a_box_without_volume_is_no_cell(tmp_path, box):
 
 @pytest.mark.parametrize("edge", [(0, 0), (1, 0), ("nan", "nan"), (0, "inf")])
 def test_a_periodic_box_must_have_a_volume(tmp_path, edge):
-    with pytest.raises(ReadError, match=r"BOX BOUNDS ff pp ff: the box repeats, but .* is none"):
+    with pytest.raises(
+        ReadError, match=r"BOX BOUNDS ff pp ff: the box repeats, but its bounds .* no vol"
+    ):
         block_of(tmp_path, dump_text(box=(edge, (0, 1), (0, 1)), flags=" ff pp ff"))
 
 
@@ -186,6 +188,12 @@ def test_flags_that_nobody_knows_are_an_error(tmp_path, flags):
     box = [(0, 1, 0)] * 3 if "xy" in flags else [(0, 1)] * 3
     with pytest.raises(ReadError, match=r"BOX BOUNDS.*expected three boundary flags such as pp"):
         block_of(tmp_path, dump_text(box=box, flags=flags))
+
+
+def test_rows_that_the_header_does_not_count_at_all_are_an_error(tmp_path):
+    text = dump_text().replace(f"ATOMS\n{len(ROWS)}\n", "ATOMS\n0\n")
+    with pytest.raises(ReadError, match=r"the header counts 0 rows, but more follow"):
+        block_of(tmp_path, text)
 
 
 @pytest.mark.parametrize("last", ["", dump_text(step=1)])
