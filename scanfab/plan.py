@@ -20,9 +20,11 @@ __all__ = ["Plan", "make_plan"]
 REPLICATES = 16
 # lines of one axis below which a replicate's mean lengths are too uncertain to be of use
 FEWEST_LINES = 30
-# segments for a standard error of 1: measured 0.16 to 0.26 squared at spacings of r_min to 2 r_min;
-# what the first round lacks is added to it, what it has too many cannot be taken back
+# segments for a standard error of 1: measured 0.16 to 0.26 squared at spacings of r_min to 2 r_min,
+# and up to so many times that at wider ones; what the first round lacks is added to it, what it has
+# too many cannot be taken back
 SEGMENTS_PER_VARIANCE = 0.05
+MORE_WHERE_WIDE = 2.4
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,5 +136,7 @@ def _auto_spacing(settings: Settings, axes: int, reach: float, lengths: dict[str
     segments = SEGMENTS_PER_VARIANCE / settings.tolerance**2
     segments_per_line = max(reach / (3.0 * lengths["rmean"]), 1.0)
     lines = segments / (REPLICATES * axes * segments_per_line)
-    spacing = max(lengths["rmin"], math.sqrt(area / lines))
+    wide = math.sqrt(area / lines)
+    more = min(max(wide / (2.0 * lengths["rmin"]), 1.0), MORE_WHERE_WIDE)
+    spacing = max(lengths["rmin"], wide / math.sqrt(more))
     return min(spacing, math.sqrt(area / (4 * FEWEST_LINES)))
