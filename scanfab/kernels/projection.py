@@ -49,12 +49,15 @@ def project(
     per_spacing = 1.0 / grid.spacing
     for k in range(radius.size):
         x, y, z = position[k, 0], position[k, 1], position[k, 2]
-        # a row within reach; whether a column is too, the visit will see
+        # a row and a column within reach; whether they cross there, the visit will see
+        column = (frame[0, 0] * x + frame[0, 1] * y + frame[0, 2] * z - grid.first_u) * per_spacing
         row = (frame[1, 0] * x + frame[1, 1] * y + frame[1, 2] * z - grid.first_v) * per_spacing
         reach = radius[k] * per_spacing
         met[count] = k
         depth[count] = frame[2, 0] * x + frame[2, 1] * y + frame[2, 2] * z
-        count += np.floor(row + reach) >= row - reach
+        count += (np.floor(row + reach) >= row - reach) & (
+            np.floor(column + reach) >= column - reach
+        )
     order = met[:count][order_of(depth[:count])]
     return Spheres(
         along(position, order, frame[0]),
