@@ -19,11 +19,10 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.cell import Cell
-from scanfab.errors import PackingError, ReadError, ScanfabWarning
+from scanfab.errors import ReadError, ScanfabWarning
 from scanfab.packing import LazyColumns
 from scanfab.readers.base import Snapshot
-from scanfab.readers.box import box_of_bounds, box_vectors
-from scanfab.readers.columns import MOST
+from scanfab.readers.box import dump_cell
 from scanfab.readers.files import plain
 from scanfab.readers.regular import LARGE, TextTable, read_regular
 
@@ -41,8 +40,6 @@ BLANK = re.compile(rb"^[\s\x1c-\x1f\x85\xa0]*(?:\n|\Z)", re.MULTILINE)
 
 # LAMMPS writes units and time before the step
 BEFORE_STEP = re.compile(rb"(?:^ITEM: (?:UNITS|TIME)[ \t]*\r?\n[^\n]*\n)+\Z", re.MULTILINE)
-# of the lower and the upper face
-BOUNDARY = re.compile("pp|[fsm][fsm]")
 STEP_OR_TIME = re.compile(rb"^ITEM: (TIMESTEP|TIME)[ \t]*\r?\n\s*(\S+)", re.MULTILINE)
 
 
@@ -113,7 +110,7 @@ def read_block(snapshot: Snapshot) -> DumpBlock:
     count = _count(where, sections)
     columns = _regular(snapshot, body, count, range(len(body.names)))
     values = _tolerant(snapshot, body, count) if columns is None else np.column_stack(columns)
-    return DumpBlock(snapshot.step, snapshot.time, _cell(where, sections), body.names, values)
+    return DumpBlock(snapshot.step, snapshot.time, dump_cell(where, sections), body.names, values)
 
 
 def read_columns(
@@ -131,7 +128,7 @@ def read_columns(
         If the header or a line is not as it should be; names the line.
     """
     where, sections, body = _header(snapshot)
-    count, cell = _count(where, sections), _cell(where, sections)
+    count, cell = _count(where, sections), dump_cell(where, sections)
     chosen = [body.names.index(name) for name in needed(body.names)]
     found = _regular(snapshot, body, count, chosen)
     if found is None:
@@ -346,46 +343,3 @@ def _locate(path: Path, snapshot: Snapshot, block: bytes, body: _Body, reason: s
 def _lines_before(snapshot: Snapshot) -> int:
     with open(plain(snapshot.path), "rb") as stream:
         return stream.read(snapshot.start).count(b"\n")
-
-
-def _cell(where: str, sections: dict[str, list[str]]) -> Cell | None:
-    """The box, periodic along the axes flagged pp; None if it has no volume and does not repeat."""
-    key = next((key for key in sections if key.startswith("BOX BOUNDS")), None)
-    if key is None:
-        return None
-    words = key.removeprefix("BOX BOUNDS").split()
-    is_general = words[:2] == ["abc", "origin"]
-    is_tilted = words[:3] == ["xy", "xz", "yz"]
-    width = 4 if is_general else 3 if is_tilted else 2
-    try:
-        bounds = np.array([line.split() for line in sections[key][:3]], dtype=np.float64)
-    except ValueError:
-        bounds = np.zeros(0)
-    if bounds.shape != (3, width):
-        raise ReadError(f"{where}: ITEM: {key}: expected three lines of {width} numbers")
-    flags = _periodic(where, key, words[(2 if is_general else 3 if is_tilted else 0) :])
-    try:
-        if not np.all(np.abs(bounds) < MOST):
-            raise PackingError
-        vectors, origin = (
-            (bounds[:, :3], bounds[:, 3]) if is_general else box_vectors(*box_of_bounds(bounds))
-        )
-        return Cell(vectors, flags, origin)
-    except PackingError:
-        if not any(flags):
-            return None
-        found = "; ".join(sections[key][:3])
-        raise ReadError(
-            f"{where}: ITEM: {key}: the box repeats, but its bounds {found} span no volume"
-        ) from None
-
-
-def _periodic(where: str, key: str, flags: list[str]) -> tuple[bool, bool, bool]:
-    """Which axes repeat; very old files do not say, and have none that do."""
-    if not flags:
-        return False, False, False
-    if len(flags) != 3 or not all(BOUNDARY.fullmatch(flag) for flag in flags):
-        raise ReadError(
-            f"{where}: ITEM: {key}: expected three boundary flags such as pp, ff, fs or mm"
-        )
-    return flags[0] == "pp", flags[1] == "pp", flags[2] == "pp"
