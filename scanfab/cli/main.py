@@ -8,6 +8,7 @@ import sys
 from contextlib import suppress
 from importlib import import_module
 from io import UnsupportedOperation
+from types import FrameType
 
 import click
 
@@ -25,7 +26,12 @@ COMMANDS = {
 }
 
 
-INTERRUPTED, TERMINATED = 130, 143
+ENDED: dict[int, str] = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
+# what modules, where they were imported, have to remove before a process ends
+LEFTOVERS = {
+    "scanfab.readers.files": "remove_copies",
+    "scanfab.kernels.cache": "remove_unkept",
+}
 
 
 class LazyGroup(click.Group):
@@ -75,10 +81,9 @@ class Terminated(BaseException):
 def main(args: list[str] | None = None) -> None:
     """Run the command line and exit: 0 done, 1 failed, 2 wrong usage, 130 and 143 interrupted."""
 
-    def terminate(*_: object) -> None:
-        raise Terminated
-
-    signal.signal(signal.SIGTERM, terminate)
+    signal.signal(signal.SIGTERM, _end)
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, _end)
     _replace_closed_streams()
     code = run(sys.argv[1:] if args is None else args)
     # the result stands: a signal would only spoil the exit code
@@ -87,6 +92,27 @@ def main(args: list[str] | None = None) -> None:
     if code:
         _leave_at_once(code)
     sys.exit(code)
+
+
+def _end(number: int, frame: FrameType | None) -> None:
+    """End on a signal: by an exception, or at once where modules are being imported."""
+    if not _imports(frame):
+        raise Terminated if number == signal.SIGTERM else KeyboardInterrupt
+    # extension modules take an exception for a failed import, and some of VTK's crash
+    _leave_at_once(_report_end(number))
+
+
+def _imports(frame: FrameType | None) -> bool:
+    """Whether what the frame does is done for an import."""
+    while frame is not None and not frame.f_code.co_filename.startswith("<frozen importlib"):
+        frame = frame.f_back
+    return frame is not None
+
+
+def _report_end(number: int) -> int:
+    """Say that a signal ended the process; the exit code for that."""
+    click.echo(f"scanfab: {ENDED[number]}", err=True)
+    return 128 + number
 
 
 def _replace_closed_streams() -> None:
@@ -102,11 +128,9 @@ def _replace_closed_streams() -> None:
 
 def _leave_at_once(code: int) -> None:
     """Exit without waiting for the frames that other threads are computing."""
-    from scanfab.readers.files import remove_copies
-
-    remove_copies()
-    if "scanfab.kernels.cache" in sys.modules:
-        sys.modules["scanfab.kernels.cache"].remove_unkept()
+    for module, function in LEFTOVERS.items():
+        if hasattr(sys.modules.get(module), function):
+            getattr(sys.modules[module], function)()
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError):  # a full disk, a closed pipe: told already
             stream.flush()
@@ -127,11 +151,9 @@ def run(args: list[str]) -> int:
         error.show()
         return error.exit_code
     except (KeyboardInterrupt, click.Abort):
-        click.echo("scanfab: interrupted", err=True)
-        return INTERRUPTED
+        return _report_end(signal.SIGINT)
     except Terminated:
-        click.echo("scanfab: terminated", err=True)
-        return TERMINATED
+        return _report_end(signal.SIGTERM)
     except (ScanfabError, OSError, MemoryError) as error:
         if debug:
             raise

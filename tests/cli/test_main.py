@@ -158,3 +158,25 @@ def test_interrupt_is_exit_code_130(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(main.cli, "main", interrupted)
     assert main.run(["compute"]) == 130
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
+@pytest.mark.parametrize(("sent", "code"), [("SIGINT", 130), ("SIGTERM", 143)])
+def test_a_signal_during_an_import_ends_the_process_at_once(tmp_path, sent, code):
+    """Whatever is imported need not pass an exception on: some extension modules crash instead."""
+    (tmp_path / "deaf.py").write_text(
+        "import os, signal, time\n"
+        "try:\n"
+        f"    os.kill(os.getpid(), signal.{sent})\n"
+        "    time.sleep(60)\n"
+        "except BaseException:\n"
+        "    raise SystemExit('an exception came here')\n"
+    )
+    program = (
+        "from scanfab.cli import main; main.run = lambda args: __import__('deaf'); main.main()"
+    )
+    answer = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True
+    )
+    assert answer.returncode == code
+    assert answer.stderr in ("scanfab: interrupted\n", "scanfab: terminated\n")
