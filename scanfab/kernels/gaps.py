@@ -10,7 +10,7 @@ import numpy.typing as npt
 from scanfab.kernels.compiled import inner, kernel
 from scanfab.kernels.follow import next_solid
 from scanfab.kernels.grid import Grid, bounds, columns_in, open_grid, strip_of
-from scanfab.kernels.lines import chords_of, solids_of
+from scanfab.kernels.lines import chords_of, order_chords, solids_of
 from scanfab.kernels.periodic import CellGrains, Prism, cell_grid, measured_in
 from scanfab.kernels.projection import Spheres, project, sort_into_strips
 from scanfab.kernels.sweep import FAR
@@ -29,7 +29,7 @@ MOST_LISTED = 4096
 
 
 class Bins(NamedTuple):
-    """What gaps are added to."""
+    """What the gaps of a direction's lines are added to."""
 
     to_block: FloatArray
     """
@@ -40,7 +40,29 @@ class Bins(NamedTuple):
     cutoffs: FloatArray
     """In ascending order, shape (C,)."""
     sums: FloatArray
-    """Number, length, squared length, shape (BLOCKS, C, 3)."""
+    """Number, length, squared length for each set of solids, shape (2, BLOCKS, C, 3)."""
+
+
+class Line(NamedTuple):
+    """A line: its place, and where it is in the blocks' coordinates at the depth 0."""
+
+    u: float
+    v: float
+    x: float
+    y: float
+    z: float
+
+
+@inner(inline="always")
+def line_at(to_block: FloatArray, u: float, v: float) -> Line:
+    """The line at a place."""
+    return Line(
+        u,
+        v,
+        to_block[0, 0] * u + to_block[0, 1] * v + to_block[0, 3],
+        to_block[1, 0] * u + to_block[1, 1] * v + to_block[1, 3],
+        to_block[2, 0] * u + to_block[2, 1] * v + to_block[2, 3],
+    )
 
 
 @inner()
@@ -55,8 +77,14 @@ def in_frame(to_block: FloatArray, frame: FloatArray) -> FloatArray:
     return found
 
 
+@inner(inline="always")
+def is_upper(coordinate: float) -> bool:
+    """Whether a coordinate lies in the upper half of its period of 1."""
+    return bool(coordinate - np.floor(coordinate) >= 0.5)
+
+
 @inner()
-def add_gap(bins: Bins, u: float, v: float, low: float, high: float) -> None:
+def add_gap(bins: Bins, which: int, line: Line, low: float, high: float) -> None:
     """Add a gap to the block of its middle and the bin of the largest cut-off that it reaches."""
     length = high - low
     place = 0
@@ -65,45 +93,44 @@ def add_gap(bins: Bins, u: float, v: float, low: float, high: float) -> None:
     if length <= 0.0 or place == 0:
         return
     middle = 0.5 * (low + high)
-    block = 0
-    for i in range(3):
-        to = bins.to_block[i]
-        along = to[0] * u + to[1] * v + to[2] * middle + to[3]
-        block += (1 << i) * (along - np.floor(along) >= 0.5)
-    bins.sums[block, place - 1, NUMBER] += 1.0
-    bins.sums[block, place - 1, LENGTH] += length
-    bins.sums[block, place - 1, SQUARE] += length * length
+    block = 1 * is_upper(line.x + bins.to_block[0, 2] * middle)
+    block += 2 * is_upper(line.y + bins.to_block[1, 2] * middle)
+    block += 4 * is_upper(line.z + bins.to_block[2, 2] * middle)
+    bins.sums[which, block, place - 1, NUMBER] += 1.0
+    bins.sums[which, block, place - 1, LENGTH] += length
+    bins.sums[which, block, place - 1, SQUARE] += length * length
 
 
 @inner()
-def add_whole(bins: Bins, u: float, v: float, solids: FloatArray, count: int) -> None:
+def add_whole(bins: Bins, which: int, line: Line, solids: FloatArray, count: int) -> None:
     """Add the gaps of a line between its first and its last solid."""
     for k in range(1, count):
-        add_gap(bins, u, v, solids[1, k - 1], solids[0, k])
+        add_gap(bins, which, line, solids[1, k - 1], solids[0, k])
 
 
 @inner()
-def add_window(bins: Bins, u: float, v: float, solids: FloatArray, count: int, half: float) -> None:
+def add_window(
+    bins: Bins, which: int, line: Line, solids: FloatArray, count: int, half: float
+) -> None:
     """Add the gaps of a line within half a length of its middle."""
     for k in range(count + 1):
         low = max(solids[1, k - 1], -half) if k > 0 else -half
         high = min(solids[0, k], half) if k < count else half
-        add_gap(bins, u, v, low, high)
+        add_gap(bins, which, line, low, high)
 
 
 @inner()
 def add_measured(
     bins: Bins,
-    u: float,
-    v: float,
+    which: int,
+    line: Line,
     solids: FloatArray,
     count: int,
-    which: int,
     grains: CellGrains,
     prism: Prism,
 ) -> None:
     """Add the gaps of a line through a periodic medium that start in its measured length."""
-    low = prism.rise_u * u + prism.rise_v * v
+    low = prism.rise_u * line.u + prism.rise_v * line.v
     known = low + measured_in(grains, prism).known
     for k in range(1, count + 1):
         end = solids[1, k - 1]
@@ -111,49 +138,53 @@ def add_measured(
             start = solids[0, k] if k < count else FAR
             if start >= known:
                 # not every solid that begins there is listed
-                start = next_solid(grains, prism, which == 1, u, v, end)
+                start = next_solid(grains, prism, which == 1, line.u, line.v, end)
             if start < FAR:
-                add_gap(bins, u, v, end, start)
+                add_gap(bins, which, line, end, start)
 
 
 @inner()
 def tally_grid(
     spheres: Spheres,
     grid: Grid,
-    which: int,
     window_radius: float,
-    in_whole: bool,
-    in_window: bool,
+    wanted: BoolArray,
     whole: Bins,
     window: Bins,
     medium: tuple[CellGrains, Prism] | None,
 ) -> None:
-    """Add the gaps of all lines of a grid, for one set of solids."""
+    """Add the gaps of all lines of a grid."""
     rows = max(MOST_LISTED // max(grid.columns, 1), 1)
     start, chosen = sort_into_strips(spheres, grid, rows)
-    low, high = columns_in(grid, 0.0 if in_whole else window_radius)
+    low, high = columns_in(grid, 0.0 if wanted[0] or wanted[1] else window_radius)
     order = np.empty(spheres.u.size, np.int64)
     solids = np.empty((2, spheres.u.size))
     for number in range(start.size - 1):
         strip = strip_of(grid, low, high, number, rows, grid.columns)
         lines = np.arange(strip.rows * strip.columns).reshape(strip.rows, strip.columns)
         met = chosen[start[number] : start[number + 1]]
-        first, chords = chords_of(spheres, met, which, strip, lines, lines.size)
+        first, chords = chords_of(spheres, met, strip, lines, lines.size)
         for line in range(lines.size):
             row, column = line // strip.columns, line % strip.columns
             u = strip.first_u + row * strip.shear + column * strip.spacing
             v = strip.first_v + row * strip.spacing
-            listed = chords[:, first[line] : first[line + 1]]
-            count = solids_of(listed, order[: listed.shape[1]], solids)
-            if in_whole:
-                if medium is not None:
-                    add_measured(whole, u, v, solids, count, which, medium[0], medium[1])
-                else:
-                    add_whole(whole, u, v, solids, count)
-            if in_window:
-                half2 = window_radius * window_radius - u * u - v * v
-                if half2 > 0.0:
-                    add_window(window, u, v, solids, count, np.sqrt(half2))
+            half2 = window_radius * window_radius - u * u - v * v
+            ordered = order[: first[line + 1] - first[line]]
+            order_chords(chords, first[line], ordered)
+            for which in range(2):
+                in_window = wanted[2 + which] and half2 > 0.0
+                if not (wanted[which] or in_window):
+                    continue
+                count = solids_of(chords, ordered, which, solids)
+                if wanted[which]:
+                    here = line_at(whole.to_block, u, v)
+                    if medium is not None:
+                        add_measured(whole, which, here, solids, count, medium[0], medium[1])
+                    else:
+                        add_whole(whole, which, here, solids, count)
+                if in_window:
+                    here = line_at(window.to_block, u, v)
+                    add_window(window, which, here, solids, count, np.sqrt(half2))
 
 
 @kernel
@@ -194,19 +225,15 @@ def tally_gaps(
         )
         spheres = project(position, radius, removed, frame, grid)
         of_whole, of_window = in_frame(to_blocks[0], frame), in_frame(to_blocks[1], frame)
-        for which in range(2):
-            if wanted[which] or wanted[2 + which]:
-                tally_grid(
-                    spheres,
-                    grid,
-                    which,
-                    window_radius,
-                    wanted[which],
-                    wanted[2 + which],
-                    Bins(of_whole, cutoffs, sums[axis, which, 0]),
-                    Bins(of_window, cutoffs, sums[axis, which, 1]),
-                    None,
-                )
+        tally_grid(
+            spheres,
+            grid,
+            window_radius,
+            wanted,
+            Bins(of_whole, cutoffs, sums[axis, :, 0]),
+            Bins(of_window, cutoffs, sums[axis, :, 1]),
+            None,
+        )
 
 
 @kernel
@@ -223,10 +250,9 @@ def tally_cell_gaps(
     """The same for the whole of a periodic medium: ``normals`` (D, 3), ``to_block`` (3, 4)."""
     for axis in range(normals.shape[0]):
         prism, spheres, grid = cell_grid(grains, normals[axis], offsets[axis], spacing)
-        for which in range(2):
-            if wanted[which]:
-                bins = Bins(in_frame(to_block, prism.frame), cutoffs, sums[axis, which, 0])
-                if grains.periodic[prism.third]:
-                    tally_grid(spheres, grid, which, 0.0, True, False, bins, bins, (grains, prism))
-                else:
-                    tally_grid(spheres, grid, which, 0.0, True, False, bins, bins, None)
+        bins = Bins(in_frame(to_block, prism.frame), cutoffs, sums[axis, :, 0])
+        in_whole = wanted & np.array([True, True, False, False])
+        if grains.periodic[prism.third]:
+            tally_grid(spheres, grid, 0.0, in_whole, bins, bins, (grains, prism))
+        else:
+            tally_grid(spheres, grid, 0.0, in_whole, bins, bins, None)

@@ -6,6 +6,8 @@ For the lines that the sweep cannot solve, and where the gaps themselves are wan
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
@@ -25,83 +27,146 @@ from scanfab.kernels.sweep import (
     moved,
 )
 
-__all__ = ["chords_of", "solids_of", "solve_closed"]
+__all__ = ["chords_of", "order_chords", "solids_of", "solve_closed"]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+
+
+class Chords(NamedTuple):
+    """Chords in lists, one after the other."""
+
+    ends: FloatArray
+    """Where they start and stop, shape (2, M)."""
+    removed: BoolArray
+    """Whether their spheres are not in the second set of solids, shape (M,)."""
 
 
 @inner()
-def list_chords(
+def room_for(count: int) -> Chords:
+    """So many chords, to be filled in."""
+    return Chords(np.empty((2, count)), np.empty(count, np.bool_))
+
+
+@inner()
+def cut(
     spheres: Spheres,
     chosen: IntArray,
-    which: int,
     strip: Strip,
     number: IntArray,
-    filled: IntArray,
-    chords: FloatArray,
-) -> None:
+    line: IntArray,
+    chords: Chords,
+    done: int,
+    count: int,
+) -> tuple[int, int]:
     """
-    List the chords of the lines that have a number >= 0, in the order of depth.
+    Add chords of the lines that have a number >= 0, in the order of depth, and those numbers.
 
-    ``number`` has shape (rows, columns). ``filled[number]`` is the place of a line's next chord in
-    ``chords`` (shape (2, M)); with no room there (M = 0) the chords are only counted.
+    ``number`` has shape (rows, columns). From the sphere ``done`` on, to the ``count`` chords that
+    are there, until there is no more room. Returns the new ``done`` and ``count``.
     """
-    for k in chosen:
-        if which == 1 and spheres.removed[k]:
-            continue
-        u, v, depth, radius = sphere_at(spheres, k)
-        rows = span(v, radius, strip.first_v, strip.per_spacing, 0, strip.rows)
+    ends, removed = chords.ends, chords.removed
+    low, high = strip.low, strip.high
+    for place in range(done, chosen.size):
+        k = chosen[place]
+        sphere = sphere_at(spheres, k)
+        rows = span(sphere.v, sphere.radius, strip.first_v, strip.per_spacing, 0, strip.rows)
+        if count + (rows[1] - rows[0]) * strip.columns > line.size:
+            return place, count
         for row in range(rows[0], rows[1]):
-            dv = strip.first_v + row * strip.spacing - v
-            reach2 = radius * radius - dv * dv
+            dv = strip.first_v + row * strip.spacing - sphere.v
+            reach2 = sphere.radius * sphere.radius - dv * dv
             reach = np.sqrt(max(reach2, 0.0))
             first_u = strip.first_u + row * strip.shear
-            columns = span(u, reach, first_u, strip.per_spacing, strip.low[row], strip.high[row])
+            columns = span(sphere.u, reach, first_u, strip.per_spacing, low[row], high[row])
             for column in range(columns[0], columns[1]):
-                line = number[row, column]
-                du = first_u + column * strip.spacing - u
-                if line < 0 or reach2 < du * du:
+                du = first_u + column * strip.spacing - sphere.u
+                if number[row, column] < 0 or reach2 < du * du:
                     continue
-                if chords.shape[1] > 0:
-                    half_chord = np.sqrt(reach2 - du * du)
-                    chords[0, filled[line]] = depth - half_chord
-                    chords[1, filled[line]] = depth + half_chord
-                filled[line] += 1
+                half_chord = np.sqrt(reach2 - du * du)
+                line[count] = number[row, column]
+                ends[0, count] = sphere.depth - half_chord
+                ends[1, count] = sphere.depth + half_chord
+                removed[count] = spheres.removed[k]
+                count += 1
+    return chosen.size, count
+
+
+@inner()
+def cut_all(
+    spheres: Spheres, chosen: IntArray, strip: Strip, number: IntArray
+) -> tuple[IntArray, Chords]:
+    """All that :func:`cut` finds."""
+    room = 4 * chosen.size + strip.rows * strip.columns
+    line, chords = np.empty(room, np.int64), room_for(room)
+    done, count = cut(spheres, chosen, strip, number, line, chords, 0, 0)
+    while done < chosen.size:
+        lines, more = np.empty(2 * line.size, np.int64), room_for(2 * line.size)
+        lines[:count] = line[:count]
+        more.ends[:, :count] = chords.ends[:, :count]
+        more.removed[:count] = chords.removed[:count]
+        line, chords = lines, more
+        done, count = cut(spheres, chosen, strip, number, line, chords, done, count)
+    return line[:count], chords
+
+
+@inner()
+def sort_by_line(line: IntArray, chords: Chords, stop: IntArray, listed: Chords) -> None:
+    """
+    Sort chords by the number of their line, in the order that they have.
+
+    ``stop``, zeros, becomes the start of each line's list, and the end of the last; see ``listed``.
+    """
+    from_ends, from_removed = chords.ends, chords.removed
+    ends, removed = listed.ends, listed.removed
+    for k in range(line.size):
+        stop[line[k] + 2] += 1
+    for one in range(2, stop.size):
+        stop[one] += stop[one - 1]
+    # lists begin where those before them end, so filling them leaves each its start
+    for k in range(line.size):
+        place = stop[line[k] + 1]
+        stop[line[k] + 1] += 1
+        ends[0, place], ends[1, place] = from_ends[0, k], from_ends[1, k]
+        removed[place] = from_removed[k]
 
 
 @inner()
 def chords_of(
-    spheres: Spheres, chosen: IntArray, which: int, strip: Strip, number: IntArray, count: int
-) -> tuple[IntArray, FloatArray]:
-    """The chords of numbered lines: the start of each line's list (and the end), and the lists."""
-    # lists begin where those before them end, so the first filling leaves the second its places
-    stop = np.zeros(count + 2, np.int64)
-    list_chords(spheres, chosen, which, strip, number, stop[2:], np.empty((2, 0)))
-    for line in range(count):
-        stop[line + 2] += stop[line + 1]
-    chords = np.empty((2, stop[count + 1]))
-    if chords.shape[1] > 0:
-        list_chords(spheres, chosen, which, strip, number, stop[1:], chords)
-    return stop, chords
+    spheres: Spheres, chosen: IntArray, strip: Strip, number: IntArray, count: int
+) -> tuple[IntArray, Chords]:
+    """The chords of numbered lines, and the start of each line's list (and the end of the last)."""
+    line, chords = cut_all(spheres, chosen, strip, number)
+    stop, listed = np.zeros(count + 2, np.int64), room_for(line.size)
+    sort_by_line(line, chords, stop, listed)
+    return stop, listed
 
 
 @inner()
-def solids_of(chords: FloatArray, order: IntArray, solids: FloatArray) -> int:
-    """
-    The union of a line's chords, shape (2, K), into the first places of ``solids``; their number.
-
-    ``order`` is room for K numbers.
-    """
+def order_chords(chords: Chords, first: int, order: IntArray) -> None:
+    """The numbers of a line's chords, from the first one on, in the order of their starts."""
     for k in range(order.size):
-        order[k] = k
-    sort_by(chords[0], order)
+        order[k] = first + k
+    sort_by(chords.ends[0], order)
+
+
+@inner()
+def solids_of(chords: Chords, order: IntArray, which: int, solids: FloatArray) -> int:
+    """
+    The union of a line's chords into the first places of ``solids``; their number.
+
+    Of the first set of solids, or of the second one, without the chords that are removed from it.
+    """
     count = 0
     for k in order:
-        if count > 0 and chords[0, k] <= solids[1, count - 1]:
-            solids[1, count - 1] = max(solids[1, count - 1], chords[1, k])
+        if which == 1 and chords.removed[k]:
+            continue
+        start, stop = chords.ends[0, k], chords.ends[1, k]
+        if count > 0 and start <= solids[1, count - 1]:
+            solids[1, count - 1] = max(solids[1, count - 1], stop)
         else:
-            solids[0, count], solids[1, count] = chords[0, k], chords[1, k]
+            solids[0, count], solids[1, count] = start, stop
             count += 1
     return count
 
@@ -168,15 +233,16 @@ def solve_closed(
                 number[row, column] = line
                 places[line] = place
                 line += 1
-    start, chords = chords_of(spheres, chosen, which, strip, number, closed)
+    solid = chosen if which == 0 else chosen[~spheres.removed[chosen]]
+    start, chords = chords_of(spheres, solid, strip, number, closed)
     wrong = np.zeros((2, TALLY_SIZE))
     right = np.zeros((2, TALLY_SIZE))
     for line in range(closed):
         order = np.arange(start[line], start[line + 1])
         bound = lines[places[line] + BOUND]
-        sweep_line(chords, order, bound, least, wrong, which, whole, window, measured)
-        sort_by(chords[0], order)
-        end = sweep_line(chords, order, bound, least, right, which, whole, window, measured)
+        sweep_line(chords.ends, order, bound, least, wrong, which, whole, window, measured)
+        sort_by(chords.ends[0], order)
+        end = sweep_line(chords.ends, order, bound, least, right, which, whole, window, measured)
         lines[places[line] + SET * np.uint64(which) + END] = end
     for entry in range(TALLY_SIZE):
         tally[which, entry] += right[which, entry] - wrong[which, entry]
