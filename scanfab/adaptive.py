@@ -11,7 +11,7 @@ import numpy as np
 from scanfab.directions import direction_rule
 from scanfab.errors import ScanfabWarning, SettingsError
 from scanfab.fabric.void import void_fabric
-from scanfab.plan import Plan
+from scanfab.plan import CLOSE, GROWTH_WITH_SPACING, Plan
 from scanfab.scan import ScanSums, Solids, is_affordable, scan_lines
 from scanfab.settings import Settings
 
@@ -20,9 +20,9 @@ __all__ = ["scan_to_tolerance"]
 # beyond these there is more overhead than scan
 MAX_REPLICATES = 16_384
 MAX_DIRECTIONS = 3_000
-# a finer rule is exact for more of what the mean lengths do and needs fewer lines in all, but the
-# scan starts afresh: it is worth that where the one factor is missing, and grows by the other
-FINER_FROM, FINER_UP_TO = 2.0, 8.0
+# where so much is missing, a scan with closer lines and a finer rule, which need fewer segments in
+# all, is worth to start afresh; the rule grows by the other factor at most
+AFRESH_FROM, FINER_UP_TO = 2.0, 8.0
 FINEST = 21
 # a round multiplies the work by this at most: early estimates of the error are uncertain
 GROWTH = 4.0
@@ -58,12 +58,12 @@ def scan_to_tolerance(solids: Solids, plan: Plan, settings: Settings) -> tuple[S
         # as many replicates as the budget allows
         left = (settings.max_chords - spent) / max(float(sums.chords.mean()), 1.0)
         missing = _missing_work(sums, plan, settings)
-        finer = _closer_lines(sums, plan, solids, settings, left)
-        if finer is None and missing <= 1.0:
+        better = _closer_lines(sums, plan, solids, settings, left)
+        if better is None and missing <= 1.0:
             return sums, plan
-        finer = finer or _finer_rule(plan, missing, settings, left)
-        if finer is not None:
-            plan, start, stop = finer, 0, finer.replicates
+        better = better or _better_plan(plan, missing, solids, settings, left)
+        if better is not None:
+            plan, start, stop = better, 0, better.replicates
             continue
         more = min(math.ceil(min(missing, GROWTH) * stop), MAX_REPLICATES, int(stop + left))
         if plan.auto == "directions" or more <= stop:
@@ -98,21 +98,29 @@ def _closer_lines(
     return None
 
 
-def _finer_rule(plan: Plan, missing: float, settings: Settings, left: float) -> Plan | None:
-    """A plan with a finer rule, if that is worth starting afresh for and there is one."""
+def _better_plan(
+    plan: Plan, missing: float, solids: Solids, settings: Settings, left: float
+) -> Plan | None:
+    """A plan to start afresh with, if that is worth it: closer lines, then a finer rule."""
     if plan.auto == "directions":
         axes = math.ceil(min(missing, GROWTH) * len(plan.rule))
-        rule = direction_rule(str(axes)) if len(plan.rule) < MAX_DIRECTIONS else plan.rule
-    elif settings.directions is None and missing >= FINER_FROM:
-        # a design of odd degree t has about ((t + 1) / 2)² axes
-        axes = math.ceil(min(missing, FINER_UP_TO) * len(plan.rule))
-        rule = direction_rule(f"design:{min(2 * math.ceil(math.sqrt(axes)) - 1, FINEST)}")
+        better = replace(plan, rule=direction_rule(str(axes)))
+        worth = len(plan.rule) < MAX_DIRECTIONS
     else:
-        return None
-    growth = len(rule) / len(plan.rule)
-    if growth <= 1.0 or growth * plan.replicates > left:
-        return None
-    return replace(plan, rule=rule)
+        worth = missing >= AFRESH_FROM
+        power = 2.0 + GROWTH_WITH_SPACING
+        closest = CLOSE * float(solids.radius.mean())
+        spacing = max(plan.spacing / missing ** (1.0 / power), min(closest, plan.spacing))
+        missing /= (plan.spacing / spacing) ** power
+        better = replace(plan, spacing=spacing)
+        if settings.directions is None and missing > 1.0:
+            # a design of odd degree t has about ((t + 1) / 2)² axes
+            axes = math.ceil(min(missing, FINER_UP_TO) * len(plan.rule))
+            degree = min(2 * math.ceil(math.sqrt(axes)) - 1, FINEST)
+            better = replace(better, rule=direction_rule(f"design:{degree}"))
+    growth = len(better.rule) / len(plan.rule) * (plan.spacing / better.spacing) ** 2
+    worth = worth and growth * plan.replicates <= left
+    return better if worth and growth > 1.0 and is_affordable(solids, better.spacing) else None
 
 
 def _within_budget(plan: Plan, solids: Solids, settings: Settings) -> Plan:

@@ -14,17 +14,17 @@ from scanfab.settings import AUTO_RULE, Settings
 from scanfab.variants import Sample
 from scanfab.window import SphereWindow, default_center, room_around, smallest_extent
 
-__all__ = ["Plan", "make_plan"]
+__all__ = ["CLOSE", "GROWTH_WITH_SPACING", "Plan", "make_plan"]
 
 # replicates of a fixed scan, and at least of an auto scan
 REPLICATES = 16
 # lines of one axis below which a replicate's mean lengths are too uncertain to be of use
 FEWEST_LINES = 30
-# segments for a standard error of 1: measured 0.16 to 0.26 squared at spacings of r_min to 2 r_min,
-# and up to so many times that at wider ones; what the first round lacks is added to it, what it has
-# too many cannot be taken back
-SEGMENTS_PER_VARIANCE = 0.05
-MORE_WHERE_WIDE = 2.4
+# segments for a standard error of 1, at a spacing of the mean radius, and the power of the spacing
+# that they grow with: measured in dense packings of radii that are equal, or in the ratio 3 or 10
+SEGMENTS_PER_VARIANCE, GROWTH_WITH_SPACING = 0.068, 0.75
+# of the mean radius: closer lines say little more, as all that remains is the choice of directions
+CLOSE = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,14 +129,14 @@ def _check_window(window: SphereWindow, sample: Sample, largest: float) -> None:
 
 def _auto_spacing(settings: Settings, axes: int, reach: float, lengths: dict[str, float]) -> float:
     """
-    Spacing of one replicate's lines: r_min, wider where the sample is so large that the first
-    round would do more than the work; never so wide that lines get too few.
+    Spacing of one replicate's lines at which the first round is likely to meet the tolerance.
+
+    Never so wide that lines get too few, nor closer than is of use: more directions are added then.
     """
     area = math.pi * reach**2
-    segments = SEGMENTS_PER_VARIANCE / settings.tolerance**2
-    segments_per_line = max(reach / (3.0 * lengths["rmean"]), 1.0)
-    lines = segments / (REPLICATES * axes * segments_per_line)
-    wide = math.sqrt(area / lines)
-    more = min(max(wide / (2.0 * lengths["rmin"]), 1.0), MORE_WHERE_WIDE)
-    spacing = max(lengths["rmin"], wide / math.sqrt(more))
-    return min(spacing, math.sqrt(area / (4 * FEWEST_LINES)))
+    radius = lengths["rmean"]
+    segments_per_line = max(reach / (3.0 * radius), 1.0)
+    # lines * segments_per_line = segments, and lines are so many axes' area / spacing²
+    lines = SEGMENTS_PER_VARIANCE / settings.tolerance**2 / (REPLICATES * axes * segments_per_line)
+    spacing = radius * math.pow(area / lines / radius**2, 1.0 / (2.0 + GROWTH_WITH_SPACING))
+    return min(max(spacing, CLOSE * radius), math.sqrt(area / (4 * FEWEST_LINES)))

@@ -15,7 +15,7 @@ from scanfab import (
     compute,
     find_contacts,
 )
-from scanfab.plan import FEWEST_LINES, REPLICATES, make_plan
+from scanfab.plan import CLOSE, FEWEST_LINES, GROWTH_WITH_SPACING, REPLICATES, make_plan
 from scanfab.settings import AUTO_RULE
 from scanfab.variants import Sample
 from tests.lattices import shaken_cubic
@@ -119,11 +119,18 @@ def test_auto_spacing_never_makes_too_few_lines(packing, tolerance):
     assert math.pi * plan.window.radius**2 / plan.spacing**2 >= 4 * FEWEST_LINES * (1 - 1e-9)
 
 
-def test_auto_spacing_of_a_small_sample_is_the_smallest_radius():
+def test_auto_spacing_of_a_small_sample_is_as_close_as_is_of_use():
     random = np.random.default_rng(0)
     packing = Packing(random.random((400, 3)) * 20, random.uniform(0.5, 1.0, 400))
-    plan = plan_of(packing, tolerance=1e-4)
-    assert plan.spacing == pytest.approx(packing.radius.min())
+    plan = plan_of(packing, tolerance=1e-5)
+    assert plan.spacing == pytest.approx(CLOSE * packing.radius.mean())
+
+
+def test_auto_spacing_is_wider_where_less_is_asked_for():
+    random = np.random.default_rng(0)
+    packing = Packing(random.random((20_000, 3)) * 60, random.uniform(0.5, 1.0, 20_000))
+    wide, close = (plan_of(packing, tolerance=t).spacing for t in (8e-4, 2e-4))
+    assert wide / close == pytest.approx(4.0 ** (2.0 / (2.0 + GROWTH_WITH_SPACING)))
 
 
 def test_window_is_for_the_variants_that_have_one(packing):

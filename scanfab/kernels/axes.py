@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.kernels.compiled import inner, kernel
+from scanfab.kernels.compiled import LANES, inner, kernel
 from scanfab.kernels.follow import follow
 from scanfab.kernels.grid import Grid, bounds, columns_in, open_grid, part_of, strip_of
 from scanfab.kernels.lines import solve_closed
@@ -15,7 +15,6 @@ from scanfab.kernels.sweep import (
     MOST_LINES,
     NOTHING,
     STATE_SIZE,
-    WIDTH,
     Flag,
     Measured,
     Strip,
@@ -33,7 +32,7 @@ BoolArray = npt.NDArray[np.bool_]
 
 SMALLEST = 5e-324
 # a row of lines has to fit a strip
-MOST_COLUMNS = MOST_LINES - WIDTH
+MOST_COLUMNS = MOST_LINES - LANES
 
 
 @inner()
@@ -79,7 +78,7 @@ def scan_strips(
 ) -> None:
     """Scan a grid strip by strip, so that the lines' state stays in cache."""
     least = max(cutoff, SMALLEST)
-    pitch = grid.columns + WIDTH
+    pitch = grid.columns + LANES
     rows = max(MOST_LINES // pitch, 1)
     start, chosen = sort_into_strips(spheres, grid, rows)
     low, high = columns_in(grid, 0.0 if whole is not None else window_radius)

@@ -6,8 +6,13 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numba
+from llvmlite.binding import get_host_cpu_name
 
-__all__ = ["inner", "kernel"]
+__all__ = ["LANES", "inner", "kernel"]
+
+# numbers that the compiler's vector instructions take at a time: 256 bits of them, also on
+# processors that have wider ones, but for these
+LANES = 8 if get_host_cpu_name() in ("znver4", "znver5") else 4
 
 # its types leave out some of its options
 njit: Any = numba.njit

@@ -26,7 +26,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.kernels.compiled import inner
+from scanfab.kernels.compiled import LANES, inner
 
 __all__ = [
     "BOUND",
@@ -43,7 +43,6 @@ __all__ = [
     "TALLY_SIZE",
     "VOID",
     "WHOLE",
-    "WIDTH",
     "WINDOW",
     "Flag",
     "Measured",
@@ -75,7 +74,6 @@ SET = np.uint64(3) * PLANE
 BOUND = np.uint64(6) * PLANE
 STATE_SIZE = int(7 * PLANE)
 # rows are visited in whole vectors, beyond their last chord, where square roots are NaN
-WIDTH = 8
 
 # entries of a tally, of the whole and, behind them, of the window; and the chords of all solids;
 # and the lines that stay in a channel of a periodic medium
@@ -91,7 +89,7 @@ class Strip(NamedTuple):
     """
     Lines at (first_u + row * shear + column * spacing, first_v + row * spacing).
 
-    A row takes ``pitch`` places of a plane, which is ``columns`` and at least WIDTH more. Of each
+    A row takes ``pitch`` places of a plane, which is ``columns`` and at least LANES more. Of each
     row the columns from ``low`` to before ``high`` can count.
     """
 
@@ -268,11 +266,12 @@ def visit(
         from_u = strip.first_u + row * strip.shear - sphere.u
         first = max(int(np.ceil((-reach - from_u) * strip.per_spacing)), strip.low[row])
         last = min(int(np.floor((reach - from_u) * strip.per_spacing)) + 1, strip.high[row])
-        chords += max(last - first, 0)
-        vectors = (last - first + WIDTH - 1) // WIDTH
+        met = max(last - first, 0)
+        chords += met
+        vectors = (met + LANES - 1) // LANES
         from_u += first * strip.spacing
         at = np.uint64(row * strip.pitch + first)
-        for j in range(np.uint64(vectors * WIDTH)):
+        for j in range(np.uint64(vectors * LANES)):
             i = at + j
             du = from_u + strip.spacing * np.int32(j)
             half_chord = np.sqrt(reach2 - du * du)

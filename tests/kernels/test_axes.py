@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from numba import njit
 
 from scanfab.kernels import axes, sweep
+from scanfab.kernels.compiled import LANES
 from scanfab.kernels.grid import columns_in, cover, strip_of
 from scanfab.kernels.projection import order_of, project
 from scanfab.scan import line_frames
@@ -167,7 +168,7 @@ def check_random_packing(kind, random):
 def closed_lines(position, radius, frame, grid, window):
     """How many lines of one strip the sweep of all spheres leaves to be solved again."""
     projected = project(position, radius, np.zeros(radius.size, np.bool_), frame, grid)
-    pitch = grid.columns + sweep.WIDTH
+    pitch = grid.columns + LANES
     strip = strip_of(grid, *columns_in(grid, 0.0), 0, grid.rows, pitch)
     state, tally = np.empty(sweep.STATE_SIZE), np.zeros((2, sweep.TALLY_SIZE))
     every = np.arange(projected.u.size)
@@ -186,7 +187,7 @@ def suspect_lines(spheres, frame, offset, spacing, window):
     position, radius = spheres
     reach = np.linalg.norm(position, axis=1).max() + radius.max() + window
     grid = square_grid(reach, offset, spacing)
-    assert grid.rows * (grid.columns + sweep.WIDTH) <= sweep.MOST_LINES
+    assert grid.rows * (grid.columns + LANES) <= sweep.MOST_LINES
     return closed_lines(position, radius, np.ascontiguousarray(frame), grid, window)
 
 
