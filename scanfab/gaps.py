@@ -164,7 +164,7 @@ def scan_gaps(
         turned, offsets = turned_frames(rule, frames, seed, replicate)
         sums = np.zeros((len(rule), 2, 2, kernel.BLOCKS, len(least), 3))
         in_lines = wanted
-        if solids.medium is not None:
+        if solids.medium is not None and wanted[:2].any():
             normals = np.ascontiguousarray(turned[:, 2])
             kernel.tally_cell_gaps(
                 solids.medium, normals, offsets, spacing, affine[0], least, wanted, sums

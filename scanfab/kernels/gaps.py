@@ -163,7 +163,7 @@ def tally_grid(
         strip = strip_of(grid, low, high, number, rows, grid.columns)
         lines = np.arange(strip.rows * strip.columns).reshape(strip.rows, strip.columns)
         met = chosen[start[number] : start[number + 1]]
-        first, chords = chords_of(spheres, met, strip, lines, lines.size)
+        first, chords = chords_of(spheres, met, 0, strip, lines, lines.size)
         for line in range(lines.size):
             row, column = line // strip.columns, line % strip.columns
             u = strip.first_u + row * strip.shear + column * strip.spacing
@@ -251,8 +251,7 @@ def tally_cell_gaps(
     for axis in range(normals.shape[0]):
         prism, spheres, grid = cell_grid(grains, normals[axis], offsets[axis], spacing)
         bins = Bins(in_frame(to_block, prism.frame), cutoffs, sums[axis, :, 0])
-        in_whole = wanted & np.array([True, True, False, False])
         if grains.periodic[prism.third]:
-            tally_grid(spheres, grid, 0.0, in_whole, bins, bins, (grains, prism))
+            tally_grid(spheres, grid, 0.0, wanted, bins, bins, (grains, prism))
         else:
-            tally_grid(spheres, grid, 0.0, in_whole, bins, bins, None)
+            tally_grid(spheres, grid, 0.0, wanted, bins, bins, None)

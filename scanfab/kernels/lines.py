@@ -53,6 +53,7 @@ def room_for(count: int) -> Chords:
 def cut(
     spheres: Spheres,
     chosen: IntArray,
+    which: int,
     strip: Strip,
     number: IntArray,
     line: IntArray,
@@ -63,6 +64,8 @@ def cut(
     """
     Add chords of the lines that have a number >= 0, in the order of depth, and those numbers.
 
+    Of the first set of solids, which has all spheres, or of the second one.
+
     ``number`` has shape (rows, columns). From the sphere ``done`` on, to the ``count`` chords that
     are there, until there is no more room. Returns the new ``done`` and ``count``.
     """
@@ -70,6 +73,8 @@ def cut(
     low, high = strip.low, strip.high
     for place in range(done, chosen.size):
         k = chosen[place]
+        if which == 1 and spheres.removed[k]:
+            continue
         sphere = sphere_at(spheres, k)
         rows = span(sphere.v, sphere.radius, strip.first_v, strip.per_spacing, 0, strip.rows)
         if count + (rows[1] - rows[0]) * strip.columns > line.size:
@@ -94,20 +99,27 @@ def cut(
 
 
 @inner()
+def copy(line: IntArray, chords: Chords, count: int, to_line: IntArray, to_chords: Chords) -> None:
+    """Copy the first chords of a list and the numbers of their lines into another."""
+    for k in range(count):
+        to_line[k] = line[k]
+        to_chords.ends[0, k], to_chords.ends[1, k] = chords.ends[0, k], chords.ends[1, k]
+        to_chords.removed[k] = chords.removed[k]
+
+
+@inner()
 def cut_all(
-    spheres: Spheres, chosen: IntArray, strip: Strip, number: IntArray
+    spheres: Spheres, chosen: IntArray, which: int, strip: Strip, number: IntArray
 ) -> tuple[IntArray, Chords]:
     """All that :func:`cut` finds."""
     room = 4 * chosen.size + strip.rows * strip.columns
     line, chords = np.empty(room, np.int64), room_for(room)
-    done, count = cut(spheres, chosen, strip, number, line, chords, 0, 0)
+    done, count = cut(spheres, chosen, which, strip, number, line, chords, 0, 0)
     while done < chosen.size:
         lines, more = np.empty(2 * line.size, np.int64), room_for(2 * line.size)
-        lines[:count] = line[:count]
-        more.ends[:, :count] = chords.ends[:, :count]
-        more.removed[:count] = chords.removed[:count]
+        copy(line, chords, count, lines, more)
         line, chords = lines, more
-        done, count = cut(spheres, chosen, strip, number, line, chords, done, count)
+        done, count = cut(spheres, chosen, which, strip, number, line, chords, done, count)
     return line[:count], chords
 
 
@@ -134,10 +146,10 @@ def sort_by_line(line: IntArray, chords: Chords, stop: IntArray, listed: Chords)
 
 @inner()
 def chords_of(
-    spheres: Spheres, chosen: IntArray, strip: Strip, number: IntArray, count: int
+    spheres: Spheres, chosen: IntArray, which: int, strip: Strip, number: IntArray, count: int
 ) -> tuple[IntArray, Chords]:
     """The chords of numbered lines, and the start of each line's list (and the end of the last)."""
-    line, chords = cut_all(spheres, chosen, strip, number)
+    line, chords = cut_all(spheres, chosen, which, strip, number)
     stop, listed = np.zeros(count + 2, np.int64), room_for(line.size)
     sort_by_line(line, chords, stop, listed)
     return stop, listed
@@ -233,8 +245,7 @@ def solve_closed(
                 number[row, column] = line
                 places[line] = place
                 line += 1
-    solid = chosen if which == 0 else chosen[~spheres.removed[chosen]]
-    start, chords = chords_of(spheres, solid, strip, number, closed)
+    start, chords = chords_of(spheres, chosen, which, strip, number, closed)
     wrong = np.zeros((2, TALLY_SIZE))
     right = np.zeros((2, TALLY_SIZE))
     for line in range(closed):
