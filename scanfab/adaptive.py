@@ -26,6 +26,8 @@ AFRESH_FROM, FINER_UP_TO = 2.0, 8.0
 FINEST = 21
 # a round multiplies the work by this at most: early estimates of the error are uncertain
 GROWTH = 4.0
+# and by this at least, so that there is something to do for several threads
+SMALLEST_ROUND = 1.1
 # by how much the expected error must be below the tolerance: then that of the replicates is seldom
 # above it, and a scan that goes on until it is below picks few that are too small
 MARGIN = 1.1
@@ -65,7 +67,8 @@ def scan_to_tolerance(solids: Solids, plan: Plan, settings: Settings) -> tuple[S
         if better is not None:
             plan, start, stop = better, 0, better.replicates
             continue
-        more = min(math.ceil(min(missing, GROWTH) * stop), MAX_REPLICATES, int(stop + left))
+        more = math.ceil(max(min(missing, GROWTH), SMALLEST_ROUND) * stop)
+        more = min(more, MAX_REPLICATES, int(stop + left))
         if plan.auto == "directions" or more <= stop:
             _warn_of_missed_tolerance(missing, spent, settings)
             return sums, plan

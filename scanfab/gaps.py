@@ -164,29 +164,31 @@ def scan_gaps(
         turned, offsets = turned_frames(rule, frames, seed, replicate)
         sums = np.zeros((len(rule), 2, 2, kernel.BLOCKS, len(least), 3))
         in_lines = wanted
-        if solids.medium is not None and wanted[:2].any():
-            normals = np.ascontiguousarray(turned[:, 2])
-            kernel.tally_cell_gaps(
-                solids.medium, normals, offsets, spacing, affine[0], least, wanted, sums
-            )
+        if solids.medium is not None:
             in_lines = wanted & [False, False, True, True]
-        kernel.tally_gaps(
-            np.ascontiguousarray(solids.position),
-            solids.radius,
-            solids.removed,
-            np.ascontiguousarray(turned),
-            offsets,
-            spacing,
-            solids.window_radius,
-            affine,
-            least,
-            in_lines,
-            sums,
-        )
+            if wanted[:2].any():
+                normals = np.ascontiguousarray(turned[:, 2])
+                kernel.tally_cell_gaps(
+                    solids.medium, normals, offsets, spacing, affine[0], least, wanted, sums
+                )
+        if in_lines.any():
+            kernel.tally_gaps(
+                np.ascontiguousarray(solids.position),
+                solids.radius,
+                solids.removed,
+                np.ascontiguousarray(turned),
+                offsets,
+                spacing,
+                solids.window_radius,
+                affine,
+                least,
+                in_lines,
+                sums,
+            )
         # what reaches a cut-off reaches all below it
         sums = np.flip(np.cumsum(np.flip(sums, axis=4), axis=4), axis=4)
-        # sets of solids and windows as variants: (a, b) of the whole, (c, d) of the window
-        return turned[:, 2], np.moveaxis(sums, 2, 1).reshape(len(rule), 4, *sums.shape[3:])
+        # whole (a, b) and window (c, d)
+        return turned[:, 2], sums.reshape(len(rule), 4, *sums.shape[3:])
 
     with ThreadPoolExecutor(workers) as pool:
         axes, sums = zip(*pool.map(one, replicates), strict=True)

@@ -23,6 +23,8 @@ FEWEST_LINES = 30
 # segments for a standard error of 1, at a spacing of the mean radius, and the power of the spacing
 # that they grow with: measured in dense packings of radii that are equal, or in the ratio 3 or 10
 SEGMENTS_PER_VARIANCE, GROWTH_WITH_SPACING = 0.068, 0.75
+# of the mean radius: lines so far apart know nothing of one another
+WIDE = 2.6
 # of the mean radius: closer lines say little more, as all that remains is the choice of directions
 CLOSE = 0.3
 
@@ -138,5 +140,9 @@ def _auto_spacing(settings: Settings, axes: int, reach: float, lengths: dict[str
     segments_per_line = max(reach / (3.0 * radius), 1.0)
     # lines * segments_per_line = segments, and lines are so many axes' area / spacing²
     lines = SEGMENTS_PER_VARIANCE / settings.tolerance**2 / (REPLICATES * axes * segments_per_line)
-    spacing = radius * math.pow(area / lines / radius**2, 1.0 / (2.0 + GROWTH_WITH_SPACING))
+    apart = area / lines / radius**2
+    spacing = radius * max(
+        min(math.pow(apart, 1.0 / (2.0 + GROWTH_WITH_SPACING)), WIDE),
+        math.sqrt(apart / WIDE**GROWTH_WITH_SPACING),
+    )
     return min(max(spacing, CLOSE * radius), math.sqrt(area / (4 * FEWEST_LINES)))

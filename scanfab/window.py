@@ -94,5 +94,8 @@ def room_around(window: SphereWindow, packing: Packing, grains: BoolArray) -> fl
 
 
 def _surface_box(packing: Packing, grains: BoolArray) -> tuple[FloatArray, FloatArray]:
-    position, radius = packing.position[grains], packing.radius[grains, None]
-    return (position - radius).min(axis=0), (position + radius).max(axis=0)
+    position, radius = packing.position[grains], packing.radius[grains]
+    # one coordinate at a time: that is faster by far for millions of grains
+    low = [(along - radius).min() for along in position.T]
+    high = [(along + radius).max() for along in position.T]
+    return np.array(low), np.array(high)

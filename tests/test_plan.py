@@ -15,7 +15,7 @@ from scanfab import (
     compute,
     find_contacts,
 )
-from scanfab.plan import CLOSE, FEWEST_LINES, GROWTH_WITH_SPACING, REPLICATES, make_plan
+from scanfab.plan import CLOSE, FEWEST_LINES, GROWTH_WITH_SPACING, REPLICATES, WIDE, make_plan
 from scanfab.settings import AUTO_RULE
 from scanfab.variants import Sample
 from tests.lattices import shaken_cubic
@@ -129,8 +129,13 @@ def test_auto_spacing_of_a_small_sample_is_as_close_as_is_of_use():
 def test_auto_spacing_is_wider_where_less_is_asked_for():
     random = np.random.default_rng(0)
     packing = Packing(random.random((20_000, 3)) * 60, random.uniform(0.5, 1.0, 20_000))
-    wide, close = (plan_of(packing, tolerance=t).spacing for t in (8e-4, 2e-4))
+    wide, close = (plan_of(packing, tolerance=t).spacing for t in (2e-4, 5e-5))
+    assert close < wide < WIDE * packing.radius.mean()
     assert wide / close == pytest.approx(4.0 ** (2.0 / (2.0 + GROWTH_WITH_SPACING)))
+    # lines that know nothing of one another: so many segments, however wide they are apart
+    widest, wider = (plan_of(packing, tolerance=t).spacing for t in (5e-4, 4e-4))
+    assert WIDE * packing.radius.mean() < wider
+    assert widest / wider == pytest.approx(1.25)
 
 
 def test_window_is_for_the_variants_that_have_one(packing):

@@ -6,9 +6,10 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 import numba
+import numpy as np
 from llvmlite.binding import get_host_cpu_name
 
-__all__ = ["LANES", "inner", "kernel"]
+__all__ = ["LANES", "ZERO", "inner", "kernel"]
 
 # numbers that the compiler's vector instructions take at a time: 256 bits of them, also on
 # processors that have wider ones, but for these
@@ -16,6 +17,9 @@ LANES = 8 if get_host_cpu_name() in ("znver4", "znver5") else 4
 
 # its types leave out some of its options
 njit: Any = numba.njit
+
+# a kernel that gets a plain 0 from another is compiled once more, for this number alone
+ZERO: int = np.int64(0)  # type: ignore[assignment]
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

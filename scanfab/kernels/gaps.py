@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.kernels.compiled import inner, kernel
+from scanfab.kernels.compiled import ZERO, inner, kernel
 from scanfab.kernels.follow import next_solid
 from scanfab.kernels.grid import Grid, bounds, columns_in, open_grid, strip_of
-from scanfab.kernels.lines import chords_of, order_chords, solids_of
+from scanfab.kernels.lines import chords_of, solids_of
 from scanfab.kernels.periodic import CellGrains, Prism, cell_grid, measured_in
-from scanfab.kernels.projection import Spheres, project, sort_into_strips
+from scanfab.kernels.projection import Spheres, number_from, project, sort_by, sort_into_strips
 from scanfab.kernels.sweep import FAR
 
 __all__ = ["BLOCKS", "LENGTH", "NUMBER", "SQUARE", "tally_cell_gaps", "tally_gaps"]
@@ -161,16 +161,18 @@ def tally_grid(
     solids = np.empty((2, spheres.u.size))
     for number in range(start.size - 1):
         strip = strip_of(grid, low, high, number, rows, grid.columns)
-        lines = np.arange(strip.rows * strip.columns).reshape(strip.rows, strip.columns)
+        lines = np.empty((strip.rows, strip.columns), np.int64)
+        number_from(ZERO, lines.ravel())
         met = chosen[start[number] : start[number + 1]]
-        first, chords = chords_of(spheres, met, 0, strip, lines, lines.size)
+        first, chords = chords_of(spheres, met, ZERO, strip, lines, lines.size)
         for line in range(lines.size):
             row, column = line // strip.columns, line % strip.columns
             u = strip.first_u + row * strip.shear + column * strip.spacing
             v = strip.first_v + row * strip.spacing
             half2 = window_radius * window_radius - u * u - v * v
             ordered = order[: first[line + 1] - first[line]]
-            order_chords(chords, first[line], ordered)
+            number_from(first[line], ordered)
+            sort_by(chords.ends[0], ordered)
             for which in range(2):
                 in_window = wanted[2 + which] and half2 > 0.0
                 if not (wanted[which] or in_window):
@@ -215,7 +217,7 @@ def tally_gaps(
     wanted : shape (4,)
         Which of the variants a, b, c, d.
     sums : shape (D, 2, 2, BLOCKS, C, 3)
-        Zeros; for each axis, set of solids, and whole or window: number, length, squared length.
+        Zeros; for each axis, whole or window, and set of solids: number, length, squared length.
     """
     extent = bounds(position, radius)
     for axis in range(frames.shape[0]):
@@ -230,8 +232,8 @@ def tally_gaps(
             grid,
             window_radius,
             wanted,
-            Bins(of_whole, cutoffs, sums[axis, :, 0]),
-            Bins(of_window, cutoffs, sums[axis, :, 1]),
+            Bins(of_whole, cutoffs, sums[axis, 0]),
+            Bins(of_window, cutoffs, sums[axis, 1]),
             None,
         )
 
@@ -250,7 +252,7 @@ def tally_cell_gaps(
     """The same for the whole of a periodic medium: ``normals`` (D, 3), ``to_block`` (3, 4)."""
     for axis in range(normals.shape[0]):
         prism, spheres, grid = cell_grid(grains, normals[axis], offsets[axis], spacing)
-        bins = Bins(in_frame(to_block, prism.frame), cutoffs, sums[axis, :, 0])
+        bins = Bins(in_frame(to_block, prism.frame), cutoffs, sums[axis, 0])
         if grains.periodic[prism.third]:
             tally_grid(spheres, grid, 0.0, wanted, bins, bins, (grains, prism))
         else:

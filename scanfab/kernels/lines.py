@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.kernels.compiled import inner
-from scanfab.kernels.projection import Spheres, sort_by, span, sphere_at
+from scanfab.kernels.compiled import ZERO, inner
+from scanfab.kernels.projection import Spheres, number_from, sort_by, span, sphere_at
 from scanfab.kernels.sweep import (
     BOUND,
     END,
@@ -27,7 +27,7 @@ from scanfab.kernels.sweep import (
     moved,
 )
 
-__all__ = ["chords_of", "order_chords", "solids_of", "solve_closed"]
+__all__ = ["chords_of", "solids_of", "solve_closed"]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -114,13 +114,14 @@ def cut_all(
     """All that :func:`cut` finds."""
     room = 4 * chosen.size + strip.rows * strip.columns
     line, chords = np.empty(room, np.int64), room_for(room)
-    done, count = cut(spheres, chosen, which, strip, number, line, chords, 0, 0)
-    while done < chosen.size:
+    done = count = ZERO
+    while True:
+        done, count = cut(spheres, chosen, which, strip, number, line, chords, done, count)
+        if done == chosen.size:
+            return line[:count], chords
         lines, more = np.empty(2 * line.size, np.int64), room_for(2 * line.size)
         copy(line, chords, count, lines, more)
         line, chords = lines, more
-        done, count = cut(spheres, chosen, which, strip, number, line, chords, done, count)
-    return line[:count], chords
 
 
 @inner()
@@ -153,14 +154,6 @@ def chords_of(
     stop, listed = np.zeros(count + 2, np.int64), room_for(line.size)
     sort_by_line(line, chords, stop, listed)
     return stop, listed
-
-
-@inner()
-def order_chords(chords: Chords, first: int, order: IntArray) -> None:
-    """The numbers of a line's chords, from the first one on, in the order of their starts."""
-    for k in range(order.size):
-        order[k] = first + k
-    sort_by(chords.ends[0], order)
 
 
 @inner()
@@ -249,7 +242,8 @@ def solve_closed(
     wrong = np.zeros((2, TALLY_SIZE))
     right = np.zeros((2, TALLY_SIZE))
     for line in range(closed):
-        order = np.arange(start[line], start[line + 1])
+        order = np.empty(start[line + 1] - start[line], np.int64)
+        number_from(start[line], order)
         bound = lines[places[line] + BOUND]
         sweep_line(chords.ends, order, bound, least, wrong, which, whole, window, measured)
         sort_by(chords.ends[0], order)

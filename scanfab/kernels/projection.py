@@ -7,11 +7,20 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.kernels.compiled import inner
+from scanfab.kernels.compiled import ZERO, inner
 from scanfab.kernels.grid import Grid
 from scanfab.kernels.sweep import Sphere
 
-__all__ = ["Spheres", "order_of", "project", "sort_by", "sort_into_strips", "span", "sphere_at"]
+__all__ = [
+    "Spheres",
+    "number_from",
+    "order_of",
+    "project",
+    "sort_by",
+    "sort_into_strips",
+    "span",
+    "sphere_at",
+]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -120,6 +129,13 @@ def sort_by(values: FloatArray, members: IntArray) -> None:
         gap //= 3
 
 
+@inner()
+def number_from(first: int, numbers: IntArray) -> None:
+    """Fill in the numbers from the first one on."""
+    for k in range(numbers.size):
+        numbers[k] = first + k
+
+
 @inner(inline="always")
 def span(
     centre: float, reach: float, first: float, per_spacing: float, low: int, high: int
@@ -143,7 +159,9 @@ def sort_into_strips(
     start = np.zeros(strips + 1, np.int64)
     if strips == 1:
         start[1] = spheres.u.size
-        return start, np.arange(spheres.u.size)
+        every = np.empty(spheres.u.size, np.int64)
+        number_from(ZERO, every)
+        return start, every
     chosen = np.empty(0, np.int64)
     per_spacing = 1.0 / grid.spacing
     for fill in range(2):

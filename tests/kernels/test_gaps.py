@@ -38,7 +38,7 @@ def slow_sums(spheres, removed, frame, offset, spacing, window, cutoffs, centers
         for kind, segments in enumerate(naive.void_segments(*grid)):
             reached = [naive.gap_sums(segments, cutoff, centers[kind]) for cutoff in cutoffs]
             for k, least in enumerate(reached):
-                sums[which, kind, :, k] = least - (reached[k + 1] if k + 1 < len(reached) else 0)
+                sums[kind, which, :, k] = least - (reached[k + 1] if k + 1 < len(reached) else 0)
     return sums
 
 
@@ -83,7 +83,7 @@ def test_only_wanted_variants_are_tallied():
     for variant in range(4):
         wanted = np.arange(4) == variant
         alone = fast_sums(*line, centers, wanted)
-        place = variant % 2, variant // 2
+        place = variant // 2, variant % 2
         np.testing.assert_allclose(alone[place], every[place], rtol=1e-12)
         alone[place] = 0.0
         assert not alone.any()
