@@ -76,9 +76,11 @@ class Blocks:
         >>> Blocks.about(np.zeros(3), 1.0).of(np.array([[-0.1, -0.2, -0.3], [0.1, -0.2, 0.3]]))
         array([0, 5])
         """
-        along = places @ self.matrix.T + self.shift
-        upper = along - np.floor(along) >= 0.5
-        numbers: IntArray = upper @ np.array([1, 2, 4])
+        numbers = np.zeros(len(places), dtype=np.int64)
+        for axis in range(3):
+            along = places @ self.matrix[axis] + self.shift[axis]
+            along -= np.floor(along)
+            numbers |= (along >= 0.5).astype(np.int64) << axis
         return numbers
 
     def affine(self) -> FloatArray:

@@ -92,7 +92,8 @@ class Sample:
         """Which grain-grain contacts enter the variant's contact fabric, shape (M,)."""
         contacts = self.contacts
         outside = self.boundary | self.removed(variant)
-        chosen = ~outside[contacts.pairs].any(axis=1)
+        one, two = contacts.pairs.T
+        chosen = ~(outside[one] | outside[two])
         if variant.in_window:
             assert window is not None
             chosen &= window.contains(contacts.point, self.packing)
@@ -108,5 +109,6 @@ class Sample:
         counted = self.counted(variant, window) & ~removed
         if not counted.any():
             return None
-        chosen = np.asarray(~removed[self.contacts.pairs].any(axis=1))
+        one, two = self.contacts.pairs.T
+        chosen = ~(removed[one] | removed[two])
         return float(self.contact_numbers(chosen)[counted].mean())
