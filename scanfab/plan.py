@@ -24,7 +24,7 @@ FEWEST_LINES = 30
 # that they grow with: measured in dense packings of radii that are equal, or in the ratio 3 or 10
 SEGMENTS_PER_VARIANCE, GROWTH_WITH_SPACING = 0.068, 0.75
 # of the mean radius: lines so far apart know nothing of one another
-WIDE = 2.6
+WIDE = 3.0
 # of the mean radius: closer lines say little more, as all that remains is the choice of directions
 CLOSE = 0.3
 

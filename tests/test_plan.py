@@ -133,9 +133,9 @@ def test_auto_spacing_is_wider_where_less_is_asked_for():
     assert close < wide < WIDE * packing.radius.mean()
     assert wide / close == pytest.approx(4.0 ** (2.0 / (2.0 + GROWTH_WITH_SPACING)))
     # lines that know nothing of one another: so many segments, however wide they are apart
-    widest, wider = (plan_of(packing, tolerance=t).spacing for t in (5e-4, 4e-4))
+    widest, wider = (plan_of(packing, tolerance=t).spacing for t in (6e-4, 5e-4))
     assert WIDE * packing.radius.mean() < wider
-    assert widest / wider == pytest.approx(1.25)
+    assert widest / wider == pytest.approx(1.2)
 
 
 def test_window_is_for_the_variants_that_have_one(packing):
