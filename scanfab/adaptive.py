@@ -56,17 +56,16 @@ def scan_to_tolerance(solids: Solids, plan: Plan, settings: Settings) -> tuple[S
     while True:
         batch = _scan(solids, plan, settings, range(start, stop))
         spent += int(batch.chords.sum())
-        sums = batch if start == 0 or sums is None else ScanSums.concatenate([sums, batch])
+        sums = batch if sums is None or start == 0 else ScanSums.concatenate([sums, batch])
         # as many replicates as the budget allows
         left = (settings.max_chords - spent) / max(float(sums.chords.mean()), 1.0)
         missing = _missing_work(sums, plan, settings)
-        better = _closer_lines(sums, plan, solids, settings, left)
-        if better is None and missing <= 1.0:
-            return sums, plan
-        better = better or _better_plan(plan, missing, solids, settings, left)
+        better = _better_plan(sums, plan, missing, solids, settings, left) if start == 0 else None
         if better is not None:
-            plan, start, stop = better, 0, better.replicates
+            plan = better
             continue
+        if missing <= 1.0:
+            return sums, plan
         more = math.ceil(max(min(missing, GROWTH), SMALLEST_ROUND) * stop)
         more = min(more, MAX_REPLICATES, int(stop + left))
         if plan.auto == "directions" or more <= stop:
@@ -88,42 +87,43 @@ def _scan(solids: Solids, plan: Plan, settings: Settings, replicates: range) -> 
     )
 
 
-def _closer_lines(
-    sums: ScanSums, plan: Plan, solids: Solids, settings: Settings, left: float
-) -> Plan | None:
-    """A plan to start afresh with, if replicates have too few lines and closer ones are allowed."""
-    closer = replace(plan, spacing=0.5 * plan.spacing)
-    allowed = is_affordable(solids, closer.spacing) and left > 4 * plan.replicates
-    allowed = allowed and closer.spacing > CLOSEST * solids.radius.min(initial=np.inf)
-    first = sums.replicates == plan.replicates
-    if plan.auto == "replicates" and first and allowed and _too_few_lines(sums, settings):
-        return closer
-    return None
-
-
 def _better_plan(
-    plan: Plan, missing: float, solids: Solids, settings: Settings, left: float
+    sums: ScanSums, plan: Plan, missing: float, solids: Solids, settings: Settings, left: float
 ) -> Plan | None:
-    """A plan to start afresh with, if that is worth it: closer lines, then a finer rule."""
+    """After the first round, a plan to start afresh with, if that is worth it and affordable."""
+    closest = CLOSEST * solids.radius.min(initial=np.inf)
+    better = plan
     if plan.auto == "directions":
-        axes = math.ceil(min(missing, GROWTH) * len(plan.rule))
-        better = replace(plan, rule=direction_rule(str(axes)))
-        worth = len(plan.rule) < MAX_DIRECTIONS
-    else:
-        worth = missing >= AFRESH_FROM
-        power = 2.0 + GROWTH_WITH_SPACING
-        closest = CLOSE * float(solids.radius.mean())
-        spacing = max(plan.spacing / missing ** (1.0 / power), min(closest, plan.spacing))
-        missing /= (plan.spacing / spacing) ** power
-        better = replace(plan, spacing=spacing)
-        if settings.directions is None and missing > 1.0:
-            # a design of odd degree t has about ((t + 1) / 2)² axes
-            axes = math.ceil(min(missing, FINER_UP_TO) * len(plan.rule))
-            degree = min(2 * math.ceil(math.sqrt(axes)) - 1, FINEST)
-            better = replace(better, rule=direction_rule(f"design:{degree}"))
+        better = _with_more_axes(plan, missing)
+    elif _too_few_lines(sums, settings) and 0.5 * plan.spacing > closest:
+        better = replace(plan, spacing=0.5 * plan.spacing)
+    elif missing >= AFRESH_FROM:
+        better = _with_closer_lines(plan, missing, solids, settings)
     growth = len(better.rule) / len(plan.rule) * (plan.spacing / better.spacing) ** 2
-    worth = worth and growth * plan.replicates <= left
-    return better if worth and growth > 1.0 and is_affordable(solids, better.spacing) else None
+    affordable = growth * plan.replicates <= left and is_affordable(solids, better.spacing)
+    return better if growth > 1.0 and affordable else None
+
+
+def _with_more_axes(plan: Plan, missing: float) -> Plan:
+    """The plan with a rule of so many more axes, up to a limit."""
+    if missing <= 1.0 or len(plan.rule) >= MAX_DIRECTIONS:
+        return plan
+    return replace(plan, rule=direction_rule(str(math.ceil(min(missing, GROWTH) * len(plan.rule)))))
+
+
+def _with_closer_lines(plan: Plan, missing: float, solids: Solids, settings: Settings) -> Plan:
+    """The plan with lines as close as is of use, and a finer rule for what is missing then."""
+    power = 2.0 + GROWTH_WITH_SPACING
+    closest = min(CLOSE * float(solids.radius.mean()), plan.spacing)
+    spacing = max(plan.spacing / missing ** (1.0 / power), closest)
+    missing /= (plan.spacing / spacing) ** power
+    plan = replace(plan, spacing=spacing)
+    if settings.directions is not None or missing <= 1.0:
+        return plan
+    # a design of odd degree t has about ((t + 1) / 2)² axes
+    axes = math.ceil(min(missing, FINER_UP_TO) * len(plan.rule))
+    degree = min(2 * math.ceil(math.sqrt(axes)) - 1, FINEST)
+    return replace(plan, rule=direction_rule(f"design:{degree}"))
 
 
 def _within_budget(plan: Plan, solids: Solids, settings: Settings) -> Plan:
