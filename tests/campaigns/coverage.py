@@ -1,7 +1,7 @@
 """
 How often the scan's standard error covers the truth: 68 of 100 times if it is right.
 
-Usage, from the root of the repository (800 seeds take three minutes on two cores)::
+Usage, from the root of the repository (1600 seeds take some six minutes on two cores)::
 
     python -m tests.campaigns.coverage [--seeds N] [--workers N]
 
