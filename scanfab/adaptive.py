@@ -1,4 +1,4 @@
-"""An auto scan: more replicates, or more directions, until every variant meets the tolerance."""
+"""An auto scan: closer lines, more directions, more replicates, until the tolerance holds."""
 
 from __future__ import annotations
 

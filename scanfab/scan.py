@@ -163,6 +163,19 @@ def scan_lines(
     ------
     SettingsError
         If the spacing asks for more lines than memory should hold.
+
+    Examples
+    --------
+    In a window of radius R, one sphere of radius r leaves void segments of the mean length
+    (4/3) (R³ - r³) / (R² + r²), here 1.87:
+
+    >>> import numpy as np
+    >>> from scanfab import Solids, direction_rule, scan_lines
+    >>> solids = Solids(np.zeros((1, 3)), np.ones(1), np.zeros(1, bool), window_radius=2.0)
+    >>> sums = scan_lines(solids, direction_rule("lebedev:5"), spacing=0.05, cutoff=0.0)
+    >>> length, segments = sums.kept("c")
+    >>> round(float(length.sum() / segments.sum()), 2)
+    1.87
     """
     _check_spacing(solids, spacing)
     frames = line_frames(rule.axes)

@@ -131,7 +131,7 @@ def contact_lines(sample: Sample, window: SphereWindow | None) -> ContactLines:
         ends=np.stack([first, second], axis=1),
         normal=contacts.normal,
         force=contacts.force,
-        boundary=np.asarray(sample.boundary[contacts.pairs].any(axis=1)),
+        boundary=~sample.contacts_without(sample.boundary),
         in_window=_inside(contacts.point, sample, window),
     )
 

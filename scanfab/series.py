@@ -225,6 +225,14 @@ def read_series(
         If no reader knows the files.
     ReadError
         If there is no series, or more than one.
+
+    Examples
+    --------
+    >>> import scanfab
+    >>> folder = "sample_data/liggghts_periodic"
+    >>> series = scanfab.read_series([f"{folder}/dump_{step}.txt.gz" for step in (60000, 30000)])
+    >>> [frame.read().step for frame in series]
+    [30000, 60000]
     """
     given = [source] if isinstance(source, str | os.PathLike) else list(source)
     paths = [Path(path) for path in given]

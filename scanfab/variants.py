@@ -88,12 +88,15 @@ class Sample:
         assert window is not None
         return self.grains & window.contains(self.packing.position, self.packing)
 
+    def contacts_without(self, left_out: BoolArray) -> BoolArray:
+        """Contacts of which neither particle is left out, shape (M,)."""
+        one, two = self.contacts.pairs.T
+        return np.asarray(~(left_out[one] | left_out[two]))
+
     def fabric_contacts(self, variant: Variant, window: SphereWindow | None) -> BoolArray:
         """Which grain-grain contacts enter the variant's contact fabric, shape (M,)."""
         contacts = self.contacts
-        outside = self.boundary | self.removed(variant)
-        one, two = contacts.pairs.T
-        chosen = ~(outside[one] | outside[two])
+        chosen = self.contacts_without(self.boundary | self.removed(variant))
         if variant.in_window:
             assert window is not None
             chosen &= window.contains(contacts.point, self.packing)
@@ -109,6 +112,4 @@ class Sample:
         counted = self.counted(variant, window) & ~removed
         if not counted.any():
             return None
-        one, two = self.contacts.pairs.T
-        chosen = ~(removed[one] | removed[two])
-        return float(self.contact_numbers(chosen)[counted].mean())
+        return float(self.contact_numbers(self.contacts_without(removed))[counted].mean())

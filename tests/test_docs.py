@@ -97,8 +97,6 @@ def test_examples_in_docstrings_run(name: str, monkeypatch: pytest.MonkeyPatch) 
 
 @pytest.mark.parametrize("name", [n for n in scanfab.__all__ if n[0].islower()])
 def test_every_public_function_has_an_example(name: str) -> None:
-    if name in ("read_series", "scan_lines"):
-        pytest.skip("shown on the README and by the functions that call it")
     assert ">>>" in (inspect.getdoc(getattr(scanfab, name)) or "")
 
 

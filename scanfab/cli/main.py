@@ -87,7 +87,7 @@ def main(args: list[str] | None = None) -> None:
     _replace_closed_streams()
     code = run(sys.argv[1:] if args is None else args)
     # the result stands: a signal would only spoil the exit code
-    for late in (signal.SIGINT, signal.SIGTERM):
+    for late in ENDED:
         signal.signal(late, signal.SIG_IGN)
     if code:
         _leave_at_once(code)

@@ -173,20 +173,21 @@ def tally_grid(
             ordered = order[: first[line + 1] - first[line]]
             number_from(first[line], ordered)
             sort_by(chords.ends[0], ordered)
+            in_blocks = line_at(whole.to_block, u, v), line_at(window.to_block, u, v)
             for which in range(2):
                 in_window = wanted[2 + which] and half2 > 0.0
                 if not (wanted[which] or in_window):
                     continue
                 count = solids_of(chords, ordered, which, solids)
                 if wanted[which]:
-                    here = line_at(whole.to_block, u, v)
                     if medium is not None:
-                        add_measured(whole, which, here, solids, count, medium[0], medium[1])
+                        add_measured(
+                            whole, which, in_blocks[0], solids, count, medium[0], medium[1]
+                        )
                     else:
-                        add_whole(whole, which, here, solids, count)
+                        add_whole(whole, which, in_blocks[0], solids, count)
                 if in_window:
-                    here = line_at(window.to_block, u, v)
-                    add_window(window, which, here, solids, count, np.sqrt(half2))
+                    add_window(window, which, in_blocks[1], solids, count, np.sqrt(half2))
 
 
 @kernel
@@ -252,6 +253,7 @@ def tally_cell_gaps(
     """The same for the whole of a periodic medium: ``normals`` (D, 3), ``to_block`` (3, 4)."""
     for axis in range(normals.shape[0]):
         prism, spheres, grid = cell_grid(grains, normals[axis], offsets[axis], spacing)
+        # with a window of no radius the second bins get nothing
         bins = Bins(in_frame(to_block, prism.frame), cutoffs, sums[axis, 0])
         if grains.periodic[prism.third]:
             tally_grid(spheres, grid, 0.0, wanted, bins, bins, (grains, prism))
