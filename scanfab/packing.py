@@ -217,13 +217,16 @@ def _cast_columns(columns: Mapping[str, npt.ArrayLike], count: int) -> dict[str,
 
 def _check_grains(position: FloatArray, radius: FloatArray, id: IntArray) -> None:
     """Finite numbers, positive radii, unique ids."""
-    if not (np.isfinite(position).all() and np.isfinite(radius).all()):
+    # a sum is finite only if all its terms are, and one pass without a temporary array
+    with np.errstate(over="ignore", invalid="ignore"):
+        total = position.sum() + radius.sum()
+    if not (np.isfinite(total) or (np.isfinite(position).all() and np.isfinite(radius).all())):
         infinite = ~(np.isfinite(position).all(axis=1) & np.isfinite(radius))
         raise PackingError(
             f"{grains_named(id, infinite)}: position and radius must be finite numbers, found "
             f"{_values(position, radius, infinite)}"
         )
-    if np.any(radius <= 0):
+    if radius.min(initial=np.inf) <= 0:
         raise PackingError(
             f"{grains_named(id, radius <= 0)}: the radius must be larger than zero, found "
             f"{_values(position, radius, radius <= 0)}"

@@ -46,12 +46,15 @@ def has_radius(names: Sequence[str]) -> bool:
     return bool(lower & {*RADIUS_NAMES, *DIAMETER_NAMES})
 
 
-def needed_columns(names: Sequence[str], options: ReadOptions) -> list[str]:
-    """Those of a dump's columns that :func:`grain_table` or most users ask for."""
+def needed_columns(names: Sequence[str], options: ReadOptions) -> dict[str, type]:
+    """Those of a dump's columns that :func:`grain_table` or most users ask for, and their types."""
     places = {place for names, _ in POSITION_NAMES for place in names.split()}
     known = {*places, *RADIUS_NAMES, *DIAMETER_NAMES, *ID_NAMES, *CLASS_COLUMNS}
     own = set(options.columns.values())
-    return [name for name in dict.fromkeys(names) if name.lower() in known or name in own]
+    needed = [name for name in names if name.lower() in known or name in own]
+    types: dict[str, type] = dict.fromkeys(needed, float)
+    id = options.columns.get("id", _first_of(ID_NAMES, names))
+    return types | {name: int for name in types if name == id}
 
 
 def grain_table(
@@ -210,11 +213,16 @@ def _radius(
 
 def _take(rest: MutableMapping[str, Any], names: Sequence[str], keep: bool = False) -> Any:
     """The first column that has one of the names; taken out of the rest unless kept."""
-    lower = {name.lower(): name for name in reversed(list(rest))}
-    for name in names:
-        if name in lower:
-            return rest[lower[name]] if keep else rest.pop(lower[name])
-    return None
+    found = _first_of(names, list(rest))
+    if found is None:
+        return None
+    return rest[found] if keep else rest.pop(found)
+
+
+def _first_of(known: Sequence[str], names: Sequence[str]) -> str | None:
+    """The first name that is one of those known, in the order of these."""
+    lower = {name.lower(): name for name in reversed(names)}
+    return next((lower[name] for name in known if name in lower), None)
 
 
 def whole_numbers(path: Path, values: npt.ArrayLike, where: str = "") -> npt.NDArray[np.int64]:

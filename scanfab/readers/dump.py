@@ -10,10 +10,11 @@ import io
 import mmap
 import re
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -108,19 +109,19 @@ def read_block(snapshot: Snapshot) -> DumpBlock:
     """
     where, sections, body = _header(snapshot)
     count = _count(where, sections)
-    columns = _regular(snapshot, body, count, range(len(body.names)))
+    columns = _regular(snapshot, body, count, dict.fromkeys(range(len(body.names)), float))
     values = _tolerant(snapshot, body, count) if columns is None else np.column_stack(columns)
     return DumpBlock(snapshot.step, snapshot.time, dump_cell(where, sections), body.names, values)
 
 
 def read_columns(
-    snapshot: Snapshot, needed: Callable[[Sequence[str]], Sequence[str]]
+    snapshot: Snapshot, needed: Callable[[Sequence[str]], Mapping[str, type]]
 ) -> tuple[LazyColumns, Cell | None]:
     """
     The columns of a snapshot by name, and its cell; of repeated names the first counts.
 
-    Of a large snapshot only the columns are parsed that ``needed`` chooses from their names; the
-    others wait until they are asked for.
+    Of a large snapshot only the columns are parsed that ``needed`` chooses from their names, with
+    their types; the others wait until they are asked for.
 
     Raises
     ------
@@ -129,20 +130,20 @@ def read_columns(
     """
     where, sections, body = _header(snapshot)
     count, cell = _count(where, sections), dump_cell(where, sections)
-    chosen = [body.names.index(name) for name in needed(body.names)]
-    found = _regular(snapshot, body, count, chosen)
+    chosen = needed(body.names)
+    found = _regular(snapshot, body, count, {body.names.index(n): t for n, t in chosen.items()})
     if found is None:
         values = _tolerant(snapshot, body, count)
-        chosen = [body.names.index(name) for name in dict.fromkeys(body.names)]
-        found = [values[:, place] for place in chosen]
-    ready = {body.names[place]: values for place, values in zip(chosen, found, strict=True)}
+        ready = {name: values[:, body.names.index(name)] for name in body.names}
+    else:
+        ready = dict(zip(chosen, found, strict=True))
     return LazyColumns(body.names, ready, partial(_read_column, snapshot)), cell
 
 
 def _read_column(snapshot: Snapshot, name: str) -> FloatArray:
     where, sections, body = _header(snapshot)
     count, place = _count(where, sections), body.names.index(name)
-    found = _regular(snapshot, body, count, [place])
+    found = _regular(snapshot, body, count, {place: float})
     return _tolerant(snapshot, body, count)[:, place] if found is None else found[0]
 
 
@@ -168,8 +169,8 @@ def _header(snapshot: Snapshot) -> tuple[str, dict[str, list[str]], _Body]:
 
 
 def _regular(
-    snapshot: Snapshot, body: _Body, count: int, places: Sequence[int]
-) -> list[FloatArray] | None:
+    snapshot: Snapshot, body: _Body, count: int, types: Mapping[int, type]
+) -> list[npt.NDArray[Any]] | None:
     """Columns of a large snapshot with one blank between two words; None if it is not so."""
     path = plain(snapshot.path)
     stop = path.stat().st_size if snapshot.stop is None else snapshot.stop
@@ -179,7 +180,7 @@ def _regular(
     if not possible or stop - start < LARGE:
         return None
     lines = body.lines + (_lines_before(snapshot) if snapshot.start else 0)
-    return read_regular(TextTable(path, start, stop, lines, len(body.names), count), places)
+    return read_regular(TextTable(path, start, stop, lines, len(body.names), count), types)
 
 
 def _tolerant(snapshot: Snapshot, body: _Body, count: int) -> FloatArray:

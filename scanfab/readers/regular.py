@@ -8,7 +8,7 @@ parser of the format, which reads it or says what is wrong in which line.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,8 +18,6 @@ import numpy as np
 import numpy.typing as npt
 
 __all__ = ["LARGE", "TextTable", "read_regular"]
-
-FloatArray = npt.NDArray[np.float64]
 
 # bytes; a smaller table is parsed before polars is loaded
 LARGE = 8 << 20
@@ -45,29 +43,30 @@ class TextTable:
     """Number of rows."""
 
 
-def read_regular(table: TextTable, places: Sequence[int]) -> list[FloatArray] | None:
+def read_regular(table: TextTable, types: Mapping[int, type]) -> list[npt.NDArray[Any]] | None:
     """
     Some columns of a table; None if it is not regular.
 
-    Every number is the double nearest to the text, as Python's float() has it.
+    Every number is the double nearest to the text, as Python's float() has it, or just the whole
+    number that the text is.
 
     Parameters
     ----------
     table : TextTable
         What to read.
-    places : sequence of int
-        The columns, from 0.
+    types : mapping of int to type
+        The columns, from 0, and what they are to be: ``float`` or ``int``.
 
     Returns
     -------
     list of ndarray or None
-        An array of shape (count,) for each place.
+        An array of shape (count,) for each column.
     """
     behind = _ends_with_blank(table)
     with ThreadPoolExecutor(1) as pool:
         # numpy and polars both let go of Python's lock
         spaces = pool.submit(_count_spaces, table)
-        columns = _parse(table, places, behind)
+        columns = _parse(table, types, behind)
         expected = table.count * (table.width + behind), table.count * behind
         return columns if spaces.result() == expected else None
 
@@ -97,15 +96,18 @@ def _count_spaces(table: TextTable) -> tuple[int, int]:
     return (spaces, pairs) if piece[0] == LINE_END else (-1, -1)
 
 
-def _parse(table: TextTable, places: Sequence[int], behind: bool) -> list[FloatArray] | None:
-    """The columns as polars sees them; None if a line has too few, or a word is no number."""
+def _parse(
+    table: TextTable, types: Mapping[int, type], behind: bool
+) -> list[npt.NDArray[Any]] | None:
+    """The columns as polars sees them; None if a line has too few, or a word is no such number."""
     import polars
 
     names = [f"{place}" for place in range(table.width)]
     schema: dict[str, Any] = dict.fromkeys(names, polars.Float64)
+    schema |= {names[place]: polars.Int64 for place, kind in types.items() if kind is int}
     if behind:
         schema["behind"] = polars.String
-    wanted = list(dict.fromkeys([*(names[place] for place in places), names[-1]]))
+    wanted = list(dict.fromkeys([*(names[place] for place in types), names[-1]]))
     # a file is parsed where it lies; a part of it has to be taken out
     whole = table.stop == os.path.getsize(table.path)
     try:
@@ -123,12 +125,13 @@ def _parse(table: TextTable, places: Sequence[int], behind: bool) -> list[FloatA
             )
             .select(wanted)
             .collect()
+            .rechunk()  # columns side by side rather than one after the other
         )
     except polars.exceptions.PolarsError:
         return None
     if frame.height < table.count or any(frame.null_count().row(0)):
         return None
-    return [frame[names[place]].to_numpy() for place in places]
+    return [frame[names[place]].to_numpy() for place in types]
 
 
 def _ends_with_blank(table: TextTable) -> bool:

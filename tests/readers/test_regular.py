@@ -17,10 +17,10 @@ from tests.dumps import ROWS, dump_text, write
 WIDTH = 3
 
 
-def columns_of(path, text, places=(0, 2), count=2):
+def columns_of(path, text, places=(0, 2), count=2, kind=float):
     """What the parser says of the columns of a file that is nothing but rows."""
     path.write_bytes(text)
-    return read_regular(TextTable(path, 0, len(text), 0, WIDTH, count), places)
+    return read_regular(TextTable(path, 0, len(text), 0, WIDTH, count), dict.fromkeys(places, kind))
 
 
 @pytest.mark.parametrize("end", [b" \n", b"\n"])
@@ -80,10 +80,15 @@ def test_every_number_is_the_nearest_double(tmp_path):
     np.testing.assert_array_equal(found, right)
 
 
-def test_ids_are_exact_up_to_two_to_the_53(tmp_path):
-    text = b"%d 0 %d \n%d 0 0 \n" % (2**53, 2**53 - 1, 2**53 - 2)
-    found = columns_of(tmp_path / "a", text)
-    assert [int(id) for id in [*found[0], found[1][0]]] == [2**53, 2**53 - 2, 2**53 - 1]
+def test_whole_numbers_are_exact(tmp_path):
+    text = b"%d 0 %d \n%d 0 -7 \n" % (2**53 + 1, 2**62 - 1, 2**53)
+    found = columns_of(tmp_path / "a", text, kind=int)
+    assert [column.tolist() for column in found] == [[2**53 + 1, 2**53], [2**62 - 1, -7]]
+
+
+@pytest.mark.parametrize("word", [b"1.0", b"1e3", b"nan", b"10000000000000000000", b"0x1"])
+def test_what_is_no_whole_number_is_left_to_the_tolerant_parser(tmp_path, word):
+    assert columns_of(tmp_path / "a", b"1 2 3 \n" + word + b" 5 6 \n", kind=int) is None
 
 
 @pytest.mark.parametrize("seed", range(300))
@@ -111,9 +116,9 @@ def counted(monkeypatch):
     """The columns that are parsed, call by call."""
     calls = []
 
-    def read(table, places):
-        calls.append(list(places))
-        return read_regular(table, places)
+    def read(table, types):
+        calls.append(list(types))
+        return read_regular(table, types)
 
     monkeypatch.setattr(dump, "read_regular", read)
     return calls
