@@ -76,7 +76,10 @@ class ScanSums:
     line_length: FloatArray
     """Length of the lines in the window, shape (R, 4, D); 0 for the whole."""
     chords: IntArray
-    """Chords that all spheres together cut from the lines, shape (R,)."""
+    """
+    Chords that all spheres together cut from the lines, shape (R,); of spheres that few lines meet,
+    as many as are to be expected.
+    """
     channels: IntArray
     """Lines of the whole that meet no grain however far they go, shape (R, 4, D)."""
 

@@ -108,7 +108,8 @@ def order_of(values: FloatArray) -> IntArray:
         stop[bucket] += 1
     start = 0
     for bucket in range(count):
-        sort_by(values, order[start : stop[bucket]])
+        if stop[bucket] - start > 1:
+            sort_by(values, order[start : stop[bucket]])
         start = stop[bucket]
     return order
 

@@ -73,6 +73,9 @@ END, GAP_START, GAP_END = np.uint64(0), PLANE, np.uint64(2) * PLANE
 SET = np.uint64(3) * PLANE
 BOUND = np.uint64(6) * PLANE
 STATE_SIZE = int(7 * PLANE)
+# a sphere that is no more lines wide is visited as a square: to find where its chords begin and end
+# in each row would take longer than the corners
+NARROW = 12
 # rows are visited in whole vectors, beyond their last chord, where square roots are NaN
 
 # entries of a tally, of the whole and, behind them, of the window; and the chords of all solids;
@@ -255,19 +258,28 @@ def visit(
     """
     a = b = c = d = e = f = 0.0
     a2 = b2 = c2 = d2 = e2 = f2 = 0.0
-    chords = 0
+    chords = 0.0
     from_v = strip.first_v - sphere.v
     first_row = max(int(np.ceil((-sphere.radius - from_v) * strip.per_spacing)), 0)
     last_row = int(np.floor((sphere.radius - from_v) * strip.per_spacing)) + 1
+    from_u = strip.first_u - sphere.u
+    first = max(int(np.ceil((-sphere.radius - from_u) * strip.per_spacing)), 0)
+    last = min(int(np.floor((sphere.radius - from_u) * strip.per_spacing)) + 1, strip.columns)
+    met = max(last - first, 0)
+    narrow = met <= NARROW and strip.shear == 0.0
     for row in range(first_row, min(last_row, strip.rows)):
         dv = from_v + row * strip.spacing
         reach2 = sphere.radius * sphere.radius - dv * dv
-        reach = np.sqrt(max(reach2, 0.0))
         from_u = strip.first_u + row * strip.shear - sphere.u
-        first = max(int(np.ceil((-reach - from_u) * strip.per_spacing)), strip.low[row])
-        last = min(int(np.floor((reach - from_u) * strip.per_spacing)) + 1, strip.high[row])
-        met = max(last - first, 0)
-        chords += met
+        if narrow:
+            # the share of the circle in the square
+            chords += met * 0.25 * np.pi
+        else:
+            reach = np.sqrt(max(reach2, 0.0))
+            first = max(int(np.ceil((-reach - from_u) * strip.per_spacing)), strip.low[row])
+            last = min(int(np.floor((reach - from_u) * strip.per_spacing)) + 1, strip.high[row])
+            met = max(last - first, 0)
+            chords += met
         vectors = (met + LANES - 1) // LANES
         from_u += first * strip.spacing
         at = np.uint64(row * strip.pitch + first)
