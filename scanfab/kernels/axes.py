@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from scanfab.kernels.compiled import LANES, inner, kernel
 from scanfab.kernels.follow import follow
-from scanfab.kernels.grid import Grid, bounds, columns_in, open_grid, part_of, strip_of
+from scanfab.kernels.grid import Grid, bounds, open_grid, part_of, strip_of
 from scanfab.kernels.lines import solve_closed
 from scanfab.kernels.periodic import CellGrains, Prism, cell_grid, measured_in
 from scanfab.kernels.projection import Spheres, project, sort_into_strips, sphere_at
@@ -81,9 +81,8 @@ def scan_strips(
     pitch = grid.columns + LANES
     rows = max(MOST_LINES // pitch, 1)
     start, chosen = sort_into_strips(spheres, grid, rows)
-    low, high = columns_in(grid, 0.0 if whole is not None else window_radius)
     for number in range(start.size - 1):
-        strip = strip_of(grid, low, high, number, rows, pitch)
+        strip = strip_of(grid, number, rows, pitch)
         met = chosen[start[number] : start[number + 1]]
         begin(lines, strip, window_radius, second, whole)
         if medium is not None:

@@ -125,7 +125,7 @@ def follow(
     for row in range(strip.rows):
         v = strip.first_v + row * strip.spacing
         for column in range(strip.columns):
-            u = strip.first_u + row * strip.shear + column * strip.spacing
+            u = strip.first_u + column * strip.spacing
             place = np.uint64(row * strip.pitch + column)
             bound = lines[place + BOUND]
             end = lines[place + SET * np.uint64(which) + END]

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from scanfab.kernels.compiled import ZERO, inner, kernel
 from scanfab.kernels.follow import next_solid
-from scanfab.kernels.grid import Grid, bounds, columns_in, open_grid, strip_of
+from scanfab.kernels.grid import Grid, bounds, open_grid, strip_of
 from scanfab.kernels.lines import chords_of, solids_of
 from scanfab.kernels.periodic import CellGrains, Prism, cell_grid, measured_in
 from scanfab.kernels.projection import Spheres, number_from, project, sort_by, sort_into_strips
@@ -156,18 +156,17 @@ def tally_grid(
     """Add the gaps of all lines of a grid."""
     rows = max(MOST_LISTED // max(grid.columns, 1), 1)
     start, chosen = sort_into_strips(spheres, grid, rows)
-    low, high = columns_in(grid, 0.0 if wanted[0] or wanted[1] else window_radius)
     order = np.empty(spheres.u.size, np.int64)
     solids = np.empty((2, spheres.u.size))
     for number in range(start.size - 1):
-        strip = strip_of(grid, low, high, number, rows, grid.columns)
+        strip = strip_of(grid, number, rows, grid.columns)
         lines = np.empty((strip.rows, strip.columns), np.int64)
         number_from(ZERO, lines.ravel())
         met = chosen[start[number] : start[number + 1]]
         first, chords = chords_of(spheres, met, ZERO, strip, lines, lines.size)
         for line in range(lines.size):
             row, column = line // strip.columns, line % strip.columns
-            u = strip.first_u + row * strip.shear + column * strip.spacing
+            u = strip.first_u + column * strip.spacing
             v = strip.first_v + row * strip.spacing
             half2 = window_radius * window_radius - u * u - v * v
             ordered = order[: first[line + 1] - first[line]]

@@ -10,21 +10,24 @@ import numpy.typing as npt
 from scanfab.kernels.compiled import inner
 from scanfab.kernels.sweep import Strip
 
-__all__ = ["Grid", "bounds", "columns_in", "cover", "open_grid", "part_of", "strip_of"]
+__all__ = ["Grid", "bounds", "cover", "open_grid", "part_of", "sheared_grid", "strip_of"]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 
 class Grid(NamedTuple):
-    """Lines at (first_u + row * shear + column * spacing, first_v + row * spacing)."""
+    """Lines at (first_u + column * spacing, first_v + row * spacing), low <= column < high."""
 
     spacing: float
     first_u: float
     first_v: float
-    shear: float
     columns: int
     rows: int
+    low: IntArray
+    """Of each row, from 0."""
+    high: IntArray
+    """Of each row, up to ``columns``."""
 
 
 @inner()
@@ -34,16 +37,29 @@ def cover(
     """The lines ((i + offset_u) * spacing, (j + offset_v) * spacing) that meet a rectangle."""
     column = int(np.ceil(low_u / spacing - offset[0]))
     row = int(np.ceil(low_v / spacing - offset[1]))
-    columns = int(np.floor(high_u / spacing - offset[0])) - column + 1
-    rows = int(np.floor(high_v / spacing - offset[1])) - row + 1
+    columns = max(int(np.floor(high_u / spacing - offset[0])) - column + 1, 0)
+    rows = max(int(np.floor(high_v / spacing - offset[1])) - row + 1, 0)
+    low, high = np.empty(rows, np.int64), np.empty(rows, np.int64)
+    for row_of in range(rows):
+        low[row_of], high[row_of] = 0, columns
     return Grid(
         spacing,
         (column + offset[0]) * spacing,
         (row + offset[1]) * spacing,
-        0.0,
-        max(columns, 0),
-        max(rows, 0),
+        columns,
+        rows,
+        low,
+        high,
     )
+
+
+@inner()
+def limit_row(grid: Grid, row: int, low_u: float, high_u: float) -> None:
+    """Leave the lines of a row from low_u to high_u."""
+    low = int(np.ceil((low_u - grid.first_u) / grid.spacing))
+    high = int(np.floor((high_u - grid.first_u) / grid.spacing)) + 1
+    grid.low[row] = min(max(low, 0), grid.columns)
+    grid.high[row] = max(min(high, grid.columns), grid.low[row])
 
 
 class Bounds(NamedTuple):
@@ -100,56 +116,73 @@ def open_grid(
     if whole and extent.reach > 0.0:
         low_u, high_u = shadow(extent, frame[0], low_u, high_u)
         low_v, high_v = shadow(extent, frame[1], low_v, high_v)
-    return cover(low_u, high_u, low_v, high_v, offset, spacing)
+    grid = cover(low_u, high_u, low_v, high_v, offset, spacing)
+    if not whole:
+        for row in range(grid.rows):
+            v = grid.first_v + row * spacing
+            # one more on either side, against rounding
+            half = np.sqrt(max(window_radius * window_radius - v * v, 0.0)) + spacing
+            limit_row(grid, row, -half, half)
+    return grid
+
+
+@inner()
+def sheared_grid(
+    low_u: float,
+    high_u: float,
+    low_v: float,
+    high_v: float,
+    skew: float,
+    offset: FloatArray,
+    spacing: float,
+) -> Grid:
+    """The lines in a parallelogram: those in v, and in u - skew * v."""
+    aside_u, aside_v = skew * low_v, skew * high_v
+    grid = cover(
+        low_u + min(aside_u, aside_v),
+        high_u + max(aside_u, aside_v),
+        low_v,
+        high_v,
+        offset,
+        spacing,
+    )
+    for row in range(grid.rows):
+        aside = skew * (grid.first_v + row * spacing)
+        limit_row(grid, row, low_u + aside, high_u + aside)
+    return grid
 
 
 @inner()
 def part_of(grid: Grid, first: int, most: int) -> Grid:
     """So many columns of a grid at most, from the first one wanted."""
+    columns = min(most, grid.columns - first)
+    low, high = np.empty(grid.rows, np.int64), np.empty(grid.rows, np.int64)
+    for row in range(grid.rows):
+        low[row] = min(max(grid.low[row] - first, 0), columns)
+        high[row] = min(max(grid.high[row] - first, 0), columns)
     return Grid(
         grid.spacing,
         grid.first_u + first * grid.spacing,
         grid.first_v,
-        grid.shear,
-        min(most, grid.columns - first),
+        columns,
         grid.rows,
+        low,
+        high,
     )
 
 
 @inner()
-def columns_in(grid: Grid, window_radius: float) -> tuple[IntArray, IntArray]:
-    """
-    Of each row the range of columns that may meet the sphere window; all if its radius is 0.
-
-    One more on either side, against rounding.
-    """
-    low, high = np.empty(grid.rows, np.int64), np.empty(grid.rows, np.int64)
-    for row in range(grid.rows):
-        low[row], high[row] = 0, grid.columns
-        if window_radius > 0.0:
-            v = grid.first_v + row * grid.spacing
-            half = np.sqrt(max(window_radius * window_radius - v * v, 0.0))
-            first_u = grid.first_u + row * grid.shear
-            low[row] = max(int(np.ceil((-half - first_u) / grid.spacing)) - 1, 0)
-            high[row] = min(int(np.floor((half - first_u) / grid.spacing)) + 2, grid.columns)
-    return low, high
-
-
-@inner()
-def strip_of(
-    grid: Grid, low: IntArray, high: IntArray, number: int, rows: int, pitch: int
-) -> Strip:
-    """One of the strips of a grid that have so many rows each; ``low`` and ``high`` of all rows."""
+def strip_of(grid: Grid, number: int, rows: int, pitch: int) -> Strip:
+    """One of the strips of a grid that have so many rows each."""
     row = number * rows
     return Strip(
         grid.spacing,
         1.0 / grid.spacing,
-        grid.first_u + row * grid.shear,
+        grid.first_u,
         grid.first_v + row * grid.spacing,
-        grid.shear,
         grid.columns,
         min(rows, grid.rows - row),
         pitch,
-        low[row : row + rows],
-        high[row : row + rows],
+        grid.low[row : row + rows],
+        grid.high[row : row + rows],
     )

@@ -83,10 +83,9 @@ def cut(
             dv = strip.first_v + row * strip.spacing - sphere.v
             reach2 = sphere.radius * sphere.radius - dv * dv
             reach = np.sqrt(max(reach2, 0.0))
-            first_u = strip.first_u + row * strip.shear
-            columns = span(sphere.u, reach, first_u, strip.per_spacing, low[row], high[row])
+            columns = span(sphere.u, reach, strip.first_u, strip.per_spacing, low[row], high[row])
             for column in range(columns[0], columns[1]):
-                du = first_u + column * strip.spacing - sphere.u
+                du = strip.first_u + column * strip.spacing - sphere.u
                 if number[row, column] < 0 or reach2 < du * du:
                     continue
                 half_chord = np.sqrt(reach2 - du * du)

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.kernels.compiled import inner
-from scanfab.kernels.grid import Grid, cover
+from scanfab.kernels.grid import Grid, sheared_grid
 from scanfab.kernels.projection import Spheres, order_of
 from scanfab.kernels.sweep import Measured
 
@@ -237,14 +237,6 @@ def cell_grid(
         found.radius[order],
         found.removed[order],
     )
-    face = cover(extent[2], extent[3], extent[0], extent[1], offset, spacing)
     skew = prism.skew_u / prism.base_v
-    grid = Grid(
-        spacing,
-        face.first_u + skew * face.first_v,
-        face.first_v,
-        skew * spacing,
-        face.columns,
-        face.rows,
-    )
+    grid = sheared_grid(extent[2], extent[3], extent[0], extent[1], skew, offset, spacing)
     return prism, spheres, grid

@@ -90,17 +90,15 @@ REORDERED = {"reassoc", "contract"}
 
 class Strip(NamedTuple):
     """
-    Lines at (first_u + row * shear + column * spacing, first_v + row * spacing).
+    Lines at (first_u + column * spacing, first_v + row * spacing), of each row low to before high.
 
-    A row takes ``pitch`` places of a plane, which is ``columns`` and at least LANES more. Of each
-    row the columns from ``low`` to before ``high`` can count.
+    A row takes ``pitch`` places of a plane, which is ``columns`` and at least LANES more.
     """
 
     spacing: float
     per_spacing: float
     first_u: float
     first_v: float
-    shear: float
     columns: int
     rows: int
     pitch: int
@@ -218,10 +216,16 @@ def begin(lines: FloatArray, strip: Strip, radius: float, second: Flag, whole: F
                 lines[i + SET + END] = end
                 lines[i + SET + GAP_START] = -FAR
                 lines[i + SET + GAP_END] = -FAR
-        for column in range(strip.columns, strip.pitch):
-            # no lines: nothing is ever greater or less than NaN
-            k = at + np.uint64(column)
-            lines[k + BOUND] = lines[k + END] = lines[k + SET + END] = np.nan
+        no_lines(lines, at, np.uint64(0), np.uint64(strip.low[row]))
+        no_lines(lines, at, np.uint64(strip.high[row]), np.uint64(strip.pitch))
+
+
+@inner()
+def no_lines(lines: FloatArray, row: np.uint64, first: np.uint64, last: np.uint64) -> None:
+    """Mark places of a row where no lines are: nothing is ever greater or less than NaN."""
+    for column in range(first, last):
+        k = row + column
+        lines[k + BOUND] = lines[k + END] = lines[k + SET + END] = np.nan
 
 
 @inner()
@@ -229,8 +233,8 @@ def measure_from(lines: FloatArray, strip: Strip, rise_u: float, rise_v: float) 
     """Let the measured length of each line begin on a plane through the origin."""
     for row in range(strip.rows):
         v = strip.first_v + row * strip.spacing
-        for column in range(strip.columns):
-            u = strip.first_u + row * strip.shear + column * strip.spacing
+        for column in range(strip.low[row], strip.high[row]):
+            u = strip.first_u + column * strip.spacing
             place = np.uint64(row * strip.pitch + column)
             lines[place + BOUND] = rise_u * u + rise_v * v
 
@@ -266,14 +270,13 @@ def visit(
     first = max(int(np.ceil((-sphere.radius - from_u) * strip.per_spacing)), 0)
     last = min(int(np.floor((sphere.radius - from_u) * strip.per_spacing)) + 1, strip.columns)
     met = max(last - first, 0)
-    narrow = met <= NARROW and strip.shear == 0.0
+    narrow = met <= NARROW
     for row in range(first_row, min(last_row, strip.rows)):
         dv = from_v + row * strip.spacing
         reach2 = sphere.radius * sphere.radius - dv * dv
-        from_u = strip.first_u + row * strip.shear - sphere.u
         if narrow:
-            # the share of the circle in the square
-            chords += met * 0.25 * np.pi
+            # the circle has this share of the square
+            chords += 0.25 * np.pi * max(min(last, strip.high[row]) - max(first, strip.low[row]), 0)
         else:
             reach = np.sqrt(max(reach2, 0.0))
             first = max(int(np.ceil((-reach - from_u) * strip.per_spacing)), strip.low[row])
@@ -281,11 +284,11 @@ def visit(
             met = max(last - first, 0)
             chords += met
         vectors = (met + LANES - 1) // LANES
-        from_u += first * strip.spacing
+        first_du = from_u + first * strip.spacing
         at = np.uint64(row * strip.pitch + first)
         for j in range(np.uint64(vectors * LANES)):
             i = at + j
-            du = from_u + strip.spacing * np.int32(j)
+            du = first_du + strip.spacing * np.int32(j)
             half_chord = np.sqrt(reach2 - du * du)
             start = sphere.depth - half_chord
             stop = sphere.depth + half_chord

@@ -8,7 +8,7 @@ from numba import njit
 
 from scanfab.kernels import axes, sweep
 from scanfab.kernels.compiled import LANES
-from scanfab.kernels.grid import columns_in, cover, strip_of
+from scanfab.kernels.grid import cover, strip_of
 from scanfab.kernels.projection import order_of, project
 from scanfab.scan import line_frames
 from tests import naive
@@ -169,7 +169,7 @@ def closed_lines(position, radius, frame, grid, window):
     """How many lines of one strip the sweep of all spheres leaves to be solved again."""
     projected = project(position, radius, np.zeros(radius.size, np.bool_), frame, grid)
     pitch = grid.columns + LANES
-    strip = strip_of(grid, *columns_in(grid, 0.0), 0, grid.rows, pitch)
+    strip = strip_of(grid, 0, grid.rows, pitch)
     state, tally = np.empty(sweep.STATE_SIZE), np.zeros((2, sweep.TALLY_SIZE))
     every = np.arange(projected.u.size)
     sweep.begin(state, strip, window, None, True)

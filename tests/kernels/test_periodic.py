@@ -60,8 +60,8 @@ def lines_of(medium, normal, offset, spacing):
     prism, grid = prism_and_grid(medium, normal, offset, spacing)
     feet = []
     for row in range(grid.rows):
-        for column in range(grid.columns):
-            u = grid.first_u + row * grid.shear + column * grid.spacing
+        for column in range(grid.low[row], grid.high[row]):
+            u = grid.first_u + column * grid.spacing
             v = grid.first_v + row * grid.spacing
             depth = prism.rise_u * u + prism.rise_v * v
             feet.append(u * prism.frame[0] + v * prism.frame[1] + depth * prism.frame[2])
