@@ -267,16 +267,18 @@ def visit(
     first_row = max(int(np.ceil((-sphere.radius - from_v) * strip.per_spacing)), 0)
     last_row = int(np.floor((sphere.radius - from_v) * strip.per_spacing)) + 1
     from_u = strip.first_u - sphere.u
-    first = max(int(np.ceil((-sphere.radius - from_u) * strip.per_spacing)), 0)
-    last = min(int(np.floor((sphere.radius - from_u) * strip.per_spacing)) + 1, strip.columns)
-    met = max(last - first, 0)
-    narrow = met <= NARROW
+    all_first = max(int(np.ceil((-sphere.radius - from_u) * strip.per_spacing)), 0)
+    all_last = int(np.floor((sphere.radius - from_u) * strip.per_spacing)) + 1
+    all_met = max(min(all_last, strip.columns) - all_first, 0)
+    narrow = all_met <= NARROW
     for row in range(first_row, min(last_row, strip.rows)):
         dv = from_v + row * strip.spacing
         reach2 = sphere.radius * sphere.radius - dv * dv
         if narrow:
+            first, met = all_first, all_met
             # the circle has this share of the square
-            chords += 0.25 * np.pi * max(min(last, strip.high[row]) - max(first, strip.low[row]), 0)
+            within = min(all_last, strip.high[row]) - max(first, strip.low[row])
+            chords += 0.25 * np.pi * max(within, 0)
         else:
             reach = np.sqrt(max(reach2, 0.0))
             first = max(int(np.ceil((-reach - from_u) * strip.per_spacing)), strip.low[row])
