@@ -15,7 +15,6 @@ from scanfab.kernels.neighbours import (
     Grid,
     Pairs,
     contact_geometry,
-    extents,
     fill_grid,
     move_into_frame,
     pairs_between,
@@ -126,8 +125,10 @@ def overlapping_pairs(
     if count == 0:
         return np.zeros((0, 2), np.int64), np.zeros((0, 3), np.int64)
     frame, vectors = _frame(position, cell)
-    moved, turns = np.empty((count, 3)), np.empty((count, 3), np.int64)
-    any_moved = move_into_frame(position, frame, moved, turns)
+    moved, turns = position, np.empty((0, 3), np.int64)
+    if frame.repeats.any():
+        moved, turns = np.empty((count, 3)), np.empty((count, 3), np.int64)
+        move_into_frame(position, frame, moved, turns)
     grids = list(_grids(moved, radius, scale, frame, vectors))
     found, room = 0, USUAL_CONTACTS * count
     while True:
@@ -144,7 +145,7 @@ def overlapping_pairs(
         room = found
     rows, image = np.empty((found, 2), np.int64), np.empty((found, 3), np.int64)
     sort_pairs(Pairs(pairs.rows[:found], pairs.image[:found], most), count, rows, image)
-    if any_moved:
+    if turns.any():
         image += turns[rows[:, 0]] - turns[rows[:, 1]]
     return rows, _in_vectors_of(cell, image, frame)
 
@@ -159,8 +160,7 @@ def _frame(position: FloatArray, cell: Cell | None) -> tuple[Frame, FloatArray]:
     repeating = len(lattice)
     # what does not repeat is orthogonal to what does
     across = _orthogonal_complement(lattice)
-    low, high = np.empty(len(across)), np.empty(len(across))
-    extents(position, across, low, high)
+    low, high = _extents(position, across)
     low, high = _without_stragglers(position, across, low, high)
     size = np.maximum(high - low, np.finfo(float).tiny ** 0.25)
     vectors = np.vstack([lattice, across * size[:, None]])
@@ -172,6 +172,16 @@ def _frame(position: FloatArray, cell: Cell | None) -> tuple[Frame, FloatArray]:
     lattice_rows = np.zeros((3, 3))
     lattice_rows[:repeating] = lattice
     return Frame(inverse, start, lattice_rows, np.arange(3) < repeating), vectors
+
+
+def _extents(position: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The smallest and largest coordinate along each direction (shape (K, 3))."""
+    low, high = np.empty(len(directions)), np.empty(len(directions))
+    # one after the other: that needs a third of the memory
+    for k, direction in enumerate(directions):
+        along = position @ direction
+        low[k], high[k] = along.min(), along.max()
+    return low, high
 
 
 def _without_stragglers(

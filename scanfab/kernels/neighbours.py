@@ -20,7 +20,6 @@ __all__ = [
     "Grid",
     "Pairs",
     "contact_geometry",
-    "extents",
     "fill_grid",
     "move_into_frame",
     "pairs_between",
@@ -77,23 +76,9 @@ class Pairs(NamedTuple):
 
 
 @kernel
-def extents(
-    position: FloatArray, directions: FloatArray, low: FloatArray, high: FloatArray
-) -> None:
-    """The smallest and largest coordinate along each direction (shape (K, 3))."""
-    low[:], high[:] = np.inf, -np.inf
-    for i in range(position.shape[0]):
-        for k in range(directions.shape[0]):
-            along = 0.0
-            for axis in range(3):
-                along += position[i, axis] * directions[k, axis]
-            low[k], high[k] = min(low[k], along), max(high[k], along)
-
-
-@kernel
-def move_into_frame(position: FloatArray, frame: Frame, moved: FloatArray, turns: IntArray) -> bool:
-    """Move positions into the frame along its lattice vectors; whether any was moved."""
-    lattice, any_moved = frame.lattice, False
+def move_into_frame(position: FloatArray, frame: Frame, moved: FloatArray, turns: IntArray) -> None:
+    """Move positions into the frame along its lattice vectors."""
+    lattice = frame.lattice
     for i in range(position.shape[0]):
         for k in range(3):
             moved[i, k] = position[i, k]
@@ -106,10 +91,8 @@ def move_into_frame(position: FloatArray, frame: Frame, moved: FloatArray, turns
             turn = int(np.floor(fraction)) if frame.repeats[axis] and outside else 0
             turns[i, axis] = turn
             if turn != 0:
-                any_moved = True
                 for k in range(3):
                     moved[i, k] -= turn * lattice[axis, k]
-    return any_moved
 
 
 @inner()
@@ -131,10 +114,11 @@ def fill_grid(
     for place in range(rows.shape[0]):
         i = rows[place]
         x, y, z = position[i, 0], position[i, 1], position[i, 2]
-        bx = _bin(frame, shape, x, y, z, 0)
-        by = _bin(frame, shape, x, y, z, 1)
-        bins[place] = (bx * shape[1] + by) * shape[2] + _bin(frame, shape, x, y, z, 2)
-        start[bins[place] + 1] += 1
+        number = 0
+        for axis in range(3):
+            number = number * shape[axis] + _bin(frame, shape, x, y, z, axis)
+        bins[place] = number
+        start[number + 1] += 1
     for number in range(1, start.shape[0]):
         start[number] += start[number - 1]
     filled = start.copy()

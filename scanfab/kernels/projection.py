@@ -37,6 +37,18 @@ class Spheres(NamedTuple):
     removed: BoolArray
 
 
+@inner()
+def room_for_spheres(count: int) -> Spheres:
+    """So many spheres, to be filled in."""
+    return Spheres(
+        np.empty(count),
+        np.empty(count),
+        np.empty(count),
+        np.empty(count),
+        np.empty(count, np.bool_),
+    )
+
+
 @inner(inline="always")
 def sphere_at(spheres: Spheres, k: int) -> Sphere:
     """Sphere k."""
@@ -67,23 +79,16 @@ def project(
         count += (np.floor(row + reach) >= row - reach) & (
             np.floor(column + reach) >= column - reach
         )
-    order = met[:count][order_of(depth[:count])]
-    return Spheres(
-        along(position, order, frame[0]),
-        along(position, order, frame[1]),
-        along(position, order, frame[2]),
-        radius[order],
-        removed[order],
-    )
-
-
-@inner()
-def along(position: FloatArray, chosen: IntArray, side: FloatArray) -> FloatArray:
-    """Coordinates of the chosen spheres along a side of the frame."""
-    found = np.empty(chosen.size)
-    for i in range(chosen.size):
-        k = chosen[i]
-        found[i] = position[k, 0] * side[0] + position[k, 1] * side[1] + position[k, 2] * side[2]
+    order = order_of(depth[:count])
+    found = room_for_spheres(count)
+    for i in range(count):
+        k = met[order[i]]
+        x, y, z = position[k, 0], position[k, 1], position[k, 2]
+        found.u[i] = frame[0, 0] * x + frame[0, 1] * y + frame[0, 2] * z
+        found.v[i] = frame[1, 0] * x + frame[1, 1] * y + frame[1, 2] * z
+        found.depth[i] = depth[order[i]]
+        found.radius[i] = radius[k]
+        found.removed[i] = removed[k]
     return found
 
 
@@ -166,7 +171,9 @@ def sort_into_strips(
     chosen = np.empty(0, np.int64)
     per_spacing = 1.0 / grid.spacing
     for fill in range(2):
-        place = start[:-1].copy()
+        place = np.empty(strips, np.int64)
+        for strip in range(strips):
+            place[strip] = start[strip]
         for k in range(spheres.u.size):
             v, radius = spheres.v[k], spheres.radius[k]
             first, last = span(v, radius, grid.first_v, per_spacing, 0, grid.rows)
