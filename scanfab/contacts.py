@@ -179,7 +179,7 @@ def _extents(position: FloatArray, directions: FloatArray) -> tuple[FloatArray, 
     low, high = np.empty(len(directions)), np.empty(len(directions))
     # one after the other: that needs a third of the memory
     for k, direction in enumerate(directions):
-        along = position @ direction
+        along = np.einsum("ij,j->i", position, direction)
         low[k], high[k] = along.min(), along.max()
     return low, high
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import shutil
 import stat
@@ -81,6 +82,20 @@ def test_the_first_run_says_that_it_compiles_and_the_second_need_not(dump, tmp_p
 
 
 @only_linux
+def test_the_garbage_collector_waits_until_the_outermost_kernel_is_compiled():
+    told = []
+    compiling = cache._Compiling(lambda: told.append(gc.isenabled()))
+    waits = []
+    try:
+        for step in (compiling.on_start, compiling.on_start, compiling.on_end, compiling.on_end):
+            step(None)
+            waits.append(not gc.isenabled())
+    finally:
+        gc.enable()
+    assert waits == [True, True, True, False]
+    assert len(told) == 1
+
+
 def test_eight_processes_that_start_cold_all_succeed(dump, tmp_path):
     home = tmp_path / "cache"
     processes = [start(dump, home) for _ in range(8)]
