@@ -62,8 +62,8 @@ def when_compiling(tell: Callable[[], None]) -> None:
     """
     Call a function when a kernel is first compiled rather than found; from any thread.
 
-    The garbage collector waits while the compiler works: it takes a sixteenth of the time, and finds
-    next to nothing.
+    The garbage collector waits while the compiler works: it would take a sixteenth of the time, and
+    find next to nothing.
     """
     event.register("numba:compile", _Compiling(tell))  # type: ignore[no-untyped-call]
 
