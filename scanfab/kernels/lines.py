@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.kernels.compiled import ZERO, inner
-from scanfab.kernels.projection import Spheres, number_from, sort_by, span, sphere_at
+from scanfab.kernels.projection import Spheres, number_from, sort_by, sphere_at
 from scanfab.kernels.sweep import (
     BOUND,
     END,
@@ -25,6 +25,7 @@ from scanfab.kernels.sweep import (
     add,
     counted,
     moved,
+    span,
 )
 
 __all__ = ["chords_of", "solids_of", "solve_closed"]

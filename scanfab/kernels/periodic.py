@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.kernels.compiled import inner
+from scanfab.kernels.compiled import ZERO, inner
 from scanfab.kernels.grid import Grid, sheared_grid
-from scanfab.kernels.projection import Spheres, order_of
+from scanfab.kernels.projection import Spheres, order_of, room_for_spheres
 from scanfab.kernels.sweep import Measured
 
 __all__ = [
@@ -207,18 +207,22 @@ def images_in(grains: CellGrains, prism: Prism) -> tuple[Spheres, FloatArray]:
     shell = 1.0 + beyond + 2.0 * mean * prism.slope
     shell *= (1.0 + 2.0 * mean / prism.base_u) * (1.0 + 2.0 * mean / prism.base_v)
     room, count = 0, int(1.1 * shell * grains.radius.size)
-    u = v = depth = radii = np.empty(0)
-    removed = np.empty(0, np.bool_)
+    images = room_for_spheres(ZERO)
     while room < count:
         room = count
-        u, v, depth, radii = np.empty(room), np.empty(room), np.empty(room), np.empty(room)
-        removed = np.empty(room, np.bool_)
-        count = fill_images(grains, prism, beyond, extent, Spheres(u, v, depth, radii, removed))
+        images = room_for_spheres(room)
+        count = fill_images(grains, prism, beyond, extent, images)
     if grains.periodic[prism.second]:
         extent[0], extent[1] = 0.0, prism.base_v
     if grains.periodic[prism.first]:
         extent[2], extent[3] = 0.0, prism.base_u
-    found = Spheres(u[:count], v[:count], depth[:count], radii[:count], removed[:count])
+    found = Spheres(
+        images.u[:count],
+        images.v[:count],
+        images.depth[:count],
+        images.radius[:count],
+        images.removed[:count],
+    )
     return found, extent
 
 

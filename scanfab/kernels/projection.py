@@ -9,16 +9,16 @@ import numpy.typing as npt
 
 from scanfab.kernels.compiled import ZERO, inner
 from scanfab.kernels.grid import Grid
-from scanfab.kernels.sweep import Sphere
+from scanfab.kernels.sweep import Sphere, span
 
 __all__ = [
     "Spheres",
     "number_from",
     "order_of",
     "project",
+    "room_for_spheres",
     "sort_by",
     "sort_into_strips",
-    "span",
     "sphere_at",
 ]
 
@@ -140,16 +140,6 @@ def number_from(first: int, numbers: IntArray) -> None:
     """Fill in the numbers from the first one on."""
     for k in range(numbers.size):
         numbers[k] = first + k
-
-
-@inner(inline="always")
-def span(
-    centre: float, reach: float, first: float, per_spacing: float, low: int, high: int
-) -> tuple[int, int]:
-    """Which lines along one side of the grid, of a range, are within ``reach`` of a centre."""
-    start = int(np.ceil((centre - reach - first) * per_spacing))
-    stop = int(np.floor((centre + reach - first) * per_spacing)) + 1
-    return max(start, low), min(stop, high)
 
 
 @inner()

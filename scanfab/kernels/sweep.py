@@ -52,6 +52,7 @@ __all__ = [
     "measure_from",
     "moved",
     "settle",
+    "span",
     "visit",
 ]
 
@@ -239,6 +240,37 @@ def measure_from(lines: FloatArray, strip: Strip, rise_u: float, rise_v: float) 
             lines[place + BOUND] = rise_u * u + rise_v * v
 
 
+@inner(inline="always")
+def span(
+    centre: float, reach: float, first: float, per_spacing: float, low: int, high: int
+) -> tuple[int, int]:
+    """Which lines along one side of the grid, of a range, are within ``reach`` of a centre."""
+    start = int(np.ceil((centre - reach - first) * per_spacing))
+    stop = int(np.floor((centre + reach - first) * per_spacing)) + 1
+    return max(start, low), min(stop, high)
+
+
+@inner(forceinline=True, error_model="numpy")
+def columns_of_row(
+    strip: Strip, sphere: Sphere, row: int, reach2: float, first: int, last: int
+) -> tuple[int, int, float]:
+    """
+    The first of the columns to visit in a row, how many, and how many chords are expected there.
+
+    ``reach2`` is the square of half the circle's width in the row; the sphere reaches from column
+    ``first`` to before ``last``.
+    """
+    low, high = strip.low[row], strip.high[row]
+    if last - first <= NARROW:
+        # the circle has this share of the square
+        chords = 0.25 * np.pi * max(min(last, high) - max(first, low), 0)
+        return first, max(last - first, 0), chords
+    reach = np.sqrt(max(reach2, 0.0))
+    first, last = span(sphere.u, reach, strip.first_u, strip.per_spacing, low, high)
+    met = max(last - first, 0)
+    return first, met, float(met)
+
+
 @inner(fastmath=REORDERED, error_model="numpy")
 def visit(
     lines: FloatArray,
@@ -263,28 +295,15 @@ def visit(
     a = b = c = d = e = f = 0.0
     a2 = b2 = c2 = d2 = e2 = f2 = 0.0
     chords = 0.0
-    from_v = strip.first_v - sphere.v
-    first_row = max(int(np.ceil((-sphere.radius - from_v) * strip.per_spacing)), 0)
-    last_row = int(np.floor((sphere.radius - from_v) * strip.per_spacing)) + 1
-    from_u = strip.first_u - sphere.u
-    all_first = max(int(np.ceil((-sphere.radius - from_u) * strip.per_spacing)), 0)
-    all_last = int(np.floor((sphere.radius - from_u) * strip.per_spacing)) + 1
-    all_met = max(min(all_last, strip.columns) - all_first, 0)
-    narrow = all_met <= NARROW
-    for row in range(first_row, min(last_row, strip.rows)):
+    radius, per_spacing = sphere.radius, strip.per_spacing
+    rows = span(sphere.v, radius, strip.first_v, per_spacing, 0, strip.rows)
+    columns = span(sphere.u, radius, strip.first_u, per_spacing, 0, strip.columns)
+    from_u, from_v = strip.first_u - sphere.u, strip.first_v - sphere.v
+    for row in range(rows[0], rows[1]):
         dv = from_v + row * strip.spacing
-        reach2 = sphere.radius * sphere.radius - dv * dv
-        if narrow:
-            first, met = all_first, all_met
-            # the circle has this share of the square
-            within = min(all_last, strip.high[row]) - max(first, strip.low[row])
-            chords += 0.25 * np.pi * max(within, 0)
-        else:
-            reach = np.sqrt(max(reach2, 0.0))
-            first = max(int(np.ceil((-reach - from_u) * strip.per_spacing)), strip.low[row])
-            last = min(int(np.floor((reach - from_u) * strip.per_spacing)) + 1, strip.high[row])
-            met = max(last - first, 0)
-            chords += met
+        reach2 = radius * radius - dv * dv
+        first, met, cut = columns_of_row(strip, sphere, row, reach2, columns[0], columns[1])
+        chords += cut
         vectors = (met + LANES - 1) // LANES
         first_du = from_u + first * strip.spacing
         at = np.uint64(row * strip.pitch + first)

@@ -81,7 +81,6 @@ def test_the_first_run_says_that_it_compiles_and_the_second_need_not(dump, tmp_p
     assert list((tmp_path / "temporary").iterdir()) == []
 
 
-@only_linux
 def test_the_garbage_collector_waits_until_the_outermost_kernel_is_compiled():
     told = []
     compiling = cache._Compiling(lambda: told.append(gc.isenabled()))
@@ -96,6 +95,7 @@ def test_the_garbage_collector_waits_until_the_outermost_kernel_is_compiled():
     assert len(told) == 1
 
 
+@only_linux
 def test_eight_processes_that_start_cold_all_succeed(dump, tmp_path):
     home = tmp_path / "cache"
     processes = [start(dump, home) for _ in range(8)]

@@ -80,6 +80,12 @@ def test_every_number_is_the_nearest_double(tmp_path):
     np.testing.assert_array_equal(found, right)
 
 
+def test_ids_are_exact_up_to_two_to_the_53(tmp_path):
+    text = b"%d 0 %d \n%d 0 0 \n" % (2**53, 2**53 - 1, 2**53 - 2)
+    found = columns_of(tmp_path / "a", text)
+    assert [int(id) for id in [*found[0], found[1][0]]] == [2**53, 2**53 - 2, 2**53 - 1]
+
+
 def test_whole_numbers_are_exact(tmp_path):
     text = b"%d 0 %d \n%d 0 -7 \n" % (2**53 + 1, 2**62 - 1, 2**53)
     found = columns_of(tmp_path / "a", text, kind=int)
