@@ -247,12 +247,10 @@ def _values(position: FloatArray, radius: FloatArray, wrong: npt.NDArray[np.bool
 
 
 def _are_unique(id: IntArray) -> bool:
-    """Whether no number occurs twice; without sorting if they lie close together, as ids do."""
-    if id.size == 0:
-        return True
-    low, high = int(id.min()), int(id.max())
-    if high - low >= 8 * id.size:
+    """Whether no number occurs twice; without sorting if they are small, as ids are."""
+    high = int(id.max(initial=-1))
+    if high >= 8 * id.size or id.min(initial=0) < 0:
         return bool(np.unique(id).size == id.size)
-    seen = np.zeros(high - low + 1, np.bool_)
-    seen[id - low] = True
+    seen = np.zeros(high + 1, np.bool_)
+    seen[id] = True
     return bool(np.count_nonzero(seen) == id.size)

@@ -232,7 +232,7 @@ def whole_numbers(path: Path, values: npt.ArrayLike, where: str = "") -> npt.NDA
         raise ReadError(f"{path}{where}: ids must be whole numbers")
     # a larger one has more digits than a double or an int64 holds; comparisons with NaN are false
     sound = numbers.size == 0 or (numbers.min() > -(2.0**62) and numbers.max() < 2.0**62)
-    whole = numbers.astype(np.int64) if sound else np.zeros(0, np.int64)
+    whole = numbers.astype(np.int64, copy=False) if sound else np.zeros(0, np.int64)
     if not sound or np.any(whole != numbers):
         raise ReadError(f"{path}{where}: ids must be whole numbers")
     whole.flags.writeable = False  # so that the packing need not copy it

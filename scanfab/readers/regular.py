@@ -21,9 +21,7 @@ __all__ = ["LARGE", "TextTable", "read_regular"]
 
 # bytes; a smaller table is parsed before polars is loaded
 LARGE = 8 << 20
-# bytes that stay in a core's cache, with arrays that the allocator has at hand
-PIECE = 1 << 16
-BLANK, LINE_END = 32, 10
+LINE_END = 10
 
 
 @dataclass(frozen=True)
@@ -64,7 +62,7 @@ def read_regular(table: TextTable, types: Mapping[int, type]) -> list[npt.NDArra
     """
     behind = _ends_with_blank(table)
     with ThreadPoolExecutor(1) as pool:
-        # numpy and polars both let go of Python's lock
+        # kernels and polars both let go of Python's lock
         spaces = pool.submit(_count_spaces, table)
         columns = _parse(table, types, behind)
         expected = table.count * (table.width + behind), table.count * behind
@@ -78,22 +76,13 @@ def _count_spaces(table: TextTable) -> tuple[int, int]:
     If both are what single blanks make, and no line lacks its last word, no line has a word more
     either, and what polars takes for columns are the words of the line.
     """
-    piece = np.empty(PIECE + 1, np.uint8)
-    piece[0] = LINE_END
-    left, spaces, pairs = table.stop - table.start, 0, 0
-    with open(table.path, "rb", buffering=0) as file:
-        file.seek(table.start)
-        while left > 0:
-            size = file.readinto(piece[1 : 1 + min(left, PIECE)].data)
-            if not size:
-                break
-            space = piece[: size + 1] <= BLANK
-            spaces += int(np.count_nonzero(space[1:]))
-            pairs += int(np.count_nonzero(space[:-1] & space[1:]))
-            left -= size
-            piece[0] = piece[size]
+    from scanfab.kernels.text import count_spaces
+
+    file = np.memmap(table.path, np.uint8, "r").view(np.ndarray)
+    # from the line end before the first row
+    text = file[table.start - 1 : table.stop]
     # a last line without its end may lack digits
-    return (spaces, pairs) if piece[0] == LINE_END else (-1, -1)
+    return count_spaces(text) if text[-1] == LINE_END else (-1, -1)
 
 
 def _parse(
@@ -120,17 +109,19 @@ def _parse(
                 schema=schema,
                 skip_lines=table.lines_before if whole else 0,
                 n_rows=table.count,
+                encoding="utf8-lossy",  # numbers are none, and nothing else is kept
                 truncate_ragged_lines=True,  # blanks are counted elsewhere
                 glob=False,
             )
             .select(wanted)
             .collect()
-            .rechunk()  # columns side by side rather than one after the other
         )
     except polars.exceptions.PolarsError:
         return None
     if frame.height < table.count or any(frame.null_count().row(0)):
         return None
+    # all columns at once, by several threads
+    frame = frame.select(names[place] for place in types).rechunk()
     return [frame[names[place]].to_numpy() for place in types]
 
 

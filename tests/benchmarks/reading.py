@@ -49,7 +49,12 @@ def parsers(path: Path, count: int) -> dict[str, Callable[[], object]]:
 
         schema = {**dict.fromkeys(NAMES, polars.Float64), "behind": polars.String}
         frame = polars.scan_csv(
-            path, has_header=False, separator=" ", schema=schema, skip_lines=HEADER
+            path,
+            has_header=False,
+            separator=" ",
+            quote_char=None,
+            schema=schema,
+            skip_lines=HEADER,
         )
         found = frame.select(NEEDED).collect()
         return [found[name].to_numpy() for name in NEEDED]

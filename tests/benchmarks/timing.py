@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import random
 import re
 import statistics
 import time
@@ -22,6 +23,7 @@ def interleaved(
     """
     Median seconds of each way: one run of each in turn, so that all share the machine's moods.
 
+    Each turn has an order of its own, as a run also feels what the one before it left in caches.
     Ways that take milliseconds have more turns, until the median is not a matter of luck. What runs
     in one thread is measured by ``time.process_time``: other work on the machine matters less.
     """
@@ -29,13 +31,13 @@ def interleaved(
         for way in ways.values():
             way()
     seconds: dict[str, list[float]] = {name: [] for name in ways}
-    began, turns = time.perf_counter(), 0
+    began, turns, order = time.perf_counter(), 0, random.Random(0)
     while turns < repeats or (warm and time.perf_counter() - began < ENOUGH):
         turns += 1
-        for name, way in ways.items():
+        for name in order.sample(list(ways), len(ways)):
             gc.collect()
             start = clock()
-            way()
+            ways[name]()
             seconds[name].append(clock() - start)
     return {name: statistics.median(values) for name, values in seconds.items()}
 
