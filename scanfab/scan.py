@@ -13,6 +13,7 @@ from scanfab.directions import DirectionRule
 from scanfab.errors import SettingsError
 from scanfab.kernels import sweep
 from scanfab.kernels.axes import scan_axes, scan_cell
+from scanfab.kernels.bins import Bins, no_bins
 from scanfab.kernels.periodic import CellGrains
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "is_affordable",
     "line_frames",
     "scan_lines",
+    "tally_frames",
     "turned_frames",
 ]
 
@@ -234,15 +236,38 @@ def _scan_frames(
     variants: str,
 ) -> ScanSums:
     """One replicate: given line frames (D, 3, 3) and shifts (D, 2)."""
+    tallies = tally_frames(solids, frames, offsets, spacing, cutoff, variants)
+    return _by_variant(frames[:, 2], tallies, variants)
+
+
+def tally_frames(
+    solids: Solids,
+    frames: FloatArray,
+    offsets: FloatArray,
+    spacing: float,
+    cutoff: float,
+    variants: str,
+    bins: Bins | None = None,
+) -> FloatArray:
+    """
+    Scan along given line frames (D, 3, 3) with given shifts (D, 2).
+
+    Returns the tallies of each axis and set of solids, shape (D, 2, TALLY_SIZE); where there are
+    bins, the gaps go there instead.
+    """
     first, second = ("a" in variants or "c" in variants), ("b" in variants or "d" in variants)
     whole, window = ("a" in variants or "b" in variants), ("c" in variants or "d" in variants)
     tallies = np.zeros((len(frames), 2, sweep.TALLY_SIZE))
+    bins = no_bins(len(frames)) if bins is None else bins
     both: sweep.Flag = True if first and second else None
     if solids.medium is not None and whole:
-        _scan_medium(solids.medium, frames, offsets, spacing, cutoff, tallies, first, both)
+        # without a or c, the solids of b and d are the only ones
+        medium = solids.medium if first else _without_removed(solids.medium)
+        if len(medium.radius):
+            axes = np.ascontiguousarray(frames[:, 2])
+            scan_cell(medium, axes, offsets, spacing, cutoff, tallies, both, bins)
         whole = False
     if whole or window:
-        # without a or c, the solids of b and d are the only ones
         solid = slice(None) if first else ~solids.removed
         scan_axes(
             np.ascontiguousarray(solids.position[solid]),
@@ -257,33 +282,19 @@ def _scan_frames(
             both,
             True if whole else None,
             True if window else None,
+            bins,
         )
-    if not first:
-        tallies = tallies[:, ::-1]
-    return _by_variant(frames[:, 2], tallies, variants)
+    if first:
+        return tallies
+    bins.sums[:] = bins.sums[:, :, ::-1].copy()
+    return tallies[:, ::-1]
 
 
-def _scan_medium(
-    medium: CellGrains,
-    frames: FloatArray,
-    offsets: FloatArray,
-    spacing: float,
-    cutoff: float,
-    tallies: FloatArray,
-    first: bool,
-    both: sweep.Flag,
-) -> None:
-    """The whole of a periodic packing."""
-    if not first:
-        solid = ~medium.removed
-        medium = medium._replace(
-            position=medium.position[solid],
-            radius=medium.radius[solid],
-            removed=medium.removed[solid],
-        )
-    if len(medium.radius):
-        axes = np.ascontiguousarray(frames[:, 2])
-        scan_cell(medium, axes, offsets, spacing, cutoff, tallies, both)
+def _without_removed(medium: CellGrains) -> CellGrains:
+    solid = ~medium.removed
+    return medium._replace(
+        position=medium.position[solid], radius=medium.radius[solid], removed=medium.removed[solid]
+    )
 
 
 def _by_variant(axes: FloatArray, tallies: FloatArray, variants: str) -> ScanSums:

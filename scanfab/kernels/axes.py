@@ -5,6 +5,14 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.kernels.bins import (
+    Bins,
+    add_gaps,
+    bins_along,
+    list_gaps,
+    list_last_gaps,
+    room_for_gaps,
+)
 from scanfab.kernels.compiled import LANES, inner, kernel
 from scanfab.kernels.follow import follow
 from scanfab.kernels.grid import Grid, bounds, open_grid, part_of, strip_of
@@ -63,6 +71,27 @@ def visit_all(
 
 
 @inner()
+def visit_in_bins(
+    lines: FloatArray,
+    strip: Strip,
+    spheres: Spheres,
+    chosen: IntArray,
+    least: float,
+    gaps: FloatArray,
+    bins: Bins,
+    second: Flag,
+    whole: Flag,
+    window: Flag,
+    measured: Measured | None,
+) -> None:
+    """Visit the chosen spheres, and add the gaps that they settle to the bins."""
+    for k in chosen:
+        sphere, removed = sphere_at(spheres, k), spheres.removed[k]
+        count = list_gaps(lines, strip, sphere, removed, least, second, measured, gaps)
+        add_gaps(bins, gaps, count, 1.0, whole, window, measured)
+
+
+@inner()
 def scan_strips(
     lines: FloatArray,
     spheres: Spheres,
@@ -75,23 +104,33 @@ def scan_strips(
     window: Flag,
     measured: Measured | None,
     medium: tuple[CellGrains, Prism] | None,
+    bins: Bins,
 ) -> None:
     """Scan a grid strip by strip, so that the lines' state stays in cache."""
     least = max(cutoff, SMALLEST)
     pitch = grid.columns + LANES
     rows = max(MOST_LINES // pitch, 1)
     start, chosen = sort_into_strips(spheres, grid, rows)
+    # of each line and set of solids a sphere settles one gap, and two are the last
+    in_bins = bins.cutoffs.size > 0
+    gaps = room_for_gaps(2 * rows * grid.columns + 1 if in_bins else 0)
     for number in range(start.size - 1):
         strip = strip_of(grid, number, rows, pitch)
         met = chosen[start[number] : start[number + 1]]
         begin(lines, strip, window_radius, second, whole)
         if medium is not None:
             measure_from(lines, strip, medium[1].rise_u, medium[1].rise_v)
-        visit_all(
-            lines, strip, spheres, met, window_radius, least, tally, second, whole, window, measured
-        )
+        flags = second, whole, window, measured
+        if in_bins:
+            visit_in_bins(lines, strip, spheres, met, least, gaps, bins, *flags)
+        else:
+            visit_all(lines, strip, spheres, met, window_radius, least, tally, *flags)
         for which in range(1 if second is None else 2):
-            closed = settle(lines, strip, which, least, tally, whole, window, measured)
+            if in_bins:
+                count, closed = list_last_gaps(lines, strip, which, least, gaps)
+                add_gaps(bins, gaps, count, 1.0, whole, window, measured)
+            else:
+                closed = settle(lines, strip, which, least, tally, whole, window, measured)
             if closed > 0.0:
                 solve_closed(
                     lines,
@@ -105,9 +144,10 @@ def scan_strips(
                     whole,
                     window,
                     measured,
+                    bins,
                 )
             if medium is not None:
-                follow(lines, strip, which, medium[0], medium[1], least, tally)
+                follow(lines, strip, which, medium[0], medium[1], least, tally, bins)
 
 
 @kernel
@@ -124,6 +164,7 @@ def scan_axes(
     second: Flag,
     whole: Flag,
     window: Flag,
+    bins: Bins,
 ) -> None:
     """
     Scan a packing along several axes.
@@ -144,6 +185,8 @@ def scan_axes(
         Zeros; the results for each axis and set of solids.
     second, whole, window : True or None
         What is counted, see :mod:`scanfab.kernels.sweep`.
+    bins : Bins
+        Where every gap is added, instead of to the tallies, if there are any.
     """
     lines = np.empty(STATE_SIZE)
     extent = bounds(position, radius)
@@ -164,6 +207,7 @@ def scan_axes(
                 window,
                 None,
                 None,
+                bins_along(bins, frame, axis),
             )
 
 
@@ -176,6 +220,7 @@ def scan_cell(
     cutoff: float,
     tallies: FloatArray,
     second: Flag,
+    bins: Bins,
 ) -> None:
     """
     Scan a periodic medium along several directions: the whole of it, that has no edge.
@@ -187,15 +232,17 @@ def scan_cell(
         prism, spheres, grid = cell_grid(grains, normals[axis], offsets[axis], spacing)
         tally = tallies[axis]
         measured = measured_in(grains, prism)
+        here = bins_along(bins, prism.frame, axis)
         for first in range(0, grid.columns, MOST_COLUMNS):
             part = part_of(grid, first, MOST_COLUMNS)
             # along an axis that is not periodic a line runs from the first solid to the last
             if grains.periodic[prism.third]:
+                medium = grains, prism
                 scan_strips(
-                    lines, spheres, part, 0.0, cutoff, tally, second, True, None, measured,
-                    (grains, prism),
+                    lines, spheres, part, 0.0, cutoff, tally, second, True, None, measured, medium,
+                    here,
                 )  # fmt: skip
             else:
                 scan_strips(
-                    lines, spheres, part, 0.0, cutoff, tally, second, True, None, None, None
+                    lines, spheres, part, 0.0, cutoff, tally, second, True, None, None, None, here
                 )

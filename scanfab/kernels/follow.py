@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.kernels.bins import Bins, add_gaps, room_for_gaps
 from scanfab.kernels.compiled import inner
 from scanfab.kernels.periodic import CellGrains, Prism, cross, dot, shifts
 from scanfab.kernels.sweep import BOUND, CHANNELS, END, FAR, KEPT, LENGTH, SET, VOID, WHOLE, Strip
@@ -118,6 +119,7 @@ def follow(
     prism: Prism,
     least: float,
     tally: FloatArray,
+    bins: Bins,
 ) -> None:
     """Tally the gaps that start in the measured length and end beyond what was listed of it."""
     # else a line leaves through a face that does not repeat
@@ -140,6 +142,10 @@ def follow(
                     if gap >= least:
                         tally[which, WHOLE + LENGTH] += gap
                         tally[which, WHOLE + KEPT] += 1.0
+                    if bins.cutoffs.size > 0:
+                        gap_of_line = room_for_gaps(1)
+                        gap_of_line[:, 0] = which, u, v, bound, end, start
+                        add_gaps(bins, gap_of_line, 1, 1.0, True, None, None)
             elif endless:
                 tally[which, CHANNELS] += 1.0
                 tally[which, WHOLE + VOID] += (

@@ -1,16 +1,21 @@
-"""
-Scan lines from lists of their chords: slower than the sweep, and exact for any spheres.
-
-For the lines that the sweep cannot solve, and where the gaps themselves are wanted.
-"""
+"""Scan lines that the sweep cannot solve, from lists of their chords: slow, and always exact."""
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.kernels.bins import (
+    HIGH,
+    LINE_BOUND,
+    LOW,
+    WHICH,
+    Bins,
+    U,
+    V,
+    add_gaps,
+    room_for_gaps,
+)
 from scanfab.kernels.compiled import ZERO, inner
 from scanfab.kernels.projection import Spheres, number_from, sort_by, sphere_at
 from scanfab.kernels.sweep import (
@@ -18,7 +23,6 @@ from scanfab.kernels.sweep import (
     END,
     FAR,
     SET,
-    TALLY_SIZE,
     Flag,
     Measured,
     Strip,
@@ -28,26 +32,10 @@ from scanfab.kernels.sweep import (
     span,
 )
 
-__all__ = ["chords_of", "solids_of", "solve_closed"]
+__all__ = ["solve_closed"]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
-BoolArray = npt.NDArray[np.bool_]
-
-
-class Chords(NamedTuple):
-    """Chords in lists, one after the other."""
-
-    ends: FloatArray
-    """Where they start and stop, shape (2, M)."""
-    removed: BoolArray
-    """Whether their spheres are not in the second set of solids, shape (M,)."""
-
-
-@inner()
-def room_for(count: int) -> Chords:
-    """So many chords, to be filled in."""
-    return Chords(np.empty((2, count)), np.empty(count, np.bool_))
 
 
 @inner()
@@ -58,7 +46,7 @@ def cut(
     strip: Strip,
     number: IntArray,
     line: IntArray,
-    chords: Chords,
+    chords: FloatArray,
     done: int,
     count: int,
 ) -> tuple[int, int]:
@@ -67,10 +55,10 @@ def cut(
 
     Of the first set of solids, which has all spheres, or of the second one.
 
-    ``number`` has shape (rows, columns). From the sphere ``done`` on, to the ``count`` chords that
-    are there, until there is no more room. Returns the new ``done`` and ``count``.
+    ``number`` has shape (rows, columns), ``chords`` (2, M): where they start and stop. From the
+    sphere ``done`` on, to the ``count`` chords that are there, until there is no more room. Returns
+    the new ``done`` and ``count``.
     """
-    ends, removed = chords.ends, chords.removed
     low, high = strip.low, strip.high
     for place in range(done, chosen.size):
         k = chosen[place]
@@ -91,48 +79,49 @@ def cut(
                     continue
                 half_chord = np.sqrt(reach2 - du * du)
                 line[count] = number[row, column]
-                ends[0, count] = sphere.depth - half_chord
-                ends[1, count] = sphere.depth + half_chord
-                removed[count] = spheres.removed[k]
+                chords[0, count] = sphere.depth - half_chord
+                chords[1, count] = sphere.depth + half_chord
                 count += 1
     return chosen.size, count
 
 
 @inner()
-def copy(line: IntArray, chords: Chords, count: int, to_line: IntArray, to_chords: Chords) -> None:
+def copy(line: IntArray, chords: FloatArray, count: int, lines: IntArray, more: FloatArray) -> None:
     """Copy the first chords of a list and the numbers of their lines into another."""
     for k in range(count):
-        to_line[k] = line[k]
-        to_chords.ends[0, k], to_chords.ends[1, k] = chords.ends[0, k], chords.ends[1, k]
-        to_chords.removed[k] = chords.removed[k]
+        lines[k] = line[k]
+        more[0, k], more[1, k] = chords[0, k], chords[1, k]
 
 
 @inner()
 def cut_all(
     spheres: Spheres, chosen: IntArray, which: int, strip: Strip, number: IntArray
-) -> tuple[IntArray, Chords]:
+) -> tuple[IntArray, FloatArray]:
     """All that :func:`cut` finds."""
     room = 4 * chosen.size + strip.rows * strip.columns
-    line, chords = np.empty(room, np.int64), room_for(room)
+    line, chords = np.empty(room, np.int64), np.empty((2, room))
     done = count = ZERO
     while True:
         done, count = cut(spheres, chosen, which, strip, number, line, chords, done, count)
         if done == chosen.size:
             return line[:count], chords
-        lines, more = np.empty(2 * line.size, np.int64), room_for(2 * line.size)
+        lines, more = np.empty(2 * line.size, np.int64), np.empty((2, 2 * line.size))
         copy(line, chords, count, lines, more)
         line, chords = lines, more
 
 
 @inner()
-def sort_by_line(line: IntArray, chords: Chords, stop: IntArray, listed: Chords) -> None:
+def chords_of(
+    spheres: Spheres, chosen: IntArray, which: int, strip: Strip, number: IntArray, count: int
+) -> tuple[IntArray, FloatArray]:
     """
-    Sort chords by the number of their line, in the order that they have.
+    The chords of numbered lines, in lists one after the other, each in the order of depth.
 
-    ``stop``, zeros, becomes the start of each line's list, and the end of the last; see ``listed``.
+    Returns the start of each line's list (and the end of the last), and where chords start and
+    stop, shape (2, M).
     """
-    from_ends, from_removed = chords.ends, chords.removed
-    ends, removed = listed.ends, listed.removed
+    line, chords = cut_all(spheres, chosen, which, strip, number)
+    stop, listed = np.zeros(count + 2, np.int64), np.empty((2, line.size))
     for k in range(line.size):
         stop[line[k] + 2] += 1
     for one in range(2, stop.size):
@@ -141,45 +130,52 @@ def sort_by_line(line: IntArray, chords: Chords, stop: IntArray, listed: Chords)
     for k in range(line.size):
         place = stop[line[k] + 1]
         stop[line[k] + 1] += 1
-        ends[0, place], ends[1, place] = from_ends[0, k], from_ends[1, k]
-        removed[place] = from_removed[k]
-
-
-@inner()
-def chords_of(
-    spheres: Spheres, chosen: IntArray, which: int, strip: Strip, number: IntArray, count: int
-) -> tuple[IntArray, Chords]:
-    """The chords of numbered lines, and the start of each line's list (and the end of the last)."""
-    line, chords = cut_all(spheres, chosen, which, strip, number)
-    stop, listed = np.zeros(count + 2, np.int64), room_for(line.size)
-    sort_by_line(line, chords, stop, listed)
+        listed[0, place], listed[1, place] = chords[0, k], chords[1, k]
     return stop, listed
 
 
 @inner()
-def solids_of(chords: Chords, order: IntArray, which: int, solids: FloatArray) -> int:
+def gaps_of(
+    chords: FloatArray,
+    order: IntArray,
+    bound: float,
+    whole: Flag,
+    measured: Measured | None,
+    gaps: FloatArray,
+) -> tuple[int, float]:
     """
-    The union of a line's chords into the first places of ``solids``; their number.
+    The gaps that the sweep settles on one line, in the first places of ``gaps``.
 
-    Of the first set of solids, or of the second one, without the chords that are removed from it.
+    Their number, the void behind the last solid included, and where that ends. Chords ordered by
+    their middles: as the sweep does it, and nothing more once the line is closed. Chords ordered by
+    their starts: exact, as none of them can reach back.
     """
+    end, low, high = -FAR, -FAR, -FAR
+    if whole is None:
+        end = -bound
     count = 0
     for k in order:
-        if which == 1 and chords.removed[k]:
+        start, stop = chords[0, k], chords[1, k]
+        if measured is not None and start - bound >= measured.known:
             continue
-        start, stop = chords.ends[0, k], chords.ends[1, k]
-        if count > 0 and start <= solids[1, count - 1]:
-            solids[1, count - 1] = max(solids[1, count - 1], stop)
-        else:
-            solids[0, count], solids[1, count] = start, stop
+        if start > end:
+            gaps[LOW, count], gaps[HIGH, count] = low, high
             count += 1
-    return count
+        end, low, high = moved(start, stop, end, low, high)
+    if end < FAR:
+        gaps[LOW, count], gaps[HIGH, count] = low, high
+        gaps[LOW, count + 1], gaps[HIGH, count + 1] = end, FAR
+        count += 2
+    return count, end
 
 
 @inner()
-def sweep_line(
-    chords: FloatArray,
-    order: IntArray,
+def tally_line(
+    gaps: FloatArray,
+    count: int,
+    sign: float,
+    u: float,
+    v: float,
     bound: float,
     least: float,
     tally: FloatArray,
@@ -187,30 +183,18 @@ def sweep_line(
     whole: Flag,
     window: Flag,
     measured: Measured | None,
-) -> float:
-    """
-    The sweep of one line's chords in an order, as far as it goes; where its last solid ends.
-
-    Chords ordered by their middles: what the sweep tallies, and nothing more once the line is
-    closed. Chords ordered by their starts: exact, as none of them can reach back.
-    """
-    end, low, high = -FAR, -FAR, -FAR
-    if whole is None:
-        end = -bound
-    for k in range(order.size + 1):
-        is_last = k == order.size
-        start = FAR if is_last else chords[0, order[k]]
-        stop = FAR if is_last else chords[1, order[k]]
-        if measured is not None and not is_last and start - bound >= measured.known:
-            continue
-        if end < FAR and start > end:
-            add(tally, which, counted(True, low, high, least, bound, whole, window, measured))
-            if is_last and window is not None:
-                add(tally, which, counted(True, end, FAR, least, bound, whole, window, measured))
-        if is_last:
-            return end
-        end, low, high = moved(start, stop, end, low, high)
-    return end
+    bins: Bins,
+) -> None:
+    """Tally the gaps of one line, or take them back, with a sign of -1."""
+    if bins.cutoffs.size > 0:
+        gaps[WHICH, :count], gaps[LINE_BOUND, :count] = which, bound
+        gaps[U, :count], gaps[V, :count] = u, v
+        add_gaps(bins, gaps, count, sign, whole, window, measured)
+    else:
+        for k in range(count):
+            low, high = gaps[LOW, k], gaps[HIGH, k]
+            a, b, c, d, e, f = counted(True, low, high, least, bound, whole, window, measured)
+            add(tally, which, (sign * a, sign * b, sign * c, sign * d, sign * e, sign * f))
 
 
 @inner()
@@ -226,28 +210,34 @@ def solve_closed(
     whole: Flag,
     window: Flag,
     measured: Measured | None,
+    bins: Bins,
 ) -> None:
     """Replace what the sweep tallied on closed lines by what their lists of chords give."""
     number = np.full((strip.rows, strip.columns), -1)
-    places = np.empty(closed, np.uint64)
+    places = np.empty(closed, np.int64)
     line = 0
     for row in range(strip.rows):
         for column in range(strip.columns):
             place = np.uint64(row * strip.pitch + column)
             if lines[place + SET * np.uint64(which) + END] == FAR:
                 number[row, column] = line
-                places[line] = place
+                places[line] = row * strip.pitch + column
                 line += 1
-    start, chords = chords_of(spheres, chosen, which, strip, number, closed)
-    wrong = np.zeros((2, TALLY_SIZE))
-    right = np.zeros((2, TALLY_SIZE))
+    first, chords = chords_of(spheres, chosen, which, strip, number, closed)
+    gaps = room_for_gaps(chords.size // 2 + 2)
     for line in range(closed):
-        order = np.empty(start[line + 1] - start[line], np.int64)
-        number_from(start[line], order)
-        bound = lines[places[line] + BOUND]
-        sweep_line(chords.ends, order, bound, least, wrong, which, whole, window, measured)
-        sort_by(chords.ends[0], order)
-        end = sweep_line(chords.ends, order, bound, least, right, which, whole, window, measured)
-        lines[places[line] + SET * np.uint64(which) + END] = end
-    for entry in range(TALLY_SIZE):
-        tally[which, entry] += right[which, entry] - wrong[which, entry]
+        row, column = places[line] // strip.pitch, places[line] % strip.pitch
+        u = strip.first_u + column * strip.spacing
+        v = strip.first_v + row * strip.spacing
+        place = np.uint64(places[line])
+        bound = lines[place + BOUND]
+        order = np.empty(first[line + 1] - first[line], np.int64)
+        number_from(first[line], order)
+        end = 0.0
+        for sign in (-1.0, 1.0):
+            count, end = gaps_of(chords, order, bound, whole, measured, gaps)
+            tally_line(
+                gaps, count, sign, u, v, bound, least, tally, which, whole, window, measured, bins
+            )
+            sort_by(chords[0], order)
+        lines[place + SET * np.uint64(which) + END] = end

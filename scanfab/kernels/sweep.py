@@ -33,6 +33,8 @@ __all__ = [
     "CHANNELS",
     "CHORDS",
     "FAR",
+    "GAP_END",
+    "GAP_START",
     "KEPT",
     "LENGTH",
     "LINES",
@@ -49,11 +51,14 @@ __all__ = [
     "Sphere",
     "Strip",
     "begin",
+    "columns_of_row",
+    "counted",
     "measure_from",
     "moved",
     "settle",
     "span",
     "visit",
+    "whole_gap",
 ]
 
 FloatArray = npt.NDArray[np.float64]

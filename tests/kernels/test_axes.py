@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from numba import njit
 
 from scanfab.kernels import axes, sweep
+from scanfab.kernels.bins import no_bins
 from scanfab.kernels.compiled import LANES
 from scanfab.kernels.grid import cover, strip_of
 from scanfab.kernels.projection import order_of, project
@@ -111,6 +112,7 @@ def fast_tallies(
         second or None,
         whole or None,
         clipped or None,
+        no_bins(1),
     )
     return named(tallies[0, 0]), named(tallies[0, 1])
 

@@ -5,6 +5,7 @@ import pytest
 from numba import njit
 
 from scanfab.kernels import axes, periodic, sweep
+from scanfab.kernels.bins import no_bins
 from scanfab.kernels.periodic import CellGrains
 from tests import naive
 from tests.uncompiled import run_uncompiled
@@ -71,7 +72,9 @@ def lines_of(medium, normal, offset, spacing):
 
 def tallies_of(medium, normal, offset, spacing, cutoff, second=True):
     tallies = np.zeros((1, 2, sweep.TALLY_SIZE))
-    axes.scan_cell(medium, normal[None], offset[None], spacing, cutoff, tallies, second or None)
+    axes.scan_cell(
+        medium, normal[None], offset[None], spacing, cutoff, tallies, second or None, no_bins(1)
+    )
     return tallies[0]
 
 

@@ -1,10 +1,11 @@
-"""The scan that lists its gaps equals its slow twin: by octant, by cut-off, with squares."""
+"""Every gap equals that of the slow twin: by octant, by cut-off, with squares."""
 
 import numpy as np
 import pytest
 
 from scanfab.gaps import Blocks
-from scanfab.kernels import gaps
+from scanfab.kernels import axes, sweep
+from scanfab.kernels.bins import BLOCKS, Bins
 from scanfab.scan import line_frames
 from tests import naive
 from tests.kernels.test_axes import KINDS, line_words, overlapping
@@ -15,16 +16,17 @@ RUNS_OF_A_KIND = 60
 REACH = 30.0
 
 
-def fast_sums(spheres, removed, frame, offset, spacing, window, cutoffs, centers, wanted=(1,) * 4):
-    """What the kernel tallies: shape (set of solids, whole or window, octant, bin, sum)."""
-    sums = np.zeros((1, 2, 2, gaps.BLOCKS, len(cutoffs), 3))
-    gaps.tally_gaps(
+def fast_sums(spheres, removed, frame, offset, spacing, window, cutoffs, centers, flags=(1, 1, 1)):
+    """What the kernel adds up: shape (whole or window, set of solids, octant, bin, sum)."""
+    blocks = np.array([Blocks.about(center, REACH).affine() for center in centers])
+    sums = np.zeros((1, 2, 2, BLOCKS, len(cutoffs), 3))
+    axes.scan_axes(
         *line_words(spheres, removed, frame, offset, spacing),
+        0.0,
         window,
-        np.array([Blocks.about(center, REACH).affine() for center in centers]),
-        np.array(cutoffs),
-        np.array(wanted, bool),
-        sums,
+        np.zeros((1, 2, sweep.TALLY_SIZE)),
+        *(True if flag else None for flag in flags),
+        Bins(blocks, np.array(cutoffs), sums),
     )
     return sums[0]
 
@@ -63,7 +65,7 @@ def check_random_packing(kind, random):
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
-def test_listed_gaps_equal_the_slow_twin(kind):
+def test_binned_gaps_equal_the_slow_twin(kind):
     runs = [np.random.default_rng([seed, 7]) for seed in range(RUNS_OF_A_KIND)]
     found = sum(check_random_packing(kind, random) for random in runs)
     if kind.__name__ != "nothing":
@@ -72,7 +74,7 @@ def test_listed_gaps_equal_the_slow_twin(kind):
         assert np.all(found.sum(axis=(0, 1)) > 0)
 
 
-def test_only_wanted_variants_are_tallied():
+def test_only_what_is_wanted_is_added():
     random = np.random.default_rng(0)
     spheres = overlapping(random)
     removed = random.random(len(spheres.radius)) < 0.3
@@ -80,22 +82,18 @@ def test_only_wanted_variants_are_tallied():
     centers = np.zeros((2, 3))
     every = fast_sums(*line, centers)
     assert np.all(every.sum(axis=(2, 3, 4)) > 0)
-    for variant in range(4):
-        wanted = np.arange(4) == variant
-        alone = fast_sums(*line, centers, wanted)
-        place = variant // 2, variant % 2
-        np.testing.assert_allclose(alone[place], every[place], rtol=1e-12)
-        alone[place] = 0.0
-        assert not alone.any()
+    for second, whole, window in [(1, 1, 0), (1, 0, 1), (0, 1, 1), (0, 1, 0), (0, 0, 1)]:
+        alone = fast_sums(*line, centers, (second, whole, window))
+        wanted = np.outer([whole, window], [1, second])[..., None, None, None]
+        np.testing.assert_allclose(alone, every * wanted, rtol=1e-9, atol=1e-12)
 
 
-def test_listed_gaps_equal_the_slow_twin_uncompiled():
+def test_binned_gaps_equal_the_slow_twin_uncompiled():
     """As plain Python the kernel also finds an index out of range."""
     run_uncompiled(
         "import numpy as np\n"
-        "from scanfab.kernels import gaps\n"
-        "from tests.kernels import test_gaps as here\n"
-        "assert not hasattr(gaps.tally_gaps, 'py_func')\n"
+        "from tests.kernels import test_bins as here\n"
+        "assert not hasattr(here.axes.scan_axes, 'py_func')\n"
         "np.seterr(invalid='ignore')\n"
         "for kind in here.KINDS:\n"
         "    for seed in range(3):\n"
