@@ -91,7 +91,7 @@ def _better_plan(
     sums: ScanSums, plan: Plan, missing: float, solids: Solids, settings: Settings, left: float
 ) -> Plan | None:
     """After the first round, a plan to start afresh with, if that is worth it and affordable."""
-    closest = CLOSEST * solids.radius.min(initial=np.inf)
+    closest = CLOSEST * solids.grain_radius.min(initial=np.inf)
     better = plan
     if plan.auto == "directions":
         better = _with_more_axes(plan, missing)
@@ -114,7 +114,7 @@ def _with_more_axes(plan: Plan, missing: float) -> Plan:
 def _with_closer_lines(plan: Plan, missing: float, solids: Solids, settings: Settings) -> Plan:
     """The plan with lines as close as is of use, and a finer rule for what is missing then."""
     power = 2.0 + GROWTH_WITH_SPACING
-    closest = min(CLOSE * float(solids.radius.mean()), plan.spacing)
+    closest = min(CLOSE * float(solids.grain_radius.mean()), plan.spacing)
     spacing = max(plan.spacing / missing ** (1.0 / power), closest)
     missing /= (plan.spacing / spacing) ** power
     plan = replace(plan, spacing=spacing)
@@ -128,8 +128,7 @@ def _with_closer_lines(plan: Plan, missing: float, solids: Solids, settings: Set
 
 def _within_budget(plan: Plan, solids: Solids, settings: Settings) -> Plan:
     """The plan, with wider lines if its first round alone would cut more chords than allowed."""
-    areas = float(np.pi * np.sum(solids.radius**2))
-    chords = areas / plan.spacing**2 * len(plan.rule) * plan.replicates
+    chords = solids.cross_section / plan.spacing**2 * len(plan.rule) * plan.replicates
     if chords <= settings.max_chords:
         return plan
     if plan.auto == "replicates":
@@ -149,9 +148,11 @@ def _within_budget(plan: Plan, solids: Solids, settings: Settings) -> Plan:
 
 
 def _width(solids: Solids) -> float:
-    """Of the window, or of the sample where there is none."""
+    """Of the window, or of the sample (the cell) where there is none."""
     if solids.window_radius > 0:
         return 2.0 * solids.window_radius
+    if solids.medium is not None:
+        return float(np.linalg.norm(solids.medium.vectors, axis=1).max())
     low = (solids.position - solids.radius[:, None]).min(axis=0)
     high = (solids.position + solids.radius[:, None]).max(axis=0)
     return float((high - low).max())

@@ -107,13 +107,11 @@ def _solids(sample: Sample, plan: Plan, settings: Settings) -> tuple[Solids, Flo
     position = position - origin
     reach = 0.0 if window is None else window.radius
     if packing.cell is not None and packing.is_periodic:
-        medium = CellGrains(
-            np.ascontiguousarray(position),
-            radius,
-            removed,
-            packing.cell.short_vectors,
-            np.array(packing.cell.periodic),
-        )
+        medium: CellGrains | None = None
+        if settings.needs_whole:
+            vectors, periodic = packing.cell.short_vectors, np.array(packing.cell.periodic)
+            position = np.ascontiguousarray(position)
+            medium = CellGrains(position, radius, removed, vectors, periodic)
         images, row = packing.cell.images_near_origin(position, radius + reach)
         return Solids(images, radius[row], removed[row], reach, medium), origin
     if not settings.needs_whole:
@@ -141,7 +139,7 @@ def _block_spacing(sums: ScanSums, plan: Plan, solids: Solids, settings: Setting
     """Such that the variant with the fewest segments keeps enough, but no more than it has."""
     kept = [int(sums.kept(variant)[1].sum()) for variant in settings.variants]
     fewest = max(min(kept), 1)
-    grains = len(solids.radius)
+    grains = len(solids.grain_radius)
     if solids.window_radius > 0.0:
         distance = np.linalg.norm(solids.position, axis=1)
         grains = int(np.count_nonzero(distance < solids.window_radius))

@@ -32,7 +32,7 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
-# lines of one axis and replicate: 40 bytes each
+# lines of one axis and replicate: more take minutes, even those that meet nothing
 MAX_LINES = 50_000_000
 
 
@@ -53,7 +53,22 @@ class Solids:
     window_radius: float = 0.0
     """Radius of the sphere window; 0 for none."""
     medium: CellGrains | None = None
-    """The grains of a periodic packing, each once, for its whole, which has no edge."""
+    """The grains of a periodic packing, each once, if its whole is scanned, which has no edge."""
+
+    @property
+    def grain_radius(self) -> FloatArray:
+        """
+        Radii of the grains that lines may meet, each once where the whole is periodic.
+
+        In a periodic packing without a window, ``radius`` has next to none.
+        """
+        return self.radius if self.medium is None else self.medium.radius
+
+    @property
+    def cross_section(self) -> float:
+        """Σ π r² of all spheres that lines may meet: they cut so many chords times spacing²."""
+        of_medium = 0.0 if self.medium is None else float(np.sum(self.medium.radius**2))
+        return np.pi * (float(np.sum(self.radius**2)) + of_medium)
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +182,7 @@ def scan_lines(
     Raises
     ------
     SettingsError
-        If the spacing asks for more lines than memory should hold.
+        If the spacing asks for more lines than can be scanned in reasonable time.
 
     Examples
     --------
@@ -324,7 +339,7 @@ def _by_variant(axes: FloatArray, tallies: FloatArray, variants: str) -> ScanSum
 
 
 def is_affordable(solids: Solids, spacing: float) -> bool:
-    """Whether memory should hold the lines of one axis and replicate."""
+    """Whether the lines of one axis and replicate are not too many."""
     return _most_lines(solids, spacing) <= MAX_LINES
 
 
@@ -342,5 +357,6 @@ def _check_spacing(solids: Solids, spacing: float) -> None:
     if lines > MAX_LINES:
         raise SettingsError(
             f"spacing: {spacing:g} between lines of one direction and replicate makes "
-            f"{lines:.2g} of them, more than {MAX_LINES:.0e}: choose a wider spacing"
+            f"{lines:.2g} of them, more than {MAX_LINES:.0e}: choose a wider spacing, or leave out "
+            f"grains that are far away from all others"
         )

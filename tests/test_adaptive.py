@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from scanfab import (
+    Cell,
     Packing,
     ScanfabWarning,
     Settings,
@@ -25,6 +26,13 @@ from tests.scanning import solids_of
 @pytest.fixture(scope="module")
 def packing():
     return find_contacts(Packing(*shaken_cubic(np.random.default_rng(0), 6)))
+
+
+@pytest.fixture(scope="module")
+def repeated():
+    """The same grains in a cell that repeats."""
+    spheres = shaken_cubic(np.random.default_rng(0), 6)
+    return find_contacts(Packing(*spheres, cell=Cell(6.0 * np.eye(3), (True, True, True))))
 
 
 @pytest.mark.parametrize("options", [{}, {"directions": 30}, {"spacing": "0.4rmin"}])
@@ -143,6 +151,28 @@ def test_scan_stops_before_it_cuts_more_chords_than_allowed(packing):
         assert 0.5 * most < chords <= 1.1 * most
         assert row.alpha_vs_axial_se > 1e-6
     assert cut[0] < cut[1]
+
+
+@pytest.mark.parametrize("variants", ["a", "b", "ab", "ac"])
+def test_periodic_whole_takes_about_as_many_lines_as_the_open_one(packing, repeated, variants):
+    """Also without an RV, where no image of a grain is near the origin."""
+    lines = {"variants": variants, "tolerance": 4e-4}
+    here, there = compute(packing, **lines), compute(repeated, **lines)
+    assert there["alpha_vs_axial_se"].max() <= 4e-4
+    for one, other in zip(here, there, strict=True):
+        assert 0.2 < other.spacing / one.spacing < 5.0
+
+
+@pytest.mark.parametrize("variants", ["a", "abcd"])
+def test_budget_holds_for_periodic_packings_too(repeated, variants):
+    with pytest.warns(ScanfabWarning, match="1e-06 was met.*--max-chords"):
+        row = compute(repeated, tolerance=1e-6, variants=variants, max_chords=1e6)[0]
+    chords = np.pi * np.sum(repeated.radius**2) / row.spacing**2 * row.directions
+    assert 0.1e6 < chords <= 1.1e6
+    with pytest.raises(SettingsError, match="more than --max-chords 10000: choose a wider spacing"):
+        compute(repeated, spacing=0.02, variants=variants, max_chords=1e4)
+    with pytest.raises(SettingsError, match="max-chords: 100 leave less than one line for each of"):
+        compute(repeated, max_chords=100, variants=variants)
 
 
 def test_fixed_spacing_that_needs_more_chords_than_allowed_is_refused(packing):

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from scanfab import direction_rule, scan_lines
+from scanfab import Cell, Solids, direction_rule, scan_lines
 from scanfab.gaps import Blocks, scan_gaps
-from scanfab.scan import line_frames, turned_frames
+from scanfab.scan import CellGrains, line_frames, turned_frames
 from tests import naive
 from tests.lattices import poisson_spheres
 from tests.scanning import ratio, solids_of
@@ -38,6 +38,26 @@ def test_all_octants_together_are_the_scan_of_the_same_lines(solids, place):
         assert np.array_equal(number, expected_number)
         assert number.min() > 0
         np.testing.assert_allclose(length, expected_length, rtol=1e-10)
+
+
+@pytest.mark.parametrize("periodic", [(True, True, True), (True, False, True)])
+def test_all_octants_of_a_periodic_packing_are_the_scan_of_the_same_lines(periodic):
+    random = np.random.default_rng(1)
+    cell = Cell([[4.0, 0, 0], [1.0, 3.5, 0], [-0.5, 0.8, 3.0]], periodic)
+    position, radius = cell.place(random.uniform(0, 4, (30, 3)))[0], random.uniform(0.3, 0.8, 30)
+    removed = random.random(30) < 0.2
+    medium = CellGrains(position, radius, removed, cell.vectors, np.array(periodic))
+    images, row = cell.images_near_origin(position, radius + 1.5)
+    solids = Solids(images, radius[row], removed[row], 1.5, medium)
+    gaps = gaps_of(solids, cutoffs=[0.1, 0.4])
+    for place, cutoff in enumerate((0.1, 0.4)):
+        sums = scan_lines(solids, RULE, spacing=0.3, cutoff=cutoff, replicates=range(3))
+        for variant in "abcd":
+            length, number = gaps.kept(variant, place)
+            expected_length, expected_number = sums.kept(variant)
+            assert np.array_equal(number, expected_number)
+            assert number.min() > 0
+            np.testing.assert_allclose(length, expected_length, rtol=1e-10)
 
 
 def test_octants_left_out_add_up_to_seven_times_all(solids):

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from scanfab import Packing, Settings, compute, find_contacts
+from scanfab import Cell, Packing, Settings, compute, find_contacts
 from scanfab.gaps import Blocks
 from scanfab.plan import make_plan
 from scanfab.variants import VARIANTS, Sample
@@ -63,6 +63,14 @@ def test_more_lines_cannot_tell_more_of_the_material(packing):
     assert fine.alpha_vs_axial_sample_se > 4 * fine.alpha_vs_axial_se
     ratio = fine.alpha_vs_axial_sample_se / coarse.alpha_vs_axial_sample_se
     assert ratio == pytest.approx(1.0, abs=0.3)
+
+
+def test_scatter_of_a_periodic_whole_does_not_depend_on_an_rv_beside_it():
+    spheres = shaken_cubic(np.random.default_rng(0), 6)
+    cell = Cell(6.0 * np.eye(3), (True, True, True))
+    repeated = find_contacts(Packing(*spheres, cell=cell))
+    alone, beside = (compute(repeated, tolerance=2e-4, variants=names)[0] for names in ("a", "ac"))
+    assert alone.alpha_vs_axial_sample_se == pytest.approx(beside.alpha_vs_axial_sample_se, rel=0.3)
 
 
 def test_turned_with_its_axis_the_sample_has_the_same_octants(packing):

@@ -5,7 +5,17 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.kernels.bins import Bins, add_gaps, room_for_gaps
+from scanfab.kernels.bins import (
+    HIGH,
+    LINE_BOUND,
+    LOW,
+    WHICH,
+    Bins,
+    U,
+    V,
+    add_gaps,
+    room_for_gaps,
+)
 from scanfab.kernels.compiled import inner
 from scanfab.kernels.periodic import CellGrains, Prism, cross, dot, shifts
 from scanfab.kernels.sweep import BOUND, CHANNELS, END, FAR, KEPT, LENGTH, SET, VOID, WHOLE, Strip
@@ -143,9 +153,10 @@ def follow(
                         tally[which, WHOLE + LENGTH] += gap
                         tally[which, WHOLE + KEPT] += 1.0
                     if bins.cutoffs.size > 0:
-                        gap_of_line = room_for_gaps(1)
-                        gap_of_line[:, 0] = which, u, v, bound, end, start
-                        add_gaps(bins, gap_of_line, 1, 1.0, True, None, None)
+                        one = room_for_gaps(1)
+                        one[WHICH, 0], one[U, 0], one[V, 0] = which, u, v
+                        one[LINE_BOUND, 0], one[LOW, 0], one[HIGH, 0] = bound, end, start
+                        add_gaps(bins, one, 1, 1.0, True, None, None)
             elif endless:
                 tally[which, CHANNELS] += 1.0
                 tally[which, WHOLE + VOID] += (

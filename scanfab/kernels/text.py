@@ -7,24 +7,31 @@ import numpy.typing as npt
 
 from scanfab.kernels.compiled import kernel
 
-__all__ = ["BLANK", "count_spaces"]
+__all__ = ["BLANK", "LINE_END", "count_spaces"]
 
-# white space is what is not above it
-BLANK = 32
+# white space is what is not above a blank
+BLANK, LINE_END = 32, 10
 # so many can be counted in a byte, of which vector instructions take more at a time
 PIECE = 240
 
 
 @kernel
-def count_spaces(text: npt.NDArray[np.uint8]) -> tuple[int, int]:
-    """How many of the bytes behind the first are white space, and how many follow another such."""
-    spaces = pairs = np.int64(0)
+def count_spaces(text: npt.NDArray[np.uint8]) -> tuple[int, int, int]:
+    """
+    White space behind the first byte.
+
+    How many bytes of it there are, how many of these follow another, and how many of those are line
+    ends that follow a blank.
+    """
+    spaces = pairs = ends = np.int64(0)
     for start in range(0, text.size - 1, PIECE):
-        some = more = np.uint8(0)
+        some = more = most = np.uint8(0)
         for k in range(np.uint64(start), np.uint64(min(start + PIECE, text.size - 1))):
-            space = np.uint8(text[k + np.uint64(1)] <= BLANK)
-            some = np.uint8(some + space)
-            more = np.uint8(more + (space & np.uint8(text[k] <= BLANK)))
+            before, here = text[k], text[k + np.uint64(1)]
+            some = np.uint8(some + np.uint8(here <= BLANK))
+            more = np.uint8(more + (np.uint8(here <= BLANK) & np.uint8(before <= BLANK)))
+            most = np.uint8(most + (np.uint8(here == LINE_END) & np.uint8(before == BLANK)))
         spaces += np.int64(some)
         pairs += np.int64(more)
-    return int(spaces), int(pairs)
+        ends += np.int64(most)
+    return int(spaces), int(pairs), int(ends)

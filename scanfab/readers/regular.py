@@ -21,7 +21,6 @@ __all__ = ["LARGE", "TextTable", "read_regular"]
 
 # bytes; a smaller table is parsed before polars is loaded
 LARGE = 8 << 20
-LINE_END = 10
 
 
 @dataclass(frozen=True)
@@ -65,24 +64,26 @@ def read_regular(table: TextTable, types: Mapping[int, type]) -> list[npt.NDArra
         # kernels and polars both let go of Python's lock
         spaces = pool.submit(_count_spaces, table)
         columns = _parse(table, types, behind)
-        expected = table.count * (table.width + behind), table.count * behind
+        blanks_at_ends = table.count * behind
+        expected = table.count * (table.width + behind), blanks_at_ends, blanks_at_ends
         return columns if spaces.result() == expected else None
 
 
-def _count_spaces(table: TextTable) -> tuple[int, int]:
+def _count_spaces(table: TextTable) -> tuple[int, int, int]:
     """
-    The number of blanks, line ends and other white space, and how often one follows another.
+    How much white space there is, how often it follows other, and how often lines end in a blank.
 
-    If both are what single blanks make, and no line lacks its last word, no line has a word more
-    either, and what polars takes for columns are the words of the line.
+    If no two blanks stand together but at the end of each line, the words that polars sees are
+    those of the line. If besides there are just as many as there should be, and no line lacks its
+    last word, no line has a word more either.
     """
-    from scanfab.kernels.text import count_spaces
+    from scanfab.kernels.text import LINE_END, count_spaces
 
     file = np.memmap(table.path, np.uint8, "r").view(np.ndarray)
     # from the line end before the first row
     text = file[table.start - 1 : table.stop]
     # a last line without its end may lack digits
-    return count_spaces(text) if text[-1] == LINE_END else (-1, -1)
+    return count_spaces(text) if text[-1] == LINE_END else (-1, -1, -1)
 
 
 def _parse(

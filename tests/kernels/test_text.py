@@ -10,9 +10,10 @@ from tests.uncompiled import run_uncompiled
 
 
 def counted(text):
-    """In plain words: spaces behind the first byte, and those of them that follow another."""
+    """In plain words: spaces behind the first byte, those that follow another, and ' \\n'."""
     spaces = [place for place in range(1, len(text)) if text[place] in b" \t\r\n\v\f"]
-    return len(spaces), sum(text[place - 1] in b" \t\r\n\v\f" for place in spaces)
+    follow = sum(text[place - 1] in b" \t\r\n\v\f" for place in spaces)
+    return len(spaces), follow, text.count(b" \n")
 
 
 def assert_counts_are_right(size, seed):
@@ -33,7 +34,7 @@ def test_white_space_is_counted(seed):
 
 
 def test_nothing_but_blanks_does_not_overflow():
-    assert count_spaces(np.full(10 * PIECE + 1, 32, np.uint8)) == (10 * PIECE, 10 * PIECE)
+    assert count_spaces(np.full(10 * PIECE + 1, 32, np.uint8)) == (10 * PIECE, 10 * PIECE, 0)
 
 
 def test_white_space_is_counted_uncompiled():

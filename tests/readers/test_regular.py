@@ -50,6 +50,9 @@ def test_regular_rows_are_read(tmp_path, end):
         pytest.param(b"1 2 3 \n", id="row missing"),
         pytest.param(b"1 2 3 \n4 5 6 \n7 8 9 \n", id="row too many"),
         pytest.param(b"1 2 3 4\n5 6 \n", id="word in the line before"),
+        pytest.param(b"1 2 3 \n4  5 6\n", id="blank from the end of its line"),
+        pytest.param(b"1  2 3 \n4 5 6\n", id="blank from the end of another line"),
+        pytest.param(b"4 5 6 \n 1 2 3\n", id="blank from the end to the beginning"),
     ],
 )
 def test_what_is_not_regular_is_left_to_the_tolerant_parser(tmp_path, text):
@@ -98,14 +101,20 @@ def test_what_is_no_whole_number_is_left_to_the_tolerant_parser(tmp_path, word):
     assert columns_of(tmp_path / "a", b"1 2 3 \n" + word + b" 5 6 \n", kind=int) is None
 
 
-@pytest.mark.parametrize("seed", range(300))
+@pytest.mark.parametrize("seed", range(600))
 def test_damaged_tables_give_the_numbers_of_the_tolerant_parser(tmp_path, seed):
     generator = random.Random(seed)
-    text = bytearray(b"".join(b"%d 0.5 1e-3 \n" % k for k in range(1, 6)))
+    end = generator.choice([b"\n", b" \n"])
+    text = bytearray(b"".join(b"%d 0.5 1e-3" % k + end for k in range(1, 6)))
     for _ in range(generator.randint(1, 3)):
         place = generator.randrange(len(text))
         size = generator.choice([0, 1, 1, 5])
         text[place : place + size] = generator.choice([b"", b" ", b"\n", b"7", b"x", b".", b"\t"])
+    if generator.random() < 0.5:  # blanks that change their place keep their number
+        blanks = [place for place, byte in enumerate(text) if byte == 32]
+        for place in generator.sample(blanks, min(len(blanks), 2)):
+            del text[place]
+            text.insert(generator.randrange(len(text)), 32)
     places = (0, 1, 2)
     found = columns_of(tmp_path / "a", bytes(text), places, count=5)
     if found is not None:
