@@ -91,7 +91,7 @@ class Frame:
         series, found = self.series, []
         for family in series.contacts:
             named = series.contacts_from == "path" and len(series.grains.files) == 1
-            contacts = _same_step(family, self.name_step, self.snapshot, named)
+            contacts = series.contacts_of(self.snapshot, self.name_step, family, named)
             if contacts is not None:
                 assert family.reader is not None
                 found.append((family.reader, contacts))
@@ -122,6 +122,10 @@ class Series:
     contacts_from: Literal["auto", "geometric", "path", "grains"] = "auto"
     """``grains``: from the grain files themselves."""
     options: ReadOptions = field(default_factory=ReadOptions)
+    # a file that holds the contacts of many frames is indexed once
+    _contact_snapshots: dict[Path, list[Snapshot]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     def __iter__(self) -> Iterator[Frame]:
         reader = self.grains.reader
@@ -134,6 +138,31 @@ class Series:
                 continue
             for snapshot in snapshots:
                 yield Frame(self, snapshot, name_step)
+
+    def contacts_of(
+        self, grains: Snapshot, name_step: int | None, family: Family, named: bool
+    ) -> Snapshot | None:
+        """
+        The contacts of a grain snapshot in a family of contact files; None if there are none.
+
+        Steps inside the files decide; where a file has none, the number in its name does. A single
+        contact file that the user named for a single grain file needs no number.
+        """
+        step = name_step if grains.step is None else grains.step
+        path = family.files.get(name_step, family.files.get(step))
+        if path is None and len(family.files) == 1:
+            path = next(iter(family.files.values()))
+        if path is None:
+            return None
+        if path not in self._contact_snapshots:
+            assert family.reader is not None
+            self._contact_snapshots[path] = family.reader.snapshots(path)
+        snapshots = self._contact_snapshots[path]
+        if len(snapshots) == 1 and (snapshots[0].step is None or grains.step is None):
+            numbered = None not in family.files and step is not None
+            matches = named or not numbered or bool({name_step, step} & set(family.files))
+            return snapshots[0] if matches else None
+        return next((one for one in snapshots if one.step == grains.step), None)
 
     def files(self) -> Iterator[Path]:
         """Every file that the frames come from."""
@@ -175,9 +204,10 @@ def read(path: PathLike, *, frame: int = 0, **options: Any) -> Packing:
     """
     frames = list(read_series(path, **options))
     try:
-        return frames[frame].read()
+        chosen = frames[frame]
     except IndexError:
         raise ReadError(f"{path}: has {len(frames)} frames, there is no frame {frame}") from None
+    return chosen.read()
 
 
 def read_series(
@@ -357,30 +387,6 @@ def _named_contacts(contacts: PathLike, format: str | None) -> tuple[Family, ...
     if not found:
         raise ReadError(f"{contacts}: expected contacts, found none")
     return found
-
-
-def _same_step(
-    family: Family, name_step: int | None, grains: Snapshot, named: bool
-) -> Snapshot | None:
-    """
-    The contacts of a grain snapshot in a family of contact files; None if there are none.
-
-    Steps inside the files decide; where a file has none, the number in its name does. A single
-    contact file that the user named for a single grain file needs no number.
-    """
-    step = name_step if grains.step is None else grains.step
-    path = family.files.get(name_step, family.files.get(step))
-    if path is None and len(family.files) == 1:
-        path = next(iter(family.files.values()))
-    if path is None:
-        return None
-    assert family.reader is not None
-    snapshots = family.reader.snapshots(path)
-    if len(snapshots) == 1 and (snapshots[0].step is None or grains.step is None):
-        numbered = None not in family.files and step is not None
-        matches = named or not numbered or bool({name_step, step} & set(family.files))
-        return snapshots[0] if matches else None
-    return next((one for one in snapshots if one.step == grains.step), None)
 
 
 def _wall_contacts(grains: GrainTable, joined: list[JoinedContacts], with_own: bool) -> Any:

@@ -227,7 +227,7 @@ def test_a_file_that_cannot_be_a_packing_is_named(tmp_path):
 
 
 def test_the_number_of_grains_may_change(tmp_path):
-    texts = [dump_text(rows=ROWS[:count], step=count) for count in (0, 2, 3, 1)]
+    texts = [dump_text(rows=ROWS[:count], step=step) for step, count in enumerate((0, 2, 3, 1))]
     write(tmp_path / "dump.txt", "".join(texts))
     assert [len(frame) for frame in frames_of(tmp_path)] == [0, 2, 3, 1]
 

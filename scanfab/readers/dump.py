@@ -67,7 +67,7 @@ def row_word(head: bytes) -> str | None:
 
 def index_dump(path: Path) -> list[Snapshot]:
     """
-    The snapshots of a file, by their first bytes.
+    The snapshots of a file, by their first bytes, in the order of their steps.
 
     An incomplete last snapshot (the program is still writing) is left out with a warning if there
     is a complete one before it.
@@ -90,10 +90,12 @@ def index_dump(path: Path) -> list[Snapshot]:
                     stacklevel=2,
                 )
                 starts.pop()
-            return [
+            found = [
                 _snapshot(path, data, start, stop)
                 for start, stop in zip(starts, stops, strict=False)
             ]
+            # a program that was started again may have gone back
+            return sorted(found, key=lambda one: one.step or 0)
         finally:
             data.close()
 
@@ -179,7 +181,8 @@ def _regular(
     possible = body.names and 2 * count * len(body.names) <= stop - start
     if not possible or stop - start < LARGE:
         return None
-    lines = body.lines + (_lines_before(snapshot) if snapshot.start else 0)
+    # to count the lines before a later snapshot would take longer than to take it out of the file
+    lines = None if snapshot.start else body.lines
     return read_regular(TextTable(path, start, stop, lines, len(body.names), count), types)
 
 
@@ -342,5 +345,10 @@ def _locate(path: Path, snapshot: Snapshot, block: bytes, body: _Body, reason: s
 
 
 def _lines_before(snapshot: Snapshot) -> int:
+    lines, left = 0, snapshot.start
     with open(plain(snapshot.path), "rb") as stream:
-        return stream.read(snapshot.start).count(b"\n")
+        while left > 0:
+            part = stream.read(min(left, HEADER_BYTES))
+            lines += part.count(b"\n")
+            left -= len(part)
+    return lines

@@ -32,8 +32,8 @@ class TextTable:
     """First byte of the first row."""
     stop: int
     """Byte behind the last row."""
-    lines_before: int
-    """Lines of the file before the first row."""
+    lines_before: int | None
+    """Lines of the file before the first row; None if they were not counted."""
     width: int
     """Number of columns."""
     count: int
@@ -99,7 +99,8 @@ def _parse(
         schema["behind"] = polars.String
     wanted = list(dict.fromkeys([*(names[place] for place in types), names[-1]]))
     # a file is parsed where it lies; a part of it has to be taken out
-    whole = table.stop == os.path.getsize(table.path)
+    skipped = table.lines_before
+    whole = skipped is not None and table.stop == os.path.getsize(table.path)
     try:
         frame = (
             polars.scan_csv(
@@ -108,7 +109,7 @@ def _parse(
                 separator=" ",
                 quote_char=None,
                 schema=schema,
-                skip_lines=table.lines_before if whole else 0,
+                skip_lines=skipped if whole and skipped else 0,
                 n_rows=table.count,
                 encoding="utf8-lossy",  # numbers are none, and nothing else is kept
                 truncate_ragged_lines=True,  # blanks are counted elsewhere

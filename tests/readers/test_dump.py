@@ -29,6 +29,13 @@ def block_of(tmp_path, text):
     return only_block(write(tmp_path / "dump", text))
 
 
+def test_snapshots_are_in_the_order_of_their_steps(tmp_path):
+    text = "".join(dump_text(step=step) for step in (80, 100, 90))
+    found = index_dump(write(tmp_path / "dump", text))
+    assert [snapshot.step for snapshot in found] == [80, 90, 100]
+    assert [snapshot.start for snapshot in found] == [0, 2 * len(text) // 3 + 1, len(text) // 3]
+
+
 def test_rows_and_names_are_those_of_the_file(tmp_path):
     block = block_of(tmp_path, dump_text(step=7))
     assert block.step == 7

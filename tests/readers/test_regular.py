@@ -145,7 +145,7 @@ def test_other_columns_are_parsed_when_they_are_asked_for(tmp_path, monkeypatch)
     calls = counted(monkeypatch)
     rows = [(*row, 0.25 * row[0]) for row in ROWS]
     text = dump_text(rows, "id type x y z radius vz")
-    packing = scanfab.read(write(tmp_path / "a.dump", dump_text(step=1) + text), frame=1)
+    packing = scanfab.read(write(tmp_path / "a.dump", dump_text(step=-1) + text), frame=1)
     assert list(packing.columns) == ["type", "vz"]
     assert calls == [[0, 1, 2, 3, 4, 5]]
     np.testing.assert_array_equal(packing.columns["vz"], [0.25, 0.5, 0.75])
@@ -153,6 +153,19 @@ def test_other_columns_are_parsed_when_they_are_asked_for(tmp_path, monkeypatch)
     assert calls[1:] == [[6]]
     with pytest.raises(ValueError, match="read-only"):
         packing.columns["vz"][0] = 1
+
+
+@pytest.mark.usefixtures("large")
+def test_every_snapshot_is_read_from_its_place(tmp_path):
+    grains = [[(id, 1, id, step, 0, 0.5) for id in (1, 2, 3)] for step in range(3)]
+    text = "".join(
+        dump_text(rows, "id type x y z radius", step=step) for step, rows in enumerate(grains)
+    )
+    path = write(tmp_path / "a.dump", text)
+    for step in range(3):
+        assert scanfab.read(path, frame=step).position.tolist() == [
+            [id, step, 0.0] for id in (1, 2, 3)
+        ]
 
 
 @pytest.mark.usefixtures("large")
