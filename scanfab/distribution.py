@@ -82,7 +82,7 @@ def _is_covered(axes: FloatArray, root: FloatArray, degree: int) -> bool:
 
 
 def mean_length_function(
-    axes: FloatArray, length: FloatArray, segments: IntArray
+    axes: FloatArray, length: FloatArray, segments: IntArray | FloatArray
 ) -> EvenFunction | None:
     """
     ℓ(n), fitted to the sums of a scan.
@@ -92,7 +92,8 @@ def mean_length_function(
     axes : ndarray, shape (R, D, 3)
         Unit vectors of each replicate.
     length, segments : ndarray, shape (R, D)
-        Sum of the lengths (dump's unit) and number of one variant's kept segments.
+        Sum of the lengths (dump's unit) and number of one variant's kept segments. For the second
+        moment, sums of squared lengths and of lengths take the places of these two.
 
     Returns
     -------

@@ -94,7 +94,8 @@ class VtkFolder:
         mesh = vtk.line_mesh(lines, result.measurement.plan.cutoff)
         self._save(f"lines-{row.variant}", mesh, result, fields)
         sums = result.measurement.sums
-        function = mean_length_function(sums.axes, *sums.kept(row.variant))
+        kept = result.measurement.kept(row.variant)
+        function = mean_length_function(sums.axes, *kept)
         if function is not None and row.alpha_vs is not None:
             points, weights = sphere_points()
             surface = vtk.distribution_mesh(points, function(points), weights)

@@ -19,7 +19,7 @@ from scanfab.fabric.void import void_fabric
 from scanfab.frame_result import FrameResult
 from scanfab.gaps import scan_gaps
 from scanfab.pipeline import compute_rows
-from scanfab.scan import ScanSums, Solids, line_frames, scan_lines
+from scanfab.scan import ScanSums, Solids, line_frames
 from scanfab.segments import sample_segments
 from scanfab.series import Series
 from scanfab.settings import Settings
@@ -217,22 +217,23 @@ def _mean_lengths(
 ) -> tuple[FloatArray, FloatArray]:
     """ℓ of each axis over the mean of all directions, and its standard error, shape (D,)."""
     solids, sums, cutoff, _ = _parts(result)
-    length, segments = sums.kept(variant)
     # as many lines as give the wanted number of segments
-    found = segments.mean()
+    found = sums.kept(variant)[1].mean()
     spacing = result.scanned.plan.spacing * np.sqrt(found * REPLICATES / ROSE_SEGMENTS)
     rule = DirectionRule("rose", axes, np.full(len(axes), 1 / len(axes)), None, turned=False)
-    rose = scan_lines(
+    rose = scan_gaps(
         solids,
         rule,
         spacing=float(spacing),
-        cutoff=cutoff,
+        cutoffs=[cutoff],
+        blocks=result.scanned.blocks,
         variants=variant,
         replicates=range(REPLICATES),
         seed=settings.seed,
         workers=settings.workers,
     )
-    sums_of, numbers = rose.kept(variant)
+    sums_of, numbers = rose.kept(variant, 0, settings.moment)
+    length, segments = result.scanned.kept(variant)
     mean = length.sum() / segments.sum()
     with np.errstate(invalid="ignore", divide="ignore"):
         value = sums_of.sum(axis=0) / numbers.sum(axis=0) / mean
@@ -268,7 +269,7 @@ def _contact_ring(normals: FloatArray, phi: float) -> Ring:
 def _projection(result: FrameResult, variant: str) -> Projection:
     _, sums, _, _ = _parts(result)
     _, directions = disk()
-    mean_length = mean_length_function(sums.axes, *sums.kept(variant))
+    mean_length = mean_length_function(sums.axes, *result.scanned.kept(variant))
     assert mean_length is not None
     points, weights = sphere_points()
     mean = float(weights @ mean_length(points))
@@ -317,7 +318,7 @@ def _cutoffs(result: FrameResult, variant: str, settings: Settings) -> CutoffCur
     )
     alpha, error = np.full((2, len(CUTOFFS)), np.nan)
     for place in range(len(CUTOFFS)):
-        fabric = void_fabric(gaps.axes, rule.weights, *gaps.kept(variant, place))
+        fabric = void_fabric(gaps.axes, rule.weights, *gaps.kept(variant, place, settings.moment))
         if fabric is not None:
             alpha[place] = fabric.tensor.axial(settings.axis)
             error[place] = fabric.axial_error(settings.axis) or np.nan

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 from typing import Any
 
+from scanfab.errors import ScanfabWarning
 from scanfab.measurement import Measurement, measure
 from scanfab.plan import Plan
 from scanfab.settings import Settings
@@ -64,4 +66,21 @@ def frame_result(
             row = VariantColumns(measurement, VARIANTS[variant], place, settings)
             row.warn_of_few_segments(f"frame {number}, variant {variant}")
             rows.append(Row(**frame, variant=variant, **row.columns()))
+    if plan.auto and settings.lists_gaps:
+        _warn_of_large_errors(rows, plan, settings)
     return FrameResult(name, number, sample, measurement, rows)
+
+
+def _warn_of_large_errors(rows: list[Row], plan: Plan, settings: Settings) -> None:
+    """Other cut-offs and the second moment are measured along lines that are chosen for one."""
+    errors = [(row.alpha_vs_axial_se or 0.0, row) for row in rows]
+    error, worst = max(errors, key=lambda one: one[0])
+    if error > settings.tolerance:
+        warnings.warn(
+            f"frame {worst.frame}, variant {worst.variant}, cut-off {worst.cutoff:g}: "
+            f"alpha_vs_axial_se is {error:.2g}, above the tolerance {settings.tolerance:g}, which "
+            f"holds for the mean length at the cut-off {plan.cutoff:g}: choose a smaller "
+            f"--tolerance",
+            ScanfabWarning,
+            stacklevel=3,
+        )

@@ -46,6 +46,25 @@ class Measurement:
     """Gaps of fewer lines, by the octant of their middle."""
     blocks: tuple[Blocks, Blocks]
     """Octants of the whole sample and of the window, of places in the dump's coordinates."""
+    moment: int
+    """1: ℓ is the mean length; 2: the mean of squares over the mean."""
+
+    def kept(
+        self, variant: str, place: int = 0
+    ) -> tuple[FloatArray, FloatArray | npt.NDArray[np.int64]]:
+        """
+        Numerator and denominator of ℓ for one variant and cut-off, shapes (R, D).
+
+        Parameters
+        ----------
+        variant : str
+            One of a, b, c, d.
+        place : int, optional
+            Which of the plan's cut-offs.
+        """
+        if self.gaps is None:
+            return self.sums.kept(variant)
+        return self.gaps.kept(variant, place, self.moment)
 
     def spheres_of(self, variant: Variant) -> tuple[FloatArray, FloatArray, float]:
         """
@@ -91,7 +110,7 @@ def measure(sample: Sample, plan: Plan, settings: Settings) -> Measurement:
         replicates=range(BLOCK_REPLICATES),
         **lines,
     )
-    return Measurement(sample, plan, solids, sums, gaps, blocked, blocks)
+    return Measurement(sample, plan, solids, sums, gaps, blocked, blocks, settings.moment)
 
 
 def _solids(sample: Sample, plan: Plan, settings: Settings) -> tuple[Solids, FloatArray]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.cell import Cell
 from scanfab.segments import Segments, cut_lines
 from scanfab.variants import Sample
 from scanfab.window import SphereWindow
@@ -72,20 +73,25 @@ class Scene:
     """A few scan lines, in the dump's coordinates."""
     cutoff: float = 0.0
     """Void segments that are shorter are dropped, dump's unit."""
+    cell: Cell | None = None
+    """Of a periodic frame."""
 
 
 def scene_of(sample: Sample, window: SphereWindow | None) -> Scene:
     """The grains of a frame and its RV."""
     chosen = sample.grains if sample.grains.any() else np.ones(len(sample.packing), bool)
     center = sample.packing.position[chosen].mean(axis=0) if window is None else window.center
-    return Scene(grains_of(sample, window), center, None if window is None else window.radius)
+    cell = sample.packing.cell if sample.packing.is_periodic else None
+    radius = None if window is None else window.radius
+    return Scene(grains_of(sample, window), center, radius, cell=cell)
 
 
 def section_lines(scene: Scene, axis: npt.ArrayLike) -> Segments:
     """
     Parallel scan lines, inclined to the axis, in a plane through the centre that holds the axis.
 
-    In the dump's coordinates; clipped to the RV, if there is one.
+    In the dump's coordinates; clipped to the RV, if there is one, in which periodic images of the
+    grains are solid too.
     """
     grains = scene.grains
     solid = ~grains.boundary
@@ -99,6 +105,9 @@ def section_lines(scene: Scene, axis: npt.ArrayLike) -> Segments:
     position = grains.position[solid] - scene.center
     radius = grains.radius[solid]
     reach = scene.window_radius or float(np.linalg.norm(position, axis=1).max(initial=0.0))
+    if scene.cell is not None and scene.window_radius is not None:
+        position, row = scene.cell.images_near_origin(position, radius + reach)
+        radius = radius[row]
     spacing = max(2.5 * float(radius.mean()), reach / 40) if len(radius) else reach
     steps = np.arange(-reach + 0.5 * spacing, reach, spacing) if spacing > 0 else np.zeros(0)
     points = np.column_stack([steps, np.zeros_like(steps)])

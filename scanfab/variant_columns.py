@@ -25,7 +25,6 @@ from scanfab.variants import Variant
 __all__ = ["FRAME_COLUMNS", "VariantColumns", "no_columns"]
 
 FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 # the same for all variants
 FRAME_COLUMNS = ("source", "frame", "step", "time", "strain", "variant", "contacts_from")
@@ -51,12 +50,8 @@ class VariantColumns:
     @cached_property
     def fabric(self) -> VoidFabric | None:
         """The void fabric."""
-        return void_fabric(self.sums.axes, self.plan.rule.weights, *self._kept())
-
-    def _kept(self) -> tuple[FloatArray, FloatArray | IntArray]:
-        if self.measurement.gaps is None:
-            return self.sums.kept(self.variant.name)
-        return self.measurement.gaps.kept(self.variant.name, self.place, self.settings.moment)
+        kept = self.measurement.kept(self.variant.name, self.place)
+        return void_fabric(self.sums.axes, self.plan.rule.weights, *kept)
 
     @cached_property
     def segments(self) -> int:

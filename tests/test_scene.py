@@ -9,6 +9,7 @@ import scanfab
 from scanfab.scene import Scene, contact_lines, grains_of, scene_of, section_lines
 from scanfab.variants import Sample
 from scanfab.window import SphereWindow
+from tests.lattices import simple_cubic
 
 
 @pytest.fixture
@@ -54,6 +55,20 @@ def test_a_section_lies_in_one_plane_and_in_the_window(sample, axis):
     assert values[2] < 1e-9 * values[0]
     assert np.linalg.norm(flat, axis=1).max() < WINDOW.radius + 1e-9
     assert lines.void.any()
+
+
+def test_a_section_cuts_periodic_images_too():
+    """A crystal looks the same about each of its grains, also one at the corner of the cell."""
+    position, radius = simple_cubic(4)
+    cell = scanfab.Cell([4.0, 4.0, 4.0])
+    packing = scanfab.Packing(position, radius, contacts=[], cell=cell)
+    sample = Sample(packing, np.zeros(len(radius), bool))
+    middle, corner = (
+        section_lines(scene_of(sample, SphereWindow(np.array(place), 1.6)), (0, 0, 1))
+        for place in ([2.5, 2.5, 2.5], [0.5, 3.5, 0.5])
+    )
+    np.testing.assert_allclose(np.sort(corner.length), np.sort(middle.length), atol=1e-9)
+    assert corner.length[corner.void].max() < 1.6
 
 
 def test_a_section_without_window_or_grains_is_no_error(sample):

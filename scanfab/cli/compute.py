@@ -154,6 +154,7 @@ def compute(
     from scanfab.manifest import asked_for
     from scanfab.settings import Settings
     from scanfab.table import Row
+    from scanfab.writers.files import check_folder
     from scanfab.writers.results import ResultFile
 
     options = fill_from_file(ctx, sources, options)
@@ -167,6 +168,8 @@ def compute(
         with usage_errors():
             settings = Settings.make(**options)
             result = None if output is None else ResultFile(output, Row)
+            for path in _manifests(output, manifest_path):
+                check_folder(path)
         asked = asked_for(sources, reading, settings)
         series = open_series(sources, reading)
         if figure is not None and _is_of_frames(figure) and len(series) > 1:
@@ -322,6 +325,8 @@ def _write_manifest(
     path: Path, asked: dict[str, Any], series: list[Series], warnings: list[str]
 ) -> None:
     from scanfab.manifest import manifest
+    from scanfab.writers.files import whole_file
 
     text = json.dumps(manifest(asked, series, warnings), indent=1, ensure_ascii=False)
-    path.write_text(text + "\n", encoding="utf-8")
+    with whole_file(path) as part:
+        part.write_text(text + "\n", encoding="utf-8")

@@ -67,7 +67,7 @@ def view(
     from scanfab.cli.console import reported_warnings
     from scanfab.errors import SettingsError
     from scanfab.settings import Settings
-    from scanfab.writers.plot import check_folder
+    from scanfab.writers.files import check_folder
 
     options = fill_from_file(ctx, sources, options)
     reading = reading_arguments(options)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
@@ -14,7 +13,8 @@ import numpy.typing as npt
 
 from scanfab.errors import SettingsError
 from scanfab.scene import Scene
-from scanfab.writers.plot import COLOURS, check_folder
+from scanfab.writers.files import check_folder, whole_file
+from scanfab.writers.plot import COLOURS
 
 __all__ = [
     "Content",
@@ -92,12 +92,8 @@ def check_page_file(path: Path) -> None:
 
 def save_page(path: Path, page: str) -> None:
     """Write a page; the file is complete or untouched."""
-    part = path.with_name(path.name + ".part")
-    try:
+    with whole_file(path) as part:
         part.write_text(page, encoding="utf-8")
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def render_page(content: Content) -> str:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from scanfab.errors import SettingsError
+from scanfab.writers.files import check_folder, whole_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,7 +19,6 @@ __all__ = [
     "DPI",
     "LOOKS",
     "PLOT_FORMATS",
-    "check_folder",
     "check_plot_file",
     "new_figure",
     "plain",
@@ -85,14 +84,6 @@ def check_plot_file(path: Path) -> None:
     check_folder(path)
 
 
-def check_folder(path: Path) -> None:
-    """SettingsError if there is no folder that a file of this name can be written to."""
-    if not path.parent.is_dir():
-        raise SettingsError(f"{path}: there is no folder {path.parent} to write to")
-    if not os.access(path.parent, os.W_OK):
-        raise SettingsError(f"{path}: the folder {path.parent} cannot be written to")
-
-
 @contextmanager
 def new_figure(width: float, height: float) -> Iterator[Figure]:
     """A figure of so many inches in the common style, drawn and saved inside the block."""
@@ -108,14 +99,10 @@ def new_figure(width: float, height: float) -> Iterator[Figure]:
 
 def save_figure(figure: Figure, path: Path, dpi: int = DPI) -> None:
     """Write PNG, SVG or PDF, by the suffix; the file is complete or untouched."""
-    part = path.with_name(f"{path.name}.part")
     kind = path.suffix.lower().lstrip(".")
     dates = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
-    try:
+    with whole_file(path) as part:
         figure.savefig(part, format=kind, dpi=dpi, metadata=dates[kind])
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def plain(text: str) -> str:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from scanfab.errors import SettingsError
+from scanfab.writers.files import check_folder, whole_file
 from scanfab.writers.rows import RowWriter, check_suffix, row_writer
 
 __all__ = ["ResultFile"]
@@ -42,8 +43,7 @@ class ResultFile:
 
     def __init__(self, path: Path, kind: type) -> None:
         check_suffix(path)
-        if not path.parent.is_dir():
-            raise SettingsError(f"{path}: there is no folder {path.parent} to write to")
+        check_folder(path)
         self.path = path
         self.kind = kind
         self.suffix = path.suffix.lower()
@@ -113,9 +113,8 @@ class ResultFile:
 
     def _write_asked(self, asked: dict[str, Any]) -> None:
         """Whole or not at all, as the process may be killed here too."""
-        whole = self._asked.with_name(self._asked.name + ".tmp")
-        whole.write_text(json.dumps(asked, indent=1), "utf-8")
-        os.replace(whole, self._asked)
+        with whole_file(self._asked) as part:
+            part.write_text(json.dumps(asked, indent=1), "utf-8")
 
     def _rows(self) -> list[dict[str, Any]]:
         from scanfab.tabular import read_rows
@@ -124,13 +123,11 @@ class ResultFile:
 
     def _convert(self) -> None:
         """Write FILE from the JSON lines of FILE.part."""
-        final = self.path.with_name(self.path.name + ".part.tmp")
-        with _open_for(self.suffix, final) as stream:
+        with whole_file(self.path) as final, _open_for(self.suffix, final) as stream:
             writer = row_writer(self.suffix, stream, self.kind)
             for row in self._rows():
                 writer.write(self.kind(**row))
             writer.close()
-        os.replace(final, self.path)
         self.part.unlink()
 
 

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from scanfab.errors import ScanfabError
 from scanfab.scene import Grains, Scene
 from scanfab.vtk_log import quiet_vtk
+from scanfab.writers.files import whole_file
 from scanfab.writers.plot import COLOURS
 
 __all__ = ["check_screen", "show_scene"]
@@ -100,12 +101,10 @@ def _show(scene: Scene, up: FloatArray, title: str, screenshot: Path | None) -> 
     if screenshot is None:
         plotter.show()
         return
-    part = screenshot.with_name(f"{screenshot.stem}.part.png")
     try:
-        plotter.screenshot(str(part))
-        os.replace(part, screenshot)
+        with whole_file(screenshot) as part:
+            plotter.screenshot(str(part))
     finally:
-        part.unlink(missing_ok=True)
         plotter.close()
 
 

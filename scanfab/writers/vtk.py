@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy.typing as npt
 
 from scanfab.scene import ContactLines, Grains
 from scanfab.segments import Segments
+from scanfab.writers.files import whole_file
 
 __all__ = [
     "Collection",
@@ -159,14 +159,8 @@ def save_mesh(mesh: Any, path: Path, fields: Mapping[str, Any]) -> None:
     taken = {*mesh.point_data, *mesh.cell_data}
     for name, values in fields.items():
         mesh.field_data[f"row_{name}" if name in taken else name] = values
-    part = path.with_name(f"{path.stem}.part{path.suffix}")
-    try:
+    with whole_file(path) as part:
         mesh.save(str(part))
-        if not part.exists():  # VTK prints, and goes on
-            raise OSError(f"{path}: cannot be written")
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 class Collection:
@@ -194,9 +188,8 @@ class Collection:
             + "\n".join(lines)
             + "\n  </Collection>\n</VTKFile>\n"
         )
-        part = self.path.with_name(self.path.name + ".part")
-        part.write_text(text, encoding="utf-8")
-        os.replace(part, self.path)
+        with whole_file(self.path) as part:
+            part.write_text(text, encoding="utf-8")
 
 
 def _lines(ends: FloatArray) -> Any:

@@ -1,0 +1,41 @@
+"""A file is whole or untouched."""
+
+import pytest
+
+from scanfab import SettingsError
+from scanfab.writers.files import check_folder, whole_file
+
+
+def test_what_is_written_takes_the_place_of_the_file(tmp_path):
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+    with whole_file(path) as part:
+        part.write_text("new")
+        assert path.read_text() == "old"
+    assert path.read_text() == "new"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def write_half(path):
+    with whole_file(path) as part:
+        part.write_text("half")
+        raise KeyError
+
+
+def test_after_an_error_the_file_is_the_old_one(tmp_path):
+    path = tmp_path / "a.txt"
+    path.write_text("old")
+    with pytest.raises(KeyError):
+        write_half(path)
+    assert path.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_file_that_was_not_written_is_an_error(tmp_path):
+    with pytest.raises(OSError, match=r"a.txt: cannot be written"), whole_file(tmp_path / "a.txt"):
+        pass
+
+
+def test_a_folder_that_is_not_there_is_refused(tmp_path):
+    with pytest.raises(SettingsError, match=r"there is no folder .*nowhere to write to"):
+        check_folder(tmp_path / "nowhere" / "a.txt")
