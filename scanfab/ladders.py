@@ -23,8 +23,9 @@ __all__ = [
 PAPER_SPACING = 0.1
 PAPER_CUTOFF = 1.0
 PAPER_RV = "0.67 to 0.7"
-# two values agree if they differ by no more than this many of their common standard errors
-AGREEING = 2.0
+# how likely chance alone makes any two steps of a ladder differ, and how sure standard errors of 16
+# replicates are
+CHANCE, FREEDOM = 0.05, 30
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -75,9 +76,9 @@ STEP_MEANINGS: dict[str, str] = {
     "alpha_vs_axial": "signed anisotropy of the void fabric along the loading axis",
     "alpha_vs_axial_se": "its standard error from the scan",
     "alpha_vs_axial_sample_se": "the sample's own scatter, by a jackknife over eight octants",
-    "steady": "1 if this step and all later ones of the ladder agree within twice their common "
-    "standard errors (of the scan; for rv also of the sample), else 0; empty for a cut-off, on "
-    "which alpha_vs depends by definition",
+    "steady": "1 if this step and all later ones of the ladder differ by no more than chance makes "
+    "of their standard errors (of the scan; for rv also of the sample), else 0; empty for a "
+    "cut-off, on which alpha_vs depends by definition",
     "note": "what makes the step doubtful",
 }
 """What each column of a calibration holds; lengths are in the dump's unit."""
@@ -85,34 +86,48 @@ STEP_MEANINGS: dict[str, str] = {
 
 def judged(rows: Iterator[StepRow], *, with_sample: bool) -> list[StepRow]:
     """The rows of a ladder with ``steady`` filled in, variant by variant."""
-    found: list[StepRow] = []
-    for row in reversed(list(rows)):
+    every, found = list(rows), list[StepRow]()
+    most = _most_errors([row.variant for row in every])
+    for row in reversed(every):
         later = [one for one in found if one.variant == row.variant]
         steady = _is_sound(row) and all(
-            one.steady and _agree(row, one, with_sample) for one in later
+            one.steady and _agree(row, one, most, with_sample) for one in later
         )
         found.append(replace(row, steady=int(steady)))
     return found[::-1]
+
+
+def _most_errors(variants: list[str]) -> float:
+    """By how many standard errors steps may differ by chance, given all pairs of a variant's."""
+    from scipy.special import stdtrit
+
+    steps = [variants.count(variant) for variant in set(variants)]
+    pairs = sum(count * (count - 1) // 2 for count in steps)
+    return float(stdtrit(FREEDOM, 1.0 - 0.5 * CHANCE / max(pairs, 1)))
 
 
 def _is_sound(row: StepRow) -> bool:
     return row.alpha_vs_axial is not None and row.alpha_vs_axial_se is not None and not row.note
 
 
-def _agree(one: StepRow, other: StepRow, with_sample: bool) -> bool:
-    """Whether two values differ by no more than twice their common standard error."""
+def _agree(one: StepRow, other: StepRow, most: float, with_sample: bool) -> bool:
+    """Whether two values differ by no more than so many of their common standard errors."""
     if one.alpha_vs_axial is None or other.alpha_vs_axial is None:
         return False
     errors = [row.alpha_vs_axial_se or 0.0 for row in (one, other)]
     if with_sample:
         errors += [row.alpha_vs_axial_sample_se or 0.0 for row in (one, other)]
-    return abs(one.alpha_vs_axial - other.alpha_vs_axial) <= AGREEING * math.hypot(*errors)
+    return abs(one.alpha_vs_axial - other.alpha_vs_axial) <= most * math.hypot(*errors)
 
 
 def first_steady(rows: Sequence[StepRow]) -> float | None:
-    """The first value of a ladder at which all variants are steady; None if there is none."""
-    steps = (list(step) for _, step in groupby(rows, key=lambda row: row.value))
-    return next((step[0].value for step in steps if all(row.steady for row in step)), None)
+    """
+    The first value of a ladder at which all variants are steady; None if there is none.
+
+    The last one alone has nothing to agree with.
+    """
+    steps = [list(step) for _, step in groupby(rows, key=lambda row: row.value)]
+    return next((step[0].value for step in steps[:-1] if all(row.steady for row in step)), None)
 
 
 def largest(rows: Sequence[StepRow], name: str, value: float | None = None) -> float | None:
