@@ -12,7 +12,7 @@ from scanfab.directions import direction_rule
 from scanfab.errors import ScanfabWarning, SettingsError
 from scanfab.fabric.void import void_fabric
 from scanfab.plan import CLOSE, GROWTH_WITH_SPACING, Plan
-from scanfab.scan import ScanSums, Solids, is_affordable, scan_lines
+from scanfab.scan import ScanSums, Solids, is_affordable, most_lines, scan_lines
 from scanfab.settings import Settings
 
 __all__ = ["scan_to_tolerance"]
@@ -52,13 +52,15 @@ def scan_to_tolerance(solids: Solids, plan: Plan, settings: Settings) -> tuple[S
         return _scan(solids, plan, settings, range(plan.replicates)), plan
     plan = _within_budget(plan, solids, settings)
     sums: ScanSums | None = None
-    start, stop, spent = 0, plan.replicates, 0
+    start, stop, spent = 0, plan.replicates, 0.0
     while True:
         batch = _scan(solids, plan, settings, range(start, stop))
-        spent += int(batch.chords.sum())
+        # a line costs as much as a chord, also if it meets nothing
+        lines = most_lines(solids, plan.spacing) * len(plan.rule)
+        spent += float(batch.chords.sum()) + lines * batch.replicates
         sums = batch if sums is None or start == 0 else ScanSums.concatenate([sums, batch])
         # as many replicates as the budget allows
-        left = (settings.max_chords - spent) / max(float(sums.chords.mean()), 1.0)
+        left = (settings.max_chords - spent) / max(float(sums.chords.mean()) + lines, 1.0)
         missing = _missing_work(sums, plan, settings)
         better = _better_plan(sums, plan, missing, solids, settings, left) if start == 0 else None
         if better is not None:
@@ -128,7 +130,8 @@ def _with_closer_lines(plan: Plan, missing: float, solids: Solids, settings: Set
 
 def _within_budget(plan: Plan, solids: Solids, settings: Settings) -> Plan:
     """The plan, with wider lines if its first round alone would cut more chords than allowed."""
-    chords = solids.cross_section / plan.spacing**2 * len(plan.rule) * plan.replicates
+    chords = solids.cross_section / plan.spacing**2 + most_lines(solids, plan.spacing)
+    chords *= len(plan.rule) * plan.replicates
     if chords <= settings.max_chords:
         return plan
     if plan.auto == "replicates":
@@ -188,7 +191,7 @@ def _missing_work(sums: ScanSums, plan: Plan, settings: Settings) -> float:
     return max(expected, min(missing, 1.1))
 
 
-def _warn_of_missed_tolerance(factor: float, spent: int, settings: Settings) -> None:
+def _warn_of_missed_tolerance(factor: float, spent: float, settings: Settings) -> None:
     more = "at least " if factor >= GROWTH else ""
     warnings.warn(
         f"the scan stopped after {spent:.2g} chords before the tolerance {settings.tolerance:g} "

@@ -81,11 +81,6 @@ class Cell:
         return any(self.periodic)
 
     @property
-    def is_orthogonal(self) -> bool:
-        """Whether the lattice vectors lie along x, y and z."""
-        return bool(np.count_nonzero(self.vectors - np.diag(np.diagonal(self.vectors))) == 0)
-
-    @property
     def heights(self) -> FloatArray:
         """Perpendicular distances between opposite faces, shape (3,), dump's length unit."""
         heights: FloatArray = 1.0 / np.linalg.norm(np.linalg.inv(self.vectors), axis=0)

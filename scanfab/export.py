@@ -23,19 +23,10 @@ from scanfab.table import Row
 from scanfab.variants import VARIANTS
 from scanfab.writers import vtk
 
-__all__ = ["KINDS", "VtkFolder", "scan_line_sample"]
+__all__ = ["VtkFolder", "scan_line_sample"]
 
 FloatArray = npt.NDArray[np.float64]
 
-KINDS = {
-    "grains": "points: radius, id, contacts, rattler, boundary, in_window",
-    "contacts": "lines between centres: normal, force, boundary, in_window",
-    "window": "the RV's surface",
-    "lines-a ... lines-d": "a few scan lines in pieces: length, void, kept, state, line",
-    "distribution-a ... -d": "ℓ(n) as a closed surface: mean_length, weight, direction, deviation",
-    "ellipsoids-a ... -d": "void (kind 0) and contact fabric (kind 1) as ellipsoids",
-    "tensors-a ... -d": "a point with both tensors: gvs, gc",
-}
 LINES = 120
 TEXT_FIELDS = ("source", "variant", "contacts_from")
 

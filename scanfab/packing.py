@@ -21,6 +21,10 @@ FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 
+# no radius is smaller: its cube is still a number
+LEAST = 1e-100
+
+
 class LazyColumns(MutableMapping[str, npt.NDArray[Any]]):
     """
     Columns of a large dump by name, each read when it is first asked for.
@@ -230,6 +234,11 @@ def _check_grains(position: FloatArray, radius: FloatArray, id: IntArray) -> Non
         raise PackingError(
             f"{grains_named(id, radius <= 0)}: the radius must be larger than zero, found "
             f"{_values(position, radius, radius <= 0)}"
+        )
+    if radius.min(initial=np.inf) < LEAST:
+        raise PackingError(
+            f"{grains_named(id, radius < LEAST)}: a radius below {LEAST:g} cannot be a length, "
+            f"found {_values(position, radius, radius < LEAST)}"
         )
     if not _are_unique(id):
         unique, counts = np.unique(id, return_counts=True)

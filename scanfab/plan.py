@@ -23,6 +23,8 @@ FEWEST_LINES = 30
 # segments for a standard error of 1, at a spacing of the mean radius, and the power of the spacing
 # that they grow with: measured in dense packings of radii that are equal, or in the ratio 3 or 10
 SEGMENTS_PER_VARIANCE, GROWTH_WITH_SPACING = 0.068, 0.75
+# of what is scanned: far closer lines than anyone could wait for
+CLOSEST = 1e-9
 # of the mean radius: lines so far apart know nothing of one another
 WIDE = 3.0
 # of the mean radius: closer lines say little more, as all that remains is the choice of directions
@@ -88,6 +90,11 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
             f"spacing: {asked:g} between lines is more than the {what} is wide ({2.0 * reach:g}): "
             f"choose a smaller one, for instance 1rmin ({lengths['rmin']:g})"
         )
+    if asked < CLOSEST * reach:
+        raise SettingsError(
+            f"spacing: {asked:g} between lines is less than {CLOSEST:g} of the radius of what they "
+            f"scan ({reach:g}): choose a wider spacing"
+        )
     lines = math.pi * reach**2 / asked**2
     replicates = int(min(max(lines / FEWEST_LINES, 1), REPLICATES))
     auto = "directions" if settings.directions is None else ""
@@ -103,6 +110,12 @@ def _window(settings: Settings, sample: Sample, half_extent: float) -> SphereWin
         else np.array(settings.rv_center, dtype=np.float64)
     )
     radius = settings.rv * half_extent if settings.rv_radius is None else settings.rv_radius
+    smallest = float(sample.packing.radius[sample.grains].min())
+    if radius < CLOSEST * smallest:
+        raise SettingsError(
+            f"rv: a radius of {radius:g} is nothing beside that of the smallest grain "
+            f"({smallest:g}): choose a larger --rv or --rv-radius"
+        )
     return SphereWindow(center, radius)
 
 

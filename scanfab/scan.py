@@ -23,6 +23,7 @@ __all__ = [
     "Solids",
     "is_affordable",
     "line_frames",
+    "most_lines",
     "scan_lines",
     "tally_frames",
     "turned_frames",
@@ -89,9 +90,13 @@ class ScanSums:
     lines: IntArray
     """Lines that meet the window (for the whole: any solid), shape (R, 4, D)."""
     void: FloatArray
-    """Length of all void in the window, kept or not, shape (R, 4, D); 0 for the whole."""
+    """
+    Length of all void in the window, kept or not, shape (R, 4, D).
+
+    For a periodic whole that in the measured length of its lines; 0 for an open one.
+    """
     line_length: FloatArray
-    """Length of the lines in the window, shape (R, 4, D); 0 for the whole."""
+    """Length of the lines in the window, shape (R, 4, D); for the whole likewise."""
     chords: IntArray
     """
     Chords that all spheres together cut from the lines, shape (R,); of spheres that few lines meet,
@@ -340,20 +345,25 @@ def _by_variant(axes: FloatArray, tallies: FloatArray, variants: str) -> ScanSum
 
 def is_affordable(solids: Solids, spacing: float) -> bool:
     """Whether the lines of one axis and replicate are not too many."""
-    return _most_lines(solids, spacing) <= MAX_LINES
+    return most_lines(solids, spacing) <= MAX_LINES
 
 
-def _most_lines(solids: Solids, spacing: float) -> float:
+def most_lines(solids: Solids, spacing: float) -> float:
+    """At most so many lines, also such that meet nothing, has one axis of a replicate."""
     reach = solids.window_radius
     if solids.medium is not None:
-        reach = max(reach, float(np.linalg.norm(solids.medium.vectors, axis=1).max()))
+        # along an axis that does not repeat, what the grains take
+        edges = np.linalg.norm(solids.medium.vectors[solids.medium.periodic], axis=1)
+        across = solids.medium.position - solids.medium.position.mean(axis=0)
+        extent = float((np.linalg.norm(across, axis=1) + solids.medium.radius).max(initial=0.0))
+        reach = max(reach, float(edges.max(initial=0.0)), extent if len(edges) < 3 else 0.0)
     if len(solids.position):
         reach = max(reach, float((np.linalg.norm(solids.position, axis=1) + solids.radius).max()))
     return (2.0 * reach / spacing + 1.0) ** 2
 
 
 def _check_spacing(solids: Solids, spacing: float) -> None:
-    lines = _most_lines(solids, spacing)
+    lines = most_lines(solids, spacing)
     if lines > MAX_LINES:
         raise SettingsError(
             f"spacing: {spacing:g} between lines of one direction and replicate makes "

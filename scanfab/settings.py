@@ -316,6 +316,10 @@ class Settings:
                 f"tolerance: expected a number above 0, found {self.tolerance:g}",
             ),
             (
+                1e-15 <= self.tolerance <= 1e15,
+                f"tolerance: expected a number from 1e-15 to 1e15, found {self.tolerance:g}",
+            ),
+            (
                 self.max_chords >= 1,
                 f"max-chords: expected a number of at least 1, found {self.max_chords:g}",
             ),

@@ -23,7 +23,6 @@ points = st.tuples(coordinates, coordinates, coordinates)
 def test_three_numbers_are_edges():
     cell = Cell(EDGES)
     np.testing.assert_array_equal(cell.vectors, np.diag(EDGES))
-    assert cell.is_orthogonal
     assert cell.is_periodic
 
 
@@ -31,7 +30,6 @@ def test_vectors_are_rows():
     cell = Cell(TILTED, (True, False, False), [1, 1, 1])
     np.testing.assert_allclose(cell.fractional(1 + TILTED[1]), [0, 1, 0], atol=1e-15)
     np.testing.assert_allclose(cell.center, 1 + TILTED.sum(axis=0) / 2)
-    assert not cell.is_orthogonal
 
 
 def test_heights_are_distances_of_opposite_faces():

@@ -108,7 +108,7 @@ def calibrate(
     On a terminal a readable table; else the steps as CSV, and what they show on standard error.
     """
     from scanfab.calibration import calibrate as calibrate_series
-    from scanfab.cli.console import reported_warnings
+    from scanfab.cli.console import announce_compiling, reported_warnings
     from scanfab.ladders import StepRow
     from scanfab.settings import Settings
     from scanfab.writers.plot_calibration import plot_calibration
@@ -121,6 +121,7 @@ def calibrate(
         with usage_errors():
             settings = Settings.make(**options)
             result = None if output is None else ResultFile(output, StepRow)
+        announce_compiling()
         (series,) = open_series((source,), reading)
         found = calibrate_series(series, settings, frame=frame)
         command = _command_line(ctx, source, found.options)

@@ -34,13 +34,14 @@ def report(tables: tuple[Path, ...], output: Path) -> int:
     TABLE is what scanfab compute wrote with -o. Settings, versions and the source of the 3D view
     come from TABLE.manifest.json beside it; without it, the report says that they are not known.
     """
-    from scanfab.cli.console import reported_warnings
+    from scanfab.cli.console import announce_compiling, reported_warnings
     from scanfab.report import has_void_fabric, make_report
     from scanfab.writers.page import check_page_file, save_page
 
     with usage_errors():
         check_page_file(output)
     with reported_warnings():
+        announce_compiling()
         save_page(output, make_report(tables))
         found = has_void_fabric(tables)
     if not found:

@@ -64,7 +64,7 @@ def view(
     SOURCE is as for scanfab compute; boundary particles are not drawn, and the loading axis is
     upright.
     """
-    from scanfab.cli.console import reported_warnings
+    from scanfab.cli.console import announce_compiling, reported_warnings
     from scanfab.errors import SettingsError
     from scanfab.settings import Settings
     from scanfab.writers.files import check_folder
@@ -82,6 +82,7 @@ def view(
         if len(series) > 1:
             names = ", ".join(one.name for one in series)
             raise click.UsageError(f"one series can be viewed at a time, found {names}")
+        announce_compiling()
         _show(series[0], settings, frame, cut, screenshot)
     return 0
 

@@ -24,9 +24,11 @@ __all__ = ["follow", "next_solid"]
 
 FloatArray = npt.NDArray[np.float64]
 
-# a line that has met nothing along so many cells stays in a channel; more where cells are small
+# a line that has met nothing along so many cells and mean free paths, and has passed by so many
+# grains, stays in a channel; in media more dilute than any sample one that has passed by many more
 MOST_CELLS = 64
-MOST_GRAINS = 1000
+MOST_FREE_PATHS = 20.0
+FEW_GRAINS, MANY_GRAINS = 1000, 30_000
 
 
 @inner()
@@ -95,14 +97,23 @@ def next_solid(
     frame, c = prism.frame, grains.vectors[prism.third]
     rise_c = dot(c, frame[2]) - prism.rise_u * dot(c, frame[0]) - prism.rise_v * dot(c, frame[1])
     step = 1.0 if rise_c > 0.0 else -1.0
-    largest = 0.0
-    for radius in grains.radius:
-        largest = max(largest, radius)
+    largest = section = 0.0
+    solid = 0
+    for g in range(grains.radius.size):
+        largest = max(largest, grains.radius[g])
+        if not (second and grains.removed[g]):
+            section += np.pi * grains.radius[g] * grains.radius[g]
+            solid += 1
+    if solid == 0:
+        return FAR
+    volume = abs(dot(grains.vectors[0], cross(grains.vectors[1], grains.vectors[2])))
+    most = min(MOST_FREE_PATHS * volume / (section * prism.length), MANY_GRAINS / solid)
+    most = max(most, FEW_GRAINS / solid)
     margin = largest * prism.slope
     place = (after - prism.rise_u * u - prism.rise_v * v) / prism.length - margin
     last = way_out(grains, frame, u, v) + 2.0 * largest
     found = FAR
-    for cells in range(max(MOST_CELLS, MOST_GRAINS // max(grains.radius.size, 1))):
+    for cells in range(max(MOST_CELLS, int(most))):
         # spheres that are so far away begin behind what was found, or outside the sample
         if (min(found, last) - after) / prism.length + 2.0 * margin < cells:
             break

@@ -25,6 +25,7 @@ from scanfab.packing import LazyColumns
 from scanfab.readers.base import Snapshot
 from scanfab.readers.box import dump_cell
 from scanfab.readers.files import plain
+from scanfab.readers.numbers import plain_reason
 from scanfab.readers.regular import LARGE, TextTable, read_regular
 
 __all__ = ["DumpBlock", "index_dump", "read_block", "read_columns", "row_word"]
@@ -334,13 +335,8 @@ def _text_columns(block: bytes, body: _Body) -> list[int]:
 
 def _locate(path: Path, snapshot: Snapshot, block: bytes, body: _Body, reason: str) -> str:
     """A message with the line of the file, from numpy's with the row of the block."""
-    match = re.search(r"at row (\d+)", reason)
-    line = _lines_before(snapshot) + block.count(b"\n", 0, body.start) + 1
-    if match:
-        line += int(match[1]) - ("changed" in reason)
-        reason = reason[: match.start()].rstrip(" ;,")
-    reason = reason.replace("could not convert string", "expected a number, found")
-    reason = reason.replace(" to float64", "")
+    reason, row = plain_reason(reason)
+    line = _lines_before(snapshot) + block.count(b"\n", 0, body.start) + 1 + (row or 0)
     return f"{path}, line {line}: {reason}"
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import re
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from scanfab.readers.base import GrainTable, ReadOptions, Snapshot
 from scanfab.readers.box import box_vectors
 from scanfab.readers.columns import MOST, grain_table
 from scanfab.readers.files import plain
+from scanfab.readers.numbers import rows_of_numbers
 
 __all__ = ["is_data_file", "read_data_grains", "step_of_data"]
 
@@ -84,17 +84,11 @@ def _count(path: Path, header: list[str]) -> int:
 
 
 def _values(path: Path, data: bytes, begin: int, end: int, count: int) -> FloatArray:
-    rows = data[begin:end]
-    if FILLED.search(rows) is None:
+    if FILLED.search(data[begin:end]) is None:
         if count:
             raise ReadError(f"{path}: the header counts {count} atoms, found none")
         return np.zeros((0, len(SPHERE)))
-    try:
-        values: FloatArray = np.loadtxt(
-            io.BytesIO(rows), dtype=np.float64, ndmin=2, comments="#", encoding="latin1"
-        )
-    except ValueError as error:
-        raise ReadError(f"{path}, {_line(data, begin, str(error))}") from None
+    values = rows_of_numbers(path, data, begin, end)
     if len(values) != count:
         raise ReadError(f"{path}: the header counts {count} atoms, found {len(values)}")
     if values.shape[1] not in (len(SPHERE), len(SPHERE) + len(FLAGS)):
@@ -103,19 +97,6 @@ def _values(path: Path, data: bytes, begin: int, end: int, count: int) -> FloatA
             f"({' '.join(SPHERE)}), found {values.shape[1]}"
         )
     return values
-
-
-def _line(data: bytes, begin: int, reason: str) -> str:
-    """numpy's message, with the line of the file for the row of the section."""
-    reason = reason.replace("could not convert string", "expected a number, found")
-    match = re.search(r"at row (\d+)", reason)
-    if match is None:
-        return reason
-    row = int(match[1]) - ("changed" in reason)
-    lines = data[begin:].split(b"\n")
-    filled = [number for number, line in enumerate(lines) if line.partition(b"#")[0].strip()]
-    number = data.count(b"\n", 0, begin) + 1 + (filled[row] if row < len(filled) else 0)
-    return f"line {number}: {reason[: match.start()].rstrip(' ;,').replace(' to float64', '')}"
 
 
 def _cell(path: Path, header: list[str]) -> Cell | None:

@@ -7,7 +7,6 @@ import re
 import struct
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +17,7 @@ from scanfab.readers.base import FileKind, GrainTable, JoinedContacts, ReadOptio
 from scanfab.readers.columns import MOST, grain_table
 from scanfab.readers.files import first_bytes, plain
 from scanfab.readers.mesh import Mesh
+from scanfab.readers.numbers import rows_of_numbers
 from scanfab.readers.vtk import VtkReader
 from scanfab.readers.yade_save import is_binary_save, is_save, read_save, snapshot_of_save
 
@@ -108,22 +108,10 @@ def _is_text(path: Path) -> bool:
 
 
 def _numbers(path: Path) -> FloatArray:
-    with open(plain(path), "rb") as lines:
-        if all(not line.partition(b"#")[0].strip(BLANKS) for line in lines):
-            return np.zeros((0, 0))  # an empty frame
-        lines.seek(0)
-        return _parsed(path, lines)
-
-
-def _parsed(path: Path, lines: IO[bytes]) -> FloatArray:
-    try:
-        # not by its name: numpy decompresses what is called .gz, packed or not
-        values: FloatArray = np.loadtxt(lines, dtype=np.float64, comments="#", ndmin=2)
-    except ValueError as error:
-        reason = str(error).replace("could not convert string", "expected a number, found")
-        reason = reason.partition(";")[0]
-        raise ReadError(f"{path}: {reason}") from None
-    return values
+    data = plain(path).read_bytes()
+    if all(not line.partition(b"#")[0].strip(BLANKS) for line in data.split(b"\n")):
+        return np.zeros((0, 0))  # an empty frame
+    return rows_of_numbers(path, data)
 
 
 def _text_columns(path: Path, lines: list[str], count: int | None) -> tuple[list[str], Cell | None]:

@@ -3,9 +3,20 @@
 import numpy as np
 import pytest
 
-from scanfab import Cell, Packing, ScanfabWarning, compute
+from scanfab import (
+    Cell,
+    Packing,
+    ScanfabWarning,
+    Solids,
+    compute,
+    direction_rule,
+    scan_lines,
+)
+from scanfab.scan import CellGrains
 from tests import naive
+from tests.scanning import ratio
 
+UNIT_CELL = np.eye(3), np.ones(3, bool)
 LOOK = {"variants": "ab", "tolerance": 1.0, "contact_tolerance": 1e-4, "seed": 3}
 CRYSTAL = {**LOOK, "variants": "a"}
 BASES = {
@@ -166,6 +177,46 @@ def test_solid_runs_are_as_many_as_void_segments():
     expected = row.mean_length * (1 - porosity) / porosity
     assert np.mean(runs) == pytest.approx(expected, abs=5 * error)
     assert error < 0.03 * expected
+
+
+def test_lines_in_a_dilute_medium_meet_a_grain_at_last():
+    """Porosity / (N_V π r²) at cut-off 0: 50 cells, far more than between near grains."""
+    random, radius = np.random.default_rng(0), 0.02
+    found = []
+    for seed in range(60):
+        medium = CellGrains(
+            random.random((16, 3)), np.full(16, radius), np.zeros(16, bool), *UNIT_CELL
+        )
+        nothing = np.zeros((0, 3)), np.zeros(0), np.zeros(0, bool)
+        sums = scan_lines(
+            Solids(*nothing, 0.0, medium),
+            direction_rule("lebedev:5"),
+            spacing=0.1,
+            cutoff=0.0,
+            variants="a",
+            replicates=[seed],
+        )
+        found.append([values.sum() for values in sums.kept("a")])
+        assert sums.channels.sum() < 0.05 * sums.line_length.sum()
+    mean = ratio(*np.array(found, dtype=float).T)
+    porosity = 1 - 16 * 4 / 3 * np.pi * radius**3
+    assert mean.agrees(porosity / (16 * np.pi * radius**2), within=0.1)
+
+
+def test_grains_that_are_removed_do_not_shorten_the_search():
+    """One of thirty is left: the same segments, whether all thirty are scanned too or not."""
+    random = np.random.default_rng(1)
+    removed = np.arange(30) > 0
+    medium = CellGrains(random.random((30, 3)), np.full(30, 0.03), removed, *UNIT_CELL)
+    solids = Solids(np.zeros((0, 3)), np.zeros(0), np.zeros(0, bool), 0.0, medium)
+    lines = {"spacing": 0.1, "cutoff": 0.0, "replicates": range(3)}
+    alone, beside = (
+        scan_lines(solids, direction_rule("lebedev:5"), variants=names, **lines)
+        for names in ("b", "ab")
+    )
+    assert alone.kept("b")[1].sum() > 0
+    assert np.array_equal(alone.kept("b")[1], beside.kept("b")[1])
+    assert np.array_equal(alone.channels[:, 1], beside.channels[:, 1])
 
 
 def test_lines_in_channels_are_counted_in_a_warning():

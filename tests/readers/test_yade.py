@@ -366,7 +366,7 @@ def test_a_text_without_grains_is_an_empty_frame(tmp_path, recwarn):
     [
         ("#format x_y_z_r\n1 2 3\n", "first line names 4 columns, the rows have 3"),
         ("#format x_y_z_r\n1 2 3 oops\n", "expected a number, found 'oops'"),
-        ("#format x_y_z_r\n1 2 3 1\n1 2 3\n", "a.txt: "),
+        ("#format x_y_z_r\n1 2 3 1\n1 2 3\n", "a.txt, line 3: the number of columns changed"),
         ("##PERIODIC:: 1 2\n1 2 3 1\n", "line 1: expected three lengths"),
         ("##PERIODIC:: 1 2 long\n1 2 3 1\n", "line 1: expected three lengths"),
         ("##PERIODIC:: 1 2 0\n1 2 3 1\n", "a.txt"),
@@ -380,3 +380,10 @@ def test_a_text_that_cannot_be_read_says_why(tmp_path, text, message):
 def test_a_text_holds_no_contacts():
     with pytest.raises(ReadError, match="expected contacts, found none"):
         scanfab.read(YADE / "text.txt", contacts=YADE / "x_y_z_r.txt")
+
+
+def test_a_word_in_a_text_export_names_its_line(tmp_path):
+    path = tmp_path / "spheres.txt"
+    path.write_text("#format x_y_z_r\n# a comment\n0 0 0 1\n\n3 x 0 1\n")
+    with pytest.raises(ReadError, match=r"spheres.txt, line 5: expected a number, found 'x'"):
+        scanfab.read(path)

@@ -1,0 +1,55 @@
+"""Rows of numbers with comments, and numpy's messages about them in users' words."""
+
+from __future__ import annotations
+
+import io
+import re
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.errors import ReadError
+
+__all__ = ["plain_reason", "rows_of_numbers"]
+
+
+def rows_of_numbers(
+    path: Path, data: bytes, begin: int = 0, end: int | None = None
+) -> npt.NDArray[np.float64]:
+    """
+    The numbers between two bytes of a file, shape (N, columns); lines may end in a comment.
+
+    Raises
+    ------
+    ReadError
+        If a word is no number, or rows differ in width; names the line.
+    """
+    try:
+        values: npt.NDArray[np.float64] = np.loadtxt(
+            io.BytesIO(data[begin:end]), dtype=np.float64, ndmin=2, comments="#", encoding="latin1"
+        )
+    except ValueError as error:
+        reason, row = plain_reason(str(error))
+        raise ReadError(f"{path}{_line_of(data, begin, row)}: {reason}") from None
+    return values
+
+
+def plain_reason(reason: str) -> tuple[str, int | None]:
+    """What numpy says of a row, without its number, and that, from 0 and without empty lines."""
+    match = re.search(r"at row (\d+)", reason)
+    row = None
+    if match is not None:
+        row = int(match[1]) - ("changed" in reason)
+        reason = reason[: match.start()].rstrip(" ;,")
+    reason = reason.replace("could not convert string", "expected a number, found")
+    return reason.replace(" to float64", ""), row
+
+
+def _line_of(data: bytes, begin: int, row: int | None) -> str:
+    lines = data[begin:].split(b"\n")
+    filled = [number for number, line in enumerate(lines) if line.partition(b"#")[0].strip()]
+    if row is None or row >= len(filled):
+        return ""
+    before = data.count(b"\n", 0, begin)
+    return f", line {before + 1 + filled[row]}"
