@@ -79,6 +79,16 @@ def test_the_surface_gives_back_the_tensor(computed, variant):
         assert share.sum() == pytest.approx(row["mean_length"], rel=2e-3)
 
 
+@pytest.mark.filterwarnings("ignore:frame .* above the tolerance:scanfab.errors.ScanfabWarning")
+def test_the_surface_has_the_moment_of_the_table(tmp_path):
+    packing = scanfab.find_contacts(scanfab.Packing(*shaken_cubic(np.random.default_rng(0), 6)))
+    words = {"variants": "c", "tolerance": 2e-3, "moment": 2}
+    (row,) = compute_rows(packing, Settings.make(**words), observe=VtkFolder(tmp_path, (0, 0, 1)))
+    mesh = pyvista.read(tmp_path / "distribution-c_000000.vtp")
+    share = mesh["weight"] * mesh["mean_length"]
+    assert share.sum() == pytest.approx(row.mean_length, rel=1e-2)
+
+
 def test_the_surface_is_closed_and_looks_outward(computed):
     mesh = pyvista.read(computed.vtk / "distribution-c_000006.vtp")
     assert mesh.is_manifold

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
+
 import numpy as np
 import pytest
 
@@ -57,6 +59,22 @@ def test_the_curve_of_cut_offs_goes_through_the_table(series, computed, caught, 
         row = row_of(computed, frame)
         (place,) = np.flatnonzero(curve.cutoff == 1.0)
         assert curve.chosen == pytest.approx(1.0)
+        near = 4 * np.hypot(curve.error[place], row["alpha_vs_axial_se"])
+        assert abs(curve.alpha[place] - row["alpha_vs_axial"]) < near
+
+
+@pytest.mark.filterwarnings("ignore:frame .* above the tolerance:scanfab.errors.ScanfabWarning")
+def test_figures_have_the_moment_of_the_table(series, caught, tmp_path):
+    """The mean of the squares over the mean is far more anisotropic than the mean."""
+    words = {"boundary": "mask=3", "tolerance": 5e-4, "moment": 2}
+    found = {}
+    for frame in (0, 6):
+        (row,) = scanfab.compute(series, **words, variants="c", frames=str(frame))
+        found[frame] = asdict(row)
+    settings = Settings.make(**words)
+    plot_frames(tmp_path / "x.png", series, settings, list(found.values()), "cutoffs")
+    for curve, row in zip(caught["cutoffs"], found.values(), strict=True):
+        (place,) = np.flatnonzero(curve.cutoff == 1.0)
         near = 4 * np.hypot(curve.error[place], row["alpha_vs_axial_se"])
         assert abs(curve.alpha[place] - row["alpha_vs_axial"]) < near
 

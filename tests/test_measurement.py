@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from scanfab import Cell, Packing, Settings, compute, find_contacts
+from scanfab import Cell, Packing, ScanfabWarning, Settings, compute, find_contacts
 from scanfab.gaps import Blocks
 from scanfab.plan import make_plan
 from scanfab.variants import VARIANTS, Sample
@@ -98,6 +98,15 @@ def test_octants_about_an_oblique_axis_are_parted_along_it(packing):
     for block in range(8):
         assert np.all(side[octants == block] == (block >= 4))
         assert values[block] == pytest.approx(along[octants != block].mean())
+
+
+def test_cut_offs_whose_errors_are_above_the_tolerance_are_told(packing):
+    """Few segments reach the larger one, along lines that suffice for the other."""
+    words = {"variants": "c", "tolerance": 2e-3, "cutoff": 0.2}
+    with pytest.warns(ScanfabWarning, match=r"c, cut-off 0.8: .* above the tolerance 0.002, which"):
+        table = compute(packing, **words, cutoffs="0.2,0.8")
+    low, high = table
+    assert low.alpha_vs_axial_se <= 2e-3 < high.alpha_vs_axial_se
 
 
 def test_two_grains_have_no_scatter():

@@ -19,7 +19,7 @@ import time
 
 import numpy as np
 
-from tests.kernels import test_axes, test_gaps
+from tests.kernels import test_axes, test_bins
 
 MOST_OVERLAP = 0.6
 MOST_RATIO = 50.0
@@ -50,7 +50,7 @@ def check(number: int, seed: int) -> str | None:
     awkward = number % AWKWARD == 0
     kind = test_axes.KINDS[number // AWKWARD % len(test_axes.KINDS)] if awkward else chained
     state = random.bit_generator.state
-    for twin in (test_axes, test_gaps):
+    for twin in (test_axes, test_bins):
         random.bit_generator.state = state
         try:
             twin.check_random_packing(kind, random)
