@@ -158,9 +158,6 @@ class Packing:
         self.columns: Mapping[str, npt.NDArray[Any]] = (
             columns if isinstance(columns, LazyColumns) else _cast_columns(columns or {}, count)
         )
-        if wall_contacts is None:
-            wall_contacts = np.zeros(count, np.int64)
-            wall_contacts.flags.writeable = False
         self.wall_contacts: IntArray = _wall_contacts(wall_contacts, count)
         self.cell = cell
         self.step = None if step is None else int(step)
@@ -208,8 +205,13 @@ class Packing:
         return Spheres(self.position, self.radius, self.id, self.cell, turns)
 
 
-def _wall_contacts(values: npt.ArrayLike, count: int) -> IntArray:
-    numbers: IntArray = cast("wall_contacts", values, np.int64, (count,))
+def _wall_contacts(values: npt.ArrayLike | None, count: int) -> IntArray:
+    if values is None:
+        # memory that nobody has looked at yet costs nothing
+        numbers: IntArray = np.zeros(count, np.int64)
+        numbers.flags.writeable = False
+        return numbers
+    numbers = cast("wall_contacts", values, np.int64, (count,))
     if np.any(numbers < 0):
         raise PackingError("wall_contacts: expected 0 or more for each grain")
     return numbers

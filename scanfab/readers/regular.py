@@ -122,9 +122,11 @@ def _parse(
         return None
     if frame.height < table.count or any(frame.null_count().row(0)):
         return None
-    # all columns at once, by several threads
-    frame = frame.select(names[place] for place in types).rechunk()
-    return [frame[names[place]].to_numpy() for place in types]
+    # memory of numpy's own comes in large pages, which is faster, and can be kept as it is
+    return [
+        np.concatenate([chunk.to_numpy() for chunk in frame[names[place]].get_chunks()])
+        for place in types
+    ]
 
 
 def _ends_with_blank(table: TextTable) -> bool:
