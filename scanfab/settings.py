@@ -62,9 +62,9 @@ def parse_length(name: str, text: str | float | Length) -> Length:
     return Length(value, match[2] or "")  # type: ignore[arg-type]
 
 
-def parse_lengths(name: str, text: str) -> tuple[Length, ...]:
+def parse_lengths(name: str, text: str | float | Sequence[str | float]) -> tuple[Length, ...]:
     """
-    Lengths as ``FROM:TO:STEP``, both ends included, or as ``L,L,...``.
+    Lengths as ``FROM:TO:STEP``, both ends included, as ``L,L,...``, or one by one.
 
     Examples
     --------
@@ -72,6 +72,9 @@ def parse_lengths(name: str, text: str) -> tuple[Length, ...]:
     >>> [length.value for length in parse_lengths("cutoffs", "0:1rmin:0.5rmin")]
     [0.0, 0.5, 1.0]
     """
+    if not isinstance(text, str):
+        parts = text if isinstance(text, Sequence) else [text]
+        return tuple(parse_length(name, part) for part in parts)
     if ":" not in text:
         return tuple(parse_length(name, part) for part in text.split(","))
     lengths = [parse_length(name, part) for part in text.split(":")]
@@ -105,6 +108,8 @@ def _whole(name: str, value: object) -> int:
 
 
 def _vector(name: str, values: Sequence[float]) -> Vector:
+    if isinstance(values, str) or not hasattr(values, "__len__"):
+        raise SettingsError(f"{name}: expected three finite numbers, found {values!r}")
     numbers = tuple(_number(name, value) for value in values)
     if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
         raise SettingsError(f"{name}: expected three finite numbers, found {values!r}")
@@ -137,14 +142,14 @@ def parse_axis(text: str | Vector) -> Vector:
     return (x / length, y / length, z / length)
 
 
-def parse_frames(text: str | slice | None) -> slice:
+def parse_frames(text: str | int | slice | None) -> slice:
     """A slice from ``A:B:C`` or a single number."""
     if text is None:
         return slice(None)
     if isinstance(text, slice):
         return text
     try:
-        numbers = [int(part) if part.strip() else None for part in text.split(":")]
+        numbers = [int(part) if part.strip() else None for part in str(text).split(":")]
     except ValueError:
         numbers = []
     if not 1 <= len(numbers) <= 3 or numbers == [None] or numbers[2:] == [0]:
@@ -199,7 +204,7 @@ class Settings:
         rv_center: Vector | None = None,
         boundary: str | tuple[str, ...] | list[str] = (),
         cutoff: str | float = "1rmin",
-        cutoffs: str | None = None,
+        cutoffs: str | float | Sequence[str | float] | None = None,
         moment: int = 1,
         spacing: str | float = "auto",
         directions: str | int | DirectionRule = "auto",
@@ -209,7 +214,7 @@ class Settings:
         contact_tolerance: float = 0.0,
         axis: str | Vector = "z",
         strain: str | Path = "auto",
-        frames: str | slice | None = None,
+        frames: str | int | slice | None = None,
         seed: int = 0,
         workers: int | None = None,
         on_error: str = "stop",
@@ -230,9 +235,9 @@ class Settings:
         cutoff, spacing : str or float
             A length in the dump's unit, or with the suffix ``rmin``, ``rmean`` or ``rmax``; spacing
             also ``auto``.
-        cutoffs : str, optional
-            Several cut-offs in one pass: ``FROM:TO:STEP`` or ``L,L,...``; ``cutoff`` is then the
-            one at which the scan meets the tolerance.
+        cutoffs : str or sequence of str or float, optional
+            Several cut-offs in one pass: ``FROM:TO:STEP``, ``L,L,...``, or one by one; ``cutoff``
+            is then the one at which the scan meets the tolerance.
         moment : int
             1: ℓ is the mean length of the kept segments; 2: the mean of the squares over the mean.
         directions : str, int or DirectionRule
@@ -249,7 +254,7 @@ class Settings:
             Loading axis: x, y, z or a vector.
         strain : str or path
             ``auto``, ``cell``, ``boundary``, ``grains`` or a CSV file.
-        frames : str or slice, optional
+        frames : str, int or slice, optional
             Which frames.
         seed, workers : int
             Seed of the random numbers; threads (all cores by default).
@@ -261,6 +266,10 @@ class Settings:
         SettingsError
             If a value cannot be used.
         """
+        if not isinstance(variants, str):
+            raise SettingsError(f"variants: expected letters out of abcd, found {variants!r}")
+        if boundary is None or not isinstance(boundary, (str, tuple, list)):
+            raise SettingsError(f"boundary: expected rules such as type=2, found {boundary!r}")
         return cls(
             variants="".join(v for v in "abcd" if v in variants),
             rv=_number("rv", rv),

@@ -294,3 +294,29 @@ def test_directions_in_one_plane_are_refused(rule):
 
 def test_three_directions_across_one_another_will_do():
     assert len(Settings.make(directions=1).directions) == 3
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("variants", None),
+        ("boundary", None),
+        ("boundary", 5),
+        ("rv_center", 5),
+        ("rv_center", "1,2,3"),
+        ("frames", 1.5),
+        ("cutoffs", [None]),
+    ],
+)
+def test_what_has_the_wrong_type_is_refused_by_name(name, value):
+    with pytest.raises(SettingsError, match=f"^{name.replace('_', '-')}: expected"):
+        Settings.make(**{name: value})
+
+
+def test_numbers_do_where_the_command_line_has_text():
+    assert Settings.make(frames=2).frames == Settings.make(frames="2").frames
+    assert Settings.make(frames=-1).frames == Settings.make(frames="-1").frames
+    assert (
+        Settings.make(cutoffs=[0.5, "1rmin"]).cutoffs == Settings.make(cutoffs="0.5,1rmin").cutoffs
+    )
+    assert Settings.make(cutoffs=0.5).cutoffs == Settings.make(cutoffs="0.5").cutoffs
