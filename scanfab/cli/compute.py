@@ -168,8 +168,8 @@ def compute(
         with usage_errors():
             settings = Settings.make(**options)
             result = None if output is None else ResultFile(output, Row)
-            for path in _manifests(output, manifest_path):
-                check_folder(path)
+            if manifest_path is not None:
+                check_folder(manifest_path)
         asked = asked_for(sources, reading, settings)
         series = open_series(sources, reading)
         if figure is not None and _is_of_frames(figure) and len(series) > 1:

@@ -343,8 +343,7 @@ def _locate(path: Path, snapshot: Snapshot, block: bytes, body: _Body, reason: s
 def _lines_before(snapshot: Snapshot) -> int:
     lines, left = 0, snapshot.start
     with open(plain(snapshot.path), "rb") as stream:
-        while left > 0:
-            part = stream.read(min(left, HEADER_BYTES))
+        while part := stream.read(min(left, HEADER_BYTES)):
             lines += part.count(b"\n")
             left -= len(part)
     return lines

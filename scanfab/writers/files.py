@@ -14,6 +14,8 @@ __all__ = ["check_folder", "whole_file"]
 
 def check_folder(path: Path) -> None:
     """SettingsError if there is no folder that a file of this name can be written to."""
+    if _is_stream(path):
+        return
     if not path.parent.is_dir():
         raise SettingsError(f"{path}: there is no folder {path.parent} to write to")
     if not os.access(path.parent, os.W_OK):
@@ -22,7 +24,14 @@ def check_folder(path: Path) -> None:
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """A file beside the wanted one, to be written, that takes its place if all goes well."""
+    """
+    A file beside the wanted one, to be written, that takes its place if all goes well.
+
+    A pipe or a device is written to as it is.
+    """
+    if _is_stream(path):
+        yield path
+        return
     # with the suffix at the end: some libraries tell the format by it
     part = path.with_name(f"{path.stem}.part{path.suffix}")
     try:
@@ -33,3 +42,7 @@ def whole_file(path: Path) -> Iterator[Path]:
         os.replace(part, path)
     finally:
         part.unlink(missing_ok=True)
+
+
+def _is_stream(path: Path) -> bool:
+    return path.exists() and not path.is_file() and not path.is_dir()

@@ -320,3 +320,13 @@ def test_very_wide_dumps_keep_their_names(tmp_path):
     names = " ".join(f"c_{number}" for number in range(3000))
     block = block_of(tmp_path, dump_text(rows=[range(3000)], names=names))
     assert len(block.names) == block.values.shape[1] == 3000
+
+
+def test_a_file_that_was_cut_meanwhile_is_no_endless_search_for_its_lines(tmp_path):
+    text = dump_text(step=1)
+    path = write(tmp_path / "dump", text + dump_text(step=2))
+    second = index_dump(path)[1]
+    path.write_text(text[:20])
+    with pytest.raises(ReadError, match="the header is incomplete"):
+        read_block(second)
+    assert dump._lines_before(second) == text[:20].count("\n")

@@ -1,5 +1,7 @@
 """A file is whole or untouched."""
 
+import os
+
 import pytest
 
 from scanfab import SettingsError
@@ -39,3 +41,17 @@ def test_a_file_that_was_not_written_is_an_error(tmp_path):
 def test_a_folder_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(SettingsError, match=r"there is no folder .*nowhere to write to"):
         check_folder(tmp_path / "nowhere" / "a.txt")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes")
+def test_a_pipe_is_written_to_as_it_is(tmp_path):
+    path = tmp_path / "pipe"
+    os.mkfifo(path)
+    check_folder(path)
+    # open for both, so that neither end waits
+    reader = os.open(path, os.O_RDWR)
+    with whole_file(path) as part:
+        part.write_text("all")
+    assert os.read(reader, 10) == b"all"
+    os.close(reader)
+    assert list(tmp_path.iterdir()) == [path]
