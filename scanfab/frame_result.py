@@ -73,8 +73,8 @@ def frame_result(
 
 def _warn_of_large_errors(rows: list[Row], plan: Plan, settings: Settings) -> None:
     """Other cut-offs and the second moment are measured along lines that are chosen for one."""
-    errors = [(row.alpha_vs_axial_se or 0.0, row) for row in rows]
-    error, worst = max(errors, key=lambda one: one[0])
+    worst = max(rows, key=lambda row: row.alpha_vs_axial_se or 0.0)
+    error = worst.alpha_vs_axial_se or 0.0
     if error > settings.tolerance:
         warnings.warn(
             f"frame {worst.frame}, variant {worst.variant}, cut-off {worst.cutoff:g}: "

@@ -86,7 +86,8 @@ STEP_MEANINGS: dict[str, str] = {
 
 def judged(rows: Iterator[StepRow], *, with_sample: bool) -> list[StepRow]:
     """The rows of a ladder with ``steady`` filled in, variant by variant."""
-    every, found = list(rows), list[StepRow]()
+    every = list(rows)
+    found: list[StepRow] = []
     most = _most_errors([row.variant for row in every])
     for row in reversed(every):
         later = [one for one in found if one.variant == row.variant]

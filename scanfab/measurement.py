@@ -52,16 +52,7 @@ class Measurement:
     def kept(
         self, variant: str, place: int = 0
     ) -> tuple[FloatArray, FloatArray | npt.NDArray[np.int64]]:
-        """
-        Numerator and denominator of ℓ for one variant and cut-off, shapes (R, D).
-
-        Parameters
-        ----------
-        variant : str
-            One of a, b, c, d.
-        place : int, optional
-            Which of the plan's cut-offs.
-        """
+        """As :meth:`GapSums.kept`, at one of the plan's cut-offs, with the moment of the table."""
         if self.gaps is None:
             return self.sums.kept(variant)
         return self.gaps.kept(variant, place, self.moment)

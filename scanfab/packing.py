@@ -232,12 +232,13 @@ def _check_grains(position: FloatArray, radius: FloatArray, id: IntArray) -> Non
             f"{grains_named(id, infinite)}: position and radius must be finite numbers, found "
             f"{_values(position, radius, infinite)}"
         )
-    if radius.min(initial=np.inf) <= 0:
+    least = radius.min(initial=np.inf)
+    if least <= 0:
         raise PackingError(
             f"{grains_named(id, radius <= 0)}: the radius must be larger than zero, found "
             f"{_values(position, radius, radius <= 0)}"
         )
-    if radius.min(initial=np.inf) < LEAST:
+    if least < LEAST:
         raise PackingError(
             f"{grains_named(id, radius < LEAST)}: a radius below {LEAST:g} cannot be a length, "
             f"found {_values(position, radius, radius < LEAST)}"
@@ -258,10 +259,12 @@ def _values(position: FloatArray, radius: FloatArray, wrong: npt.NDArray[np.bool
 
 
 def _are_unique(id: IntArray) -> bool:
-    """Whether no number occurs twice; without sorting if they are small, as ids are."""
-    high = int(id.max(initial=-1))
-    if high >= 8 * id.size or id.min(initial=0) < 0:
+    """Whether no number occurs twice; without sorting if they lie close together, as ids do."""
+    if id.size == 0:
+        return True
+    low, high = int(id.min()), int(id.max())
+    if high - low >= 8 * id.size:
         return bool(np.unique(id).size == id.size)
-    seen = np.zeros(high + 1, np.bool_)
-    seen[id] = True
+    seen = np.zeros(high - low + 1, np.bool_)
+    seen[id - low] = True
     return bool(np.count_nonzero(seen) == id.size)

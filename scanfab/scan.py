@@ -25,6 +25,7 @@ __all__ = [
     "line_frames",
     "most_lines",
     "scan_lines",
+    "sums_of",
     "tally_frames",
     "turned_frames",
 ]
@@ -207,7 +208,8 @@ def scan_lines(
 
     def one(replicate: int) -> ScanSums:
         turned, offsets = turned_frames(rule, frames, seed, replicate)
-        return _scan_frames(solids, turned, offsets, spacing, cutoff, variants)
+        tallies = tally_frames(solids, turned, offsets, spacing, cutoff, variants)
+        return sums_of(turned, tallies, variants)
 
     numbers = list(replicates)
     if not numbers:
@@ -245,19 +247,6 @@ def _random_rotation(random: np.random.Generator) -> FloatArray:
             [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
         ]
     )
-
-
-def _scan_frames(
-    solids: Solids,
-    frames: FloatArray,
-    offsets: FloatArray,
-    spacing: float,
-    cutoff: float,
-    variants: str,
-) -> ScanSums:
-    """One replicate: given line frames (D, 3, 3) and shifts (D, 2)."""
-    tallies = tally_frames(solids, frames, offsets, spacing, cutoff, variants)
-    return _by_variant(frames[:, 2], tallies, variants)
 
 
 def tally_frames(
@@ -317,8 +306,8 @@ def _without_removed(medium: CellGrains) -> CellGrains:
     )
 
 
-def _by_variant(axes: FloatArray, tallies: FloatArray, variants: str) -> ScanSums:
-    """The sums of one replicate from its tallies by axis and set of solids."""
+def sums_of(frames: FloatArray, tallies: FloatArray, variants: str) -> ScanSums:
+    """The sums of one replicate from its line frames, and its tallies by axis and set of solids."""
     wanted = np.array([variant in variants for variant in "abcd"])
 
     def of(whole: int, window: int | None) -> FloatArray:
@@ -332,7 +321,7 @@ def _by_variant(axes: FloatArray, tallies: FloatArray, variants: str) -> ScanSum
         return of(sweep.WHOLE + number, sweep.WINDOW + number)
 
     return ScanSums(
-        axes=axes[None],
+        axes=frames[None, :, 2],
         length=entry(sweep.LENGTH),
         segments=entry(sweep.KEPT).astype(np.int64),
         lines=entry(sweep.LINES).astype(np.int64),

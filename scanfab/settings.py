@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
@@ -62,7 +62,7 @@ def parse_length(name: str, text: str | float | Length) -> Length:
     return Length(value, match[2] or "")  # type: ignore[arg-type]
 
 
-def parse_lengths(name: str, text: str | float | Sequence[str | float]) -> tuple[Length, ...]:
+def parse_lengths(name: str, text: str | float | Iterable[str | float]) -> tuple[Length, ...]:
     """
     Lengths as ``FROM:TO:STEP``, both ends included, as ``L,L,...``, or one by one.
 
@@ -73,7 +73,7 @@ def parse_lengths(name: str, text: str | float | Sequence[str | float]) -> tuple
     [0.0, 0.5, 1.0]
     """
     if not isinstance(text, str):
-        parts = text if isinstance(text, Sequence) else [text]
+        parts = text if isinstance(text, Iterable) else [text]
         return tuple(parse_length(name, part) for part in parts)
     if ":" not in text:
         return tuple(parse_length(name, part) for part in text.split(","))
@@ -108,9 +108,7 @@ def _whole(name: str, value: object) -> int:
 
 
 def _vector(name: str, values: Sequence[float]) -> Vector:
-    if isinstance(values, str) or not hasattr(values, "__len__"):
-        raise SettingsError(f"{name}: expected three finite numbers, found {values!r}")
-    numbers = tuple(_number(name, value) for value in values)
+    numbers = tuple(_number(name, value) for value in values) if hasattr(values, "__len__") else ()
     if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
         raise SettingsError(f"{name}: expected three finite numbers, found {values!r}")
     return numbers
@@ -204,7 +202,7 @@ class Settings:
         rv_center: Vector | None = None,
         boundary: str | tuple[str, ...] | list[str] = (),
         cutoff: str | float = "1rmin",
-        cutoffs: str | float | Sequence[str | float] | None = None,
+        cutoffs: str | float | Iterable[str | float] | None = None,
         moment: int = 1,
         spacing: str | float = "auto",
         directions: str | int | DirectionRule = "auto",
@@ -268,7 +266,7 @@ class Settings:
         """
         if not isinstance(variants, str):
             raise SettingsError(f"variants: expected letters out of abcd, found {variants!r}")
-        if boundary is None or not isinstance(boundary, (str, tuple, list)):
+        if not isinstance(boundary, str | tuple | list):
             raise SettingsError(f"boundary: expected rules such as type=2, found {boundary!r}")
         return cls(
             variants="".join(v for v in "abcd" if v in variants),

@@ -6,7 +6,7 @@ import numpy as np
 
 from scanfab.directions import direction_rule
 from scanfab.fabric.void import void_fabric
-from scanfab.scan import ScanSums, Solids, _scan_frames, line_frames, scan_lines
+from scanfab.scan import ScanSums, Solids, line_frames, scan_lines, sums_of, tally_frames
 
 Z = np.array([[0.0, 0.0, 1.0]])
 
@@ -31,12 +31,18 @@ def solids_of(spheres, window_radius=0.0, removed=None):
     )
 
 
+def scan_frames(solids, frames, offsets, spacing, cutoff, variants="abcd"):
+    """Scan along given line frames, with given shifts of the lines, as one replicate."""
+    tallies = tally_frames(solids, frames, offsets, spacing, cutoff, variants)
+    return sums_of(frames, tallies, variants)
+
+
 def scan_along(solids, axes, spacing, cutoff=0.0, replicates=16, seed=0):
     """Scan along the same axes in every replicate: only the lines are shifted."""
     random = np.random.default_rng(seed)
     frames = line_frames(np.asarray(axes, dtype=float))
     return ScanSums.concatenate(
-        _scan_frames(solids, frames, random.random((len(frames), 2)), spacing, cutoff, "abcd")
+        scan_frames(solids, frames, random.random((len(frames), 2)), spacing, cutoff)
         for _ in range(replicates)
     )
 

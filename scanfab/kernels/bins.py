@@ -33,15 +33,12 @@ __all__ = [
     "BLOCKS",
     "HIGH",
     "LENGTH",
-    "LINE_BOUND",
     "LOW",
     "NUMBER",
     "SQUARE",
-    "WHICH",
     "Bins",
-    "U",
-    "V",
     "add_gaps",
+    "add_line",
     "bins_along",
     "list_gaps",
     "list_last_gaps",
@@ -145,6 +142,26 @@ def add_gaps(
             sums[kind, which, block, place, NUMBER] += sign
             sums[kind, which, block, place, LENGTH] += sign * length
             sums[kind, which, block, place, SQUARE] += sign * length * length
+
+
+@inner()
+def add_line(
+    bins: Bins,
+    gaps: FloatArray,
+    count: int,
+    sign: float,
+    which: int,
+    u: float,
+    v: float,
+    bound: float,
+    whole: Flag,
+    window: Flag,
+    measured: Measured | None,
+) -> None:
+    """The same for gaps of the line through (u, v), of which the list has but their two ends."""
+    for k in range(count):
+        gaps[WHICH, k], gaps[U, k], gaps[V, k], gaps[LINE_BOUND, k] = which, u, v, bound
+    add_gaps(bins, gaps, count, sign, whole, window, measured)
 
 
 @inner(error_model="numpy")

@@ -5,22 +5,12 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.kernels.bins import (
-    HIGH,
-    LINE_BOUND,
-    LOW,
-    WHICH,
-    Bins,
-    U,
-    V,
-    add_gaps,
-    room_for_gaps,
-)
+from scanfab.kernels.bins import HIGH, LOW, Bins, add_line, room_for_gaps
 from scanfab.kernels.compiled import inner
 from scanfab.kernels.periodic import CellGrains, Prism, cross, dot, shifts
 from scanfab.kernels.sweep import BOUND, CHANNELS, END, FAR, KEPT, LENGTH, SET, VOID, WHOLE, Strip
 
-__all__ = ["follow", "next_solid"]
+__all__ = ["follow"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -86,17 +76,8 @@ def way_out(grains: CellGrains, frame: FloatArray, u: float, v: float) -> float:
 
 
 @inner()
-def next_solid(
-    grains: CellGrains, prism: Prism, second: bool, u: float, v: float, after: float
-) -> float:
-    """
-    Where the line through (u, v) enters the next solid behind a depth, which lies in void.
-
-    FAR if it stays in a channel. ``second``: of the grains that are not removed.
-    """
-    frame, c = prism.frame, grains.vectors[prism.third]
-    rise_c = dot(c, frame[2]) - prism.rise_u * dot(c, frame[0]) - prism.rise_v * dot(c, frame[1])
-    step = 1.0 if rise_c > 0.0 else -1.0
+def limits_of(grains: CellGrains, prism: Prism, second: bool) -> tuple[float, int]:
+    """The largest radius, and along how many cells a line is followed; 0 where no grain is left."""
     largest = section = 0.0
     solid = 0
     for g in range(grains.radius.size):
@@ -105,15 +86,36 @@ def next_solid(
             section += np.pi * grains.radius[g] * grains.radius[g]
             solid += 1
     if solid == 0:
-        return FAR
+        return largest, 0
     volume = abs(dot(grains.vectors[0], cross(grains.vectors[1], grains.vectors[2])))
     most = min(MOST_FREE_PATHS * volume / (section * prism.length), MANY_GRAINS / solid)
-    most = max(most, FEW_GRAINS / solid)
+    return largest, max(MOST_CELLS, int(max(most, FEW_GRAINS / solid)))
+
+
+@inner()
+def next_solid(
+    grains: CellGrains,
+    prism: Prism,
+    second: bool,
+    limits: tuple[float, int],
+    u: float,
+    v: float,
+    after: float,
+) -> float:
+    """
+    Where the line through (u, v) enters the next solid behind a depth, which lies in void.
+
+    FAR if it stays in a channel. ``second``: of the grains that are not removed.
+    """
+    frame, c = prism.frame, grains.vectors[prism.third]
+    largest, most = limits
+    rise_c = dot(c, frame[2]) - prism.rise_u * dot(c, frame[0]) - prism.rise_v * dot(c, frame[1])
+    step = 1.0 if rise_c > 0.0 else -1.0
     margin = largest * prism.slope
     place = (after - prism.rise_u * u - prism.rise_v * v) / prism.length - margin
     last = way_out(grains, frame, u, v) + 2.0 * largest
     found = FAR
-    for cells in range(max(MOST_CELLS, int(most))):
+    for cells in range(most):
         # spheres that are so far away begin behind what was found, or outside the sample
         if (min(found, last) - after) / prism.length + 2.0 * margin < cells:
             break
@@ -143,6 +145,7 @@ def follow(
     bins: Bins,
 ) -> None:
     """Tally the gaps that start in the measured length and end beyond what was listed of it."""
+    limits = limits_of(grains, prism, which == 1)
     # else a line leaves through a face that does not repeat
     endless = grains.periodic[0] and grains.periodic[1] and grains.periodic[2]
     for row in range(strip.rows):
@@ -155,19 +158,18 @@ def follow(
             is_empty = end == -FAR
             if not is_empty and not bound <= end < bound + prism.length:
                 continue
-            start = next_solid(grains, prism, which == 1, u, v, bound if is_empty else end)
+            start = next_solid(grains, prism, which == 1, limits, u, v, bound if is_empty else end)
             if start < FAR:
                 if not is_empty:
                     gap = start - end
                     tally[which, WHOLE + VOID] += gap
-                    if gap >= least:
-                        tally[which, WHOLE + LENGTH] += gap
-                        tally[which, WHOLE + KEPT] += 1.0
                     if bins.cutoffs.size > 0:
                         one = room_for_gaps(1)
-                        one[WHICH, 0], one[U, 0], one[V, 0] = which, u, v
-                        one[LINE_BOUND, 0], one[LOW, 0], one[HIGH, 0] = bound, end, start
-                        add_gaps(bins, one, 1, 1.0, True, None, None)
+                        one[LOW, 0], one[HIGH, 0] = end, start
+                        add_line(bins, one, 1, 1.0, which, u, v, bound, True, None, None)
+                    elif gap >= least:
+                        tally[which, WHOLE + LENGTH] += gap
+                        tally[which, WHOLE + KEPT] += 1.0
             elif endless:
                 tally[which, CHANNELS] += 1.0
                 tally[which, WHOLE + VOID] += (

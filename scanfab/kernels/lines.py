@@ -5,17 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.kernels.bins import (
-    HIGH,
-    LINE_BOUND,
-    LOW,
-    WHICH,
-    Bins,
-    U,
-    V,
-    add_gaps,
-    room_for_gaps,
-)
+from scanfab.kernels.bins import HIGH, LOW, Bins, add_line, room_for_gaps
 from scanfab.kernels.compiled import ZERO, inner
 from scanfab.kernels.projection import Spheres, number_from, sort_by, sphere_at
 from scanfab.kernels.sweep import (
@@ -187,9 +177,7 @@ def tally_line(
 ) -> None:
     """Tally the gaps of one line, or take them back, with a sign of -1."""
     if bins.cutoffs.size > 0:
-        gaps[WHICH, :count], gaps[LINE_BOUND, :count] = which, bound
-        gaps[U, :count], gaps[V, :count] = u, v
-        add_gaps(bins, gaps, count, sign, whole, window, measured)
+        add_line(bins, gaps, count, sign, which, u, v, bound, whole, window, measured)
     else:
         for k in range(count):
             low, high = gaps[LOW, k], gaps[HIGH, k]

@@ -155,8 +155,6 @@ class _Body:
     names: list[str]
     start: int
     """Bytes from the start of the snapshot to its first row."""
-    lines: int
-    """Lines from the start of the snapshot to its first row."""
 
 
 def _header(snapshot: Snapshot) -> tuple[str, dict[str, list[str]], _Body]:
@@ -182,9 +180,7 @@ def _regular(
     possible = body.names and 2 * count * len(body.names) <= stop - start
     if not possible or stop - start < LARGE:
         return None
-    # to count the lines before a later snapshot would take longer than to take it out of the file
-    lines = None if snapshot.start else body.lines
-    return read_regular(TextTable(path, start, stop, lines, len(body.names), count), types)
+    return read_regular(TextTable(path, start, stop, len(body.names), count), types)
 
 
 def _tolerant(snapshot: Snapshot, body: _Body, count: int) -> FloatArray:
@@ -247,7 +243,7 @@ def _sections(where: str, block: bytes) -> tuple[dict[str, list[str]], _Body]:
     """The header's sections by key, and the body: the first section whose key has no known word."""
     sections: dict[str, list[str]] = {}
     word, place = None, 0
-    for lines, line in enumerate(block[:HEADER_BYTES].splitlines(keepends=True), start=1):
+    for line in block[:HEADER_BYTES].splitlines(keepends=True):
         place += len(line)
         text = line.decode("utf-8", "replace").strip().removeprefix("\ufeff")
         if not text.startswith("ITEM:"):
@@ -258,7 +254,7 @@ def _sections(where: str, block: bytes) -> tuple[dict[str, list[str]], _Body]:
         if key.startswith("NUMBER OF "):
             word = key.removeprefix("NUMBER OF ")
         elif word is not None and key.split()[:1] == [word]:
-            return sections, _Body(key.split()[1:], place, lines)
+            return sections, _Body(key.split()[1:], place)
         sections[key] = []
     raise ReadError(f"{where}: the header is incomplete: no ITEM: {word or 'ATOMS'} line")
 

@@ -21,6 +21,8 @@ __all__ = ["LARGE", "TextTable", "read_regular"]
 
 # bytes; a smaller table is parsed before polars is loaded
 LARGE = 8 << 20
+# bytes before the first row, up to which a table is parsed where it lies
+HEADER = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -32,8 +34,6 @@ class TextTable:
     """First byte of the first row."""
     stop: int
     """Byte behind the last row."""
-    lines_before: int | None
-    """Lines of the file before the first row; None if they were not counted."""
     width: int
     """Number of columns."""
     count: int
@@ -98,18 +98,16 @@ def _parse(
     if behind:
         schema["behind"] = polars.String
     wanted = list(dict.fromkeys([*(names[place] for place in types), names[-1]]))
-    # a file is parsed where it lies; a part of it has to be taken out
-    skipped = table.lines_before
-    whole = skipped is not None and table.stop == os.path.getsize(table.path)
+    source, lines_before = _source(table)
     try:
         frame = (
             polars.scan_csv(
-                table.path if whole else _bytes(table),
+                source,
                 has_header=False,
                 separator=" ",
                 quote_char=None,
                 schema=schema,
-                skip_lines=skipped if whole and skipped else 0,
+                skip_lines=lines_before,
                 n_rows=table.count,
                 encoding="utf8-lossy",  # numbers are none, and nothing else is kept
                 truncate_ragged_lines=True,  # blanks are counted elsewhere
@@ -136,7 +134,11 @@ def _ends_with_blank(table: TextTable) -> bool:
         return file.readline().endswith(b" \n")
 
 
-def _bytes(table: TextTable) -> bytes:
+def _source(table: TextTable) -> tuple[Path | bytes, int]:
+    """Where polars finds the rows, and how many lines there are before them."""
     with open(table.path, "rb") as file:
+        if table.start <= HEADER and table.stop == os.path.getsize(table.path):
+            return table.path, file.read(table.start).count(b"\n")
+        # a part of a file has to be taken out
         file.seek(table.start)
-        return file.read(table.stop - table.start)
+        return file.read(table.stop - table.start), 0

@@ -5,9 +5,9 @@ import pytest
 
 from scanfab import Packing, compute, contact_fabric, find_contacts, void_fabric
 from scanfab.directions import direction_rule
-from scanfab.scan import _scan_frames, line_frames
+from scanfab.scan import line_frames
 from tests.lattices import Spheres, poisson_spheres, rotation, shaken_cubic
-from tests.scanning import fabric, solids_of
+from tests.scanning import fabric, scan_frames, solids_of
 
 WINDOW, SPACING, CUTOFF = 3.0, 0.3, 0.4
 RULE = direction_rule("lebedev:9")
@@ -24,7 +24,7 @@ def tensors(spheres, frames, variants="abcd", unit=1.0):
     removed = np.arange(len(spheres.radius)) % 3 == 0
     offsets = np.random.default_rng(1).random((len(frames), 2))
     solids = solids_of(spheres, WINDOW * unit, removed)
-    sums = _scan_frames(solids, frames, offsets, SPACING * unit, CUTOFF * unit, variants)
+    sums = scan_frames(solids, frames, offsets, SPACING * unit, CUTOFF * unit, variants)
     fabrics = [void_fabric(sums.axes, RULE.weights, *sums.kept(name)) for name in variants]
     return np.array([fabric.tensor.matrix for fabric in fabrics]), sums
 

@@ -21,7 +21,7 @@ def columns_of(path, text, places=(0, 2), count=2, kind=float):
     """What the parser says of the columns of a file that is nothing but rows."""
     header = b"ITEM: ATOMS a b c\n"
     path.write_bytes(header + text)
-    table = TextTable(path, len(header), len(header + text), 1, WIDTH, count)
+    table = TextTable(path, len(header), len(header + text), WIDTH, count)
     return read_regular(table, dict.fromkeys(places, kind))
 
 
