@@ -22,10 +22,11 @@ if TYPE_CHECKING:
     from scanfab.fabric.contact import contact_fabric
     from scanfab.fabric.tensor import FabricTensor
     from scanfab.fabric.void import VoidFabric, void_fabric
+    from scanfab.opening import read, read_series
     from scanfab.packing import ContactList, Contacts, Packing
     from scanfab.pipeline import compute
     from scanfab.scan import ScanSums, Solids, scan_lines
-    from scanfab.series import Series, read, read_series
+    from scanfab.series import Series
     from scanfab.settings import Settings
     from scanfab.table import COLUMNS, Row, Table
     from scanfab.tabular import read_rows
@@ -59,9 +60,9 @@ _HOME = {
     "contact_fabric": "fabric.contact",
     "direction_rule": "directions",
     "find_contacts": "contacts",
-    "read": "series",
+    "read": "opening",
     "read_rows": "tabular",
-    "read_series": "series",
+    "read_series": "opening",
     "scan_lines": "scan",
     "void_fabric": "fabric.void",
 }

@@ -10,7 +10,8 @@ from typing import Any
 
 from scanfab.errors import ReadError, SettingsError
 from scanfab.manifest import asked_for
-from scanfab.series import Series, open_sources
+from scanfab.opening import open_sources
+from scanfab.series import Series
 from scanfab.settings import Settings
 
 __all__ = ["read_manifest", "reopen", "repeat_command", "restored_settings", "spelt_settings"]

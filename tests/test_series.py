@@ -10,7 +10,7 @@ import pytest
 
 import scanfab
 from scanfab.errors import PackingError, ReadError, ScanfabWarning, UnknownFormatError
-from scanfab.series import open_sources
+from scanfab.opening import open_sources
 from tests.dumps import PAIRS, ROWS, dump_text, pairs_text, write
 from tests.truth import FLOOR, id_pairs
 

@@ -55,8 +55,8 @@ def open_series(sources: tuple[str, ...], reading: dict[str, Any]) -> list[Serie
     from dataclasses import replace
 
     from scanfab.errors import ReadError
+    from scanfab.opening import open_sources, read_series
     from scanfab.readers.files import temporary_copy
-    from scanfab.series import open_sources, read_series
 
     if "-" not in sources:
         return open_sources(sources, **reading)
@@ -72,7 +72,7 @@ def open_series(sources: tuple[str, ...], reading: dict[str, Any]) -> list[Serie
 
 def settings_file(sources: tuple[str, ...]) -> Path | None:
     """The scanfab.toml beside the dumps; a usage error if the sources have different ones."""
-    from scanfab.series import SETTINGS_FILE
+    from scanfab.opening import SETTINGS_FILE
 
     folders = {Path(s) if Path(s).is_dir() else Path(s).parent for s in sources if s != "-"}
     found = [folder / SETTINGS_FILE for folder in sorted(folders)]
