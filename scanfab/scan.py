@@ -14,6 +14,7 @@ from scanfab.errors import SettingsError
 from scanfab.kernels import sweep
 from scanfab.kernels.axes import scan_axes, scan_cell
 from scanfab.kernels.bins import Bins, no_bins
+from scanfab.kernels.compiled import Flag
 from scanfab.kernels.periodic import CellGrains
 
 __all__ = [
@@ -268,7 +269,7 @@ def tally_frames(
     whole, window = ("a" in variants or "b" in variants), ("c" in variants or "d" in variants)
     tallies = np.zeros((len(frames), 2, sweep.TALLY_SIZE))
     bins = no_bins(len(frames)) if bins is None else bins
-    both: sweep.Flag = True if first and second else None
+    both: Flag = True if first and second else None
     if solids.medium is not None and whole:
         # without a or c, the solids of b and d are the only ones
         medium = solids.medium if first else _without_removed(solids.medium)

@@ -13,24 +13,14 @@ from scanfab.kernels.bins import (
     list_last_gaps,
     room_for_gaps,
 )
-from scanfab.kernels.compiled import LANES, inner, kernel
+from scanfab.kernels.compiled import LANES, Flag, inner, kernel
 from scanfab.kernels.follow import follow
 from scanfab.kernels.grid import Grid, bounds, open_grid, part_of, strip_of
 from scanfab.kernels.lines import solve_closed
 from scanfab.kernels.periodic import CellGrains, Prism, cell_grid, measured_in
 from scanfab.kernels.projection import Spheres, project, sort_into_strips, sphere_at
-from scanfab.kernels.sweep import (
-    MOST_LINES,
-    NOTHING,
-    STATE_SIZE,
-    Flag,
-    Measured,
-    Strip,
-    begin,
-    measure_from,
-    settle,
-    visit,
-)
+from scanfab.kernels.strips import MOST_LINES, STATE_SIZE, Strip, begin, measure_from
+from scanfab.kernels.sweep import NOTHING, Measured, settle, visit
 
 __all__ = ["scan_axes", "scan_cell"]
 

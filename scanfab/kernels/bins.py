@@ -11,23 +11,20 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.kernels.compiled import inner
-from scanfab.kernels.sweep import (
+from scanfab.kernels.compiled import Flag, inner
+from scanfab.kernels.strips import (
     BOUND,
     END,
     FAR,
     GAP_END,
     GAP_START,
     SET,
-    Flag,
-    Measured,
     Sphere,
     Strip,
     columns_of_row,
-    moved,
     span,
-    whole_gap,
 )
+from scanfab.kernels.sweep import Measured, moved, whole_gap
 
 __all__ = [
     "BLOCKS",

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 import numba
 import numpy as np
 from llvmlite.binding import get_host_cpu_name
 
-__all__ = ["LANES", "ZERO", "inner", "kernel"]
+__all__ = ["LANES", "REORDERED", "ZERO", "Flag", "inner", "kernel"]
 
 # numbers that the compiler's vector instructions take at a time: 256 bits of them, also on
 # processors that have wider ones, but for these
@@ -20,6 +20,12 @@ njit: Any = numba.njit
 
 # a kernel that gets a plain 0 from another is compiled once more, for this number alone
 ZERO: int = np.int64(0)  # type: ignore[assignment]
+
+# what lets the compiler make vector instructions of a loop with sums: any order of the terms
+REORDERED = {"reassoc", "contract"}
+
+# an argument that is there or not: for each choice a kernel is compiled with nothing else in it
+Flag = Literal[True] | None
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

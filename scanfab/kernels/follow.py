@@ -8,7 +8,8 @@ import numpy.typing as npt
 from scanfab.kernels.bins import HIGH, LOW, Bins, add_line, room_for_gaps
 from scanfab.kernels.compiled import inner
 from scanfab.kernels.periodic import CellGrains, Prism, cross, dot, shifts
-from scanfab.kernels.sweep import BOUND, CHANNELS, END, FAR, KEPT, LENGTH, SET, VOID, WHOLE, Strip
+from scanfab.kernels.strips import BOUND, END, FAR, SET, Strip
+from scanfab.kernels.sweep import CHANNELS, KEPT, LENGTH, VOID, WHOLE
 
 __all__ = ["follow"]
 

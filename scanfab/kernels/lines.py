@@ -6,21 +6,10 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.kernels.bins import HIGH, LOW, Bins, add_line, room_for_gaps
-from scanfab.kernels.compiled import ZERO, inner
+from scanfab.kernels.compiled import ZERO, Flag, inner
 from scanfab.kernels.projection import Spheres, number_from, sort_by, sphere_at
-from scanfab.kernels.sweep import (
-    BOUND,
-    END,
-    FAR,
-    SET,
-    Flag,
-    Measured,
-    Strip,
-    add,
-    counted,
-    moved,
-    span,
-)
+from scanfab.kernels.strips import BOUND, END, FAR, SET, Strip, span
+from scanfab.kernels.sweep import Measured, add, counted, moved
 
 __all__ = ["solve_closed"]
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from scanfab.kernels.compiled import ZERO, inner
 from scanfab.kernels.grid import Grid
-from scanfab.kernels.sweep import Sphere, span
+from scanfab.kernels.strips import Sphere, span
 
 __all__ = [
     "Spheres",

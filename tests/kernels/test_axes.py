@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from scanfab.kernels import axes, sweep
+from scanfab.kernels import axes, strips, sweep
 from scanfab.kernels.bins import no_bins
 from scanfab.kernels.compiled import LANES
 from scanfab.kernels.grid import cover, strip_of
@@ -172,9 +172,9 @@ def closed_lines(position, radius, frame, grid, window):
     projected = project(position, radius, np.zeros(radius.size, np.bool_), frame, grid)
     pitch = grid.columns + LANES
     strip = strip_of(grid, 0, grid.rows, pitch)
-    state, tally = np.empty(sweep.STATE_SIZE), np.zeros((2, sweep.TALLY_SIZE))
+    state, tally = np.empty(strips.STATE_SIZE), np.zeros((2, sweep.TALLY_SIZE))
     every = np.arange(projected.u.size)
-    sweep.begin(state, strip, window, None, True)
+    strips.begin(state, strip, window, None, True)
     axes.visit_all(state, strip, projected, every, window, 1e-300, tally, None, True, True, None)
     return sweep.settle(state, strip, 0, 1e-300, tally, True, True, None)
 
@@ -189,7 +189,7 @@ def suspect_lines(spheres, frame, offset, spacing, window):
     position, radius = spheres
     reach = np.linalg.norm(position, axis=1).max() + radius.max() + window
     grid = square_grid(reach, offset, spacing)
-    assert grid.rows * (grid.columns + LANES) <= sweep.MOST_LINES
+    assert grid.rows * (grid.columns + LANES) <= strips.MOST_LINES
     return closed_lines(position, radius, np.ascontiguousarray(frame), grid, window)
 
 
@@ -282,7 +282,7 @@ def test_rows_that_fit_no_strip_are_cut():
     position = np.array([[-700.0, 0, 0], [0, 0, 0], [700, 0, 1], [0.5, 0, 5]])
     spheres = position, np.array([3.0, 2, 3, 2])
     grid = np.eye(3), np.array([0.3, 0.4])
-    assert sweep.MOST_LINES < 1400 / 0.05
+    assert strips.MOST_LINES < 1400 / 0.05
     fine = fast_tallies(spheres, np.zeros(4, bool), *grid, 0.05, 0.1, 2.0)[0]
     near = position[[1, 3]], spheres[1][[1, 3]]
     fine_near = fast_tallies(near, np.zeros(2, bool), *grid, 0.05, 0.1, 2.0)[0]
