@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from itertools import product
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import numpy.typing as npt
@@ -15,14 +15,16 @@ from scanfab.cell import Cell
 from scanfab.contact_list import ContactList, Contacts, Spheres, resolve_contacts
 from scanfab.errors import PackingError
 
-__all__ = ["ContactList", "Contacts", "LazyColumns", "Packing", "lies_within"]
+__all__ = ["MOST", "ContactList", "Contacts", "LazyColumns", "Packing", "lies_within"]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 
-# no radius is smaller: its cube is still a number
-LEAST = 1e-100
+# no radius is smaller, no length larger: their cubes are still numbers
+LEAST, MOST = 1e-100, 1e100
+# rows that fit into a cache; longer temporary arrays take more time than what is done with them
+PART = 1 << 15
 
 
 class LazyColumns(MutableMapping[str, npt.NDArray[Any]]):
@@ -207,10 +209,8 @@ class Packing:
 
 def _wall_contacts(values: npt.ArrayLike | None, count: int) -> IntArray:
     if values is None:
-        # memory that nobody has looked at yet costs nothing
-        numbers: IntArray = np.zeros(count, np.int64)
-        numbers.flags.writeable = False
-        return numbers
+        # one number, seen as many times
+        return np.broadcast_to(np.int64(0), count)
     numbers = cast("wall_contacts", values, np.int64, (count,))
     if np.any(numbers < 0):
         raise PackingError("wall_contacts: expected 0 or more for each grain")
@@ -223,32 +223,35 @@ def _cast_columns(columns: Mapping[str, npt.ArrayLike], count: int) -> dict[str,
 
 def _check_grains(position: FloatArray, radius: FloatArray, id: IntArray) -> None:
     """Finite numbers, positive radii, unique ids."""
-    # a sum is finite only if all its terms are, and one pass without a temporary array
-    with np.errstate(over="ignore", invalid="ignore"):
-        total = position.sum() + radius.sum()
-    if not (np.isfinite(total) or (np.isfinite(position).all() and np.isfinite(radius).all())):
-        infinite = ~(np.isfinite(position).all(axis=1) & np.isfinite(radius))
-        raise PackingError(
-            f"{grains_named(id, infinite)}: position and radius must be finite numbers, found "
-            f"{_values(position, radius, infinite)}"
-        )
-    least = radius.min(initial=np.inf)
-    if least <= 0:
-        raise PackingError(
-            f"{grains_named(id, radius <= 0)}: the radius must be larger than zero, found "
-            f"{_values(position, radius, radius <= 0)}"
-        )
-    if least < LEAST:
-        raise PackingError(
-            f"{grains_named(id, radius < LEAST)}: a radius below {LEAST:g} cannot be a length, "
-            f"found {_values(position, radius, radius < LEAST)}"
-        )
+    if not (_all_within(position, -MOST, MOST) and _all_within(radius, LEAST, MOST)):
+        _refuse_grains(position, radius, id)
     if not _are_unique(id):
         unique, counts = np.unique(id, return_counts=True)
         raise PackingError(
             f"the id {unique[np.argmax(counts > 1)]} occurs twice: "
             f"{unique.size} ids for {id.size} grains"
         )
+
+
+def _all_within(values: FloatArray, least: float, most: float) -> bool:
+    """Whether all are numbers between these; without a temporary array."""
+    return values.size == 0 or bool(values.min() >= least and values.max() <= most)
+
+
+def _refuse_grains(position: FloatArray, radius: FloatArray, id: IntArray) -> NoReturn:
+    """Say what is wrong with the first wrong grain."""
+    finite = np.isfinite(position).all(axis=1) & np.isfinite(radius)
+    large = (np.abs(position) > MOST).any(axis=1) | (radius > MOST)
+    reasons = [
+        (~finite, "position and radius must be finite numbers"),
+        (radius <= 0, "the radius must be larger than zero"),
+        (radius < LEAST, f"a radius below {LEAST:g} cannot be a length"),
+        (large, f"a number above {MOST:g} cannot be a length"),
+    ]
+    wrong, reason = next((wrong, reason) for wrong, reason in reasons if wrong.any())
+    raise PackingError(
+        f"{grains_named(id, wrong)}: {reason}, found {_values(position, radius, wrong)}"
+    )
 
 
 def _values(position: FloatArray, radius: FloatArray, wrong: npt.NDArray[np.bool_]) -> str:
@@ -266,5 +269,6 @@ def _are_unique(id: IntArray) -> bool:
     if high - low >= 8 * id.size:
         return bool(np.unique(id).size == id.size)
     seen = np.zeros(high - low + 1, np.bool_)
-    seen[id - low] = True
+    for start in range(0, id.size, PART):
+        seen[id[start : start + PART] - low] = True
     return bool(np.count_nonzero(seen) == id.size)

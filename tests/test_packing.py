@@ -53,6 +53,12 @@ def test_positions_and_radii_are_finite_and_the_grain_is_named(wrong):
         Packing(ROW, [1, wrong, 1], id=[10, 20, 30])
 
 
+@pytest.mark.parametrize("wrong", [1e101, -1e101])
+def test_numbers_whose_cube_is_none_are_refused(wrong):
+    with pytest.raises(PackingError, match=r"grain 20: .* cannot be a length"):
+        Packing([ROW[0], [0, wrong, 0], ROW[2]], 1.0, id=[10, 20, 30])
+
+
 @pytest.mark.parametrize("wrong", [0.0, -1.0])
 def test_radii_are_above_zero_and_the_grains_are_named(wrong):
     with pytest.raises(PackingError, match="grain 30: the radius must be larger than zero"):

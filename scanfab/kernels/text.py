@@ -18,12 +18,13 @@ PIECE = 240
 @kernel
 def count_spaces(text: npt.NDArray[np.uint8]) -> tuple[int, int, int]:
     """
-    White space behind the first byte.
+    White space of a text that begins behind a line end.
 
     How many bytes of it there are, how many of these follow another, and how many of those are line
     ends that follow a blank.
     """
-    spaces = pairs = ends = np.int64(0)
+    spaces = pairs = np.int64(text.size > 0 and text[0] <= BLANK)
+    ends = np.int64(0)
     for start in range(0, text.size - 1, PIECE):
         some = more = most = np.uint8(0)
         for k in range(np.uint64(start), np.uint64(min(start + PIECE, text.size - 1))):

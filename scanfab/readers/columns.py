@@ -16,10 +16,9 @@ from scanfab.packing import LazyColumns, lies_within
 from scanfab.readers.base import GrainTable, ReadOptions
 
 __all__ = [
-    "MOST",
     "grain_table",
     "has_radius",
-    "needed_columns",
+    "room_for_columns",
     "user_cell",
     "whole_numbers",
 ]
@@ -34,9 +33,7 @@ ID_NAMES = ("id", "ids", "particle_id", "particleid", "body_id", "bodyid")
 # coordinates in the order of preference, and whether they are fractions of the box
 POSITION_NAMES = (("x y z", False), ("xu yu zu", False), ("xs ys zs", True), ("xsu ysu zsu", True))
 
-# no length is larger: the cubes of this one are still numbers
-MOST = 1e100
-# nor is a grain so many cells away from a periodic cell
+# no grain is further from a periodic cell, in cells
 MOST_TURNS = 1e9
 
 
@@ -46,15 +43,32 @@ def has_radius(names: Sequence[str]) -> bool:
     return bool(lower & {*RADIUS_NAMES, *DIAMETER_NAMES})
 
 
-def needed_columns(names: Sequence[str], options: ReadOptions) -> dict[str, type]:
-    """Those of a dump's columns that :func:`grain_table` or most users ask for, and their types."""
-    places = {place for names, _ in POSITION_NAMES for place in names.split()}
-    known = {*places, *RADIUS_NAMES, *DIAMETER_NAMES, *ID_NAMES, *CLASS_COLUMNS}
-    own = set(options.columns.values())
-    needed = [name for name in names if name.lower() in known or name in own]
-    types: dict[str, type] = dict.fromkeys(needed, float)
-    id = options.columns.get("id", _first_of(ID_NAMES, names))
-    return types | {name: int for name in types if name == id}
+def room_for_columns(
+    options: ReadOptions, names: Sequence[str], count: int
+) -> dict[str, npt.NDArray[Any]]:
+    """
+    Empty arrays for those of a dump's columns that :func:`grain_table` or most users ask for.
+
+    Coordinates are columns of one array.
+    """
+    coordinates = {name for system, _ in POSITION_NAMES for name in system.split()}
+    known = {*coordinates, *RADIUS_NAMES, *DIAMETER_NAMES, *ID_NAMES, *CLASS_COLUMNS}
+    own = options.columns
+    id = own.get("id", _first_of(ID_NAMES, names))
+    room: dict[str, npt.NDArray[Any]] = {
+        name: np.empty(count, np.int64 if name == id else np.float64)
+        for name in names
+        if name.lower() in known or name in own.values()
+    }
+    for system, _ in POSITION_NAMES:
+        found = [
+            own.get(axis, _first_of((name,), names))
+            for axis, name in zip("xyz", system.split(), strict=True)
+        ]
+        chosen = [name for name in found if name and name in room]
+        if len(chosen) == 3:
+            return room | dict(zip(chosen, np.empty((count, 3)).T, strict=True))
+    return room
 
 
 def grain_table(
@@ -144,7 +158,7 @@ def _position(
     path: Path, rest: MutableMapping[str, Any], named: dict[str, Any], cell: Cell | None, where: str
 ) -> FloatArray:
     if "position" in rest:
-        return _lengths(path, rest.pop("position"), "a coordinate", where)
+        return _numbers(path, rest.pop("position"), "a coordinate", where)
     for names, scaled in POSITION_NAMES:
         found = [
             named[axis] if axis in named else _take(rest, (name,), keep=True)
@@ -154,14 +168,13 @@ def _position(
             continue
         for name in names.split():
             _take(rest, (name,))
-        position = np.column_stack(
-            [_lengths(path, column, "a coordinate", where) for column in found]
-        )
+        position = _numbers(path, _together(found), "a coordinate", where)
         if not scaled:
             return position
         if cell is None:
             raise ReadError(f"{path}{where}: {names} are fractions of a box, but there is no box")
-        with np.errstate(invalid="ignore"):  # what is not finite is the packing's to refuse
+        # what is not finite is the packing's to refuse
+        with np.errstate(over="ignore", invalid="ignore"):
             return np.asarray(cell.origin + position @ cell.vectors)
     raise ReadError(
         f"{path}{where}: no coordinates: expected the columns x y z (or xu yu zu, xs ys zs), "
@@ -169,11 +182,22 @@ def _position(
     )
 
 
+def _together(columns: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
+    """Columns as one array of shape (N, 3): that of which they are the columns, if there is one."""
+    whole = columns[0].base
+    if isinstance(whole, np.ndarray) and whole.shape == (len(columns[0]), 3):
+        places = [(column.ctypes.data, column.dtype) for column in columns]
+        if places == [(column.ctypes.data, column.dtype) for column in whole.T]:
+            return whole
+    return np.column_stack(columns)
+
+
 def _refuse_far(path: Path, position: FloatArray, cell: Cell | None, where: str) -> None:
     """An error if rounding would be all that is left of a position once it is in the cell."""
-    if cell is None or lies_within(cell, position, -MOST_TURNS, MOST_TURNS):
-        return
-    turns = np.abs(cell.fractional(position[np.isfinite(position).all(axis=1)]))
+    with np.errstate(over="ignore", invalid="ignore"):
+        if cell is None or lies_within(cell, position, -MOST_TURNS, MOST_TURNS):
+            return
+        turns = np.abs(cell.fractional(position[np.isfinite(position).all(axis=1)]))
     if np.any(turns > MOST_TURNS):
         raise ReadError(
             f"{path}{where}: a grain is {turns.max():g} cells away from the cell: has the cell the "
@@ -197,13 +221,13 @@ def _radius(
             )
         return np.full(count, options.radius)
     if "radius" in named:
-        return _lengths(path, named["radius"], "a radius", where)
+        return _numbers(path, named["radius"], "a radius", where)
     radius = _take(rest, RADIUS_NAMES)
     if radius is not None:
-        return _lengths(path, radius, "a radius", where)
+        return _numbers(path, radius, "a radius", where)
     diameter = _take(rest, DIAMETER_NAMES)
     if diameter is not None:
-        return 0.5 * _lengths(path, diameter, "a diameter", where)
+        return 0.5 * _numbers(path, diameter, "a diameter", where)
     raise ReadError(
         f"{path}{where}: no radius: expected a column radius (or diameter), found "
         f"{', '.join(rest) or 'none'}; name it with --columns radius=..., or give one radius for "
@@ -228,25 +252,28 @@ def _first_of(known: Sequence[str], names: Sequence[str]) -> str | None:
 def whole_numbers(path: Path, values: npt.ArrayLike, where: str = "") -> npt.NDArray[np.int64]:
     """Ids as whole numbers; ReadError if they are not."""
     numbers = np.asarray(values)
-    if numbers.dtype.kind not in "biuf" or numbers.ndim != 1:
+    if numbers.ndim != 1 or not _are_whole(numbers):
         raise ReadError(f"{path}{where}: ids must be whole numbers")
-    # a larger one has more digits than a double or an int64 holds; comparisons with NaN are false
-    sound = numbers.size == 0 or (numbers.min() > -(2.0**62) and numbers.max() < 2.0**62)
-    whole = numbers.astype(np.int64, copy=False) if sound else np.zeros(0, np.int64)
-    if not sound or np.any(whole != numbers):
-        raise ReadError(f"{path}{where}: ids must be whole numbers")
+    whole = numbers.astype(np.int64, copy=False)
     whole.flags.writeable = False  # so that the packing need not copy it
     return whole
 
 
-def _lengths(path: Path, values: npt.ArrayLike, what: str, where: str) -> FloatArray:
-    """Numbers that may be lengths; those that are not finite are the packing's to refuse."""
+def _are_whole(numbers: npt.NDArray[Any]) -> bool:
+    if numbers.dtype == np.int64 or numbers.size == 0:
+        return True
+    # a larger one has more digits than a double or an int64 holds; comparisons with NaN are false
+    return bool(
+        numbers.dtype.kind in "biuf"
+        and numbers.min() > -(2.0**62)
+        and numbers.max() < 2.0**62
+        and np.all(numbers == numbers.astype(np.int64))
+    )
+
+
+def _numbers(path: Path, values: npt.ArrayLike, what: str, where: str) -> FloatArray:
+    """Numbers that may be lengths; which of them cannot be is the packing's to say."""
     array = np.asarray(values)
     if array.dtype.kind not in "biuf":
         raise ReadError(f"{path}{where}: expected numbers for {what}, found {array.dtype}")
-    lengths = array.astype(np.float64, copy=False)
-    # two passes without a temporary array settle it for sound dumps
-    usual = lengths.size == 0 or (lengths.min() >= -MOST and lengths.max() <= MOST)
-    if not usual and np.any(np.isfinite(lengths) & (np.abs(lengths) > MOST)):
-        raise ReadError(f"{path}{where}: {what} above {MOST:g} cannot be a length")
-    return lengths
+    return array.astype(np.float64, copy=False)

@@ -10,7 +10,7 @@ import io
 import mmap
 import re
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -112,19 +112,21 @@ def read_block(snapshot: Snapshot) -> DumpBlock:
     """
     where, sections, body = _header(snapshot)
     count = _count(where, sections)
-    columns = _regular(snapshot, body, count, dict.fromkeys(range(len(body.names)), float))
-    values = _tolerant(snapshot, body, count) if columns is None else np.column_stack(columns)
+    table = _long_table(snapshot, body, count)
+    values = np.empty((0 if table is None else count, len(body.names)))
+    if table is None or not read_regular(table, dict(enumerate(values.T))):
+        values = _tolerant(snapshot, body, count)
     return DumpBlock(snapshot.step, snapshot.time, dump_cell(where, sections), body.names, values)
 
 
 def read_columns(
-    snapshot: Snapshot, needed: Callable[[Sequence[str]], Mapping[str, type]]
+    snapshot: Snapshot, room: Callable[[Sequence[str], int], dict[str, npt.NDArray[Any]]]
 ) -> tuple[LazyColumns, Cell | None]:
     """
     The columns of a snapshot by name, and its cell; of repeated names the first counts.
 
-    Of a large snapshot only the columns are parsed that ``needed`` chooses from their names, with
-    their types; the others wait until they are asked for.
+    Of a large snapshot only the columns are parsed for which ``room`` makes arrays, from the names
+    of all and the number of rows; the others wait until they are asked for.
 
     Raises
     ------
@@ -133,21 +135,23 @@ def read_columns(
     """
     where, sections, body = _header(snapshot)
     count, cell = _count(where, sections), dump_cell(where, sections)
-    chosen = needed(body.names)
-    found = _regular(snapshot, body, count, {body.names.index(n): t for n, t in chosen.items()})
-    if found is None:
+    table = _long_table(snapshot, body, count)
+    ready = {} if table is None else room(body.names, count)
+    places = {body.names.index(name): column for name, column in ready.items()}
+    if table is None or not read_regular(table, places):
         values = _tolerant(snapshot, body, count)
         ready = {name: values[:, body.names.index(name)] for name in body.names}
-    else:
-        ready = dict(zip(chosen, found, strict=True))
     return LazyColumns(body.names, ready, partial(_read_column, snapshot)), cell
 
 
 def _read_column(snapshot: Snapshot, name: str) -> FloatArray:
     where, sections, body = _header(snapshot)
     count, place = _count(where, sections), body.names.index(name)
-    found = _regular(snapshot, body, count, {place: float})
-    return _tolerant(snapshot, body, count)[:, place] if found is None else found[0]
+    table = _long_table(snapshot, body, count)
+    values = np.empty(0 if table is None else count)
+    if table is None or not read_regular(table, {place: values}):
+        values = _tolerant(snapshot, body, count)[:, place]
+    return values
 
 
 @dataclass(frozen=True)
@@ -169,10 +173,8 @@ def _header(snapshot: Snapshot) -> tuple[str, dict[str, list[str]], _Body]:
     return where, *_sections(where, head)
 
 
-def _regular(
-    snapshot: Snapshot, body: _Body, count: int, types: Mapping[int, type]
-) -> list[npt.NDArray[Any]] | None:
-    """Columns of a large snapshot with one blank between two words; None if it is not so."""
+def _long_table(snapshot: Snapshot, body: _Body, count: int) -> TextTable | None:
+    """Where the rows of a large snapshot stand; None if it is small or cannot have so many."""
     path = plain(snapshot.path)
     stop = path.stat().st_size if snapshot.stop is None else snapshot.stop
     start = snapshot.start + body.start
@@ -180,7 +182,7 @@ def _regular(
     possible = body.names and 2 * count * len(body.names) <= stop - start
     if not possible or stop - start < LARGE:
         return None
-    return read_regular(TextTable(path, start, stop, len(body.names), count), types)
+    return TextTable(path, start, stop, len(body.names), count)
 
 
 def _tolerant(snapshot: Snapshot, body: _Body, count: int) -> FloatArray:

@@ -6,7 +6,7 @@ import re
 from functools import partial
 
 from scanfab.readers.base import FileKind, GrainTable, ReadOptions, Snapshot
-from scanfab.readers.columns import grain_table, has_radius, needed_columns
+from scanfab.readers.columns import grain_table, has_radius, room_for_columns
 from scanfab.readers.dump import read_columns, row_word
 
 __all__ = ["dump_kind", "read_dump_grains"]
@@ -23,5 +23,5 @@ def dump_kind(head: bytes) -> FileKind:
 
 def read_dump_grains(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
     """Columns in any order and any subset that suffices; of repeated names the first counts."""
-    columns, cell = read_columns(snapshot, partial(needed_columns, options=options))
+    columns, cell = read_columns(snapshot, partial(room_for_columns, options))
     return grain_table(snapshot.path, columns, cell, options, f", step {snapshot.step}")

@@ -9,9 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.errors import ReadError
-from scanfab.packing import ContactList
+from scanfab.packing import MOST, ContactList
 from scanfab.readers.base import GrainTable, JoinedContacts
-from scanfab.readers.columns import MOST
 
 __all__ = ["count_walls", "join_ids", "join_positions", "rows_of_ids"]
 

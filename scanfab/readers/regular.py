@@ -7,10 +7,10 @@ parser of the format, which reads it or says what is wrong in which line.
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +21,10 @@ __all__ = ["LARGE", "TextTable", "read_regular"]
 
 # bytes; a smaller table is parsed before polars is loaded
 LARGE = 8 << 20
-# bytes before the first row, up to which a table is parsed where it lies
-HEADER = 1 << 16
+# bytes that are parsed at a time: the memory of one piece serves the next, which is faster than new
+PIECE = 16 << 20
+# pieces on their way: while polars parses one in several threads, others are read, counted, copied
+WORKERS = 4
 
 
 @dataclass(frozen=True)
@@ -40,9 +42,9 @@ class TextTable:
     """Number of rows."""
 
 
-def read_regular(table: TextTable, types: Mapping[int, type]) -> list[npt.NDArray[Any]] | None:
+def read_regular(table: TextTable, columns: Mapping[int, npt.NDArray[Any]]) -> bool:
     """
-    Some columns of a table; None if it is not regular.
+    Some columns of a table; False if it is not regular.
 
     Every number is the double nearest to the text, as Python's float() has it, or just the whole
     number that the text is.
@@ -51,64 +53,85 @@ def read_regular(table: TextTable, types: Mapping[int, type]) -> list[npt.NDArra
     ----------
     table : TextTable
         What to read.
-    types : mapping of int to type
-        The columns, from 0, and what they are to be: ``float`` or ``int``.
-
-    Returns
-    -------
-    list of ndarray or None
-        An array of shape (count,) for each column.
+    columns : mapping of int to ndarray
+        Where the columns, from 0, are to be put: each of shape (count,), float64 or int64.
     """
     behind = _ends_with_blank(table)
-    with ThreadPoolExecutor(1) as pool:
-        # kernels and polars both let go of Python's lock
-        spaces = pool.submit(_count_spaces, table)
-        columns = _parse(table, types, behind)
-        blanks_at_ends = table.count * behind
-        expected = table.count * (table.width + behind), blanks_at_ends, blanks_at_ends
-        return columns if spaces.result() == expected else None
+    kinds = {place: column.dtype for place, column in columns.items()}
+    rows = 0
+    with ThreadPoolExecutor(WORKERS) as pool:
+        for frame in pool.map(partial(_read_piece, table, kinds, behind), _pieces(table)):
+            if frame is None or rows + frame.height > table.count:
+                return False
+            for place, column in columns.items():
+                _put(frame[f"{place}"].get_chunks(), column[rows : rows + frame.height])
+            rows += frame.height
+    return rows == table.count
 
 
-def _count_spaces(table: TextTable) -> tuple[int, int, int]:
+def _put(parts: list[Any], column: npt.NDArray[Any]) -> None:
+    """Series of polars one behind the other into an array."""
+    start = 0
+    for part in parts:
+        column[start : start + len(part)] = part.to_numpy()
+        start += len(part)
+
+
+def _pieces(table: TextTable) -> Iterator[tuple[int, int]]:
+    """First bytes, and those behind the last, of parts of the table that are whole lines."""
+    start = table.start
+    with open(table.path, "rb") as file:
+        while start < table.stop:
+            place = file.seek(start + PIECE)
+            stop = min(place + len(file.readline()), table.stop)
+            yield start, stop
+            start = stop
+
+
+def _read_piece(
+    table: TextTable, kinds: Mapping[int, np.dtype[Any]], behind: bool, piece: tuple[int, int]
+) -> Any:
     """
-    How much white space there is, how often it follows other, and how often lines end in a blank.
+    The columns of some lines; None if they are not regular.
 
     If no two blanks stand together but at the end of each line, the words that polars sees are
     those of the line. If besides there are just as many as there should be, and no line lacks its
     last word, no line has a word more either.
     """
-    from scanfab.kernels.text import LINE_END, count_spaces
+    from scanfab.kernels.text import count_spaces
 
-    file = np.memmap(table.path, np.uint8, "r").view(np.ndarray)
-    # from the line end before the first row
-    text = file[table.start - 1 : table.stop]
+    start, stop = piece
+    with open(table.path, "rb") as file:
+        file.seek(start)
+        text = file.read(stop - start)
     # a last line without its end may lack digits
-    return count_spaces(text) if text[-1] == LINE_END else (-1, -1, -1)
+    frame = _parse(text, table.width, kinds, behind) if text.endswith(b"\n") else None
+    if frame is None:
+        return None
+    rows = frame.height
+    blanks_at_ends = rows * behind
+    expected = rows * (table.width + behind), blanks_at_ends, blanks_at_ends
+    return frame if count_spaces(np.frombuffer(text, np.uint8)) == expected else None
 
 
-def _parse(
-    table: TextTable, types: Mapping[int, type], behind: bool
-) -> list[npt.NDArray[Any]] | None:
+def _parse(text: bytes, width: int, kinds: Mapping[int, np.dtype[Any]], behind: bool) -> Any:
     """The columns as polars sees them; None if a line has too few, or a word is no such number."""
     import polars
 
-    names = [f"{place}" for place in range(table.width)]
+    names = [f"{place}" for place in range(width)]
     schema: dict[str, Any] = dict.fromkeys(names, polars.Float64)
-    schema |= {names[place]: polars.Int64 for place, kind in types.items() if kind is int}
+    schema |= {names[place]: polars.Int64 for place, kind in kinds.items() if kind == np.int64}
     if behind:
         schema["behind"] = polars.String
-    wanted = list(dict.fromkeys([*(names[place] for place in types), names[-1]]))
-    source, lines_before = _source(table)
+    wanted = list(dict.fromkeys([*(names[place] for place in kinds), names[-1]]))
     try:
         frame = (
             polars.scan_csv(
-                source,
+                text,
                 has_header=False,
                 separator=" ",
                 quote_char=None,
                 schema=schema,
-                skip_lines=lines_before,
-                n_rows=table.count,
                 encoding="utf8-lossy",  # numbers are none, and nothing else is kept
                 truncate_ragged_lines=True,  # blanks are counted elsewhere
                 glob=False,
@@ -118,13 +141,7 @@ def _parse(
         )
     except polars.exceptions.PolarsError:
         return None
-    if frame.height < table.count or any(frame.null_count().row(0)):
-        return None
-    # memory of numpy's own comes in large pages, which is faster, and can be kept as it is
-    return [
-        np.concatenate([chunk.to_numpy() for chunk in frame[names[place]].get_chunks()])
-        for place in types
-    ]
+    return None if any(frame.null_count().row(0)) else frame
 
 
 def _ends_with_blank(table: TextTable) -> bool:
@@ -132,13 +149,3 @@ def _ends_with_blank(table: TextTable) -> bool:
     with open(table.path, "rb") as file:
         file.seek(table.start)
         return file.readline().endswith(b" \n")
-
-
-def _source(table: TextTable) -> tuple[Path | bytes, int]:
-    """Where polars finds the rows, and how many lines there are before them."""
-    with open(table.path, "rb") as file:
-        if table.start <= HEADER and table.stop == os.path.getsize(table.path):
-            return table.path, file.read(table.start).count(b"\n")
-        # a part of a file has to be taken out
-        file.seek(table.start)
-        return file.read(table.stop - table.start), 0

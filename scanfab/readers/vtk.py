@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from scanfab.cell import Cell
 from scanfab.errors import ReadError
-from scanfab.packing import ContactList
+from scanfab.packing import MOST, ContactList
 from scanfab.readers.base import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
-from scanfab.readers.columns import MOST, grain_table, has_radius, whole_numbers
+from scanfab.readers.columns import grain_table, has_radius, whole_numbers
 from scanfab.readers.files import bare_name, plain
 from scanfab.readers.join import join_ids, join_positions
 from scanfab.readers.mesh import Mesh, form_of, read_bounds, read_mesh

@@ -13,8 +13,9 @@ import numpy.typing as npt
 
 from scanfab.cell import Cell
 from scanfab.errors import PackingError, ReadError
+from scanfab.packing import MOST
 from scanfab.readers.base import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
-from scanfab.readers.columns import MOST, grain_table
+from scanfab.readers.columns import grain_table
 from scanfab.readers.files import first_bytes, plain
 from scanfab.readers.mesh import Mesh
 from scanfab.readers.numbers import rows_of_numbers

@@ -12,8 +12,9 @@ import numpy.typing as npt
 
 from scanfab.cell import Cell
 from scanfab.errors import PackingError, ReadError
+from scanfab.packing import MOST
 from scanfab.readers.base import GrainTable, ReadOptions, Snapshot
-from scanfab.readers.columns import MOST, grain_table, whole_numbers
+from scanfab.readers.columns import grain_table, whole_numbers
 from scanfab.readers.files import first_bytes, plain
 from scanfab.readers.join import join_ids
 

@@ -10,9 +10,9 @@ from tests.uncompiled import run_uncompiled
 
 
 def counted(text):
-    """In plain words: spaces behind the first byte, those that follow another, and ' \\n'."""
-    spaces = [place for place in range(1, len(text)) if text[place] in b" \t\r\n\v\f"]
-    follow = sum(text[place - 1] in b" \t\r\n\v\f" for place in spaces)
+    """In plain words: spaces, those that follow another or begin the text, and ' \\n'."""
+    spaces = [place for place, byte in enumerate(text) if byte in b" \t\r\n\v\f"]
+    follow = sum(place == 0 or text[place - 1] in b" \t\r\n\v\f" for place in spaces)
     return len(spaces), follow, text.count(b" \n")
 
 
@@ -29,12 +29,13 @@ def assert_counts_are_right(size, seed):
 
 @pytest.mark.parametrize("seed", range(20))
 def test_white_space_is_counted(seed):
-    for size in (1, 2, PIECE - 1, PIECE, PIECE + 1, PIECE + 2, 3 * PIECE + 1, 2000):
+    for size in (0, 1, 2, PIECE - 1, PIECE, PIECE + 1, PIECE + 2, 3 * PIECE + 1, 2000):
         assert_counts_are_right(size, seed)
 
 
 def test_nothing_but_blanks_does_not_overflow():
-    assert count_spaces(np.full(10 * PIECE + 1, 32, np.uint8)) == (10 * PIECE, 10 * PIECE, 0)
+    size = 10 * PIECE + 1
+    assert count_spaces(np.full(size, 32, np.uint8)) == (size, size, 0)
 
 
 def test_white_space_is_counted_uncompiled():
