@@ -7,7 +7,10 @@ from pathlib import Path
 import click
 
 from scanfab.cli.main import COMMANDS, cli
-from scanfab.table import COLUMNS, MEANINGS
+from scanfab.compare import DIFFERENCE_MEANINGS, FRAME_MEANINGS, SUMMARY_MEANINGS
+from scanfab.inspection import REPORT_MEANINGS
+from scanfab.ladders import STEP_MEANINGS
+from scanfab.table import MEANINGS
 
 PAGE = Path(__file__).parent / "command-line.md"
 
@@ -26,6 +29,15 @@ smallest, mean and largest radius of the grains, without the boundary, in the fi
 series that has grains.
 """
 
+TABLES = {
+    "scanfab compute": MEANINGS,
+    "scanfab compare": FRAME_MEANINGS,
+    "scanfab compare --summary": SUMMARY_MEANINGS,
+    "scanfab compare --differences": DIFFERENCE_MEANINGS,
+    "scanfab calibrate": STEP_MEANINGS,
+    "scanfab inspect --json": REPORT_MEANINGS,
+}
+
 
 def help_of(name: str) -> str:
     """The help of one command, as a terminal of 100 columns shows it."""
@@ -41,12 +53,15 @@ def help_of(name: str) -> str:
 def page() -> str:
     """The whole page."""
     helps = [f"## scanfab {name}\n\n```text\n{help_of(name)}\n```\n" for name in COMMANDS]
-    rows = "\n".join(f"| `{name}` | {MEANINGS[name]} |" for name in COLUMNS)
-    columns = (
-        "## Columns of the table\n\nA value that does not exist is an empty cell.\n\n"
-        f"| column | what it holds |\n|---|---|\n{rows}\n"
-    )
-    return "\n".join([INTRODUCTION, *helps, columns])
+    columns = "## Columns\n\nA value that does not exist is an empty cell, in JSON null.\n"
+    tables = [table(command, meanings) for command, meanings in TABLES.items()]
+    return "\n".join([INTRODUCTION, *helps, columns, *tables])
+
+
+def table(command: str, meanings: dict[str, str]) -> str:
+    """What the columns of a command's table hold."""
+    rows = "\n".join(f"| `{name}` | {meaning} |" for name, meaning in meanings.items())
+    return f"### {command}\n\n| column | what it holds |\n|---|---|\n{rows}\n"
 
 
 if __name__ == "__main__":

@@ -13,7 +13,16 @@ import numpy.typing as npt
 from scanfab.errors import SettingsError
 from scanfab.fabric.jackknife import BLOCKS, jackknife_error
 
-__all__ = ["Comparison", "DifferenceRow", "FrameRow", "SummaryRow", "compare_tables"]
+__all__ = [
+    "DIFFERENCE_MEANINGS",
+    "FRAME_MEANINGS",
+    "SUMMARY_MEANINGS",
+    "Comparison",
+    "DifferenceRow",
+    "FrameRow",
+    "SummaryRow",
+    "compare_tables",
+]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -70,6 +79,41 @@ class DifferenceRow:
     difference_se: float | None
 
 
+FRAME_MEANINGS: dict[str, str] = {
+    "source": "as in the fabric table",
+    "frame": "as in the fabric table",
+    "strain": "as in the fabric table",
+    "variant": "as in the fabric table",
+    "alpha_vs_axial": "signed anisotropy of the void fabric along the loading axis",
+    "alpha_c_axial": "signed anisotropy of the contact fabric along the loading axis",
+    "alpha_vs_axial_norm": "alpha_vs_axial over its largest absolute value in the source's variant",
+    "alpha_c_axial_norm": "likewise",
+}
+SUMMARY_MEANINGS: dict[str, str] = {
+    "source": "as in the fabric table",
+    "variant": "as in the fabric table",
+    "frames": "number of frames that enter the fits",
+    "slope": "least-squares slope of alpha_vs_axial on alpha_c_axial, with an intercept",
+    "slope_origin": "that slope through the origin",
+    "r2": "R² of the fit with an intercept",
+    "slope_se": "standard error of the slope from the sample's octants, each left out in all "
+    "frames; empty if a frame has no values without octants",
+    "peak": "alpha_vs_axial where its absolute value is largest",
+    "peak_strain": "the strain there",
+    "final": "alpha_vs_axial of the last frame that has one",
+}
+DIFFERENCE_MEANINGS: dict[str, str] = {
+    "source": "as in the fabric table",
+    "frame": "as in the fabric table",
+    "strain": "as in the fabric table",
+    "variants": "the two variants, for instance a-b",
+    "difference": "alpha_vs_axial of the first minus that of the second",
+    "difference_se": "its standard error as if both scans were independent, which is too large "
+    "where they share lines",
+}
+"""What each column holds; anisotropies and strains are dimensionless."""
+
+
 @dataclass(frozen=True)
 class Comparison:
     """The tables that :func:`compare_tables` makes."""
@@ -95,14 +139,8 @@ def compare_tables(
     Returns
     -------
     Comparison
-        ``frames``: each anisotropy also divided by its group's largest absolute value.
-        ``summary``: ``slope`` is the least-squares slope of ``alpha_vs_axial`` on
-        ``alpha_c_axial`` with an intercept, ``slope_origin`` without; ``r2`` of the former;
-        ``slope_se`` is that of the sample: the scatter of the slopes when each of the eight octants
-        is left out in all frames; None if a frame has no values without octants.
-        ``peak`` is the largest ``alpha_vs_axial`` by absolute value, ``final`` the last one.
-        ``differences``: of ``alpha_vs_axial`` between two variants of a frame; the standard error
-        takes both scans as independent, which is too large where they share lines.
+        Rows for frames, for sources and variants, and for pairs of variants; what they hold is in
+        ``FRAME_MEANINGS``, ``SUMMARY_MEANINGS`` and ``DIFFERENCE_MEANINGS``.
 
     Raises
     ------

@@ -11,7 +11,7 @@ from scanfab.series import Frame, Series
 from scanfab.settings import Settings
 from scanfab.variants import VARIANTS, Sample
 
-__all__ = ["FrameReport", "inspect_series"]
+__all__ = ["REPORT_MEANINGS", "FrameReport", "inspect_series"]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -28,7 +28,6 @@ class FrameReport:
     radius_min: float | None
     radius_max: float | None
     contacts: int
-    """All that are listed (or found by geometry), those with boundary particles included."""
     contacts_from: str
     rattlers: int
     coordination: float | None
@@ -36,6 +35,28 @@ class FrameReport:
     periodic: list[bool] | None
     columns: list[str]
     warnings: list[str]
+
+
+REPORT_MEANINGS: dict[str, str] = {
+    "source": "the series as given",
+    "frame": "index in the series, from 0",
+    "step": "of the dump",
+    "time": "of the dump",
+    "format": "the reader",
+    "grains": "without boundary particles",
+    "boundary": "number of boundary particles",
+    "radius_min": "smallest radius of a grain",
+    "radius_max": "largest radius of a grain",
+    "contacts": "all that are listed or found by geometry, with boundary particles too",
+    "contacts_from": "file or geometric",
+    "rattlers": "grains with too few contacts",
+    "coordination": "mean number of contacts of a grain",
+    "cell": "the lattice vectors, by rows",
+    "periodic": "whether the sample repeats along each of them",
+    "columns": "what the dump says of each particle; what is not standard by its own name",
+    "warnings": "what is doubtful",
+}
+"""What each entry holds; lengths are in the dump's unit."""
 
 
 def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:

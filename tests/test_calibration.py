@@ -35,10 +35,6 @@ def ladder(found, name, variant="c"):
     return [row for row in found.rows if row.ladder == name and row.variant == variant]
 
 
-def test_every_column_has_a_meaning():
-    assert list(STEP_MEANINGS) == list(StepRow.__dataclass_fields__)
-
-
 def test_ladders_go_from_coarse_to_fine(found):
     assert [row.value for row in ladder(found, "spacing")] == [4, 2, 1, 0.5, 0.2, 0.1]
     directions = ladder(found, "directions")

@@ -8,6 +8,7 @@ import inspect
 import pkgutil
 import re
 import shutil
+from dataclasses import fields
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -16,10 +17,10 @@ import click
 import pytest
 
 import scanfab
+from scanfab import compare, inspection, ladders, table
 from scanfab.cli.main import COMMANDS, cli
 from scanfab.directions import RULES
 from scanfab.readers.registry import installed_readers
-from scanfab.table import COLUMNS, MEANINGS
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -56,8 +57,19 @@ def test_every_option_is_documented(name: str) -> None:
             assert not option.startswith("-") or option in text
 
 
-def test_every_column_has_a_meaning() -> None:
-    assert tuple(MEANINGS) == COLUMNS
+@pytest.mark.parametrize(
+    ("meanings", "row"),
+    [
+        (table.MEANINGS, table.Row),
+        (compare.FRAME_MEANINGS, compare.FrameRow),
+        (compare.SUMMARY_MEANINGS, compare.SummaryRow),
+        (compare.DIFFERENCE_MEANINGS, compare.DifferenceRow),
+        (ladders.STEP_MEANINGS, ladders.StepRow),
+        (inspection.REPORT_MEANINGS, inspection.FrameReport),
+    ],
+)
+def test_every_column_has_a_meaning(meanings: dict[str, str], row: type) -> None:
+    assert tuple(meanings) == tuple(field.name for field in fields(row))
 
 
 def test_every_reader_has_a_page() -> None:
