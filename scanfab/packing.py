@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from itertools import product
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,16 +14,22 @@ from scanfab.cast import cast, grains_named
 from scanfab.cell import Cell
 from scanfab.contact_list import ContactList, Contacts, Spheres, resolve_contacts
 from scanfab.errors import PackingError
+from scanfab.limits import LEAST, MOST, all_within
 
-__all__ = ["MOST", "ContactList", "Contacts", "LazyColumns", "Packing", "lies_within"]
+__all__ = [
+    "ContactList",
+    "Contacts",
+    "LazyColumns",
+    "Packing",
+    "check_lengths",
+    "lies_within",
+]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 
-# no radius is smaller, no length larger: their cubes are still numbers
-LEAST, MOST = 1e-100, 1e100
-# rows that fit into a cache; longer temporary arrays take more time than what is done with them
+# rows whose temporary array stays in a cache: a new one for all would take longer to come by
 PART = 1 << 15
 
 
@@ -120,8 +126,8 @@ class Packing:
     Raises
     ------
     PackingError
-        If a shape is wrong, a number is not finite, a radius is not positive, an id occurs twice,
-        or a contact names a row that does not exist.
+        If a shape is wrong, a number is not finite or above 1e100, a radius is not positive or
+        below 1e-100, an id occurs twice, or a contact names a row that does not exist.
 
     Examples
     --------
@@ -151,7 +157,8 @@ class Packing:
             "radius", np.full(count, radii) if radii.ndim == 0 else radii, np.float64, (count,)
         )
         self.id: IntArray = cast("id", np.arange(count) if id is None else id, np.int64, (count,))
-        _check_grains(centres, self.radius, self.id)
+        check_lengths(centres, self.radius, self.id)
+        _check_ids(self.id)
         turns: IntArray | None = None
         self.position: FloatArray = centres
         if cell is not None and not lies_within(cell, centres, 0.0, 1.0):
@@ -221,25 +228,10 @@ def _cast_columns(columns: Mapping[str, npt.ArrayLike], count: int) -> dict[str,
     return {name: cast(name, values, None, (count, ...)) for name, values in columns.items()}
 
 
-def _check_grains(position: FloatArray, radius: FloatArray, id: IntArray) -> None:
-    """Finite numbers, positive radii, unique ids."""
-    if not (_all_within(position, -MOST, MOST) and _all_within(radius, LEAST, MOST)):
-        _refuse_grains(position, radius, id)
-    if not _are_unique(id):
-        unique, counts = np.unique(id, return_counts=True)
-        raise PackingError(
-            f"the id {unique[np.argmax(counts > 1)]} occurs twice: "
-            f"{unique.size} ids for {id.size} grains"
-        )
-
-
-def _all_within(values: FloatArray, least: float, most: float) -> bool:
-    """Whether all are numbers between these; without a temporary array."""
-    return values.size == 0 or bool(values.min() >= least and values.max() <= most)
-
-
-def _refuse_grains(position: FloatArray, radius: FloatArray, id: IntArray) -> NoReturn:
-    """Say what is wrong with the first wrong grain."""
+def check_lengths(position: FloatArray, radius: FloatArray, id: IntArray) -> None:
+    """PackingError that names the first grain whose position or radius cannot be a length."""
+    if all_within(position, -MOST, MOST) and all_within(radius, LEAST, MOST):
+        return
     finite = np.isfinite(position).all(axis=1) & np.isfinite(radius)
     large = (np.abs(position) > MOST).any(axis=1) | (radius > MOST)
     reasons = [
@@ -252,6 +244,16 @@ def _refuse_grains(position: FloatArray, radius: FloatArray, id: IntArray) -> No
     raise PackingError(
         f"{grains_named(id, wrong)}: {reason}, found {_values(position, radius, wrong)}"
     )
+
+
+def _check_ids(id: IntArray) -> None:
+    """PackingError if an id occurs twice."""
+    if not _are_unique(id):
+        unique, counts = np.unique(id, return_counts=True)
+        raise PackingError(
+            f"the id {unique[np.argmax(counts > 1)]} occurs twice: "
+            f"{unique.size} ids for {id.size} grains"
+        )
 
 
 def _values(position: FloatArray, radius: FloatArray, wrong: npt.NDArray[np.bool_]) -> str:

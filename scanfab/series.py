@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -12,7 +13,7 @@ import numpy as np
 
 from scanfab.errors import PackingError, ReadError, ScanfabWarning
 from scanfab.families import Family
-from scanfab.packing import Packing
+from scanfab.packing import Packing, check_lengths
 from scanfab.readers.base import GrainTable, JoinedContacts, Reader, ReadOptions, Snapshot
 
 __all__ = ["Frame", "Series"]
@@ -51,6 +52,11 @@ class Frame:
         options = self.series.options
         files = self._contact_files()
         grains = self.reader.read_grains(self.snapshot, options)
+        if files:
+            # contacts are joined by lengths and ids: what is wrong with those comes first
+            with _named(self.snapshot.path):
+                id = np.arange(len(grains.radius)) if grains.id is None else grains.id
+                check_lengths(grains.position, grains.radius, id)
         joined = [reader.read_contacts(snapshot, options, grains) for reader, snapshot in files]
         listed = [part.contacts for part in joined if part.contacts is not None]
         with_own = self.series.contacts_from in ("auto", "grains")
@@ -64,7 +70,7 @@ class Frame:
                 f"{self.snapshot.path}: --contacts file was asked for, but there is no contact file"
             )
         step = self.name_step if self.snapshot.step is None else self.snapshot.step
-        try:
+        with _named(self.snapshot.path):
             return Packing(
                 grains.position,
                 grains.radius,
@@ -76,8 +82,6 @@ class Frame:
                 step=step,
                 time=self.snapshot.time,
             )
-        except PackingError as error:
-            raise PackingError(f"{self.snapshot.path}: {error}") from None
 
     def _contact_files(self) -> list[tuple[Reader, Snapshot]]:
         """The snapshots of the contact files that belong to this frame."""
@@ -161,6 +165,15 @@ class Series:
         """Every file that the frames come from."""
         for family in (self.grains, *self.contacts):
             yield from family.files.values()
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Let errors of a packing begin with its file."""
+    try:
+        yield
+    except PackingError as error:
+        raise PackingError(f"{path}: {error}") from None
 
 
 def _wall_contacts(grains: GrainTable, joined: list[JoinedContacts], with_own: bool) -> Any:

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from scanfab.kernels.compiled import kernel
 
-__all__ = ["BLANK", "LINE_END", "count_spaces"]
+__all__ = ["count_spaces"]
 
 # white space is what is not above a blank
 BLANK, LINE_END = 32, 10

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from scanfab.cell import Cell
 from scanfab.errors import PackingError, ReadError
-from scanfab.packing import MOST
+from scanfab.limits import MOST
 
 __all__ = ["box_of_bounds", "box_vectors", "dump_cell"]
 

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from scanfab.boundary import CLASS_COLUMNS
 from scanfab.cell import Cell
 from scanfab.errors import ReadError
+from scanfab.limits import all_within
 from scanfab.packing import LazyColumns, lies_within
 from scanfab.readers.base import GrainTable, ReadOptions
 
@@ -35,6 +36,8 @@ POSITION_NAMES = (("x y z", False), ("xu yu zu", False), ("xs ys zs", True), ("x
 
 # no grain is further from a periodic cell, in cells
 MOST_TURNS = 1e9
+# whole numbers below 2^53 are exact as decimals
+MOST_DECIMAL = 2.0**53 - 1.0
 
 
 def has_radius(names: Sequence[str]) -> bool:
@@ -45,30 +48,35 @@ def has_radius(names: Sequence[str]) -> bool:
 
 def room_for_columns(
     options: ReadOptions, names: Sequence[str], count: int
-) -> dict[str, npt.NDArray[Any]]:
+) -> tuple[dict[str, npt.NDArray[Any]], dict[str, npt.NDArray[Any]]]:
     """
     Empty arrays for those of a dump's columns that :func:`grain_table` or most users ask for.
 
-    Coordinates are columns of one array.
+    Returns them by the dump's names, where they are to be filled in, and by the names that
+    ``grain_table`` knows: coordinates are columns of one array, ``position``.
     """
     coordinates = {name for system, _ in POSITION_NAMES for name in system.split()}
     known = {*coordinates, *RADIUS_NAMES, *DIAMETER_NAMES, *ID_NAMES, *CLASS_COLUMNS}
     own = options.columns
     id = own.get("id", _first_of(ID_NAMES, names))
-    room: dict[str, npt.NDArray[Any]] = {
+    columns: dict[str, npt.NDArray[Any]] = {
         name: np.empty(count, np.int64 if name == id else np.float64)
         for name in names
         if name.lower() in known or name in own.values()
     }
-    for system, _ in POSITION_NAMES:
-        found = [
-            own.get(axis, _first_of((name,), names))
-            for axis, name in zip("xyz", system.split(), strict=True)
-        ]
-        chosen = [name for name in found if name and name in room]
-        if len(chosen) == 3:
-            return room | dict(zip(chosen, np.empty((count, 3)).T, strict=True))
-    return room
+    for system, scaled in POSITION_NAMES:
+        found = [_first_of((name,), names) for name in system.split()]
+        chosen = [name for name in found if name is not None]
+        if len(chosen) < 3:
+            continue
+        named = not set(own.values()) <= set(names) - set(chosen) or own.keys() & set("xyz")
+        if scaled or named:
+            break
+        position = np.empty((count, 3))
+        filled = columns | dict(zip(chosen, position.T, strict=True))
+        others = {name: column for name, column in columns.items() if name not in chosen}
+        return filled, others | {"position": position}
+    return columns, columns
 
 
 def grain_table(
@@ -158,7 +166,7 @@ def _position(
     path: Path, rest: MutableMapping[str, Any], named: dict[str, Any], cell: Cell | None, where: str
 ) -> FloatArray:
     if "position" in rest:
-        return _numbers(path, rest.pop("position"), "a coordinate", where)
+        return _lengths(path, rest.pop("position"), "a coordinate", where)
     for names, scaled in POSITION_NAMES:
         found = [
             named[axis] if axis in named else _take(rest, (name,), keep=True)
@@ -168,7 +176,7 @@ def _position(
             continue
         for name in names.split():
             _take(rest, (name,))
-        position = _numbers(path, _together(found), "a coordinate", where)
+        position = _lengths(path, np.column_stack(found), "a coordinate", where)
         if not scaled:
             return position
         if cell is None:
@@ -180,16 +188,6 @@ def _position(
         f"{path}{where}: no coordinates: expected the columns x y z (or xu yu zu, xs ys zs), "
         f"found {', '.join(rest) or 'none'}; name them with --columns x=...,y=...,z=..."
     )
-
-
-def _together(columns: Sequence[npt.NDArray[Any]]) -> npt.NDArray[Any]:
-    """Columns as one array of shape (N, 3): that of which they are the columns, if there is one."""
-    whole = columns[0].base
-    if isinstance(whole, np.ndarray) and whole.shape == (len(columns[0]), 3):
-        places = [(column.ctypes.data, column.dtype) for column in columns]
-        if places == [(column.ctypes.data, column.dtype) for column in whole.T]:
-            return whole
-    return np.column_stack(columns)
 
 
 def _refuse_far(path: Path, position: FloatArray, cell: Cell | None, where: str) -> None:
@@ -221,13 +219,13 @@ def _radius(
             )
         return np.full(count, options.radius)
     if "radius" in named:
-        return _numbers(path, named["radius"], "a radius", where)
+        return _lengths(path, named["radius"], "a radius", where)
     radius = _take(rest, RADIUS_NAMES)
     if radius is not None:
-        return _numbers(path, radius, "a radius", where)
+        return _lengths(path, radius, "a radius", where)
     diameter = _take(rest, DIAMETER_NAMES)
     if diameter is not None:
-        return 0.5 * _numbers(path, diameter, "a diameter", where)
+        return 0.5 * _lengths(path, diameter, "a diameter", where)
     raise ReadError(
         f"{path}{where}: no radius: expected a column radius (or diameter), found "
         f"{', '.join(rest) or 'none'}; name it with --columns radius=..., or give one radius for "
@@ -253,7 +251,9 @@ def whole_numbers(path: Path, values: npt.ArrayLike, where: str = "") -> npt.NDA
     """Ids as whole numbers; ReadError if they are not."""
     numbers = np.asarray(values)
     if numbers.ndim != 1 or not _are_whole(numbers):
-        raise ReadError(f"{path}{where}: ids must be whole numbers")
+        raise ReadError(
+            f"{path}{where}: ids must be whole numbers, below 2^53 where they are read as decimals"
+        )
     whole = numbers.astype(np.int64, copy=False)
     whole.flags.writeable = False  # so that the packing need not copy it
     return whole
@@ -262,16 +262,13 @@ def whole_numbers(path: Path, values: npt.ArrayLike, where: str = "") -> npt.NDA
 def _are_whole(numbers: npt.NDArray[Any]) -> bool:
     if numbers.dtype == np.int64 or numbers.size == 0:
         return True
-    # a larger one has more digits than a double or an int64 holds; comparisons with NaN are false
-    return bool(
-        numbers.dtype.kind in "biuf"
-        and numbers.min() > -(2.0**62)
-        and numbers.max() < 2.0**62
-        and np.all(numbers == numbers.astype(np.int64))
-    )
+    # larger decimals may have been rounded; comparisons with NaN are false
+    if numbers.dtype.kind == "f" and not all_within(numbers, -MOST_DECIMAL, MOST_DECIMAL):
+        return False
+    return numbers.dtype.kind in "biuf" and bool(np.all(numbers == numbers.astype(np.int64)))
 
 
-def _numbers(path: Path, values: npt.ArrayLike, what: str, where: str) -> FloatArray:
+def _lengths(path: Path, values: npt.ArrayLike, what: str, where: str) -> FloatArray:
     """Numbers that may be lengths; which of them cannot be is the packing's to say."""
     array = np.asarray(values)
     if array.dtype.kind not in "biuf":

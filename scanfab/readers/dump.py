@@ -31,6 +31,7 @@ from scanfab.readers.regular import LARGE, TextTable, read_regular
 __all__ = ["DumpBlock", "index_dump", "read_block", "read_columns", "row_word"]
 
 FloatArray = npt.NDArray[np.float64]
+Columns = dict[str, npt.NDArray[Any]]
 
 # a snapshot's header never comes near this size, whatever the number of columns
 HEADER_BYTES = 1 << 16
@@ -112,21 +113,21 @@ def read_block(snapshot: Snapshot) -> DumpBlock:
     """
     where, sections, body = _header(snapshot)
     count = _count(where, sections)
-    table = _long_table(snapshot, body, count)
-    values = np.empty((0 if table is None else count, len(body.names)))
-    if table is None or not read_regular(table, dict(enumerate(values.T))):
+    values = _regular(snapshot, body, count, range(len(body.names)))
+    if values is None:
         values = _tolerant(snapshot, body, count)
     return DumpBlock(snapshot.step, snapshot.time, dump_cell(where, sections), body.names, values)
 
 
 def read_columns(
-    snapshot: Snapshot, room: Callable[[Sequence[str], int], dict[str, npt.NDArray[Any]]]
+    snapshot: Snapshot, room: Callable[[Sequence[str], int], tuple[Columns, Columns]]
 ) -> tuple[LazyColumns, Cell | None]:
     """
     The columns of a snapshot by name, and its cell; of repeated names the first counts.
 
     Of a large snapshot only the columns are parsed for which ``room`` makes arrays, from the names
-    of all and the number of rows; the others wait until they are asked for.
+    of all and the number of rows: those to fill in by the dump's names, and what they are to be
+    called. The others wait until they are asked for.
 
     Raises
     ------
@@ -135,23 +136,23 @@ def read_columns(
     """
     where, sections, body = _header(snapshot)
     count, cell = _count(where, sections), dump_cell(where, sections)
-    table = _long_table(snapshot, body, count)
-    ready = {} if table is None else room(body.names, count)
-    places = {body.names.index(name): column for name, column in ready.items()}
-    if table is None or not read_regular(table, places):
-        values = _tolerant(snapshot, body, count)
-        ready = {name: values[:, body.names.index(name)] for name in body.names}
-    return LazyColumns(body.names, ready, partial(_read_column, snapshot)), cell
+    table, load = _long_table(snapshot, body, count), partial(_read_column, snapshot)
+    if table is not None:
+        filled, ready = room(body.names, count)
+        places = {body.names.index(name): column for name, column in filled.items()}
+        if read_regular(table, places):
+            rest = [name for name in body.names if name in ready or name not in filled]
+            return LazyColumns([*rest, *ready], ready, load), cell
+    values = _tolerant(snapshot, body, count)
+    ready = {name: values[:, body.names.index(name)] for name in body.names}
+    return LazyColumns(body.names, ready, load), cell
 
 
 def _read_column(snapshot: Snapshot, name: str) -> FloatArray:
     where, sections, body = _header(snapshot)
     count, place = _count(where, sections), body.names.index(name)
-    table = _long_table(snapshot, body, count)
-    values = np.empty(0 if table is None else count)
-    if table is None or not read_regular(table, {place: values}):
-        values = _tolerant(snapshot, body, count)[:, place]
-    return values
+    values = _regular(snapshot, body, count, [place])
+    return _tolerant(snapshot, body, count)[:, place] if values is None else values[:, 0]
 
 
 @dataclass(frozen=True)
@@ -171,6 +172,17 @@ def _header(snapshot: Snapshot) -> tuple[str, dict[str, list[str]], _Body]:
     if snapshot.stop is not None:
         head = head[: snapshot.stop - snapshot.start]
     return where, *_sections(where, head)
+
+
+def _regular(
+    snapshot: Snapshot, body: _Body, count: int, places: Sequence[int]
+) -> FloatArray | None:
+    """Some columns of a large snapshot, shape (count, n); None if its table is not regular."""
+    table = _long_table(snapshot, body, count)
+    if table is None:
+        return None
+    values = np.empty((count, len(places)))
+    return values if read_regular(table, dict(zip(places, values.T, strict=True))) else None
 
 
 def _long_table(snapshot: Snapshot, body: _Body, count: int) -> TextTable | None:

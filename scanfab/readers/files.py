@@ -14,6 +14,7 @@ from collections import OrderedDict
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from threading import Lock, get_ident
 from typing import IO, Any
 
 from scanfab.errors import ReadError
@@ -33,9 +34,11 @@ OPENERS: dict[bytes, Callable[..., Any]] = {
     b"\xfd7zXZ\x00": lzma.open,
 }
 COMPRESSED_SUFFIXES = (".gz", ".bz2", ".xz")
-# decompressed copies of the files used last; two frames need at most a few
-KEPT = 6
+# decompressed copies of the files used last, for each thread that reads: a frame needs few
+KEPT = 4
 _copies: OrderedDict[tuple[str, int, int], Path] = OrderedDict()
+_threads: set[int] = set()
+_lock = Lock()
 _folder: list[str] = []
 
 
@@ -61,18 +64,22 @@ def plain(path: Path) -> Path:
         return path
     status = path.stat()
     key = (str(path), status.st_mtime_ns, status.st_size)
-    if key in _copies:
-        _copies.move_to_end(key)
-        return _copies[key]
+    with _lock:
+        _threads.add(get_ident())
+        if key in _copies:
+            _copies.move_to_end(key)
+            return _copies[key]
     try:
         with opener(path, "rb") as packed:
             copy = temporary_copy(packed, bare_name(path))
     except (OSError, EOFError, lzma.LZMAError, zlib.error) as error:
         raise ReadError(f"{path}: cannot be decompressed: {_reason(error)}") from None
-    _copies[key] = copy
-    while len(_copies) > KEPT:
-        _, oldest = _copies.popitem(last=False)
-        shutil.rmtree(oldest.parent, ignore_errors=True)
+    with _lock:
+        _copies[key] = copy
+        surplus = max(len(_copies) - KEPT * len(_threads), 0)
+        oldest = [_copies.popitem(last=False)[1] for _ in range(surplus)]
+    for one in oldest:
+        shutil.rmtree(one.parent, ignore_errors=True)
     return copy
 
 

@@ -9,7 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.errors import ReadError
-from scanfab.packing import MOST, ContactList
+from scanfab.limits import MOST
+from scanfab.packing import ContactList
 from scanfab.readers.base import GrainTable, JoinedContacts
 
 __all__ = ["count_walls", "join_ids", "join_positions", "rows_of_ids"]

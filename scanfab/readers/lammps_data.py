@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from scanfab.cell import Cell
 from scanfab.errors import PackingError, ReadError
-from scanfab.packing import MOST
+from scanfab.limits import MOST
 from scanfab.readers.base import GrainTable, ReadOptions, Snapshot
 from scanfab.readers.box import box_vectors
 from scanfab.readers.columns import grain_table

@@ -7,12 +7,13 @@ parser of the format, which reads it or says what is wrong in which line.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
-from typing import Any
+from threading import Lock
+from typing import IO, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -23,7 +24,7 @@ __all__ = ["LARGE", "TextTable", "read_regular"]
 LARGE = 8 << 20
 # bytes that are parsed at a time: the memory of one piece serves the next, which is faster than new
 PIECE = 16 << 20
-# pieces on their way: while polars parses one in several threads, others are read, counted, copied
+# pieces under way: while polars parses one in several threads, another is counted, read or copied
 WORKERS = 4
 
 
@@ -44,7 +45,7 @@ class TextTable:
 
 def read_regular(table: TextTable, columns: Mapping[int, npt.NDArray[Any]]) -> bool:
     """
-    Some columns of a table; False if it is not regular.
+    Read some columns of a table, if it is regular.
 
     Every number is the double nearest to the text, as Python's float() has it, or just the whole
     number that the text is.
@@ -55,17 +56,19 @@ def read_regular(table: TextTable, columns: Mapping[int, npt.NDArray[Any]]) -> b
         What to read.
     columns : mapping of int to ndarray
         Where the columns, from 0, are to be put: each of shape (count,), float64 or int64.
+
+    Returns
+    -------
+    bool
+        False if the table is not regular: what is in the arrays then has no meaning.
     """
-    behind = _ends_with_blank(table)
-    kinds = {place: column.dtype for place, column in columns.items()}
     rows = 0
-    with ThreadPoolExecutor(WORKERS) as pool:
-        for frame in pool.map(partial(_read_piece, table, kinds, behind), _pieces(table)):
-            if frame is None or rows + frame.height > table.count:
-                return False
-            for place, column in columns.items():
-                _put(frame[f"{place}"].get_chunks(), column[rows : rows + frame.height])
-            rows += frame.height
+    for frame in _parsed(table, {place: column.dtype for place, column in columns.items()}):
+        if frame is None or rows + frame.height > table.count:
+            return False
+        for place, column in columns.items():
+            _put(frame[f"{place}"].get_chunks(), column[rows : rows + frame.height])
+        rows += frame.height
     return rows == table.count
 
 
@@ -77,19 +80,41 @@ def _put(parts: list[Any], column: npt.NDArray[Any]) -> None:
         start += len(part)
 
 
-def _pieces(table: TextTable) -> Iterator[tuple[int, int]]:
+def _parsed(table: TextTable, kinds: Mapping[int, np.dtype[Any]]) -> Iterator[Any]:
+    """The data frames of the table's pieces, in their order; None for one that is not regular."""
+    # opened once: the file may be replaced by another while it is read
+    with open(table.path, "rb") as file, ThreadPoolExecutor(WORKERS) as pool:
+        file.seek(table.start)
+        # polars sees an empty word behind such a line
+        behind = file.readline().endswith(b" \n")
+        pieces, lock = list(_pieces(file, table)), Lock()
+        waiting: deque[Future[Any]] = deque()
+        for piece in pieces:
+            words = file, lock, piece, table.width, kinds, behind
+            waiting.append(pool.submit(_parse_piece, *words))
+            if len(waiting) == 2 * WORKERS:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+
+
+def _pieces(file: IO[bytes], table: TextTable) -> Iterator[tuple[int, int]]:
     """First bytes, and those behind the last, of parts of the table that are whole lines."""
     start = table.start
-    with open(table.path, "rb") as file:
-        while start < table.stop:
-            place = file.seek(start + PIECE)
-            stop = min(place + len(file.readline()), table.stop)
-            yield start, stop
-            start = stop
+    while start < table.stop:
+        place = file.seek(start + PIECE)
+        stop = min(place + len(file.readline()), table.stop)
+        yield start, stop
+        start = stop
 
 
-def _read_piece(
-    table: TextTable, kinds: Mapping[int, np.dtype[Any]], behind: bool, piece: tuple[int, int]
+def _parse_piece(
+    file: IO[bytes],
+    lock: Lock,
+    piece: tuple[int, int],
+    width: int,
+    kinds: Mapping[int, np.dtype[Any]],
+    behind: bool,
 ) -> Any:
     """
     The columns of some lines; None if they are not regular.
@@ -101,16 +126,18 @@ def _read_piece(
     from scanfab.kernels.text import count_spaces
 
     start, stop = piece
-    with open(table.path, "rb") as file:
+    with lock:
         file.seek(start)
         text = file.read(stop - start)
-    # a last line without its end may lack digits
-    frame = _parse(text, table.width, kinds, behind) if text.endswith(b"\n") else None
+    # a last line without its end may lack digits; a byte order mark would be passed over
+    if not text.endswith(b"\n") or not text[:1].isascii():
+        return None
+    frame = _parse(text, width, kinds, behind)
     if frame is None:
         return None
     rows = frame.height
     blanks_at_ends = rows * behind
-    expected = rows * (table.width + behind), blanks_at_ends, blanks_at_ends
+    expected = rows * (width + behind), blanks_at_ends, blanks_at_ends
     return frame if count_spaces(np.frombuffer(text, np.uint8)) == expected else None
 
 
@@ -139,13 +166,6 @@ def _parse(text: bytes, width: int, kinds: Mapping[int, np.dtype[Any]], behind: 
             .select(wanted)
             .collect()
         )
-    except polars.exceptions.PolarsError:
+    except (polars.exceptions.PolarsError, OSError):  # the latter: like a compressed file
         return None
     return None if any(frame.null_count().row(0)) else frame
-
-
-def _ends_with_blank(table: TextTable) -> bool:
-    """Whether the first row does: polars sees an empty word behind it."""
-    with open(table.path, "rb") as file:
-        file.seek(table.start)
-        return file.readline().endswith(b" \n")

@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from scanfab.cell import Cell
 from scanfab.errors import ReadError
-from scanfab.packing import MOST, ContactList
+from scanfab.limits import MOST
+from scanfab.packing import ContactList
 from scanfab.readers.base import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
 from scanfab.readers.columns import grain_table, has_radius, whole_numbers
 from scanfab.readers.files import bare_name, plain

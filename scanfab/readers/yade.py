@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from scanfab.cell import Cell
 from scanfab.errors import PackingError, ReadError
-from scanfab.packing import MOST
+from scanfab.limits import MOST
 from scanfab.readers.base import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
 from scanfab.readers.columns import grain_table
 from scanfab.readers.files import first_bytes, plain

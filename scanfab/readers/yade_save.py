@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from scanfab.cell import Cell
 from scanfab.errors import PackingError, ReadError
-from scanfab.packing import MOST
+from scanfab.limits import MOST
 from scanfab.readers.base import GrainTable, ReadOptions, Snapshot
 from scanfab.readers.columns import grain_table, whole_numbers
 from scanfab.readers.files import first_bytes, plain

@@ -5,6 +5,9 @@ from __future__ import annotations
 import bz2
 import gzip
 import lzma
+from collections import OrderedDict
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -63,13 +66,23 @@ def test_a_file_that_changes_is_unpacked_again(tmp_path):
     assert files.plain(path).read_bytes().startswith(b"something else")
 
 
-def test_only_the_copies_used_last_are_kept(tmp_path):
-    copies = []
-    for number in range(files.KEPT + 2):
+@pytest.mark.parametrize("threads", [1, 3])
+def test_of_each_thread_only_the_copies_used_last_are_kept(tmp_path, monkeypatch, threads):
+    monkeypatch.setattr(files, "_copies", OrderedDict())
+    monkeypatch.setattr(files, "_threads", set())
+
+    def copied(number):
         path = tmp_path / f"{number}.gz"
         path.write_bytes(gzip.compress(TEXT))
-        copies.append(files.plain(path))
-    assert [copy.exists() for copy in copies] == [False] * 2 + [True] * files.KEPT
+        return files.plain(path)
+
+    with ExitStack() as stack:
+        pools = [stack.enter_context(ThreadPoolExecutor(1)) for _ in range(threads)]
+        kept = files.KEPT * threads
+        copies = [
+            pools[number % threads].submit(copied, number).result() for number in range(kept + 2)
+        ]
+    assert [copy.exists() for copy in copies] == [False] * 2 + [True] * kept
 
 
 def test_a_packed_file_cut_off_is_an_error(packed):

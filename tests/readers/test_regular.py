@@ -53,6 +53,9 @@ def test_regular_rows_are_read(tmp_path, end):
         pytest.param(b"1 2 3\n4 5 6 7 8\n", id="words too many"),
         pytest.param(b"1 2 3 \n4 5 six \n", id="word"),
         pytest.param(b'1 2 3 \n"4" 5 6 \n', id="quotes"),
+        pytest.param(b"x^1 2 3 \n4 5 6 \n", id="like a compressed file"),
+        pytest.param(b"1 2 3 \n\x1f\x8b4 5 6 \n", id="like another compressed file"),
+        pytest.param(b"1 2 3 \n\xef\xbb\xbf4 5 6 \n", id="byte order mark"),
         pytest.param(b"1 2 3 \n\n4 5 6 \n", id="blank line"),
         pytest.param(b"1 2 3 \n", id="row missing"),
         pytest.param(b"1 2 3 \n4 5 6 \n7 8 9 \n", id="row too many"),
@@ -72,6 +75,20 @@ def test_a_blank_anywhere_is_seen(tmp_path):
     for place in range(len(text)):
         spoilt = text[:place] + b" " + text[place:]
         assert columns_of(tmp_path / "a", spoilt) is None, place
+
+
+def test_a_file_that_is_replaced_is_read_as_it_was(tmp_path, monkeypatch):
+    path, pieces = tmp_path / "a", regular._pieces
+
+    def replaced(*args):
+        for piece in pieces(*args):
+            yield piece
+            write(tmp_path / "b", "7 7 7 \n" * 4)
+            (tmp_path / "b").replace(path)
+
+    monkeypatch.setattr(regular, "_pieces", replaced)
+    found = columns_of(path, b"1 2 3 \n4 5 6 \n")
+    np.testing.assert_array_equal(found, [[1, 4], [3, 6]])
 
 
 def number(generator):
