@@ -9,7 +9,7 @@ import numba
 import numpy as np
 from llvmlite.binding import get_host_cpu_name
 
-__all__ = ["LANES", "REORDERED", "ZERO", "Flag", "inner", "kernel"]
+__all__ = ["LANES", "ONE", "REORDERED", "ZERO", "Flag", "inner", "kernel"]
 
 # numbers that the compiler's vector instructions take at a time: 256 bits of them, also on
 # processors that have wider ones, but for these
@@ -18,8 +18,9 @@ LANES = 8 if get_host_cpu_name() in ("znver4", "znver5") else 4
 # its types leave out some of its options
 njit: Any = numba.njit
 
-# a kernel that gets a plain 0 from another is compiled once more, for this number alone
+# a kernel that gets a plain number from another is compiled once more, for this number alone
 ZERO: int = np.int64(0)  # type: ignore[assignment]
+ONE: int = np.int64(1)  # type: ignore[assignment]
 
 # what lets the compiler make vector instructions of a loop with sums: any order of the terms
 REORDERED = {"reassoc", "contract"}

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.kernels.compiled import ZERO, inner
+from scanfab.kernels.compiled import ONE, ZERO, inner
 from scanfab.kernels.grid import Grid
 from scanfab.kernels.strips import Sphere, span
 
@@ -25,6 +25,9 @@ __all__ = [
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
+
+# a bucket with more indices is sorted by itself, and not with all others
+FEW = 16
 
 
 class Spheres(NamedTuple):
@@ -113,9 +116,10 @@ def order_of(values: FloatArray) -> IntArray:
         stop[bucket] += 1
     start = 0
     for bucket in range(count):
-        if stop[bucket] - start > 1:
+        if stop[bucket] - start > FEW:
             sort_by(values, order[start : stop[bucket]])
         start = stop[bucket]
+    insert(values, order, ONE)
     return order
 
 
@@ -126,13 +130,19 @@ def sort_by(values: FloatArray, members: IntArray) -> None:
     while gap < members.size // 9:
         gap = 3 * gap + 1
     while gap > 0:
-        for i in range(gap, members.size):
-            moving, j = members[i], i
-            while j >= gap and values[members[j - gap]] > values[moving]:
-                members[j] = members[j - gap]
-                j -= gap
-            members[j] = moving
+        insert(values, members, gap)
         gap //= 3
+
+
+@inner()
+def insert(values: FloatArray, members: IntArray, gap: int) -> None:
+    """Order those that are a multiple of the gap apart: fast where few are far from their place."""
+    for i in range(gap, members.size):
+        moving, j = members[i], i
+        while j >= gap and values[members[j - gap]] > values[moving]:
+            members[j] = members[j - gap]
+            j -= gap
+        members[j] = moving
 
 
 @inner()

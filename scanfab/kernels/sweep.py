@@ -154,7 +154,7 @@ def moved(
     return (FAR if high < low else end), low, high
 
 
-@inner(fastmath=REORDERED, error_model="numpy")
+@inner(forceinline=True, fastmath=REORDERED, error_model="numpy")
 def visit(
     lines: FloatArray,
     strip: Strip,
