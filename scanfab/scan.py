@@ -102,7 +102,7 @@ class ScanSums:
     chords: IntArray
     """
     Chords that all spheres together cut from the lines, shape (R,); of spheres that few lines meet,
-    as many as are to be expected, also where lines miss the window.
+    as many as are to be expected.
     """
     channels: IntArray
     """Lines of the whole that meet no grain however far they go, shape (R, 4, D)."""

@@ -141,11 +141,11 @@ def columns_of_row(
     ``reach2`` is the square of half the circle's width in the row; the sphere reaches from column
     ``first`` to before ``last``.
     """
-    if last - first <= NARROW:
-        met = max(last - first, 0)
-        # the circle has this share of the square
-        return first, met, 0.25 * np.pi * met
     low, high = strip.low[row], strip.high[row]
+    if last - first <= NARROW:
+        # the circle has this share of the square
+        chords = 0.25 * np.pi * max(min(last, high) - max(first, low), 0)
+        return first, max(last - first, 0), chords
     reach = np.sqrt(max(reach2, 0.0))
     first, last = span(sphere.u, reach, strip.first_u, strip.per_spacing, low, high)
     met = max(last - first, 0)
