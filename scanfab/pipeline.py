@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import warnings
-from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +27,7 @@ from scanfab.series import Series
 from scanfab.settings import STRAIN_MODES, Settings
 from scanfab.strain import StrainFile, axial_length
 from scanfab.table import Row, Table
+from scanfab.threads import in_order
 from scanfab.variants import Sample
 
 __all__ = ["FrameResult", "compute", "compute_rows"]
@@ -201,13 +201,8 @@ class _Pool:
         """The results in the order of the jobs, of which one a worker is under way."""
         first = list(islice(jobs, self.workers))
         threads = max(1, self.workers // max(len(first), 1))
-        waiting = deque(self._pool.submit(job, threads) for job in first)
-        while waiting:
-            rows = waiting.popleft().result()
-            following = next(jobs, None)
-            if following is not None:
-                waiting.append(self._pool.submit(following, threads))
-            yield rows
+        every = (partial(job, threads) for job in chain(first, jobs))
+        return in_order(self._pool, every, self.workers)
 
 
 def no_such_frames(frames: slice) -> SettingsError:

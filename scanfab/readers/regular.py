@@ -7,16 +7,18 @@ parser of the format, which reads it or says what is wrong in which line.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Iterator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from threading import Lock
 from typing import IO, Any
 
 import numpy as np
 import numpy.typing as npt
+
+from scanfab.threads import in_order
 
 __all__ = ["LARGE", "TextTable", "read_regular"]
 
@@ -88,14 +90,15 @@ def _parsed(table: TextTable, kinds: Mapping[int, np.dtype[Any]]) -> Iterator[An
         # polars sees an empty word behind such a line
         behind = file.readline().endswith(b" \n")
         pieces, lock = list(_pieces(file, table)), Lock()
-        waiting: deque[Future[Any]] = deque()
-        for piece in pieces:
-            words = file, lock, piece, table.width, kinds, behind
-            waiting.append(pool.submit(_parse_piece, *words))
-            if len(waiting) == 2 * WORKERS:
-                yield waiting.popleft().result()
-        while waiting:
-            yield waiting.popleft().result()
+
+        def parse(start: int, stop: int) -> Any:
+            with lock:
+                file.seek(start)
+                text = file.read(stop - start)
+            return _parse_piece(text, table.width, kinds, behind)
+
+        jobs = (partial(parse, *piece) for piece in pieces)
+        yield from in_order(pool, jobs, 2 * WORKERS)
 
 
 def _pieces(file: IO[bytes], table: TextTable) -> Iterator[tuple[int, int]]:
@@ -108,14 +111,7 @@ def _pieces(file: IO[bytes], table: TextTable) -> Iterator[tuple[int, int]]:
         start = stop
 
 
-def _parse_piece(
-    file: IO[bytes],
-    lock: Lock,
-    piece: tuple[int, int],
-    width: int,
-    kinds: Mapping[int, np.dtype[Any]],
-    behind: bool,
-) -> Any:
+def _parse_piece(text: bytes, width: int, kinds: Mapping[int, np.dtype[Any]], behind: bool) -> Any:
     """
     The columns of some lines; None if they are not regular.
 
@@ -125,10 +121,6 @@ def _parse_piece(
     """
     from scanfab.kernels.text import count_spaces
 
-    start, stop = piece
-    with lock:
-        file.seek(start)
-        text = file.read(stop - start)
     # a last line without its end may lack digits; a byte order mark would be passed over
     if not text.endswith(b"\n") or not text[:1].isascii():
         return None
