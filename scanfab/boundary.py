@@ -109,14 +109,13 @@ def enclosing_class(packing: Packing) -> str | None:
     All particles of the class lie farther out than nearly all others, measured in the box of the
     sample, round or square.
     """
-    if len(packing) < 50:
+    columns = [name for name in packing.columns if name.lower() in CLASS_COLUMNS]
+    if len(packing) < 50 or not columns:
         return None
     low, high = packing.position.min(axis=0), packing.position.max(axis=0)
     scaled = (packing.position - 0.5 * (low + high)) / np.maximum(high - low, 1e-300)
     distances = np.linalg.norm(scaled, axis=1), np.abs(scaled).max(axis=1)
-    for name in packing.columns:
-        if name.lower() not in CLASS_COLUMNS:
-            continue
+    for name in columns:
         values = packing.columns[name]
         if values.ndim != 1 or values.dtype.kind not in "iuf":
             continue

@@ -12,7 +12,7 @@ from scanfab.directions import DirectionRule, direction_rule
 from scanfab.errors import ScanfabWarning, SettingsError
 from scanfab.settings import AUTO_RULE, Settings
 from scanfab.variants import Sample
-from scanfab.window import SphereWindow, default_center, room_around, smallest_extent
+from scanfab.window import SphereWindow, SurfaceBox
 
 __all__ = ["CLOSE", "GROWTH_WITH_SPACING", "Plan", "make_plan"]
 
@@ -65,11 +65,11 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
         "rmean": float(radii.mean()),
         "rmax": float(radii.max()),
     }
-    half_extent = 0.5 * smallest_extent(sample.packing, grains)
-    window = _window(settings, sample, half_extent) if settings.needs_window else None
+    box = SurfaceBox.of(sample.packing, grains)
+    window = _window(settings, box, lengths["rmin"]) if settings.needs_window else None
     if window is not None:
-        _check_window(window, sample, lengths["rmax"])
-    reach = half_extent if window is None else window.radius
+        _check_window(window, sample, box, lengths["rmax"])
+    reach = 0.5 * box.smallest_extent if window is None else window.radius
     rule = settings.directions or direction_rule(AUTO_RULE)
     if rule.bias > 0.1 * settings.tolerance:
         warnings.warn(
@@ -103,14 +103,11 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     return Plan(window, cutoff, cutoffs, rule, asked * math.sqrt(replicates), replicates, auto)
 
 
-def _window(settings: Settings, sample: Sample, half_extent: float) -> SphereWindow:
-    center = (
-        default_center(sample.packing, sample.grains)
-        if settings.rv_center is None
-        else np.array(settings.rv_center, dtype=np.float64)
-    )
-    radius = settings.rv * half_extent if settings.rv_radius is None else settings.rv_radius
-    smallest = float(sample.packing.radius[sample.grains].min())
+def _window(settings: Settings, box: SurfaceBox, smallest: float) -> SphereWindow:
+    center = np.array(box.center if settings.rv_center is None else settings.rv_center, dtype=float)
+    radius = settings.rv_radius
+    if radius is None:
+        radius = settings.rv * 0.5 * box.smallest_extent
     if radius < CLOSEST * smallest:
         raise SettingsError(
             f"rv: a radius of {radius:g} is nothing beside that of the smallest grain "
@@ -119,11 +116,11 @@ def _window(settings: Settings, sample: Sample, half_extent: float) -> SphereWin
     return SphereWindow(center, radius)
 
 
-def _check_window(window: SphereWindow, sample: Sample, largest: float) -> None:
+def _check_window(window: SphereWindow, sample: Sample, box: SurfaceBox, largest: float) -> None:
     """Refuse an RV without grains or larger than the sample; warn of one at its surface."""
     packing, grains = sample.packing, sample.grains
     distance = window.distance(packing.position[grains], packing)
-    room = room_around(window, packing, grains)
+    room = box.room_around(window)
     if not np.any(distance < window.radius + packing.radius[grains]):
         raise SettingsError(
             f"the {window} holds no grain: choose another --rv-center or a larger --rv-radius"

@@ -118,12 +118,11 @@ def section_lines(scene: Scene, axis: npt.ArrayLike) -> Segments:
 def grains_of(sample: Sample, window: SphereWindow | None) -> Grains:
     """The particles of a frame, with what the sample knows of them."""
     packing = sample.packing
-    everything = np.ones(len(sample.contacts), bool)
     return Grains(
         position=packing.position,
         radius=packing.radius,
         id=packing.id,
-        contacts=sample.contact_numbers(everything),
+        contacts=sample.contact_numbers,
         rattler=sample.rattlers,
         boundary=sample.boundary,
         in_window=_inside(packing.position, sample, window),

@@ -120,12 +120,13 @@ class VariantColumns:
     def _contact(self) -> dict[str, Any]:
         chosen = self.sample.fabric_contacts(self.variant, self.plan.window)
         contacts, axis = self.sample.contacts, self.settings.axis
-        normals = contacts.normal[chosen]
+        # several times as fast as to index with a mask
+        normals = np.compress(chosen, contacts.normal, axis=0)
         tensor = contact_fabric(normals)
         value = tensor.axial(axis) if tensor else None
         scatter: Jackknife | None = None
         if tensor:
-            points = contacts.point[chosen]
+            points = np.compress(chosen, contacts.point, axis=0)
             if self.variant.in_window:
                 window = self.plan.window
                 assert window is not None

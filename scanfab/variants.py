@@ -69,13 +69,20 @@ class Sample:
 
         One pass, no repetition; contacts with boundary particles and walls count.
         """
-        everything = np.ones(len(self.contacts), dtype=bool)
-        return self.grains & (self.contact_numbers(everything) < self.min_contacts)
+        return self.grains & (self.contact_numbers < self.min_contacts)
 
-    def contact_numbers(self, chosen: BoolArray) -> IntArray:
-        """Number of the chosen contacts and of the wall contacts of each particle, shape (N,)."""
-        ends = self.contacts.pairs[chosen].ravel()
-        return np.bincount(ends, minlength=len(self.packing)) + self.packing.wall_contacts
+    @cached_property
+    def contact_numbers(self) -> IntArray:
+        """Number of contacts of each particle, those with walls included, shape (N,)."""
+        return self._numbers_of(self.contacts.pairs)
+
+    @cached_property
+    def contact_numbers_without_rattlers(self) -> IntArray:
+        """The same without contacts that a rattler has part in."""
+        return self._numbers_of(self.contacts.pairs[self.contacts_without(self.rattlers)])
+
+    def _numbers_of(self, pairs: IntArray) -> IntArray:
+        return np.bincount(pairs.ravel(), minlength=len(self.packing)) + self.packing.wall_contacts
 
     def removed(self, variant: Variant) -> BoolArray:
         """Grains that the variant leaves out, shape (N,)."""
@@ -108,8 +115,12 @@ class Sample:
 
         Contacts with removed grains are left out. None if there is no grain.
         """
-        removed = self.removed(variant)
-        counted = self.counted(variant, window) & ~removed
+        counted = self.counted(variant, window) & ~self.removed(variant)
         if not counted.any():
             return None
-        return float(self.contact_numbers(self.contacts_without(removed))[counted].mean())
+        numbers = (
+            self.contact_numbers_without_rattlers
+            if variant.without_rattlers
+            else self.contact_numbers
+        )
+        return float(numbers[counted].mean())

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.cell import Cell
 from scanfab.errors import SettingsError
 from scanfab.packing import Packing
 
-__all__ = ["SphereWindow", "default_center", "room_around", "smallest_extent"]
+__all__ = ["SphereWindow", "SurfaceBox"]
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -30,7 +31,8 @@ class SphereWindow:
 
     def distance(self, points: FloatArray, packing: Packing) -> FloatArray:
         """Distance of points from the centre, nearest image, shape (N,)."""
-        distance: FloatArray = np.linalg.norm(self.branches(points, packing), axis=1)
+        branches = self.branches(points, packing)
+        distance: FloatArray = np.sqrt(np.einsum("ij,ij->i", branches, branches))
         return distance
 
     def __str__(self) -> str:
@@ -62,40 +64,48 @@ class SphereWindow:
         return branch
 
 
-def smallest_extent(packing: Packing, grains: BoolArray) -> float:
-    """The smallest extent of the grains' surfaces (of the cell, along its periodic vectors)."""
-    low, high = _surface_box(packing, grains)
-    extent = high - low
-    if packing.cell is not None:
-        extent = np.where(packing.cell.periodic, packing.cell.heights, extent)
-    return float(extent.min())
+@dataclass(frozen=True, eq=False)
+class SurfaceBox:
+    """The box of the grains' surfaces; what is asked of it is the cell's where that is periodic."""
 
+    low: FloatArray
+    """Shape (3,)."""
+    high: FloatArray
+    cell: Cell | None
 
-def default_center(packing: Packing, grains: BoolArray) -> FloatArray:
-    """The middle of the box of the grains' surfaces (of the cell, along its periodic vectors)."""
-    low, high = _surface_box(packing, grains)
-    middle: FloatArray = 0.5 * (low + high)
-    if packing.cell is not None:
-        middle = np.where(packing.cell.periodic, packing.cell.center, middle)
-    return middle
+    @classmethod
+    def of(cls, packing: Packing, grains: BoolArray) -> SurfaceBox:
+        """That of some particles of a packing."""
+        position = np.compress(grains, packing.position, axis=0)
+        radius = packing.radius[grains]
+        # one coordinate at a time: that is faster by far for millions of grains
+        low = np.array([(along - radius).min() for along in position.T])
+        high = np.array([(along + radius).max() for along in position.T])
+        return cls(low, high, packing.cell)
 
+    @property
+    def smallest_extent(self) -> float:
+        """Of the box (of the cell, along its periodic vectors)."""
+        extent = self.high - self.low
+        if self.cell is not None:
+            extent = np.where(self.cell.periodic, self.cell.heights, extent)
+        return float(extent.min())
 
-def room_around(window: SphereWindow, packing: Packing, grains: BoolArray) -> float:
-    """
-    The smallest distance from the window to a face of the box of the grains' surfaces.
+    @property
+    def center(self) -> FloatArray:
+        """The middle of the box (of the cell, along its periodic vectors)."""
+        middle: FloatArray = 0.5 * (self.low + self.high)
+        if self.cell is not None:
+            middle = np.where(self.cell.periodic, self.cell.center, middle)
+        return middle
 
-    Negative if it reaches beyond; infinite if all directions are periodic, as there is no face.
-    """
-    low, high = _surface_box(packing, grains)
-    room = np.minimum(window.center - low, high - window.center) - window.radius
-    if packing.cell is not None:
-        room = np.where(packing.cell.periodic, np.inf, room)
-    return float(room.min())
+    def room_around(self, window: SphereWindow) -> float:
+        """
+        The smallest distance from a window to a face.
 
-
-def _surface_box(packing: Packing, grains: BoolArray) -> tuple[FloatArray, FloatArray]:
-    position, radius = packing.position[grains], packing.radius[grains]
-    # one coordinate at a time: that is faster by far for millions of grains
-    low = [(along - radius).min() for along in position.T]
-    high = [(along + radius).max() for along in position.T]
-    return np.array(low), np.array(high)
+        Negative if it reaches beyond; infinite if all directions are periodic, as there is no face.
+        """
+        nearest = np.minimum(window.center - self.low, self.high - window.center)
+        if self.cell is not None:
+            nearest = np.where(self.cell.periodic, np.inf, nearest)
+        return float(nearest.min()) - window.radius

@@ -67,7 +67,7 @@ def test_number_of_contacts_of_a_rattler_may_be_chosen(least, expected):
 def test_grain_held_by_its_own_images_is_no_rattler():
     packing = find_contacts(Packing([[1, 1, 1]], 0.6, cell=Cell([1.0, 4.0, 4.0])))
     sample = Sample(packing, np.zeros(1, bool))
-    assert sample.contact_numbers(np.ones(1, bool)).tolist() == [2]
+    assert sample.contact_numbers.tolist() == [2]
     assert rows(sample.rattlers) == []
 
 

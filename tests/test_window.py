@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scanfab import Cell, Packing, SettingsError, compute
-from scanfab.window import SphereWindow, default_center, room_around, smallest_extent
+from scanfab.window import SphereWindow, SurfaceBox
 from tests.lattices import shaken_cubic
 
 CELL = Cell([10.0, 8.0, 6.0], origin=(-1.0, 2.0, 3.0))
@@ -40,30 +40,30 @@ def test_faces_that_do_not_repeat_are_not_looked_through():
 
 
 def test_default_center_is_the_middle_of_the_surfaces():
-    assert default_center(four_grains(), ALL) == pytest.approx([4.75, 3.625, 4.0])
+    assert SurfaceBox.of(four_grains(), ALL).center == pytest.approx([4.75, 3.625, 4.0])
 
 
 def test_smallest_extent_is_that_of_the_surfaces():
-    assert smallest_extent(four_grains(), ALL) == pytest.approx(9.25)
+    assert SurfaceBox.of(four_grains(), ALL).smallest_extent == pytest.approx(9.25)
 
 
 def test_boundary_does_not_count_for_center_and_extent():
     grains = np.array([True, True, False, True])
-    assert default_center(four_grains(), grains) == pytest.approx([4.75, 0.0, 4.0])
-    assert smallest_extent(four_grains(), grains) == pytest.approx(2.0)
+    assert SurfaceBox.of(four_grains(), grains).center == pytest.approx([4.75, 0.0, 4.0])
+    assert SurfaceBox.of(four_grains(), grains).smallest_extent == pytest.approx(2.0)
 
 
 def test_periodic_cell_gives_center_and_extent():
     packing = Packing([[0, 3, 4]], 1.0, cell=CELL)
-    assert default_center(packing, np.ones(1, bool)) == pytest.approx([4.0, 6.0, 6.0])
-    assert smallest_extent(packing, np.ones(1, bool)) == pytest.approx(6.0)
+    assert SurfaceBox.of(packing, np.ones(1, bool)).center == pytest.approx([4.0, 6.0, 6.0])
+    assert SurfaceBox.of(packing, np.ones(1, bool)).smallest_extent == pytest.approx(6.0)
 
 
 def test_only_periodic_vectors_of_a_cell_give_center_and_extent():
     """Along the others it is the grains: here from 2 to 4."""
     packing = Packing([[0, 3, 4]], 1.0, cell=Cell([10.0, 80.0, 6.0], (True, False, True)))
-    assert default_center(packing, np.ones(1, bool)) == pytest.approx([5.0, 3.0, 3.0])
-    assert smallest_extent(packing, np.ones(1, bool)) == pytest.approx(2.0)
+    assert SurfaceBox.of(packing, np.ones(1, bool)).center == pytest.approx([5.0, 3.0, 3.0])
+    assert SurfaceBox.of(packing, np.ones(1, bool)).smallest_extent == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize(
@@ -102,6 +102,6 @@ def test_room_around_the_window_is_to_the_nearest_surface_that_is_no_periodic_fa
     window = SphereWindow(np.array([4.0, 4.0, 4.0]), 3.0)
     beyond = SphereWindow(np.array([4.0, 4.0, 4.0]), 6.0)
     # along y the surfaces lie at -1 and 8.25, along x and z farther away
-    assert room_around(window, four_grains(), ALL) == pytest.approx(8.25 - 7)
-    assert room_around(beyond, four_grains(), ALL) == pytest.approx(8.25 - 10)
-    assert room_around(beyond, four_grains(cell=CELL), ALL) == np.inf
+    assert SurfaceBox.of(four_grains(), ALL).room_around(window) == pytest.approx(8.25 - 7)
+    assert SurfaceBox.of(four_grains(), ALL).room_around(beyond) == pytest.approx(8.25 - 10)
+    assert SurfaceBox.of(four_grains(cell=CELL), ALL).room_around(beyond) == np.inf
