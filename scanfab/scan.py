@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 
@@ -22,6 +22,8 @@ __all__ = [
     "CellGrains",
     "ScanSums",
     "Solids",
+    "drawn_lines",
+    "in_parts",
     "is_affordable",
     "line_frames",
     "most_lines",
@@ -37,6 +39,10 @@ BoolArray = npt.NDArray[np.bool_]
 
 # lines of one axis and replicate: more take minutes, even those that meet nothing
 MAX_LINES = 50_000_000
+AXES_A_JOB = 16
+# of the spacing and for each variant: spheres of such a radius are scanned as fast row by row as
+# over lists of chords; for the more variants the lists serve, the sooner they pay
+FEW_LINES = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +108,7 @@ class ScanSums:
     chords: IntArray
     """
     Chords that all spheres together cut from the lines, shape (R,); of spheres that few lines meet,
-    as many as are to be expected.
+    at times as many as are to be expected.
     """
     channels: IntArray
     """Lines of the whole that meet no grain however far they go, shape (R, 4, D)."""
@@ -205,20 +211,45 @@ def scan_lines(
     1.87
     """
     _check_spacing(solids, spacing)
+    frames, offsets = drawn_lines(rule, seed, replicates)
+
+    def some(frames: FloatArray, offsets: FloatArray) -> FloatArray:
+        return tally_frames(solids, frames, offsets, spacing, cutoff, variants)
+
+    return sums_of(frames, in_parts(some, frames, offsets, workers), variants)
+
+
+def drawn_lines(
+    rule: DirectionRule, seed: int, replicates: Iterable[int]
+) -> tuple[FloatArray, FloatArray]:
+    """Line frames of all replicates, shape (R, D, 3, 3), and shifts of their grids, (R, D, 2)."""
     frames = line_frames(rule.axes)
-
-    def one(replicate: int) -> ScanSums:
-        turned, offsets = turned_frames(rule, frames, seed, replicate)
-        tallies = tally_frames(solids, turned, offsets, spacing, cutoff, variants)
-        return sums_of(turned, tallies, variants)
-
-    numbers = list(replicates)
-    if not numbers:
+    drawn = [turned_frames(rule, frames, seed, replicate) for replicate in replicates]
+    if not drawn:
         raise SettingsError("replicates: expected at least one")
-    if workers == 1 or len(numbers) == 1:
-        return ScanSums.concatenate(map(one, numbers))
+    turned, offsets = zip(*drawn, strict=True)
+    return np.array(turned), np.array(offsets)
+
+
+def in_parts(
+    scan: Callable[[FloatArray, FloatArray], FloatArray],
+    frames: FloatArray,
+    offsets: FloatArray,
+    workers: int,
+) -> FloatArray:
+    """
+    Scan along the axes of all replicates, a few in each job of several threads.
+
+    ``scan`` takes the frames and shifts of some axes, (A, 3, 3) and (A, 2), and returns what it
+    adds up for each, (A, ...); the result has the shape (R, D, ...).
+    """
+    count = offsets.shape[0] * offsets.shape[1]
+    frames, shifts = frames.reshape(count, 3, 3), offsets.reshape(count, 2)
+    parts = [slice(first, first + AXES_A_JOB) for first in range(0, count, AXES_A_JOB)]
     with ThreadPoolExecutor(workers) as pool:
-        return ScanSums.concatenate(pool.map(one, numbers))
+        found = list(pool.map(lambda part: scan(frames[part], shifts[part]), parts))
+    sums = np.concatenate(found)
+    return sums.reshape(*offsets.shape[:2], *sums.shape[1:])
 
 
 def turned_frames(
@@ -275,7 +306,8 @@ def tally_frames(
         medium = solids.medium if first else _without_removed(solids.medium)
         if len(medium.radius):
             axes = np.ascontiguousarray(frames[:, 2])
-            scan_cell(medium, axes, offsets, spacing, cutoff, tallies, both, bins)
+            by_lists = _few_lines(medium.radius, spacing, 1 + (both is not None))
+            scan_cell(medium, axes, offsets, spacing, cutoff, tallies, by_lists, both, bins)
         whole = False
     if whole or window:
         solid = slice(None) if first else ~solids.removed
@@ -289,6 +321,7 @@ def tally_frames(
             cutoff,
             solids.window_radius,
             tallies,
+            _few_lines(solids.radius[solid], spacing, (1 + (both is not None)) * (whole + window)),
             both,
             True if whole else None,
             True if window else None,
@@ -300,6 +333,11 @@ def tally_frames(
     return tallies[:, ::-1]
 
 
+def _few_lines(radius: FloatArray, spacing: float, variants: int) -> bool:
+    """Whether most chords are of spheres that meet but few lines."""
+    return bool(np.sum(radius**2) < FEW_LINES * variants * spacing * np.sum(radius))
+
+
 def _without_removed(medium: CellGrains) -> CellGrains:
     solid = ~medium.removed
     return medium._replace(
@@ -308,28 +346,27 @@ def _without_removed(medium: CellGrains) -> CellGrains:
 
 
 def sums_of(frames: FloatArray, tallies: FloatArray, variants: str) -> ScanSums:
-    """The sums of one replicate from its line frames, and its tallies by axis and set of solids."""
-    wanted = np.array([variant in variants for variant in "abcd"])
+    """The sums of replicates from their line frames and tallies, shape (R, D, 2, TALLY_SIZE)."""
+    wanted = np.array([variant in variants for variant in "abcd"])[:, None]
+    # replicate, set of solids, axis
+    entries = np.moveaxis(tallies, (3, 2), (0, 2))
 
-    def of(whole: int, window: int | None) -> FloatArray:
-        groups = [tallies[..., whole], 0.0 * tallies[..., 0]]
-        if window is not None:
-            groups[1] = tallies[..., window]
-        values = np.concatenate(groups, axis=1).T[None]
-        return np.where(wanted[:, None], values, 0.0)
+    def of(whole: int, window: int | None = None) -> FloatArray:
+        second = 0.0 * entries[0] if window is None else entries[window]
+        return np.where(wanted, np.concatenate([entries[whole], second], axis=1), 0.0)
 
-    def entry(number: int) -> FloatArray:
+    def both(number: int) -> FloatArray:
         return of(sweep.WHOLE + number, sweep.WINDOW + number)
 
     return ScanSums(
-        axes=frames[None, :, 2],
-        length=entry(sweep.LENGTH),
-        segments=entry(sweep.KEPT).astype(np.int64),
-        lines=entry(sweep.LINES).astype(np.int64),
-        void=entry(sweep.VOID),
-        line_length=entry(sweep.LINE_LENGTH),
-        chords=np.array([tallies[:, :, sweep.CHORDS].sum()]).astype(np.int64),
-        channels=of(sweep.CHANNELS, None).astype(np.int64),
+        axes=frames[:, :, 2],
+        length=both(sweep.LENGTH),
+        segments=both(sweep.KEPT).astype(np.int64),
+        lines=both(sweep.LINES).astype(np.int64),
+        void=both(sweep.VOID),
+        line_length=both(sweep.LINE_LENGTH),
+        chords=entries[sweep.CHORDS].sum(axis=(1, 2)).astype(np.int64),
+        channels=of(sweep.CHANNELS).astype(np.int64),
     )
 
 

@@ -34,7 +34,7 @@ def solids_of(spheres, window_radius=0.0, removed=None):
 def scan_frames(solids, frames, offsets, spacing, cutoff, variants="abcd"):
     """Scan along given line frames, with given shifts of the lines, as one replicate."""
     tallies = tally_frames(solids, frames, offsets, spacing, cutoff, variants)
-    return sums_of(frames, tallies, variants)
+    return sums_of(frames[None], tallies[None], variants)
 
 
 def scan_along(solids, axes, spacing, cutoff=0.0, replicates=16, seed=0):

@@ -5,18 +5,20 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.kernels.bins import (
-    Bins,
-    add_gaps,
-    bins_along,
-    list_gaps,
-    list_last_gaps,
-    room_for_gaps,
-)
-from scanfab.kernels.compiled import LANES, Flag, inner, kernel
+from scanfab.kernels.bins import Bins, bins_along
+from scanfab.kernels.compiled import LANES, ZERO, Flag, inner, kernel
 from scanfab.kernels.follow import follow
 from scanfab.kernels.grid import Grid, bounds, open_grid, part_of, strip_of
 from scanfab.kernels.lines import solve_closed
+from scanfab.kernels.lists import (
+    LISTED_LINES,
+    Lists,
+    bin_last_gaps,
+    bin_lists,
+    list_chords,
+    room_for_lists,
+    sweep_lists,
+)
 from scanfab.kernels.periodic import CellGrains, Prism, cell_grid, measured_in
 from scanfab.kernels.projection import Spheres, project, sort_into_strips, sphere_at
 from scanfab.kernels.strips import MOST_LINES, STATE_SIZE, Strip, begin, measure_from
@@ -29,8 +31,6 @@ IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
 
 SMALLEST = 5e-324
-# a row of lines has to fit a strip
-MOST_COLUMNS = MOST_LINES - LANES
 
 
 @inner()
@@ -61,24 +61,34 @@ def visit_all(
 
 
 @inner()
-def visit_in_bins(
+def visit_listed(
     lines: FloatArray,
+    lists: Lists,
     strip: Strip,
     spheres: Spheres,
     chosen: IntArray,
     least: float,
-    gaps: FloatArray,
+    tally: FloatArray,
     bins: Bins,
     second: Flag,
     whole: Flag,
     window: Flag,
     measured: Measured | None,
 ) -> None:
-    """Visit the chosen spheres, and add the gaps that they settle to the bins."""
-    for k in chosen:
-        sphere, removed = sphere_at(spheres, k), spheres.removed[k]
-        count = list_gaps(lines, strip, sphere, removed, least, second, measured, gaps)
-        add_gaps(bins, gaps, count, 1.0, whole, window, measured)
+    """List the chords of the chosen spheres, and sweep the lists when one is full and at last."""
+    done = ZERO
+    while done < chosen.size:
+        done = list_chords(lists, strip, spheres, chosen, done)
+        if bins.cutoffs.size > 0:
+            bin_lists(lines, lists, strip, least, bins, second, whole, window, measured)
+        else:
+            sweep_lists(lines, lists, strip, least, tally, second, whole, window, measured)
+
+
+@inner()
+def most_lines(lists: Lists) -> int:
+    """So many lines a strip may have."""
+    return LISTED_LINES if lists.stop.size > 0 else MOST_LINES
 
 
 @inner()
@@ -89,6 +99,7 @@ def scan_strips(
     window_radius: float,
     cutoff: float,
     tally: FloatArray,
+    lists: Lists,
     second: Flag,
     whole: Flag,
     window: Flag,
@@ -99,11 +110,9 @@ def scan_strips(
     """Scan a grid strip by strip, so that the lines' state stays in cache."""
     least = max(cutoff, SMALLEST)
     pitch = grid.columns + LANES
-    rows = max(MOST_LINES // pitch, 1)
+    by_lists, in_bins = lists.stop.size > 0, bins.cutoffs.size > 0
+    rows = max(most_lines(lists) // pitch, 1)
     start, chosen = sort_into_strips(spheres, grid, rows)
-    # of each line and set of solids a sphere settles one gap, and two are the last
-    in_bins = bins.cutoffs.size > 0
-    gaps = room_for_gaps(2 * rows * grid.columns + 1 if in_bins else 0)
     for number in range(start.size - 1):
         strip = strip_of(grid, number, rows, pitch)
         met = chosen[start[number] : start[number + 1]]
@@ -111,14 +120,13 @@ def scan_strips(
         if medium is not None:
             measure_from(lines, strip, medium[1].rise_u, medium[1].rise_v)
         flags = second, whole, window, measured
-        if in_bins:
-            visit_in_bins(lines, strip, spheres, met, least, gaps, bins, *flags)
+        if by_lists:
+            visit_listed(lines, lists, strip, spheres, met, least, tally, bins, *flags)
         else:
             visit_all(lines, strip, spheres, met, window_radius, least, tally, *flags)
         for which in range(1 if second is None else 2):
             if in_bins:
-                count, closed = list_last_gaps(lines, strip, which, least, gaps)
-                add_gaps(bins, gaps, count, 1.0, whole, window, measured)
+                closed = bin_last_gaps(lines, strip, which, bins, whole, window, measured)
             else:
                 closed = settle(lines, strip, which, least, tally, whole, window, measured)
             if closed > 0.0:
@@ -151,6 +159,7 @@ def scan_axes(
     cutoff: float,
     window_radius: float,
     tallies: FloatArray,
+    by_lists: bool,
     second: Flag,
     whole: Flag,
     window: Flag,
@@ -173,25 +182,32 @@ def scan_axes(
         Radius of the sphere window; 0 for none.
     tallies : shape (D, 2, TALLY_SIZE)
         Zeros; the results for each axis and set of solids.
+    by_lists : bool
+        Whether to list the chords of each line first, see :mod:`scanfab.kernels.lists`: faster
+        where a sphere meets few lines. For bins they are listed anyhow.
     second, whole, window : True or None
         What is counted, see :mod:`scanfab.kernels.sweep`.
     bins : Bins
         Where every gap is added, instead of to the tallies, if there are any.
     """
     lines = np.empty(STATE_SIZE)
+    lists = room_for_lists(by_lists or bins.cutoffs.size > 0)
+    # a row of lines has to fit a strip
+    most = most_lines(lists) - LANES
     extent = bounds(position, radius)
     for axis in range(frames.shape[0]):
         frame = frames[axis]
         grid = open_grid(extent, frame, offsets[axis], spacing, window_radius, whole is not None)
         spheres = project(position, radius, removed, frame, grid)
-        for first in range(0, grid.columns, MOST_COLUMNS):
+        for first in range(0, grid.columns, most):
             scan_strips(
                 lines,
                 spheres,
-                part_of(grid, first, MOST_COLUMNS),
+                part_of(grid, first, most),
                 window_radius,
                 cutoff,
                 tallies[axis],
+                lists,
                 second,
                 whole,
                 window,
@@ -209,6 +225,7 @@ def scan_cell(
     spacing: float,
     cutoff: float,
     tallies: FloatArray,
+    by_lists: bool,
     second: Flag,
     bins: Bins,
 ) -> None:
@@ -218,21 +235,24 @@ def scan_cell(
     ``normals`` has shape (D, 3), the rest is as in :func:`scan_axes`.
     """
     lines = np.empty(STATE_SIZE)
+    lists = room_for_lists(by_lists or bins.cutoffs.size > 0)
+    most = most_lines(lists) - LANES
     for axis in range(normals.shape[0]):
         prism, spheres, grid = cell_grid(grains, normals[axis], offsets[axis], spacing)
         tally = tallies[axis]
         measured = measured_in(grains, prism)
         here = bins_along(bins, prism.frame, axis)
-        for first in range(0, grid.columns, MOST_COLUMNS):
-            part = part_of(grid, first, MOST_COLUMNS)
+        for first in range(0, grid.columns, most):
+            part = part_of(grid, first, most)
             # along an axis that is not periodic a line runs from the first solid to the last
             if grains.periodic[prism.third]:
                 medium = grains, prism
                 scan_strips(
-                    lines, spheres, part, 0.0, cutoff, tally, second, True, None, measured, medium,
-                    here,
+                    lines, spheres, part, 0.0, cutoff, tally, lists, second, True, None, measured,
+                    medium, here,
                 )  # fmt: skip
             else:
                 scan_strips(
-                    lines, spheres, part, 0.0, cutoff, tally, second, True, None, None, None, here
-                )
+                    lines, spheres, part, 0.0, cutoff, tally, lists, second, True, None, None,
+                    None, here,
+                )  # fmt: skip

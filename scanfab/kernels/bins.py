@@ -1,7 +1,7 @@
 """
 Void segments one by one: by the octant of their middle and by cut-off, with their squares.
 
-What sums for one cut-off cannot tell. It is the sweep again, chord by chord.
+What sums for one cut-off cannot tell.
 """
 
 from __future__ import annotations
@@ -12,33 +12,21 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.kernels.compiled import Flag, inner
-from scanfab.kernels.strips import (
-    BOUND,
-    END,
-    FAR,
-    GAP_END,
-    GAP_START,
-    SET,
-    Sphere,
-    Strip,
-    columns_of_row,
-    span,
-)
-from scanfab.kernels.sweep import Measured, moved, whole_gap
+from scanfab.kernels.strips import FAR
+from scanfab.kernels.sweep import Measured, whole_gap
 
 __all__ = [
     "BLOCKS",
-    "HIGH",
+    "GAP_HIGH",
+    "GAP_LOW",
     "LENGTH",
-    "LOW",
+    "LINE_BOUND",
+    "LINE_U",
     "NUMBER",
     "SQUARE",
     "Bins",
     "add_gaps",
-    "add_line",
     "bins_along",
-    "list_gaps",
-    "list_last_gaps",
     "no_bins",
     "room_for_gaps",
 ]
@@ -48,9 +36,12 @@ FloatArray = npt.NDArray[np.float64]
 BLOCKS = 8
 # what is added up of the gaps of a block and bin
 NUMBER, LENGTH, SQUARE = range(3)
-# whose gaps they are, and of the list of gaps its rows
+# whose gaps they are
 OF_WHOLE, OF_WINDOW = 0, 1
-WHICH, U, V, LINE_BOUND, LOW, HIGH = range(6)
+# of a list of gaps its rows: the line's place along u, its bound, where the gap starts and ends;
+# its length in the whole and, behind that, in the window; likewise its bin
+LINE_U, LINE_BOUND, GAP_LOW, GAP_HIGH = range(4)
+COUNTED, PLACE = 4, 6
 
 
 class Bins(NamedTuple):
@@ -70,7 +61,7 @@ class Bins(NamedTuple):
     """
     sums: FloatArray
     """
-    Number, length, squared length, shape (D, 2, 2, BLOCKS, C, 3).
+    Number, length, squared length, shape (D, 2, 2, BLOCKS * C, 3).
 
     For each axis, whole or window, and set of solids; without D those of one axis.
     """
@@ -78,7 +69,7 @@ class Bins(NamedTuple):
 
 def no_bins(axes: int) -> Bins:
     """For so many axes, none: a kernel that takes these is compiled once, with bins or without."""
-    return Bins(np.zeros((2, 3, 4)), np.zeros(0), np.zeros((axes, 2, 2, BLOCKS, 0, 3)))
+    return Bins(np.zeros((2, 3, 4)), np.zeros(0), np.zeros((axes, 2, 2, 0, 3)))
 
 
 @inner()
@@ -96,136 +87,72 @@ def bins_along(bins: Bins, frame: FloatArray, axis: int) -> Bins:
 
 @inner()
 def room_for_gaps(count: int) -> FloatArray:
-    """So many gaps, to be listed: set of solids, line, its bound, and where the gap is."""
-    return np.empty((6, count))
+    """So many gaps, to be listed: the first four rows; the others are for :func:`add_gaps`."""
+    return np.empty((8, count))
+
+
+@inner(error_model="numpy")
+def find_bins(
+    bins: Bins,
+    gaps: FloatArray,
+    count: np.uint64,
+    kind: int,
+    v: float,
+    measured: Measured | None,
+) -> None:
+    """Of gaps on a row of lines, the lengths, 0 where they do not count, and the bins."""
+    cutoffs, to_block = bins.cutoffs, bins.to_block[kind]
+    x_u, y_u, z_u = to_block[0, 0], to_block[1, 0], to_block[2, 0]
+    x_n, y_n, z_n = to_block[0, 2], to_block[1, 2], to_block[2, 2]
+    x_v = to_block[0, 1] * v + to_block[0, 3]
+    y_v = to_block[1, 1] * v + to_block[1, 3]
+    z_v = to_block[2, 1] * v + to_block[2, 3]
+    lengths, places = gaps[COUNTED + kind], gaps[PLACE + kind]
+    for k in range(count):
+        u, bound = gaps[LINE_U, k], gaps[LINE_BOUND, k]
+        low, high = gaps[GAP_LOW, k], gaps[GAP_HIGH, k]
+        # NaN where the line misses the window
+        reach = bound if kind == OF_WINDOW else FAR
+        low = low if low > -reach else -reach
+        high = high if high < reach else reach
+        length = whole_gap(low, high, 0.0, bound, measured)[2]
+        middle = 0.5 * (low + high)
+        x = x_v + x_u * u + x_n * middle
+        y = y_v + y_u * u + y_n * middle
+        z = z_v + z_u * u + z_n * middle
+        block = 1.0 if x - np.floor(x) >= 0.5 else 0.0
+        block += 2.0 if y - np.floor(y) >= 0.5 else 0.0
+        block += 4.0 if z - np.floor(z) >= 0.5 else 0.0
+        lengths[k] = length if (length > 0.0) & (length >= cutoffs[0]) else 0.0
+        places[k] = block * cutoffs.size
+    for number in range(1, cutoffs.size):
+        for k in range(count):
+            places[k] += 1.0 if lengths[k] >= cutoffs[number] else 0.0
 
 
 @inner(error_model="numpy")
 def add_gaps(
     bins: Bins,
     gaps: FloatArray,
-    count: int,
-    sign: float,
-    whole: Flag,
-    window: Flag,
-    measured: Measured | None,
-) -> None:
-    """Add the first gaps of a list where they count, as the sweep does, or take them back."""
-    # no array is handed on in the loop: to count its references would take longer than all else
-    to_block, cutoffs, sums = bins.to_block, bins.cutoffs, bins.sums
-    for k in range(count):
-        which = int(gaps[WHICH, k])
-        u, v, bound = gaps[U, k], gaps[V, k], gaps[LINE_BOUND, k]
-        for kind in range(2):
-            low, high = gaps[LOW, k], gaps[HIGH, k]
-            length = 0.0
-            if kind == OF_WHOLE and whole is not None:
-                length = whole_gap(low, high, 0.0, bound, measured)[2]
-            if kind == OF_WINDOW and window is not None:
-                # NaN where the line misses the window
-                low = low if low > -bound else -bound
-                high = high if high < bound else bound
-                length = high - low
-            place = -1
-            while place + 1 < cutoffs.size and cutoffs[place + 1] <= length:
-                place += 1
-            if not length > 0.0 or place < 0:
-                continue
-            middle, block = 0.5 * (low + high), 0
-            for i in range(3):
-                x = to_block[kind, i, 0] * u + to_block[kind, i, 1] * v + to_block[kind, i, 3]
-                x += to_block[kind, i, 2] * middle
-                block += (1 << i) * (x - np.floor(x) >= 0.5)
-            sums[kind, which, block, place, NUMBER] += sign
-            sums[kind, which, block, place, LENGTH] += sign * length
-            sums[kind, which, block, place, SQUARE] += sign * length * length
-
-
-@inner()
-def add_line(
-    bins: Bins,
-    gaps: FloatArray,
-    count: int,
+    count: np.uint64,
     sign: float,
     which: int,
-    u: float,
     v: float,
-    bound: float,
     whole: Flag,
     window: Flag,
     measured: Measured | None,
 ) -> None:
-    """The same for gaps of the line through (u, v), of which the list has but their two ends."""
+    """Add the first gaps of a list, all on one row of lines, where they count; or take them off."""
+    kinds = np.uint64(OF_WINDOW if whole is None else OF_WHOLE), np.uint64(1 + (window is not None))
+    for kind in range(kinds[0], kinds[1]):
+        find_bins(bins, gaps, count, kind, v, measured)
+    sums, of = bins.sums, np.uint64(which)
     for k in range(count):
-        gaps[WHICH, k], gaps[U, k], gaps[V, k], gaps[LINE_BOUND, k] = which, u, v, bound
-    add_gaps(bins, gaps, count, sign, whole, window, measured)
-
-
-@inner(error_model="numpy")
-def list_gaps(
-    lines: FloatArray,
-    strip: Strip,
-    sphere: Sphere,
-    removed: bool,
-    least: float,
-    second: Flag,
-    measured: Measured | None,
-    gaps: FloatArray,
-) -> int:
-    """Visit the chords that a sphere cuts from a strip, and list the gaps that they settle."""
-    count = 0
-    radius, per_spacing = sphere.radius, strip.per_spacing
-    rows = span(sphere.v, radius, strip.first_v, per_spacing, 0, strip.rows)
-    columns = span(sphere.u, radius, strip.first_u, per_spacing, 0, strip.columns)
-    for row in range(rows[0], rows[1]):
-        v = strip.first_v + row * strip.spacing
-        reach2 = radius * radius - (v - sphere.v) * (v - sphere.v)
-        first, met, _ = columns_of_row(strip, sphere, row, reach2, columns[0], columns[1])
-        for column in range(first, first + met):
-            u = strip.first_u + column * strip.spacing
-            # NaN beyond the ends of the row: then nothing happens
-            half_chord = np.sqrt(reach2 - (u - sphere.u) * (u - sphere.u))
-            start, stop = sphere.depth - half_chord, sphere.depth + half_chord
-            i = np.uint64(row * strip.pitch + column)
-            bound = lines[i + BOUND]
-            if measured is not None and not start - bound < measured.known:
-                continue
-            for which in range(1 if second is None or removed else 2):
-                k = i + SET * np.uint64(which)
-                end, low, high = lines[k + END], lines[k + GAP_START], lines[k + GAP_END]
-                # listed anyhow, and overwritten if it is none: no branch to be guessed wrong
-                gaps[WHICH, count], gaps[U, count], gaps[V, count] = which, u, v
-                gaps[LINE_BOUND, count], gaps[LOW, count], gaps[HIGH, count] = bound, low, high
-                count += (start > end) & (high - low >= least)
-                end, low, high = moved(start, stop, end, low, high)
-                lines[k + END], lines[k + GAP_START], lines[k + GAP_END] = end, low, high
-    return count
-
-
-@inner()
-def list_last_gaps(
-    lines: FloatArray, strip: Strip, which: int, least: float, gaps: FloatArray
-) -> tuple[int, float]:
-    """
-    List every line's last gap, and the void behind its last solid.
-
-    Returns how many they are, and the number of closed lines, of which nothing is listed.
-    """
-    count, closed = 0, 0.0
-    for row in range(strip.rows):
-        v = strip.first_v + row * strip.spacing
-        for column in range(strip.low[row], strip.high[row]):
-            u = strip.first_u + column * strip.spacing
-            i = np.uint64(row * strip.pitch + column)
-            k = i + SET * np.uint64(which)
-            end, bound = lines[k + END], lines[i + BOUND]
-            if end == FAR:
-                closed += 1.0
-                continue
-            last = lines[k + GAP_START], lines[k + GAP_END]
-            for low, high in (last, (end, FAR)):
-                if high - low >= least:
-                    gaps[WHICH, count], gaps[U, count], gaps[V, count] = which, u, v
-                    gaps[LINE_BOUND, count], gaps[LOW, count], gaps[HIGH, count] = bound, low, high
-                    count += 1
-    return count, closed
+        # both in turns, as a gap has to wait for the one before it if they share a bin
+        for kind in range(kinds[0], kinds[1]):
+            length = gaps[np.uint64(COUNTED) + kind, k]
+            place = np.uint64(gaps[np.uint64(PLACE) + kind, k])
+            number = sign if length > 0.0 else 0.0
+            sums[kind, of, place, NUMBER] += number
+            sums[kind, of, place, LENGTH] += number * length
+            sums[kind, of, place, SQUARE] += number * length * length

@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.kernels.bins import HIGH, LOW, Bins, add_line, room_for_gaps
+from scanfab.kernels.bins import (
+    GAP_HIGH,
+    GAP_LOW,
+    LINE_BOUND,
+    LINE_U,
+    Bins,
+    add_gaps,
+    room_for_gaps,
+)
 from scanfab.kernels.compiled import inner
 from scanfab.kernels.periodic import CellGrains, Prism, cross, dot, shifts
 from scanfab.kernels.strips import BOUND, END, FAR, SET, Strip
@@ -166,8 +174,9 @@ def follow(
                     tally[which, WHOLE + VOID] += gap
                     if bins.cutoffs.size > 0:
                         one = room_for_gaps(1)
-                        one[LOW, 0], one[HIGH, 0] = end, start
-                        add_line(bins, one, 1, 1.0, which, u, v, bound, True, None, None)
+                        one[LINE_U, 0], one[LINE_BOUND, 0] = u, bound
+                        one[GAP_LOW, 0], one[GAP_HIGH, 0] = end, start
+                        add_gaps(bins, one, np.uint64(1), 1.0, which, v, True, None, None)
                     elif gap >= least:
                         tally[which, WHOLE + LENGTH] += gap
                         tally[which, WHOLE + KEPT] += 1.0

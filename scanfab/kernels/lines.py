@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.kernels.bins import HIGH, LOW, Bins, add_line, room_for_gaps
+from scanfab.kernels.bins import (
+    GAP_HIGH,
+    GAP_LOW,
+    LINE_BOUND,
+    LINE_U,
+    Bins,
+    add_gaps,
+    room_for_gaps,
+)
 from scanfab.kernels.compiled import ZERO, Flag, inner
 from scanfab.kernels.projection import Spheres, number_from, sort_by, sphere_at
 from scanfab.kernels.strips import BOUND, END, FAR, SET, Strip, span
@@ -138,12 +146,12 @@ def gaps_of(
         if measured is not None and start - bound >= measured.known:
             continue
         if start > end:
-            gaps[LOW, count], gaps[HIGH, count] = low, high
+            gaps[GAP_LOW, count], gaps[GAP_HIGH, count] = low, high
             count += 1
         end, low, high = moved(start, stop, end, low, high)
     if end < FAR:
-        gaps[LOW, count], gaps[HIGH, count] = low, high
-        gaps[LOW, count + 1], gaps[HIGH, count + 1] = end, FAR
+        gaps[GAP_LOW, count], gaps[GAP_HIGH, count] = low, high
+        gaps[GAP_LOW, count + 1], gaps[GAP_HIGH, count + 1] = end, FAR
         count += 2
     return count, end
 
@@ -166,10 +174,12 @@ def tally_line(
 ) -> None:
     """Tally the gaps of one line, or take them back, with a sign of -1."""
     if bins.cutoffs.size > 0:
-        add_line(bins, gaps, count, sign, which, u, v, bound, whole, window, measured)
+        for k in range(count):
+            gaps[LINE_U, k], gaps[LINE_BOUND, k] = u, bound
+        add_gaps(bins, gaps, np.uint64(count), sign, which, v, whole, window, measured)
     else:
         for k in range(count):
-            low, high = gaps[LOW, k], gaps[HIGH, k]
+            low, high = gaps[GAP_LOW, k], gaps[GAP_HIGH, k]
             a, b, c, d, e, f = counted(True, low, high, least, bound, whole, window, measured)
             add(tally, which, (sign * a, sign * b, sign * c, sign * d, sign * e, sign * f))
 

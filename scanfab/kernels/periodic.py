@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from scanfab.kernels.compiled import ZERO, inner
 from scanfab.kernels.grid import Grid, sheared_grid
-from scanfab.kernels.projection import Spheres, order_of, room_for_spheres
+from scanfab.kernels.projection import Spheres, order_of, range_of, room_for_spheres
 from scanfab.kernels.sweep import Measured
 
 __all__ = [
@@ -233,7 +233,7 @@ def cell_grid(
     """The lines along a direction through a periodic medium, and the images that they may meet."""
     prism = prism_along(normal, grains.vectors, grains.periodic)
     found, extent = images_in(grains, prism)
-    order = order_of(found.depth)
+    order = order_of(found.depth, *range_of(found.depth))
     spheres = Spheres(
         found.u[order],
         found.v[order],

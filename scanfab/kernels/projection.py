@@ -9,13 +9,14 @@ import numpy.typing as npt
 
 from scanfab.kernels.compiled import ONE, ZERO, inner
 from scanfab.kernels.grid import Grid
-from scanfab.kernels.strips import Sphere, span
+from scanfab.kernels.strips import FAR, Sphere, span
 
 __all__ = [
     "Spheres",
     "number_from",
     "order_of",
     "project",
+    "range_of",
     "room_for_spheres",
     "sort_by",
     "sort_into_strips",
@@ -53,12 +54,12 @@ def room_for_spheres(count: int) -> Spheres:
 
 
 @inner(inline="always")
-def sphere_at(spheres: Spheres, k: int) -> Sphere:
+def sphere_at(spheres: Spheres, k: int | np.uint64) -> Sphere:
     """Sphere k."""
     return Sphere(spheres.u[k], spheres.v[k], spheres.depth[k], spheres.radius[k])
 
 
-@inner()
+@inner(error_model="numpy")
 def project(
     position: FloatArray,
     radius: FloatArray,
@@ -67,55 +68,73 @@ def project(
     grid: Grid,
 ) -> Spheres:
     """The spheres that may meet a line, ordered by depth, in the frame with rows u, v, n."""
-    met = np.empty(radius.size, np.int64)
-    depth = np.empty(radius.size)
-    count = 0
+    u_x, u_y, u_z = frame[0, 0], frame[0, 1], frame[0, 2]
+    v_x, v_y, v_z = frame[1, 0], frame[1, 1], frame[1, 2]
+    n_x, n_y, n_z = frame[2, 0], frame[2, 1], frame[2, 2]
+    met, depth = np.empty(radius.size, np.int64), np.empty(radius.size)
+    count = np.uint64(0)
+    low, high = np.inf, -np.inf
     per_spacing = 1.0 / grid.spacing
-    for k in range(radius.size):
+    for k in range(np.uint64(radius.size)):
         x, y, z = position[k, 0], position[k, 1], position[k, 2]
         # a row and a column within reach; whether they cross there, the visit will see
-        column = (frame[0, 0] * x + frame[0, 1] * y + frame[0, 2] * z - grid.first_u) * per_spacing
-        row = (frame[1, 0] * x + frame[1, 1] * y + frame[1, 2] * z - grid.first_v) * per_spacing
+        column = (u_x * x + u_y * y + u_z * z - grid.first_u) * per_spacing
+        row = (v_x * x + v_y * y + v_z * z - grid.first_v) * per_spacing
         reach = radius[k] * per_spacing
         met[count] = k
-        depth[count] = frame[2, 0] * x + frame[2, 1] * y + frame[2, 2] * z
-        count += (np.floor(row + reach) >= row - reach) & (
-            np.floor(column + reach) >= column - reach
+        along = n_x * x + n_y * y + n_z * z
+        depth[count] = along
+        low, high = min(low, along), max(high, along)
+        count += np.uint64(
+            (np.floor(row + reach) >= row - reach) & (np.floor(column + reach) >= column - reach)
         )
-    order = order_of(depth[:count])
-    found = room_for_spheres(count)
+    order = order_of(depth[:count], low, high)
+    found = room_for_spheres(int(count))
     for i in range(count):
-        k = met[order[i]]
-        x, y, z = position[k, 0], position[k, 1], position[k, 2]
-        found.u[i] = frame[0, 0] * x + frame[0, 1] * y + frame[0, 2] * z
-        found.v[i] = frame[1, 0] * x + frame[1, 1] * y + frame[1, 2] * z
-        found.depth[i] = depth[order[i]]
-        found.radius[i] = radius[k]
-        found.removed[i] = removed[k]
+        place = np.uint64(order[i])
+        grain = np.uint64(met[place])
+        x, y, z = position[grain, 0], position[grain, 1], position[grain, 2]
+        found.u[i] = u_x * x + u_y * y + u_z * z
+        found.v[i] = v_x * x + v_y * y + v_z * z
+        found.depth[i] = depth[place]
+        found.radius[i] = radius[grain]
+        found.removed[i] = removed[grain]
     return found
 
 
 @inner()
-def order_of(values: FloatArray) -> IntArray:
-    """Indices that sort the values: by buckets, in linear time unless most crowd in a few."""
-    count = values.size
+def range_of(values: FloatArray) -> tuple[float, float]:
+    """The least and the greatest of values."""
     low, high = np.inf, -np.inf
     for value in values:
         low, high = min(low, value), max(high, value)
-    per_width = (count - 1) / (high - low) if high > low else 0.0
+    return low, high
+
+
+@inner(error_model="numpy")
+def order_of(values: FloatArray, low: float, high: float) -> IntArray:
+    """
+    Indices that sort values, none of which is less than ``low`` or greater than ``high``.
+
+    By buckets, in linear time unless most values crowd in a few.
+    """
+    count = values.size
+    per_width = (count - 1) / (high - low)
+    # all of them may be equal, or nearly
+    per_width = per_width if per_width < FAR else 0.0
     stop = np.zeros(count + 1, np.int64)
     for value in values:
-        stop[int((value - low) * per_width) + 1] += 1
-    for bucket in range(count):
-        stop[bucket + 1] += stop[bucket]
+        stop[np.uint64((value - low) * per_width) + np.uint64(1)] += 1
+    for bucket in range(np.uint64(count)):
+        stop[bucket + np.uint64(1)] += stop[bucket]
     # from starts of the buckets to their ends, while they fill
     order = np.empty(count, np.int64)
-    for k in range(count):
-        bucket = int((values[k] - low) * per_width)
-        order[stop[bucket]] = k
-        stop[bucket] += 1
+    for k in range(np.uint64(count)):
+        its_bucket = np.uint64((values[k] - low) * per_width)
+        order[np.uint64(stop[its_bucket])] = k
+        stop[its_bucket] += 1
     start = 0
-    for bucket in range(count):
+    for bucket in range(np.uint64(count)):
         if stop[bucket] - start > FEW:
             sort_by(values, order[start : stop[bucket]])
         start = stop[bucket]
@@ -137,11 +156,13 @@ def sort_by(values: FloatArray, members: IntArray) -> None:
 @inner()
 def insert(values: FloatArray, members: IntArray, gap: int) -> None:
     """Order those that are a multiple of the gap apart: fast where few are far from their place."""
-    for i in range(gap, members.size):
-        moving, j = members[i], i
-        while j >= gap and values[members[j - gap]] > values[moving]:
-            members[j] = members[j - gap]
-            j -= gap
+    step = np.uint64(gap)
+    for i in range(step, np.uint64(members.size)):
+        moving, j = members[i], np.uint64(i)
+        value = values[np.uint64(moving)]
+        while j >= step and values[np.uint64(members[j - step])] > value:
+            members[j] = members[j - step]
+            j -= step
         members[j] = moving
 
 

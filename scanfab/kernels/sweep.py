@@ -154,6 +154,43 @@ def moved(
     return (FAR if high < low else end), low, high
 
 
+@inner(forceinline=True, error_model="numpy")
+def meet(
+    lines: FloatArray,
+    i: np.uint64,
+    start: float,
+    stop: float,
+    least: float,
+    bound: float,
+    whole: Flag,
+    window: Flag,
+    measured: Measured | None,
+) -> Sums:
+    """
+    Let the line whose state begins at a place meet a chord, and count the gap that this settles.
+
+    A chord of NaN settles none, and leaves the line as it is.
+    """
+    end, low, high = lines[i + END], lines[i + GAP_START], lines[i + GAP_END]
+    sums = counted(start > end, low, high, least, bound, whole, window, measured)
+    end, low, high = moved(start, stop, end, low, high)
+    lines[i + END], lines[i + GAP_START], lines[i + GAP_END] = end, low, high
+    return sums
+
+
+@inner(forceinline=True, error_model="numpy")
+def both(first: Sums, second: Sums) -> Sums:
+    """The sums of two."""
+    return (
+        first[0] + second[0],
+        first[1] + second[1],
+        first[2] + second[2],
+        first[3] + second[3],
+        first[4] + second[4],
+        first[5] + second[5],
+    )
+
+
 @inner(forceinline=True, fastmath=REORDERED, error_model="numpy")
 def visit(
     lines: FloatArray,
@@ -175,8 +212,7 @@ def visit(
     The compiler makes vector instructions of the inner loop because rows are contiguous, indices
     cannot be negative, planes cannot overlap, and there are choices instead of branches.
     """
-    a = b = c = d = e = f = 0.0
-    a2 = b2 = c2 = d2 = e2 = f2 = 0.0
+    sums = sums2 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     chords = 0.0
     radius, per_spacing = sphere.radius, strip.per_spacing
     rows = span(sphere.v, radius, strip.first_v, per_spacing, 0, strip.rows)
@@ -201,25 +237,16 @@ def visit(
             if measured is not None:
                 stop = stop if start - bound < measured.known else np.nan
                 start = start if start - bound < measured.known else np.nan
-            end, low, high = lines[i + END], lines[i + GAP_START], lines[i + GAP_END]
-            sums = counted(start > end, low, high, least, bound, whole, window, measured)
-            a, b, c = a + sums[0], b + sums[1], c + sums[2]
-            d, e, f = d + sums[3], e + sums[4], f + sums[5]
-            end, low, high = moved(start, stop, end, low, high)
-            lines[i + END], lines[i + GAP_START], lines[i + GAP_END] = end, low, high
+            found = meet(lines, i, start, stop, least, bound, whole, window, measured)
+            sums = both(sums, found)
             if second is not None:
-                k = i + SET
-                end, low, high = lines[k + END], lines[k + GAP_START], lines[k + GAP_END]
                 start, stop = start + kept, stop + kept
-                sums = counted(start > end, low, high, least, bound, whole, window, measured)
-                a2, b2, c2 = a2 + sums[0], b2 + sums[1], c2 + sums[2]
-                d2, e2, f2 = d2 + sums[3], e2 + sums[4], f2 + sums[5]
-                end, low, high = moved(start, stop, end, low, high)
-                lines[k + END], lines[k + GAP_START], lines[k + GAP_END] = end, low, high
+                found = meet(lines, i + SET, start, stop, least, bound, whole, window, measured)
+                sums2 = both(sums2, found)
     tally[0, CHORDS] += chords
-    add(tally, 0, (a, b, c, d, e, f))
+    add(tally, 0, sums)
     if second is not None:
-        add(tally, 1, (a2, b2, c2, d2, e2, f2))
+        add(tally, 1, sums2)
 
 
 @inner(inline="always")

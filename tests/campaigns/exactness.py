@@ -7,8 +7,8 @@ Usage, from the root of the repository (10,000 packings take about ten minutes):
 
 Grains hang together in chains; neighbours overlap by 0 to 60 % of the sum of their radii, radii
 have ratios of 1 to 50. Each packing is scanned along a random axis, with all grains and without
-some, by the sweep at four cut-offs and by the scan that lists its gaps: numbers must be equal, and
-lengths to rounding. The exit code is 0 if all are.
+some, by both sweeps at four cut-offs and by the scan that puts its gaps in bins: numbers must be
+equal, and lengths to rounding. The exit code is 0 if all are.
 """
 
 from __future__ import annotations

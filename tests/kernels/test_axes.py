@@ -6,17 +6,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from scanfab.kernels import axes, strips, sweep
+from scanfab.kernels import axes, lists, strips, sweep
 from scanfab.kernels.bins import no_bins
 from scanfab.kernels.compiled import LANES
 from scanfab.kernels.grid import cover, strip_of
-from scanfab.kernels.projection import order_of, project
+from scanfab.kernels.projection import order_of, project, range_of
 from scanfab.scan import line_frames
 from tests import naive
 from tests.lattices import ball_points, poisson_spheres, rotation
 from tests.uncompiled import run_uncompiled
 
 RUNS_OF_A_KIND = 300
+# row by row, and over lists of chords
+WAYS = (False, True)
 
 
 def scattered(random):
@@ -98,6 +100,7 @@ def fast_tallies(
     cutoff,
     window,
     *,
+    by_lists=False,
     whole=True,
     clipped=True,
     second=True,
@@ -109,6 +112,7 @@ def fast_tallies(
         cutoff,
         window,
         tallies,
+        by_lists,
         second or None,
         whole or None,
         clipped or None,
@@ -141,9 +145,11 @@ def assert_fast_equals_naive(spheres, removed, frame, offset, spacing, cutoffs, 
         naive.scan(position[~removed], radius[~removed], frame, offset, spacing, window),
     ]
     for cutoff in cutoffs:
-        fast = fast_tallies(spheres, removed, frame, offset, spacing, cutoff, window)
-        for one, gaps in zip(fast, subsets, strict=True):
-            assert_equal(one, naive.tally(gaps, cutoff))
+        for by_lists in WAYS:
+            line = removed, frame, offset, spacing, cutoff, window
+            fast = fast_tallies(spheres, *line, by_lists=by_lists)
+            for one, gaps in zip(fast, subsets, strict=True):
+                assert_equal(one, naive.tally(gaps, cutoff))
 
 
 def check_random_packing(kind, random):
@@ -195,7 +201,7 @@ def suspect_lines(spheres, frame, offset, spacing, window):
 
 @njit
 def sorted_order(values):
-    return order_of(values)
+    return order_of(values, *range_of(values))
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.__name__)
@@ -255,17 +261,22 @@ def test_random_packings_have_suspect_lines(kind):
     assert found >= 10
 
 
-def test_less_that_is_wanted_is_the_same():
+@pytest.mark.parametrize("by_lists", WAYS)
+def test_less_that_is_wanted_is_the_same(by_lists):
     """Each choice of what is tallied is a loop of its own."""
+
+    def fast(*line, **choice):
+        return fast_tallies(*line, by_lists=by_lists, **choice)
+
     for seed in range(100):
         random = np.random.default_rng(seed)
         spheres = overlapping(random)
         removed = random.random(len(spheres.radius)) < 0.3
         line = removed, rotation(random), random.random(2), 0.3, 0.2, 1.2
-        all_of_it = fast_tallies(spheres, *line)
-        window = fast_tallies(spheres, *line, whole=False)
-        whole = fast_tallies(spheres, *line, clipped=False)
-        first = fast_tallies(spheres, *line, second=False)
+        all_of_it = fast(spheres, *line)
+        window = fast(spheres, *line, whole=False)
+        whole = fast(spheres, *line, clipped=False)
+        first = fast(spheres, *line, second=False)
         for number in range(2):
             assert window[number][3:] == pytest.approx(all_of_it[number][3:], rel=1e-12)
             assert whole[number][:3] == pytest.approx(all_of_it[number][:3], rel=1e-12)
@@ -273,23 +284,38 @@ def test_less_that_is_wanted_is_the_same():
             assert not any(whole[number][3:])
         assert first[0] == pytest.approx(all_of_it[0], rel=1e-12)
         assert not any(first[1])
-        alone = fast_tallies(spheres, *line, second=False, whole=False)
+        alone = fast(spheres, *line, second=False, whole=False)
         assert alone[0][3:] == pytest.approx(all_of_it[0][3:], rel=1e-12)
 
 
-def test_rows_that_fit_no_strip_are_cut():
+@pytest.mark.parametrize("by_lists", WAYS)
+def test_rows_that_fit_no_strip_are_cut(by_lists):
     """A wide sample: more columns than a strip holds."""
     position = np.array([[-700.0, 0, 0], [0, 0, 0], [700, 0, 1], [0.5, 0, 5]])
     spheres = position, np.array([3.0, 2, 3, 2])
     grid = np.eye(3), np.array([0.3, 0.4])
     assert strips.MOST_LINES < 1400 / 0.05
-    fine = fast_tallies(spheres, np.zeros(4, bool), *grid, 0.05, 0.1, 2.0)[0]
+    line = *grid, 0.05, 0.1, 2.0
+    fine = fast_tallies(spheres, np.zeros(4, bool), *line, by_lists=by_lists)[0]
     near = position[[1, 3]], spheres[1][[1, 3]]
-    fine_near = fast_tallies(near, np.zeros(2, bool), *grid, 0.05, 0.1, 2.0)[0]
+    fine_near = fast_tallies(near, np.zeros(2, bool), *line, by_lists=by_lists)[0]
     ends = fine.whole_lines - fine_near.whole_lines
     assert ends == pytest.approx(2 * np.pi * 9 / 0.05**2, rel=0.01)
     assert fine[:2] == pytest.approx(fine_near[:2])
     assert fine[3:] == pytest.approx(fine_near[3:])
+
+
+def test_lists_that_are_full_are_swept_and_filled_again():
+    """A column of many small grains: far more chords on a line than a list has room for."""
+    random = np.random.default_rng(3)
+    count = 1500
+    position = random.uniform([-0.5, -0.5, -6.0], [0.5, 0.5, 6.0], (count, 3))
+    spheres = position, random.uniform(0.1, 0.2, count)
+    chords_per_line = np.pi * np.sum(spheres[1] ** 2)
+    assert chords_per_line > 1.5 * lists.MOST_CHORDS
+    removed = random.random(count) < 0.3
+    grid = np.eye(3), random.random(2), 0.2
+    assert_fast_equals_naive(spheres, removed, *grid, [0.0, 0.1], 5.0)
 
 
 @pytest.mark.parametrize(

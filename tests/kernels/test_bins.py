@@ -19,16 +19,17 @@ REACH = 30.0
 def fast_sums(spheres, removed, frame, offset, spacing, window, cutoffs, centers, flags=(1, 1, 1)):
     """What the kernel adds up: shape (whole or window, set of solids, octant, bin, sum)."""
     blocks = np.array([Blocks.about(center, REACH).affine() for center in centers])
-    sums = np.zeros((1, 2, 2, BLOCKS, len(cutoffs), 3))
+    sums = np.zeros((1, 2, 2, BLOCKS * len(cutoffs), 3))
     axes.scan_axes(
         *line_words(spheres, removed, frame, offset, spacing),
         0.0,
         window,
         np.zeros((1, 2, sweep.TALLY_SIZE)),
+        True,
         *(True if flag else None for flag in flags),
         Bins(blocks, np.array(cutoffs), sums),
     )
-    return sums[0]
+    return sums.reshape(2, 2, BLOCKS, len(cutoffs), 3)
 
 
 def slow_sums(spheres, removed, frame, offset, spacing, window, cutoffs, centers):

@@ -8,6 +8,7 @@ from scanfab.kernels import axes, periodic, sweep
 from scanfab.kernels.bins import no_bins
 from scanfab.kernels.periodic import CellGrains
 from tests import naive
+from tests.kernels.test_axes import WAYS
 from tests.uncompiled import run_uncompiled
 
 PERIODS = [(1, 1, 1), (1, 1, 0), (0, 1, 1), (1, 0, 1), (1, 0, 0), (0, 0, 1)]
@@ -70,11 +71,10 @@ def lines_of(medium, normal, offset, spacing):
     return np.array(feet), measured
 
 
-def tallies_of(medium, normal, offset, spacing, cutoff, second=True):
+def tallies_of(medium, normal, offset, spacing, cutoff, second=True, by_lists=False):
     tallies = np.zeros((1, 2, sweep.TALLY_SIZE))
-    axes.scan_cell(
-        medium, normal[None], offset[None], spacing, cutoff, tallies, second or None, no_bins(1)
-    )
+    lines = normal[None], offset[None], spacing, cutoff
+    axes.scan_cell(medium, *lines, tallies, by_lists, second or None, no_bins(1))
     return tallies[0]
 
 
@@ -86,7 +86,9 @@ def check_equals_naive(random, periods, make=random_medium):
 
 def assert_equals_naive(medium, normal, offset, spacing, cutoff):
     feet, measured = lines_of(medium, normal, offset, spacing)
-    fast = tallies_of(medium, normal, offset, spacing, cutoff)
+    fast = [
+        tallies_of(medium, normal, offset, spacing, cutoff, by_lists=by_lists) for by_lists in WAYS
+    ]
     for which, kept in enumerate([np.ones(len(medium.radius), bool), ~medium.removed]):
         gaps = [
             gap
@@ -102,8 +104,10 @@ def assert_equals_naive(medium, normal, offset, spacing, cutoff):
             )
         ]
         long_enough = [gap for gap in gaps if gap >= max(cutoff, 1e-300)]
-        assert fast[which, sweep.KEPT] == len(long_enough)
-        assert fast[which, sweep.LENGTH] == pytest.approx(sum(long_enough), rel=1e-9, abs=1e-9)
+        for tally in fast:
+            length = pytest.approx(sum(long_enough), rel=1e-9, abs=1e-9)
+            assert tally[which, sweep.KEPT] == len(long_enough)
+            assert tally[which, sweep.LENGTH] == length
 
 
 @pytest.mark.parametrize("periods", PERIODS, ids=str)
