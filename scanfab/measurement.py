@@ -23,9 +23,9 @@ FloatArray = npt.NDArray[np.float64]
 
 # of the scan for the sample's scatter: its own noise is known, and taken off; so many segments a
 # grain make it far less than the scatter, which falls with the number of grains as it does
-BLOCK_REPLICATES = 4
+BLOCK_REPLICATES = 2
 BLOCK_SEGMENTS_PER_GRAIN = 2000
-BLOCK_SEGMENTS = 1_000_000
+BLOCK_SEGMENTS = 800_000
 # where grains overlap many times there are far more chords than segments, and all are listed
 BLOCK_CHORDS = 30_000_000
 
