@@ -39,7 +39,7 @@ BoolArray = npt.NDArray[np.bool_]
 
 # lines of one axis and replicate: more take minutes, even those that meet nothing
 MAX_LINES = 50_000_000
-AXES_A_JOB = 16
+JOBS_A_THREAD, MOST_AXES = 4, 16
 # of the spacing and for each variant: spheres of such a radius are scanned as fast row by row as
 # over lists of chords; for the more variants the lists serve, the sooner they pay
 FEW_LINES = 0.5
@@ -245,10 +245,18 @@ def in_parts(
     """
     count = offsets.shape[0] * offsets.shape[1]
     frames, shifts = frames.reshape(count, 3, 3), offsets.reshape(count, 2)
-    parts = [slice(first, first + AXES_A_JOB) for first in range(0, count, AXES_A_JOB)]
-    with ThreadPoolExecutor(workers) as pool:
-        found = list(pool.map(lambda part: scan(frames[part], shifts[part]), parts))
-    sums = np.concatenate(found)
+    # so many that no thread waits long for the last one, but not many more
+    axes = min(max(count // (JOBS_A_THREAD * workers), 1), MOST_AXES)
+    parts = [slice(first, first + axes) for first in range(0, count, axes)]
+
+    def one(part: slice) -> FloatArray:
+        return scan(frames[part], shifts[part])
+
+    if workers == 1 or len(parts) == 1:
+        sums = np.concatenate([one(part) for part in parts])
+    else:
+        with ThreadPoolExecutor(workers) as pool:
+            sums = np.concatenate(list(pool.map(one, parts)))
     return sums.reshape(*offsets.shape[:2], *sums.shape[1:])
 
 

@@ -41,7 +41,7 @@ def _tolerance(repeats: int, tolerance: float = 1e-4) -> str:
     seconds = interleaved({f"{n}": lambda n=n: compute(n) for n in (1, 2)}, repeats)
     found = compute(2)
     error = max(found["alpha_vs_axial_se"])
-    rows = [(n, f"{value:.2f}") for n, value in seconds.items()]
+    rows = [(n, f"{value:.3f}") for n, value in seconds.items()]
     note = f"\n\n{sum(found['segments']):,} segments; the largest standard error is {error:.1e}."
     return table(["threads", "seconds"], rows) + note
 
