@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from scanfab.kernels.compiled import ZERO, inner
 from scanfab.kernels.grid import Grid, sheared_grid
-from scanfab.kernels.projection import Spheres, order_of, range_of, room_for_spheres
+from scanfab.kernels.projection import Spheres, in_order, order_of, range_of, room_for_spheres
 from scanfab.kernels.sweep import Measured
 
 __all__ = [
@@ -118,16 +118,17 @@ def prism_along(normal: FloatArray, vectors: FloatArray, periodic: BoolArray) ->
     return Prism(frame, first, second, third, base_u, skew_u, base_v, rise_u, rise_v, length, slope)
 
 
-@inner()
+@inner(error_model="numpy")
 def shifts(position: float, reach: float, low: float, high: float, step: float) -> tuple[int, int]:
     """The whole numbers k for which position + k * step is within reach of low to high."""
+    per_step = 1.0 / step
     return (
-        int(np.ceil((low - reach - position) / step)),
-        int(np.floor((high + reach - position) / step)) + 1,
+        int(np.ceil((low - reach - position) * per_step)),
+        int(np.floor((high + reach - position) * per_step)) + 1,
     )
 
 
-@inner()
+@inner(error_model="numpy")
 def fill_images(
     grains: CellGrains, prism: Prism, beyond: float, extent: FloatArray, spheres: Spheres
 ) -> int:
@@ -137,7 +138,13 @@ def fill_images(
     Returns their number, also of those without room. ``extent`` (least and greatest v, least and
     greatest u along the skew) becomes what bounds the face where an axis is not periodic.
     """
-    frame = prism.frame
+    # no array is handed on in the loop: to count its references would take longer than all else
+    frame, position = prism.frame, grains.position
+    u_x, u_y, u_z = frame[0, 0], frame[0, 1], frame[0, 2]
+    v_x, v_y, v_z = frame[1, 0], frame[1, 1], frame[1, 2]
+    n_x, n_y, n_z = frame[2, 0], frame[2, 1], frame[2, 2]
+    layers = grains.periodic[prism.third]
+    rows, columns = grains.periodic[prism.second], grains.periodic[prism.first]
     a, b, c = (
         grains.vectors[prism.first],
         grains.vectors[prism.second],
@@ -150,27 +157,28 @@ def fill_images(
     wide = np.sqrt(1.0 + skew * skew)
     room = spheres.u.size
     count = 0
-    for g in range(grains.radius.size):
-        x, r = grains.position[g], grains.radius[g]
-        u0, v0, n0 = dot(x, frame[0]), dot(x, frame[1]), dot(x, frame[2])
+    low_v, high_v, low_u, high_u = extent[0], extent[1], extent[2], extent[3]
+    for g in range(np.uint64(grains.radius.size)):
+        x, y, z, r = position[g, 0], position[g, 1], position[g, 2], grains.radius[g]
+        u0, v0 = u_x * x + u_y * y + u_z * z, v_x * x + v_y * y + v_z * z
+        n0 = n_x * x + n_y * y + n_z * z
         height = (n0 - prism.rise_u * u0 - prism.rise_v * v0) / prism.length
         layer = 0, 1
-        if grains.periodic[prism.third]:
+        if layers:
             layer = shifts(height, r * prism.slope, 0.0, 1.0 + beyond, 1.0)
         for i in range(layer[0], layer[1]):
             k = i * step
             u1, v1, n1 = u0 + k * c_u, v0 + k * c_v, n0 + k * c_n
             over = 0, 1
-            if grains.periodic[prism.second]:
+            if rows:
                 over = shifts(v1, r, 0.0, prism.base_v, prism.base_v)
             for j in range(over[0], over[1]):
                 u2, v2, n2 = u1 + j * prism.skew_u, v1 + j * prism.base_v, n1 + j * along_b
                 aside = u2 - skew * v2
-                extent[0], extent[1] = min(extent[0], v2 - r), max(extent[1], v2 + r)
-                extent[2] = min(extent[2], aside - r * wide)
-                extent[3] = max(extent[3], aside + r * wide)
+                low_v, high_v = min(low_v, v2 - r), max(high_v, v2 + r)
+                low_u, high_u = min(low_u, aside - r * wide), max(high_u, aside + r * wide)
                 across = 0, 1
-                if grains.periodic[prism.first]:
+                if columns:
                     across = shifts(aside, r * wide, 0.0, prism.base_u, prism.base_u)
                 for q in range(across[0], across[1]):
                     if count < room:
@@ -180,6 +188,7 @@ def fill_images(
                         spheres.radius[count] = r
                         spheres.removed[count] = grains.removed[g]
                     count += 1
+    extent[0], extent[1], extent[2], extent[3] = low_v, high_v, low_u, high_u
     return count
 
 
@@ -233,14 +242,7 @@ def cell_grid(
     """The lines along a direction through a periodic medium, and the images that they may meet."""
     prism = prism_along(normal, grains.vectors, grains.periodic)
     found, extent = images_in(grains, prism)
-    order = order_of(found.depth, *range_of(found.depth))
-    spheres = Spheres(
-        found.u[order],
-        found.v[order],
-        found.depth[order],
-        found.radius[order],
-        found.removed[order],
-    )
+    spheres = in_order(found, order_of(found.depth, *range_of(found.depth)))
     skew = prism.skew_u / prism.base_v
     grid = sheared_grid(extent[2], extent[3], extent[0], extent[1], skew, offset, spacing)
     return prism, spheres, grid

@@ -13,6 +13,7 @@ from scanfab.kernels.strips import FAR, Sphere, span
 
 __all__ = [
     "Spheres",
+    "in_order",
     "number_from",
     "order_of",
     "project",
@@ -109,6 +110,17 @@ def range_of(values: FloatArray) -> tuple[float, float]:
     for value in values:
         low, high = min(low, value), max(high, value)
     return low, high
+
+
+@inner()
+def in_order(spheres: Spheres, order: IntArray) -> Spheres:
+    """The spheres in another order."""
+    found = room_for_spheres(order.size)
+    for i in range(np.uint64(order.size)):
+        k = np.uint64(order[i])
+        found.u[i], found.v[i], found.depth[i] = spheres.u[k], spheres.v[k], spheres.depth[k]
+        found.radius[i], found.removed[i] = spheres.radius[k], spheres.removed[k]
+    return found
 
 
 @inner(error_model="numpy")
