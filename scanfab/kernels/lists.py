@@ -43,18 +43,20 @@ IntArray = npt.NDArray[np.int64]
 
 # lines swept side by side; their lists lie together, first the first chord of each line
 ABREAST = 64
-MOST_CHORDS = 64
+# chords that a list has room for; as soon as one is in the second half, whose places have a bit of
+# their own, all lists are swept
+ROOM = 64
 NEXT = 2 * ABREAST
-TILE = MOST_CHORDS * NEXT
-# of the places of a list, those of its second half have this bit
+TILE = ROOM * NEXT
 SECOND_HALF = TILE // 2
-# the lists of a strip's lines fit a core's second cache, or nearly
+# samples of ten thousand grains have one strip, mostly: to sort spheres into smaller ones, whose
+# lists fit the second cache, takes longer than it saves
 LISTED_LINES = 16_384
 # more than nothing, and its square root too little to matter
 LEAST_REACH2 = 1e-300
 # gaps to be put in bins together
 TOGETHER = 512
-ALMOST = np.uint64(TOGETHER - MOST_CHORDS)
+ALMOST = np.uint64(TOGETHER - ROOM)
 
 
 class Lists(NamedTuple):

@@ -312,7 +312,7 @@ def test_lists_that_are_full_are_swept_and_filled_again():
     position = random.uniform([-0.5, -0.5, -6.0], [0.5, 0.5, 6.0], (count, 3))
     spheres = position, random.uniform(0.1, 0.2, count)
     chords_per_line = np.pi * np.sum(spheres[1] ** 2)
-    assert chords_per_line > 1.5 * lists.MOST_CHORDS
+    assert chords_per_line > 1.5 * lists.ROOM
     removed = random.random(count) < 0.3
     grid = np.eye(3), random.random(2), 0.2
     assert_fast_equals_naive(spheres, removed, *grid, [0.0, 0.1], 5.0)
