@@ -15,7 +15,7 @@ from scanfab.distribution import mean_length_function, sphere_points
 from scanfab.errors import SettingsError
 from scanfab.fabric.tensor import COMPONENTS
 from scanfab.frame_result import FrameResult
-from scanfab.scan import line_frames
+from scanfab.line_grids import line_frames
 from scanfab.scene import contact_lines, grains_of, scene_of
 from scanfab.segments import Segments, sample_segments
 from scanfab.settings import Vector

@@ -18,8 +18,9 @@ from scanfab.fabric.contact import contact_fabric
 from scanfab.fabric.void import void_fabric
 from scanfab.frame_result import FrameResult
 from scanfab.gaps import scan_gaps
+from scanfab.line_grids import line_frames
 from scanfab.pipeline import compute_rows
-from scanfab.scan import ScanSums, Solids, line_frames
+from scanfab.scan import ScanSums, Solids
 from scanfab.segments import sample_segments
 from scanfab.series import Series
 from scanfab.settings import Settings

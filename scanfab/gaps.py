@@ -16,7 +16,8 @@ import numpy.typing as npt
 from scanfab.cell import Cell
 from scanfab.directions import DirectionRule
 from scanfab.kernels.bins import BLOCKS, Bins
-from scanfab.scan import Solids, drawn_lines, in_parts, line_frames, tally_frames
+from scanfab.line_grids import drawn_lines, line_frames
+from scanfab.scan import Solids, in_parts, tally_frames
 
 __all__ = ["Blocks", "GapSums", "scan_gaps"]
 

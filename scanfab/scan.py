@@ -16,21 +16,19 @@ from scanfab.kernels.axes import scan_axes, scan_cell
 from scanfab.kernels.bins import Bins, no_bins
 from scanfab.kernels.compiled import Flag
 from scanfab.kernels.periodic import CellGrains
+from scanfab.line_grids import drawn_lines
 
 __all__ = [
     "MAX_LINES",
     "CellGrains",
     "ScanSums",
     "Solids",
-    "drawn_lines",
     "in_parts",
     "is_affordable",
-    "line_frames",
     "most_lines",
     "scan_lines",
     "sums_of",
     "tally_frames",
-    "turned_frames",
 ]
 
 FloatArray = npt.NDArray[np.float64]
@@ -135,25 +133,6 @@ class ScanSums:
         )
 
 
-def line_frames(axes: FloatArray) -> FloatArray:
-    """
-    Orthonormal frames (rows u, v, n) whose third row is each axis, shape (D, 3, 3).
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from scanfab.scan import line_frames
-    >>> line_frames(np.array([[0.0, 0.0, 1.0]]))[0]
-    array([[1., 0., 0.],
-           [0., 1., 0.],
-           [0., 0., 1.]])
-    """
-    helper = np.eye(3)[np.argmin(np.abs(axes), axis=1)]
-    u = helper - np.sum(helper * axes, axis=1, keepdims=True) * axes
-    u /= np.linalg.norm(u, axis=1, keepdims=True)
-    return np.stack([u, np.cross(axes, u), axes], axis=1)
-
-
 def scan_lines(
     solids: Solids,
     rule: DirectionRule,
@@ -219,18 +198,6 @@ def scan_lines(
     return sums_of(frames, in_parts(some, frames, offsets, workers), variants)
 
 
-def drawn_lines(
-    rule: DirectionRule, seed: int, replicates: Iterable[int]
-) -> tuple[FloatArray, FloatArray]:
-    """Line frames of all replicates, shape (R, D, 3, 3), and shifts of their grids, (R, D, 2)."""
-    frames = line_frames(rule.axes)
-    drawn = [turned_frames(rule, frames, seed, replicate) for replicate in replicates]
-    if not drawn:
-        raise SettingsError("replicates: expected at least one")
-    turned, offsets = zip(*drawn, strict=True)
-    return np.array(turned), np.array(offsets)
-
-
 def in_parts(
     scan: Callable[[FloatArray, FloatArray], FloatArray],
     frames: FloatArray,
@@ -258,35 +225,6 @@ def in_parts(
         with ThreadPoolExecutor(workers) as pool:
             sums = np.concatenate(list(pool.map(one, parts)))
     return sums.reshape(*offsets.shape[:2], *sums.shape[1:])
-
-
-def turned_frames(
-    rule: DirectionRule, frames: FloatArray, seed: int, replicate: int
-) -> tuple[FloatArray, FloatArray]:
-    """
-    The lines of one replicate.
-
-    Returns the rule's line frames (shape (D, 3, 3)), turned, and the shifts of the grids in units
-    of the spacing (shape (D, 2)).
-    """
-    random = np.random.default_rng([seed, replicate])
-    rotation = _random_rotation(random)
-    offsets = random.random((len(rule), 2))
-    return (frames @ rotation.T if rule.turned else frames), offsets
-
-
-def _random_rotation(random: np.random.Generator) -> FloatArray:
-    """A rotation matrix out of all, each as likely: from a random unit quaternion."""
-    # SciPy has this too, but takes as long to import as a small frame to compute
-    quaternion = random.normal(size=4)
-    x, y, z, w = quaternion / np.linalg.norm(quaternion)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
 
 
 def tally_frames(

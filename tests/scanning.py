@@ -6,7 +6,8 @@ import numpy as np
 
 from scanfab.directions import direction_rule
 from scanfab.fabric.void import void_fabric
-from scanfab.scan import ScanSums, Solids, line_frames, scan_lines, sums_of, tally_frames
+from scanfab.line_grids import line_frames
+from scanfab.scan import ScanSums, Solids, scan_lines, sums_of, tally_frames
 
 Z = np.array([[0.0, 0.0, 1.0]])
 

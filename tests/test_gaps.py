@@ -5,7 +5,8 @@ import pytest
 
 from scanfab import Cell, Solids, direction_rule, scan_lines
 from scanfab.gaps import Blocks, scan_gaps
-from scanfab.scan import CellGrains, line_frames, turned_frames
+from scanfab.line_grids import line_frames, turned_frames
+from scanfab.scan import CellGrains
 from tests import naive
 from tests.lattices import poisson_spheres
 from tests.scanning import ratio, solids_of

@@ -1,10 +1,11 @@
-"""The scan: frames, replicates, seeds and workers."""
+"""The scan: replicates, seeds and workers."""
 
 import numpy as np
 import pytest
 
 from scanfab import Packing, SettingsError, compute, direction_rule, scan_lines
-from scanfab.scan import MAX_LINES, ScanSums, line_frames, turned_frames
+from scanfab.line_grids import line_frames, turned_frames
+from scanfab.scan import MAX_LINES, ScanSums
 from tests import naive
 from tests.lattices import Spheres, poisson_spheres, separate_spheres, shaken_cubic
 from tests.scanning import fabric, solids_of
@@ -23,13 +24,6 @@ def raw(sums):
         getattr(sums, name).tobytes()
         for name in ("axes", "length", "segments", "lines", "void", "line_length")
     )
-
-
-def test_frames_are_orthonormal_and_right_handed():
-    frames = line_frames(direction_rule("lebedev:41").axes)
-    assert np.abs(frames @ frames.transpose(0, 2, 1) - np.eye(3)).max() < 1e-14
-    assert np.linalg.det(frames) == pytest.approx(np.ones(len(frames)))
-    assert np.array_equal(frames[:, 2], direction_rule("lebedev:41").axes)
 
 
 def test_scan_equals_the_slow_twin_for_all_variants(solids):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scanfab.scan import line_frames
+from scanfab.line_grids import line_frames
 from scanfab.segments import Segments, cut_lines, grid_points, sample_segments
 from tests import naive
 from tests.lattices import shaken_cubic

@@ -14,7 +14,8 @@ import numpy as np
 from numba import njit
 
 from scanfab.directions import DirectionRule
-from scanfab.scan import Solids, line_frames, scan_lines
+from scanfab.line_grids import line_frames
+from scanfab.scan import Solids, scan_lines
 from tests.benchmarks.packings import PAPER, dense
 from tests.benchmarks.timing import interleaved, table
 

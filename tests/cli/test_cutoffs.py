@@ -10,7 +10,7 @@ import pytest
 
 from scanfab import Packing, compute, direction_rule, find_contacts
 from scanfab.cli.main import run
-from scanfab.scan import line_frames, turned_frames
+from scanfab.line_grids import line_frames, turned_frames
 from scanfab.table import COLUMNS
 from tests import naive
 from tests.interruptions import interrupted_at_row

@@ -5,7 +5,7 @@ import pytest
 
 from scanfab import Packing, compute, contact_fabric, find_contacts, void_fabric
 from scanfab.directions import direction_rule
-from scanfab.scan import line_frames
+from scanfab.line_grids import line_frames
 from tests.lattices import Spheres, poisson_spheres, rotation, shaken_cubic
 from tests.scanning import fabric, scan_frames, solids_of
 

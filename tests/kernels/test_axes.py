@@ -11,7 +11,7 @@ from scanfab.kernels.bins import no_bins
 from scanfab.kernels.compiled import LANES
 from scanfab.kernels.grid import cover, strip_of
 from scanfab.kernels.projection import order_of, project, range_of
-from scanfab.scan import line_frames
+from scanfab.line_grids import line_frames
 from tests import naive
 from tests.lattices import ball_points, poisson_spheres, rotation
 from tests.uncompiled import run_uncompiled

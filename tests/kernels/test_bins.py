@@ -6,7 +6,7 @@ import pytest
 from scanfab.gaps import Blocks
 from scanfab.kernels import axes, sweep
 from scanfab.kernels.bins import BLOCKS, Bins
-from scanfab.scan import line_frames
+from scanfab.line_grids import line_frames
 from tests import naive
 from tests.kernels.test_axes import KINDS, line_words, overlapping
 from tests.lattices import rotation
