@@ -6,6 +6,7 @@ __all__ = [
     "PackingError",
     "ReadError",
     "ScanfabError",
+    "ScanfabNote",
     "ScanfabWarning",
     "SettingsError",
     "SkippedFrameWarning",
@@ -35,6 +36,10 @@ class SettingsError(ScanfabError):
 
 class ScanfabWarning(UserWarning):
     """Something that the user should know, although the result stands."""
+
+
+class ScanfabNote(UserWarning):
+    """Something worth knowing that puts nothing in doubt."""
 
 
 class SkippedFrameWarning(ScanfabWarning):

@@ -46,7 +46,10 @@ def asked_for(
 
 
 def manifest(
-    asked: dict[str, Any], series: Iterable[Series], warnings: Sequence[str] = ()
+    asked: dict[str, Any],
+    series: Iterable[Series],
+    warnings: Sequence[str] = (),
+    notes: Sequence[str] = (),
 ) -> dict[str, Any]:
     """
     The manifest of a finished result.
@@ -57,7 +60,7 @@ def manifest(
         From :func:`asked_for`.
     series : iterable of Series
         What was read.
-    warnings : sequence of str, optional
+    warnings, notes : sequence of str, optional
         What the user was told.
     """
     files = {path for one in series for path in one.files()}
@@ -73,6 +76,7 @@ def manifest(
             for path in sorted(files)
         ],
         "warnings": list(warnings),
+        "notes": list(notes),
     }
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 from scanfab.errors import ReadError
 
-__all__ = ["number_of", "numbers_of", "read_rows"]
+__all__ = ["number_of", "numbers_of", "read_rows", "total_error"]
 
 TEXT_COLUMNS = ("source", "variant", "contacts_from")
 
@@ -69,6 +69,31 @@ def number_of(row: Mapping[str, Any], name: str) -> float | None:
 def numbers_of(rows: Iterable[Mapping[str, Any]], name: str) -> list[float]:
     """The numbers of such a column."""
     return [value for row in rows if (value := number_of(row, name)) is not None]
+
+
+def total_error(row: Mapping[str, Any], name: str) -> float | None:
+    """
+    The standard error to quote beside an anisotropy: of the scan and of the sample together.
+
+    Parameters
+    ----------
+    row : mapping
+        Of a fabric table.
+    name : str
+        ``alpha_vs_axial``: √(scan² + sample²), None where the sample's part is not known.
+        ``alpha_c_axial``: the sample's, as contacts are counted, not scanned.
+
+    Examples
+    --------
+    >>> from scanfab.tabular import total_error
+    >>> row = {"alpha_vs_axial_se": 3e-4, "alpha_vs_axial_sample_se": 4e-4}
+    >>> round(total_error(row, "alpha_vs_axial"), 7)
+    0.0005
+    """
+    sample = number_of(row, f"{name}_sample_se")
+    if name == "alpha_c_axial" or sample is None:
+        return sample
+    return math.hypot(number_of(row, f"{name}_se") or 0.0, sample)
 
 
 def _parse(path: Path | str, text: str) -> Any:

@@ -29,6 +29,7 @@ from scanfab.cli.options import (
 from scanfab.cli.sources import SourceCommand, fill_from_file, open_series, reading_arguments
 
 if TYPE_CHECKING:
+    from scanfab.cli.console import Told
     from scanfab.pipeline import Observer
     from scanfab.series import Series
     from scanfab.settings import Settings
@@ -178,7 +179,7 @@ def compute(
         run = _Run(series, settings, vtk_folder, resume, keep=plot is not None)
         _write(run, asked, result)
         for path in _manifests(output, manifest_path):
-            _write_manifest(path, asked, series, told.texts)
+            _write_manifest(path, asked, series, told)
         if plot is not None:
             _draw(plot, figure, run)
     return 0 if run.found and not told.skipped and not run.skipped else 1
@@ -321,12 +322,10 @@ def _manifests(output: Path | None, asked: Path | None) -> list[Path]:
     return paths if asked is None else [*paths, asked]
 
 
-def _write_manifest(
-    path: Path, asked: dict[str, Any], series: list[Series], warnings: list[str]
-) -> None:
+def _write_manifest(path: Path, asked: dict[str, Any], series: list[Series], told: Told) -> None:
     from scanfab.manifest import manifest
     from scanfab.writers.files import whole_file
 
-    text = json.dumps(manifest(asked, series, warnings), indent=1, ensure_ascii=False)
+    text = json.dumps(manifest(asked, series, told.texts, told.notes), indent=1, ensure_ascii=False)
     with whole_file(path) as part:
         part.write_text(text + "\n", encoding="utf-8")

@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from scanfab.errors import ScanfabWarning, SkippedFrameWarning
+from scanfab.errors import ScanfabNote, ScanfabWarning, SkippedFrameWarning
 from scanfab.table import Row
 
 __all__ = ["announce_compiling", "print_table", "reported_warnings", "with_progress"]
@@ -40,24 +40,33 @@ class Told:
 
     def __init__(self) -> None:
         self.texts: list[str] = []
-        """Each text once."""
+        """Warnings, each text once."""
+        self.notes: list[str] = []
+        """Notes, each text once."""
+
+    def hear(self, category: type[Warning], text: str) -> None:
+        """Tell a warning or note of scanfab, if it is new."""
+        self.skipped += issubclass(category, SkippedFrameWarning)
+        known, kind = (
+            (self.notes, "note") if issubclass(category, ScanfabNote) else (self.texts, "warning")
+        )
+        if issubclass(category, ScanfabWarning | ScanfabNote) and text not in known:
+            known.append(text)
+            click.echo(f"scanfab: {kind}: {text}", err=True)
 
 
 @contextmanager
 def reported_warnings() -> Iterator[Told]:
-    """Warnings of scanfab as single lines on standard error, each text once."""
+    """Warnings and notes of scanfab as single lines on standard error, each text once."""
     told = Told()
 
     def show(message: Any, category: type[Warning], *rest: Any, **more: Any) -> None:
-        text = str(message)
-        told.skipped += issubclass(category, SkippedFrameWarning)
-        if issubclass(category, ScanfabWarning) and text not in told.texts:
-            told.texts.append(text)
-            click.echo(f"scanfab: warning: {text}", err=True)
+        told.hear(category, str(message))
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         warnings.simplefilter("always", ScanfabWarning)
+        warnings.simplefilter("always", ScanfabNote)
         warnings.showwarning = show
         yield told
 
