@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.errors import SettingsError
-from scanfab.fabric.jackknife import BLOCKS, jackknife_error
+from scanfab.fabric.jackknife import BLOCKS, variance_without_noise
 
 __all__ = [
     "DIFFERENCE_MEANINGS",
@@ -32,7 +32,10 @@ WITHOUT = tuple(
     for name in ("alpha_vs_axial", "alpha_c_axial")
     for block in range(1, BLOCKS + 1)
 )
-NUMBERS = ("frame", "strain", "alpha_vs_axial", "alpha_c_axial", "alpha_vs_axial_se", *WITHOUT)
+HALVES = tuple(f"alpha_vs_axial_half_{block}" for block in range(1, BLOCKS + 1))
+NUMBERS = (
+    "frame", "strain", "alpha_vs_axial", "alpha_c_axial", "alpha_vs_axial_se", *WITHOUT, *HALVES,
+)  # fmt: skip
 # with fewer points a line says nothing
 FEWEST_FRAMES = 3
 
@@ -255,31 +258,42 @@ def _summary(
 
 
 def _points(
-    group: Sequence[Mapping[str, Any]], strain_max: float | None, suffix: str = ""
+    group: Sequence[Mapping[str, Any]],
+    strain_max: float | None,
+    names: Sequence[str] = ("alpha_c_axial", "alpha_vs_axial"),
 ) -> FloatArray:
-    """Contact and void anisotropy of the frames of a fit, shape (M, 2)."""
-    names = [f"alpha_c_axial{suffix}", f"alpha_vs_axial{suffix}"]
+    """Columns of the frames of a fit that have all of them, shape (M, len(names))."""
     values = [
         [row.get(name) for name in names] for row in group if _within(row["strain"], strain_max)
     ]
-    return np.array([pair for pair in values if None not in pair], float).reshape(-1, 2)
+    return np.array([some for some in values if None not in some], float).reshape(-1, len(names))
 
 
 def _slope_error(group: Sequence[Mapping[str, Any]], strain_max: float | None) -> float | None:
     """
     Standard error of the slope from the blocks of the sample.
 
-    Frames of one sample are not independent: their scatter about the line says nothing of it.
+    Frames of one sample are not independent: their scatter about the line says nothing of it. The
+    values without each block come from two replicates of the scan, so there are two slopes for
+    each, and the noise of the scan is taken off. None if nothing is left, or if a frame lacks the
+    values without some block.
     """
     frames = len(_points(group, strain_max))
-    slopes = []
+    slopes: list[list[float | None]] = []
     for block in range(1, BLOCKS + 1):
-        points = _points(group, strain_max, f"_without_{block}")
-        slope = _fit(*points.T)[0]
-        if slope is None or len(points) < frames:
+        names = [f"alpha_c_axial_without_{block}", f"alpha_vs_axial_without_{block}"]
+        contact, void = _points(group, strain_max, names).T
+        halves = _points(group, strain_max, [*names, f"alpha_vs_axial_half_{block}"])[:, 2]
+        if len(contact) < frames:
             return None
-        slopes.append(slope)
-    return jackknife_error(np.array(slopes))
+        if len(halves) < frames:  # a table of before this column: the noise stays in
+            halves = np.zeros(frames)
+        slopes.append([_fit(contact, void + sign * halves)[0] for sign in (1.0, -1.0)])
+    values = np.array(slopes, float)
+    if np.isnan(values).any():
+        return None
+    variance = variance_without_noise(values)
+    return math.sqrt(variance) if variance >= 0 else None
 
 
 def _within(strain: float | None, strain_max: float | None) -> bool:

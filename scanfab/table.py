@@ -78,6 +78,14 @@ class Row:
     gc_axis_y: float | None
     gc_axis_z: float | None
     coaxiality_deg: float | None
+    alpha_vs_axial_half_1: float | None
+    alpha_vs_axial_half_2: float | None
+    alpha_vs_axial_half_3: float | None
+    alpha_vs_axial_half_4: float | None
+    alpha_vs_axial_half_5: float | None
+    alpha_vs_axial_half_6: float | None
+    alpha_vs_axial_half_7: float | None
+    alpha_vs_axial_half_8: float | None
 
 
 COLUMNS: tuple[str, ...] = tuple(field.name for field in fields(Row))
@@ -146,6 +154,15 @@ MEANINGS: dict[str, str] = {
     "gc_axis_y": "likewise",
     "gc_axis_z": "likewise",
     "coaxiality_deg": "angle between these two directions, 0 to 90 degrees",
+    "alpha_vs_axial_half_1": "alpha_vs_axial_without_1 is the mean of two replicates: half their "
+    "difference, which tells compare the scan's noise in a slope",
+    "alpha_vs_axial_half_2": "likewise",
+    "alpha_vs_axial_half_3": "likewise",
+    "alpha_vs_axial_half_4": "likewise",
+    "alpha_vs_axial_half_5": "likewise",
+    "alpha_vs_axial_half_6": "likewise",
+    "alpha_vs_axial_half_7": "likewise",
+    "alpha_vs_axial_half_8": "likewise",
 }
 """What each column holds; lengths are in the dump's unit."""
 

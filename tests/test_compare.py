@@ -193,3 +193,36 @@ def test_a_word_among_the_numbers_is_named(column, value):
     rows = [*curve()[:2], {**curve()[2], column: value}]
     with pytest.raises(SettingsError, match=f"row 3: {column}: expected a number, found "):
         compare_tables(rows)
+
+
+def noisy_replicates(rows, random):
+    """The rows with two replicates of each value without an octant, each with noise of its own."""
+    found = []
+    for row in rows:
+        changes = {}
+        for block in range(1, 9):
+            one, two = 0.1 * row["alpha_vs_axial"] * random.normal(size=2)
+            name = f"alpha_vs_axial_without_{block}"
+            changes[name] = row[name] + 0.5 * (one + two)
+            changes[f"alpha_vs_axial_half_{block}"] = 0.5 * (one - two)
+        found.append({**row, **changes})
+    return found
+
+
+def test_the_noise_of_the_scan_is_taken_off_the_error_of_the_slope():
+    """Of the slope's variance the mean is right with the replicates, and too large without them."""
+    random = np.random.default_rng(3)
+    rows = with_octants(curve())
+    exact = summary_of(rows).slope_se ** 2
+    with_replicates, without = [], []
+    for _ in range(300):
+        noisy = noisy_replicates(rows, random)
+        # empty where noise is all that is left: a negative estimate, left out, would be missed
+        with_replicates.append(summary_of(noisy).slope_se)
+        means = [{k: v for k, v in row.items() if "half" not in k} for row in noisy]
+        without.append(summary_of(means).slope_se ** 2)
+    assert None not in with_replicates
+    variances = np.square(with_replicates)
+    error = variances.std() / np.sqrt(len(variances))
+    assert variances.mean() == pytest.approx(exact, abs=4 * error)
+    assert np.mean(without) > exact + 8 * error
