@@ -21,7 +21,7 @@ __all__ = ["Measurement", "measure"]
 
 FloatArray = npt.NDArray[np.float64]
 
-# Of the scan for the sample's scatter, whose noise is known from its replicates and taken off. Lines
+# Of the scan for the sample's scatter: its noise is known from the replicates, and taken off. Lines
 # at one distance in mean radii make as many segments for each grain of a small sample as of a large
 # one (about 900 in dense packings), so noise and scatter fall together as grains are added.
 BLOCK_REPLICATES = 2
