@@ -15,7 +15,7 @@ from scanfab.plan import CLOSE, GROWTH_WITH_SPACING, Plan
 from scanfab.scan import ScanSums, Solids, is_affordable, most_lines, scan_lines
 from scanfab.settings import Settings
 
-__all__ = ["scan_to_tolerance"]
+__all__ = ["missing_work", "scan_to_tolerance"]
 
 # beyond these there is more overhead than scan
 MAX_REPLICATES = 16_384
@@ -28,9 +28,11 @@ FINEST = 21
 GROWTH = 4.0
 # and by this at least, so that there is something to do for several threads
 SMALLEST_ROUND = 1.1
-# by how much the expected error must be below the tolerance: then that of the replicates is seldom
-# above it, and a scan that goes on until it is below picks few that are too small
-MARGIN = 1.1
+# By how much the expected error must be below the tolerance: then that of the replicates, which is
+# reported, is seldom above it, and a scan that goes on until it is below picks few errors that are
+# too small by chance. The error of 16 replicates is uncertain by 18 %: where their number is fixed
+# the margin is wider, while more replicates make the error surer.
+MARGIN, MARGIN_OF_FIXED = 1.1, 1.3
 # of the smallest radius: directions that are empty with lines so close cannot be filled
 CLOSEST = 0.05
 # fraction of the directions of a replicate that may keep no segment before lines are set closer
@@ -61,7 +63,7 @@ def scan_to_tolerance(solids: Solids, plan: Plan, settings: Settings) -> tuple[S
         sums = batch if sums is None or start == 0 else ScanSums.concatenate([sums, batch])
         # as many replicates as the budget allows
         left = (settings.max_chords - spent) / max(float(sums.chords.mean()) + lines, 1.0)
-        missing = _missing_work(sums, plan, settings)
+        missing = missing_work(sums, plan, settings)
         better = _better_plan(sums, plan, missing, solids, settings, left) if start == 0 else None
         if better is not None:
             plan = better
@@ -170,8 +172,14 @@ def _too_few_lines(sums: ScanSums, settings: Settings) -> bool:
     return False
 
 
-def _missing_work(sums: ScanSums, plan: Plan, settings: Settings) -> float:
-    """By what factor the lines must grow for every variant to meet the tolerance; <= 1: done."""
+def missing_work(sums: ScanSums, plan: Plan, settings: Settings) -> float:
+    """
+    By what factor the lines must grow for every variant to meet the tolerance; <= 1: done.
+
+    The one rule for all scans that are chosen by their error: ``auto`` ones, and those that a
+    calibration recommends.
+    """
+    margin = MARGIN if plan.auto == "replicates" else MARGIN_OF_FIXED
     missing = expected = 0.0
     for variant in settings.variants:
         length, segments = sums.kept(variant)
@@ -180,7 +188,7 @@ def _missing_work(sums: ScanSums, plan: Plan, settings: Settings) -> float:
             error = fabric.axial_error(settings.axis) or 0.0
             missing = max(missing, (error / settings.tolerance) ** 2)
             error = fabric.expected_error(settings.axis, plan.rule.degree) or error
-            expected = max(expected, (MARGIN * error / settings.tolerance) ** 2)
+            expected = max(expected, (margin * error / settings.tolerance) ** 2)
         elif segments.any() and plan.auto == "replicates" and sums.replicates < 256:
             # a direction without any segment may still get one
             return GROWTH

@@ -59,6 +59,9 @@ def frame_result(
             for _ in settings.cutoffs or (settings.cutoff,)
         ]
         return FrameResult(name, number, sample, None, empty)
+    doubt = sample.doubt_of_escaped()
+    if doubt is not None:
+        warnings.warn(f"frame {number}: {doubt}", ScanfabWarning, stacklevel=2)
     measurement = measure(sample, plan, settings)
     rows = []
     for variant in settings.variants:

@@ -135,7 +135,7 @@ def _solids(sample: Sample, plan: Plan, settings: Settings) -> tuple[Solids, Flo
 def _blocks(sample: Sample, plan: Plan, settings: Settings) -> tuple[Blocks, Blocks]:
     """The octants about the middle of the sample (of the cell), and about the window's centre."""
     packing = sample.packing
-    position = packing.position[sample.grains]
+    position = packing.position[sample.gathered]
     low, high = position.min(axis=0), position.max(axis=0)
     radius = float(packing.radius.max())
     reach = float(np.linalg.norm(high - low)) + radius

@@ -26,8 +26,8 @@ def axial_length(sample: Sample, mode: str, axis: Vector) -> float | None:
         One frame.
     mode : str
         ``cell``: the diagonal entry of the cell along the axis; ``boundary`` and ``grains``: the
-        extent of those particles' centres; ``auto``: the cell if it is periodic along the axis,
-        else the boundary if there is one, else none.
+        extent of those particles' centres (without grains that have escaped); ``auto``: the cell
+        if it is periodic along the axis, else the boundary if there is one, else none.
     axis : three floats
         Unit vector.
 
@@ -56,7 +56,7 @@ def axial_length(sample: Sample, mode: str, axis: Vector) -> float | None:
             what = "the dump has no cell" if cell is None else "the axis is not x, y or z"
             raise SettingsError(f"strain: cell was asked for, but {what}")
         return float(cell.vectors[along, along])
-    chosen = sample.boundary if mode == "boundary" else sample.grains
+    chosen = sample.boundary if mode == "boundary" else sample.gathered
     if not chosen.any():
         raise SettingsError(
             f"strain: {mode} was asked for, but the frame has none"

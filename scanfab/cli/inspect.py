@@ -14,6 +14,7 @@ from scanfab.cli.options import (
     sample_options,
     sources_argument,
     usage_errors,
+    window_options,
 )
 from scanfab.cli.sources import (
     SourceCommand,
@@ -34,11 +35,13 @@ __all__ = ["inspect"]
 @reading_options
 @sample_options
 @frames_option
+@window_options
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line and frame.")
 @click.pass_context
 def inspect(ctx: click.Context, /, sources: tuple[str, ...], as_json: bool, **options: Any) -> int:
     """
-    Show what the reader sees in each frame: grains, radii, contacts, rattlers, cell, columns.
+    Show what the reader sees in each frame: grains, radii, contacts, rattlers, cell, columns,
+    extents, and where the RV would be.
 
     Nothing is computed; contacts are found by geometry where no file lists them.
     """
