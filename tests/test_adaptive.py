@@ -14,6 +14,7 @@ from scanfab import (
     direction_rule,
     find_contacts,
     scan_lines,
+    void_fabric,
 )
 from scanfab.directions import DirectionRule
 from scanfab.plan import REPLICATES, make_plan
@@ -75,6 +76,21 @@ def test_auto_scan_does_not_much_more_than_it_must(packing):
     """The worst variant's error is not far below the tolerance."""
     table = compute(packing, tolerance=4e-4)
     assert table["alpha_vs_axial_se"].max() > 2e-4
+
+
+def test_a_scan_of_a_given_spacing_does_not_stop_at_an_error_that_is_small_by_chance(packing):
+    """The estimate from all mean lengths lies so far below that chance seldom helps."""
+    centred = find_contacts(Packing(packing.position - 3.0, packing.radius))
+    solids = solids_of(centred, 2.0)
+    for seed in range(6):
+        settings = Settings.make(
+            variants="c", tolerance=1e-3, spacing=0.15, cutoff=0.4, seed=seed, workers=1
+        )
+        plan = make_plan(settings, Sample(centred, np.zeros(len(packing), bool)))
+        sums, plan = adaptive.scan_to_tolerance(solids, plan, settings)
+        fabric = void_fabric(sums.axes, plan.rule.weights, *sums.kept("c"))
+        assert 1.3 * fabric.expected_error(settings.axis, plan.rule.degree) <= 1e-3
+        assert fabric.axial_error(settings.axis) <= 1e-3
 
 
 def test_smaller_tolerance_takes_more_lines(packing):
