@@ -6,11 +6,11 @@ Usage, from the root of the repository (1600 seeds take half an hour on two core
     python -m tests.campaigns.coverage [--seeds N] [--workers N]
 
 The last frames of two series of sample_data, all variants. The truth is a scan with an error ten
-times smaller or more, with other random numbers. Each seed is a scan of its own: the default ``auto``
-at a loose tolerance, a given spacing with automatic directions, fixed lines in 16 replicates, and
-what ``calibrate`` recommends. Counted is how often ``alpha_vs_axial`` differs from the truth by less
-than its standard error. Of a normal estimate
-with an exactly known error that is 68.3 %; with an error from the scatter of 16 replicates
+times smaller or more, with other random numbers. Each seed is a scan of its own: the default
+``auto`` at a loose tolerance, a given spacing with automatic directions, fixed lines in 16
+replicates, and what ``calibrate`` recommends. Counted is how often ``alpha_vs_axial`` differs from
+the truth by less than its standard error. Of a normal estimate with an exactly known error that is
+68.3 %; with an error from the scatter of 16 replicates
 Student's t with 15 degrees of freedom gives 66.7 %. The exit code is 0 if every variant lies
 within 68 ± 5 %.
 """
