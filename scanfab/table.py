@@ -78,6 +78,7 @@ class Row:
     gc_axis_y: float | None
     gc_axis_z: float | None
     coaxiality_deg: float | None
+    shear_strain: float | None
 
 
 COLUMNS: tuple[str, ...] = tuple(field.name for field in fields(Row))
@@ -146,6 +147,8 @@ MEANINGS: dict[str, str] = {
     "gc_axis_y": "likewise",
     "gc_axis_z": "likewise",
     "coaxiality_deg": "angle between these two directions, 0 to 90 degrees",
+    "shear_strain": "of a cell that repeats along all its vectors, since the first frame: "
+    "√(2/3 e:e) of the logarithmic strain's deviator e; else empty",
 }
 """What each column holds; lengths are in the dump's unit."""
 
