@@ -119,10 +119,10 @@ def _width(columns: Sequence[Column]) -> int:
 
 
 def _bars(values: Sequence[float | None], longest: int) -> str:
-    """A curve of numbers up to 1 as a line of bars; negative ones are blank."""
+    """A curve of numbers up to ±1 as a line of bars, by their size: in extension all are negative."""
     step = -(-len(values) // longest) if values else 1
     return "".join(
-        "·" if value is None else BARS[round(max(value, 0.0) * (len(BARS) - 1))]
+        "·" if value is None else BARS[round(abs(value) * (len(BARS) - 1))]
         for value in values[::step]
     )
 
