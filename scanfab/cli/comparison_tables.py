@@ -119,7 +119,7 @@ def _width(columns: Sequence[Column]) -> int:
 
 
 def _bars(values: Sequence[float | None], longest: int) -> str:
-    """A curve of numbers up to ±1 as a line of bars, by their size: in extension all are negative."""
+    """A curve of numbers up to ±1 as a line of bars, by size: in extension all are negative."""
     step = -(-len(values) // longest) if values else 1
     return "".join(
         "·" if value is None else BARS[round(abs(value) * (len(BARS) - 1))]
