@@ -42,6 +42,7 @@ def frame_result(
     plan: Plan | None,
     settings: Settings,
     strain: float | None,
+    shear_strain: float | None = None,
 ) -> FrameResult:
     """Scan one frame; of a frame without grains there are rows without numbers."""
     frame: dict[str, Any] = {
@@ -50,6 +51,7 @@ def frame_result(
         "step": sample.packing.step,
         "time": sample.packing.time,
         "strain": strain,
+        "shear_strain": shear_strain,
         "contacts_from": sample.contacts.source,
     }
     if plan is None or not sample.grains.any():

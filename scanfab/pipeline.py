@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.boundary import enclosing_class, select_boundary
+from scanfab.cell import Cell
 from scanfab.contacts import find_contacts
 from scanfab.errors import (
     PackingError,
@@ -25,7 +26,7 @@ from scanfab.packing import Packing
 from scanfab.plan import Plan, make_plan
 from scanfab.series import Series
 from scanfab.settings import STRAIN_MODES, Settings
-from scanfab.strain import StrainFile, axial_length
+from scanfab.strain import StrainFile, axial_length, is_flipped, shear_strain
 from scanfab.table import Row, Table
 from scanfab.threads import in_order
 from scanfab.variants import Sample
@@ -176,8 +177,8 @@ class _Run:
 
     def _rows(self, number: int, sample: Sample, threads: int) -> list[Row]:
         settings = replace(self.settings, workers=threads)
-        strain = self.strains.at(number, sample)
-        result = frame_result(self.name, number, sample, self.plan, settings, strain)
+        strains = self.strains.at(number, sample)
+        result = frame_result(self.name, number, sample, self.plan, settings, *strains)
         if self.observe is not None:
             self.observe(result)
         return result.rows
@@ -242,24 +243,50 @@ def chosen_frames(source: Packing | Series, frames: slice) -> range:
 
 
 class _Strains:
-    """Strain of the frames of a series, from its first frame that has grains."""
+    """Strains of the frames of a series, from its first frame that has grains."""
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
         self.file = None if settings.strain in STRAIN_MODES else StrainFile(Path(settings.strain))
         self.first: float | None = None
+        self.first_cell: Cell | None = None
+        self.cells: dict[int, Cell | None] = {}
 
     def start(self, sample: Sample) -> None:
+        self.first_cell = sample.packing.cell
         if self.file is None:
             self.first = axial_length(sample, self.settings.strain, self.settings.axis)
 
-    def at(self, number: int, sample: Sample) -> float | None:
+    def at(self, number: int, sample: Sample) -> tuple[float | None, float | None]:
+        """Axial and shear strain of a frame."""
+        if not sample.grains.any():
+            return self._axial(number, sample), None
+        cell = sample.packing.cell
+        self._warn_of_flips(number, cell)
+        return self._axial(number, sample), shear_strain(cell, self.first_cell)
+
+    def _axial(self, number: int, sample: Sample) -> float | None:
         if self.file is not None:
             return self.file.at(number, sample.packing.step)
         if self.first is None or not sample.grains.any():
             return None
         length = axial_length(sample, self.settings.strain, self.settings.axis)
         return None if length is None or self.first == 0 else 1.0 - length / self.first
+
+    def _warn_of_flips(self, number: int, cell: Cell | None) -> None:
+        """Frames come in any order: each is held against both neighbours that are known."""
+        self.cells[number] = cell
+        step = abs(self.settings.frames.step or 1)
+        for early in (number - step, number):
+            late = early + step
+            if is_flipped(self.cells.get(late), self.cells.get(early)):
+                warnings.warn(
+                    f"the cell seems to be flipped between the frames {early} and {late}: from "
+                    f"there on its vectors are others than in the first frame, and shear_strain is "
+                    f"not the strain since then (LAMMPS: fix deform ... flip no)",
+                    ScanfabWarning,
+                    stacklevel=2,
+                )
 
 
 def classify(packing: Packing, settings: Settings) -> Sample:

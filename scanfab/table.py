@@ -78,6 +78,7 @@ class Row:
     gc_axis_y: float | None
     gc_axis_z: float | None
     coaxiality_deg: float | None
+    shear_strain: float | None
     alpha_vs_axial_half_1: float | None
     alpha_vs_axial_half_2: float | None
     alpha_vs_axial_half_3: float | None
@@ -155,6 +156,8 @@ MEANINGS: dict[str, str] = {
     "gc_axis_y": "likewise",
     "gc_axis_z": "likewise",
     "coaxiality_deg": "angle between these two directions, 0 to 90 degrees",
+    "shear_strain": "of a cell that repeats along all its vectors, since the first frame: "
+    "√(2/3 e:e) of the logarithmic strain's deviator e; else empty",
     "alpha_vs_axial_half_1": "alpha_vs_axial_without_1 is the mean of two replicates: half their "
     "difference, which tells compare the scan's noise in a slope",
     "alpha_vs_axial_half_2": "likewise",

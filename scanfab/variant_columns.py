@@ -27,7 +27,9 @@ __all__ = ["FRAME_COLUMNS", "VariantColumns", "no_columns"]
 FloatArray = npt.NDArray[np.float64]
 
 # the same for all variants
-FRAME_COLUMNS = ("source", "frame", "step", "time", "strain", "variant", "contacts_from")
+FRAME_COLUMNS = (
+    "source", "frame", "step", "time", "strain", "variant", "contacts_from", "shear_strain",
+)  # fmt: skip
 
 
 class VariantColumns:

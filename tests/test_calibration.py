@@ -182,3 +182,25 @@ def test_figure_has_four_panels_with_labels(found, tmp_path):
     with pytest.raises(SettingsError, match=r"figures can be written as \.png"):
         plot_calibration(found.rows, tmp_path / "ladders.doc")
     assert math.isfinite(found.rows[-1].seconds)
+
+
+def test_figure_has_letters_total_errors_and_words(found, tmp_path, monkeypatch):
+    from scanfab.writers import plot_calibration
+
+    drawn = []
+    monkeypatch.setattr(plot_calibration, "save_figure", lambda figure, _: drawn.append(figure))
+    plot_calibration.plot_calibration(found.rows, tmp_path / "ladders.png")
+    panels = drawn[0].axes
+    assert [axes.get_title(loc="left") for axes in panels] == ["(a)", "(b)", "(c)", "(d)"]
+    assert all(axes.get_ylabel().endswith(", axial") for axes in panels)
+    note = drawn[0].legends[0].get_title().get_text()
+    assert note.startswith(f"frame {found.rows[0].frame}\nbands: one total standard error")
+    row = next(r for r in found.rows if r.ladder == "rv" and r.alpha_vs_axial_sample_se is not None)
+    half = 1e3 * math.hypot(row.alpha_vs_axial_se, row.alpha_vs_axial_sample_se)
+    heights = [
+        np.ptp(path.vertices[path.vertices[:, 0] == row.value, 1])
+        for shade in panels[3].collections
+        for path in shade.get_paths()
+        if row.value in path.vertices[:, 0]
+    ]
+    assert any(height == pytest.approx(2 * half) for height in heights)

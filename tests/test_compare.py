@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+import warnings
 
 import numpy as np
 import pytest
 
 from scanfab.compare import compare_tables
-from scanfab.errors import SettingsError
-from tests.tables import CONTACT, STRAIN, VOID, curve
+from scanfab.errors import ScanfabNote, ScanfabWarning, SettingsError
+from tests.tables import CONTACT, STRAIN, VOID, curve, sheared
 
 
 def summary_of(rows, **options):
@@ -36,7 +37,9 @@ def test_groups_are_source_and_variant():
 
 def test_several_rows_of_a_frame_are_refused():
     """Those of several cut-offs would make one curve of many."""
-    with pytest.raises(SettingsError, match=r"one, variant c: several rows for frame 0: .*cut-off"):
+    with pytest.raises(
+        SettingsError, match=r"one, variant c: several rows for frame 0: .*--cutoff; .*--label NAME"
+    ):
         compare_tables([*curve("one", "d"), *curve("one", "c"), *curve("one", "c", 2.0)])
 
 
@@ -137,7 +140,42 @@ def test_frames_beyond_the_largest_strain_are_out_of_the_fit_alone():
 def test_frames_without_a_strain_are_out_of_a_fit_up_to_a_strain():
     rows = [{**row, "strain": None} for row in curve()]
     assert summary_of(rows).frames == 5
-    assert summary_of(rows, strain_max=1.0).frames == 0
+    with pytest.warns(ScanfabWarning, match="strain-max: no frame has a strain"):
+        assert summary_of(rows, strain_max=1.0).frames == 0
+
+
+@pytest.mark.parametrize(("largest", "kind"), [(5.0, ScanfabWarning), (0.5, ScanfabNote)])
+def test_a_largest_strain_that_leaves_out_nothing_says_that_strains_are_fractions(largest, kind):
+    message = rf"{largest:g} leaves out no frame: .* fractions \(5 % is 0.05\), .* 0 and 0.04"
+    with pytest.warns(kind, match=message):
+        assert summary_of(curve(), strain_max=largest).frames == 5
+
+
+def test_a_largest_strain_that_leaves_out_frames_says_nothing():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        summary_of(curve(), strain_max=0.02)
+
+
+def test_a_largest_strain_that_is_no_number_is_refused():
+    with pytest.raises(SettingsError, match="strain-max: expected a number, found nan"):
+        summary_of(curve(), strain_max=math.nan)
+
+
+def test_of_a_sheared_cell_the_largest_strain_is_the_shear_strain():
+    with pytest.warns(ScanfabNote, match="shear_strain stands in for the axial strain"):
+        row = summary_of(sheared(), strain_max=0.2)
+    assert row.frames == 3
+    assert row.peak_strain == 0.4
+
+
+def test_errors_stand_beside_their_values():
+    errors = {"alpha_vs_axial_se": 3e-4, "alpha_vs_axial_sample_se": 4e-4}
+    rows = [{**row, **errors, "alpha_c_axial_sample_se": 1e-3} for row in curve()]
+    first = compare_tables(rows).frames[0]
+    assert first.alpha_vs_axial_total_se == pytest.approx(5e-4)
+    assert (first.alpha_vs_axial_se, first.alpha_c_axial_sample_se) == (3e-4, 1e-3)
+    assert compare_tables(curve()).frames[0].alpha_vs_axial_total_se is None
 
 
 def test_frames_without_a_value_are_left_out():
@@ -183,7 +221,7 @@ def test_differences_without_standard_errors_have_none():
 def test_a_table_without_the_columns_is_refused():
     rows = curve()
     rows[1].pop("strain")
-    with pytest.raises(SettingsError, match=r"the table has no column strain: expected a table of"):
+    with pytest.raises(SettingsError, match=r"row 2: there is no column strain: expected a"):
         compare_tables(rows)
 
 
