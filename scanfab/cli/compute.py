@@ -83,10 +83,11 @@ __all__ = ["compute"]
 )
 @click.option(
     "--max-chords",
-    default=1e11,
+    default=1e10,
     show_default=True,
     metavar="N",
-    help="An auto scan stops before it cuts more chords from grains than this, in each frame.",
+    help="An auto scan stops before it cuts more chords from grains than this, in each frame: by "
+    "default after one or two minutes of one processor (lines count like chords).",
 )
 @axis_option
 @click.option(
