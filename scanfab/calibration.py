@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 import warnings
@@ -30,6 +31,8 @@ from scanfab.table import Row
 from scanfab.variants import Sample
 
 __all__ = ["Calibration", "calibrate"]
+
+LOGGER = logging.getLogger("scanfab")
 
 # in r_min, down to the spacing of the 2017 paper
 SPACINGS = (4.0, 2.0, 1.0, 0.5, 0.2, 0.1)
@@ -186,6 +189,7 @@ class _Calibrator:
             warnings.warn(f"{ladder} {value:g} left out: {error}", ScanfabWarning, stacklevel=2)
             return
         seconds = time.perf_counter() - begun
+        LOGGER.info("%s %s: %.2g s", ladder, "" if value is None else f"{value:g}", seconds)
         for row in rows:
             yield self._row(row, ladder, value, plan, seconds, _notes(caught, row))
 
@@ -269,7 +273,7 @@ def _samples(
     chosen = list(chosen_frames(source, wanted)) if isinstance(source, Series) else [0, -1]
     number = chosen[0] if chosen else len(reads)
     if number >= len(reads) or (isinstance(source, Packing) and frame not in (0, -1)):
-        raise no_such_frames(wanted)
+        raise no_such_frames(source, wanted)
     first: Sample | None = None
     for place, read in enumerate(reads):
         sample = classify(read(), settings)

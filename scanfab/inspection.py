@@ -84,7 +84,7 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
         if number >= chosen.stop - 1:
             break
     if not found:
-        raise no_such_frames(settings.frames)
+        raise no_such_frames(series, settings.frames)
 
 
 def _report(source: str, number: int, frame: Frame, settings: Settings) -> FrameReport:
