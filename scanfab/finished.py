@@ -101,7 +101,6 @@ def finished_table(
     differing = differing_settings(manifest["settings"], dict(asked), FREE)
     if differing:
         raise _refused(path, f"it was made with other settings ({', '.join(differing)})")
-    _check_inputs(path, manifest, series)
     rows = read_rows(path)
     if rows and not {"source", "frame"} <= set(rows[0]):
         raise _refused(path, "it lacks the columns source and frame, which tell its frames")
@@ -112,6 +111,7 @@ def finished_table(
         own = [_row(row) for row in group]
         if len(own) == settings.rows_per_frame:
             found[source][frame] = own
+    _check_inputs(path, manifest, series, found)
     frames = slice(*(manifest["settings"].get("frames") or (None,)))
     return FinishedTable(path, found, frames, [str(one) for one in manifest.get("warnings", [])])
 
@@ -129,7 +129,12 @@ def _refused(path: Path, reason: str) -> SettingsError:
     )
 
 
-def _check_inputs(path: Path, manifest: Mapping[str, Any], series: Sequence[Series]) -> None:
+def _check_inputs(
+    path: Path,
+    manifest: Mapping[str, Any],
+    series: Sequence[Series],
+    rows: Mapping[str, Mapping[int, Any]],
+) -> None:
     """Refuse a table whose inputs are not what they were, but for frames behind the last one."""
     before = {str(one.get("path")): one for one in manifest.get("inputs", [])}
     for gone in before.keys() - {str(file) for one in series for file in one.files()}:
@@ -137,24 +142,31 @@ def _check_inputs(path: Path, manifest: Mapping[str, Any], series: Sequence[Seri
     for one in series:
         steps = [step for step, file in one.grains.files.items() if str(file) in before]
         last = max((step for step in steps if step is not None), default=None)
-        for family in (one.grains, *one.contacts):
-            for step, file in family.files.items():
-                is_last = step is None or step == last
-                if str(file) in before:
-                    _check_same(path, file, before[str(file)], may_grow=is_last)
-                elif steps and (step is None or last is None or step <= last):
-                    raise _refused(path, f"{file} is new, and not behind the last frame")
+        for step, file in (item for f in (one.grains, *one.contacts) for item in f.files.items()):
+            known, is_last = before.get(str(file)), step is None or step == last
+            if known is None and steps and (step is None or last is None or step <= last):
+                raise _refused(path, f"{file} is new, and not behind the last frame")
+            if known is None or _is_same(file, known, may_grow=is_last):
+                continue
+            if not _was_skipped(one, step, rows[one.name]):
+                raise _refused(path, f"{file} has changed since")
 
 
-def _check_same(path: Path, file: Path, before: Mapping[str, Any], may_grow: bool) -> None:
-    """A file that begins as the whole of it was; snapshots may have come behind."""
+def _is_same(file: Path, before: Mapping[str, Any], may_grow: bool) -> bool:
+    """Whether a file is what it was, or begins as it was; snapshots may have come behind."""
     size, length = before.get("size"), file.stat().st_size
     if not isinstance(size, int) or length < size or (length > size and not may_grow):
-        raise _refused(path, f"{file} has changed since")
+        return False
     digest = hashlib.sha256()
     with open(file, "rb") as stream:
         while size and (part := stream.read(min(size, 1 << 20))):
             digest.update(part)
             size -= len(part)
-    if digest.hexdigest() != before.get("sha256"):
-        raise _refused(path, f"{file} has changed since")
+    return digest.hexdigest() == before.get("sha256")
+
+
+def _was_skipped(series: Series, step: int | None, rows: Mapping[int, Any]) -> bool:
+    """Whether the files of a step have given no row: a broken file may have been mended."""
+    frames = [number for number, frame in enumerate(series) if frame.name_step == step]
+    # a broken file counts as one frame: if there are more, later ones have other numbers now
+    return len(frames) == 1 and frames[0] not in rows
