@@ -292,5 +292,5 @@ def _tell_progress(
         void_fabric(sums.axes, plan.rule.weights, *sums.kept(name)) for name in settings.variants
     ]
     errors = [one.axial_error(settings.axis) or 0.0 for one in fabrics if one is not None]
-    worst, tolerance = max(errors, default=math.inf), settings.tolerance
-    LOGGER.info("%s: error %.1g of %g, about %s", where, worst, tolerance, spelt_time(seconds))
+    worst, tolerance = spelt_apart(max(errors, default=math.inf), settings.tolerance)
+    LOGGER.info("%s: error %s of %s, about %s", where, worst, tolerance, spelt_time(seconds))

@@ -9,10 +9,19 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from scanfab.cli.options import check_plot, output_option, plot_option, usage_errors
+from scanfab.cli.options import (
+    check_plot,
+    completed,
+    excerpt_options,
+    output_option,
+    plot_option,
+    usage_errors,
+)
+from scanfab.cli.talk import talk_options
 
 if TYPE_CHECKING:
     from scanfab.compare import Comparison
+    from scanfab.writers.rows import Excerpt
 
 __all__ = ["compare"]
 
@@ -35,18 +44,23 @@ BARS = " ▁▂▃▄▅▆▇█"
     "--strain-max", type=float, metavar="X", help="Leave frames beyond this strain out of the fits."
 )
 @output_option
+@excerpt_options
 @plot_option
 @click.option(
     "--figure",
     metavar="NAME",
+    shell_complete=completed("evolution", "normalised", "correlation"),
     help="Which figure: evolution, normalised or correlation (default: all on one page).",
 )
+@talk_options
 def compare(
     tables: tuple[str, ...],
     summary: bool,
     differences: bool,
     strain_max: float | None,
     output: Path | None,
+    fields: str | None,
+    digits: int,
     plot: Path | None,
     figure: str | None,
 ) -> int:
@@ -57,12 +71,12 @@ def compare(
     input. Per frame: both anisotropies, also divided by their own largest absolute value; with
     --summary, per source and variant: the slope of void on contact fabric. On a terminal both.
     """
-    from scanfab.cli.console import reported_warnings
+    from scanfab.cli.console import is_readable, reported_warnings
     from scanfab.compare import compare_tables
     from scanfab.errors import SettingsError
     from scanfab.figures import TABLE_FIGURES, plot_rows
     from scanfab.tabular import read_rows
-    from scanfab.writers.rows import check_suffix
+    from scanfab.writers.rows import Excerpt, check_suffix
 
     check_plot(plot, figure, TABLE_FIGURES)
     if summary and differences:
@@ -81,29 +95,31 @@ def compare(
         if not chosen:
             lacking = "two variants of one frame" if comparison.frames else "frames"
             raise SettingsError(f"there is nothing to compare: the tables hold no {lacking}")
+        with usage_errors():
+            excerpt = Excerpt.make(type(chosen[0]), fields, digits)
         if output is not None:
-            _write_file(chosen, output)
-        elif sys.stdout.isatty() and not differences:
+            _write_file(chosen, output, excerpt)
+        elif is_readable() and not differences and excerpt.is_all:
             _print(comparison)
         else:
-            _write_csv(chosen)
+            _write_csv(chosen, excerpt)
         if plot is not None:
             plot_rows(plot, rows, figure, strain_max)
     return 0 if any(row.alpha_vs_axial is not None for row in comparison.frames) else 1
 
 
-def _write_csv(rows: Sequence[Any]) -> None:
+def _write_csv(rows: Sequence[Any], excerpt: Excerpt) -> None:
     from scanfab.writers.rows import CsvWriter
 
-    writer = CsvWriter(sys.stdout)
+    writer = CsvWriter(sys.stdout, excerpt=excerpt)
     for row in rows:
         writer.write(row)
 
 
-def _write_file(rows: Sequence[Any], output: Path) -> None:
+def _write_file(rows: Sequence[Any], output: Path, excerpt: Excerpt) -> None:
     from scanfab.writers.results import ResultFile
 
-    with ResultFile(output, type(rows[0])).writer({}) as writer:
+    with ResultFile(output, type(rows[0]), excerpt).writer({}) as writer:
         for row in rows:
             writer.write(row)
 
