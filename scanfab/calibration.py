@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 import warnings
@@ -32,6 +33,8 @@ from scanfab.table import Row
 from scanfab.variants import Sample
 
 __all__ = ["Calibration", "calibrate"]
+
+LOGGER = logging.getLogger("scanfab")
 
 # in r_min, down to the spacing of the 2017 paper
 SPACINGS = (4.0, 2.0, 1.0, 0.5, 0.2, 0.1)
@@ -192,6 +195,7 @@ class _Calibrator:
             self._check_budget(ladder, plan)
             result = frame_result(self.name, self.number, self.sample, plan, settings, None)
         seconds = time.perf_counter() - begun
+        LOGGER.info("%s %s: %.2g s", ladder, "" if value is None else f"{value:g}", seconds)
         rows = [
             self._row(row, ladder, value, plan, seconds, _notes(caught, row)) for row in result.rows
         ]
@@ -282,7 +286,7 @@ def _samples(
     chosen = list(chosen_frames(source, wanted)) if isinstance(source, Series) else [0, -1]
     number = chosen[0] if chosen else len(reads)
     if number >= len(reads) or (isinstance(source, Packing) and frame not in (0, -1)):
-        raise no_such_frames(wanted)
+        raise no_such_frames(source, wanted)
     first: Sample | None = None
     for place, read in enumerate(reads):
         sample = classify(read(), settings)

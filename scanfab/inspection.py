@@ -102,7 +102,7 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
         if number >= chosen.stop - 1:
             break
     if not found:
-        raise no_such_frames(settings.frames)
+        raise no_such_frames(series, settings.frames)
 
 
 def _read(frame: Frame, settings: Settings) -> tuple[Sample, list[str]]:

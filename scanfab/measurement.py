@@ -78,12 +78,14 @@ class Measurement:
         return position[solid], radius[solid], reach
 
 
-def measure(sample: Sample, plan: Plan, settings: Settings) -> Measurement:
-    """Scan one frame that has grains."""
+def measure(
+    sample: Sample, plan: Plan, settings: Settings, where: str = "the frame"
+) -> Measurement:
+    """Scan one frame that has grains; ``where`` names it in messages."""
     if plan.window is not None:
         plan.window.check_fits(sample.packing)
     solids, origin = _solids(sample, plan, settings)
-    sums, plan = scan_to_tolerance(solids, plan, settings)
+    sums, plan = scan_to_tolerance(solids, plan, settings, where)
     blocks = _blocks(sample, plan, settings)
     lines: dict[str, Any] = {
         "cutoffs": plan.cutoffs,

@@ -135,7 +135,7 @@ def _section(one: _Input, told: list[str]) -> Section:
         no_view = f"The view is left out: {error}."
     return Section(
         title=str(one.path),
-        command=repeat_command(asked, one.path.name),
+        command=repeat_command(asked, one.path.name, _overridden(one.manifest)),
         settings=settings_table(asked),
         versions=[(str(k), str(v)) for k, v in (one.manifest.get("versions") or {}).items()],
         inputs=input_table(one.manifest),
@@ -144,6 +144,12 @@ def _section(one: _Input, told: list[str]) -> Section:
         no_view=no_view,
         pictures=pictures,
     )
+
+
+def _overridden(manifest: Mapping[str, Any]) -> list[str]:
+    """Options of the settings file beside the dumps that the command line has overridden."""
+    found = manifest.get("settings_file")
+    return [str(name) for name in found.get("not_used", [])] if isinstance(found, dict) else []
 
 
 class _told(warnings.catch_warnings):  # noqa: N801

@@ -5,11 +5,22 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from scanfab.cli.options import check_plot, output_option, plot_option, usage_errors
+from scanfab.cli.options import (
+    check_plot,
+    completed,
+    excerpt_options,
+    output_option,
+    plot_option,
+    usage_errors,
+)
+from scanfab.cli.talk import talk_options
+
+if TYPE_CHECKING:
+    from scanfab.writers.rows import Excerpt
 
 __all__ = ["compare"]
 
@@ -43,12 +54,15 @@ __all__ = ["compare"]
     help="Name of a table in place of its source, once a table, in their order.",
 )
 @output_option
+@excerpt_options
 @plot_option
 @click.option(
     "--figure",
     metavar="NAME",
+    shell_complete=completed("evolution", "normalised", "correlation"),
     help="Which figure: evolution, normalised or correlation (default: all on one page).",
 )
+@talk_options
 def compare(
     tables: tuple[str, ...],
     summary: bool,
@@ -57,6 +71,8 @@ def compare(
     cutoff: float | None,
     labels: tuple[str, ...],
     output: Path | None,
+    fields: str | None,
+    digits: int,
     plot: Path | None,
     figure: str | None,
 ) -> int:
@@ -68,13 +84,13 @@ def compare(
     --summary, per source and variant: the slope of void on contact fabric. On a terminal both.
     """
     from scanfab.cli.comparison_tables import print_comparison
-    from scanfab.cli.console import reported_warnings
+    from scanfab.cli.console import is_readable, reported_warnings
     from scanfab.compare import compare_tables
     from scanfab.errors import SettingsError
     from scanfab.figures import TABLE_FIGURES, plot_rows
     from scanfab.selection import choose_rows
     from scanfab.tabular import read_rows
-    from scanfab.writers.rows import check_suffix
+    from scanfab.writers.rows import Excerpt, check_suffix
 
     check_plot(plot, figure, TABLE_FIGURES)
     if summary and differences:
@@ -96,28 +112,30 @@ def compare(
         if not chosen:
             lacking = "two variants of one frame" if comparison.frames else "frames"
             raise SettingsError(f"there is nothing to compare: the tables hold no {lacking}")
+        with usage_errors():
+            excerpt = Excerpt.make(type(chosen[0]), fields, digits)
         if output is not None:
-            _write_file(chosen, output)
-        elif sys.stdout.isatty() and not differences:
+            _write_file(chosen, output, excerpt)
+        elif is_readable() and not differences and excerpt.is_all:
             print_comparison(comparison)
         else:
-            _write_csv(chosen)
+            _write_csv(chosen, excerpt)
         if plot is not None:
             plot_rows(plot, rows, figure, strain_max)
     return 0 if any(row.alpha_vs_axial is not None for row in comparison.frames) else 1
 
 
-def _write_csv(rows: Sequence[Any]) -> None:
+def _write_csv(rows: Sequence[Any], excerpt: Excerpt) -> None:
     from scanfab.writers.rows import CsvWriter
 
-    writer = CsvWriter(sys.stdout)
+    writer = CsvWriter(sys.stdout, excerpt=excerpt)
     for row in rows:
         writer.write(row)
 
 
-def _write_file(rows: Sequence[Any], output: Path) -> None:
+def _write_file(rows: Sequence[Any], output: Path, excerpt: Excerpt) -> None:
     from scanfab.writers.results import ResultFile
 
-    with ResultFile(output, type(rows[0])).writer({}) as writer:
+    with ResultFile(output, type(rows[0]), excerpt).writer({}) as writer:
         for row in rows:
             writer.write(row)

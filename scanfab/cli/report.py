@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from scanfab.cli.options import usage_errors
+from scanfab.cli.talk import talk_options, working
 
 __all__ = ["report"]
 
@@ -27,6 +28,7 @@ __all__ = ["report"]
     metavar="FILE.html",
     help="The report.",
 )
+@talk_options
 def report(tables: tuple[Path, ...], output: Path) -> int:
     """
     Write a report on fabric tables: one HTML file that opens without a network.
@@ -42,7 +44,9 @@ def report(tables: tuple[Path, ...], output: Path) -> int:
         check_page_file(output)
     with reported_warnings():
         announce_compiling()
-        save_page(output, make_report(tables))
+        with working():
+            page = make_report(tables)
+        save_page(output, page)
         found = has_void_fabric(tables)
     if not found:
         click.echo("scanfab: warning: no row of the tables has a void fabric", err=True)
