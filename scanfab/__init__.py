@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+
+# as typing has it, which takes longer to load than all that is needed to answer Ctrl-C
+TYPE_CHECKING = False
 
 if TYPE_CHECKING:
+    from typing import Any
+
     from scanfab.calibration import Calibration, calibrate
     from scanfab.cell import Cell
     from scanfab.compare import compare_tables

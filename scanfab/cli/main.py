@@ -1,118 +1,36 @@
-"""The scanfab command: finds its subcommands when they are used, and turns errors into messages."""
+"""
+The process of the scanfab command: turns errors into messages, and signals into exit codes.
+
+Nothing is imported here that takes time: until main() runs, Ctrl-C shows a traceback.
+"""
 
 from __future__ import annotations
 
 import os
 import signal
 import sys
-from contextlib import suppress
-from importlib import import_module
-from io import UnsupportedOperation
-from types import FrameType
 
-import click
-
-__all__ = ["cli", "main"]
-
-# one module a command, imported only when the command runs: --help stays fast
-COMMANDS = {
-    "compute": "the fabric table: one row per frame and variant",
-    "compare": "variants side by side, normalised curves, correlation with contact fabric",
-    "inspect": "what the reader sees, nothing computed",
-    "calibrate": "how many lines are enough: ladders of settings, and those it recommends",
-    "report": "one file to hand on: settings, tables, figures, a view that can be turned",
-    "view": "a frame in 3D",
-    "formats": "every reader and writer, its extensions, and the package it comes from",
-}
-
-
-ENDED: dict[int, str] = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
-# what modules, where they were imported, have to remove before a process ends
-LEFTOVERS = {
-    "scanfab.readers.files": "remove_copies",
-    "scanfab.kernels.cache": "remove_unkept",
-}
-
-
-class LazyGroup(click.Group):
-    """A group that knows its commands by name."""
-
-    def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(COMMANDS)
-
-    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in COMMANDS:
-            return None
-        command = getattr(import_module(f"scanfab.cli.{cmd_name}"), cmd_name)
-        assert isinstance(command, click.Command)
-        return command
-
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Commands"):
-            formatter.write_dl(list(COMMANDS.items()))
-
-
-def _print_version(ctx: click.Context, param: click.Parameter, value: bool) -> None:
-    if value and not ctx.resilient_parsing:
-        from importlib.metadata import version
-
-        click.echo(f"scanfab {version('scanfab')}")
-        ctx.exit()
-
-
-@click.group(cls=LazyGroup)
-@click.option(
-    "--version",
-    is_flag=True,
-    expose_value=False,
-    is_eager=True,
-    callback=_print_version,
-    help="Show the version and exit.",
+from scanfab.cli.signals import (
+    catch_signals,
+    flush_streams,
+    ignore_signals,
+    interrupted_words,
+    leave_at_once,
 )
-@click.option("--debug", is_flag=True, expose_value=False, help="Show a traceback with an error.")
-def cli() -> None:
-    """The void fabric of granular packings by scan lines, from DEM particle dumps."""
 
-
-class Terminated(BaseException):
-    """The process was told to end (SIGTERM)."""
+__all__ = ["main", "run"]
 
 
 def main(args: list[str] | None = None) -> None:
     """Run the command line and exit: 0 done, 1 failed, 2 wrong usage, 130 and 143 interrupted."""
-
-    signal.signal(signal.SIGTERM, _end)
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, _end)
+    catch_signals()
     _replace_closed_streams()
     code = run(sys.argv[1:] if args is None else args)
-    # the result stands: a signal would only spoil the exit code
-    for late in ENDED:
-        signal.signal(late, signal.SIG_IGN)
+    ignore_signals()
     if code:
-        _leave_at_once(code)
+        flush_streams()
+        leave_at_once(code)
     sys.exit(code)
-
-
-def _end(number: int, frame: FrameType | None) -> None:
-    """End on a signal: by an exception, or at once where modules are being imported."""
-    if not _imports(frame):
-        raise Terminated if number == signal.SIGTERM else KeyboardInterrupt
-    # extension modules take an exception for a failed import, and some of VTK's crash
-    _leave_at_once(_report_end(number))
-
-
-def _imports(frame: FrameType | None) -> bool:
-    """Whether what the frame does is done for an import."""
-    while frame is not None and not frame.f_code.co_filename.startswith("<frozen importlib"):
-        frame = frame.f_back
-    return frame is not None
-
-
-def _report_end(number: int) -> int:
-    """Say that a signal ended the process; the exit code for that."""
-    click.echo(f"scanfab: {ENDED[number]}", err=True)
-    return 128 + number
 
 
 def _replace_closed_streams() -> None:
@@ -126,19 +44,11 @@ def _replace_closed_streams() -> None:
         sys.stderr = open(os.devnull, "w")  # noqa: SIM115
 
 
-def _leave_at_once(code: int) -> None:
-    """Exit without waiting for the frames that other threads are computing."""
-    for module, function in LEFTOVERS.items():
-        if hasattr(sys.modules.get(module), function):
-            getattr(sys.modules[module], function)()
-    for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError):  # a full disk, a closed pipe: told already
-            stream.flush()
-    os._exit(code)
-
-
 def run(args: list[str]) -> int:
     """The command line's exit code; errors become one message on standard error."""
+    import click
+
+    from scanfab.cli.group import cli
     from scanfab.errors import ScanfabError
 
     # wherever it stands: the group knows it only for its help
@@ -151,9 +61,8 @@ def run(args: list[str]) -> int:
         error.show()
         return error.exit_code
     except (KeyboardInterrupt, click.Abort):
-        return _report_end(signal.SIGINT)
-    except Terminated:
-        return _report_end(signal.SIGTERM)
+        click.echo(interrupted_words(signal.SIGINT), err=True)
+        return 128 + signal.SIGINT
     except (ScanfabError, OSError, MemoryError) as error:
         if debug:
             raise
@@ -162,8 +71,11 @@ def run(args: list[str]) -> int:
 
 
 def _describe(error: BaseException) -> str:
+    from io import UnsupportedOperation
+
     if isinstance(error, UnsupportedOperation):
         return "standard output is closed: name a file with -o"
-    if isinstance(error, OSError) and error.filename is not None:
-        return f"{error.filename}: {os.strerror(error.errno or 0)}"
+    if isinstance(error, OSError) and error.errno and error.strerror == os.strerror(error.errno):
+        # whatever writes to files names them
+        return f"{error.filename or 'standard output'}: {error.strerror}"
     return str(error) or type(error).__name__

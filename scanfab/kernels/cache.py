@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import atexit
 import gc
 import hashlib
 import os
@@ -17,7 +16,9 @@ from typing import Any
 import numba
 from numba.core import event
 
-__all__ = ["is_kept", "kernel_cache", "remove_unkept", "when_compiling"]
+from scanfab.ending import at_end
+
+__all__ = ["is_kept", "kernel_cache", "when_compiling"]
 
 # bytes that compiled kernels need at most
 ROOM = 4 << 20
@@ -39,7 +40,7 @@ def kernel_cache() -> Iterator[None]:
         # not a folder that others know: what it holds is run
         folder = Path(tempfile.mkdtemp(prefix="scanfab-kernels-"))
         _unkept.append(str(folder))
-        atexit.register(remove_unkept)
+        at_end(_remove_unkept)
     config.CACHE_DIR = str(folder)
     try:
         yield
@@ -52,7 +53,7 @@ def is_kept() -> bool:
     return not _unkept
 
 
-def remove_unkept() -> None:
+def _remove_unkept() -> None:
     """Delete what cannot be kept, at the end of the process."""
     for folder in _unkept:
         shutil.rmtree(folder, ignore_errors=True)
