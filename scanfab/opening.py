@@ -238,7 +238,8 @@ def _named_contacts(contacts: PathLike, format: str | None) -> tuple[Family, ...
     families = sort_into_families(files, format)
     found = tuple(family.check() for family in families if family.kind == "contacts")
     if not found:
-        raise ReadError(f"{contacts}: expected contacts, found none")
+        problem = next((family.problem for family in families if family.problem), None)
+        raise ReadError(problem or f"{contacts}: expected contacts, found none")
     return found
 
 

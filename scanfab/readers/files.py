@@ -18,6 +18,7 @@ from typing import IO, Any
 
 from scanfab.ending import at_end
 from scanfab.errors import ReadError
+from scanfab.streams import check_file
 
 __all__ = [
     "COMPRESSED_SUFFIXES",
@@ -108,6 +109,7 @@ def _remove_copies() -> None:
 
 
 def _opener(path: Path) -> Callable[..., Any]:
+    check_file(path)
     try:
         with open(path, "rb") as stream:
             magic = stream.read(6)
