@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-
 # as typing has it, which takes longer to load than all that is needed to answer Ctrl-C
 TYPE_CHECKING = False
 
@@ -111,6 +109,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    from importlib import import_module
+
     if name == "__version__":
         from importlib.metadata import version
 

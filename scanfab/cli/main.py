@@ -1,28 +1,24 @@
 """
 The process of the scanfab command: turns errors into messages, and signals into exit codes.
 
-Nothing is imported here that takes time: until main() runs, Ctrl-C shows a traceback.
+Next to nothing is imported before main() runs: until then, Ctrl-C shows a traceback.
 """
 
 from __future__ import annotations
 
-import os
 import signal
 import sys
-
-from scanfab.cli.signals import (
-    catch_signals,
-    flush_streams,
-    ignore_signals,
-    interrupted_words,
-    leave_at_once,
-)
 
 __all__ = ["main", "run"]
 
 
 def main(args: list[str] | None = None) -> None:
     """Run the command line and exit: 0 done, 1 failed, 2 wrong usage, 130 and 143 interrupted."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        # without a word until we can say one
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+    from scanfab.cli.signals import catch_signals, flush_streams, ignore_signals, leave_at_once
+
     catch_signals()
     _replace_closed_streams()
     code = run(sys.argv[1:] if args is None else args)
@@ -35,6 +31,8 @@ def main(args: list[str] | None = None) -> None:
 
 def _replace_closed_streams() -> None:
     """Where the shell closed a standard stream: nothing to read, and an error to write to."""
+    import os
+
     # they stay open as long as the process
     if sys.stdin is None:
         sys.stdin = open(os.devnull)  # noqa: SIM115
@@ -49,6 +47,7 @@ def run(args: list[str]) -> int:
     import click
 
     from scanfab.cli.group import cli
+    from scanfab.cli.signals import interrupted_words
     from scanfab.errors import ScanfabError
 
     # wherever it stands: the group knows it only for its help
@@ -71,6 +70,7 @@ def run(args: list[str]) -> int:
 
 
 def _describe(error: BaseException) -> str:
+    import os
     from io import UnsupportedOperation
 
     if isinstance(error, UnsupportedOperation):

@@ -44,7 +44,7 @@ def interrupted_words(number: int) -> str:
 def catch_signals() -> None:
     """From now on signals end the process in our way; one that is ignored stays so."""
     signal.signal(signal.SIGTERM, _end)
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, _end)
 
 
