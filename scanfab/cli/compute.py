@@ -328,4 +328,5 @@ def _write_manifest(path: Path, asked: dict[str, Any], series: list[Series], tol
 
     text = json.dumps(manifest(asked, series, told.texts, told.notes), indent=1, ensure_ascii=False)
     with whole_file(path) as part:
-        part.write_text(text + "\n", encoding="utf-8")
+        # names of files need be no text; what replaces their letters is how JSON spells them
+        part.write_text(text + "\n", encoding="utf-8", errors="backslashreplace")

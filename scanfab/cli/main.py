@@ -11,6 +11,18 @@ import sys
 
 __all__ = ["main", "run"]
 
+# bars of a curve become those that a keyboard has
+PLAIN_LETTERS = dict(zip("▁▂▃▄▅▆▇█", "_.-:=+*#", strict=True)) | {
+    "α": "a",
+    "ℓ": "l",
+    "±": "+-",
+    "²": "^2",
+    "·": ".",
+    "…": "~",
+    "→": "->",
+    "≥": ">=",
+}
+
 
 def main(args: list[str] | None = None) -> None:
     """Run the command line and exit: 0 done, 1 failed, 2 wrong usage, 130 and 143 interrupted."""
@@ -21,6 +33,7 @@ def main(args: list[str] | None = None) -> None:
 
     catch_signals()
     _replace_closed_streams()
+    _replace_foreign_letters()
     code = run(sys.argv[1:] if args is None else args)
     ignore_signals()
     if code:
@@ -40,6 +53,24 @@ def _replace_closed_streams() -> None:
         sys.stdout = open(os.devnull)  # noqa: SIM115
     if sys.stderr is None:
         sys.stderr = open(os.devnull, "w")  # noqa: SIM115
+
+
+def _replace_foreign_letters() -> None:
+    """Where a terminal knows no Greek, and for file names that are no text: what it can show."""
+    import codecs
+
+    codecs.register_error("scanfab", _shown)
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="scanfab")
+
+
+def _shown(error: UnicodeError) -> tuple[str, int]:
+    """An error handler of codecs: other letters for those that cannot be encoded."""
+    assert isinstance(error, UnicodeEncodeError)
+    letters = error.object[error.start : error.end]
+    known = "".join(PLAIN_LETTERS.get(letter, letter) for letter in letters)
+    return known.encode("ascii", "backslashreplace").decode(), error.end
 
 
 def run(args: list[str]) -> int:

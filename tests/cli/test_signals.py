@@ -102,7 +102,8 @@ def run(args):
 def test_the_process_hears_signals_before_anything_large_is_imported():
     code = (
         "import sys; before = set(sys.modules); import scanfab.cli.main; "
-        "print(*sorted({'click', 'numpy', 'typing', 're', 'contextlib', 'importlib'} & (set(sys.modules) - before)))"
+        "heavy = {'click', 'numpy', 'typing', 're', 'contextlib', 'importlib'}; "
+        "print(*sorted(heavy & (set(sys.modules) - before)))"
     )
     words = [sys.executable, "-S", "-c", code]
     root = str(Path(__file__).parents[2])
