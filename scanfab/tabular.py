@@ -13,7 +13,7 @@ from typing import Any
 
 from scanfab.errors import ReadError
 
-__all__ = ["TEXT_COLUMNS", "is_number", "number_of", "numbers_of", "read_rows", "total_error"]
+__all__ = ["is_number", "number_of", "numbers_of", "read_rows", "total_error"]
 
 TEXT_COLUMNS = ("source", "variant", "contacts_from")
 
