@@ -148,7 +148,7 @@ def _grouped(
     for row in rows:
         groups.setdefault((row["source"], row["variant"]), []).append(row)
     for (source, variant), group in groups.items():
-        frames = [row["frame"] for row in group]
+        frames = [row["frame"] for row in group if row["frame"] is not None]
         if len(set(frames)) < len(frames):
             twice = next(frame for frame in frames if frames.count(frame) > 1)
             raise SettingsError(

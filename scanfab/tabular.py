@@ -14,7 +14,7 @@ from typing import Any
 from scanfab.errors import ReadError
 from scanfab.streams import check_file_or_pipe
 
-__all__ = ["TEXT_COLUMNS", "is_number", "number_of", "numbers_of", "read_rows", "total_error"]
+__all__ = ["is_number", "number_of", "numbers_of", "read_rows", "total_error"]
 
 TEXT_COLUMNS = ("source", "variant", "contacts_from")
 

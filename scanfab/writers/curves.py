@@ -19,6 +19,8 @@ FloatArray = npt.NDArray[np.float64]
 Rows = Sequence[Mapping[str, Any]]
 
 LONGEST_NAME = 32
+# beyond it nothing can be drawn: in units of the axis it would be infinite
+LARGEST = 1e100
 ABSCISSAE = {
     "strain": r"axial strain $\varepsilon_a$ in %",
     "shear_strain": r"shear strain $\varepsilon_q$ in %",
@@ -127,7 +129,8 @@ def _curve(source: str, variant: str, group: Rows, abscissa: str | None) -> Curv
 
 
 def _array(values: Iterable[float | None]) -> FloatArray:
-    return np.array([np.nan if value is None else value for value in values], np.float64)
+    array = np.array([np.nan if value is None else value for value in values], np.float64)
+    return np.where(np.abs(array) < LARGEST, array, np.nan)
 
 
 def _error(values: Iterable[float | None]) -> FloatArray:

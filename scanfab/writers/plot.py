@@ -167,4 +167,4 @@ def band(axes: Axes, x: FloatArray, y: FloatArray, error: FloatArray, colour: An
     alone = known & ~beside[:-2] & ~beside[2:]
     if alone.any():
         low, high = (y - error)[alone], (y + error)[alone]
-        axes.vlines(x[alone], low, high, color=colour, alpha=0.3, lw=5)
+        axes.vlines(x[alone], low, high, color=colour, alpha=0.3, lw=5, zorder=1)

@@ -179,9 +179,7 @@ class _Page:
             for axes, quantity in zip(panels, quantities, strict=True):
                 _draw(axes, group.drawn, quantity, share)
         for axes in columns[-1]:
-            axes.set_xlabel(self.abscissa)
-            if self.abscissa == "frame":
-                axes.xaxis.get_major_locator().set_params(integer=True)
+            self._abscissa(axes)
         titles = [
             group.title if place == 0 else ""
             for group in self.groups
@@ -189,6 +187,18 @@ class _Page:
         ]
         self._letter(columns.ravel().tolist(), titles)
         self._legend(part, _note(self.groups, quantities, share))
+
+    def _abscissa(self, axes: Axes) -> None:
+        from matplotlib.ticker import MaxNLocator
+
+        axes.set_xlabel(self.abscissa)
+        places = np.concatenate([one.curve.x for group in self.groups for one in group.drawn])
+        known = np.unique(places[np.isfinite(places)])
+        if len(known) == 1:
+            # one frame alone has no scale
+            axes.set_xlim(known[0] - 1, known[0] + 1)
+        if self.abscissa == "frame":
+            axes.xaxis.set_major_locator(MaxNLocator(integer=True))
 
     def _letter(self, panels: Sequence[Axes], titles: Sequence[str]) -> None:
         letter(panels, titles, self.lettered)

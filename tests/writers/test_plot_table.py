@@ -136,6 +136,13 @@ def test_a_missing_value_is_a_hole_and_one_frame_a_point(drawn):
     assert "no line" in legend_of(figure.axes[5])[0]
 
 
+@pytest.mark.parametrize("column", ["alpha_vs_axial", "alpha_vs_axial_se", "alpha_c_axial"])
+def test_what_is_too_large_to_draw_is_a_hole(tmp_path, column):
+    rows = curve()
+    rows[2][column] = 1e308
+    plot_rows(tmp_path / "x.png", rows, "evolution")
+
+
 def test_noise_does_not_fill_the_panel(drawn):
     rows = [{**row, "alpha_vs_axial": 1e-6 * row["frame"]} for row in curve()]
     low, high = drawn(rows, "evolution").axes[0].get_ylim()
@@ -241,6 +248,7 @@ def test_one_frame_has_its_error_as_a_bar(drawn):
     """An area needs two points."""
     row = {**curve()[2], "alpha_vs_axial_sample_se": 2e-3, "alpha_vs_axial_se": None}
     figure = drawn([row], "evolution")
+    assert figure.axes[0].get_xlim() == pytest.approx((1.0, 3.0))
     heights = [
         np.ptp(segment[:, 1])
         for found in figure.axes[0].collections
