@@ -30,7 +30,7 @@ def unpacked(path):
 
 @pytest.fixture(scope="module")
 def frames():
-    with pytest.warns(scanfab.ScanfabWarning, match="passed over"):
+    with pytest.warns(scanfab.ScanfabNote, match="passed over"):
         series = scanfab.read_series(SHEAR, contact_columns=COLUMNS)
     return [frame.read() for frame in series]
 
