@@ -6,6 +6,8 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from scanfab.doubts import cell_doubt, doubts_of, refuse_impossible
+from scanfab.errors import PackingError, ScanfabNote
 from scanfab.pipeline import boundary_hint, chosen_frames, classify, no_such_frames
 from scanfab.series import Frame, Series
 from scanfab.settings import Settings
@@ -91,6 +93,10 @@ def _report(source: str, number: int, frame: Frame, settings: Settings) -> Frame
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         sample = classify(frame.read(), settings)
+    for one in caught:
+        if issubclass(one.category, ScanfabNote):
+            warnings.warn(one.message, stacklevel=2)
+    told = [str(one.message) for one in caught if not issubclass(one.category, ScanfabNote)]
     packing, grains = sample.packing, sample.grains
     radius = packing.radius[grains]
     cell = packing.cell
@@ -111,10 +117,16 @@ def _report(source: str, number: int, frame: Frame, settings: Settings) -> Frame
         cell=None if cell is None else cell.vectors.tolist(),
         periodic=None if cell is None else list(cell.periodic),
         columns=["id", "x", "y", "z", "radius", *packing.columns],
-        warnings=[str(one.message) for one in caught] + _hints(sample, settings),
+        warnings=told + _hints(frame, sample, settings),
     )
 
 
-def _hints(sample: Sample, settings: Settings) -> list[str]:
-    hint = boundary_hint(sample, settings)
-    return [hint] if hint else []
+def _hints(frame: Frame, sample: Sample, settings: Settings) -> list[str]:
+    """What looks wrong, also what makes the frame impossible to measure."""
+    hints = [boundary_hint(sample, settings)] if len(sample.packing) else []
+    try:
+        refuse_impossible(sample)
+    except PackingError as error:
+        hints.append(str(error))
+    hints += [*doubts_of(sample), cell_doubt(sample, frame.carries, always=True)]
+    return [hint for hint in hints if hint]

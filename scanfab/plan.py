@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scanfab.directions import DirectionRule, direction_rule
+from scanfab.doubts import refuse_impossible
 from scanfab.errors import ScanfabWarning, SettingsError
 from scanfab.settings import AUTO_RULE, Settings
 from scanfab.variants import Sample
@@ -57,7 +58,10 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     ------
     SettingsError
         If the settings do not fit the packing.
+    PackingError
+        If the packing cannot be measured.
     """
+    refuse_impossible(sample)
     grains = sample.grains
     radii = sample.packing.radius[grains]
     lengths = {
@@ -78,6 +82,7 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
             stacklevel=2,
         )
     cutoff = settings.cutoff.resolve(lengths)
+    _check_cutoff(min((one.resolve(lengths) for one in settings.cutoffs), default=cutoff), sample)
     # as many as were asked for, also if two are equal: every frame has the same number of rows
     cutoffs = tuple(sorted(one.resolve(lengths) for one in settings.cutoffs)) or (cutoff,)
     if settings.spacing is None:
@@ -88,7 +93,7 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
         what = "sample" if window is None else "RV"
         raise SettingsError(
             f"spacing: {asked:g} between lines is more than the {what} is wide ({2.0 * reach:g}): "
-            f"choose a smaller one, for instance 1rmin ({lengths['rmin']:g})"
+            f"lengths are in the dump's unit; did you mean 1rmin ({lengths['rmin']:g})?"
         )
     if asked < CLOSEST * reach:
         raise SettingsError(
@@ -101,6 +106,19 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     if auto:
         replicates = REPLICATES
     return Plan(window, cutoff, cutoffs, rule, asked * math.sqrt(replicates), replicates, auto)
+
+
+def _check_cutoff(cutoff: float, sample: Sample) -> None:
+    """Refuse a cut-off that is longer than any line in the sample, periodic or not."""
+    position, radius = sample.packing.position, sample.packing.radius
+    longest = float(np.linalg.norm(np.ptp(position, axis=0)) + 2.0 * radius.max())
+    if cutoff > longest:
+        smallest = float(radius[sample.grains].min())
+        raise SettingsError(
+            f"cutoff: {cutoff:g} is {cutoff / smallest:.3g} times the smallest radius "
+            f"({smallest:g}), and longer than the sample ({longest:.3g}): lengths are in the "
+            f"dump's unit; did you mean 1rmin?"
+        )
 
 
 def _window(settings: Settings, box: SurfaceBox, smallest: float) -> SphereWindow:

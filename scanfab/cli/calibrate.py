@@ -12,6 +12,7 @@ import click
 from click.core import ParameterSource
 
 from scanfab.cli.options import (
+    SourceType,
     axis_option,
     check_plot,
     cutoff_option,
@@ -47,7 +48,7 @@ TITLES = {
 
 
 @click.command(cls=SourceCommand)
-@click.argument("source", metavar="SOURCE", type=click.Path(exists=True, allow_dash=True))
+@click.argument("source", metavar="SOURCE", type=SourceType())
 @reading_options
 @sample_options
 @click.option(
@@ -122,8 +123,11 @@ def calibrate(
             settings = Settings.make(**options)
             result = None if output is None else ResultFile(output, StepRow)
         announce_compiling()
-        (series,) = open_series((source,), reading)
-        found = calibrate_series(series, settings, frame=frame)
+        series = open_series((source,), reading)
+        if len(series) > 1:
+            names = ", ".join(one.name for one in series)
+            raise click.UsageError(f"one series can be calibrated at a time, found {names}")
+        found = calibrate_series(series[0], settings, frame=frame)
         command = _command_line(ctx, source, found.options)
         if result is not None:
             with result.writer({}) as writer:
@@ -145,7 +149,8 @@ def _command_line(ctx: click.Context, source: str, recommended: dict[str, str]) 
             continue
         value = ctx.params[name]
         for one in value if parameter.multiple else [value]:
-            spelt = one.split() if name == "cell" else one if isinstance(one, tuple) else [one]
+            numbers = name == "cell" and not Path(one).is_file()
+            spelt = one.split() if numbers else one if isinstance(one, tuple) else [one]
             words += [parameter.opts[0], *map(str, spelt)]
     words += ["--variants", ctx.params["variants"]]
     for name, value in recommended.items():

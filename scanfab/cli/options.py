@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 import click
 
 __all__ = [
+    "SourceType",
     "axis_option",
     "check_plot",
     "cutoff_option",
@@ -50,12 +52,28 @@ def together(*options: Callable[[Command], Command]) -> Callable[[Command], Comm
     return add
 
 
+class SourceType(click.Path):
+    """A path that exists, or a glob in quotes that names some; it stays as it is."""
+
+    def __init__(self) -> None:
+        super().__init__(exists=True, allow_dash=True)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Refuse what does not exist."""
+        return value if glob.glob(value) else super().convert(value, param, ctx)
+
+
+def _expand(ctx: click.Context, param: click.Parameter, sources: tuple[str, ...]) -> Any:
+    """What the shell would have made of globs that it was not asked to expand."""
+    found: list[str] = []
+    for source in sources:
+        is_glob = source != "-" and not Path(source).exists()
+        found += sorted(glob.glob(source)) if is_glob else [source]
+    return tuple(found)
+
+
 sources_argument = click.argument(
-    "sources",
-    metavar="SOURCE...",
-    nargs=-1,
-    required=True,
-    type=click.Path(exists=True, allow_dash=True),
+    "sources", metavar="SOURCE...", nargs=-1, required=True, type=SourceType(), callback=_expand
 )
 
 reading_options = together(
@@ -79,8 +97,9 @@ reading_options = together(
     ),
     click.option(
         "--cell",
-        metavar="LX LY LZ [XY XZ YZ]",
-        help="The cell, for formats that do not carry it (periodic in xyz unless --periodic).",
+        metavar="LX LY LZ [XY XZ YZ]|FILE.csv",
+        help="The cell, for formats that do not carry it (periodic in xyz unless --periodic); "
+        "FILE.csv has one for each step or frame: step lx ly lz, and xy xz yz if tilted.",
     ),
     click.option("--periodic", metavar="xyz", help="Periodic directions (default: the dump's)."),
     click.option(
