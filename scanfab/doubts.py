@@ -46,13 +46,22 @@ def refuse_impossible(sample: Sample) -> None:
             raise PackingError(text)
 
 
-def doubts_of(sample: Sample) -> list[str]:
-    """What a user should know of a frame; the sample's contacts are known."""
+def doubts_of(sample: Sample, *, cell_is_named: bool = False) -> list[str]:
+    """
+    What a user should know of a frame whose contacts are known.
+
+    Parameters
+    ----------
+    sample : Sample
+        One frame.
+    cell_is_named : bool, optional
+        Whether the user has said what the cell is, or what is periodic, and may be mistaken.
+    """
     packing = sample.packing
     if len(packing) < FEWEST:
         return []
     clumps = _clumps(packing)
-    texts = [clumps, _own_images(packing), _empty_period(packing)]
+    texts = [clumps, _own_images(packing), _empty_period(packing) if cell_is_named else ""]
     if not clumps:
         texts.append(_many_contacts(sample))
     texts.append(_no_contacts(sample))

@@ -128,5 +128,8 @@ def _hints(frame: Frame, sample: Sample, settings: Settings) -> list[str]:
         refuse_impossible(sample)
     except PackingError as error:
         hints.append(str(error))
-    hints += [*doubts_of(sample), cell_doubt(sample, frame.carries, always=True)]
+    hints += [
+        *doubts_of(sample, cell_is_named=frame.cell_is_named),
+        cell_doubt(sample, frame.carries, always=True),
+    ]
     return [hint for hint in hints if hint]

@@ -165,13 +165,14 @@ class _Run:
         if sample.grains.any():
             if self.settings.boundary and not self.has_boundary:
                 self._refuse_unknown_boundary(number, sample)
-            for doubt in (*doubts_of(sample), cell_doubt(sample, frame.carries, always=False)):
+            doubts = doubts_of(sample, cell_is_named=frame.cell_is_named)
+            for doubt in (*doubts, cell_doubt(sample, frame.carries, always=False)):
                 if doubt:
                     warnings.warn(doubt, ScanfabWarning, stacklevel=2)
             self.plan = make_plan(self.settings, sample)
             self.strains.start(sample)
             hint = boundary_hint(sample, self.settings)
-            if hint is not None:
+            if hint is not None and not self.settings.boundary:
                 warnings.warn(hint, ScanfabWarning, stacklevel=2)
 
     def _refuse_unknown_boundary(self, number: int, sample: Sample) -> None:
@@ -254,6 +255,9 @@ class _Readable(Protocol):
     @property
     def carries(self) -> Carries: ...
 
+    @property
+    def cell_is_named(self) -> bool: ...
+
     def read(self) -> Packing: ...
 
 
@@ -263,6 +267,7 @@ class _Given:
 
     packing: Packing
     carries: Carries = "cell"
+    cell_is_named: bool = False
 
     def read(self) -> Packing:
         return self.packing

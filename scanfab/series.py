@@ -101,29 +101,44 @@ class Frame:
         with _named(self.snapshot.path):
             id = np.arange(len(grains.radius)) if grains.id is None else grains.id
             check_lengths(grains.position, grains.radius, id)
-        joined = [reader.read_contacts(snapshot, options, grains) for reader, snapshot in files]
-        paths = " and ".join(str(snapshot.path) for _, snapshot in files)
+        joined = [self._joined(reader, snapshot, options, grains) for reader, snapshot in files]
         lists = sum(part.contacts is not None for part in joined)
-        if lists > 1 or (lists and grains.contacts is not None and self._takes_all):
-            if self.series.contacts_from == "beside":
-                warnings.warn(
-                    f"two contact lists lie beside {self.snapshot.path}: {paths}: none is taken; "
-                    f"choose with --contacts",
-                    ScanfabWarning,
-                    stacklevel=4,
-                )
-                return []
-            raise ReadError(f"two contact lists for one frame: {paths}: choose with --contacts")
+        with_own = self.series.contacts_from == "auto" and grains.contacts is not None
+        paths = " and ".join(str(snapshot.path) for _, snapshot in files)
+        if lists + with_own > 1:
+            return self._several_lists(paths)
         if not lists and self.series.contacts_from == "path":
-            raise ReadError(
-                f"{paths}: lists contacts with walls only: name the file of the contacts between "
-                f"grains with --contacts"
+            warnings.warn(
+                f"{paths}: lists contacts with walls only: contacts between grains are found by "
+                f"geometry, unless --contacts names their file",
+                ScanfabWarning,
+                stacklevel=4,
             )
         return joined
 
-    @property
-    def _takes_all(self) -> bool:
-        return self.series.contacts_from in ("auto", "grains")
+    def _joined(
+        self, reader: Reader, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
+    ) -> JoinedContacts:
+        try:
+            return reader.read_contacts(snapshot, options, grains)
+        except ReadError as error:
+            if self.series.contacts_from != "beside":
+                raise
+            raise ReadError(
+                f"{error} (this file lies beside the grains; --contacts geometric leaves it alone)"
+            ) from None
+
+    def _several_lists(self, paths: str) -> list[JoinedContacts]:
+        """An error; but of files that lie beside others none is taken."""
+        if self.series.contacts_from != "beside":
+            raise ReadError(f"two contact lists for one frame: {paths}: choose with --contacts")
+        warnings.warn(
+            f"two contact lists lie beside {self.snapshot.path}: {paths}: none is taken; choose "
+            f"with --contacts",
+            ScanfabWarning,
+            stacklevel=5,
+        )
+        return []
 
     @property
     def step(self) -> int | None:
@@ -134,8 +149,15 @@ class Frame:
     def carries(self) -> Carries:
         """What the dump or its user say of a cell."""
         ask = getattr(self.reader, "carries", None)
-        told = self.series.cells is not None or self.series.options.cell is not None
+        options = self.series.options
+        told = self.series.cells or options.cell or options.periodic is not None
         return "cell" if told or ask is None else ask(self.snapshot.path)
+
+    @property
+    def cell_is_named(self) -> bool:
+        """Whether the user names a cell, or what is periodic."""
+        options = self.series.options
+        return bool(self.series.cells or options.cell or options.periodic)
 
     def _options(self) -> ReadOptions:
         """How to read this frame, with its cell if a file names those of the frames."""

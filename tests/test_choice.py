@@ -10,7 +10,9 @@ import pytest
 import scanfab
 from scanfab.cli.main import run
 from scanfab.errors import ReadError, ScanfabNote, ScanfabWarning
+from scanfab.writers.results import ResultFile
 from tests.dumps import PAIRS, dump_text, pairs_text, write
+from tests.truth import FLOOR, SAMPLE_DATA
 
 NO_RADIUS = "id type x y z c_rad"
 
@@ -130,8 +132,6 @@ def test_a_column_that_may_be_the_radius_is_suggested(tmp_path):
 def test_a_fabric_table_is_known(tmp_path, ending, capsys):
     grid = [[x, y, z] for x in range(4) for y in range(4) for z in range(4)]
     table = scanfab.compute(scanfab.Packing(grid, 0.4), variants="a", directions=9, spacing=0.5)
-    from scanfab.writers.results import ResultFile
-
     path = tmp_path / f"fabric.{ending}"
     with ResultFile(path, scanfab.Row).writer({}) as writer:
         for row in table:
@@ -162,11 +162,17 @@ def test_a_glob_that_meets_nothing_is_wrong_usage(folder, capsys):
     assert "does not exist" in capsys.readouterr().err
 
 
-def test_a_list_of_wall_contacts_is_no_list_of_contacts():
-    from tests.truth import FLOOR
+def test_contacts_beside_that_cannot_be_read_say_how_to_leave_them_alone(folder):
+    write(folder / "contacts_9.txt", pairs_text([(1, 77)], step=9))
+    message = r"contacts_9.txt: cannot tell.*--contacts geometric leaves it alone"
+    with pytest.raises(ReadError, match=message), pytest.warns(ScanfabNote):
+        scanfab.read(folder / "dump_9.txt")
 
-    with pytest.raises(ReadError, match=r"walls_all.txt: lists contacts with walls only"):
-        scanfab.read(FLOOR / "tutorial.txt", contacts=FLOOR / "walls_all.txt")
+
+def test_a_mesh_of_walls_is_no_list_of_contacts(folder):
+    mesh = FLOOR / "mesh_30000.vtk"
+    with pytest.raises(ReadError, match="expected contacts, found walls, or something else"):
+        scanfab.read_series(folder, contacts=mesh)
 
 
 def test_what_editors_leave_is_no_frame(folder):
@@ -179,8 +185,6 @@ def test_what_editors_leave_is_no_frame(folder):
 
 @pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabNote")
 def test_the_command_line_takes_a_file_of_cells(tmp_path, capsys):
-    from tests.truth import SAMPLE_DATA
-
     strained = SAMPLE_DATA / "yade_strained"
     words = ["inspect", str(strained / "rec_spheres.27500.vtu"), "--json"]
     assert run([*words, "--cell", str(strained / "truth.csv")]) == 0

@@ -200,3 +200,22 @@ def test_bias_of_a_rule_counts_over_a_tenth_of_the_tolerance(packing, tolerance,
 def test_exact_rules_have_no_bias_to_warn_of(packing):
     for rule in ("7", "lebedev:11", "design:9", "icosahedral:9", "product:5"):
         assert plan_of(packing, directions=rule, tolerance=1e-12).rule.bias < 1e-13
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-3])
+def test_a_cutoff_longer_than_the_sample_asks_for_rmin(packing, unit):
+    small = Packing(packing.position * unit, packing.radius * unit)
+    with pytest.raises(SettingsError, match=r"cutoff: .* times the smallest.*did you mean 1rmin"):
+        plan_of(small, cutoff=100.0 * unit)
+    assert plan_of(small, cutoff=1.0 * unit).cutoff == unit
+
+
+def test_of_several_cutoffs_the_smallest_counts(packing):
+    assert len(plan_of(packing, cutoffs="0.5,1000").cutoffs) == 2
+    with pytest.raises(SettingsError, match="did you mean 1rmin"):
+        plan_of(packing, cutoffs="1000,2000")
+
+
+def test_an_absurd_spacing_asks_for_rmin(packing):
+    with pytest.raises(SettingsError, match=r"spacing: .*did you mean 1rmin"):
+        plan_of(packing, spacing=1000.0, directions=9)

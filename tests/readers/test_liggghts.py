@@ -257,13 +257,17 @@ def test_wall_contacts_count_for_their_grains():
 
 
 def test_wall_contacts_alone_leave_the_contacts_to_geometry():
-    packing = scanfab.read(FLOOR / "tutorial.txt", contacts=FLOOR / "walls_all.txt")
+    with pytest.warns(
+        scanfab.ScanfabWarning, match=r"walls_all.txt: lists contacts with walls only"
+    ):
+        packing = scanfab.read(FLOOR / "tutorial.txt", contacts=FLOOR / "walls_all.txt")
     assert packing.contacts is None
     assert packing.wall_contacts.sum() == 25
 
 
 def test_walls_files_are_not_taken_for_pairs():
-    packing = scanfab.read(FLOOR / "precise.txt", contacts=FLOOR / "walls_all.txt")
+    with pytest.warns(scanfab.ScanfabWarning, match="lists contacts with walls only"):
+        packing = scanfab.read(FLOOR / "precise.txt", contacts=FLOOR / "walls_all.txt")
     assert packing.contacts is None
 
 
