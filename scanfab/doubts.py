@@ -28,6 +28,8 @@ SOLIDS = 20.0
 # distances of nearest neighbours, in diameters: of grains that just touch, and of radii that cannot
 # be those of a packing
 TOUCHING, APART = 1.01, 5.0
+# solid fraction of a cloud that is too thin for one
+THIN = 1e-3
 # of the period, without any grain
 EMPTY = 0.2
 
@@ -115,12 +117,11 @@ def _plane(packing: Packing) -> str:
 def _overfull(sample: Sample) -> str:
     position = sample.packing.position[sample.grains]
     radius = sample.packing.radius[sample.grains]
-    if len(radius) < FEWEST:
+    contacts = sample.packing.contacts
+    # who lists contacts has them from a program that knew the radii
+    if len(radius) < FEWEST or (contacts is not None and contacts.source == "file"):
         return ""
-    box = np.prod((position + radius[:, None]).max(0) - (position - radius[:, None]).min(0))
-    if sample.packing.cell is not None and sample.packing.is_periodic:
-        box = min(box, abs(np.linalg.det(sample.packing.cell.vectors)))
-    solid = 4.0 / 3.0 * np.pi * np.sum((radius / np.cbrt(box)) ** 3)
+    solid = _solid_fraction(position, radius, sample.packing)
     if solid < SOLIDS:
         return ""
     return (
@@ -128,6 +129,15 @@ def _overfull(sample: Sample) -> str:
         f"{_span(radius)}, centres within {_extent(position):.3g}): check the units of radius and "
         f"position"
     )
+
+
+def _solid_fraction(position: FloatArray, radius: FloatArray, packing: Packing) -> float:
+    """The volumes of some grains in that of the box of their surfaces, or of the cell."""
+    reach = radius[:, None]
+    box = float(np.prod((position + reach).max(axis=0) - (position - reach).min(axis=0)))
+    if packing.cell is not None and packing.is_periodic:
+        box = min(box, abs(float(np.linalg.det(packing.cell.vectors))))
+    return float(4.0 / 3.0 * np.pi * np.sum((radius / np.cbrt(box)) ** 3))
 
 
 def _clumps(packing: Packing) -> str:
@@ -219,7 +229,8 @@ def _no_contacts(sample: Sample) -> str:
     if len(sample.contacts) or packing.wall_contacts.any() or sample.contacts.source == "file":
         return ""
     nearest = _nearest(packing)
-    if TOUCHING < nearest < APART:
+    solid = _solid_fraction(packing.position, packing.radius, packing)
+    if nearest > TOUCHING and (nearest < APART or solid > THIN):
         return ""  # a loose cloud, before it settles
     return (
         f"no contact at all by geometry: the centres of nearest neighbours are {nearest:.6g} "

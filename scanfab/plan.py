@@ -82,7 +82,6 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
             stacklevel=2,
         )
     cutoff = settings.cutoff.resolve(lengths)
-    _check_cutoff(min((one.resolve(lengths) for one in settings.cutoffs), default=cutoff), sample)
     # as many as were asked for, also if two are equal: every frame has the same number of rows
     cutoffs = tuple(sorted(one.resolve(lengths) for one in settings.cutoffs)) or (cutoff,)
     if settings.spacing is None:
@@ -106,19 +105,6 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     if auto:
         replicates = REPLICATES
     return Plan(window, cutoff, cutoffs, rule, asked * math.sqrt(replicates), replicates, auto)
-
-
-def _check_cutoff(cutoff: float, sample: Sample) -> None:
-    """Refuse a cut-off that is longer than any line in the sample, periodic or not."""
-    position, radius = sample.packing.position, sample.packing.radius
-    longest = float(np.linalg.norm(np.ptp(position, axis=0)) + 2.0 * radius.max())
-    if cutoff > longest:
-        smallest = float(radius[sample.grains].min())
-        raise SettingsError(
-            f"cutoff: {cutoff:g} is {cutoff / smallest:.3g} times the smallest radius "
-            f"({smallest:g}), and longer than the sample ({longest:.3g}): lengths are in the "
-            f"dump's unit; did you mean 1rmin?"
-        )
 
 
 def _window(settings: Settings, box: SurfaceBox, smallest: float) -> SphereWindow:

@@ -202,18 +202,12 @@ def test_exact_rules_have_no_bias_to_warn_of(packing):
         assert plan_of(packing, directions=rule, tolerance=1e-12).rule.bias < 1e-13
 
 
-@pytest.mark.parametrize("unit", [1.0, 1e-3])
-def test_a_cutoff_longer_than_the_sample_asks_for_rmin(packing, unit):
-    small = Packing(packing.position * unit, packing.radius * unit)
-    with pytest.raises(SettingsError, match=r"cutoff: .* times the smallest.*did you mean 1rmin"):
-        plan_of(small, cutoff=100.0 * unit)
-    assert plan_of(small, cutoff=1.0 * unit).cutoff == unit
-
-
-def test_of_several_cutoffs_the_smallest_counts(packing):
-    assert len(plan_of(packing, cutoffs="0.5,1000").cutoffs) == 2
-    with pytest.raises(SettingsError, match="did you mean 1rmin"):
-        plan_of(packing, cutoffs="1000,2000")
+@pytest.mark.parametrize(("cutoff", "is_absurd"), [(1000.0, True), (9.0, False)])
+def test_a_cutoff_of_hundreds_of_radii_asks_for_rmin(packing, cutoff, is_absurd):
+    options = {"spacing": 0.8, "directions": 9, "variants": "c", "cutoff": cutoff}
+    with pytest.warns(ScanfabWarning, match="no void segment reaches the cut-off") as told:
+        compute(packing, **options)
+    assert any("did you mean 1rmin?" in str(one.message) for one in told) == is_absurd
 
 
 def test_an_absurd_spacing_asks_for_rmin(packing):

@@ -67,8 +67,8 @@ def _expand(ctx: click.Context, param: click.Parameter, sources: tuple[str, ...]
     """What the shell would have made of globs that it was not asked to expand."""
     found: list[str] = []
     for source in sources:
-        is_glob = source != "-" and not Path(source).exists()
-        found += sorted(glob.glob(source)) if is_glob else [source]
+        matches = [] if Path(source).exists() else sorted(glob.glob(source))
+        found += matches or [source]
     return tuple(found)
 
 
