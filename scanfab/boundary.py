@@ -13,7 +13,7 @@ import numpy.typing as npt
 from scanfab.errors import SettingsError
 from scanfab.packing import Packing
 
-__all__ = ["BoundaryRule", "enclosing_class", "select_boundary"]
+__all__ = ["BoundaryRule", "enclosing_class", "existing_values", "select_boundary"]
 
 BoolArray = npt.NDArray[np.bool_]
 
@@ -25,6 +25,8 @@ OPERATORS = {
     "<": np.less,
     "<=": np.less_equal,
 }
+# values that a message lists one by one
+MOST_LISTED = 10
 # columns that sort particles into classes
 CLASS_COLUMNS = ("type", "mask", "material", "matid", "materialid", "mat", "group")
 
@@ -100,6 +102,23 @@ def select_boundary(packing: Packing, rules: Sequence[BoundaryRule]) -> BoolArra
     for rule in rules:
         chosen |= rule.select(packing)
     return chosen
+
+
+def existing_values(packing: Packing, rules: Sequence[BoundaryRule]) -> str:
+    """The values that the columns of some expressions have, for messages."""
+    if len(packing) == 0:
+        return "there are no particles"
+    return "; ".join(
+        f"{name} is {_values(_column(packing, name))}"
+        for name in dict.fromkeys(rule.column for rule in rules)
+    )
+
+
+def _values(column: npt.NDArray[Any]) -> str:
+    found = np.unique(column)
+    if found.size > MOST_LISTED:
+        return f"{found[0]:g} to {found[-1]:g}"
+    return " or ".join(f"{value:g}" for value in found)
 
 
 def enclosing_class(packing: Packing) -> str | None:

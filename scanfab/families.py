@@ -14,8 +14,19 @@ from scanfab.readers.base import FileKind, Reader
 from scanfab.readers.files import bare_name
 from scanfab.readers.registry import reader_for, reader_named
 
-__all__ = ["Family", "sort_into_families"]
+__all__ = [
+    "SETTINGS_FILE",
+    "Family",
+    "families_beside",
+    "files_in",
+    "own_contacts",
+    "sort_into_families",
+]
 
+# options of the command line, beside the dumps
+SETTINGS_FILE = "scanfab.toml"
+# endings of what editors and interrupted programs leave
+LEFTOVERS = ("~", ".part", ".tmp", ".bak")
 NUMBER = re.compile(r"\d+")
 
 
@@ -58,11 +69,99 @@ def sort_into_families(files: Sequence[Path], format: str | None) -> list[Family
     UnknownFormatError
         If there is no reader of that name.
     """
+    return [
+        _family(_by_step(members), members, _glob(members, files), format)
+        for members in _groups(files)
+    ]
+
+
+def _groups(files: Sequence[Path]) -> list[list[Path]]:
+    """The files of each family, in the order of their steps, by their names alone."""
     groups: dict[str, list[Path]] = defaultdict(list)
     for file in files:
         groups[NUMBER.sub("*", bare_name(file))].append(file)
-    families = [members for _, group in sorted(groups.items()) for members in _split(group)]
-    return [_family(members, _glob(members, files), format) for members in families]
+    return [members for _, group in sorted(groups.items()) for members in _split(group)]
+
+
+def _by_step(members: list[Path]) -> list[tuple[int | None, Path]]:
+    place = _place(members)
+    return [(next(iter(_numbers(file)[place:]), None), file) for file in members]
+
+
+def families_beside(grains: Family, format: str | None) -> list[Family]:
+    """
+    Other families in the folders of some grain files, with the files of the same steps only.
+
+    Their files go by the same keys as the grain files.
+    """
+    keys: dict[Path, dict[Path, int | None]] = defaultdict(dict)
+    for key, file in grains.files.items():
+        keys[file.parent][file] = key
+    found: dict[str, list[tuple[int | None, Path]]] = defaultdict(list)
+    for folder, own in keys.items():
+        files = files_in(folder)
+        groups = _groups(files)
+        wanted = {
+            step: own[file] for group in groups for step, file in _by_step(group) if file in own
+        }
+        for group in groups:
+            same = [(wanted[step], file) for step, file in _by_step(group) if step in wanted]
+            if same and not own.keys() & set(group):
+                found[_glob(group, files)] += same
+    return [
+        _family(files, [file for _, file in files], pattern, format)
+        for pattern, files in found.items()
+    ]
+
+
+def files_in(folder: Path) -> list[Path]:
+    """The files of a folder that may be dumps: not hidden ones, nor what is left behind."""
+    return sorted(
+        file
+        for file in folder.iterdir()
+        if not file.name.startswith(".")
+        and file.name != SETTINGS_FILE
+        and not file.name.endswith(LEFTOVERS)
+        and file.is_file()
+    )
+
+
+def own_contacts(
+    grains: Family, rivals: Sequence[Family], contacts: Sequence[Family]
+) -> tuple[list[Family], list[Family]]:
+    """
+    Which families of contact files belong to a family of grains, and of which it is in doubt.
+
+    Where no other grains lie beside, all do. Else those whose names begin with as many of the same
+    words as the grains' and with more than those of the others have in common with them.
+    """
+    own: list[Family] = []
+    doubtful: list[Family] = []
+    others = [rival for rival in rivals if _stem(rival) != _stem(grains)]
+    for family in contacts:
+        kin = _kinship(grains, family)
+        closest = max((_kinship(rival, family) for rival in others), default=(-1, False))
+        if kin > closest:
+            own.append(family)
+        elif kin == closest:
+            doubtful.append(family)
+    return own, doubtful
+
+
+def _stem(family: Family) -> list[str]:
+    """The words of a pattern without its ending."""
+    return re.findall(r"[^\W_]+", bare_name(Path(family.pattern)).removesuffix(_ending(family)))
+
+
+def _ending(family: Family) -> str:
+    return "".join(re.findall(r"\.[A-Za-z]\w*$", bare_name(Path(family.pattern))))
+
+
+def _kinship(one: Family, two: Family) -> tuple[int, bool]:
+    """How many words two names begin with in common, and whether they have the same ending."""
+    words = list(zip(_stem(one), _stem(two), strict=False))
+    common = next((k for k, (a, b) in enumerate(words) if a != b), len(words))
+    return common, _ending(one) == _ending(two)
 
 
 def _numbers(file: Path) -> tuple[int, ...]:
@@ -100,7 +199,9 @@ def _place(group: list[Path]) -> int:
     return differing[-1] if differing else max(len(columns) - 1, 0)
 
 
-def _family(members: list[Path], pattern: str, format: str | None) -> Family:
+def _family(
+    steps: list[tuple[int | None, Path]], members: list[Path], pattern: str, format: str | None
+) -> Family:
     sample = max(members, key=lambda file: file.stat().st_size)
     reader: Reader | None = None
     kind: FileKind = "other"
@@ -115,9 +216,7 @@ def _family(members: list[Path], pattern: str, format: str | None) -> Family:
         problem = str(error)
     files: dict[int | None, Path] = {}
     clash: str | None = None
-    place = _place(members)
-    for file in members:
-        step = next(iter(_numbers(file)[place:]), None)
+    for step, file in steps:
         if step in files:
             clash = f"two files for one step: {files[step]} and {file}: name one of them"
         files.setdefault(step, file)

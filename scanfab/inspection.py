@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 
-from scanfab.errors import PackingError, ReadError
+from scanfab.doubts import cell_doubt, doubts_of, refuse_impossible
+from scanfab.errors import PackingError, ReadError, ScanfabNote
 from scanfab.pipeline import boundary_hint, chosen_frames, classify, no_such_frames
 from scanfab.plan import rv_of
 from scanfab.series import Frame, Series
@@ -110,8 +111,11 @@ def _read(frame: Frame, settings: Settings) -> tuple[Sample, list[str]]:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         sample = classify(frame.read(), settings)
-    hints = [boundary_hint(sample, settings), sample.doubt_of_escaped()]
-    return sample, [*(str(one.message) for one in caught), *filter(None, hints)]
+    for one in caught:
+        if issubclass(one.category, ScanfabNote):
+            warnings.warn(one.message, stacklevel=2)
+    told = [str(one.message) for one in caught if not issubclass(one.category, ScanfabNote)]
+    return sample, [*told, *_hints(frame, sample, settings)]
 
 
 def _rv(sample: Sample, settings: Settings) -> SphereWindow | None:
@@ -153,3 +157,18 @@ def _report(
         rv_center=None if window is None else window.center.tolist(),
         rv_radius=None if window is None else window.radius,
     )
+
+
+def _hints(frame: Frame, sample: Sample, settings: Settings) -> list[str]:
+    """What looks wrong, also what makes the frame impossible to measure."""
+    hints = [boundary_hint(sample, settings)] if len(sample.packing) else []
+    try:
+        refuse_impossible(sample)
+    except PackingError as error:
+        hints.append(str(error))
+    hints += [
+        *doubts_of(sample, cell_is_named=frame.cell_is_named),
+        cell_doubt(sample, frame.carries, always=True),
+        sample.doubt_of_escaped(),
+    ]
+    return [hint for hint in hints if hint]

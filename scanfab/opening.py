@@ -9,18 +9,23 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from scanfab.errors import ReadError, ScanfabWarning, UnknownFormatError
-from scanfab.families import Family, sort_into_families
+from scanfab.choice import choose_grains, expanded, files_of
+from scanfab.errors import ReadError, ScanfabNote, ScanfabWarning
+from scanfab.families import (
+    SETTINGS_FILE,
+    Family,
+    families_beside,
+    own_contacts,
+    sort_into_families,
+)
+from scanfab.frame_file import FrameFile
 from scanfab.packing import Packing
 from scanfab.readers.base import ReadOptions
-from scanfab.series import Series
+from scanfab.series import ContactsFrom, Series
 
 __all__ = ["SETTINGS_FILE", "open_sources", "read", "read_series"]
 
 PathLike = str | os.PathLike[str]
-
-# options of the command line, beside the dumps
-SETTINGS_FILE = "scanfab.toml"
 
 
 def read(path: PathLike, *, frame: int = 0, **options: Any) -> Packing:
@@ -30,7 +35,7 @@ def read(path: PathLike, *, frame: int = 0, **options: Any) -> Packing:
     Parameters
     ----------
     path : path
-        A particle file.
+        A particle file; its contact file beside it is read too, as by :func:`read_series`.
     frame : int, optional
         Which snapshot, if the file holds several; negative from the end.
     **options
@@ -71,7 +76,7 @@ def read_series(
     columns: dict[str, str] | None = None,
     contact_columns: str | None = None,
     radius: float | None = None,
-    cell: tuple[float, ...] | None = None,
+    cell: tuple[float, ...] | PathLike | None = None,
     periodic: str | None = None,
 ) -> Series:
     """
@@ -80,7 +85,8 @@ def read_series(
     Parameters
     ----------
     source : path or sequence of paths
-        A folder with one series, or its files.
+        A folder with one series, or its files; globs too. Contact files that lie beside single
+        grain files are taken as if the folder had been named, if they are clearly theirs.
     format : str, optional
         Name of the reader; by content if not given.
     contacts : str or path, optional
@@ -93,8 +99,9 @@ def read_series(
         ``"id1=c_ids[1],id2=c_ids[2]"``.
     radius : float, optional
         Radius for dumps without one, dump's length unit.
-    cell : tuple of float, optional
-        LX LY LZ or LX LY LZ XY XZ YZ, for formats that do not carry it.
+    cell : tuple of float or path, optional
+        LX LY LZ or LX LY LZ XY XZ YZ, for formats that do not carry it; or a CSV file with the cell
+        of each frame: columns ``step`` or ``frame``, ``lx ly lz``, and ``xy xz yz`` if tilted.
     periodic : str, optional
         Letters out of xyz.
 
@@ -118,25 +125,33 @@ def read_series(
     [30000, 60000]
     """
     given = [source] if isinstance(source, str | os.PathLike) else list(source)
-    paths = [Path(path) for path in given]
-    options = ReadOptions(columns or {}, contact_columns, radius, cell, periodic)
-    families = sort_into_families([file for path in paths for file in _files(path)], format)
-    grains = _grain_family(paths, families).check()
-    name = _as_text(os.fspath(given[0]) if len(given) == 1 else _common_folder(paths))
-    own = tuple(family for family in families if family.kind == "contacts")
+    paths = [path for one in given for path in expanded(one)]
+    cells = None if cell is None or isinstance(cell, tuple | list) else _cell_file(cell)
+    one_cell = tuple(cell) if isinstance(cell, tuple | list) else None
+    options = ReadOptions(columns or {}, contact_columns, radius, one_cell, periodic)
+    families = sort_into_families([file for path in paths for file in files_of(path)], format)
+    grains = choose_grains(paths, families, radius is not None).check()
+    name = _as_text(os.fspath(given[0]) if len(paths) == len(given) == 1 else _common_folder(paths))
+    own = [family for family in families if family.kind == "contacts"]
     _note_passed_over(families, [grains, *own])
+
+    def series(files: Sequence[Family], contacts_from: ContactsFrom) -> Series:
+        checked = tuple(family.check() for family in files)
+        return Series(name, grains, checked, contacts_from, options, cells)
+
     if contacts == "geometric":
-        return Series(name, grains, (), "geometric", options)
-    if contacts in ("auto", "file"):
-        if contacts == "file" and not own:
-            if not getattr(grains.reader, "lists_contacts", False):
-                raise ReadError(
-                    f"{name}: --contacts file was asked for, but there is no contact file"
-                )
-            return Series(name, grains, (), "grains", options)
-        checked = tuple(family.check() for family in own)
-        return Series(name, grains, checked, "auto" if contacts == "auto" else "path", options)
-    return Series(name, grains, _named_contacts(contacts, format), "path", options)
+        return series((), "geometric")
+    if contacts not in ("auto", "file"):
+        return series(_named_contacts(contacts, format), "path")
+    if not own and not any(path.is_dir() for path in paths):
+        own, beside = _contacts_beside(grains, format), True
+    else:
+        beside = False
+    if contacts == "file" and not own:
+        if not getattr(grains.reader, "lists_contacts", False):
+            raise ReadError(f"{name}: --contacts file was asked for, but there is no contact file")
+        return series((), "grains")
+    return series(own, "path" if contacts == "file" else "beside" if beside else "auto")
 
 
 def open_sources(sources: Sequence[PathLike], **options: Any) -> list[Series]:
@@ -152,7 +167,7 @@ def open_sources(sources: Sequence[PathLike], **options: Any) -> list[Series]:
     """
     groups: list[PathLike | list[PathLike]] = []
     files: list[PathLike] = []
-    for source in sources:
+    for source in (path for one in sources for path in _as_given(one)):
         if Path(source).is_dir():
             groups.append(source)
         else:
@@ -165,81 +180,87 @@ def open_sources(sources: Sequence[PathLike], **options: Any) -> list[Series]:
     ]
 
 
-def _files(path: Path) -> list[Path]:
-    if path.is_dir():
-        found = sorted(file for file in path.iterdir() if file.is_file())
-        files = [
-            file for file in found if not file.name.startswith(".") and file.name != SETTINGS_FILE
-        ]
-        if not files:
-            raise ReadError(f"{path}: the folder holds no files")
-        return files
-    if not path.exists():
-        raise ReadError(f"{path}: there is no such file or folder")
-    return [path]
+def _as_given(source: PathLike) -> Sequence[PathLike]:
+    """What a glob stands for; any other source as it is spelt, which names its series."""
+    found = expanded(source)
+    return [source] if found == [Path(source)] else found
 
 
-def _grain_family(paths: list[Path], families: list[Family]) -> Family:
-    """The one family of grain files."""
-    grains: list[Family] = []
-    for kind in ("grains", "index", "points"):
-        grains = grains or [family for family in families if family.kind == kind]
-    where = ", ".join(str(path) for path in paths[:3]) + (", ..." if len(paths) > 3 else "")
-    if len(grains) > 1:
-        message = f"{where}: several series of grains: choose one of\n  "
-        message += "\n  ".join(family.pattern for family in grains)
-        contacts = [family.pattern for family in families if family.kind == "contacts"]
-        if contacts:
-            message += "\nand its contacts, --contacts with one of\n  "
-            message += "\n  ".join(f"'{pattern}'" for pattern in contacts)
-        raise ReadError(message)
-    if not grains:
-        problem = next((family.problem for family in families if family.problem), None)
-        if problem is not None:
-            raise ReadError(problem)
-        known = [family for family in families if family.reader is not None]
-        if not known:
-            raise UnknownFormatError(
-                f"{where}: no reader knows the format; scanfab formats lists those that exist"
-            )
-        raise ReadError(
-            f"{where}: no grains: expected points with a radius, found only "
-            + ", ".join(f"{family.pattern} ({family.kind})" for family in known)
+def _cell_file(path: PathLike) -> FrameFile:
+    """The cells of --cell FILE.csv."""
+    try:
+        return FrameFile(Path(path), ["lx", "ly", "lz"], ["xy", "xz", "yz"], positive=3)
+    except OSError as error:
+        raise ReadError(f"{path}: cannot be read: {os.strerror(error.errno or 0)}") from None
+
+
+def _contacts_beside(grains: Family, format: str | None) -> list[Family]:
+    """
+    The contact files in the folder of single grain files, as if the folder had been named.
+
+    Told by a note; also where it is not clear whose contacts they are, and they are left alone.
+    """
+    if grains.kind == "index":
+        return []
+    beside = families_beside(grains, format)
+    rivals = [family for family in beside if family.kind in ("grains", grains.kind)]
+    contacts = [family for family in beside if family.kind == "contacts" and family.clash is None]
+    own, doubtful = own_contacts(grains, rivals, contacts)
+    if own:
+        _note(f"contacts are read from {_patterns(own)}, beside the grains")
+    elif doubtful:
+        _note(
+            f"{_patterns(doubtful)}: contacts beside the grains, but it is not clear whose they "
+            f"are: name them with --contacts, or they are left alone"
         )
-    return grains[0]
+    return own
 
 
-def _note_passed_over(families: list[Family], used: list[Family]) -> None:
-    """One warning for the files that do not enter, and one for each that is damaged."""
-    unused = [one.pattern for one in families if one not in used and one.problem is None]
+def _patterns(families: Sequence[Family]) -> str:
+    return ", ".join(family.pattern for family in families)
+
+
+def _note(text: str) -> None:
+    warnings.warn(text, ScanfabNote, stacklevel=4)
+
+
+def _note_passed_over(families: Sequence[Family], used: Sequence[Family]) -> None:
+    """One note for the files that do not enter, and a warning for each that is damaged."""
+    unused = [
+        one for one in families if one not in used and one.problem is None and one.kind != "cell"
+    ]
     if unused:
-        names = ", ".join(Path(pattern).name for pattern in unused[:5])
+        names = ", ".join(Path(one.pattern).name + _lack(one) for one in unused[:5])
         more = f" and {len(unused) - 5} more" if len(unused) > 5 else ""
-        warnings.warn(
-            f"passed over, neither grains nor contacts: {names}{more}",
-            ScanfabWarning,
-            stacklevel=3,
-        )
+        _note(f"passed over, neither grains nor contacts: {names}{more}")
     for family in families:
         if family.problem is not None:
             warnings.warn(f"passed over: {family.problem}", ScanfabWarning, stacklevel=3)
 
 
-def _named_contacts(contacts: PathLike, format: str | None) -> tuple[Family, ...]:
+def _lack(family: Family) -> str:
+    return " (no radius: --radius)" if family.kind == "points" else ""
+
+
+def _named_contacts(contacts: PathLike, format: str | None) -> list[Family]:
     """Contact files from --contacts PATH: a file, a folder or a glob."""
     path = Path(contacts)
     files = (
-        _files(path)
+        files_of(path)
         if path.exists()
         else [Path(match) for match in sorted(glob.glob(str(contacts)))]
     )
     if not files:
         raise ReadError(f"{contacts}: there is no such contact file, folder or glob")
     families = sort_into_families(files, format)
-    found = tuple(family.check() for family in families if family.kind == "contacts")
+    found = [family for family in families if family.kind == "contacts"]
     if not found:
         problem = next((family.problem for family in families if family.problem), None)
-        raise ReadError(problem or f"{contacts}: expected contacts, found none")
+        if problem is not None:
+            raise ReadError(problem)
+        kinds = {"grains": "grains", "points": "points without a radius", "cell": "a cell"}
+        what = sorted({kinds.get(one.kind, "walls, or something else") for one in families})
+        raise ReadError(f"{contacts}: expected contacts, found {' and '.join(what)}")
     return found
 
 

@@ -7,15 +7,17 @@ import time
 import warnings
 from collections.abc import Callable, Container, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain, islice
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
-from scanfab.boundary import enclosing_class, select_boundary
+from scanfab.boundary import enclosing_class, existing_values, select_boundary
 from scanfab.cell import Cell
 from scanfab.contacts import find_contacts
+from scanfab.doubts import cell_doubt, doubts_of
 from scanfab.errors import (
     PackingError,
     ReadError,
@@ -26,6 +28,7 @@ from scanfab.errors import (
 from scanfab.frame_result import FrameResult, frame_result
 from scanfab.packing import Packing
 from scanfab.plan import Plan, make_plan
+from scanfab.readers.base import Carries
 from scanfab.series import Series
 from scanfab.settings import STRAIN_MODES, Settings
 from scanfab.strain import StrainFile, axial_length, is_flipped, shear_strain
@@ -43,6 +46,10 @@ Observer = Callable[[FrameResult], None]
 def compute(source: Packing | Series, **options: Any) -> Table:
     """
     The fabric table of a packing or of a series.
+
+    The RV, ``rmin`` and the initial length L0 of a series are those of its first frame that has
+    grains. In a loop over frames, ``compute(frame.read())``, each frame gets its own: hand over the
+    series, or name ``rv_radius``, ``rv_center`` and ``cutoff`` as lengths.
 
     Parameters
     ----------
@@ -127,22 +134,23 @@ class _Run:
         self.strains = _Strains(settings)
         self.particles = 0
         self.found = False
+        self.has_boundary = False
 
     def jobs(self) -> Iterator[Callable[[int], list[Row]]]:
         """For each chosen frame what computes its rows, with a number of threads."""
         chosen = chosen_frames(self.source, self.settings.frames)
-        for number, read in _frames(self.source):
+        for number, frame in _frames(self.source):
             due = number in chosen
             self.found = self.found or due
             due = due and number not in self.done
             if self.plan is None:
-                sample = self._read(number, read)
+                sample = self._read(number, frame.read)
                 if sample is not None:
-                    self._start(sample)
+                    self._start(number, frame, sample)
                     if due:
                         yield partial(self._rows, number, sample)
             elif due:
-                yield partial(self._read_rows, number, read)
+                yield partial(self._read_rows, number, frame.read)
             if number >= chosen.stop - 1 and self.plan is not None:
                 break
 
@@ -153,15 +161,35 @@ class _Run:
         if self.plan is None:
             _complain_of_no_grains(self.name, self.particles, self.settings)
 
-    def _start(self, sample: Sample) -> None:
+    def _start(self, number: int, frame: _Readable, sample: Sample) -> None:
         """Make the plan, if the frame has grains."""
         self.particles += len(sample.packing)
+        self.has_boundary = self.has_boundary or bool(sample.boundary.any())
         if sample.grains.any():
+            if self.settings.boundary and not self.has_boundary:
+                self._refuse_unknown_boundary(number, sample)
+            doubts = doubts_of(sample, cell_is_named=frame.cell_is_named)
+            for doubt in (*doubts, cell_doubt(sample, frame.carries, always=False)):
+                if doubt:
+                    warnings.warn(doubt, ScanfabWarning, stacklevel=2)
             self.plan = make_plan(self.settings, sample)
             self.strains.start(sample)
             hint = boundary_hint(sample, self.settings)
-            if hint is not None:
+            if hint is not None and not self.settings.boundary:
                 warnings.warn(hint, ScanfabWarning, stacklevel=2)
+
+    def _refuse_unknown_boundary(self, number: int, sample: Sample) -> None:
+        """An error if the boundary's particles are in no later frame either."""
+        rules = self.settings.boundary
+        for later, frame in _frames(self.source):
+            with suppress(PackingError, ReadError):
+                if later > number and select_boundary(frame.read(), rules).any():
+                    return
+        named = " or ".join(rule.text for rule in rules)
+        raise SettingsError(
+            f"boundary: no particle of any frame has {named}: "
+            f"{existing_values(sample.packing, rules)}"
+        )
 
     def _read(self, number: int, read: Callable[[], Packing]) -> Sample | None:
         """The frame; None if it cannot be read and such frames are to be skipped."""
@@ -230,12 +258,32 @@ def _complain_of_no_grains(name: str, particles: int, settings: Settings) -> Non
     warnings.warn(f"{name}: no frame has any grains", ScanfabWarning, stacklevel=3)
 
 
-def _frames(source: Packing | Series) -> Iterator[tuple[int, Any]]:
-    if isinstance(source, Packing):
-        yield 0, lambda: source
-    else:
-        for number, frame in enumerate(source):
-            yield number, frame.read
+class _Readable(Protocol):
+    """A frame of a series, or a packing in its place."""
+
+    @property
+    def carries(self) -> Carries: ...
+
+    @property
+    def cell_is_named(self) -> bool: ...
+
+    def read(self) -> Packing: ...
+
+
+@dataclass(frozen=True)
+class _Given:
+    """A packing made of arrays, whose maker knows its cell."""
+
+    packing: Packing
+    carries: Carries = "cell"
+    cell_is_named: bool = False
+
+    def read(self) -> Packing:
+        return self.packing
+
+
+def _frames(source: Packing | Series) -> Iterator[tuple[int, _Readable]]:
+    yield from enumerate([_Given(source)] if isinstance(source, Packing) else source)
 
 
 def chosen_frames(source: Packing | Series, frames: slice) -> range:
@@ -308,7 +356,10 @@ def boundary_hint(sample: Sample, settings: Settings) -> str | None:
     """What to tell of boundary particles that are not named, or of a name that fits none."""
     if settings.boundary:
         named = " or ".join(rule.text for rule in settings.boundary)
-        return None if sample.boundary.any() else f"boundary: no particle has {named}"
+        if sample.boundary.any():
+            return None
+        values = existing_values(sample.packing, settings.boundary)
+        return f"boundary: no particle has {named}: {values}"
     expression = enclosing_class(sample.packing)
     if expression is None:
         return None

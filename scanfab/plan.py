@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scanfab.directions import DirectionRule, direction_rule
+from scanfab.doubts import refuse_impossible
 from scanfab.errors import ScanfabWarning, SettingsError
 from scanfab.settings import AUTO_RULE, Settings
 from scanfab.variants import Sample
@@ -57,7 +58,10 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     ------
     SettingsError
         If the settings do not fit the packing.
+    PackingError
+        If the packing cannot be measured.
     """
+    refuse_impossible(sample)
     grains = sample.grains
     radii = sample.packing.radius[grains]
     lengths = {
@@ -88,7 +92,7 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
         what = "sample" if window is None else "RV"
         raise SettingsError(
             f"spacing: {asked:g} between lines is more than the {what} is wide ({2.0 * reach:g}): "
-            f"choose a smaller one, for instance 1rmin ({lengths['rmin']:g})"
+            f"lengths are in the dump's unit; did you mean 1rmin ({lengths['rmin']:g})?"
         )
     if asked < CLOSEST * reach:
         raise SettingsError(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -13,10 +13,25 @@ import numpy as np
 
 from scanfab.errors import PackingError, ReadError, ScanfabWarning
 from scanfab.families import Family
+from scanfab.frame_file import FrameFile
 from scanfab.packing import Packing, check_lengths
-from scanfab.readers.base import GrainTable, JoinedContacts, Reader, ReadOptions, Snapshot
+from scanfab.readers.base import (
+    Carries,
+    GrainTable,
+    JoinedContacts,
+    Reader,
+    ReadOptions,
+    Snapshot,
+)
 
-__all__ = ["Frame", "Series"]
+__all__ = ["ContactsFrom", "Frame", "Series"]
+
+
+ContactsFrom = Literal["auto", "beside", "geometric", "path", "grains"]
+"""
+``auto``: from what the source holds; ``beside``: from what lies beside single grain files;
+``path``: from what the user names; ``grains``: from the grain files themselves.
+"""
 
 
 @dataclass(frozen=True)
@@ -27,6 +42,8 @@ class Frame:
     snapshot: Snapshot
     name_step: int | None
     """The step in the file's name."""
+    number: int = 0
+    """In the series, from 0."""
     problem: ReadError | None = None
     """Why not even the frames of the file can be told."""
 
@@ -49,27 +66,19 @@ class Frame:
         """
         if self.problem is not None:
             raise self.problem
-        options = self.series.options
-        files = self._contact_files()
+        options = self._options()
         grains = self.reader.read_grains(self.snapshot, options)
-        if files:
-            # contacts are joined by lengths and ids: what is wrong with those comes first
-            with _named(self.snapshot.path):
-                id = np.arange(len(grains.radius)) if grains.id is None else grains.id
-                check_lengths(grains.position, grains.radius, id)
-        joined = [reader.read_contacts(snapshot, options, grains) for reader, snapshot in files]
+        with_own = self.series.contacts_from in ("auto", "beside", "grains")
+        own = grains.contacts if with_own else None
+        beside = self.series.contacts_from == "beside"
+        joined = [] if beside and own is not None else self._joined_contacts(grains, options)
         listed = [part.contacts for part in joined if part.contacts is not None]
-        with_own = self.series.contacts_from in ("auto", "grains")
-        if with_own and grains.contacts is not None:
-            listed.append(grains.contacts)
-        if len(listed) > 1:
-            paths = " and ".join(str(snapshot.path) for _, snapshot in files)
-            raise ReadError(f"two contact lists for one frame: {paths}: choose with --contacts")
+        if own is not None:
+            listed.append(own)
         if self.series.contacts_from == "grains" and not listed:
             raise ReadError(
                 f"{self.snapshot.path}: --contacts file was asked for, but there is no contact file"
             )
-        step = self.name_step if self.snapshot.step is None else self.snapshot.step
         with _named(self.snapshot.path):
             return Packing(
                 grains.position,
@@ -79,9 +88,90 @@ class Frame:
                 contacts=listed[0] if listed else None,
                 wall_contacts=_wall_contacts(grains, joined, with_own),
                 cell=grains.cell,
-                step=step,
+                step=self.step,
                 time=self.snapshot.time,
             )
+
+    def _joined_contacts(self, grains: GrainTable, options: ReadOptions) -> list[JoinedContacts]:
+        """The contact files of the frame, joined to its grains; one of them lists grain pairs."""
+        files = self._contact_files()
+        if not files:
+            return []
+        # contacts are joined by lengths and ids: what is wrong with those comes first
+        with _named(self.snapshot.path):
+            id = np.arange(len(grains.radius)) if grains.id is None else grains.id
+            check_lengths(grains.position, grains.radius, id)
+        joined = [self._joined(reader, snapshot, options, grains) for reader, snapshot in files]
+        lists = sum(part.contacts is not None for part in joined)
+        with_own = self.series.contacts_from == "auto" and grains.contacts is not None
+        paths = " and ".join(str(snapshot.path) for _, snapshot in files)
+        if lists + with_own > 1:
+            return self._several_lists(paths)
+        if not lists and self.series.contacts_from == "path":
+            warnings.warn(
+                f"{paths}: lists contacts with walls only: contacts between grains are found by "
+                f"geometry, unless --contacts names their file",
+                ScanfabWarning,
+                stacklevel=4,
+            )
+        return joined
+
+    def _joined(
+        self, reader: Reader, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
+    ) -> JoinedContacts:
+        try:
+            return reader.read_contacts(snapshot, options, grains)
+        except ReadError as error:
+            if self.series.contacts_from != "beside":
+                raise
+            raise ReadError(
+                f"{error} (this file lies beside the grains; --contacts geometric leaves it alone)"
+            ) from None
+
+    def _several_lists(self, paths: str) -> list[JoinedContacts]:
+        """An error; but of files that lie beside others none is taken."""
+        if self.series.contacts_from != "beside":
+            raise ReadError(f"two contact lists for one frame: {paths}: choose with --contacts")
+        warnings.warn(
+            f"two contact lists lie beside {self.snapshot.path}: {paths}: none is taken; choose "
+            f"with --contacts",
+            ScanfabWarning,
+            stacklevel=5,
+        )
+        return []
+
+    @property
+    def step(self) -> int | None:
+        """That of the dump, else the one in the file's name."""
+        return self.name_step if self.snapshot.step is None else self.snapshot.step
+
+    @property
+    def carries(self) -> Carries:
+        """What the dump or its user say of a cell."""
+        ask = getattr(self.reader, "carries", None)
+        options = self.series.options
+        told = self.series.cells or options.cell or options.periodic is not None
+        return "cell" if told or ask is None else ask(self.snapshot.path)
+
+    @property
+    def cell_is_named(self) -> bool:
+        """Whether the user names a cell, or what is periodic."""
+        options = self.series.options
+        return bool(self.series.cells or options.cell or options.periodic)
+
+    def _options(self) -> ReadOptions:
+        """How to read this frame, with its cell if a file names those of the frames."""
+        options, cells = self.series.options, self.series.cells
+        if cells is None:
+            return options
+        found = cells.at(self.number, self.step)
+        if found is None:
+            name = f"step {self.step}" if cells.key == "step" else f"frame {self.number}"
+            raise ReadError(
+                f"{cells.path}: names no cell for {name}, which is {self.snapshot.path}: add a row "
+                f"for it"
+            )
+        return replace(options, cell=found)
 
     def _contact_files(self) -> list[tuple[Reader, Snapshot]]:
         """The snapshots of the contact files that belong to this frame."""
@@ -93,9 +183,8 @@ class Frame:
                 assert family.reader is not None
                 found.append((family.reader, contacts))
         if not found and series.contacts:
-            step = self.name_step if self.snapshot.step is None else self.snapshot.step
             patterns = ", ".join(family.pattern for family in series.contacts)
-            message = f"{self.snapshot.path}: no contact file for step {step} among {patterns}"
+            message = f"{self.snapshot.path}: no contact file for step {self.step} among {patterns}"
             if series.contacts_from == "path":
                 raise ReadError(message)
             warnings.warn(
@@ -116,9 +205,10 @@ class Series:
     """As the user named it."""
     grains: Family
     contacts: tuple[Family, ...] = ()
-    contacts_from: Literal["auto", "geometric", "path", "grains"] = "auto"
-    """``grains``: from the grain files themselves."""
+    contacts_from: ContactsFrom = "auto"
     options: ReadOptions = field(default_factory=ReadOptions)
+    cells: FrameFile | None = None
+    """The cell of each frame, in the place of one for all in the options."""
     # a file that holds the contacts of many frames is indexed once
     _contact_snapshots: dict[Path, list[Snapshot]] = field(
         default_factory=dict, init=False, repr=False, compare=False
@@ -129,16 +219,17 @@ class Series:
     def __iter__(self) -> Iterator[Frame]:
         reader = self.grains.reader
         assert reader is not None
+        number = 0
         for name_step, path in self.grains.files.items():
+            problem: ReadError | None = None
             try:
                 snapshots = reader.snapshots(path)
             except ReadError as error:
-                self._met[path] = 1
-                yield Frame(self, Snapshot(path), name_step, error)
-                continue
+                snapshots, problem = [Snapshot(path)], error
             self._met[path] = len(snapshots)
             for snapshot in snapshots:
-                yield Frame(self, snapshot, name_step)
+                yield Frame(self, snapshot, name_step, number, problem)
+                number += 1
 
     def frames_expected(self) -> int:
         """
@@ -178,6 +269,8 @@ class Series:
         """Every file that the frames come from."""
         for family in (self.grains, *self.contacts):
             yield from family.files.values()
+        if self.cells is not None:
+            yield self.cells.path
 
 
 @contextmanager

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import math
 from pathlib import Path
 
 import numpy as np
 
 from scanfab.cell import Cell
-from scanfab.errors import ReadError, SettingsError
+from scanfab.errors import SettingsError
+from scanfab.frame_file import FrameFile
 from scanfab.variants import Sample
 
 __all__ = ["StrainFile", "axial_length", "is_flipped", "shear_strain"]
@@ -140,34 +139,9 @@ class StrainFile:
     """
 
     def __init__(self, path: Path) -> None:
-        self.strain: dict[int, float] = {}
-        try:
-            with open(path, newline="", encoding="utf-8-sig") as stream:
-                self._read(path, csv.DictReader(stream, skipinitialspace=True))
-        except UnicodeDecodeError:
-            raise ReadError(f"{path}: expected a CSV file, found bytes that are no text") from None
-
-    def _read(self, path: Path, rows: csv.DictReader[str]) -> None:
-        names = [name.strip() for name in rows.fieldnames or []]
-        rows.fieldnames = names
-        self.key = "step" if "step" in names else "frame"
-        if self.key not in names or "strain" not in names:
-            raise ReadError(
-                f"{path}: expected the columns step or frame, and strain; found {names}"
-            )
-        for row in rows:
-            try:
-                strain = float(row["strain"])
-                self.strain[int(float(row[self.key]))] = strain
-            except (OverflowError, TypeError, ValueError):
-                strain = math.nan
-            if not math.isfinite(strain):
-                raise ReadError(
-                    f"{path}, line {rows.line_num}: expected numbers as {self.key} and strain, "
-                    f"found {row[self.key]!r} and {row['strain']!r}"
-                )
+        self._file = FrameFile(path, ["strain"])
 
     def at(self, frame: int, step: int | None) -> float | None:
         """The strain of a frame; None if the file does not name it."""
-        number = step if self.key == "step" else frame
-        return None if number is None else self.strain.get(number)
+        found = self._file.at(frame, step)
+        return None if found is None else found[0]

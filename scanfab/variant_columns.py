@@ -32,6 +32,10 @@ FRAME_COLUMNS = (
 )  # fmt: skip
 
 
+# in smallest radii: a cut-off that nobody means
+ABSURD = 100.0
+
+
 class VariantColumns:
     """The columns of one variant and cut-off."""
 
@@ -149,6 +153,17 @@ class VariantColumns:
             ),
         }
 
+    def _too_long(self, cutoff: float) -> str:
+        """Of a cut-off that no segment reaches; a large number may be one in another unit."""
+        message = f"no void segment reaches the cut-off {cutoff:g}"
+        times = cutoff / float(self.sample.packing.radius[self.sample.grains].min())
+        if times < ABSURD:
+            return message
+        return (
+            f"{message}, {times:.4g} times the smallest radius: lengths are in the dump's unit, "
+            f"did you mean 1rmin?"
+        )
+
     def warn_of_few_segments(self, where: str) -> None:
         """Say where there is no void fabric, or a doubtful one, or lines without a grain."""
         channels = int(self.sums.channels[:, self.which].sum())
@@ -160,7 +175,7 @@ class VariantColumns:
                 stacklevel=4,
             )
         if self.segments == 0:
-            message = f"no void segment reaches the cut-off {self.plan.cutoffs[self.place]:g}"
+            message = self._too_long(self.plan.cutoffs[self.place])
         elif self.fabric is None:
             message = "in some direction no void segment is kept, so there is no void fabric"
         elif self.fabric.filled > 0.01:

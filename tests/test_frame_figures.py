@@ -17,7 +17,7 @@ from scanfab.writers.plot_frame import disk
 from tests.conftest import ROOT, SAMPLE
 from tests.writers.test_plot_table import BYTES
 
-pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.errors.ScanfabWarning")
+pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.errors.ScanfabNote")
 SETTINGS = Settings.make(boundary="mask=3", tolerance=5e-4)
 
 

@@ -9,7 +9,8 @@ import pytest
 import scanfab
 from scanfab.inspection import FrameReport, inspect_series
 from scanfab.settings import Settings
-from tests.dumps import ROWS, dump_text, pairs_text, write
+from tests.dumps import ROWS, dump_text, pairs_text, write, yade_spheres
+from tests.truth import FLOOR, SAMPLE_DATA
 
 
 def reports(folder, texts, **options):
@@ -34,7 +35,34 @@ def test_boundary_particles_are_no_grains(tmp_path):
 
 def test_a_boundary_that_fits_nothing_is_a_warning(tmp_path):
     (report,) = reports(tmp_path, [dump_text()], boundary="type=9")
-    assert report.warnings == ["boundary: no particle has type=9"]
+    assert report.warnings == ["boundary: no particle has type=9: type is 1 or 2"]
+
+
+def test_a_format_without_a_cell_is_always_told(tmp_path):
+    yade_spheres(tmp_path / "a-spheres-0.vtk", [[0, 0, 0], [5, 0, 0]], [1, 1])
+    (report,) = inspect_series(scanfab.read_series(tmp_path), Settings.make())
+    assert report.warnings == [
+        "this format carries no cell; --cell LX LY LZ if the sample is periodic"
+    ]
+    with_cell = scanfab.read_series(tmp_path, cell=(9.0, 9.0, 9.0))
+    assert next(inspect_series(with_cell, Settings.make())).warnings == []
+
+
+def test_a_box_that_may_be_periodic_is_told():
+    series = scanfab.read_series(FLOOR / "grains_30000.vtk", contacts="geometric")
+    (report,) = inspect_series(series, Settings.make())
+    (text,) = report.warnings
+    assert "does not say whether it repeats" in text
+    assert "--periodic xyz" in text
+
+
+def test_a_sheet_of_discs_is_told_in_full():
+    sheet = SAMPLE_DATA / "lammps_discs" / "sheet.3000.lammpstrj"
+    (report,) = inspect_series(scanfab.read_series(sheet), Settings.make())
+    assert [text.partition(",")[0].partition("(")[0].strip() for text in report.warnings] == [
+        "all 300 centres lie in one plane",
+        "300 grains touch themselves",
+    ]
 
 
 def test_an_empty_frame_has_no_radii(tmp_path):

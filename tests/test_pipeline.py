@@ -395,3 +395,32 @@ def test_settings_are_checked_before_a_frame_is_read(tmp_path):
 def test_a_boundary_that_is_everything_is_refused(tmp_path):
     with pytest.raises(SettingsError, match="no grain is left"):
         scanfab.compute(series_of(tmp_path, [heap()]), boundary="radius>0", **SCAN)
+
+
+def test_a_boundary_that_no_frame_has_is_an_error_that_lists_the_values(tmp_path):
+    series = series_of(tmp_path, [heap(), heap(squeeze=0.9)])
+    message = "no particle of any frame has type=3 or id>=900: type is 1 or 2; id is 1 to 110"
+    with pytest.raises(SettingsError, match=message):
+        scanfab.compute(series, boundary=["type=3", "id>=900"], variants="a", **SCAN)
+
+
+def test_a_boundary_that_only_a_later_frame_has_is_fine(tmp_path):
+    grains = [row for row in heap() if row[1] == 1]
+    series = series_of(tmp_path, [grains, heap(squeeze=0.9)])
+    table = scanfab.compute(series, boundary="type=2", variants="a", **SCAN)
+    assert len(table) == 2
+
+
+def test_a_boundary_that_a_packing_does_not_have_is_an_error():
+    with pytest.raises(SettingsError, match="no particle of any frame has type=3"):
+        scanfab.compute(packing_of(heap()), boundary="type=3", variants="a", **SCAN)
+
+
+def test_clumps_are_warned_of_once_and_computed(tmp_path):
+    # two grains of a column are one clump
+    rows = [(*row, 100 * round(row[2]) + 10 * round(row[3]) + round(row[4]) // 2) for row in heap()]
+    texts = [dump_text(rows, f"{NAMES} mol", step=k, box=BOX) for k in range(2)]
+    series = scanfab.read_series(write(tmp_path / "dump.txt", "".join(texts)))
+    with pytest.warns(ScanfabWarning, match="the column mol names") as told:
+        assert len(scanfab.compute(series, variants="a", **SCAN)) == 2
+    assert len(told) == 1

@@ -200,3 +200,16 @@ def test_bias_of_a_rule_counts_over_a_tenth_of_the_tolerance(packing, tolerance,
 def test_exact_rules_have_no_bias_to_warn_of(packing):
     for rule in ("7", "lebedev:11", "design:9", "icosahedral:9", "product:5"):
         assert plan_of(packing, directions=rule, tolerance=1e-12).rule.bias < 1e-13
+
+
+@pytest.mark.parametrize(("cutoff", "is_absurd"), [(1000.0, True), (9.0, False)])
+def test_a_cutoff_of_hundreds_of_radii_asks_for_rmin(packing, cutoff, is_absurd):
+    options = {"spacing": 0.8, "directions": 9, "variants": "c", "cutoff": cutoff}
+    with pytest.warns(ScanfabWarning, match="no void segment reaches the cut-off") as told:
+        compute(packing, **options)
+    assert any("did you mean 1rmin?" in str(one.message) for one in told) == is_absurd
+
+
+def test_an_absurd_spacing_asks_for_rmin(packing):
+    with pytest.raises(SettingsError, match=r"spacing: .*did you mean 1rmin"):
+        plan_of(packing, spacing=1000.0, directions=9)

@@ -20,7 +20,7 @@ from tests.conftest import ROOT
 from tests.dumps import write
 from tests.tables import curve
 
-pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.errors.ScanfabWarning")
+pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.errors.ScanfabNote")
 
 
 @pytest.fixture

@@ -9,7 +9,13 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab.errors import PackingError, ReadError, ScanfabWarning, UnknownFormatError
+from scanfab.errors import (
+    PackingError,
+    ReadError,
+    ScanfabNote,
+    ScanfabWarning,
+    UnknownFormatError,
+)
 from scanfab.opening import open_sources
 from tests.dumps import PAIRS, ROWS, dump_text, pairs_text, write
 from tests.truth import FLOOR, id_pairs
@@ -139,7 +145,7 @@ def test_named_contacts_must_exist(folder, contacts):
 
 
 def test_named_contacts_must_be_contacts(folder):
-    with pytest.raises(ReadError, match="expected contacts, found none"):
+    with pytest.raises(ReadError, match="expected contacts, found grains"):
         scanfab.read_series(folder, contacts=folder / "dump_9.txt")
 
 
@@ -170,7 +176,7 @@ def test_unknown_files_are_passed_over_with_one_note(folder):
     for name in ("log.liggghts", "in.deck", "floor.stl", "README.md", "a.png", "b.pdf", "c.xyz"):
         write(folder / name, "hello\n")
     with pytest.warns(
-        ScanfabWarning, match=r"passed over, neither grains nor contacts: .*and 2 more"
+        ScanfabNote, match=r"passed over, neither grains nor contacts: .*and 2 more"
     ) as e:
         series = scanfab.read_series(folder)
     assert len(e) == 1
@@ -193,7 +199,7 @@ def test_points_without_a_radius_are_used_if_there_is_nothing_else(tmp_path):
 
 def test_points_without_a_radius_are_passed_over_beside_grains(folder):
     write(folder / "tracers_9.txt", dump_text(names="id type x y z mass"))
-    with pytest.warns(ScanfabWarning, match="passed over.*tracers_9"):
+    with pytest.warns(ScanfabNote, match="passed over.*tracers_9.*no radius: --radius"):
         assert len(frames_of(folder)) == 3
 
 

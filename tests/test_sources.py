@@ -117,7 +117,7 @@ def test_absolute_and_relative_paths_mix(tmp_path: Path, monkeypatch: pytest.Mon
 
 def test_a_source_keeps_the_name_that_it_was_given(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
-    with pytest.warns(scanfab.ScanfabWarning):
+    with pytest.warns(scanfab.ScanfabNote):
         assert scanfab.read_series("./sample_data/yade_triaxial/").name == (
             "./sample_data/yade_triaxial/"
         )

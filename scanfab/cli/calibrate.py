@@ -12,6 +12,7 @@ import click
 from click.core import ParameterSource
 
 from scanfab.cli.options import (
+    SourceType,
     axis_option,
     check_plot,
     completed,
@@ -52,7 +53,7 @@ TITLES = {
 
 
 @click.command(cls=SourceCommand)
-@click.argument("source", metavar="SOURCE", type=click.Path(exists=True, allow_dash=True))
+@click.argument("source", metavar="SOURCE", type=SourceType())
 @reading_options
 @sample_options
 @click.option(
@@ -137,10 +138,13 @@ def calibrate(
             settings = Settings.make(**options)
             result = None if output is None else ResultFile(output, StepRow, excerpt)
         announce_compiling()
-        (series,) = open_series((source,), reading)
-        tell_inputs([series], settings.workers)
+        series = open_series((source,), reading)
+        if len(series) > 1:
+            names = ", ".join(one.name for one in series)
+            raise click.UsageError(f"one series can be calibrated at a time, found {names}")
+        tell_inputs(series, settings.workers)
         with working():
-            found = calibrate_series(series, settings, frame=frame)
+            found = calibrate_series(series[0], settings, frame=frame)
         command = _command_line(ctx, source, found.options)
         if result is not None:
             with result.writer({}) as writer:
@@ -165,7 +169,8 @@ def _command_line(ctx: click.Context, source: str, recommended: dict[str, str]) 
             continue
         value = ctx.params[name]
         for one in value if parameter.multiple else [value]:
-            spelt = one.split() if name == "cell" else one if isinstance(one, tuple) else [one]
+            numbers = name == "cell" and not Path(one).is_file()
+            spelt = one.split() if numbers else one if isinstance(one, tuple) else [one]
             words += [parameter.opts[0], *map(str, spelt)]
     words += ["--variants", ctx.params["variants"]]
     for name, value in recommended.items():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,6 +13,7 @@ from click.shell_completion import CompletionItem
 
 __all__ = [
     "AS_CSV",
+    "SourceType",
     "axis_option",
     "check_plot",
     "completed",
@@ -80,12 +82,28 @@ def _reader_names() -> Iterable[str]:
     return installed_readers()
 
 
+class SourceType(click.Path):
+    """A path that exists, or a glob in quotes that names some; it stays as it is."""
+
+    def __init__(self) -> None:
+        super().__init__(exists=True, allow_dash=True)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Refuse what does not exist."""
+        return value if glob.glob(value) else super().convert(value, param, ctx)
+
+
+def _expand(ctx: click.Context, param: click.Parameter, sources: tuple[str, ...]) -> Any:
+    """What the shell would have made of globs that it was not asked to expand."""
+    found: list[str] = []
+    for source in sources:
+        matches = [] if Path(source).exists() else sorted(glob.glob(source))
+        found += matches or [source]
+    return tuple(found)
+
+
 sources_argument = click.argument(
-    "sources",
-    metavar="SOURCE...",
-    nargs=-1,
-    required=True,
-    type=click.Path(exists=True, allow_dash=True),
+    "sources", metavar="SOURCE...", nargs=-1, required=True, type=SourceType(), callback=_expand
 )
 
 reading_options = together(
@@ -114,8 +132,9 @@ reading_options = together(
     ),
     click.option(
         "--cell",
-        metavar="LX LY LZ [XY XZ YZ]",
-        help="The cell, for formats that do not carry it (periodic in xyz unless --periodic).",
+        metavar="LX LY LZ [XY XZ YZ]|FILE.csv",
+        help="The cell, for formats that do not carry it (periodic in xyz unless --periodic); "
+        "FILE.csv has one for each step or frame: step lx ly lz, and xy xz yz if tilted.",
     ),
     click.option("--periodic", metavar="xyz", help="Periodic directions (default: the dump's)."),
     click.option(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -21,7 +22,7 @@ _READING_NAMES = (
 
 
 class SourceCommand(click.Command):
-    """A command with sources, whose --cell takes three or six numbers."""
+    """A command with sources, whose --cell takes three or six numbers, or a file."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Join the numbers behind --cell into one word, as click knows no variable count."""
@@ -30,8 +31,8 @@ class SourceCommand(click.Command):
         while rest:
             word = rest.pop(0)
             joined.append(word)
-            if word == "--cell":
-                numbers = _leading_numbers(rest)
+            numbers = _leading_numbers(rest) if word == "--cell" else 0
+            if numbers:
                 joined.append(" ".join(rest[:numbers]))
                 del rest[:numbers]
         return super().parse_args(ctx, joined)
@@ -41,7 +42,7 @@ def reading_arguments(options: dict[str, Any]) -> dict[str, Any]:
     """Take the reading options out of a command's, as arguments of ``read_series``."""
     taken = {name: options.pop(name) for name in _READING_NAMES}
     taken["columns"] = _column_names(taken["columns"])
-    taken["cell"] = _numbers(taken["cell"])
+    taken["cell"] = _cell(taken["cell"])
     _check_periodic(taken["periodic"])
     if taken["format"] is not None:
         _check_format(taken["format"])
@@ -76,16 +77,18 @@ def _leading_numbers(words: list[str]) -> int:
     return 6 if count >= 6 else min(count, 3)
 
 
-def _numbers(text: str | None) -> tuple[float, ...] | None:
-    if text is None:
-        return None
+def _cell(text: str | None) -> tuple[float, ...] | str | None:
+    """Numbers, or the name of a file that has those of each frame."""
+    if text is None or Path(text).is_file():
+        return text
     try:
         numbers = tuple(float(word) for word in text.split())
     except ValueError:
         numbers = ()
     if len(numbers) not in (3, 6) or min(numbers[:3]) <= 0:
         raise click.UsageError(
-            "--cell: expected three lengths LX LY LZ above 0, or six numbers with XY XZ YZ"
+            f"--cell: expected three lengths LX LY LZ above 0, or six numbers with XY XZ YZ, or a "
+            f"CSV file with those of each frame, found {text!r}"
         )
     return numbers
 

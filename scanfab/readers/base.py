@@ -14,15 +14,29 @@ from scanfab.cell import Cell
 from scanfab.errors import SettingsError
 from scanfab.packing import ContactList
 
-__all__ = ["FileKind", "GrainTable", "JoinedContacts", "ReadOptions", "Reader", "Snapshot"]
+__all__ = [
+    "Carries",
+    "FileKind",
+    "GrainTable",
+    "JoinedContacts",
+    "ReadOptions",
+    "Reader",
+    "Snapshot",
+]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
-FileKind = Literal["grains", "index", "points", "contacts", "other"]
+FileKind = Literal["grains", "index", "points", "contacts", "cell", "other"]
 """
 What a file holds. ``index``: names of other files that hold grains; ``points``: grains without a
-radius, unless the user gives one; ``other``: neither grains nor contacts (a wall mesh, a box).
+radius, unless the user gives one; ``cell``: the periodic cell of grains in another file, whose
+reader finds it; ``other``: neither grains nor contacts (a wall mesh, a box).
+"""
+
+Carries = Literal["cell", "box", "nothing"]
+"""
+What a file of grains says of a cell: all; a ``box``, but not whether it repeats; or ``nothing``.
 """
 
 
@@ -101,7 +115,9 @@ class Reader(Protocol):
 
     All methods raise ReadError, with the file and what was expected, and nothing else. A reader of
     a format that any program may write can say so with an attribute ``generic = True``: it is asked
-    after the others. One whose grain files may list contacts says ``lists_contacts = True``.
+    after the others. One whose grain files may list contacts says ``lists_contacts = True``. One
+    whose grain files do not all carry their cell has a method ``carries(path)`` that answers with
+    one of :data:`Carries`.
     """
 
     name: str

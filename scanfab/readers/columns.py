@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, MutableMapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy.typing as npt
 
 from scanfab.boundary import CLASS_COLUMNS
 from scanfab.cell import Cell
+from scanfab.doubts import CLUMP_COLUMNS
 from scanfab.errors import ReadError
 from scanfab.limits import all_within
 from scanfab.packing import LazyColumns, lies_within
@@ -31,6 +33,8 @@ Columns = Mapping[str, npt.NDArray[Any]]
 RADIUS_NAMES = ("radius", "radii", "rad", "r", "f_radius")
 DIAMETER_NAMES = ("diameter", "diam")
 ID_NAMES = ("id", "ids", "particle_id", "particleid", "body_id", "bodyid")
+# other names that a radius may have, such as c_rad and f_r[1]
+LIKE_A_RADIUS = re.compile(r"(?i)rad(i|$|[^a-z])|(^|_)r($|\[)")
 # coordinates in the order of preference, and whether they are fractions of the box
 POSITION_NAMES = (("x y z", False), ("xu yu zu", False), ("xs ys zs", True), ("xsu ysu zsu", True))
 
@@ -56,7 +60,14 @@ def room_for_columns(
     ``grain_table`` knows: coordinates are columns of one array, ``position``.
     """
     coordinates = {name for system, _ in POSITION_NAMES for name in system.split()}
-    known = {*coordinates, *RADIUS_NAMES, *DIAMETER_NAMES, *ID_NAMES, *CLASS_COLUMNS}
+    known = {
+        *coordinates,
+        *RADIUS_NAMES,
+        *DIAMETER_NAMES,
+        *ID_NAMES,
+        *CLASS_COLUMNS,
+        *CLUMP_COLUMNS,
+    }
     own = options.columns
     id = own.get("id", _first_of(ID_NAMES, names))
     columns: dict[str, npt.NDArray[Any]] = {
@@ -226,10 +237,12 @@ def _radius(
     diameter = _take(rest, DIAMETER_NAMES)
     if diameter is not None:
         return 0.5 * _lengths(path, diameter, "a diameter", where)
+    like = next((name for name in rest if LIKE_A_RADIUS.search(name)), "...")
     raise ReadError(
         f"{path}{where}: no radius: expected a column radius (or diameter), found "
-        f"{', '.join(rest) or 'none'}; name it with --columns radius=..., or give one radius for "
-        f"all grains with --radius"
+        f"{', '.join(rest) or 'none'}; name it with --columns radius={like}"
+        f"{'' if like == '...' else ' (if that is one)'}, or give one radius for all grains with "
+        f"--radius"
     )
 
 

@@ -9,7 +9,14 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.errors import ReadError
-from scanfab.readers.base import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
+from scanfab.readers.base import (
+    Carries,
+    FileKind,
+    GrainTable,
+    JoinedContacts,
+    ReadOptions,
+    Snapshot,
+)
 from scanfab.readers.dump import DumpBlock, index_dump, read_block, row_word
 from scanfab.readers.dump_grains import dump_kind, read_dump_grains
 from scanfab.readers.files import first_bytes
@@ -76,6 +83,10 @@ class LammpsReader:
         if is_data_file(first_bytes(snapshot.path)):
             return read_data_grains(snapshot, options)
         return read_dump_grains(snapshot, options)
+
+    def carries(self, path: Path) -> Carries:
+        """A data file has a box without boundary flags."""
+        return "box" if is_data_file(first_bytes(path)) else "cell"
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable

@@ -14,7 +14,14 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.errors import ReadError
-from scanfab.readers.base import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
+from scanfab.readers.base import (
+    Carries,
+    FileKind,
+    GrainTable,
+    JoinedContacts,
+    ReadOptions,
+    Snapshot,
+)
 from scanfab.readers.dump import DumpBlock, index_dump, read_block, row_word
 from scanfab.readers.dump_grains import dump_kind, read_dump_grains
 from scanfab.readers.files import first_bytes
@@ -94,6 +101,10 @@ class LiggghtsReader:
         if not _is_text(first_bytes(snapshot.path)):
             return self._vtk.read_grains(snapshot, options)
         return read_dump_grains(snapshot, options)
+
+    def carries(self, path: Path) -> Carries:
+        """A text dump says which directions are periodic, a VTK file does not."""
+        return "cell" if _is_text(first_bytes(path)) else self._vtk.carries(path)
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable

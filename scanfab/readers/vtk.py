@@ -13,11 +13,19 @@ from scanfab.cell import Cell
 from scanfab.errors import ReadError
 from scanfab.limits import MOST
 from scanfab.packing import ContactList
-from scanfab.readers.base import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
+from scanfab.readers.base import (
+    Carries,
+    FileKind,
+    GrainTable,
+    JoinedContacts,
+    ReadOptions,
+    Snapshot,
+)
 from scanfab.readers.columns import grain_table, has_radius, whole_numbers
 from scanfab.readers.files import bare_name, plain
 from scanfab.readers.join import join_ids, join_positions
 from scanfab.readers.mesh import Mesh, form_of, read_bounds, read_mesh
+from scanfab.readers.yade_cells import cell_beside, is_cell_file
 
 __all__ = ["VtkReader"]
 
@@ -49,6 +57,8 @@ class VtkReader:
             return "index"
         if form not in HOLDING_POINTS:
             return "other"
+        if is_cell_file(path):
+            return "cell"
         mesh = read_mesh(path)
         if mesh.has_faces:
             return "other"
@@ -64,12 +74,15 @@ class VtkReader:
         return self._listed(path) if form_of(path) == "Collection" else [Snapshot(path)]
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
-        """Points and their arrays, with the box of LIGGGHTS' file beside it."""
+        """Points and their arrays, with the box of LIGGGHTS or the cell of YADE beside them."""
         mesh = read_mesh(snapshot.path)
         columns = {**mesh.point_arrays, "position": mesh.points}
         if len(mesh.points) == 0:
             columns["radius"] = np.zeros(0)
-        grains = grain_table(snapshot.path, columns, _box_beside(snapshot.path), options)
+        cell = _box_beside(snapshot.path)
+        if cell is None and options.cell is None:
+            cell = cell_beside(snapshot.path, mesh.points)
+        grains = grain_table(snapshot.path, columns, cell, options)
         if len(mesh.lines) == 0:
             return grains
         # lines between the grains' own points
@@ -87,6 +100,10 @@ class VtkReader:
             pairs = np.column_stack(named)
             return join_ids(snapshot.path, grains, pairs, force, walls=self.walls)
         return join_positions(snapshot.path, grains, mesh.points[mesh.lines], force)
+
+    def carries(self, path: Path) -> Carries:
+        """LIGGGHTS writes a box beside its files; VTK itself has no cell."""
+        return "nothing" if _box_beside(path) is None else "box"
 
     def _listed(self, index: Path) -> list[Snapshot]:
         """The grain files of a ``.pvd``, in its order."""

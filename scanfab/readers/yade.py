@@ -14,7 +14,14 @@ import numpy.typing as npt
 from scanfab.cell import Cell
 from scanfab.errors import PackingError, ReadError
 from scanfab.limits import MOST
-from scanfab.readers.base import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
+from scanfab.readers.base import (
+    Carries,
+    FileKind,
+    GrainTable,
+    JoinedContacts,
+    ReadOptions,
+    Snapshot,
+)
 from scanfab.readers.columns import grain_table
 from scanfab.readers.files import first_bytes, plain
 from scanfab.readers.mesh import Mesh
@@ -30,7 +37,8 @@ FloatArray = npt.NDArray[np.float64]
 EXPORTER_HEAD = b"# vtk DataFile Version 3.0.\n"
 # as numpy has them
 BLANKS = b" \t\n\r\v\f\x1c\x1d\x1e\x1f\x85\xa0"
-TEXT_HEADS = (b"#format ", b"##PERIODIC::")
+PERIODIC_HEAD = b"##PERIODIC::"
+TEXT_HEADS = (b"#format ", PERIODIC_HEAD)
 
 
 class YadeReader(VtkReader):
@@ -91,6 +99,11 @@ class YadeReader(VtkReader):
             )
         _refuse_lost_lines(snapshot.path)
         return super().read_contacts(snapshot, options, grains)
+
+    def carries(self, path: Path) -> Carries:
+        """A saved simulation and ``SpherePack.save`` say whether the sample is periodic."""
+        says = first_bytes(path).startswith(PERIODIC_HEAD) or is_save(path)
+        return "cell" if says else super().carries(path)
 
     def force_on_second(self, mesh: Mesh) -> FloatArray | None:
         """YADE's forces act on the second body."""

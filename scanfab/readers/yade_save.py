@@ -70,6 +70,8 @@ def read_save(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         "position": np.array(scene.centres, dtype=np.float64).reshape(-1, 3),
         "radius": np.array(scene.radii, dtype=np.float64),
     }
+    if max(scene.clumps, default=-1.0) >= 0:
+        columns["clumpId"] = np.array(scene.clumps, dtype=np.float64)
     grains = grain_table(path, columns, scene.cell(), options)
     pairs = whole_numbers(path, np.array(scene.pairs, dtype=np.float64).ravel()).reshape(-1, 2)
     image = whole_numbers(path, np.array(scene.images, dtype=np.float64).ravel()).reshape(-1, 3)
@@ -97,6 +99,8 @@ class _Scene:
     """Ids of all bodies, of spheres and of walls."""
     ids: list[float] = field(default_factory=list)
     masks: list[float] = field(default_factory=list)
+    clumps: list[float] = field(default_factory=list)
+    """The clump of each sphere; -1 if it stands alone."""
     centres: list[list[float]] = field(default_factory=list)
     radii: list[float] = field(default_factory=list)
     pairs: list[list[float]] = field(default_factory=list)
@@ -149,6 +153,7 @@ class _Scene:
             raise ValueError("a sphere has no position")
         self.ids.append(_number(body, "id"))
         self.masks.append(_number(body, "groupMask"))
+        self.clumps.append(float(body.findtext("clumpId", "-1")))
         self.centres.append(_vector(place))
         self.radii.append(_number(shape, "radius"))
 

@@ -30,7 +30,7 @@ def unpacked(path):
 
 @pytest.fixture(scope="module")
 def frames():
-    with pytest.warns(scanfab.ScanfabWarning, match="passed over"):
+    with pytest.warns(scanfab.ScanfabNote, match="passed over"):
         series = scanfab.read_series(SHEAR, contact_columns=COLUMNS)
     return [frame.read() for frame in series]
 
@@ -158,7 +158,8 @@ def test_dumps_of_liggghts_stay_its_own_and_read_the_same(name):
 
 @pytest.mark.parametrize("format", ["lammps", "liggghts"])
 def test_lammps_grains_read_the_same_either_way(format):
-    packing = scanfab.read(LAST, format=format)
+    # a reader of LIGGGHTS' dumps cannot read the contacts beside them
+    packing = scanfab.read(LAST, format=format, contacts="geometric")
     np.testing.assert_array_equal(packing.position, scanfab.read(LAST).position)
 
 
@@ -303,7 +304,7 @@ def test_what_is_wrong_with_a_data_file(tmp_path, old, new, message):
 
 def test_a_data_file_holds_no_contacts(tmp_path):
     path = write(tmp_path / "a.data", DATA)
-    with pytest.raises(ReadError, match="expected contacts, found none"):
+    with pytest.raises(ReadError, match="expected contacts, found grains"):
         scanfab.read(LAST, contacts=path)
 
 

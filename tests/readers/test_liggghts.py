@@ -257,13 +257,17 @@ def test_wall_contacts_count_for_their_grains():
 
 
 def test_wall_contacts_alone_leave_the_contacts_to_geometry():
-    packing = scanfab.read(FLOOR / "tutorial.txt", contacts=FLOOR / "walls_all.txt")
+    with pytest.warns(
+        scanfab.ScanfabWarning, match=r"walls_all.txt: lists contacts with walls only"
+    ):
+        packing = scanfab.read(FLOOR / "tutorial.txt", contacts=FLOOR / "walls_all.txt")
     assert packing.contacts is None
     assert packing.wall_contacts.sum() == 25
 
 
 def test_walls_files_are_not_taken_for_pairs():
-    packing = scanfab.read(FLOOR / "precise.txt", contacts=FLOOR / "walls_all.txt")
+    with pytest.warns(scanfab.ScanfabWarning, match="lists contacts with walls only"):
+        packing = scanfab.read(FLOOR / "precise.txt", contacts=FLOOR / "walls_all.txt")
     assert packing.contacts is None
 
 
@@ -428,7 +432,7 @@ def test_the_box_beside_a_vtk_file_does_not_make_it_periodic():
 def test_the_box_in_a_folder_is_passed_over(tmp_path, ending):
     for file in ("grains_30000.vtk", f"grains_boundingBox_30000{ending}"):
         (tmp_path / file).write_bytes((FLOOR / file).read_bytes())
-    with pytest.warns(scanfab.ScanfabWarning, match="passed over"):
+    with pytest.warns(scanfab.ScanfabNote, match="passed over"):
         (frame,) = scanfab.read_series(tmp_path, periodic="xy")
     assert_true_grains(frame.read(), FLOOR)
 
@@ -436,7 +440,7 @@ def test_the_box_in_a_folder_is_passed_over(tmp_path, ending):
 def test_wall_meshes_in_a_folder_are_passed_over(tmp_path):
     for file in ("grains_30000.vtk", "mesh_30000.vtk"):
         (tmp_path / file).write_bytes((FLOOR / file).read_bytes())
-    with pytest.warns(scanfab.ScanfabWarning, match="passed over"):
+    with pytest.warns(scanfab.ScanfabNote, match="passed over"):
         (frame,) = scanfab.read_series(tmp_path)
     assert len(frame.read()) == 150
 

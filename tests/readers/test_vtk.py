@@ -207,7 +207,7 @@ def test_legacy_grids_are_neither_grains_nor_contacts(tmp_path, head):
 def test_an_index_of_other_files_beside_the_grains_is_passed_over(tmp_path, name):
     (tmp_path / name).write_bytes((FLOOR / "vtm" / name).read_bytes())
     polydata(tmp_path / "grains_30000.vtp", radius=RADIUS)
-    with pytest.warns(scanfab.ScanfabWarning, match="passed over"):
+    with pytest.warns(scanfab.ScanfabNote, match="passed over"):
         (frame,) = scanfab.read_series(tmp_path)
     assert len(frame.read()) == 4
 

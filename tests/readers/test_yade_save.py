@@ -163,7 +163,7 @@ def test_the_binary_format_is_refused_with_advice(tmp_path):
 
 
 def test_a_save_is_no_contact_list_for_others():
-    with pytest.raises(ReadError, match="expected contacts, found none"):
+    with pytest.raises(ReadError, match="expected contacts, found grains"):
         scanfab.read(YADE / "periodic_pack.txt", contacts=PERIODIC)
 
 

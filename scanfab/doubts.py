@@ -1,0 +1,257 @@
+"""What looks wrong in a frame before anything is measured: units, clumps, cells, flat samples."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.errors import PackingError
+from scanfab.packing import Packing
+from scanfab.periodicity import fitting_periods
+from scanfab.variants import Sample
+
+__all__ = ["CLUMP_COLUMNS", "cell_doubt", "doubts_of", "refuse_impossible"]
+
+FloatArray = npt.NDArray[np.float64]
+
+# columns that say which body a sphere is part of, by names in lower case; all but the first few
+# number molecules, too
+CLUMP_COLUMNS = ("clump", "clumpid", "clump_id", "id_multisphere", "mol", "molecule")
+# particles below which nothing is said of a sample's form
+FEWEST = 10
+# a clump is smaller than this part of the sample
+SMALL = 0.5
+# contacts a grain that no packing of spheres has
+MANY_CONTACTS = 30
+# solids in the box of their surfaces, in its volume: only clumps of many spheres overlap as much
+SOLIDS = 20.0
+# distances of nearest neighbours, in diameters: of grains that just touch, and of radii that cannot
+# be those of a packing
+TOUCHING, APART = 1.01, 5.0
+# solid fraction of a cloud that is too thin for one
+THIN = 1e-3
+# of the period, without any grain
+EMPTY = 0.2
+
+
+def refuse_impossible(sample: Sample) -> None:
+    """
+    Refuse what cannot be measured.
+
+    Raises
+    ------
+    PackingError
+        If all centres lie in one plane, or the solids do not fit into their own box by far.
+    """
+    for text in (_plane(sample.packing), _overfull(sample)):
+        if text:
+            raise PackingError(text)
+
+
+def doubts_of(sample: Sample, *, cell_is_named: bool = False) -> list[str]:
+    """
+    What a user should know of a frame whose contacts are known.
+
+    Parameters
+    ----------
+    sample : Sample
+        One frame.
+    cell_is_named : bool, optional
+        Whether the user has said what the cell is, or what is periodic, and may be mistaken.
+    """
+    packing = sample.packing
+    if len(packing) < FEWEST:
+        return []
+    clumps = _clumps(packing)
+    texts = [clumps, _own_images(packing), _empty_period(packing) if cell_is_named else ""]
+    if not clumps:
+        texts.append(_many_contacts(sample))
+    texts.append(_no_contacts(sample))
+    return [text for text in texts if text]
+
+
+def cell_doubt(sample: Sample, carries: str, *, always: bool) -> str:
+    """
+    What to tell of a sample that is not periodic, if its format could not have said so.
+
+    Parameters
+    ----------
+    sample : Sample
+        One frame.
+    carries : str
+        What its format says of a cell, as :data:`scanfab.readers.base.Carries`.
+    always : bool
+        Not only if opposite faces fit together.
+    """
+    if carries == "cell" or sample.packing.is_periodic:
+        return ""
+    lacks, cure = (
+        ("this format carries no cell", "--cell LX LY LZ")
+        if carries == "nothing"
+        else ("this format has a box, but does not say whether it repeats", "--periodic xyz")
+    )
+    periods = fitting_periods(sample.packing)
+    found = {axis: period for axis, period in zip("xyz", periods, strict=True) if period}
+    if found:
+        lengths = ", ".join(f"{period:.4g} along {axis}" for axis, period in found.items())
+        return (
+            f"the sample looks periodic: grains of opposite faces touch at a period of {lengths} "
+            f"(roughly); {lacks}: name it with {cure}"
+        )
+    return f"{lacks}; {cure} if the sample is periodic" if always else ""
+
+
+def _plane(packing: Packing) -> str:
+    if len(packing) < FEWEST:
+        return ""
+    flat = np.ptp(packing.position, axis=0) == 0
+    if flat.sum() != 1:
+        return ""
+    axis = "xyz"[int(np.argmax(flat))]
+    return (
+        f"all {len(packing)} centres lie in one plane ({axis} = {packing.position[0, flat][0]:g}): "
+        f"scanfab measures samples in 3D; a 2D sample cannot be measured yet"
+    )
+
+
+def _overfull(sample: Sample) -> str:
+    position = sample.packing.position[sample.grains]
+    radius = sample.packing.radius[sample.grains]
+    contacts = sample.packing.contacts
+    # who lists contacts has them from a program that knew the radii
+    if len(radius) < FEWEST or (contacts is not None and contacts.source == "file"):
+        return ""
+    solid = _solid_fraction(position, radius, sample.packing)
+    if solid < SOLIDS:
+        return ""
+    return (
+        f"the grains' volumes add up to {solid:.3g} times that of the box that they lie in (radii "
+        f"{_span(radius)}, centres within {_extent(position):.3g}): check the units of radius and "
+        f"position"
+    )
+
+
+def _solid_fraction(position: FloatArray, radius: FloatArray, packing: Packing) -> float:
+    """The volumes of some grains in that of the box of their surfaces, or of the cell."""
+    reach = radius[:, None]
+    box = float(np.prod((position + reach).max(axis=0) - (position - reach).min(axis=0)))
+    if packing.cell is not None and packing.is_periodic:
+        box = min(box, abs(float(np.linalg.det(packing.cell.vectors))))
+    return float(4.0 / 3.0 * np.pi * np.sum((radius / np.cbrt(box)) ** 3))
+
+
+def _clumps(packing: Packing) -> str:
+    names = [name for name in packing.columns if name.lower() in CLUMP_COLUMNS]
+    for name in names:
+        found = _bodies(packing, name)
+        if found is not None:
+            bodies, members = found
+            return (
+                f"the column {name} names {bodies} clumps of {members} spheres: clumps are not "
+                f"read as bodies yet, each sphere counts as a grain; contacts, coordination and "
+                f"rattlers (variants b and d) are those of single spheres"
+            )
+    return ""
+
+
+def _bodies(packing: Packing, name: str) -> tuple[int, int] | None:
+    """
+    How many bodies a column names, and of how many spheres; None if it names none.
+
+    A body has several spheres that lie close together. A number that many spheres all over the
+    sample have in common is that of a species or a molecule.
+    """
+    values = packing.columns[name]
+    if values.ndim != 1 or values.dtype.kind not in "iuf":
+        return None
+    rows = np.flatnonzero(values > 0)
+    _, body, counts = np.unique(values[rows], return_inverse=True, return_counts=True)
+    several = counts > 1
+    if not several.any():
+        return None
+    order = np.argsort(body, kind="stable")
+    position = packing.position[rows[order]]
+    starts = np.cumsum(counts) - counts
+    extents = np.maximum.reduceat(position, starts) - np.minimum.reduceat(position, starts)
+    small = extents.max(axis=1) < SMALL * _extent(packing.position)
+    # a body that a periodic face cuts seems as large as the sample
+    if np.count_nonzero(small & several) < 0.5 * np.count_nonzero(several):
+        return None
+    return int(several.sum()), int(counts[several].sum())
+
+
+def _own_images(packing: Packing) -> str:
+    assert packing.contacts is not None
+    pairs = packing.contacts.pairs
+    itself = np.unique(pairs[pairs[:, 0] == pairs[:, 1], 0])
+    if itself.size == 0 or packing.cell is None:
+        return ""
+    return (
+        f"{itself.size} grains touch themselves, through a face of the cell: its shortest period "
+        f"({packing.cell.lattice.shortest:.3g}) is not above their diameter (up to "
+        f"{2 * packing.radius[itself].max():.3g}); is this a 2D sample, or the unit of the cell "
+        f"another?"
+    )
+
+
+def _empty_period(packing: Packing) -> str:
+    cell = packing.cell
+    if cell is None:
+        return ""
+    fractions = cell.fractional(packing.position)
+    largest = float(packing.radius.max())
+    for axis in np.flatnonzero(cell.periodic):
+        along = np.sort(fractions[:, axis])
+        gap = float(max(np.diff(along).max(), along[0] + 1.0 - along[-1]))
+        if gap > EMPTY and gap * cell.heights[axis] > 4.0 * largest:
+            return (
+                f"the grains fill {1.0 - gap:.0%} of the cell's period along {'xyz'[axis]} "
+                f"({cell.heights[axis]:.4g}), the rest of it is empty: is the sample periodic "
+                f"there, and with this period (--periodic, --cell)?"
+            )
+    return ""
+
+
+def _many_contacts(sample: Sample) -> str:
+    numbers = sample.contact_numbers[sample.grains]
+    mean = float(numbers.mean()) if numbers.size else 0.0
+    if sample.contacts.source != "geometric" or mean < MANY_CONTACTS:
+        return ""
+    radius = sample.packing.radius[sample.grains]
+    return (
+        f"{mean:.0f} contacts a grain by geometry (radii {_span(radius)}, centres within "
+        f"{_extent(sample.packing.position):.3g}): check the units of radius and position"
+    )
+
+
+def _no_contacts(sample: Sample) -> str:
+    packing = sample.packing
+    if len(sample.contacts) or packing.wall_contacts.any() or sample.contacts.source == "file":
+        return ""
+    nearest = _nearest(packing)
+    solid = _solid_fraction(packing.position, packing.radius, packing)
+    if nearest > TOUCHING and (nearest < APART or solid > THIN):
+        return ""  # a loose cloud, before it settles
+    return (
+        f"no contact at all by geometry: the centres of nearest neighbours are {nearest:.6g} "
+        f"diameters apart (median); check the units of radius and position, or use "
+        f"--contact-tolerance 1e-4"
+    )
+
+
+def _nearest(packing: Packing) -> float:
+    """Median distance of a grain's nearest neighbour, in sums of their radii."""
+    from scipy.spatial import KDTree
+
+    some = np.arange(0, len(packing), len(packing) // 1000 + 1)
+    distance, near = KDTree(packing.position).query(packing.position[some], k=2)
+    reach = packing.radius[some] + packing.radius[near[:, 1]]
+    return float(np.median(distance[:, 1] / reach))
+
+
+def _span(radius: FloatArray) -> str:
+    return f"{radius.min():.3g} to {radius.max():.3g}"
+
+
+def _extent(position: FloatArray) -> float:
+    return float(np.ptp(position, axis=0).max())

@@ -1,0 +1,151 @@
+"""
+The periodic cell that YADE writes beside a VTK file of spheres, which has none itself.
+
+``VTKRecorder`` numbers both by the step. ``VTKExporter`` numbers a cell by how many files of
+*interactions* it has written, so that a cell may be overwritten, or bear the number of another
+frame: it is taken only where there is one cell for each file of spheres, in their order.
+"""
+
+from __future__ import annotations
+
+import glob
+import re
+import warnings
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.cell import Cell
+from scanfab.errors import PackingError, ReadError, ScanfabNote, ScanfabWarning
+from scanfab.readers.base import ReadOptions
+from scanfab.readers.files import COMPRESSED_SUFFIXES, bare_name
+from scanfab.readers.mesh import read_mesh
+from scanfab.readers.yade_save import is_save, read_save, snapshot_of_save
+
+__all__ = ["cell_beside", "is_cell_file"]
+
+FloatArray = npt.NDArray[np.float64]
+
+EXPORTED = re.compile(r"(.*)-spheres-(\d+)\.vtk")
+RECORDED = re.compile(r"(.*)spheres\.(\d+)\.vtu")
+CELL_FILE = re.compile(r".*-periCell-\d+\.vtk|.*pericell\.\d+\.vtu")
+# corners of a cell in both kinds of file, and those at the ends of its vectors
+CORNERS, ORIGIN, ENDS = 8, 4, (7, 5, 0)
+# in cells: YADE wraps spheres into the cell, but writes six digits
+ROUNDING = 1e-4
+
+
+def is_cell_file(path: Path) -> bool:
+    """Whether a file is named as YADE names those of a cell."""
+    return CELL_FILE.fullmatch(bare_name(path)) is not None
+
+
+def cell_beside(path: Path, position: FloatArray) -> Cell | None:
+    """
+    The cell of a file of spheres.
+
+    Parameters
+    ----------
+    path : Path
+        What ``VTKExporter`` or ``VTKRecorder`` has written.
+    position : ndarray, shape (N, 3)
+        The spheres' centres as they stand there, dump's length unit.
+
+    Raises
+    ------
+    ReadError
+        If spheres lie outside: then it is not their cell.
+    """
+    name = bare_name(path)
+    exported, recorded = EXPORTED.fullmatch(name), RECORDED.fullmatch(name)
+    named = exported or recorded
+    if named is None:
+        return None
+    number = int(named[2])
+    file = (
+        _exported_cell(path, named[1], number)
+        if exported
+        else _with_any_packing(path.with_name(f"{named[1]}pericell.{named[2]}.vtu"))
+    )
+    file = file or _saved_state(path, named[1], number)
+    if file is None:
+        return None
+    cell = _read_cell(file)
+    if cell is not None:
+        _refuse_outside(path, file, cell, position)
+        pattern = re.sub(r"\d+", "*", file.name)
+        warnings.warn(
+            f"the cell is read from {file.parent / pattern}, beside the grains",
+            ScanfabNote,
+            stacklevel=2,
+        )
+    return cell
+
+
+def _exported_cell(path: Path, base: str, number: int) -> Path | None:
+    """The file of the cell, if there is no doubt which one it is."""
+    spheres = _numbered(path.parent, f"{base}-spheres-")
+    cells = _numbered(path.parent, f"{base}-periCell-")
+    if not cells:
+        return None
+    # behind the interactions of its frame a cell has the next number, before them the same one
+    pairs = list(zip(sorted(spheres), sorted(cells), strict=False))
+    if len(spheres) == len(cells) and all(two - one in (0, 1) for one, two in pairs):
+        return cells[dict(pairs)[number]]
+    warnings.warn(
+        f"{path.parent / base}-periCell-*: {len(cells)} cells beside {len(spheres)} files of "
+        f"spheres: YADE numbers the cells by the files of interactions, so it cannot be told which "
+        f"cell belongs to which frame: name the cells with --cell FILE.csv",
+        ScanfabWarning,
+        stacklevel=3,
+    )
+    return None
+
+
+def _numbered(folder: Path, start: str) -> dict[int, Path]:
+    """Files of one kind by their number."""
+    name = re.compile(re.escape(start) + r"(\d+)\.vtk")
+    files = sorted(folder.glob(f"{glob.escape(start)}*"))
+    return {int(match[1]): file for file in files if (match := name.fullmatch(bare_name(file)))}
+
+
+def _with_any_packing(path: Path) -> Path | None:
+    packed = [path, *(path.with_name(path.name + ending) for ending in COMPRESSED_SUFFIXES)]
+    return next((file for file in packed if file.is_file()), None)
+
+
+def _saved_state(path: Path, base: str, step: int) -> Path | None:
+    """The ``O.save`` of the same step, whose name begins alike and bears the number of the step."""
+    found = [
+        file
+        for file in sorted(path.parent.glob(f"{glob.escape(base)}*.xml*"))
+        if step in map(int, re.findall(r"\d+", bare_name(file)))
+        and is_save(file)
+        and snapshot_of_save(file).step == step
+    ]
+    return found[0] if len(found) == 1 else None
+
+
+def _read_cell(file: Path) -> Cell | None:
+    """The cell in a file of either kind; None if a saved state does not repeat."""
+    if not is_cell_file(file):
+        return read_save(snapshot_of_save(file), ReadOptions()).cell
+    corners = read_mesh(file).points
+    if len(corners) != CORNERS:
+        raise ReadError(f"{file}: expected the {CORNERS} corners of a cell, found {len(corners)}")
+    try:
+        return Cell(corners[list(ENDS)] - corners[ORIGIN], origin=corners[ORIGIN])
+    except PackingError as error:
+        raise ReadError(f"{file}: {error}") from None
+
+
+def _refuse_outside(path: Path, file: Path, cell: Cell, position: FloatArray) -> None:
+    fractions = cell.fractional(position)
+    outside = np.any((fractions < -ROUNDING) | (fractions > 1.0 + ROUNDING), axis=1)
+    if outside.any():
+        raise ReadError(
+            f"{path}: {np.count_nonzero(outside)} grains lie outside the cell of {file}, into "
+            f"which YADE wraps them: it is the cell of another state; name the right one with "
+            f"--cell LX LY LZ or --cell FILE.csv"
+        )

@@ -1,0 +1,158 @@
+"""What looks wrong in a frame is said, and nothing is said of what is right."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab.cell import Cell
+from scanfab.contacts import find_contacts
+from scanfab.doubts import cell_doubt, doubts_of, refuse_impossible
+from scanfab.errors import PackingError
+from scanfab.packing import Packing
+from scanfab.variants import Sample
+from tests.truth import BOX, CELL, FLOOR, SAMPLE_DATA, SHEAR, TRIAXIAL, YADE
+
+CLUMPS, DISCS = SAMPLE_DATA / "clumps", SAMPLE_DATA / "lammps_discs"
+pytestmark = pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabNote")
+
+
+def sample_of(packing):
+    packing = packing if packing.contacts is not None else find_contacts(packing)
+    return Sample(packing, np.zeros(len(packing), bool))
+
+
+def read(path, **options):
+    return sample_of(scanfab.read(path, **options))
+
+
+def columns_of(packing, **columns):
+    return Packing(packing.position, packing.radius, columns=columns)
+
+
+@pytest.fixture(scope="module")
+def loose():
+    """A packing without anything remarkable."""
+    return scanfab.read(BOX / "dump_40000.txt.gz", contacts="geometric")
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        BOX / "dump_40000.txt.gz",
+        CELL / "dump_30000.txt.gz",
+        SHEAR / "shear.200000.lammpstrj.gz",
+        TRIAXIAL / "triaxial-spheres-00000000.vtk.gz",
+        YADE / "formats.xml.bz2",
+        FLOOR / "tutorial.txt",
+    ],
+)
+def test_sound_samples_raise_no_doubt(path):
+    sample = read(path, contacts="geometric")
+    refuse_impossible(sample)
+    assert doubts_of(sample) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("clumps.xml.bz2", "the column clumpId names 30 clumps of 60 spheres"),
+        ("clumps_spheres.0.vtu", "the column clumpId names 30 clumps of 60 spheres"),
+        ("multisphere_2.txt", "the column mol names 40 clumps of 80 spheres"),
+    ],
+)
+def test_clumps_are_named(name, message):
+    (doubt,) = [text for text in doubts_of(read(CLUMPS / name)) if "clumps" in text]
+    assert doubt.startswith(message)
+    assert "rattlers" in doubt
+
+
+@pytest.mark.parametrize(
+    "mol",
+    [
+        lambda n: np.zeros(n),
+        lambda n: np.ones(n),
+        lambda n: 1 + np.arange(n) % 2,
+        lambda n: np.arange(n),
+        lambda n: np.full(n, -1.0),
+    ],
+    ids=["zero", "one", "two species", "each its own", "none"],
+)
+def test_molecules_that_are_no_clumps_raise_no_doubt(loose, mol):
+    packing = columns_of(loose, mol=mol(len(loose)))
+    assert doubts_of(sample_of(packing)) == []
+
+
+def test_a_sheet_of_discs_is_refused():
+    sample = read(DISCS / "sheet.3000.lammpstrj")
+    with pytest.raises(PackingError, match=r"all 300 centres lie in one plane \(z = 0\).*3D"):
+        refuse_impossible(sample)
+    with pytest.raises(PackingError, match="one plane"), pytest.warns(scanfab.ScanfabWarning):
+        scanfab.compute(scanfab.read_series(DISCS / "sheet.3000.lammpstrj"))
+
+
+def test_grains_that_touch_themselves_are_named():
+    doubts = doubts_of(read(DISCS / "sheet.3000.lammpstrj"))
+    assert any(text.startswith("300 grains touch themselves") for text in doubts)
+
+
+@pytest.mark.parametrize("factor", [1e3, 30.0])
+def test_radii_in_another_unit_are_refused_if_far_too_large(loose, factor):
+    packing = Packing(loose.position, loose.radius * factor)
+    with pytest.raises(PackingError, match="check the units of radius and position"):
+        refuse_impossible(sample_of(packing))
+
+
+def test_many_contacts_a_grain_ask_for_the_units(loose):
+    (doubt,) = doubts_of(sample_of(Packing(loose.position, loose.radius * 2.5)))
+    assert "contacts a grain by geometry" in doubt
+    assert "check the units of radius and position" in doubt
+
+
+def test_no_contact_at_all_asks_for_the_units(loose):
+    (doubt,) = doubts_of(sample_of(Packing(loose.position, loose.radius * 1e-3)))
+    assert doubt.startswith("no contact at all by geometry")
+    assert "check the units of radius and position" in doubt
+
+
+def test_contacts_that_rounding_has_opened_ask_for_a_tolerance():
+    grid = np.stack(np.meshgrid(*3 * [np.arange(5.0)]), axis=-1).reshape(-1, 3)
+    (doubt,) = doubts_of(sample_of(Packing(grid, 0.5 - 1e-6)))
+    assert "no contact at all" in doubt
+    assert "--contact-tolerance 1e-4" in doubt
+
+
+def test_a_loose_cloud_is_no_doubt(loose):
+    assert doubts_of(sample_of(Packing(loose.position, loose.radius * 0.5))) == []
+
+
+def test_a_period_that_is_half_empty_is_named_if_it_is_the_user_s():
+    dump = scanfab.read(BOX / "dump_40000.txt.gz", contacts="geometric", periodic="xyz")
+    assert doubts_of(sample_of(dump)) == []
+    (doubt,) = doubts_of(sample_of(dump), cell_is_named=True)
+    assert "of the cell's period along x (0.04), the rest of it is empty" in doubt
+
+
+@pytest.mark.parametrize("carries", ["nothing", "box"])
+def test_a_format_without_a_cell_is_told_where_it_is_asked_for(loose, carries):
+    sample = sample_of(loose)
+    assert cell_doubt(sample, carries, always=False) == ""
+    cure = {"nothing": "--cell LX LY LZ", "box": "--periodic xyz"}[carries]
+    assert f"{cure} if the sample is periodic" in cell_doubt(sample, carries, always=True)
+    assert cell_doubt(sample, "cell", always=True) == ""
+
+
+def test_a_periodic_sample_without_its_cell_is_found_out():
+    sample = read(YADE / "periodic_x_y_z_r.txt")
+    assert len(sample.contacts) < 261
+    doubt = cell_doubt(sample, "nothing", always=False)
+    assert "looks periodic" in doubt
+    assert "0.02872 along x, 0.03223 along y, 0.03553 along z" in doubt
+
+
+def test_a_periodic_sample_with_its_cell_raises_no_doubt():
+    packing = scanfab.read(YADE / "periodic_x_y_z_r.txt")
+    cell = Cell([0.0286394, 0.0321223, 0.0354697])
+    whole = sample_of(Packing(packing.position, packing.radius, cell=cell))
+    assert cell_doubt(whole, "nothing", always=True) == ""
