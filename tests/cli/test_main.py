@@ -72,6 +72,22 @@ def test_wrong_usage_is_exit_code_2_and_one_message(args: list[str], message: st
     assert "Traceback" not in answer.stderr
 
 
+@pytest.mark.parametrize(
+    ("word", "hint"),
+    [
+        ("computee", "No such command 'computee'. Did you mean 'compute'?"),
+        ("nonsense", "No such command 'nonsense'. Choose from compute, compare, inspect"),
+    ],
+)
+def test_a_command_that_does_not_exist_gets_a_suggestion(
+    word: str, hint: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from scanfab.cli.main import run
+
+    assert run([word]) == 2
+    assert hint in capsys.readouterr().err
+
+
 def test_missing_source_is_wrong_usage() -> None:
     answer = scanfab("compute", "nowhere")
     assert answer.returncode == 2
@@ -158,6 +174,24 @@ def test_interrupt_is_exit_code_130(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(main.cli, "main", interrupted)
     assert main.run(["compute"]) == 130
+
+
+def test_what_a_command_says_of_its_state_is_told_where_it_is_interrupted(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """And is gone with the next command."""
+    from scanfab.cli import main
+
+    def interrupted(*_: object, **__: object) -> None:
+        main.tell_when_ended(lambda: " after 3 of 5 frames")
+        raise main.Terminated
+
+    monkeypatch.setattr(main.cli, "main", interrupted)
+    assert main.run(["compute"]) == 143
+    assert capsys.readouterr().err == "scanfab: terminated after 3 of 5 frames\n"
+    monkeypatch.setattr(main.cli, "main", lambda *_, **__: 0)
+    assert main.run(["formats"]) == 0
+    assert main._standing is None
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
