@@ -183,6 +183,7 @@ def compute(
     """
     from scanfab.cli.console import announce_compiling, is_readable, reported_warnings
     from scanfab.cli.main import tell_when_ended
+    from scanfab.errors import ScanfabError
     from scanfab.manifest import asked_for
     from scanfab.settings import Settings
     from scanfab.table import Row
@@ -216,7 +217,12 @@ def compute(
                 asked = run.go_on(result, asked)
         printed = not is_readable()
         tell_when_ended(lambda: _standing(run, output, printed))
-        _write(run, asked, result, excerpt)
+        try:
+            _write(run, asked, result, excerpt)
+        except (ScanfabError, OSError):
+            if result is not None and run.done:
+                click.echo(f"scanfab: stopped{_standing(run, output, printed)}", err=True)
+            raise
         tell_when_ended(None)
         for path in _manifests(output, manifest_path):
             _write_manifest(path, asked, run, told, settings_file)
@@ -257,11 +263,11 @@ def _draw(plot: Path, figure: str | None, run: Run) -> None:
 
 def _standing(run: Run, output: Path | None, printed: bool) -> str:
     """What to add where an interruption is told: how far the run is, and how to go on."""
+    if not run.done:
+        return " before the first frame was finished: nothing is kept"
     if output is None:
         kept = "the rows printed so far are all" if printed else "nothing is kept"
         return f"{run.standing()}; {kept}: with -o FILE, --resume could go on"
-    if not run.done:
-        return " before the first frame was finished: nothing is kept"
     again = "the same command" if run.resume else "the same command with --resume"
     return f"{run.standing()}; {again} goes on"
 
