@@ -269,7 +269,7 @@ def _write_or_say(
         _write(run, asked, result, excerpt)
     except (ScanfabError, OSError):
         if result is not None and run.done:
-            click.echo(f"scanfab: stopped{standing()}", err=True)
+            click.echo(f"scanfab: stopped {standing()}", err=True)
         raise
     tell_when_ended(None)
 
@@ -277,7 +277,7 @@ def _write_or_say(
 def _standing(run: Run, in_file: bool, printed: bool) -> str:
     """How far a run is, and how to go on."""
     if not run.done:
-        return " before the first frame was finished: nothing is kept"
+        return "before the first frame was finished: nothing is kept"
     if not in_file:
         kept = "the rows printed so far are all" if printed else "nothing is kept"
         return f"{run.standing()}; {kept}: with -o FILE, --resume could go on"

@@ -102,7 +102,7 @@ class Run:
 
     def standing(self) -> str:
         """How many frames are finished, for the sentence that tells of an interruption."""
-        return f" after {self.done} of {max(self.frames(), self.done)} frames"
+        return f"after {self.done} of {max(self.frames(), self.done)} frames"
 
     def rows(self) -> Iterator[Row]:
         """The rows behind those of FILE.part."""

@@ -183,7 +183,7 @@ def test_what_a_command_says_of_its_state_is_told_where_it_is_interrupted(
     from scanfab.cli import main
 
     def interrupted(*_: object, **__: object) -> None:
-        main.tell_when_ended(lambda: " after 3 of 5 frames")
+        main.tell_when_ended(lambda: "after 3 of 5 frames")
         raise main.Terminated
 
     monkeypatch.setattr(main.cli, "main", interrupted)
