@@ -264,7 +264,7 @@ def _write_or_say(
     def standing() -> str:
         return _standing(run, result is not None, printed)
 
-    tell_when_ended(standing)
+    tell_when_ended(lambda: f" {standing()}")
     try:
         _write(run, asked, result, excerpt)
     except (ScanfabError, OSError):

@@ -127,7 +127,7 @@ def _imports(frame: FrameType | None) -> bool:
 
 def _report_end(number: int) -> int:
     """Say that a signal ended the process; the exit code for that."""
-    click.echo(f"scanfab: {ENDED[number]}{f' {_standing()}' if _standing else ''}", err=True)
+    click.echo(f"scanfab: {ENDED[number]}{_standing() if _standing else ''}", err=True)
     return 128 + number
 
 

@@ -176,24 +176,6 @@ def test_interrupt_is_exit_code_130(monkeypatch: pytest.MonkeyPatch) -> None:
     assert main.run(["compute"]) == 130
 
 
-def test_what_a_command_says_of_its_state_is_told_where_it_is_interrupted(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """And is gone with the next command."""
-    from scanfab.cli import main
-
-    def interrupted(*_: object, **__: object) -> None:
-        main.tell_when_ended(lambda: "after 3 of 5 frames")
-        raise main.Terminated
-
-    monkeypatch.setattr(main.cli, "main", interrupted)
-    assert main.run(["compute"]) == 143
-    assert capsys.readouterr().err == "scanfab: terminated after 3 of 5 frames\n"
-    monkeypatch.setattr(main.cli, "main", lambda *_, **__: 0)
-    assert main.run(["formats"]) == 0
-    assert main._standing is None
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
 @pytest.mark.parametrize(
     ("sent", "code", "word"), [("SIGINT", 130, "interrupted"), ("SIGTERM", 143, "terminated")]
