@@ -24,6 +24,20 @@ output, everything else to standard error. Exit codes: 0 done; 1 a failure, or n
 fabric; 2 wrong usage; 130 interrupted. With `-o FILE` the rows go to `FILE.part`, which becomes
 `FILE` at the end: `FILE` is complete or untouched.
 
+`--resume` goes on with the `FILE.part` of an interrupted run. With a complete `FILE` it takes its
+rows and computes only what is missing: frames that were written later, other `--frames`, frames
+that were skipped. The result has the bytes of one run over all of them. That needs
+`FILE.manifest.json`, the same settings (but `--workers` and `--frames`) and the same inputs.
+Without `--resume` a run starts afresh, and a `FILE.part` that holds rows is kept under another
+name.
+
+A file `scanfab.toml` beside the dumps holds options of `scanfab compute` in its section
+`[compute]`, as `boundary = "mask=3"`. Every command takes those that it has and that its line
+does not name, and says which.
+
+Shells complete commands, options and choices: `eval "$(_SCANFAB_COMPLETE=bash_source scanfab)"`
+in `~/.bashrc` (`zsh_source`, `fish_source` for others).
+
 Lengths are in the dump's own units; nothing is converted. `rmin`, `rmean` and `rmax` are the
 smallest, mean and largest radius of the grains, without the boundary, in the first frame of the
 series that has grains.

@@ -8,6 +8,7 @@ import shlex
 import pytest
 
 from scanfab.cli.compute import compute
+from scanfab.cli.main import run
 from scanfab.errors import ReadError
 from scanfab.manifest import asked_for
 from scanfab.rerun import read_manifest, reopen, repeat_command, restored_settings
@@ -103,3 +104,18 @@ def test_what_is_no_manifest_is_an_error(tmp_path, text):
 
 def test_no_manifest_is_none(tmp_path):
     assert read_manifest(tmp_path / "t.csv") is None
+
+
+def test_columns_and_digits_are_repeated(tmp_path, monkeypatch):
+    """The command of the manifest gives the same bytes."""
+    monkeypatch.chdir(ROOT)
+    table, again = tmp_path / "table.csv", tmp_path / "again.csv"
+    words = [SAMPLE, "--boundary", "mask=3", "--frames", "0", "--directions", "9"]
+    words += ["--spacing", "1rmin", "--fields", "frame,variant,alpha_vs_axial", "--digits", "4"]
+    assert run(["compute", *words, "-o", str(table)]) == 0
+    asked = read_manifest(table)["settings"]
+    command = shlex.split(repeat_command(asked, str(again)))
+    assert run(command[1:]) == 0
+    assert again.read_bytes() == table.read_bytes()
+    assert table.read_text().startswith("frame,variant,alpha_vs_axial\n")
+    assert restored_settings(asked).seed == 0

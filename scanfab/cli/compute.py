@@ -181,8 +181,7 @@ def compute(
     Variants: a whole sample; b whole sample, rattlers removed; c representative volume (RV); d RV,
     rattlers removed. Lengths are in the dump's own units.
     """
-    from scanfab.cli.console import announce_compiling, is_readable, reported_warnings
-    from scanfab.cli.signals import telling
+    from scanfab.cli.console import announce_compiling, reported_warnings
     from scanfab.manifest import asked_for
     from scanfab.settings import Settings
     from scanfab.table import Row
@@ -214,9 +213,7 @@ def compute(
         if resume and result is not None:
             with usage_errors():
                 asked = run.go_on(result, asked)
-        printed = not is_readable()
-        with telling(lambda: _standing(run, output, printed)):
-            _write(run, asked, result, excerpt)
+        _write_or_say(run, asked, result, excerpt)
         for path in _manifests(output, manifest_path):
             _write_manifest(path, asked, run, told, settings_file)
         if plot is not None:
@@ -254,13 +251,35 @@ def _draw(plot: Path, figure: str | None, run: Run) -> None:
         plot_rows(plot, run.kept, figure)
 
 
-def _standing(run: Run, output: Path | None, printed: bool) -> str:
-    """What to add where an interruption is told: how far the run is, and how to go on."""
-    if output is None:
-        kept = "the rows printed so far are all" if printed else "nothing is kept"
-        return f"{run.standing()}; {kept}: with -o FILE, --resume could go on"
+def _write_or_say(
+    run: Run, asked: dict[str, Any], result: ResultFile | None, excerpt: Excerpt
+) -> None:
+    """Write the rows; where that is interrupted or fails, say how far it is and how to go on."""
+    from scanfab.cli.console import is_readable
+    from scanfab.cli.signals import telling
+    from scanfab.errors import ScanfabError
+
+    printed = not is_readable()
+
+    def standing() -> str:
+        return _standing(run, result is not None, printed)
+
+    try:
+        with telling(standing):
+            _write(run, asked, result, excerpt)
+    except (ScanfabError, OSError):
+        if result is not None and run.done:
+            click.echo(f"scanfab: stopped {standing()}", err=True)
+        raise
+
+
+def _standing(run: Run, in_file: bool, printed: bool) -> str:
+    """How far a run is, and how to go on."""
     if not run.done:
         return "before the first frame was finished: nothing is kept"
+    if not in_file:
+        kept = "the rows printed so far are all" if printed else "nothing is kept"
+        return f"{run.standing()}; {kept}: with -o FILE, --resume could go on"
     again = "the same command" if run.resume else "the same command with --resume"
     return f"{run.standing()}; {again} goes on"
 

@@ -32,8 +32,11 @@ def telling(words: Callable[[], str]) -> Iterator[None]:
     _more.append(words)
     try:
         yield
-    finally:
+    except Exception:
         _more.remove(words)
+        raise
+    # where KeyboardInterrupt ended the block, run() still has to say them
+    _more.remove(words)
 
 
 def interrupted_words(number: int) -> str:

@@ -72,6 +72,22 @@ def test_wrong_usage_is_exit_code_2_and_one_message(args: list[str], message: st
     assert "Traceback" not in answer.stderr
 
 
+@pytest.mark.parametrize(
+    ("word", "hint"),
+    [
+        ("computee", "No such command 'computee'. Did you mean 'compute'?"),
+        ("nonsense", "No such command 'nonsense'. Choose from compute, compare, inspect"),
+    ],
+)
+def test_a_command_that_does_not_exist_gets_a_suggestion(
+    word: str, hint: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from scanfab.cli.main import run
+
+    assert run([word]) == 2
+    assert hint in capsys.readouterr().err
+
+
 def test_missing_source_is_wrong_usage() -> None:
     answer = scanfab("compute", "nowhere")
     assert answer.returncode == 2

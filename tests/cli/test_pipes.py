@@ -12,6 +12,7 @@ import time
 
 import pytest
 
+from scanfab.cli.main import run
 from tests.dumps import cubic_rows, dump_text, write
 from tests.interruptions import PROGRAM
 
@@ -84,18 +85,39 @@ def test_shells_get_a_completion_script(shell):
     assert done.returncode == 0
 
 
+def offered(words: str, current: str = "") -> set[str]:
+    """What bash offers for the word that is being typed."""
+    env = {
+        **os.environ,
+        "_SCANFAB_COMPLETE": "bash_complete",
+        "COMP_WORDS": f"{words} {current}",
+        "COMP_CWORD": str(len(words.split())),
+    }
+    done = subprocess.run(PROGRAM, env=env, capture_output=True, text=True, check=False)
+    return set(done.stdout.split())
+
+
 def test_commands_and_options_are_completed():
-    found = {}
-    for words, current in (("scanfab co", "co"), ("scanfab compute --tol", "--tol")):
-        env = {
-            **os.environ,
-            "_SCANFAB_COMPLETE": "bash_complete",
-            "COMP_WORDS": words,
-            "COMP_CWORD": str(len(words.split()) - 1),
-        }
-        done = subprocess.run(PROGRAM, env=env, capture_output=True, text=True, check=False)
-        found[current] = {line.split(",")[1] for line in done.stdout.split()}
-    assert found == {"co": {"compute", "compare"}, "--tol": {"--tolerance"}}
+    assert offered("scanfab", "co") == {"plain,compute", "plain,compare"}
+    assert offered("scanfab compute", "--tol") == {"plain,--tolerance"}
+
+
+@pytest.mark.parametrize(
+    ("words", "current", "found"),
+    [
+        ("compute --on-error", "", {"plain,stop", "plain,skip"}),
+        ("compute --strain", "ce", {"plain,cell", "file,ce"}),
+        ("compute --contacts", "g", {"plain,geometric", "file,g"}),
+        ("inspect --format", "l", {"plain,lammps", "plain,liggghts"}),
+        ("compute --figure", "ro", {"plain,rose"}),
+        ("compare --figure", "ev", {"plain,evolution"}),
+        ("calibrate --variants", "c", {"plain,cd", "plain,c"}),
+        ("compute --directions", "le", {"plain,lebedev:"}),
+        ("view --axis", "", {"plain,x", "plain,y", "plain,z"}),
+    ],
+)
+def test_choices_are_completed(words, current, found):
+    assert offered(f"scanfab {words}", current) == found
 
 
 @pytest.mark.parametrize("word", ["--help", "--version"])
@@ -118,3 +140,37 @@ def test_head_ends_a_computation_quietly(tmp_path):
     done = subprocess.run(["sh", "-c", line], capture_output=True, text=True, check=False)
     assert len(done.stdout.splitlines()) == 1
     assert done.stderr == ""
+
+
+@pytest.mark.parametrize("command", ["compute", "calibrate"])
+def test_a_dash_is_standard_output_as_csv(packed, monkeypatch, capsys, command):
+    """On a terminal too, which gets a readable table without it."""
+    words = [command, str(packed), "--variants", "c", "--cutoff", "0.2rmin", "--tolerance", "0.1"]
+    words += ["--max-chords", "1e5"]
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+    assert run([*words, "-o", "-"]) == 0
+    rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
+    assert {row["variant"] for row in rows} == {"c"}
+    assert not os.path.exists("-")
+
+
+def test_a_dash_goes_with_columns_and_digits_and_is_compared(packed, capsys, tmp_path):
+    words = ["compute", str(packed), *FAST, "--digits", "3", "-o", "-"]
+    assert run(words) == 0
+    table = write(tmp_path / "table.csv", capsys.readouterr().out)
+    fields = ["--fields", "variant,frame,alpha_vs_axial", "--digits", "2"]
+    assert run(["compare", str(table), *fields, "-o", "-"]) == 0
+    rows = list(csv.DictReader(io.StringIO(capsys.readouterr().out)))
+    assert list(rows[0]) == ["variant", "frame", "alpha_vs_axial"]
+    for row in rows:
+        assert float(row["alpha_vs_axial"]) == float(f"{float(row['alpha_vs_axial']):.2g}")
+
+
+def test_a_dash_cannot_be_gone_on_with(packed, capsys):
+    assert run(["compute", str(packed), "-o", "-", "--resume"]) == 2
+    assert "--resume goes with -o FILE" in capsys.readouterr().err
+
+
+def test_a_column_that_does_not_exist_is_wrong_usage(packed, capsys):
+    assert run(["compute", str(packed), "--fields", "frame,alpha_v"]) == 2
+    assert "fields: there is no column 'alpha_v': did you mean alpha_vs?" in capsys.readouterr().err

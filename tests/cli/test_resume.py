@@ -229,3 +229,20 @@ def test_frames_that_an_earlier_run_skipped_are_not_forgotten(short_series, tmp_
 def test_resume_needs_a_file(short_series, capsys):
     assert run(["compute", str(short_series), "--resume"]) == 2
     assert "--resume goes with -o FILE" in capsys.readouterr().err
+
+
+def test_an_error_says_how_to_go_on_too(short_series, tmp_path, capsys):
+    """Once the broken dump is mended."""
+    dumps = shutil.copytree(short_series, tmp_path / "dumps")
+    broken = dumps / "dump_200.txt"
+    good = broken.read_text()
+    broken.write_text("ITEM: TIMESTEP\n")
+    output, whole = tmp_path / "table.csv", tmp_path / "whole.csv"
+    words = ["compute", str(dumps), *FAST, "-o"]
+    assert run([*words, str(output), "--workers", "1"]) == 1
+    told = capsys.readouterr().err
+    assert "stopped after 2 of 4 frames; the same command with --resume goes on\n" in told
+    assert told.splitlines()[-1].startswith("scanfab: error: ")
+    broken.write_text(good)
+    assert run([*words, str(output), "--resume"]) == run([*words, str(whole)]) == 0
+    assert output.read_bytes() == whole.read_bytes()
