@@ -35,9 +35,9 @@ GROWTH = 4.0
 SMALLEST_ROUND = 1.1
 # By how much the expected error must be below the tolerance: then that of the replicates, which is
 # reported, is seldom above it, and a scan that goes on until it is below picks few errors that are
-# too small by chance. The error of 16 replicates is uncertain by 18 %: where their number is fixed
-# the margin is wider, while more replicates make the error surer.
-MARGIN, MARGIN_OF_FIXED = 1.1, 1.3
+# too small by chance. Where replicates can be added this makes the error surer; where their number R
+# is fixed it stays uncertain by a part of 1/√(2(R - 1)), so many of which the margin leaves.
+MARGIN, SIGMAS = 1.1, 1.6
 # of the smallest radius: directions that are empty with lines so close cannot be filled
 CLOSEST = 0.05
 # fraction of the directions of a replicate that may keep no segment before lines are set closer
@@ -237,7 +237,9 @@ def missing_work(sums: ScanSums, plan: Plan, settings: Settings) -> float:
     The one rule for all scans that are chosen by their error: ``auto`` ones, and those that a
     calibration recommends.
     """
-    margin = MARGIN if plan.auto == "replicates" else MARGIN_OF_FIXED
+    margin = MARGIN
+    if plan.auto != "replicates" and sums.replicates > 1:
+        margin = 1.0 + SIGMAS / math.sqrt(2.0 * (sums.replicates - 1))
     missing = expected = 0.0
     for variant in settings.variants:
         length, segments = sums.kept(variant)

@@ -250,18 +250,23 @@ class _Calibrator:
     def _recommended(
         self, spacings: list[StepRow], directions: list[StepRow], target: float
     ) -> tuple[list[StepRow], dict[str, str]]:
-        """Steady spacing and directions, and more of the latter until the error is surely met."""
+        """
+        Steady spacing and directions, and more of the latter until the error is surely met.
+
+        They are chosen along other lines than those that tell what they reach: whoever repeats the
+        scan with lines of their own must not find a larger error.
+        """
         spacing = min(first_steady(spacings) or PAPER_SPACING, FIXED_SPACING)
         rule = direction_rule(str(int(first_steady(directions) or len(direction_rule(AUTO_RULE)))))
-        rows: list[StepRow] = []
         for _ in range(ROUNDS):
             settings = replace(
                 self.settings,
                 spacing=Length(spacing, "rmin"),
                 directions=rule,
                 tolerance=target,
+                seed=self.settings.seed + 1,
             )
-            rows, found = self._measured("recommended", len(rule), settings)
+            found = self._measured("recommended", len(rule), settings)[1]
             missing = missing_work(found.sums, found.plan, settings)
             if missing <= 1.0:
                 break
@@ -269,6 +274,8 @@ class _Calibrator:
             if wanted > MOST_DIRECTIONS:
                 spacing = float(f"{spacing * math.sqrt(MOST_DIRECTIONS / wanted):.2g}")
             rule = direction_rule(str(min(math.ceil(wanted), MOST_DIRECTIONS)))
+        settings = replace(self.settings, spacing=Length(spacing, "rmin"), directions=rule)
+        rows = self._measured("recommended", len(rule), settings)[0]
         return rows, {"spacing": f"{spacing:g}rmin", "directions": rule.name}
 
 

@@ -19,6 +19,8 @@ __all__ = ["CLOSE", "GROWTH_WITH_SPACING", "Plan", "make_plan", "rv_of"]
 
 # replicates of a fixed scan, and at least of an auto scan
 REPLICATES = 16
+# and at most of one whose directions are added until its error, as these tell it, is small enough
+MOST_REPLICATES = 64
 # lines of one axis below which a replicate's mean lengths are too uncertain to be of use
 FEWEST_LINES = 30
 # segments for a standard error of 1, at a spacing of the mean radius, and the power of the spacing
@@ -100,10 +102,9 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
             f"scan ({reach:g}): choose a wider spacing"
         )
     lines = math.pi * reach**2 / asked**2
-    replicates = int(min(max(lines / FEWEST_LINES, 1), REPLICATES))
     auto = "directions" if settings.directions is None else ""
-    if auto:
-        replicates = REPLICATES
+    fewest, most = (REPLICATES, MOST_REPLICATES) if auto else (1, REPLICATES)
+    replicates = int(min(max(lines / FEWEST_LINES, fewest), most))
     return Plan(window, cutoff, cutoffs, rule, asked * math.sqrt(replicates), replicates, auto)
 
 
