@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from scanfab.errors import SettingsError
 from scanfab.fabric.jackknife import BLOCKS, jackknife_error
+from scanfab.selection import check_rows
 
 __all__ = [
     "DIFFERENCE_MEANINGS",
@@ -26,13 +27,6 @@ __all__ = [
 
 FloatArray = npt.NDArray[np.float64]
 
-NEEDED = ("source", "frame", "strain", "variant", "alpha_vs_axial", "alpha_c_axial")
-WITHOUT = tuple(
-    f"{name}_without_{block}"
-    for name in ("alpha_vs_axial", "alpha_c_axial")
-    for block in range(1, BLOCKS + 1)
-)
-NUMBERS = ("frame", "strain", "alpha_vs_axial", "alpha_c_axial", "alpha_vs_axial_se", *WITHOUT)
 # with fewer points a line says nothing
 FEWEST_FRAMES = 3
 
@@ -174,36 +168,21 @@ def _grouped(
     rows: Iterable[Mapping[str, Any]],
 ) -> dict[tuple[str, str], list[Mapping[str, Any]]]:
     """Rows by source and variant, in the order of their first appearance."""
+    rows = list(rows)
+    check_rows(rows)
     groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
-    for number, row in enumerate(rows, start=1):
-        missing = [name for name in NEEDED if name not in row]
-        if missing:
-            raise SettingsError(
-                f"the table has no column {', '.join(missing)}: "
-                f"expected a table of scanfab compute, found the columns {', '.join(row)}"
-            )
-        _check_values(number, row)
+    for row in rows:
         groups.setdefault((row["source"], row["variant"]), []).append(row)
     for (source, variant), group in groups.items():
-        frames = [row["frame"] for row in group if row["frame"] is not None]
+        frames = [row["frame"] for row in group]
         if len(set(frames)) < len(frames):
             twice = next(frame for frame in frames if frames.count(frame) > 1)
             raise SettingsError(
                 f"{source}, variant {variant}: several rows for frame {twice}: choose the rows of "
-                f"one cut-off and of one run"
+                f"one cut-off with --cutoff; two runs of one sample are told apart by "
+                f"--label NAME, once for each table"
             )
     return groups
-
-
-def _check_values(number: int, row: Mapping[str, Any]) -> None:
-    """Tables come from anywhere: a word among the numbers is an error that says where."""
-    for name in ("source", "variant"):
-        if not isinstance(row[name], str):
-            raise SettingsError(f"row {number}: {name}: expected a name, found {row[name]!r}")
-    for name in NUMBERS:
-        value = row.get(name)
-        if value is not None and not (isinstance(value, int | float) and math.isfinite(value)):
-            raise SettingsError(f"row {number}: {name}: expected a number, found {value!r}")
 
 
 def _normalised(group: Sequence[Mapping[str, Any]]) -> list[FrameRow]:

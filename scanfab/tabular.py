@@ -13,7 +13,7 @@ from typing import Any
 
 from scanfab.errors import ReadError
 
-__all__ = ["number_of", "numbers_of", "read_rows", "total_error"]
+__all__ = ["TEXT_COLUMNS", "is_number", "number_of", "numbers_of", "read_rows", "total_error"]
 
 TEXT_COLUMNS = ("source", "variant", "contacts_from")
 
@@ -58,12 +58,20 @@ def read_rows(path: Path | str) -> list[dict[str, Any]]:
     return _read_csv(path, text)
 
 
+def is_number(value: object) -> bool:
+    """Whether a value is a finite number: no truth value, and no integer beyond all floats."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
+
+
 def number_of(row: Mapping[str, Any], name: str) -> float | None:
     """A row's number in a column that need not exist; None for anything else there."""
     value = row.get(name)
-    if isinstance(value, int | float) and math.isfinite(value):
-        return float(value)
-    return None
+    return float(value) if is_number(value) else None  # type: ignore[arg-type]
 
 
 def numbers_of(rows: Iterable[Mapping[str, Any]], name: str) -> list[float]:
@@ -99,7 +107,7 @@ def total_error(row: Mapping[str, Any], name: str) -> float | None:
 def _parse(path: Path | str, text: str) -> Any:
     try:
         return json.loads(text)
-    except (json.JSONDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # also an integer of too many digits
         raise ReadError(f"{path}: cannot be read as JSON: {error}") from None
 
 

@@ -45,6 +45,7 @@ def test_a_table_without_rows_is_empty(tmp_path):
         (b"[{]", "cannot be read as JSON"),
         (b"[1, 2]", "expected JSON objects, one for each row"),
         (b"[" * 100_000, "cannot be read as JSON"),
+        (b'[{"a": ' + b"9" * 5000 + b"}]", "cannot be read as JSON"),
         (b"\xff\xfe\x00\x01", "expected a table as text or Parquet, found other bytes"),
         (b"PAR1 and nothing else", "cannot be read as Parquet"),
     ],

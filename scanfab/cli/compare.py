@@ -34,6 +34,19 @@ BARS = " ▁▂▃▄▅▆▇█"
 @click.option(
     "--strain-max", type=float, metavar="X", help="Leave frames beyond this strain out of the fits."
 )
+@click.option(
+    "--cutoff",
+    type=float,
+    metavar="C",
+    help="Take the rows of this cut-off from tables of several; in the tables' unit.",
+)
+@click.option(
+    "--label",
+    "labels",
+    multiple=True,
+    metavar="NAME",
+    help="Name of a table in place of its source, once a table, in their order.",
+)
 @output_option
 @plot_option
 @click.option(
@@ -46,6 +59,8 @@ def compare(
     summary: bool,
     differences: bool,
     strain_max: float | None,
+    cutoff: float | None,
+    labels: tuple[str, ...],
     output: Path | None,
     plot: Path | None,
     figure: str | None,
@@ -61,17 +76,21 @@ def compare(
     from scanfab.compare import compare_tables
     from scanfab.errors import SettingsError
     from scanfab.figures import TABLE_FIGURES, plot_rows
+    from scanfab.selection import choose_rows
     from scanfab.tabular import read_rows
     from scanfab.writers.rows import check_suffix
 
     check_plot(plot, figure, TABLE_FIGURES)
     if summary and differences:
         raise click.UsageError("--summary and --differences are two tables: ask for one of them")
+    if labels and len(labels) != len(tables):
+        raise click.UsageError(f"--label: expected one a table: {len(tables)}, found {len(labels)}")
     if output is not None:
         with usage_errors():
             check_suffix(output)
     with reported_warnings():
-        rows = [row for table in tables for row in read_rows(table)]
+        read = [(table, read_rows(table)) for table in tables]
+        rows = [row for one in choose_rows(read, cutoff, labels) for row in one]
         comparison = compare_tables(rows, strain_max=strain_max)
         chosen: Sequence[Any] = comparison.frames
         if summary:

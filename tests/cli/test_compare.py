@@ -82,6 +82,44 @@ def test_the_tables_of_compute_are_read_in_every_format(tmp_path, compare, suffi
     assert {abs(float(row["alpha_vs_axial_norm"])) for row in rows} == {1.0}
 
 
+def test_the_rows_of_one_cutoff_are_chosen(tmp_path, compare, capsys):
+    rows = [{**row, "cutoff": c, "frame": row["frame"]} for row in curve() for c in (0.0, 0.5, 1.0)]
+    given = table(tmp_path, rows)
+    assert run(["compare", given]) == 1
+    assert "choose the rows of one cut-off with --cutoff" in capsys.readouterr().err
+    assert len(compare(given, "--cutoff", "0.5")) == 5
+    assert run(["compare", given, "--cutoff", "0.7"]) == 1
+    assert "no row has the cut-off 0.7: expected one of the table's: 0, 0.5, 1" in (
+        capsys.readouterr().err
+    )
+
+
+def test_labels_name_the_tables(tmp_path, compare, capsys):
+    given = [table(tmp_path, curve(factor=k), f"{k}.jsonl") for k in (1.0, 2.0)]
+    assert run(["compare", *given]) == 1
+    assert "--label NAME, once for each table" in capsys.readouterr().err
+    rows = compare(*given, "--summary", "--label", "coarse", "--label", "fine")
+    assert [row["source"] for row in rows] == ["coarse", "fine"]
+    assert run(["compare", *given, "--label", "coarse"]) == 2
+    assert "--label: expected one a table: 2, found 1" in capsys.readouterr().err
+
+
+def test_the_same_table_twice_counts_once(tmp_path, compare, capsys):
+    given = table(tmp_path, curve())
+    assert run(["compare", given, given]) == 0
+    printed = capsys.readouterr()
+    assert len(printed.out.splitlines()) == 6
+    assert printed.err.count("warning") == 1
+    assert "rows of one that" in printed.err
+
+
+def test_a_table_of_compare_is_called_so(tmp_path, capsys):
+    given, output = table(tmp_path, curve()), tmp_path / "compared.csv"
+    assert run(["compare", given, "-o", str(output)]) == 0
+    assert run(["compare", str(output)]) == 1
+    assert f"{output}: this is a table of scanfab compare: " in capsys.readouterr().err
+
+
 def test_a_dash_is_standard_input(tmp_path, compare, monkeypatch):
     data = Path(table(tmp_path, curve())).read_bytes()
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(data)))
@@ -98,7 +136,7 @@ def test_tables_without_a_void_fabric_are_exit_code_1(tmp_path, capsys):
     ("text", "words", "message"),
     [
         ("source,frame\n", [], "there is nothing to compare: the tables hold no frames"),
-        ("a,b\n1,2\n", [], "the table has no column source, frame"),
+        ("a,b\n1,2\n", [], "there is no column source, frame"),
         ("a,b\n1\n", [], "line 2: expected 2 cells, found 1"),
         (json.dumps(curve()[0]), ["--differences"], "hold no two variants of one frame"),
     ],
