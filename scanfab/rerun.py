@@ -14,9 +14,18 @@ from scanfab.opening import open_sources
 from scanfab.series import Series
 from scanfab.settings import Settings
 
-__all__ = ["read_manifest", "reopen", "repeat_command", "restored_settings", "spelt_settings"]
+__all__ = [
+    "READING",
+    "read_manifest",
+    "reopen",
+    "repeat_command",
+    "restored_settings",
+    "spelt_settings",
+]
 
 READING = ("format", "columns", "contact_columns", "radius", "cell", "periodic", "contacts")
+# a manifest may say more than what the command line takes
+OPTIONS = (*READING, *Settings.__dataclass_fields__)
 
 
 def read_manifest(table: Path) -> dict[str, Any] | None:
@@ -76,7 +85,7 @@ def repeat_command(asked: Mapping[str, Any], output: str | None = None) -> str:
     usual = spelt_settings(asked_for((), {"contacts": "auto"}, Settings.make()))
     words = ["scanfab", "compute", *map(str, asked["sources"])]
     for name, value in spelt_settings(asked).items():
-        if usual.get(name) != value:
+        if name in OPTIONS and usual.get(name) != value:
             option = f"--{name.replace('_', '-')}"
             words += _words(option, name, value)
     if output is not None:
@@ -142,13 +151,19 @@ def _spell(name: str, value: Any) -> Any:
         raise TypeError
     if name == "axis" and isinstance(value, list):
         return ",".join(map(_number, value))
+    if name == "cutoffs" and isinstance(value, list):
+        return ",".join(_length(one) for one in value)
     if isinstance(value, dict) and {"value", "unit"} <= set(value):
-        return f"{_number(value['value'])}{value['unit']}"
+        return _length(value)
     if name == "boundary":
         return tuple(str(rule["text"]) for rule in value)
     if isinstance(value, list):
         return tuple(value)
     return value
+
+
+def _length(value: Mapping[str, Any]) -> str:
+    return f"{_number(value['value'])}{value['unit']}"
 
 
 def _words(option: str, name: str, value: Any) -> list[str]:
