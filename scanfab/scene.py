@@ -81,7 +81,9 @@ class Scene:
 def scene_of(sample: Sample, window: SphereWindow | None) -> Scene:
     """The grains of a frame and its RV."""
     chosen = sample.grains if sample.grains.any() else np.ones(len(sample.packing), bool)
-    center = sample.packing.position[chosen].mean(axis=0) if window is None else window.center
+    center = np.zeros(3) if window is None else window.center
+    if window is None and len(sample.packing):
+        center = sample.packing.position[chosen].mean(axis=0)
     cell = sample.packing.cell if sample.packing.is_periodic else None
     radius = None if window is None else window.radius
     return Scene(grains_of(sample, window), center, radius, cell=cell)

@@ -25,7 +25,10 @@ def test_a_biased_rule_is_told_with_its_bias():
 @pytest.mark.parametrize(
     ("values", "part"),
     [
-        ({"alpha_vs_axial_se": None}, "no standard error of the scan: it was made of one replicate"),
+        (
+            {"alpha_vs_axial_se": None},
+            "standard error of the scan: it was made of one replicate",
+        ),
         ({"alpha_vs_axial": None}, "5 of 5 rows have no void fabric"),
         (
             {"alpha_vs_axial_se": 0.01, "alpha_vs_axial_sample_se": 1e-4},

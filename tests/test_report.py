@@ -44,7 +44,9 @@ def copied(computed, tmp_path, monkeypatch):
 @pytest.fixture
 def quick(monkeypatch):
     """Without the figures that take another scan."""
-    monkeypatch.setattr("scanfab.report_frames._pictures", lambda *_: [Picture("data:,", "none", 1)])
+    monkeypatch.setattr(
+        "scanfab.report_frames._pictures", lambda *_: [Picture("data:,", "none", 1)]
+    )
 
 
 def change(table: Path, **changes):

@@ -103,5 +103,6 @@ def _show(
     if cut:
         scene = replace(scene, lines=section_lines(scene, settings.axis))
     strain = "" if look.strain is None else f", axial strain {100 * look.strain:.3g} %"
-    title = f"{series.name}, frame {look.number}{strain}"
+    none = "" if look.sample.grains.any() else ", no grains"
+    title = f"{series.name}, frame {look.number}{strain}{none}"
     show_scene(scene, settings.axis, title, screenshot)
