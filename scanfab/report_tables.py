@@ -65,9 +65,8 @@ def results_tables(summary: Iterable[SummaryRow], rows: Sequence[Row]) -> list[P
 def _results(source: str, summary: Sequence[SummaryRow], rows: Sequence[Row]) -> Part:
     ends = [_ends(one, rows) for one in summary]
     first, last = [one[0] for one in ends], [one[1] for one in ends]
-    here, there = _where(last, "last"), _where(first, "first")
-    if here == there:
-        here, there = f"{here}, last frame", f"{there}, first frame"
+    strains = {number_of(row, "strain") for row in (*first, *last) if row}
+    here, there = _where("last", last, len(strains) > 1), _where("first", first, len(strains) > 1)
     lines = [
         (f"α_vs{here}", [_value(row, VOID) for row in last]),
         ("its error: scan", [_spell_error(number_of(row, f"{VOID}_se")) for row in last]),
@@ -97,13 +96,15 @@ def _ends(one: SummaryRow, rows: Sequence[Row]) -> tuple[Row, Row]:
     return (group[0], group[-1]) if group else ({}, {})
 
 
-def _where(rows: Sequence[Row], which: str) -> str:
+def _where(which: str, rows: Sequence[Row], by_strain: bool) -> str:
     """At which strain or in which frame, if it is the same for all variants."""
     row = next((row for row in rows if row), {})
     if not row or len({one["frame"] for one in rows if one}) > 1:
         return f", {which} frame that has one"
     strain = number_of(row, "strain")
-    return f", frame {row['frame']}" if strain is None else f" at {100 * strain:.3g} % strain"
+    if strain is None or not by_strain:
+        return f", frame {row['frame']}"
+    return f" at {100 * strain:.3g} % strain"
 
 
 def _value(row: Row, name: str) -> str:

@@ -152,16 +152,25 @@
       pen.font = "13px system-ui, sans-serif";
       pen.textAlign = "center";
       pen.textBaseline = "middle";
-      pen.strokeStyle = pen.fillStyle = TEXT;
-      pen.lineWidth = 1.5;
       for (const [name, x, y, z] of data.axes) {
         const [right, up] = place(x, y, z);
+        pen.strokeStyle = TEXT;
+        pen.lineWidth = 1.5;
         pen.beginPath();
         pen.moveTo(left, low);
         pen.lineTo(left + length * right, low - length * up);
         pen.stroke();
-        pen.fillText(name, left + 1.35 * length * right, low - 1.35 * length * up);
+        write(name, left + 1.35 * length * right, low - 1.35 * length * up);
       }
+    }
+
+    // with a white edge, to be read upon grains
+    function write(text, x, y) {
+      pen.strokeStyle = "#ffffff";
+      pen.lineWidth = 3;
+      pen.strokeText(text, x, y);
+      pen.fillStyle = TEXT;
+      pen.fillText(text, x, y);
     }
 
     // a bar with its length in the dump's unit, in the lower right corner
@@ -169,12 +178,13 @@
       const unit = scale / dense * 1000 / data.size;
       const length = rounded(110 / unit);
       const right = canvas.width / dense - 20, low = canvas.height / dense - 24;
+      pen.strokeStyle = TEXT;
       pen.lineWidth = 3;
       pen.beginPath();
       pen.moveTo(right - length * unit, low);
       pen.lineTo(right, low);
       pen.stroke();
-      pen.fillText(String(Number(length.toPrecision(1))), right - length * unit / 2, low - 12);
+      write(String(Number(length.toPrecision(1))), right - length * unit / 2, low - 12);
     }
 
     function redraw() {
