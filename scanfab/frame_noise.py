@@ -9,7 +9,7 @@ from dataclasses import asdict
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.distribution import sphere_points
+from scanfab.distribution import HIGHEST_DEGREE, sphere_points
 from scanfab.frame_figures import CONCENTRATION, ScannedFrames
 from scanfab.frame_result import FrameResult
 from scanfab.tabular import number_of, total_error
@@ -19,8 +19,11 @@ __all__ = ["noise_notes"]
 
 FloatArray = npt.NDArray[np.float64]
 
-# a distribution with the axial anisotropy α and no other deviates by 5 α of its mean at its axis
-LOBE = 5.0
+# a lobe is a sum of harmonics, each with √5 times the error of the axial anisotropy α: of the
+# sample those of the second degree, five, as it hardly differs in finer ones; of the scan all that
+# are fitted, as lines of different directions are independent
+SAMPLE_HARMONICS = 5
+SCAN_HARMONICS = sum(2 * degree + 1 for degree in range(2, HIGHEST_DEGREE + 1, 2))
 # where nothing but noise is, the largest lobe of a picture is 2 to 3 times its standard error
 CHANCE = 3.0
 
@@ -29,8 +32,7 @@ def noise_notes(frames: ScannedFrames, projections: Sequence[Projection]) -> str
     """
     What chance alone makes of the lobes of each frame, in words.
 
-    The error of a lobe is that of the axial anisotropy, of scan and sample together, as if it were
-    the same along every axis; of contacts it is that of the smoothed density.
+    The error of a lobe is of scan and sample together, as if it were the same in all directions.
     """
     notes = []
     for result, picture in zip(frames.results, projections, strict=True):
@@ -55,8 +57,12 @@ def _note(what: str, error: float, deviation: FloatArray) -> str:
 
 def void_noise(result: FrameResult) -> float | None:
     """Standard error of a lobe of the mean void length, per cent of the mean."""
-    error = total_error(asdict(result.rows[0]), "alpha_vs_axial")
-    return None if error is None else 100.0 * LOBE * error
+    row = asdict(result.rows[0])
+    scan, sample = (number_of(row, f"alpha_vs_axial_{part}") for part in ("se", "sample_se"))
+    if sample is None:
+        return None
+    parts = (SCAN_HARMONICS**0.5 * (scan or 0.0), SAMPLE_HARMONICS**0.5 * sample)
+    return 100.0 * 5.0**0.5 * math.hypot(*parts)
 
 
 def contact_noise(result: FrameResult) -> float | None:
