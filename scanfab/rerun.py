@@ -24,8 +24,6 @@ __all__ = [
 ]
 
 READING = ("format", "columns", "contact_columns", "radius", "cell", "periodic", "contacts")
-# a manifest may say more than what the command line takes
-OPTIONS = (*READING, *Settings.__dataclass_fields__)
 
 
 def read_manifest(table: Path) -> dict[str, Any] | None:
@@ -85,7 +83,7 @@ def repeat_command(asked: Mapping[str, Any], output: str | None = None) -> str:
     usual = spelt_settings(asked_for((), {"contacts": "auto"}, Settings.make()))
     words = ["scanfab", "compute", *map(str, asked["sources"])]
     for name, value in spelt_settings(asked).items():
-        if name in OPTIONS and usual.get(name) != value:
+        if usual.get(name) != value:
             option = f"--{name.replace('_', '-')}"
             words += _words(option, name, value)
     if output is not None:

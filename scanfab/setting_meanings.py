@@ -9,7 +9,8 @@ from scanfab.rerun import spelt_settings
 
 __all__ = ["SETTING_MEANINGS", "settings_table"]
 
-# of the options that read and of the fields of Settings; a test misses any that is not here
+# of the options that read, of the fields of Settings, and of those that write; a test misses any
+# that is not here
 SETTING_MEANINGS = {
     "format": "reader of the dumps; not given: found by their content",
     "columns": "names of columns that are not the usual ones",
@@ -37,6 +38,8 @@ SETTING_MEANINGS = {
     "frames": "which frames, as a Python slice",
     "seed": "of the random numbers; the same seed repeats the same numbers",
     "on_error": "what a frame that cannot be read does: stop, or skip it",
+    "fields": "columns of the table, where not all are written",
+    "digits": "significant digits of the numbers of the table",
 }
 
 
