@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import math
+import time
 import warnings
 from dataclasses import replace
 
@@ -14,8 +16,11 @@ from scanfab.fabric.void import void_fabric
 from scanfab.plan import CLOSE, GROWTH_WITH_SPACING, Plan
 from scanfab.scan import ScanSums, Solids, is_affordable, most_lines, scan_lines
 from scanfab.settings import Settings
+from scanfab.spelling import spelt_apart, spelt_time
 
-__all__ = ["scan_to_tolerance"]
+__all__ = ["missing_work", "scan_to_tolerance"]
+
+LOGGER = logging.getLogger("scanfab")
 
 # beyond these there is more overhead than scan
 MAX_REPLICATES = 16_384
@@ -28,18 +33,29 @@ FINEST = 21
 GROWTH = 4.0
 # and by this at least, so that there is something to do for several threads
 SMALLEST_ROUND = 1.1
-# by how much the expected error must be below the tolerance: then that of the replicates is seldom
-# above it, and a scan that goes on until it is below picks few that are too small
-MARGIN = 1.1
+# By how much the expected error must be below the tolerance: then that of the replicates, which is
+# reported, is seldom above it, and a scan that goes on until it is below picks few errors that are
+# too small by chance. The error of 16 replicates is uncertain by 18 %: where their number is fixed
+# the margin is wider, while more replicates make the error surer.
+MARGIN, MARGIN_OF_FIXED = 1.1, 1.3
 # of the smallest radius: directions that are empty with lines so close cannot be filled
 CLOSEST = 0.05
 # fraction of the directions of a replicate that may keep no segment before lines are set closer
 MOST_EMPTY = 0.005
+# a variant of fewer of its grains than the one is hardly a packing any more: it may ask for the
+# other times as many lines as the variants beside it, but not hold them back
+FEW_KEPT, HELD_BACK = 0.1, 10.0
+# behind these "at least" is all that can be said of the lines that are missing
+FAR_MORE = 1000
 
 
-def scan_to_tolerance(solids: Solids, plan: Plan, settings: Settings) -> tuple[ScanSums, Plan]:
+def scan_to_tolerance(
+    solids: Solids, plan: Plan, settings: Settings, where: str = "the frame"
+) -> tuple[ScanSums, Plan]:
     """
     Scan one frame as planned, and where the plan is ``auto``, on until the tolerance holds.
+
+    Progress goes to the logger ``scanfab``; ``where`` names the frame there and in warnings.
 
     Returns
     -------
@@ -53,6 +69,7 @@ def scan_to_tolerance(solids: Solids, plan: Plan, settings: Settings) -> tuple[S
     plan = _within_budget(plan, solids, settings)
     sums: ScanSums | None = None
     start, stop, spent = 0, plan.replicates, 0.0
+    begun = time.perf_counter()
     while True:
         batch = _scan(solids, plan, settings, range(start, stop))
         # a line costs as much as a chord, also if it meets nothing
@@ -61,19 +78,26 @@ def scan_to_tolerance(solids: Solids, plan: Plan, settings: Settings) -> tuple[S
         sums = batch if sums is None or start == 0 else ScanSums.concatenate([sums, batch])
         # as many replicates as the budget allows
         left = (settings.max_chords - spent) / max(float(sums.chords.mean()) + lines, 1.0)
-        missing = _missing_work(sums, plan, settings)
-        better = _better_plan(sums, plan, missing, solids, settings, left) if start == 0 else None
+        counted = _counted_variants(sums, plan, solids, settings, left)
+        missing = missing_work(sums, plan, counted)
+        rest = min(missing, settings.max_chords / spent) - 1.0
+        if rest > 0.0:
+            seconds = rest * (time.perf_counter() - begun)
+            _tell_progress(sums, plan, counted, where, seconds)
+        better = _better_plan(sums, plan, missing, solids, counted, left) if start == 0 else None
         if better is not None:
             plan = better
             continue
         if missing <= 1.0:
-            return sums, plan
+            break
         more = math.ceil(max(min(missing, GROWTH), SMALLEST_ROUND) * stop)
         more = min(more, MAX_REPLICATES, int(stop + left))
         if plan.auto == "directions" or more <= stop:
-            _warn_of_missed_tolerance(missing, spent, settings)
-            return sums, plan
+            _warn_of_missed_tolerance(missing, spent, settings, where)
+            break
         start, stop = stop, more
+    _warn_of_dropped_variants(sums, plan, counted, settings, where)
+    return sums, plan
 
 
 def _scan(solids: Solids, plan: Plan, settings: Settings, replicates: range) -> ScanSums:
@@ -161,6 +185,42 @@ def _width(solids: Solids) -> float:
     return float((high - low).max())
 
 
+def _counted_variants(
+    sums: ScanSums, plan: Plan, solids: Solids, settings: Settings, left: float
+) -> Settings:
+    """
+    The settings with the variants that the scan goes on for.
+
+    One that keeps but a few grains does not hold back the others, nor one whose tolerance is out of
+    reach of the budget, which allows so many more replicates; such are all variants, or none.
+    """
+    alone = {name: replace(settings, variants=name) for name in settings.variants}
+    missing = {name: missing_work(sums, plan, one) for name, one in alone.items()}
+    few = [name for name in missing if _kept_grains(solids, name) < FEW_KEPT]
+    usual = max((missing[name] for name in missing if name not in few), default=math.inf)
+    held_back = {
+        name
+        for name in few
+        if missing[name] > HELD_BACK * usual
+        or (usual < math.inf and _too_few_lines(sums, alone[name]))
+    }
+    # closer lines tell more than more of them; and early estimates of the error are uncertain
+    reach = GROWTH * (1.0 + left / sums.replicates) ** (1.0 + 0.5 * GROWTH_WITH_SPACING)
+    near = "".join(n for n in missing if n not in held_back and missing[n] <= reach)
+    return replace(settings, variants=near or settings.variants)
+
+
+def _kept_grains(solids: Solids, variant: str) -> float:
+    """The fraction of its window's grains that are solid in a variant."""
+    if variant in "ac":
+        return 1.0
+    removed = solids.removed if solids.medium is None else solids.medium.removed
+    if variant == "d":
+        inside = np.linalg.norm(solids.position, axis=1) < solids.window_radius
+        removed = solids.removed[inside]
+    return 1.0 - float(removed.mean()) if len(removed) else 1.0
+
+
 def _too_few_lines(sums: ScanSums, settings: Settings) -> bool:
     """Whether some variant keeps segments, but none in too many directions of a replicate."""
     for variant in settings.variants:
@@ -170,8 +230,14 @@ def _too_few_lines(sums: ScanSums, settings: Settings) -> bool:
     return False
 
 
-def _missing_work(sums: ScanSums, plan: Plan, settings: Settings) -> float:
-    """By what factor the lines must grow for every variant to meet the tolerance; <= 1: done."""
+def missing_work(sums: ScanSums, plan: Plan, settings: Settings) -> float:
+    """
+    By what factor the lines must grow for every variant to meet the tolerance; <= 1: done.
+
+    The one rule for all scans that are chosen by their error: ``auto`` ones, and those that a
+    calibration recommends.
+    """
+    margin = MARGIN if plan.auto == "replicates" else MARGIN_OF_FIXED
     missing = expected = 0.0
     for variant in settings.variants:
         length, segments = sums.kept(variant)
@@ -180,7 +246,7 @@ def _missing_work(sums: ScanSums, plan: Plan, settings: Settings) -> float:
             error = fabric.axial_error(settings.axis) or 0.0
             missing = max(missing, (error / settings.tolerance) ** 2)
             error = fabric.expected_error(settings.axis, plan.rule.degree) or error
-            expected = max(expected, (MARGIN * error / settings.tolerance) ** 2)
+            expected = max(expected, (margin * error / settings.tolerance) ** 2)
         elif segments.any() and plan.auto == "replicates" and sums.replicates < 256:
             # a direction without any segment may still get one
             return GROWTH
@@ -191,12 +257,48 @@ def _missing_work(sums: ScanSums, plan: Plan, settings: Settings) -> float:
     return max(expected, min(missing, 1.1))
 
 
-def _warn_of_missed_tolerance(factor: float, spent: float, settings: Settings) -> None:
+def _warn_of_missed_tolerance(factor: float, spent: float, settings: Settings, where: str) -> None:
     more = "at least " if factor >= GROWTH else ""
+    if factor > FAR_MORE:
+        more, factor = "more than ", FAR_MORE
     warnings.warn(
-        f"the scan stopped after {spent:.2g} chords before the tolerance {settings.tolerance:g} "
-        f"was met: alpha_vs_axial_se is what it reached; {more}{factor:.1f} times as many lines "
-        f"would be needed (--max-chords, --tolerance)",
+        f"{where}: the scan stopped after {spent:.2g} chords before the tolerance "
+        f"{settings.tolerance:g} was met: alpha_vs_axial_se is what it reached; {more}"
+        f"{factor:.4g} times as many lines would be needed (--max-chords, --tolerance)",
         ScanfabWarning,
         stacklevel=3,
     )
+
+
+def _warn_of_dropped_variants(
+    sums: ScanSums, plan: Plan, counted: Settings, settings: Settings, where: str
+) -> None:
+    """Say of variants that the scan did not go on for what they have reached."""
+    for name in settings.variants:
+        fabric = void_fabric(sums.axes, plan.rule.weights, *sums.kept(name))
+        error = math.inf if fabric is None else fabric.axial_error(settings.axis) or 0.0
+        if name in counted.variants or error <= settings.tolerance:
+            continue
+        reached, tolerance = spelt_apart(error, settings.tolerance)
+        said = f"alpha_vs_axial_se is {reached}, above the tolerance {tolerance}"
+        warnings.warn(
+            f"{where}, variant {name}: {said if fabric else 'there is no void fabric yet'}: it "
+            f"keeps few grains, or would need far more lines than the others (--variants {name} "
+            f"scans it alone)",
+            ScanfabWarning,
+            stacklevel=3,
+        )
+
+
+def _tell_progress(
+    sums: ScanSums, plan: Plan, settings: Settings, where: str, seconds: float
+) -> None:
+    """The largest error so far, and about how long the rest of the scan will take."""
+    if not LOGGER.isEnabledFor(logging.INFO):
+        return
+    fabrics = [
+        void_fabric(sums.axes, plan.rule.weights, *sums.kept(name)) for name in settings.variants
+    ]
+    errors = [one.axial_error(settings.axis) or 0.0 for one in fabrics if one is not None]
+    worst, tolerance = spelt_apart(max(errors, default=math.inf), settings.tolerance)
+    LOGGER.info("%s: error %s of %s, about %s", where, worst, tolerance, spelt_time(seconds))

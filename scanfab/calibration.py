@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
+from scanfab.adaptive import missing_work
 from scanfab.directions import direction_rule
 from scanfab.errors import PackingError, ScanfabWarning, SettingsError
 from scanfab.frame_result import frame_result
@@ -21,6 +23,7 @@ from scanfab.ladders import (
     sentence,
     sentence_of_recommended,
 )
+from scanfab.measurement import Measurement
 from scanfab.packing import Packing
 from scanfab.pipeline import boundary_hint, chosen_frames, classify, no_such_frames
 from scanfab.plan import Plan, make_plan
@@ -30,6 +33,8 @@ from scanfab.table import Row
 from scanfab.variants import Sample
 
 __all__ = ["Calibration", "calibrate"]
+
+LOGGER = logging.getLogger("scanfab")
 
 # in r_min, down to the spacing of the 2017 paper
 SPACINGS = (4.0, 2.0, 1.0, 0.5, 0.2, 0.1)
@@ -130,10 +135,10 @@ class _Calibrator:
                     f"there is no void"
                 )
         ladders = {
-            "spacing": judged(self._spacings(), with_sample=False),
-            "directions": judged(self._directions(), with_sample=False),
+            "spacing": judged(self._spacings()),
+            "directions": judged(self._directions()),
             "cutoff": cutoffs,
-            "rv": judged(self._rvs(), with_sample=True) if self.settings.needs_window else [],
+            "rv": judged(self._rvs()) if self.settings.needs_window else [],
         }
         sample = largest(cutoffs, "alpha_vs_axial_sample_se", self._default_cutoff())
         target = max(self.settings.tolerance, OF_SAMPLE * (sample or 0.0))
@@ -172,22 +177,29 @@ class _Calibrator:
 
     def _step(self, ladder: str, value: float | None, settings: Settings) -> Iterator[StepRow]:
         """The rows of one step; none if its settings do not fit the sample."""
-        begun = time.perf_counter()
         try:
-            with warnings.catch_warnings(record=True) as caught:
-                warnings.simplefilter("always")
-                plan = make_plan(settings, self.first)
-                self._check_budget(ladder, plan)
-                words = (self.name, self.number, self.sample, plan, settings, None)
-                rows = frame_result(*words).rows
+            yield from self._measured(ladder, value, settings)[0]
         except SettingsError as error:
-            if ladder in ("cutoff", "recommended"):
+            if ladder == "cutoff":
                 raise
             warnings.warn(f"{ladder} {value:g} left out: {error}", ScanfabWarning, stacklevel=2)
-            return
+
+    def _measured(
+        self, ladder: str, value: float | None, settings: Settings
+    ) -> tuple[list[StepRow], Measurement]:
+        """The rows of one step, and what they were made from."""
+        begun = time.perf_counter()
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            plan = make_plan(settings, self.first)
+            self._check_budget(ladder, plan)
+            result = frame_result(self.name, self.number, self.sample, plan, settings, None)
         seconds = time.perf_counter() - begun
-        for row in rows:
-            yield self._row(row, ladder, value, plan, seconds, _notes(caught, row))
+        LOGGER.info("%s %s: %.2g s", ladder, "" if value is None else f"{value:g}", seconds)
+        rows = [
+            self._row(row, ladder, value, plan, seconds, _notes(caught, row)) for row in result.rows
+        ]
+        return rows, result.scanned
 
     def _check_budget(self, ladder: str, plan: Plan) -> None:
         """Refuse a step of fixed lines that would cut more chords than allowed."""
@@ -238,17 +250,22 @@ class _Calibrator:
     def _recommended(
         self, spacings: list[StepRow], directions: list[StepRow], target: float
     ) -> tuple[list[StepRow], dict[str, str]]:
-        """Steady spacing and directions, and more of the latter until the error is met."""
+        """Steady spacing and directions, and more of the latter until the error is surely met."""
         spacing = min(first_steady(spacings) or PAPER_SPACING, FIXED_SPACING)
         rule = direction_rule(str(int(first_steady(directions) or len(direction_rule(AUTO_RULE)))))
         rows: list[StepRow] = []
         for _ in range(ROUNDS):
-            settings = replace(self.settings, spacing=Length(spacing, "rmin"), directions=rule)
-            rows = list(self._step("recommended", len(rule), settings))
-            error = largest(rows, "alpha_vs_axial_se")
-            if error is None or error <= target:
+            settings = replace(
+                self.settings,
+                spacing=Length(spacing, "rmin"),
+                directions=rule,
+                tolerance=target,
+            )
+            rows, found = self._measured("recommended", len(rule), settings)
+            missing = missing_work(found.sums, found.plan, settings)
+            if missing <= 1.0:
                 break
-            wanted = len(rule) * 1.1 * (error / target) ** 2
+            wanted = len(rule) * missing
             if wanted > MOST_DIRECTIONS:
                 spacing = float(f"{spacing * math.sqrt(MOST_DIRECTIONS / wanted):.2g}")
             rule = direction_rule(str(min(math.ceil(wanted), MOST_DIRECTIONS)))
@@ -269,7 +286,7 @@ def _samples(
     chosen = list(chosen_frames(source, wanted)) if isinstance(source, Series) else [0, -1]
     number = chosen[0] if chosen else len(reads)
     if number >= len(reads) or (isinstance(source, Packing) and frame not in (0, -1)):
-        raise no_such_frames(wanted)
+        raise no_such_frames(source, wanted)
     first: Sample | None = None
     for place, read in enumerate(reads):
         sample = classify(read(), settings)

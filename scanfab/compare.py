@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.errors import SettingsError
-from scanfab.fabric.jackknife import BLOCKS, jackknife_error
+from scanfab.abscissa import strain_column, why_not_strain
+from scanfab.comparison import (
+    DIFFERENCE_MEANINGS,
+    FRAME_MEANINGS,
+    SUMMARY_MEANINGS,
+    Comparison,
+    DifferenceRow,
+    FrameRow,
+    SummaryRow,
+)
+from scanfab.errors import ScanfabNote, ScanfabWarning, SettingsError
+from scanfab.fabric.jackknife import BLOCKS, variance_without_noise
 from scanfab.selection import check_rows
+from scanfab.tabular import number_of, numbers_of, total_error
 
 __all__ = [
     "DIFFERENCE_MEANINGS",
@@ -23,98 +34,13 @@ __all__ = [
     "FrameRow",
     "SummaryRow",
     "compare_tables",
+    "fitted_points",
 ]
 
 FloatArray = npt.NDArray[np.float64]
 
 # with fewer points a line says nothing
 FEWEST_FRAMES = 3
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class FrameRow:
-    """One frame and variant, with both anisotropies divided by their own largest absolute value."""
-
-    source: str
-    frame: int
-    strain: float | None
-    variant: str
-    alpha_vs_axial: float | None
-    alpha_c_axial: float | None
-    alpha_vs_axial_norm: float | None
-    alpha_c_axial_norm: float | None
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class SummaryRow:
-    """One source and variant: void fabric against contact fabric over the frames."""
-
-    source: str
-    variant: str
-    frames: int
-    slope: float | None
-    slope_origin: float | None
-    r2: float | None
-    slope_se: float | None
-    peak: float | None
-    peak_strain: float | None
-    final: float | None
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class DifferenceRow:
-    """How far two variants of one frame are apart."""
-
-    source: str
-    frame: int
-    strain: float | None
-    variants: str
-    difference: float
-    difference_se: float | None
-
-
-FRAME_MEANINGS: dict[str, str] = {
-    "source": "as in the fabric table",
-    "frame": "as in the fabric table",
-    "strain": "as in the fabric table",
-    "variant": "as in the fabric table",
-    "alpha_vs_axial": "signed anisotropy of the void fabric along the loading axis",
-    "alpha_c_axial": "signed anisotropy of the contact fabric along the loading axis",
-    "alpha_vs_axial_norm": "alpha_vs_axial over its largest absolute value in the source's variant",
-    "alpha_c_axial_norm": "likewise",
-}
-SUMMARY_MEANINGS: dict[str, str] = {
-    "source": "as in the fabric table",
-    "variant": "as in the fabric table",
-    "frames": "number of frames that enter the fits",
-    "slope": "least-squares slope of alpha_vs_axial on alpha_c_axial, with an intercept",
-    "slope_origin": "that slope through the origin",
-    "r2": "R² of the fit with an intercept",
-    "slope_se": "standard error of the slope from the sample's octants, each left out in all "
-    "frames; empty if a frame has no values without octants",
-    "peak": "alpha_vs_axial where its absolute value is largest",
-    "peak_strain": "the strain there",
-    "final": "alpha_vs_axial of the last frame that has one",
-}
-DIFFERENCE_MEANINGS: dict[str, str] = {
-    "source": "as in the fabric table",
-    "frame": "as in the fabric table",
-    "strain": "as in the fabric table",
-    "variants": "the two variants, for instance a-b",
-    "difference": "alpha_vs_axial of the first minus that of the second",
-    "difference_se": "its standard error as if both scans were independent, which is too large "
-    "where they share lines",
-}
-"""What each column holds; anisotropies and strains are dimensionless."""
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """The tables that :func:`compare_tables` makes."""
-
-    frames: tuple[FrameRow, ...]
-    summary: tuple[SummaryRow, ...]
-    differences: tuple[DifferenceRow, ...]
 
 
 def compare_tables(
@@ -128,7 +54,8 @@ def compare_tables(
     rows : iterable of mapping
         Rows of fabric tables by column; numbers may be None. Groups are source and variant.
     strain_max : float, optional
-        Leave frames beyond this strain out of the fits.
+        Leave frames beyond this strain, a fraction, out of the fits; beyond this shear strain
+        where the axial strain is the same in all frames.
 
     Returns
     -------
@@ -153,22 +80,69 @@ def compare_tables(
     >>> round(compare_tables(rows).summary[0].slope, 12)
     0.1
     """
+    rows = list(rows)
     groups = _grouped(rows)
+    _tell_of_strains(rows, strain_max)
+    column = strain_column(rows)
     return Comparison(
         frames=tuple(row for group in groups.values() for row in _normalised(group)),
         summary=tuple(
-            _summary(source, variant, group, strain_max)
+            _summary(source, variant, _with_strain(group, column), strain_max)
             for (source, variant), group in groups.items()
         ),
         differences=tuple(_differences(groups)),
     )
 
 
+def fitted_points(
+    rows: Sequence[Mapping[str, Any]], strain_max: float | None = None
+) -> list[FloatArray]:
+    """
+    Contact and void anisotropy of the frames that enter each fit of :func:`compare_tables`.
+
+    Returns
+    -------
+    list of ndarray, shape (M, 2)
+        In the order of the summary.
+    """
+    column = strain_column(rows)
+    return [_points(_with_strain(group, column), strain_max) for group in _grouped(rows).values()]
+
+
+def _tell_of_strains(rows: Sequence[Mapping[str, Any]], strain_max: float | None) -> None:
+    """Say which strain stands for which, and what is odd about the largest one of a fit."""
+    hint = why_not_strain(rows)
+    if hint is not None:
+        warnings.warn(hint, ScanfabNote, stacklevel=3)
+    if strain_max is None:
+        return
+    if not math.isfinite(strain_max):
+        raise SettingsError(f"strain-max: expected a number, found {strain_max}")
+    strains = numbers_of(rows, strain_column(rows) or "strain")
+    if not strains:
+        warnings.warn("strain-max: no frame has a strain, so none is fitted", ScanfabWarning, 3)
+    elif max(strains) <= strain_max:
+        warnings.warn(
+            f"strain-max: {strain_max:g} leaves out no frame: strains are fractions (5 % is 0.05), "
+            f"and lie between {min(strains):.3g} and {max(strains):.3g}",
+            ScanfabWarning if strain_max > 1 else ScanfabNote,
+            stacklevel=3,
+        )
+
+
+def _with_strain(
+    group: Sequence[Mapping[str, Any]], column: str | None
+) -> Sequence[Mapping[str, Any]]:
+    """Rows whose strain is the one that the frames are told apart by."""
+    if column in (None, "strain"):
+        return group
+    return [{**row, "strain": number_of(row, str(column))} for row in group]
+
+
 def _grouped(
-    rows: Iterable[Mapping[str, Any]],
+    rows: Sequence[Mapping[str, Any]],
 ) -> dict[tuple[str, str], list[Mapping[str, Any]]]:
     """Rows by source and variant, in the order of their first appearance."""
-    rows = list(rows)
     check_rows(rows)
     groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for row in rows:
@@ -202,6 +176,11 @@ def _normalised(group: Sequence[Mapping[str, Any]]) -> list[FrameRow]:
             alpha_c_axial=row["alpha_c_axial"],
             alpha_vs_axial_norm=norm(row, "alpha_vs_axial"),
             alpha_c_axial_norm=norm(row, "alpha_c_axial"),
+            alpha_vs_axial_se=number_of(row, "alpha_vs_axial_se"),
+            alpha_vs_axial_sample_se=number_of(row, "alpha_vs_axial_sample_se"),
+            alpha_vs_axial_total_se=total_error(row, "alpha_vs_axial"),
+            alpha_c_axial_sample_se=number_of(row, "alpha_c_axial_sample_se"),
+            shear_strain=number_of(row, "shear_strain"),
         )
         for row in group
     ]
@@ -234,31 +213,42 @@ def _summary(
 
 
 def _points(
-    group: Sequence[Mapping[str, Any]], strain_max: float | None, suffix: str = ""
+    group: Sequence[Mapping[str, Any]],
+    strain_max: float | None,
+    names: Sequence[str] = ("alpha_c_axial", "alpha_vs_axial"),
 ) -> FloatArray:
-    """Contact and void anisotropy of the frames of a fit, shape (M, 2)."""
-    names = [f"alpha_c_axial{suffix}", f"alpha_vs_axial{suffix}"]
+    """Columns of the frames of a fit that have all of them, shape (M, len(names))."""
     values = [
         [row.get(name) for name in names] for row in group if _within(row["strain"], strain_max)
     ]
-    return np.array([pair for pair in values if None not in pair], float).reshape(-1, 2)
+    return np.array([some for some in values if None not in some], float).reshape(-1, len(names))
 
 
 def _slope_error(group: Sequence[Mapping[str, Any]], strain_max: float | None) -> float | None:
     """
     Standard error of the slope from the blocks of the sample.
 
-    Frames of one sample are not independent: their scatter about the line says nothing of it.
+    Frames of one sample are not independent: their scatter about the line says nothing of it. The
+    values without each block come from two replicates of the scan, so there are two slopes for
+    each, and the noise of the scan is taken off. None if nothing is left, or if a frame lacks the
+    values without some block.
     """
     frames = len(_points(group, strain_max))
-    slopes = []
+    slopes: list[list[float | None]] = []
     for block in range(1, BLOCKS + 1):
-        points = _points(group, strain_max, f"_without_{block}")
-        slope = _fit(*points.T)[0]
-        if slope is None or len(points) < frames:
+        names = [f"alpha_c_axial_without_{block}", f"alpha_vs_axial_without_{block}"]
+        contact, void = _points(group, strain_max, names).T
+        halves = _points(group, strain_max, [*names, f"alpha_vs_axial_half_{block}"])[:, 2]
+        if len(contact) < frames:
             return None
-        slopes.append(slope)
-    return jackknife_error(np.array(slopes))
+        if len(halves) < frames:  # a table of before this column: the noise stays in
+            halves = np.zeros(frames)
+        slopes.append([_fit(contact, void + sign * halves)[0] for sign in (1.0, -1.0)])
+    values = np.array(slopes, float)
+    if np.isnan(values).any():
+        return None
+    variance = variance_without_noise(values)
+    return math.sqrt(variance) if variance >= 0 else None
 
 
 def _within(strain: float | None, strain_max: float | None) -> bool:

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from scanfab.compare import SummaryRow, compare_tables
+from scanfab.compare import SummaryRow, compare_tables, fitted_points
 from scanfab.writers.plot_table import TABLE_FIGURES, Fit, plot_table
 
 __all__ = ["TABLE_FIGURES", "fits_of", "plot_rows"]
@@ -45,24 +46,13 @@ def plot_rows(
 def fits_of(rows: Sequence[Mapping[str, Any]], strain_max: float | None = None) -> list[Fit | None]:
     """The line of each source and variant as ``compare --summary`` has it; None without one."""
     summary = compare_tables(rows, strain_max=strain_max).summary
-    return [_fit(one, rows, strain_max) for one in summary]
+    points = fitted_points(rows, strain_max)
+    return [_fit(one, group) for one, group in zip(summary, points, strict=True)]
 
 
-def _fit(
-    summary: SummaryRow, rows: Sequence[Mapping[str, Any]], strain_max: float | None
-) -> Fit | None:
+def _fit(summary: SummaryRow, points: npt.NDArray[np.float64]) -> Fit | None:
     if summary.slope is None:
         return None
-    points = np.array(
-        [
-            (row["alpha_c_axial"], row["alpha_vs_axial"])
-            for row in rows
-            if (row["source"], row["variant"]) == (summary.source, summary.variant)
-            and row["alpha_c_axial"] is not None
-            and row["alpha_vs_axial"] is not None
-            and (strain_max is None or (row["strain"] is not None and row["strain"] <= strain_max))
-        ]
-    )
     middle = points.mean(axis=0)
     return Fit(
         slope=summary.slope,

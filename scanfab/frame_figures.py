@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.abscissa import strain_column
 from scanfab.directions import DirectionRule
 from scanfab.distribution import mean_length_function, sphere_points
 from scanfab.errors import SettingsError
 from scanfab.fabric.contact import contact_fabric
+from scanfab.fabric.jackknife import BLOCKS, void_jackknife
 from scanfab.fabric.void import void_fabric
 from scanfab.frame_result import FrameResult
 from scanfab.gaps import scan_gaps
@@ -106,8 +108,13 @@ class ScannedFrames:
     """The first and the last frame of a table that have a void fabric, scanned for one variant."""
 
     results: list[FrameResult]
+    titles: list[str]
     variant: str
-    settings: Settings
+
+    @property
+    def titled(self) -> list[tuple[FrameResult, str]]:
+        """Each frame with its title."""
+        return list(zip(self.results, self.titles, strict=True))
 
 
 def plot_frames(
@@ -140,14 +147,14 @@ def plot_frames(
     name, angles = parse_figure(figure)
     frames = scan_frames(series, settings, rows)
     if name == "rose":
-        roses = [_rose(one, frames.variant, angles, settings) for one in frames.results]
+        roses = [_rose(*one, frames.variant, angles, settings) for one in frames.titled]
         plot_rose(path, roses, dpi)
     elif name == "projection":
         plot_projection(path, projections_of(frames), dpi)
     elif name == "histogram":
         plot_histogram(path, lengths_of(frames), dpi)
     else:
-        curves = [_cutoffs(one, frames.variant, settings) for one in frames.results]
+        curves = [_cutoffs(*one, frames.variant, settings) for one in frames.titled]
         plot_cutoffs(path, curves, dpi)
 
 
@@ -171,30 +178,27 @@ def scan_frames(
         If no frame has a void fabric of that variant.
     """
     variant = "c" if "c" in settings.variants else settings.variants[0]
-    return ScannedFrames(_results(series, settings, rows, variant), variant, settings)
+    own = [row for row in rows if row["source"] == series.name and row["variant"] == variant]
+    results = _results(series, settings, own, variant)
+    titles = [_title(one, strain_column(own)) for one in results]
+    return ScannedFrames(results, titles, variant)
 
 
 def projections_of(frames: ScannedFrames) -> list[Projection]:
     """What :func:`scanfab.writers.plot_frame.plot_projection` draws."""
-    return [_projection(one, frames.variant) for one in frames.results]
+    return [_projection(*one, frames.variant) for one in frames.titled]
 
 
 def lengths_of(frames: ScannedFrames) -> list[LengthSample]:
     """What :func:`scanfab.writers.plot_frame.plot_histogram` draws."""
-    return [_lengths(one, frames.variant) for one in frames.results]
+    return [_lengths(*one, frames.variant) for one in frames.titled]
 
 
 def _results(
     series: Series, settings: Settings, rows: Sequence[Mapping[str, Any]], variant: str
 ) -> list[FrameResult]:
     """The first and the last frame, computed again for one variant."""
-    numbers = [
-        row["frame"]
-        for row in rows
-        if row["source"] == series.name
-        and row["variant"] == variant
-        and row["alpha_vs_axial"] is not None
-    ]
+    numbers = [row["frame"] for row in rows if row["alpha_vs_axial"] is not None]
     if not numbers:
         raise SettingsError(
             f"there is nothing to draw: no frame has a void fabric of variant {variant}"
@@ -207,11 +211,14 @@ def _results(
     return results
 
 
-def _title(result: FrameResult) -> str:
-    strain = result.rows[0].strain
-    return (
-        f"frame {result.number}" if strain is None else rf"$\varepsilon_a$ = {100 * strain:.1f} %"
-    )
+def _title(result: FrameResult, column: str | None) -> str:
+    """Variant, frame and, if the table has one, the strain."""
+    row = result.rows[0]
+    title = f"variant {row.variant}, frame {result.number}"
+    if column is None:
+        return title
+    symbol = {"strain": "a", "shear_strain": "q"}[column]
+    return rf"{title}, $\varepsilon_{symbol}$ = {100 * getattr(row, column):.3g} %"
 
 
 def _parts(result: FrameResult) -> tuple[Solids, ScanSums, float, float]:
@@ -227,7 +234,9 @@ def _normals(result: FrameResult, variant: str) -> FloatArray:
     return result.sample.contacts.normal[chosen]
 
 
-def _rose(result: FrameResult, variant: str, angles: Sequence[float], settings: Settings) -> Rose:
+def _rose(
+    result: FrameResult, title: str, variant: str, angles: Sequence[float], settings: Settings
+) -> Rose:
     rings = {phi: _azimuths(phi) for phi in angles}
     axes = np.concatenate([_vectors(theta, phi) for phi, theta in rings.items()])
     value, error = _mean_lengths(result, variant, axes, settings)
@@ -238,7 +247,7 @@ def _rose(result: FrameResult, variant: str, angles: Sequence[float], settings: 
         void.append(_around(phi, theta, value[here], error[here]))
     normals = _normals(result, variant)
     contact = [_contact_ring(normals, phi) for phi in angles] if len(normals) else []
-    return Rose(_title(result), void, contact)
+    return Rose(title, void, contact)
 
 
 def _azimuths(phi: float) -> FloatArray:
@@ -315,7 +324,7 @@ def _contact_ring(normals: FloatArray, phi: float) -> Ring:
     return Ring(phi, middle, count / expected, np.sqrt(count) / expected, density)
 
 
-def _projection(result: FrameResult, variant: str) -> Projection:
+def _projection(result: FrameResult, title: str, variant: str) -> Projection:
     _, sums, _, _ = _parts(result)
     _, directions = disk()
     mean_length = mean_length_function(sums.axes, *result.scanned.kept(variant))
@@ -324,7 +333,7 @@ def _projection(result: FrameResult, variant: str) -> Projection:
     mean = float(weights @ mean_length(points))
     normals = _normals(result, variant)
     return Projection(
-        _title(result),
+        title,
         100 * (mean_length(directions) / mean - 1),
         100 * (_smoothed_density(normals, directions) - 1) if len(normals) else None,
     )
@@ -341,17 +350,17 @@ def _smoothed_density(normals: FloatArray, directions: FloatArray) -> FloatArray
     return density.reshape(directions.shape[:-1]) / isotropic
 
 
-def _lengths(result: FrameResult, variant: str) -> LengthSample:
+def _lengths(result: FrameResult, title: str, variant: str) -> LengthSample:
     _, _, cutoff, smallest = _parts(result)
     position, radius, reach = result.scanned.spheres_of(VARIANTS[variant])
     points, _ = sphere_points()
     frames = line_frames(points[: len(points) // 2 : 20])
     found = sample_segments(position, radius, frames, HISTOGRAM_LINES, reach)
-    return LengthSample(_title(result), found.length[found.void] / smallest, cutoff / smallest)
+    return LengthSample(title, found.length[found.void] / smallest, cutoff / smallest)
 
 
-def _cutoffs(result: FrameResult, variant: str, settings: Settings) -> CutoffCurve:
-    """Axial anisotropy and its standard error over the cut-off, all by the same lines."""
+def _cutoffs(result: FrameResult, title: str, variant: str, settings: Settings) -> CutoffCurve:
+    """Axial anisotropy and its standard errors over the cut-off, all by the same lines."""
     solids, _, chosen, smallest = _parts(result)
     scanned, rule = result.scanned, result.scanned.plan.rule
     gaps = scan_gaps(
@@ -365,10 +374,18 @@ def _cutoffs(result: FrameResult, variant: str, settings: Settings) -> CutoffCur
         seed=settings.seed,
         workers=settings.workers,
     )
-    alpha, error = np.full((2, len(CUTOFFS)), np.nan)
+    alpha, error, total = np.full((3, len(CUTOFFS)), np.nan)
     for place in range(len(CUTOFFS)):
-        fabric = void_fabric(gaps.axes, rule.weights, *gaps.kept(variant, place, settings.moment))
-        if fabric is not None:
-            alpha[place] = fabric.tensor.axial(settings.axis)
-            error[place] = fabric.axial_error(settings.axis) or np.nan
-    return CutoffCurve(_title(result), np.array(CUTOFFS), alpha, error, chosen / smallest)
+        kept = gaps.kept(variant, place, settings.moment)
+        fabric = void_fabric(gaps.axes, rule.weights, *kept)
+        if fabric is None:
+            continue
+        alpha[place] = fabric.tensor.axial(settings.axis)
+        error[place] = fabric.axial_error(settings.axis) or np.nan
+        without = [
+            gaps.kept(variant, place, settings.moment, without=block) for block in range(BLOCKS)
+        ]
+        sample = void_jackknife(gaps.axes, rule.weights, kept, without, settings.axis)
+        if sample is not None and sample.error is not None:
+            total[place] = np.hypot(error[place], sample.error)
+    return CutoffCurve(title, np.array(CUTOFFS), alpha, error, total, chosen / smallest)

@@ -10,6 +10,7 @@ from scanfab.errors import ScanfabWarning
 from scanfab.measurement import Measurement, measure
 from scanfab.plan import Plan
 from scanfab.settings import Settings
+from scanfab.spelling import spelt_apart
 from scanfab.table import Row
 from scanfab.variant_columns import VariantColumns, no_columns
 from scanfab.variants import VARIANTS, Sample
@@ -42,6 +43,7 @@ def frame_result(
     plan: Plan | None,
     settings: Settings,
     strain: float | None,
+    shear_strain: float | None = None,
 ) -> FrameResult:
     """Scan one frame; of a frame without grains there are rows without numbers."""
     frame: dict[str, Any] = {
@@ -50,6 +52,7 @@ def frame_result(
         "step": sample.packing.step,
         "time": sample.packing.time,
         "strain": strain,
+        "shear_strain": shear_strain,
         "contacts_from": sample.contacts.source,
     }
     if plan is None or not sample.grains.any():
@@ -59,7 +62,10 @@ def frame_result(
             for _ in settings.cutoffs or (settings.cutoff,)
         ]
         return FrameResult(name, number, sample, None, empty)
-    measurement = measure(sample, plan, settings)
+    doubt = sample.doubt_of_escaped()
+    if doubt is not None:
+        warnings.warn(f"frame {number}: {doubt}", ScanfabWarning, stacklevel=2)
+    measurement = measure(sample, plan, settings, f"frame {number}")
     rows = []
     for variant in settings.variants:
         for place in range(len(plan.cutoffs)):
@@ -76,9 +82,10 @@ def _warn_of_large_errors(rows: list[Row], plan: Plan, settings: Settings) -> No
     worst = max(rows, key=lambda row: row.alpha_vs_axial_se or 0.0)
     error = worst.alpha_vs_axial_se or 0.0
     if error > settings.tolerance:
+        reached, tolerance = spelt_apart(error, settings.tolerance)
         warnings.warn(
             f"frame {worst.frame}, variant {worst.variant}, cut-off {worst.cutoff:g}: "
-            f"alpha_vs_axial_se is {error:.2g}, above the tolerance {settings.tolerance:g}, which "
+            f"alpha_vs_axial_se is {reached}, above the tolerance {tolerance}, which "
             f"holds for the mean length at the cut-off {plan.cutoff:g}: choose a smaller "
             f"--tolerance",
             ScanfabWarning,

@@ -17,7 +17,7 @@ from scanfab.cell import Cell
 from scanfab.directions import DirectionRule
 from scanfab.kernels.bins import BLOCKS, Bins
 from scanfab.line_grids import drawn_lines, line_frames
-from scanfab.scan import Solids, in_parts, tally_frames
+from scanfab.scan import Solids, in_parts, shortest_gap, tally_frames
 
 __all__ = ["Blocks", "GapSums", "scan_gaps"]
 
@@ -155,7 +155,7 @@ def scan_gaps(
         Of the whole sample and of the window, in the frame of ``solids``.
     """
     frames, offsets = drawn_lines(rule, seed, replicates)
-    least = np.array(cutoffs, dtype=np.float64)
+    least = np.maximum(np.array(cutoffs, dtype=np.float64), shortest_gap(solids))
     affine = np.array([one.affine() for one in blocks])
 
     def some(frames: FloatArray, offsets: FloatArray) -> FloatArray:

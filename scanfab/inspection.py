@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 
+from scanfab.errors import PackingError, ReadError
 from scanfab.pipeline import boundary_hint, chosen_frames, classify, no_such_frames
+from scanfab.plan import rv_of
 from scanfab.series import Frame, Series
 from scanfab.settings import Settings
 from scanfab.variants import VARIANTS, Sample
+from scanfab.window import SphereWindow, SurfaceBox
 
 __all__ = ["REPORT_MEANINGS", "FrameReport", "inspect_series"]
 
@@ -35,6 +39,10 @@ class FrameReport:
     periodic: list[bool] | None
     columns: list[str]
     warnings: list[str]
+    low: list[float] | None
+    high: list[float] | None
+    rv_center: list[float] | None
+    rv_radius: float | None
 
 
 REPORT_MEANINGS: dict[str, str] = {
@@ -55,6 +63,10 @@ REPORT_MEANINGS: dict[str, str] = {
     "periodic": "whether the sample repeats along each of them",
     "columns": "what the dump says of each particle; what is not standard by its own name",
     "warnings": "what is doubtful",
+    "low": "corner of the box of the grains' surfaces, x y z; grains that flew away left out",
+    "high": "the opposite corner",
+    "rv_center": "centre of the RV, which is that of the series' first frame that has grains",
+    "rv_radius": "its radius",
 }
 """What each entry holds; lengths are in the dump's unit."""
 
@@ -68,7 +80,7 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
     series : Series
         The frames.
     settings : Settings
-        ``boundary``, ``frames``, ``min_contacts`` and ``contact_tolerance`` count.
+        ``boundary``, ``frames``, ``min_contacts``, ``contact_tolerance`` and the RV count.
 
     Raises
     ------
@@ -77,22 +89,46 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
     """
     chosen = chosen_frames(series, settings.frames)
     found = False
+    window: SphereWindow | None = None
     for number, frame in enumerate(series):
         if number in chosen:
             found = True
-            yield _report(series.name, number, frame, settings)
+            sample, told = _read(frame, settings)
+            window = window or _rv(sample, settings)
+            yield _report(series.name, number, frame, sample, told, window)
+        elif window is None:
+            with suppress(PackingError, ReadError):
+                window = _rv(_read(frame, settings)[0], settings)
         if number >= chosen.stop - 1:
             break
     if not found:
-        raise no_such_frames(settings.frames)
+        raise no_such_frames(series, settings.frames)
 
 
-def _report(source: str, number: int, frame: Frame, settings: Settings) -> FrameReport:
+def _read(frame: Frame, settings: Settings) -> tuple[Sample, list[str]]:
+    """A frame, and what is doubtful about it."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         sample = classify(frame.read(), settings)
+    hints = [boundary_hint(sample, settings), sample.doubt_of_escaped()]
+    return sample, [*(str(one.message) for one in caught), *filter(None, hints)]
+
+
+def _rv(sample: Sample, settings: Settings) -> SphereWindow | None:
+    return rv_of(sample, settings) if sample.grains.any() else None
+
+
+def _report(
+    source: str,
+    number: int,
+    frame: Frame,
+    sample: Sample,
+    told: list[str],
+    window: SphereWindow | None,
+) -> FrameReport:
     packing, grains = sample.packing, sample.grains
     radius = packing.radius[grains]
+    box = SurfaceBox.of(packing, sample.gathered) if grains.any() else None
     cell = packing.cell
     return FrameReport(
         source=source,
@@ -111,10 +147,9 @@ def _report(source: str, number: int, frame: Frame, settings: Settings) -> Frame
         cell=None if cell is None else cell.vectors.tolist(),
         periodic=None if cell is None else list(cell.periodic),
         columns=["id", "x", "y", "z", "radius", *packing.columns],
-        warnings=[str(one.message) for one in caught] + _hints(sample, settings),
+        warnings=told,
+        low=None if box is None else box.low.tolist(),
+        high=None if box is None else box.high.tolist(),
+        rv_center=None if window is None else window.center.tolist(),
+        rv_radius=None if window is None else window.radius,
     )
-
-
-def _hints(sample: Sample, settings: Settings) -> list[str]:
-    hint = boundary_hint(sample, settings)
-    return [hint] if hint else []

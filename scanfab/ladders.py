@@ -77,23 +77,21 @@ STEP_MEANINGS: dict[str, str] = {
     "alpha_vs_axial_se": "its standard error from the scan",
     "alpha_vs_axial_sample_se": "the sample's own scatter, by a jackknife over eight octants",
     "steady": "1 if this step and all later ones of the ladder differ by no more than chance makes "
-    "of their standard errors (of the scan; for rv also of the sample), else 0; empty for a "
-    "cut-off, on which alpha_vs depends by definition",
+    "of their standard errors (of the scan; for rv also of the sample, as the smaller RV is a part "
+    "of the larger), else 0; empty for a cut-off, on which alpha_vs depends by definition",
     "note": "what makes the step doubtful",
 }
 """What each column of a calibration holds; lengths are in the dump's unit."""
 
 
-def judged(rows: Iterator[StepRow], *, with_sample: bool) -> list[StepRow]:
+def judged(rows: Iterator[StepRow]) -> list[StepRow]:
     """The rows of a ladder with ``steady`` filled in, variant by variant."""
     every = list(rows)
     found: list[StepRow] = []
     most = _most_errors([row.variant for row in every])
     for row in reversed(every):
         later = [one for one in found if one.variant == row.variant]
-        steady = _is_sound(row) and all(
-            one.steady and _agree(row, one, most, with_sample) for one in later
-        )
+        steady = _is_sound(row) and all(one.steady and _agree(row, one, most) for one in later)
         found.append(replace(row, steady=int(steady)))
     return found[::-1]
 
@@ -111,14 +109,26 @@ def _is_sound(row: StepRow) -> bool:
     return row.alpha_vs_axial is not None and row.alpha_vs_axial_se is not None and not row.note
 
 
-def _agree(one: StepRow, other: StepRow, most: float, with_sample: bool) -> bool:
-    """Whether two values differ by no more than so many of their common standard errors."""
+def _agree(one: StepRow, other: StepRow, most: float) -> bool:
+    """Whether two values differ by no more than so many standard errors of their difference."""
     if one.alpha_vs_axial is None or other.alpha_vs_axial is None:
         return False
     errors = [row.alpha_vs_axial_se or 0.0 for row in (one, other)]
-    if with_sample:
-        errors += [row.alpha_vs_axial_sample_se or 0.0 for row in (one, other)]
-    return abs(one.alpha_vs_axial - other.alpha_vs_axial) <= most * math.hypot(*errors)
+    error = math.hypot(*errors, _nested_error(one, other) if one.ladder == "rv" else 0.0)
+    return abs(one.alpha_vs_axial - other.alpha_vs_axial) <= most * error
+
+
+def _nested_error(one: StepRow, other: StepRow) -> float:
+    """
+    The sample's standard error of the difference between two RVs, one inside the other.
+
+    They have the grains of the smaller one in common. The variance of a mean over grains falls with
+    their number, so that of the difference of two such means is the difference of the variances;
+    both follow from the larger RV's, which is the better known.
+    """
+    small, large = sorted((one, other), key=lambda row: row.rv_radius or 0.0)
+    more = ((large.rv_radius or 0.0) / (small.rv_radius or 1.0)) ** 3
+    return (large.alpha_vs_axial_sample_se or 0.0) * math.sqrt(max(more - 1.0, 0.0))
 
 
 def first_steady(rows: Sequence[StepRow]) -> float | None:

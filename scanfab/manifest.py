@@ -14,7 +14,7 @@ from scanfab.directions import DirectionRule
 from scanfab.series import Series
 from scanfab.settings import Settings
 
-__all__ = ["asked_for", "manifest"]
+__all__ = ["asked_for", "manifest", "with_frames"]
 
 PACKAGES = (
     "scanfab", "numpy", "numba", "scipy", "meshio", "pyvista", "click", "rich", "h5py",
@@ -43,6 +43,11 @@ def asked_for(
         if name != "workers"
     }
     return {"scanfab": version("scanfab"), "sources": list(sources), **_plain(reading), **chosen}
+
+
+def with_frames(asked: dict[str, Any], frames: slice) -> dict[str, Any]:
+    """What was asked for, of other frames."""
+    return {**asked, "frames": _plain(frames)}
 
 
 def manifest(

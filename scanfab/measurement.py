@@ -12,8 +12,8 @@ import numpy.typing as npt
 from scanfab.adaptive import scan_to_tolerance
 from scanfab.directions import direction_rule
 from scanfab.gaps import Blocks, GapSums, scan_gaps
-from scanfab.plan import Plan
-from scanfab.scan import CellGrains, ScanSums, Solids
+from scanfab.plan import CLOSE, Plan
+from scanfab.scan import CellGrains, ScanSums, Solids, most_lines
 from scanfab.settings import AUTO_RULE, Settings
 from scanfab.variants import Sample, Variant
 
@@ -21,13 +21,15 @@ __all__ = ["Measurement", "measure"]
 
 FloatArray = npt.NDArray[np.float64]
 
-# of the scan for the sample's scatter: its own noise is known, and taken off; so many segments a
-# grain make it far less than the scatter, which falls with the number of grains as it does
+# Of the scan for the sample's scatter: its noise is known from the replicates, and taken off. Lines
+# at one distance in mean radii make as many segments for each grain of a small sample as of a large
+# one (about 900 in dense packings), so noise and scatter fall together as grains are added.
 BLOCK_REPLICATES = 2
-BLOCK_SEGMENTS_PER_GRAIN = 2000
-BLOCK_SEGMENTS = 800_000
-# where grains overlap many times there are far more chords than segments, and all are listed
-BLOCK_CHORDS = 30_000_000
+# Chords that this scan may cut: in dense packings of like grains 1,250 a grain are needed. Where
+# grains overlap many times or differ much in size there would be more. Of samples of more than a
+# million grains the scatter is far below any tolerance in use.
+CHORDS_A_GRAIN = 2_000
+FEWEST_CHORDS, MOST_CHORDS = 3e7, 1e9
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,12 +78,14 @@ class Measurement:
         return position[solid], radius[solid], reach
 
 
-def measure(sample: Sample, plan: Plan, settings: Settings) -> Measurement:
-    """Scan one frame that has grains."""
+def measure(
+    sample: Sample, plan: Plan, settings: Settings, where: str = "the frame"
+) -> Measurement:
+    """Scan one frame that has grains; ``where`` names it in messages."""
     if plan.window is not None:
         plan.window.check_fits(sample.packing)
     solids, origin = _solids(sample, plan, settings)
-    sums, plan = scan_to_tolerance(solids, plan, settings)
+    sums, plan = scan_to_tolerance(solids, plan, settings, where)
     blocks = _blocks(sample, plan, settings)
     lines: dict[str, Any] = {
         "cutoffs": plan.cutoffs,
@@ -97,7 +101,7 @@ def measure(sample: Sample, plan: Plan, settings: Settings) -> Measurement:
     blocked = scan_gaps(
         solids,
         direction_rule(AUTO_RULE),
-        spacing=_block_spacing(sums, plan, solids, settings),
+        spacing=_block_spacing(solids),
         replicates=range(BLOCK_REPLICATES),
         **lines,
     )
@@ -133,7 +137,7 @@ def _solids(sample: Sample, plan: Plan, settings: Settings) -> tuple[Solids, Flo
 def _blocks(sample: Sample, plan: Plan, settings: Settings) -> tuple[Blocks, Blocks]:
     """The octants about the middle of the sample (of the cell), and about the window's centre."""
     packing = sample.packing
-    position = packing.position[sample.grains]
+    position = packing.position[sample.gathered]
     low, high = position.min(axis=0), position.max(axis=0)
     radius = float(packing.radius.max())
     reach = float(np.linalg.norm(high - low)) + radius
@@ -145,17 +149,11 @@ def _blocks(sample: Sample, plan: Plan, settings: Settings) -> tuple[Blocks, Blo
     return whole, Blocks.about(plan.window.center, plan.window.radius + radius, settings.axis)
 
 
-def _block_spacing(sums: ScanSums, plan: Plan, solids: Solids, settings: Settings) -> float:
-    """Such that the variant with the fewest segments keeps enough, but no more than it has."""
-    kept = [int(sums.kept(variant)[1].sum()) for variant in settings.variants]
-    fewest = max(min(kept), 1)
-    grains = len(solids.grain_radius)
-    if solids.window_radius > 0.0:
-        distance = np.linalg.norm(solids.position, axis=1)
-        grains = int(np.count_nonzero(distance < solids.window_radius))
-    wanted = min(fewest, BLOCK_SEGMENTS, BLOCK_SEGMENTS_PER_GRAIN * max(grains, 1))
-    axes = len(plan.rule) * sums.replicates
-    per_axis = BLOCK_REPLICATES * len(direction_rule(AUTO_RULE)) / axes
-    chords = float(sums.chords.sum()) * wanted / fewest
-    wider = max(chords / BLOCK_CHORDS, 1.0)
-    return plan.spacing * math.sqrt(per_axis * fewest / wanted * wider)
+def _block_spacing(solids: Solids) -> float:
+    """As close as is of use, but no closer than the sample's scatter is worth."""
+    spacing = CLOSE * float(solids.grain_radius.mean())
+    axes = BLOCK_REPLICATES * len(direction_rule(AUTO_RULE))
+    # a line costs as much as a chord, also if it meets nothing
+    chords = axes * (solids.cross_section / spacing**2 + most_lines(solids, spacing))
+    most = min(max(CHORDS_A_GRAIN * len(solids.grain_radius), FEWEST_CHORDS), MOST_CHORDS)
+    return spacing * math.sqrt(max(chords / most, 1.0))

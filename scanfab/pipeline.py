@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
+import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -12,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.boundary import enclosing_class, select_boundary
+from scanfab.cell import Cell
 from scanfab.contacts import find_contacts
 from scanfab.errors import (
     PackingError,
@@ -25,13 +28,14 @@ from scanfab.packing import Packing
 from scanfab.plan import Plan, make_plan
 from scanfab.series import Series
 from scanfab.settings import STRAIN_MODES, Settings
-from scanfab.strain import StrainFile, axial_length
+from scanfab.strain import StrainFile, axial_length, is_flipped, shear_strain
 from scanfab.table import Row, Table
 from scanfab.threads import in_order
 from scanfab.variants import Sample
 
 __all__ = ["FrameResult", "compute", "compute_rows"]
 
+LOGGER = logging.getLogger("scanfab")
 
 Observer = Callable[[FrameResult], None]
 
@@ -74,7 +78,7 @@ def compute_rows(
     source: Packing | Series,
     settings: Settings,
     *,
-    start: int = 0,
+    done: Container[int] = (),
     observe: Observer | None = None,
 ) -> Iterator[Row]:
     """
@@ -84,14 +88,14 @@ def compute_rows(
     ----------
     source, settings
         As for :func:`compute`.
-    start : int, optional
-        Leave out the frames before this one, which an earlier run has computed.
+    done : container of int, optional
+        Leave out these frames, which an earlier run has computed.
     observe : callable, optional
         Called with the :class:`FrameResult` of each frame, by the thread that computed it.
     """
     if not isinstance(source, Packing | Series):
         raise SettingsError(f"compute: expected a Packing or a Series, found {source!r}")
-    run = _Run(source, settings, start, observe)
+    run = _Run(source, settings, done, observe)
     jobs = run.jobs()
     with _Pool(settings.workers) as pool:
         for rows in pool.in_order(jobs):
@@ -111,13 +115,13 @@ class _Run:
         self,
         source: Packing | Series,
         settings: Settings,
-        start: int,
+        done: Container[int],
         observe: Observer | None,
     ) -> None:
         self.source = source
         self.settings = settings
         self.name = "" if isinstance(source, Packing) else source.name
-        self.start = start
+        self.done = done
         self.observe = observe
         self.plan: Plan | None = None
         self.strains = _Strains(settings)
@@ -130,7 +134,7 @@ class _Run:
         for number, read in _frames(self.source):
             due = number in chosen
             self.found = self.found or due
-            due = due and number >= self.start
+            due = due and number not in self.done
             if self.plan is None:
                 sample = self._read(number, read)
                 if sample is not None:
@@ -144,9 +148,8 @@ class _Run:
 
     def finish(self) -> None:
         """Complain of frames that do not exist, and of grains that were never met."""
-        frames = self.settings.frames
         if not self.found:
-            raise no_such_frames(frames)
+            raise no_such_frames(self.source, self.settings.frames)
         if self.plan is None:
             _complain_of_no_grains(self.name, self.particles, self.settings)
 
@@ -176,8 +179,11 @@ class _Run:
 
     def _rows(self, number: int, sample: Sample, threads: int) -> list[Row]:
         settings = replace(self.settings, workers=threads)
-        strain = self.strains.at(number, sample)
-        result = frame_result(self.name, number, sample, self.plan, settings, strain)
+        strains = self.strains.at(number, sample)
+        begun = time.perf_counter()
+        result = frame_result(self.name, number, sample, self.plan, settings, *strains)
+        seconds, grains = time.perf_counter() - begun, int(sample.grains.sum())
+        LOGGER.info("%s: frame %d: %d grains in %.2g s", self.name, number, grains, seconds)
         if self.observe is not None:
             self.observe(result)
         return result.rows
@@ -205,11 +211,14 @@ class _Pool:
         return in_order(self._pool, every, self.workers)
 
 
-def no_such_frames(frames: slice) -> SettingsError:
+def no_such_frames(source: Packing | Series, frames: slice) -> SettingsError:
     """The error for a slice that meets no frame."""
+    count = 1 if isinstance(source, Packing) else sum(1 for _ in source)
+    name = "the packing" if isinstance(source, Packing) else source.name
+    has = "1 frame, 0" if count == 1 else f"{count} frames, 0 to {count - 1}"
     parts = [frames.start, frames.stop, *([] if frames.step is None else [frames.step])]
     spelt = ":".join("" if part is None else str(part) for part in parts)
-    return SettingsError(f"frames: the series has no frame in {spelt}")
+    return SettingsError(f"frames: the series has no frame in {spelt}: {name} has {has}")
 
 
 def _complain_of_no_grains(name: str, particles: int, settings: Settings) -> None:
@@ -242,24 +251,50 @@ def chosen_frames(source: Packing | Series, frames: slice) -> range:
 
 
 class _Strains:
-    """Strain of the frames of a series, from its first frame that has grains."""
+    """Strains of the frames of a series, from its first frame that has grains."""
 
     def __init__(self, settings: Settings) -> None:
         self.settings = settings
         self.file = None if settings.strain in STRAIN_MODES else StrainFile(Path(settings.strain))
         self.first: float | None = None
+        self.first_cell: Cell | None = None
+        self.cells: dict[int, Cell | None] = {}
 
     def start(self, sample: Sample) -> None:
+        self.first_cell = sample.packing.cell
         if self.file is None:
             self.first = axial_length(sample, self.settings.strain, self.settings.axis)
 
-    def at(self, number: int, sample: Sample) -> float | None:
+    def at(self, number: int, sample: Sample) -> tuple[float | None, float | None]:
+        """Axial and shear strain of a frame."""
+        if not sample.grains.any():
+            return self._axial(number, sample), None
+        cell = sample.packing.cell
+        self._warn_of_flips(number, cell)
+        return self._axial(number, sample), shear_strain(cell, self.first_cell)
+
+    def _axial(self, number: int, sample: Sample) -> float | None:
         if self.file is not None:
             return self.file.at(number, sample.packing.step)
         if self.first is None or not sample.grains.any():
             return None
         length = axial_length(sample, self.settings.strain, self.settings.axis)
         return None if length is None or self.first == 0 else 1.0 - length / self.first
+
+    def _warn_of_flips(self, number: int, cell: Cell | None) -> None:
+        """Frames come in any order: each is held against both neighbours that are known."""
+        self.cells[number] = cell
+        step = abs(self.settings.frames.step or 1)
+        for early in (number - step, number):
+            late = early + step
+            if is_flipped(self.cells.get(late), self.cells.get(early)):
+                warnings.warn(
+                    f"the cell seems to be flipped between the frames {early} and {late}: from "
+                    f"there on its vectors are others than in the first frame, and shear_strain is "
+                    f"not the strain since then (LAMMPS: fix deform ... flip no)",
+                    ScanfabWarning,
+                    stacklevel=2,
+                )
 
 
 def classify(packing: Packing, settings: Settings) -> Sample:

@@ -14,7 +14,7 @@ from scanfab.settings import AUTO_RULE, Settings
 from scanfab.variants import Sample
 from scanfab.window import SphereWindow, SurfaceBox
 
-__all__ = ["CLOSE", "GROWTH_WITH_SPACING", "Plan", "make_plan"]
+__all__ = ["CLOSE", "GROWTH_WITH_SPACING", "Plan", "make_plan", "rv_of"]
 
 # replicates of a fixed scan, and at least of an auto scan
 REPLICATES = 16
@@ -65,8 +65,8 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
         "rmean": float(radii.mean()),
         "rmax": float(radii.max()),
     }
-    box = SurfaceBox.of(sample.packing, grains)
-    window = _window(settings, box, lengths["rmin"]) if settings.needs_window else None
+    box = SurfaceBox.of(sample.packing, sample.gathered)
+    window = rv_of(sample, settings) if settings.needs_window else None
     if window is not None:
         _check_window(window, sample, box, lengths["rmax"])
     reach = 0.5 * box.smallest_extent if window is None else window.radius
@@ -103,11 +103,21 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     return Plan(window, cutoff, cutoffs, rule, asked * math.sqrt(replicates), replicates, auto)
 
 
-def _window(settings: Settings, box: SurfaceBox, smallest: float) -> SphereWindow:
+def rv_of(sample: Sample, settings: Settings) -> SphereWindow:
+    """
+    The RV that settings make of the first frame that has grains.
+
+    Raises
+    ------
+    SettingsError
+        If it is far smaller than any grain.
+    """
+    box = SurfaceBox.of(sample.packing, sample.gathered)
     center = np.array(box.center if settings.rv_center is None else settings.rv_center, dtype=float)
     radius = settings.rv_radius
     if radius is None:
         radius = settings.rv * 0.5 * box.smallest_extent
+    smallest = float(sample.packing.radius[sample.grains].min())
     if radius < CLOSEST * smallest:
         raise SettingsError(
             f"rv: a radius of {radius:g} is nothing beside that of the smallest grain "
@@ -130,10 +140,11 @@ def _check_window(window: SphereWindow, sample: Sample, box: SurfaceBox, largest
             f"the {window} reaches {-room:g} beyond the sample, that is more than two of its "
             f"largest radii ({largest:g}): choose a smaller --rv or another --rv-center"
         )
-    if room < 2 * largest:
+    if room < largest:
         warnings.warn(
-            f"the {window} comes within two of the largest radii ({largest:g}) of the sample's "
-            f"surface, where the packing is another: choose a smaller --rv, or use more grains",
+            f"the {window} comes within one of the largest radii ({largest:g}) of the sample's "
+            f"surface: it cuts the outermost layer of grains, which a boundary arranges: choose a "
+            f"smaller --rv, or use more grains",
             ScanfabWarning,
             stacklevel=3,
         )

@@ -77,10 +77,11 @@ def make_report(
     ScanfabError
         If a table cannot be read, is no fabric table, or holds no frames.
     """
-    inputs = read_inputs(tables, cutoff, labels)
-    rows = [row for one in inputs for row in one.rows]
-    comparison = compare_tables(rows)
     heard = _Heard()
+    with _listening(heard, tell=True):
+        inputs = read_inputs(tables, cutoff, labels)
+        rows = [row for one in inputs for row in one.rows]
+        comparison = compare_tables(rows)
     sections = [_section(one, heard) for one in inputs]
     asked = [one.manifest["settings"] for one in inputs if one.manifest is not None]
     content = Content(
@@ -151,7 +152,7 @@ def _section(one: Input, heard: _Heard) -> Section:
             no_view = f"The view is left out: {error}."
     return Section(
         title=str(one.path),
-        command=repeat_command(asked, one.path.name),
+        command=repeat_command(asked, one.path.name, _overridden(one.manifest)),
         settings=settings_table(asked),
         versions=[(str(k), str(v)) for k, v in (one.manifest.get("versions") or {}).items()],
         inputs=input_table(one.manifest),
@@ -160,12 +161,18 @@ def _section(one: Input, heard: _Heard) -> Section:
     )
 
 
-class _listening(warnings.catch_warnings):  # noqa: N801
-    """Collect the texts of warnings and notes."""
+def _overridden(manifest: Mapping[str, Any]) -> list[str]:
+    """Options of the settings file beside the dumps that the command line has overridden."""
+    found = manifest.get("settings_file")
+    return [str(name) for name in found.get("not_used", [])] if isinstance(found, dict) else []
 
-    def __init__(self, heard: _Heard) -> None:
+
+class _listening(warnings.catch_warnings):  # noqa: N801
+    """Collect the texts of warnings and notes; ``tell`` them too."""
+
+    def __init__(self, heard: _Heard, tell: bool = False) -> None:
         super().__init__(record=True)
-        self.heard = heard
+        self.heard, self.tell = heard, tell
 
     def __enter__(self) -> Any:
         self.caught = super().__enter__()
@@ -179,3 +186,5 @@ class _listening(warnings.catch_warnings):  # noqa: N801
             elif issubclass(one.category, ScanfabNote):
                 self.heard.notes.append(str(one.message))
         super().__exit__(*details)
+        for one in self.caught or [] if self.tell else []:
+            warnings.warn(one.message, one.category, stacklevel=3)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -61,7 +61,9 @@ def _is_manifest(found: Any) -> bool:
     )
 
 
-def repeat_command(asked: Mapping[str, Any], output: str | None = None) -> str:
+def repeat_command(
+    asked: Mapping[str, Any], output: str | None = None, named: Collection[str] = ()
+) -> str:
     """
     The command line that repeats a computation, quoted for a shell.
 
@@ -71,6 +73,9 @@ def repeat_command(asked: Mapping[str, Any], output: str | None = None) -> str:
         The ``settings`` of a manifest.
     output : str, optional
         The table.
+    named : collection of str, optional
+        Options to name even with their usual value: those for which a settings file beside the
+        dumps has another.
 
     Examples
     --------
@@ -83,8 +88,8 @@ def repeat_command(asked: Mapping[str, Any], output: str | None = None) -> str:
     usual = spelt_settings(asked_for((), {"contacts": "auto"}, Settings.make()))
     words = ["scanfab", "compute", *map(str, asked["sources"])]
     for name, value in spelt_settings(asked).items():
-        if usual.get(name) != value:
-            option = f"--{name.replace('_', '-')}"
+        option = f"--{name.replace('_', '-')}"
+        if usual.get(name) != value or option[2:] in named:
             words += _words(option, name, value)
     if output is not None:
         words += ["-o", output]
@@ -166,6 +171,8 @@ def _length(value: Mapping[str, Any]) -> str:
 
 def _words(option: str, name: str, value: Any) -> list[str]:
     """An option as words of a command line."""
+    if name == "fields":
+        return [option, ",".join(value)]
     if name == "columns":
         return [option, ",".join(f"{key}={column}" for key, column in value.items())]
     if isinstance(value, bool):

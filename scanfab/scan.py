@@ -27,6 +27,7 @@ __all__ = [
     "is_affordable",
     "most_lines",
     "scan_lines",
+    "shortest_gap",
     "sums_of",
     "tally_frames",
 ]
@@ -38,6 +39,8 @@ BoolArray = npt.NDArray[np.bool_]
 # lines of one axis and replicate: more take minutes, even those that meet nothing
 MAX_LINES = 50_000_000
 JOBS_A_THREAD, MOST_AXES = 4, 16
+# Of the smallest radius: what lies between surfaces that coincide but for rounding is no gap.
+SHORTEST = 1e-9
 # of the spacing and for each variant: spheres of such a radius are scanned as fast row by row as
 # over lists of chords; for the more variants the lists serve, the sooner they pay
 FEW_LINES = 0.5
@@ -159,7 +162,8 @@ def scan_lines(
     spacing : float
         Distance between neighbouring lines of one axis and replicate, dump's length unit.
     cutoff : float
-        Segments shorter than this are not kept, dump's length unit.
+        Segments shorter than this are not kept, dump's length unit; nor, at 0, are those below 1e-9
+        of the smallest radius, which rounding makes between surfaces that coincide.
     variants : str, optional
         Which of a, b, c, d to scan; the sums of the others are 0.
     replicates : iterable of int, optional
@@ -196,6 +200,12 @@ def scan_lines(
         return tally_frames(solids, frames, offsets, spacing, cutoff, variants)
 
     return sums_of(frames, in_parts(some, frames, offsets, workers), variants)
+
+
+def shortest_gap(solids: Solids) -> float:
+    """Shorter gaps are rounding, dump's length unit."""
+    radius = solids.grain_radius
+    return SHORTEST * float(radius.min()) if len(radius) else 0.0
 
 
 def in_parts(
@@ -245,6 +255,7 @@ def tally_frames(
     first, second = ("a" in variants or "c" in variants), ("b" in variants or "d" in variants)
     whole, window = ("a" in variants or "b" in variants), ("c" in variants or "d" in variants)
     tallies = np.zeros((len(frames), 2, sweep.TALLY_SIZE))
+    cutoff = max(cutoff, shortest_gap(solids))
     bins = no_bins(len(frames)) if bins is None else bins
     both: Flag = True if first and second else None
     if solids.medium is not None and whole:

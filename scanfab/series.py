@@ -123,6 +123,8 @@ class Series:
     _contact_snapshots: dict[Path, list[Snapshot]] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
+    _met: dict[Path, int] = field(default_factory=dict, init=False, repr=False, compare=False)
+    """How many frames the grain files hold that were looked into."""
 
     def __iter__(self) -> Iterator[Frame]:
         reader = self.grains.reader
@@ -131,10 +133,21 @@ class Series:
             try:
                 snapshots = reader.snapshots(path)
             except ReadError as error:
+                self._met[path] = 1
                 yield Frame(self, Snapshot(path), name_step, error)
                 continue
+            self._met[path] = len(snapshots)
             for snapshot in snapshots:
                 yield Frame(self, snapshot, name_step)
+
+    def frames_expected(self) -> int:
+        """
+        About how many frames there are, without looking for them.
+
+        Files that nobody has looked into yet count as many as the last one that was, at first one.
+        """
+        met = list(self._met.values())
+        return sum(met) + (len(self.grains.files) - len(met)) * (met[-1] if met else 1)
 
     def contacts_of(
         self, grains: Snapshot, name_step: int | None, family: Family, named: bool

@@ -14,7 +14,16 @@ from scanfab.boundary import BoundaryRule
 from scanfab.directions import DirectionRule, direction_rule
 from scanfab.errors import SettingsError
 
-__all__ = ["AUTO_RULE", "AXES", "Length", "Settings", "parse_axis", "parse_frames", "parse_length"]
+__all__ = [
+    "AUTO_RULE",
+    "AXES",
+    "MAX_CHORDS",
+    "Length",
+    "Settings",
+    "parse_axis",
+    "parse_frames",
+    "parse_length",
+]
 
 Vector = tuple[float, float, float]
 
@@ -22,6 +31,9 @@ AXES: dict[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0
 # equal weights and few axes: the random turns of the replicates do the rest
 AUTO_RULE = "icosahedral:9"
 MOST_CUTOFFS = 1000
+# of an auto scan of one frame: one to two minutes of one processor, some hundred times what dense
+# packings need for the default tolerance
+MAX_CHORDS = 1e10
 STRAIN_MODES = ("auto", "cell", "boundary", "grains")
 
 
@@ -182,7 +194,7 @@ class Settings:
     directions: DirectionRule | None = None
     """None for ``auto``."""
     tolerance: float = 1e-4
-    max_chords: float = 1e11
+    max_chords: float = MAX_CHORDS
     min_contacts: int = 2
     contact_tolerance: float = 0.0
     axis: Vector = AXES["z"]
@@ -207,7 +219,7 @@ class Settings:
         spacing: str | float = "auto",
         directions: str | int | DirectionRule = "auto",
         tolerance: float = 1e-4,
-        max_chords: float = 1e11,
+        max_chords: float = MAX_CHORDS,
         min_contacts: int = 2,
         contact_tolerance: float = 0.0,
         axis: str | Vector = "z",

@@ -1,4 +1,4 @@
-"""Axial strain of a frame: 1 - L/L0 along the loading axis, positive in compression."""
+"""Strains of a frame: axial, 1 - L/L0 along the loading axis; and the shear of a periodic cell."""
 
 from __future__ import annotations
 
@@ -8,12 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
+from scanfab.cell import Cell
 from scanfab.errors import ReadError, SettingsError
 from scanfab.variants import Sample
 
-__all__ = ["StrainFile", "axial_length"]
+__all__ = ["StrainFile", "axial_length", "is_flipped", "shear_strain"]
 
 Vector = tuple[float, float, float]
+
+# programs that flip their cells do so when it leans by half a length or a little later
+MOST_TILT = 0.61
 
 
 def axial_length(sample: Sample, mode: str, axis: Vector) -> float | None:
@@ -26,8 +30,8 @@ def axial_length(sample: Sample, mode: str, axis: Vector) -> float | None:
         One frame.
     mode : str
         ``cell``: the diagonal entry of the cell along the axis; ``boundary`` and ``grains``: the
-        extent of those particles' centres; ``auto``: the cell if it is periodic along the axis,
-        else the boundary if there is one, else none.
+        extent of those particles' centres (without grains that have escaped); ``auto``: the cell
+        if it is periodic along the axis, else the boundary if there is one, else none.
     axis : three floats
         Unit vector.
 
@@ -56,13 +60,73 @@ def axial_length(sample: Sample, mode: str, axis: Vector) -> float | None:
             what = "the dump has no cell" if cell is None else "the axis is not x, y or z"
             raise SettingsError(f"strain: cell was asked for, but {what}")
         return float(cell.vectors[along, along])
-    chosen = sample.boundary if mode == "boundary" else sample.grains
+    chosen = sample.boundary if mode == "boundary" else sample.gathered
     if not chosen.any():
         raise SettingsError(
             f"strain: {mode} was asked for, but the frame has none"
             + (": name them with --boundary" if mode == "boundary" else "")
         )
     return float(np.ptp(sample.packing.position[chosen] @ np.array(axis)))
+
+
+def shear_strain(cell: Cell | None, first: Cell | None) -> float | None:
+    """
+    How much a periodic cell was sheared, whichever way.
+
+    Parameters
+    ----------
+    cell, first : Cell or None
+        Of this frame and of the first.
+
+    Returns
+    -------
+    float or None
+        √(2/3 e:e) of the deviator e of the logarithmic strain, dimensionless, never negative; None
+        unless both cells repeat along all three vectors. Each vector is taken for the one that it
+        was in the first frame.
+
+    Examples
+    --------
+    >>> from scanfab import Cell
+    >>> from scanfab.strain import shear_strain
+    >>> sheared = Cell([[1, 0, 0], [0.5, 1, 0], [0, 0, 1]])
+    >>> round(shear_strain(sheared, Cell([1.0, 1.0, 1.0])), 4)
+    0.2857
+    """
+    if cell is None or first is None or not all(cell.periodic + first.periodic):
+        return None
+    if np.array_equal(cell.vectors, first.vectors):
+        return 0.0
+    # H = F H0 with lattice vectors as columns; here they are rows
+    gradient = np.linalg.solve(first.vectors, cell.vectors)
+    # ln B has twice the logarithms of the stretches as principal values
+    stretch = np.log(np.linalg.svd(gradient, compute_uv=False))
+    return float(np.sqrt(2.0 / 3.0) * np.linalg.norm(stretch - stretch.mean()))
+
+
+def is_flipped(cell: Cell | None, before: Cell | None) -> bool:
+    """
+    Whether a cell seems to be described by other vectors of its lattice than in the frame before.
+
+    Then whole vectors were added to some, which also brings them nearer to those before, and
+    neither cell leans further than where programs flip them.
+    """
+    if cell is None or before is None or not all(cell.periodic + before.periodic):
+        return False
+    change = np.linalg.solve(cell.vectors.T, before.vectors.T)
+    whole = np.rint(change)
+    return bool(
+        np.any(whole != np.eye(3))
+        and round(abs(np.linalg.det(whole))) == 1
+        and max(_tilt(cell), _tilt(before)) <= MOST_TILT
+    )
+
+
+def _tilt(cell: Cell) -> float:
+    """By how many lengths of another vector a vector leans, at most."""
+    lengths = np.linalg.norm(cell.vectors, axis=1)
+    leaning = (cell.vectors @ cell.vectors.T) / lengths**2
+    return float(np.abs(leaning[np.tril_indices(3, -1)]).max())
 
 
 class StrainFile:

@@ -78,6 +78,15 @@ class Row:
     gc_axis_y: float | None
     gc_axis_z: float | None
     coaxiality_deg: float | None
+    shear_strain: float | None
+    alpha_vs_axial_half_1: float | None
+    alpha_vs_axial_half_2: float | None
+    alpha_vs_axial_half_3: float | None
+    alpha_vs_axial_half_4: float | None
+    alpha_vs_axial_half_5: float | None
+    alpha_vs_axial_half_6: float | None
+    alpha_vs_axial_half_7: float | None
+    alpha_vs_axial_half_8: float | None
 
 
 COLUMNS: tuple[str, ...] = tuple(field.name for field in fields(Row))
@@ -119,7 +128,8 @@ MEANINGS: dict[str, str] = {
     "gc_yz": "likewise",
     "alpha_c": "largest minus smallest principal value of the contact fabric",
     "alpha_c_axial": "signed anisotropy of the contact fabric along the loading axis",
-    "alpha_c_axial_se": "its standard error if contacts were independent",
+    "alpha_c_axial_se": "its standard error if contacts were independent; too large by about half "
+    "in relaxed dense packings",
     "alpha_vs_axial_sample_se": "the sample's own scatter, by a jackknife over eight octants",
     "alpha_c_axial_sample_se": "likewise",
     "alpha_vs_axial_without_1": "alpha_vs_axial without the segments of octant 1 (-x, -y, -z; for "
@@ -146,6 +156,17 @@ MEANINGS: dict[str, str] = {
     "gc_axis_y": "likewise",
     "gc_axis_z": "likewise",
     "coaxiality_deg": "angle between these two directions, 0 to 90 degrees",
+    "shear_strain": "of a cell that repeats along all its vectors, since the first frame: "
+    "√(2/3 e:e) of the logarithmic strain's deviator e; else empty",
+    "alpha_vs_axial_half_1": "alpha_vs_axial_without_1 is the mean of two replicates: half their "
+    "difference, which tells compare the scan's noise in a slope",
+    "alpha_vs_axial_half_2": "likewise",
+    "alpha_vs_axial_half_3": "likewise",
+    "alpha_vs_axial_half_4": "likewise",
+    "alpha_vs_axial_half_5": "likewise",
+    "alpha_vs_axial_half_6": "likewise",
+    "alpha_vs_axial_half_7": "likewise",
+    "alpha_vs_axial_half_8": "likewise",
 }
 """What each column holds; lengths are in the dump's unit."""
 

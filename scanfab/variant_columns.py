@@ -27,7 +27,9 @@ __all__ = ["FRAME_COLUMNS", "VariantColumns", "no_columns"]
 FloatArray = npt.NDArray[np.float64]
 
 # the same for all variants
-FRAME_COLUMNS = ("source", "frame", "step", "time", "strain", "variant", "contacts_from")
+FRAME_COLUMNS = (
+    "source", "frame", "step", "time", "strain", "variant", "contacts_from", "shear_strain",
+)  # fmt: skip
 
 
 class VariantColumns:
@@ -103,6 +105,7 @@ class VariantColumns:
             "alpha_vs_axial": value,
             "alpha_vs_axial_se": fabric.axial_error(axis) if fabric else None,
             **_scatter_columns("alpha_vs_axial", value, scatter),
+            **_half_columns(scatter),
             **_axis_columns("gvs", fabric.tensor if fabric else None),
         }
 
@@ -195,6 +198,12 @@ def _scatter_columns(
         f"{name}_sample_se": None if scatter is None else scatter.error,
         **{f"{name}_without_{block + 1}": one for block, one in enumerate(without)},
     }
+
+
+def _half_columns(scatter: Jackknife | None) -> dict[str, float | None]:
+    """Half the differences between the replicates that the values without each block come from."""
+    halves = [None] * BLOCKS if scatter is None else scatter.half.tolist()
+    return {f"alpha_vs_axial_half_{block + 1}": half for block, half in enumerate(halves)}
 
 
 def no_columns() -> dict[str, Any]:

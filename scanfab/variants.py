@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.escaped import Escaped, escaped_grains
 from scanfab.packing import Contacts, Packing
 from scanfab.window import SphereWindow
 
@@ -61,6 +62,31 @@ class Sample:
     def grains(self) -> BoolArray:
         """Particles that are not boundary, shape (N,)."""
         return ~self.boundary
+
+    @cached_property
+    def escaped(self) -> Escaped:
+        """Grains that lie far away from all others."""
+        return escaped_grains(self.packing, self.grains)
+
+    @property
+    def gathered(self) -> BoolArray:
+        """Grains that have not escaped, which the sample's extents are those of, shape (N,)."""
+        return self.grains & ~self.escaped.grains
+
+    def doubt_of_escaped(self) -> str | None:
+        """What to tell of grains that have escaped; None without any."""
+        rows = np.flatnonzero(self.escaped.grains)
+        if not len(rows):
+            return None
+        first, packing = rows[0], self.packing
+        place = ", ".join(f"{x:g}" for x in packing.position[first])
+        others = f" and {len(rows) - 1} more" if len(rows) > 1 else ""
+        ids = ",".join(str(one) for one in packing.id[rows])
+        return (
+            f"grain {packing.id[first]} at ({place}){others}: {self.escaped.gap:g} away from all "
+            f"others, so the sample's extents, RV and octants leave out what has flown away; in a "
+            f'and b it is still solid: --boundary "id={ids}" takes it out'
+        )
 
     @cached_property
     def rattlers(self) -> BoolArray:

@@ -23,3 +23,21 @@ def curve(source: str = "one", variant: str = "c", factor: float = 1.0) -> list[
         }
         for frame, (strain, void, contact) in enumerate(zip(STRAIN, VOID, CONTACT, strict=True))
     ]
+
+
+def sheared(source: str = "shear") -> list[dict[str, Any]]:
+    """Rows of a cell in simple shear: its principal axes are not the loading axis."""
+    return [
+        {
+            **row,
+            "strain": 0.0,
+            "shear_strain": 10 * row["strain"],
+            "alpha_vs_axial": 1e-3 * place,
+            "alpha_c_axial": 1e-3 * place,
+            "alpha_vs": abs(row["alpha_vs_axial"]),
+            "alpha_c": abs(row["alpha_c_axial"]),
+            "alpha_c_axial_se": 1e-3,
+            "coaxiality_deg": 9.0 * place,
+        }
+        for place, row in enumerate(curve(source))
+    ]

@@ -1,5 +1,7 @@
 """An auto scan goes on until every variant meets the tolerance, and no further than needed."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -14,6 +16,7 @@ from scanfab import (
     direction_rule,
     find_contacts,
     scan_lines,
+    void_fabric,
 )
 from scanfab.directions import DirectionRule
 from scanfab.plan import REPLICATES, make_plan
@@ -75,6 +78,21 @@ def test_auto_scan_does_not_much_more_than_it_must(packing):
     """The worst variant's error is not far below the tolerance."""
     table = compute(packing, tolerance=4e-4)
     assert table["alpha_vs_axial_se"].max() > 2e-4
+
+
+def test_a_scan_of_a_given_spacing_does_not_stop_at_an_error_that_is_small_by_chance(packing):
+    """The estimate from all mean lengths lies so far below that chance seldom helps."""
+    centred = find_contacts(Packing(packing.position - 3.0, packing.radius))
+    solids = solids_of(centred, 2.0)
+    for seed in range(6):
+        settings = Settings.make(
+            variants="c", tolerance=1e-3, spacing=0.15, cutoff=0.4, seed=seed, workers=1
+        )
+        plan = make_plan(settings, Sample(centred, np.zeros(len(packing), bool)))
+        sums, plan = adaptive.scan_to_tolerance(solids, plan, settings)
+        fabric = void_fabric(sums.axes, plan.rule.weights, *sums.kept("c"))
+        assert 1.3 * fabric.expected_error(settings.axis, plan.rule.degree) <= 1e-3
+        assert fabric.axial_error(settings.axis) <= 1e-3
 
 
 def test_smaller_tolerance_takes_more_lines(packing):
@@ -193,6 +211,61 @@ def test_chords_of_a_scan_are_those_of_all_grains(packing):
     sums = scan_lines(solids, rule, spacing=0.1, cutoff=0.1, variants="ab")
     expected = np.pi * np.sum(packing.radius**2) / 0.1**2 * len(rule)
     assert sums.chords.mean() == pytest.approx(expected, rel=0.01)
+
+
+@pytest.fixture(scope="module")
+def loose():
+    """Grains that touch no other, and two squares of four that do, far from one another."""
+    lattice = np.stack(np.meshgrid(*3 * [np.arange(6.0)]), axis=-1).reshape(-1, 3)
+    position = 2.6 * lattice + np.random.default_rng(0).uniform(0, 0.4, lattice.shape)
+    square = 0.98 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    squares = np.concatenate([square + 5.5, square + 9.5])
+    apart = np.linalg.norm(position[:, None] - squares, axis=2).min(axis=1) > 2.001
+    return find_contacts(Packing(np.concatenate([position[apart], squares]), 1.0))
+
+
+def test_variant_of_few_grains_does_not_hold_back_the_others(loose):
+    """The others are scanned to the tolerance, with the lines that they need alone."""
+    options = {"tolerance": 5e-4, "max_chords": 3e8}
+    alone = compute(loose, variants="acd", **options)
+    with pytest.warns(ScanfabWarning) as caught:
+        table = compute(loose, **options)
+    kept = dict(zip(table["variant"], table["grains"], strict=True))
+    assert kept["b"] == 8 < 0.1 * kept["a"]
+    for name in "acd":
+        assert table.select(variant=name)[0].alpha_vs_axial_se <= 5e-4
+    assert table.select(variant="a")[0].lines == alone[0].lines
+    told = "\n".join(str(one.message) for one in caught)
+    error = table.select(variant="b")[0].alpha_vs_axial_se
+    assert f"frame 0, variant b: alpha_vs_axial_se is {error:.2g}, above" in told
+    assert "before the tolerance" not in told
+
+
+def test_variant_of_few_grains_is_scanned_if_it_is_asked_for_alone(loose):
+    told, lines = [], []
+    for variants in ("b", "ab"):
+        with pytest.warns(ScanfabWarning) as caught:
+            table = compute(loose, variants=variants, tolerance=2e-3, max_chords=3e7)
+        told.append("\n".join(str(one.message) for one in caught))
+        lines.append(table[-1].lines)
+    assert "frame 0: the scan stopped after" in told[0]
+    assert "frame 0, variant b: alpha_vs_axial_se is" in told[1]
+    assert "the scan stopped" not in told[1]
+    assert lines[0] > 2 * lines[1]
+
+
+def test_budget_of_chords_is_minutes_by_default():
+    """100 to 200 million chords a second and processor."""
+    assert Settings.make().max_chords == 1e10
+
+
+def test_scan_tells_how_far_it_is_and_how_long_the_rest_takes(packing, caplog):
+    with caplog.at_level("INFO", logger="scanfab"):
+        compute(packing, tolerance=2e-4, variants="a")
+    states = [one.getMessage() for one in caplog.records if ": error" in one.getMessage()]
+    assert states
+    for state in states:
+        assert re.fullmatch(r"frame 0: error [\d.e-]+ of 0\.0002, about \d+ (s|min)", state)
 
 
 def test_default_settings_ask_for_the_tolerance():

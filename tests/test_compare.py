@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+import warnings
 
 import numpy as np
 import pytest
 
 from scanfab.compare import compare_tables
-from scanfab.errors import SettingsError
-from tests.tables import CONTACT, STRAIN, VOID, curve
+from scanfab.errors import ScanfabNote, ScanfabWarning, SettingsError
+from tests.tables import CONTACT, STRAIN, VOID, curve, sheared
 
 
 def summary_of(rows, **options):
@@ -139,7 +140,42 @@ def test_frames_beyond_the_largest_strain_are_out_of_the_fit_alone():
 def test_frames_without_a_strain_are_out_of_a_fit_up_to_a_strain():
     rows = [{**row, "strain": None} for row in curve()]
     assert summary_of(rows).frames == 5
-    assert summary_of(rows, strain_max=1.0).frames == 0
+    with pytest.warns(ScanfabWarning, match="strain-max: no frame has a strain"):
+        assert summary_of(rows, strain_max=1.0).frames == 0
+
+
+@pytest.mark.parametrize(("largest", "kind"), [(5.0, ScanfabWarning), (0.5, ScanfabNote)])
+def test_a_largest_strain_that_leaves_out_nothing_says_that_strains_are_fractions(largest, kind):
+    message = rf"{largest:g} leaves out no frame: .* fractions \(5 % is 0.05\), .* 0 and 0.04"
+    with pytest.warns(kind, match=message):
+        assert summary_of(curve(), strain_max=largest).frames == 5
+
+
+def test_a_largest_strain_that_leaves_out_frames_says_nothing():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        summary_of(curve(), strain_max=0.02)
+
+
+def test_a_largest_strain_that_is_no_number_is_refused():
+    with pytest.raises(SettingsError, match="strain-max: expected a number, found nan"):
+        summary_of(curve(), strain_max=math.nan)
+
+
+def test_of_a_sheared_cell_the_largest_strain_is_the_shear_strain():
+    with pytest.warns(ScanfabNote, match="shear_strain stands in for the axial strain"):
+        row = summary_of(sheared(), strain_max=0.2)
+    assert row.frames == 3
+    assert row.peak_strain == 0.4
+
+
+def test_errors_stand_beside_their_values():
+    errors = {"alpha_vs_axial_se": 3e-4, "alpha_vs_axial_sample_se": 4e-4}
+    rows = [{**row, **errors, "alpha_c_axial_sample_se": 1e-3} for row in curve()]
+    first = compare_tables(rows).frames[0]
+    assert first.alpha_vs_axial_total_se == pytest.approx(5e-4)
+    assert (first.alpha_vs_axial_se, first.alpha_c_axial_sample_se) == (3e-4, 1e-3)
+    assert compare_tables(curve()).frames[0].alpha_vs_axial_total_se is None
 
 
 def test_frames_without_a_value_are_left_out():
@@ -195,3 +231,36 @@ def test_a_word_among_the_numbers_is_named(column, value):
     rows = [*curve()[:2], {**curve()[2], column: value}]
     with pytest.raises(SettingsError, match=f"row 3: {column}: expected a number, found "):
         compare_tables(rows)
+
+
+def noisy_replicates(rows, random):
+    """The rows with two replicates of each value without an octant, each with noise of its own."""
+    found = []
+    for row in rows:
+        changes = {}
+        for block in range(1, 9):
+            one, two = 0.1 * row["alpha_vs_axial"] * random.normal(size=2)
+            name = f"alpha_vs_axial_without_{block}"
+            changes[name] = row[name] + 0.5 * (one + two)
+            changes[f"alpha_vs_axial_half_{block}"] = 0.5 * (one - two)
+        found.append({**row, **changes})
+    return found
+
+
+def test_the_noise_of_the_scan_is_taken_off_the_error_of_the_slope():
+    """Of the slope's variance the mean is right with the replicates, and too large without them."""
+    random = np.random.default_rng(3)
+    rows = with_octants(curve())
+    exact = summary_of(rows).slope_se ** 2
+    with_replicates, without = [], []
+    for _ in range(300):
+        noisy = noisy_replicates(rows, random)
+        # empty where noise is all that is left: a negative estimate, left out, would be missed
+        with_replicates.append(summary_of(noisy).slope_se)
+        means = [{k: v for k, v in row.items() if "half" not in k} for row in noisy]
+        without.append(summary_of(means).slope_se ** 2)
+    assert None not in with_replicates
+    variances = np.square(with_replicates)
+    error = variances.std() / np.sqrt(len(variances))
+    assert variances.mean() == pytest.approx(exact, abs=4 * error)
+    assert np.mean(without) > exact + 8 * error

@@ -140,6 +140,47 @@ def test_the_disk_is_equal_area():
     assert rho**2 == pytest.approx(1 - directions[..., 2], abs=1e-12)
 
 
+def test_titles_name_variant_frame_and_strain(series, computed, caught, tmp_path):
+    for name in FRAME_FIGURES:
+        plot_frames(tmp_path / "x.png", series, SETTINGS, computed.rows, name)
+        titles = [one.title for one in caught[name]]
+        strain = 100 * row_of(computed, 6)["strain"]
+        assert titles == [
+            r"variant c, frame 0, $\varepsilon_a$ = 0 %",
+            rf"variant c, frame 6, $\varepsilon_a$ = {strain:.3g} %",
+        ]
+
+
+def test_without_a_strain_titles_name_the_frame(series, computed, caught, tmp_path):
+    rows = [{**row, "strain": 0.0} for row in computed.rows]
+    plot_frames(tmp_path / "x.png", series, SETTINGS, rows, "histogram")
+    assert [one.title for one in caught["histogram"]] == [
+        "variant c, frame 0",
+        "variant c, frame 6",
+    ]
+
+
+def test_cut_offs_have_the_total_error_and_the_scan_s_part(series, computed, caught, tmp_path):
+    """The sample's part is about the table's, which is of another scan of the same octants."""
+    plot_frames(tmp_path / "x.png", series, SETTINGS, computed.rows, "cutoffs")
+    last = caught["cutoffs"][1]
+    (place,) = np.flatnonzero(last.cutoff == 1.0)
+    sample = np.sqrt(last.total[place] ** 2 - last.error[place] ** 2)
+    known = row_of(computed, 6)["alpha_vs_axial_sample_se"]
+    assert sample == pytest.approx(known, rel=0.5)
+    assert np.nanmin(last.total - last.error) > 0
+
+
+@pytest.mark.parametrize("name", ["rose", "projection"])
+def test_panels_are_lettered(series, computed, tmp_path, monkeypatch, name):
+    drawn = []
+    monkeypatch.setattr(plot_frame, "save_figure", lambda figure, *_: drawn.append(figure))
+    plot_frames(tmp_path / "x.png", series, SETTINGS, computed.rows, name)
+    titles = [axes.get_title(loc="left") for axes in drawn[0].axes[:4]]
+    assert [title[:3] for title in titles] == ["(a)", "(b)", "(c)", "(d)"]
+    assert all("variant c, frame " in title for title in titles)
+
+
 def test_one_frame_and_other_variants(series, computed, tmp_path, caught):
     rows = [row for row in computed.rows if row["frame"] == 3]
     settings = Settings.make(boundary="mask=3", tolerance=1e-3, variants="b")

@@ -65,6 +65,15 @@ def test_more_lines_cannot_tell_more_of_the_material(packing):
     assert ratio == pytest.approx(1.0, abs=0.3)
 
 
+def test_the_scatter_of_a_large_sample_is_no_noise_of_the_scan():
+    """Of 4,096 grains over 12 seeds: hidden by noise in none, and the same within 15 %."""
+    large = find_contacts(Packing(*shaken_cubic(np.random.default_rng(0), 16)))
+    options = {"variants": "c", "tolerance": 1e-3}
+    found = [compute(large, **options, seed=seed)[0].alpha_vs_axial_sample_se for seed in range(12)]
+    assert None not in found
+    assert np.std(found, ddof=1) < 0.15 * np.mean(found)
+
+
 def test_scatter_of_a_periodic_whole_does_not_depend_on_an_rv_beside_it():
     spheres = shaken_cubic(np.random.default_rng(0), 6)
     cell = Cell(6.0 * np.eye(3), (True, True, True))

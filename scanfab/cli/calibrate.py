@@ -14,7 +14,9 @@ from click.core import ParameterSource
 from scanfab.cli.options import (
     axis_option,
     check_plot,
+    completed,
     cutoff_option,
+    excerpt_options,
     output_option,
     plot_option,
     reading_options,
@@ -24,18 +26,21 @@ from scanfab.cli.options import (
     window_options,
     workers_option,
 )
-from scanfab.cli.sources import SourceCommand, fill_from_file, open_series, reading_arguments
+from scanfab.cli.settings_file import fill_from_file
+from scanfab.cli.sources import SourceCommand, open_series, reading_arguments
+from scanfab.cli.talk import talk_options, tell_inputs, working
 
 if TYPE_CHECKING:
     from scanfab.calibration import Calibration
     from scanfab.ladders import StepRow
+    from scanfab.writers.rows import Excerpt
 
 __all__ = ["calibrate"]
 
 # what compute has no use for, or what is recommended instead
 OWN = (
     "source", "frame", "output", "plot", "variants", "spacing", "directions", "tolerance",
-    "max_chords",
+    "max_chords", "fields", "digits",
 )  # fmt: skip
 TITLES = {
     "spacing": "spacing / r_min",
@@ -53,7 +58,13 @@ TITLES = {
 @click.option(
     "--frame", default=-1, metavar="K", help="Which frame, as in the fabric table (default: last)."
 )
-@click.option("--variants", default="cd", show_default=True, help="Which variants to compute.")
+@click.option(
+    "--variants",
+    default="cd",
+    show_default=True,
+    shell_complete=completed("cd", "c", "d", "abcd"),
+    help="Which variants to compute.",
+)
 @window_options
 @cutoff_option
 @click.option(
@@ -87,7 +98,9 @@ TITLES = {
 @seed_option
 @workers_option
 @output_option
+@excerpt_options
 @plot_option
+@talk_options
 @click.pass_context
 def calibrate(
     ctx: click.Context,
@@ -108,22 +121,26 @@ def calibrate(
     On a terminal a readable table; else the steps as CSV, and what they show on standard error.
     """
     from scanfab.calibration import calibrate as calibrate_series
-    from scanfab.cli.console import announce_compiling, reported_warnings
+    from scanfab.cli.console import announce_compiling, is_readable, reported_warnings
     from scanfab.ladders import StepRow
     from scanfab.settings import Settings
     from scanfab.writers.plot_calibration import plot_calibration
     from scanfab.writers.results import ResultFile
+    from scanfab.writers.rows import Excerpt
 
-    options = fill_from_file(ctx, (source,), options)
-    reading = reading_arguments(options)
     check_plot(plot, None, ())
     with reported_warnings():
+        options, _ = fill_from_file(ctx, (source,), options)
+        reading = reading_arguments(options)
         with usage_errors():
+            excerpt = Excerpt.make(StepRow, options.pop("fields"), int(options.pop("digits")))
             settings = Settings.make(**options)
-            result = None if output is None else ResultFile(output, StepRow)
+            result = None if output is None else ResultFile(output, StepRow, excerpt)
         announce_compiling()
         (series,) = open_series((source,), reading)
-        found = calibrate_series(series, settings, frame=frame)
+        tell_inputs([series], settings.workers)
+        with working():
+            found = calibrate_series(series, settings, frame=frame)
         command = _command_line(ctx, source, found.options)
         if result is not None:
             with result.writer({}) as writer:
@@ -131,7 +148,10 @@ def calibrate(
                     writer.write(row)
         if plot is not None:
             plot_calibration(found.rows, plot)
-        _show(found, command, as_rows=result is None and not sys.stdout.isatty())
+        if result is not None or is_readable():
+            _show(found, command, result is None)
+        else:
+            _write_rows(found, command, excerpt)
     return 0
 
 
@@ -153,19 +173,23 @@ def _command_line(ctx: click.Context, source: str, recommended: dict[str, str]) 
     return shlex.join(words)
 
 
-def _show(found: Calibration, command: str, as_rows: bool) -> None:
-    """What was found: on a terminal all of it, else rows on one stream and words on the other."""
-    if as_rows:
-        from scanfab.writers.rows import CsvWriter
-
-        writer = CsvWriter(sys.stdout)
-        for row in found.rows:
-            writer.write(row)
-    elif sys.stdout.isatty():
+def _show(found: Calibration, command: str, tables: bool) -> None:
+    """What was found, in words, on a terminal behind tables of the steps."""
+    if tables:
         _print(found.rows)
-    for sentence in found.findings:
-        click.echo(sentence, err=as_rows)
-    click.echo(command, err=as_rows)
+    for sentence in (*found.findings, command):
+        click.echo(sentence)
+
+
+def _write_rows(found: Calibration, command: str, excerpt: Excerpt) -> None:
+    """The steps on one stream, and what was found on the other."""
+    from scanfab.writers.rows import CsvWriter
+
+    writer = CsvWriter(sys.stdout, excerpt=excerpt)
+    for row in found.rows:
+        writer.write(row)
+    for sentence in (*found.findings, command):
+        click.echo(sentence, err=True)
 
 
 def _print(rows: tuple[StepRow, ...]) -> None:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +12,9 @@ import click
 from scanfab.cli.options import (
     axis_option,
     check_plot,
+    completed,
     cutoff_option,
+    excerpt_options,
     frames_option,
     output_option,
     plot_option,
@@ -26,17 +26,23 @@ from scanfab.cli.options import (
     window_options,
     workers_option,
 )
-from scanfab.cli.sources import SourceCommand, fill_from_file, open_series, reading_arguments
+from scanfab.cli.running import Run
+from scanfab.cli.settings_file import SettingsFile, fill_from_file
+from scanfab.cli.sources import SourceCommand, open_series, reading_arguments
+from scanfab.cli.talk import talk_options, tell_inputs
 
 if TYPE_CHECKING:
     from scanfab.cli.console import Told
-    from scanfab.pipeline import Observer
-    from scanfab.series import Series
-    from scanfab.settings import Settings
-    from scanfab.table import Row
     from scanfab.writers.results import ResultFile
+    from scanfab.writers.rows import Excerpt
 
-__all__ = ["compute"]
+__all__ = ["OF_THE_LINE", "compute"]
+
+# what a settings file says nothing of: where results go
+OF_THE_LINE = (
+    "sources", "output", "resume", "manifest_path", "vtk_folder", "plot", "figure", "quiet",
+    "verbose", "help",
+)  # fmt: skip
 
 
 @click.command(cls=SourceCommand)
@@ -44,7 +50,13 @@ __all__ = ["compute"]
 @reading_options
 @sample_options
 @frames_option
-@click.option("--variants", default="abcd", show_default=True, help="Which variants to compute.")
+@click.option(
+    "--variants",
+    default="abcd",
+    show_default=True,
+    shell_complete=completed("abcd", "ab", "cd", "ac", *"abcd"),
+    help="Which variants to compute.",
+)
 @window_options
 @cutoff_option
 @click.option(
@@ -57,6 +69,7 @@ __all__ = ["compute"]
     default=1,
     show_default=True,
     metavar="1|2",
+    shell_complete=completed("1", "2"),
     help="Mean length of the void segments (1), or mean of the squares over the mean (2).",
 )
 @click.option(
@@ -64,6 +77,7 @@ __all__ = ["compute"]
     default="auto",
     show_default=True,
     metavar="L",
+    shell_complete=completed("auto"),
     help="Distance between neighbouring lines, likewise; auto meets --tolerance.",
 )
 @click.option(
@@ -71,6 +85,10 @@ __all__ = ["compute"]
     default="auto",
     show_default=True,
     metavar="N|RULE",
+    shell_complete=completed(
+        "auto",
+        *(f"{rule}:" for rule in ("lebedev", "design", "icosahedral", "product", "fibonacci")),
+    ),
     help="N axes, rounded up to the next exact rule, or lebedev:DEGREE, design:DEGREE, "
     "icosahedral:DEGREE, product:DEGREE, fibonacci:N, equal-angle:STEP, equal-angle-full:STEP.",
 )
@@ -83,10 +101,11 @@ __all__ = ["compute"]
 )
 @click.option(
     "--max-chords",
-    default=1e11,
+    default=1e10,
     show_default=True,
     metavar="N",
-    help="An auto scan stops before it cuts more chords from grains than this, in each frame.",
+    help="An auto scan stops before it cuts more chords from grains than this, in each frame: by "
+    "default after one or two minutes of one processor (lines count like chords).",
 )
 @axis_option
 @click.option(
@@ -94,6 +113,7 @@ __all__ = ["compute"]
     default="auto",
     show_default=True,
     metavar="auto|cell|boundary|grains|FILE.csv",
+    shell_complete=completed("auto", "cell", "boundary", "grains", files=True),
     help="Where the axial strain comes from.",
 )
 @seed_option
@@ -103,10 +123,16 @@ __all__ = ["compute"]
     default="stop",
     show_default=True,
     metavar="stop|skip",
+    shell_complete=completed("stop", "skip"),
     help="What a frame that cannot be read does.",
 )
 @output_option
-@click.option("--resume", is_flag=True, help="Go on with FILE.part of an interrupted run.")
+@excerpt_options
+@click.option(
+    "--resume",
+    is_flag=True,
+    help="Go on with FILE.part of an interrupted run, or add what is missing to a complete FILE.",
+)
 @click.option(
     "--manifest",
     "manifest_path",
@@ -126,10 +152,14 @@ __all__ = ["compute"]
 @click.option(
     "--figure",
     metavar="NAME",
+    shell_complete=completed(
+        "evolution", "normalised", "correlation", "rose", "projection", "histogram", "cutoffs"
+    ),
     help="Which figure: of the table evolution, normalised or correlation (default: all on one "
     "page); of the first and last frame rose (or rose:30,60,90 for these polar angles), "
     "projection, histogram or cutoffs.",
 )
+@talk_options
 @click.pass_context
 def compute(
     ctx: click.Context,
@@ -151,35 +181,45 @@ def compute(
     Variants: a whole sample; b whole sample, rattlers removed; c representative volume (RV); d RV,
     rattlers removed. Lengths are in the dump's own units.
     """
-    from scanfab.cli.console import announce_compiling, reported_warnings
+    from scanfab.cli.console import announce_compiling, is_readable, reported_warnings
+    from scanfab.cli.main import tell_when_ended
     from scanfab.manifest import asked_for
     from scanfab.settings import Settings
     from scanfab.table import Row
     from scanfab.writers.files import check_folder
     from scanfab.writers.results import ResultFile
+    from scanfab.writers.rows import Excerpt
 
-    options = fill_from_file(ctx, sources, options)
-    reading = reading_arguments(options)
-    if options.get("cutoffs") and (vtk_folder is not None or plot is not None):
-        raise click.UsageError("--vtk and --plot are of one cut-off: leave out --cutoffs")
     if resume and output is None:
         raise click.UsageError("--resume goes with -o FILE")
     _check_figure(plot, figure)
     with reported_warnings() as told:
+        options, settings_file = fill_from_file(ctx, sources, options)
+        if options.get("cutoffs") and (vtk_folder is not None or plot is not None):
+            raise click.UsageError("--vtk and --plot are of one cut-off: leave out --cutoffs")
+        reading = reading_arguments(options)
         with usage_errors():
+            excerpt = Excerpt.make(Row, options.pop("fields"), int(options.pop("digits")))
             settings = Settings.make(**options)
-            result = None if output is None else ResultFile(output, Row)
+            result = None if output is None else ResultFile(output, Row, excerpt)
             if manifest_path is not None:
                 check_folder(manifest_path)
-        asked = asked_for(sources, reading, settings)
+        asked = {**asked_for(sources, reading, settings), **excerpt.asked()}
         series = open_series(sources, reading)
         if figure is not None and _is_of_frames(figure) and len(series) > 1:
             raise click.UsageError(f"--figure {figure} draws one series: name one source")
+        tell_inputs(series, settings.workers)
         announce_compiling()
-        run = _Run(series, settings, vtk_folder, resume, keep=plot is not None)
-        _write(run, asked, result)
+        run = Run(series, settings, vtk_folder, resume, keep=plot is not None)
+        if resume and result is not None:
+            with usage_errors():
+                asked = run.go_on(result, asked)
+        printed = not is_readable()
+        tell_when_ended(lambda: _standing(run, output, printed))
+        _write(run, asked, result, excerpt)
+        tell_when_ended(None)
         for path in _manifests(output, manifest_path):
-            _write_manifest(path, asked, series, told)
+            _write_manifest(path, asked, run, told, settings_file)
         if plot is not None:
             _draw(plot, figure, run)
     return 0 if run.found and not told.skipped and not run.skipped else 1
@@ -203,7 +243,7 @@ def _is_of_frames(figure: str) -> bool:
     return figure not in TABLE_FIGURES
 
 
-def _draw(plot: Path, figure: str | None, run: _Run) -> None:
+def _draw(plot: Path, figure: str | None, run: Run) -> None:
     from scanfab.figures import plot_rows
     from scanfab.frame_figures import plot_frames
 
@@ -215,106 +255,32 @@ def _draw(plot: Path, figure: str | None, run: _Run) -> None:
         plot_rows(plot, run.kept, figure)
 
 
-class _Run:
-    """The series under way, and what becomes of their rows."""
-
-    def __init__(
-        self,
-        series: list[Series],
-        settings: Settings,
-        vtk_folder: Path | None,
-        resume: bool,
-        keep: bool,
-    ) -> None:
-        self.series = series
-        self.settings = settings
-        self.resume = resume
-        self.found = False
-        """Whether any row has a void fabric."""
-        self.skipped = False
-        """Whether an earlier run has skipped frames."""
-        self.kept: list[dict[str, Any]] = []
-        """The rows, if they are wanted."""
-        self._keep = keep
-        self._observers = _vtk_folders(vtk_folder, series, settings, resume)
-
-    def before(self, done: list[dict[str, Any]]) -> None:
-        """Rows of an earlier run."""
-        self.found = any(row["alpha_vs"] is not None for row in done)
-        self.skipped = self._has_gaps(done)
-        self.kept = list(done) if self._keep else []
-
-    def _has_gaps(self, done: list[dict[str, Any]]) -> bool:
-        """Whether an earlier run has skipped frames between those that it has written."""
-        from scanfab.pipeline import chosen_frames
-
-        for one in self.series:
-            written = {row["frame"] for row in done if row["source"] == one.name}
-            if not written:
-                continue
-            chosen = chosen_frames(one, self.settings.frames)
-            due = range(chosen.start, max(written) + 1, chosen.step)
-            if len(due) > len(written):
-                return True
-        return False
-
-    def rows(self, last: dict[str, Any] | None) -> Iterator[Row]:
-        """The rows behind the last one that an earlier run has written."""
-        from scanfab.cli.console import with_progress
-
-        for row in with_progress(self._rows(last)):
-            self.found = self.found or row.alpha_vs is not None
-            if self._keep:
-                self.kept.append(asdict(row))
-            yield row
-
-    def _rows(self, last: dict[str, Any] | None) -> Iterator[Row]:
-        from scanfab.pipeline import compute_rows
-
-        names = [one.name for one in self.series]
-        first = names.index(last["source"]) if last is not None else 0
-        for one, observe in list(zip(self.series, self._observers, strict=True))[first:]:
-            start = last["frame"] + 1 if last is not None and one.name == last["source"] else 0
-            yield from compute_rows(one, self.settings, start=start, observe=observe)
+def _standing(run: Run, output: Path | None, printed: bool) -> str:
+    """What to add where an interruption is told: how far the run is, and how to go on."""
+    if output is None:
+        kept = "the rows printed so far are all" if printed else "nothing is kept"
+        return f"{run.standing()}; {kept}: with -o FILE, --resume could go on"
+    if not run.done:
+        return " before the first frame was finished: nothing is kept"
+    again = "the same command" if run.resume else "the same command with --resume"
+    return f"{run.standing()}; {again} goes on"
 
 
-def _vtk_folders(
-    folder: Path | None, series: list[Series], settings: Settings, resume: bool
-) -> list[Observer | None]:
-    """What writes the ParaView files of each series, in folders of their own if several."""
-    if folder is None:
-        return [None] * len(series)
-    from scanfab.export import VtkFolder
-
-    folders = [folder / f"series-{number}" for number in range(1, len(series) + 1)]
-    with usage_errors():
-        return [
-            VtkFolder(one, settings.axis, resume)
-            for one in (folders if len(series) > 1 else [folder])
-        ]
-
-
-def _write(run: _Run, asked: dict[str, Any], result: ResultFile | None) -> None:
+def _write(run: Run, asked: dict[str, Any], result: ResultFile | None, excerpt: Excerpt) -> None:
     """Write the rows as they come."""
-    from scanfab.cli.console import print_table
+    from scanfab.cli.console import is_readable, print_table
     from scanfab.writers.rows import CsvWriter
 
-    if result is None:
-        if sys.stdout.isatty():
-            print_table(list(run.rows(None)))
-        else:
-            printer = CsvWriter(sys.stdout)
-            for row in run.rows(None):
-                printer.write(row)
-        return
-    done: list[dict[str, Any]] = []
-    if run.resume:
-        with usage_errors():
-            done = result.finished_rows(asked, run.settings.rows_per_frame)
-    run.before(done)
-    with result.writer(asked, run.resume) as writer:
-        for row in run.rows(done[-1] if done else None):
-            writer.write(row)
+    if result is not None:
+        with result.writer(asked, run.resume) as writer:
+            for row in run.rows():
+                writer.write(row)
+    elif is_readable():
+        print_table(list(run.rows()), excerpt)
+    else:
+        printer = CsvWriter(sys.stdout, excerpt=excerpt)
+        for row in run.rows():
+            printer.write(row)
 
 
 def _manifests(output: Path | None, asked: Path | None) -> list[Path]:
@@ -322,10 +288,17 @@ def _manifests(output: Path | None, asked: Path | None) -> list[Path]:
     return paths if asked is None else [*paths, asked]
 
 
-def _write_manifest(path: Path, asked: dict[str, Any], series: list[Series], told: Told) -> None:
+def _write_manifest(
+    path: Path, asked: dict[str, Any], run: Run, told: Told, settings_file: SettingsFile | None
+) -> None:
     from scanfab.manifest import manifest
     from scanfab.writers.files import whole_file
 
-    text = json.dumps(manifest(asked, series, told.texts, told.notes), indent=1, ensure_ascii=False)
+    # what was told of the rows that an earlier run has finished
+    before = run.table.warnings if run.table is not None else []
+    found = manifest(asked, run.series, [*dict.fromkeys([*before, *told.texts])], told.notes)
+    if settings_file is not None:
+        found["settings_file"] = settings_file.asked()
+    text = json.dumps(found, indent=1, ensure_ascii=False)
     with whole_file(path) as part:
         part.write_text(text + "\n", encoding="utf-8")

@@ -1,4 +1,4 @@
-"""What goes to people: warnings and progress on standard error, tables on a terminal."""
+"""What goes to people: warnings on standard error, tables on a terminal."""
 
 from __future__ import annotations
 
@@ -6,30 +6,45 @@ import sys
 import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from typing import Any
 
 import click
 
+from scanfab.cli.options import AS_CSV
+from scanfab.cli.talk import Level, level
 from scanfab.errors import ScanfabNote, ScanfabWarning, SkippedFrameWarning
 from scanfab.table import Row
+from scanfab.writers.rows import Excerpt
 
-__all__ = ["announce_compiling", "print_table", "reported_warnings", "with_progress"]
+__all__ = ["announce_compiling", "is_readable", "print_table", "reported_warnings"]
 
-# title of each column on a terminal, and the width of terminal from which it is shown
-SHOWN = {
-    "frame": ("frame", 0),
-    "strain": ("strain", 0),
-    "variant": ("variant", 0),
-    "grains": ("grains", 0),
-    "contacts": ("contacts", 0),
-    "coordination": ("coordination", 120),
-    "solid_fraction": ("solid fraction", 120),
-    "mean_length": ("mean length", 100),
-    "alpha_vs": ("α_vs", 100),
-    "alpha_vs_axial": ("α_vs axial", 0),
-    "alpha_vs_axial_se": ("±", 0),
-    "alpha_c_axial": ("α_c axial", 0),
+# titles of the columns that a terminal always shows, and of those for which there may be room, the
+# most telling first
+KEYS = {
+    "frame": "frame",
+    "strain": "strain",
+    "variant": "variant",
+    "grains": "grains",
+    "contacts": "contacts",
+    "alpha_vs_axial": "α_vs axial",
+    "total": "± total",
+    "alpha_c_axial": "α_c axial",
 }
+MORE = {
+    "alpha_vs_axial_se": "± scan",
+    "alpha_vs_axial_sample_se": "± sample",
+    "alpha_vs": "α_vs",
+    "mean_length": "mean length",
+    "coordination": "coordination",
+    "solid_fraction": "solid fraction",
+}
+ORDER = (
+    "frame", "strain", "variant", "grains", "contacts", "coordination", "solid_fraction",
+    "mean_length", "alpha_vs", "alpha_vs_axial", "total", "alpha_vs_axial_se",
+    "alpha_vs_axial_sample_se", "alpha_c_axial",
+)  # fmt: skip
+BETWEEN = 2
 
 
 class Told:
@@ -38,7 +53,8 @@ class Told:
     skipped = 0
     """Frames that were skipped."""
 
-    def __init__(self) -> None:
+    def __init__(self, level: Level = Level.USUAL) -> None:
+        self.level = level
         self.texts: list[str] = []
         """Warnings, each text once."""
         self.notes: list[str] = []
@@ -52,13 +68,14 @@ class Told:
         )
         if issubclass(category, ScanfabWarning | ScanfabNote) and text not in known:
             known.append(text)
-            click.echo(f"scanfab: {kind}: {text}", err=True)
+            if kind == "warning" or self.level is not Level.QUIET:
+                click.echo(f"scanfab: {kind}: {text}", err=True)
 
 
 @contextmanager
 def reported_warnings() -> Iterator[Told]:
     """Warnings and notes of scanfab as single lines on standard error, each text once."""
-    told = Told()
+    told = Told(level())
 
     def show(message: Any, category: type[Warning], *rest: Any, **more: Any) -> None:
         told.hear(category, str(message))
@@ -71,6 +88,11 @@ def reported_warnings() -> Iterator[Told]:
         yield told
 
 
+def is_readable() -> bool:
+    """Whether results go to a terminal, as a table to be read, and not as CSV."""
+    return sys.stdout.isatty() and not click.get_current_context().meta.get(AS_CSV)
+
+
 def announce_compiling() -> None:
     """A line on standard error if the scan has to be compiled first."""
     from scanfab.kernels.cache import is_kept, when_compiling
@@ -80,43 +102,49 @@ def announce_compiling() -> None:
         if is_kept()
         else "and cannot be kept: NUMBA_CACHE_DIR may name a folder that can be written to"
     )
+    quiet = level() is Level.QUIET
     when_compiling(
-        lambda: click.echo(f"scanfab: compiling the scan, some ten seconds; {kept}", err=True)
+        lambda: (
+            None
+            if quiet
+            else click.echo(f"scanfab: compiling the scan, some ten seconds; {kept}", err=True)
+        )
     )
 
 
-def with_progress(rows: Iterable[Row]) -> Iterator[Row]:
-    """The same rows, with a line of progress on standard error if it is a terminal."""
-    if not sys.stderr.isatty():
-        yield from rows
-        return
-    from rich.console import Console
-    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task("first frame")
-        for row in rows:
-            progress.update(task, description=f"{row.source}: frame {row.frame} done")
-            yield row
-
-
-def print_table(rows: Iterable[Row]) -> None:
-    """A readable table on standard output."""
+def print_table(rows: Iterable[Row], excerpt: Excerpt) -> None:
+    """A readable table on standard output: the columns that were asked for, or those that fit."""
     from rich.console import Console
     from rich.table import Table
 
-    console = Console()
-    shown = {name: title for name, (title, width) in SHOWN.items() if width <= console.width}
-    table = Table(box=None, header_style="bold", pad_edge=False)
-    for title in shown.values():
-        table.add_column(title, justify="right", no_wrap=True)
-    for row in rows:
-        table.add_row(*(_spell(getattr(row, name)) for name in shown))
+    from scanfab.tabular import total_error
+
+    values = [asdict(row) for row in rows]
+    for row in values:
+        row["total"] = total_error(row, "alpha_vs_axial")
+    width = Console().width
+    titles = {name: name for name in excerpt.fields} or {**KEYS, **MORE}
+    columns = {
+        name: [titles[name], *(_spell(row[name], excerpt.digits) for row in values)]
+        for name in excerpt.fields or ORDER
+    }
+    widths = {name: max(map(len, cells)) + BETWEEN for name, cells in columns.items()}
+    if not excerpt.fields:
+        for name in reversed(MORE):
+            if sum(widths.values()) - BETWEEN > width:
+                del columns[name], widths[name]
+    # a column is never cut: a terminal that is too narrow for these wraps their lines
+    console = Console(width=max(width, sum(widths.values())))
+    table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, BETWEEN, 0, 0))
+    for name in columns:
+        table.add_column(titles[name], justify="right", no_wrap=True)
+    for cells in zip(*(column[1:] for column in columns.values()), strict=True):
+        table.add_row(*cells)
     console.print(table)
 
 
-def _spell(value: Any) -> str:
+def _spell(value: Any, digits: int) -> str:
     if value is None:
         return "-"
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
+    # three digits say enough on a terminal, unless others were asked for
+    return f"{value:.{digits if digits < 17 else 3}g}" if isinstance(value, float) else str(value)

@@ -14,14 +14,11 @@ from scanfab.cli.options import (
     sample_options,
     sources_argument,
     usage_errors,
+    window_options,
 )
-from scanfab.cli.sources import (
-    SourceCommand,
-    fill_from_file,
-    open_series,
-    reading_arguments,
-    settings_file,
-)
+from scanfab.cli.settings_file import fill_from_file
+from scanfab.cli.sources import SourceCommand, open_series, reading_arguments
+from scanfab.cli.talk import talk_options, tell_inputs, working
 
 if TYPE_CHECKING:
     from scanfab.inspection import FrameReport
@@ -34,11 +31,14 @@ __all__ = ["inspect"]
 @reading_options
 @sample_options
 @frames_option
+@window_options
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line and frame.")
+@talk_options
 @click.pass_context
 def inspect(ctx: click.Context, /, sources: tuple[str, ...], as_json: bool, **options: Any) -> int:
     """
-    Show what the reader sees in each frame: grains, radii, contacts, rattlers, cell, columns.
+    Show what the reader sees in each frame: grains, radii, contacts, rattlers, cell, columns,
+    extents, and where the RV would be.
 
     Nothing is computed; contacts are found by geometry where no file lists them.
     """
@@ -46,21 +46,25 @@ def inspect(ctx: click.Context, /, sources: tuple[str, ...], as_json: bool, **op
     from scanfab.inspection import inspect_series
     from scanfab.settings import Settings
 
-    options = fill_from_file(ctx, sources, options)
-    reading = reading_arguments(options)
     with reported_warnings():
+        options, _ = fill_from_file(ctx, sources, options)
+        reading = reading_arguments(options)
         with usage_errors():
             settings = Settings.make(**options)
-        found = settings_file(sources)
-        if found is not None:
-            click.echo(f"scanfab: options from {found}", err=True)
         announce_compiling()
-        for series in open_series(sources, reading):
-            for report in inspect_series(series, settings):
+        every = open_series(sources, reading)
+        tell_inputs(every, settings.workers)
+
+        def frames() -> int:
+            return sum(len(range(one.frames_expected())[settings.frames]) for one in every)
+
+        with working(frames, prints=True) as advance:
+            for report in (one for series in every for one in inspect_series(series, settings)):
                 if as_json:
                     click.echo(json.dumps(asdict(report), ensure_ascii=False))
                 else:
                     _print(report)
+                advance()
     return 0
 
 

@@ -5,14 +5,16 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from collections.abc import Callable
 from contextlib import suppress
+from difflib import get_close_matches
 from importlib import import_module
 from io import UnsupportedOperation
 from types import FrameType
 
 import click
 
-__all__ = ["cli", "main"]
+__all__ = ["cli", "main", "tell_when_ended"]
 
 # one module a command, imported only when the command runs: --help stays fast
 COMMANDS = {
@@ -34,6 +36,16 @@ LEFTOVERS = {
 }
 
 
+# how far the command under way is, said where it is interrupted
+_standing: Callable[[], str] | None = None
+
+
+def tell_when_ended(standing: Callable[[], str] | None) -> None:
+    """What to add to the word that the process was interrupted."""
+    global _standing
+    _standing = standing
+
+
 class LazyGroup(click.Group):
     """A group that knows its commands by name."""
 
@@ -42,7 +54,11 @@ class LazyGroup(click.Group):
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in COMMANDS:
-            return None
+            if ctx.resilient_parsing:
+                return None
+            near = get_close_matches(cmd_name, COMMANDS, n=1)
+            hint = f"Did you mean {near[0]!r}?" if near else f"Choose from {', '.join(COMMANDS)}."
+            raise click.UsageError(f"No such command {cmd_name!r}. {hint}", ctx)
         command = getattr(import_module(f"scanfab.cli.{cmd_name}"), cmd_name)
         assert isinstance(command, click.Command)
         return command
@@ -111,7 +127,7 @@ def _imports(frame: FrameType | None) -> bool:
 
 def _report_end(number: int) -> int:
     """Say that a signal ended the process; the exit code for that."""
-    click.echo(f"scanfab: {ENDED[number]}", err=True)
+    click.echo(f"scanfab: {ENDED[number]}{_standing() if _standing else ''}", err=True)
     return 128 + number
 
 
@@ -141,6 +157,7 @@ def run(args: list[str]) -> int:
     """The command line's exit code; errors become one message on standard error."""
     from scanfab.errors import ScanfabError
 
+    tell_when_ended(None)
     # wherever it stands: the group knows it only for its help
     debug = "--debug" in args
     args = [word for word in args if word != "--debug"]

@@ -8,11 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import click
+from click.shell_completion import CompletionItem
 
 __all__ = [
+    "AS_CSV",
     "axis_option",
     "check_plot",
+    "completed",
     "cutoff_option",
+    "excerpt_options",
     "frames_option",
     "output_option",
     "plot_option",
@@ -26,6 +30,26 @@ __all__ = [
 ]
 
 Command = Callable[..., Any]
+Completion = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
+
+# of the context: -o - asks for CSV on standard output, on a terminal too
+AS_CSV = "scanfab.as_csv"
+
+
+def completed(
+    *choices: str, files: bool = False, more: Callable[[], Iterable[str]] = tuple
+) -> Completion:
+    """
+    What a shell offers for an option: these words, those of a function, or files.
+
+    The option takes other words too, or complains of them in words of its own.
+    """
+
+    def complete(ctx: click.Context, parameter: click.Parameter, text: str) -> list[CompletionItem]:
+        found = [CompletionItem(word) for word in (*choices, *more()) if word.startswith(text)]
+        return [*found, CompletionItem(text, type="file")] if files else found
+
+    return complete
 
 
 @contextmanager
@@ -50,6 +74,12 @@ def together(*options: Callable[[Command], Command]) -> Callable[[Command], Comm
     return add
 
 
+def _reader_names() -> Iterable[str]:
+    from scanfab.readers.registry import installed_readers
+
+    return installed_readers()
+
+
 sources_argument = click.argument(
     "sources",
     metavar="SOURCE...",
@@ -59,7 +89,12 @@ sources_argument = click.argument(
 )
 
 reading_options = together(
-    click.option("--format", metavar="NAME", help="Reader to use (default: by content)."),
+    click.option(
+        "--format",
+        metavar="NAME",
+        shell_complete=completed(more=_reader_names),
+        help="Reader to use (default: by content).",
+    ),
     click.option(
         "--columns",
         metavar="NAMES",
@@ -87,6 +122,7 @@ reading_options = together(
         "--contacts",
         default="auto",
         metavar="PATH|file|geometric",
+        shell_complete=completed("file", "geometric", files=True),
         help="Contacts: a file, folder or glob matched by step; from the dump's own contact files; "
         "or by geometry (default: file if there is one, else geometric).",
     ),
@@ -146,7 +182,12 @@ cutoff_option = click.option(
 )
 
 axis_option = click.option(
-    "--axis", default="z", show_default=True, metavar="x|y|z|X,Y,Z", help="Loading axis."
+    "--axis",
+    default="z",
+    show_default=True,
+    metavar="x|y|z|X,Y,Z",
+    shell_complete=completed("x", "y", "z"),
+    help="Loading axis.",
 )
 
 seed_option = click.option(
@@ -157,13 +198,38 @@ workers_option = click.option(
     "--workers", type=int, metavar="N", help="Parallel workers (default: all cores)."
 )
 
+
+def _output(ctx: click.Context, parameter: click.Parameter, path: Path | None) -> Path | None:
+    """The file; ``-`` is standard output, which gets CSV wherever it goes."""
+    if path == Path("-"):
+        ctx.meta[AS_CSV] = True
+        return None
+    return path
+
+
 output_option = click.option(
     "-o",
     "output",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=click.Path(dir_okay=False, path_type=Path, allow_dash=True),
+    callback=_output,
     metavar="FILE",
-    help="Result file: .csv .tsv .json .jsonl .parquet (default: CSV on standard output, or a "
-    "readable table on a terminal).",
+    help="Result file: .csv .tsv .json .jsonl .parquet; - is CSV on standard output (default: the "
+    "same, or a readable table on a terminal).",
+)
+
+excerpt_options = together(
+    click.option(
+        "--fields",
+        metavar="NAME,NAME,...",
+        help="Which columns to write, in this order (default: all).",
+    ),
+    click.option(
+        "--digits",
+        default=17,
+        show_default=True,
+        metavar="N",
+        help="Significant digits of written numbers; 17: as short as reads back the same.",
+    ),
 )
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from scanfab.cli.options import usage_errors
+from scanfab.cli.talk import talk_options, working
 
 __all__ = ["report"]
 
@@ -44,6 +45,7 @@ __all__ = ["report"]
     metavar="NAME",
     help="Name of a table in place of its source, once a table, in their order.",
 )
+@talk_options
 def report(
     tables: tuple[Path, ...],
     output: Path,
@@ -68,13 +70,14 @@ def report(
         check_page_file(output)
     with reported_warnings():
         announce_compiling()
-        made = make_report(
-            tables,
-            title=title,
-            author=_full_name() if author is None else author,
-            cutoff=cutoff,
-            labels=labels,
-        )
+        with working():
+            made = make_report(
+                tables,
+                title=title,
+                author=_full_name() if author is None else author,
+                cutoff=cutoff,
+                labels=labels,
+            )
         save_page(output, made.page)
     if not made.has_void_fabric:
         click.echo("scanfab: warning: no row of the tables has a void fabric", err=True)

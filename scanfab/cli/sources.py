@@ -1,21 +1,19 @@
-"""The sources of a command line: how to read them, and the settings file beside them."""
+"""The sources of a command line, and how to read them."""
 
 from __future__ import annotations
 
 import re
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from click.core import ParameterSource
 
 from scanfab.cli.options import usage_errors
 
 if TYPE_CHECKING:
     from scanfab.series import Series
 
-__all__ = ["SourceCommand", "fill_from_file", "open_series", "reading_arguments", "settings_file"]
+__all__ = ["SourceCommand", "open_series", "reading_arguments"]
 
 _READING_NAMES = (
     "format", "columns", "contact_columns", "radius", "cell", "periodic", "contacts",
@@ -68,73 +66,6 @@ def open_series(sources: tuple[str, ...], reading: dict[str, Any]) -> list[Serie
     if copy.stat().st_size == 0:
         raise ReadError("standard input: expected a dump, found nothing")
     return [replace(read_series(copy, **reading), name="-")]
-
-
-def settings_file(sources: tuple[str, ...]) -> Path | None:
-    """The scanfab.toml beside the dumps; a usage error if the sources have different ones."""
-    from scanfab.opening import SETTINGS_FILE
-
-    folders = {Path(s) if Path(s).is_dir() else Path(s).parent for s in sources if s != "-"}
-    found = [folder / SETTINGS_FILE for folder in sorted(folders)]
-    found = [path for path in found if path.is_file()]
-    if len(found) > 1:
-        raise click.UsageError(
-            f"the sources have several settings files: {', '.join(map(str, found))}; "
-            f"compute them one by one"
-        )
-    return found[0] if found else None
-
-
-def fill_from_file(
-    ctx: click.Context, sources: tuple[str, ...], options: dict[str, Any]
-) -> dict[str, Any]:
-    """The options, those that the command line does not name from the settings file."""
-    path = settings_file(sources)
-    if path is None:
-        return options
-    parameters = {
-        name.removeprefix("--"): parameter
-        for parameter in ctx.command.params
-        for name in parameter.opts
-        if parameter.name in options
-    }
-    filled = dict(options)
-    for key, value in _section(path, "compute").items():
-        parameter = parameters.get(key)
-        if parameter is not None:
-            name = str(parameter.name)
-            if ctx.get_parameter_source(name) is ParameterSource.DEFAULT:
-                filled[name] = _from_toml(ctx, path, parameter, value)
-        elif ctx.command.name == "compute":
-            raise click.UsageError(f"{path}: compute has no option {key!r}")
-    return filled
-
-
-def _section(path: Path, name: str) -> dict[str, Any]:
-    import tomllib
-
-    try:
-        with open(path, "rb") as stream:
-            section = tomllib.load(stream).get(name, {})
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise click.UsageError(f"{path}: {error}") from None
-    if not isinstance(section, dict):
-        raise click.UsageError(f"{path}: expected a section [{name}]")
-    return section
-
-
-def _from_toml(ctx: click.Context, path: Path, parameter: click.Parameter, value: Any) -> Any:
-    """A value of the settings file as the command line would give it."""
-    if isinstance(value, list) and not parameter.multiple and parameter.nargs == 1:
-        value = " ".join(map(str, value))  # the numbers of a cell
-    elif parameter.multiple and not isinstance(value, list):
-        value = [value]
-    elif not isinstance(value, list):
-        value = str(value)
-    try:
-        return parameter.type_cast_value(ctx, value)
-    except click.BadParameter as error:
-        raise click.UsageError(f"{path}: {parameter.name}: {error.format_message()}") from None
 
 
 def _leading_numbers(words: list[str]) -> int:

@@ -16,7 +16,9 @@ from scanfab.cli.options import (
     usage_errors,
     window_options,
 )
-from scanfab.cli.sources import SourceCommand, fill_from_file, open_series, reading_arguments
+from scanfab.cli.settings_file import fill_from_file
+from scanfab.cli.sources import SourceCommand, open_series, reading_arguments
+from scanfab.cli.talk import talk_options
 
 if TYPE_CHECKING:
     from scanfab.series import Series
@@ -48,6 +50,7 @@ __all__ = ["view"]
     metavar="FILE.png",
     help="Write a picture instead of opening a window; needs no screen.",
 )
+@talk_options
 @click.pass_context
 def view(
     ctx: click.Context,
@@ -69,9 +72,9 @@ def view(
     from scanfab.settings import Settings
     from scanfab.writers.files import check_folder
 
-    options = fill_from_file(ctx, sources, options)
-    reading = reading_arguments(options)
     with reported_warnings():
+        options, _ = fill_from_file(ctx, sources, options)
+        reading = reading_arguments(options)
         with usage_errors():
             settings = Settings.make(variants="c", **options)
             if screenshot is not None:

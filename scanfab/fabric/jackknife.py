@@ -41,6 +41,14 @@ class Jackknife(NamedTuple):
     """By how much leaving out a block moves the anisotropy, shape (8,), dimensionless."""
     error: float | None
     """The standard error that follows, dimensionless; None if the scan's noise hides it."""
+    half: FloatArray
+    """
+    How far the first replicate's value lies above the mean of all, shape (8,): of two replicates
+    half their difference.
+
+    From these the noise of the scan is known in whatever is made of several frames, such as a
+    slope. 0 for contacts, which are counted.
+    """
 
 
 def jackknife_error(values: FloatArray) -> float:
@@ -92,7 +100,7 @@ def contact_jackknife(
     if np.any(number == len(along)):
         return None
     rest = (along.sum() - np.bincount(places, along, minlength=BLOCKS)) / (len(along) - number)
-    return Jackknife(rest - along.mean(), jackknife_error(rest))
+    return Jackknife(rest - along.mean(), jackknife_error(rest), np.zeros(BLOCKS))
 
 
 def void_jackknife(
@@ -129,7 +137,8 @@ def void_jackknife(
     values = np.array([axial(fabric.replicates, axis) for fabric in fabrics if fabric is not None])
     means = values.mean(axis=1)
     variance = variance_without_noise(values[1:])
-    return Jackknife(means[1:] - means[0], math.sqrt(variance) if variance > 0 else None)
+    error = math.sqrt(variance) if variance > 0 else None
+    return Jackknife(means[1:] - means[0], error, values[1:, 0] - means[1:])
 
 
 def variance_without_noise(values: FloatArray) -> float:

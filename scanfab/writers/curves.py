@@ -10,11 +10,23 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.tabular import number_of
+from scanfab.abscissa import strain_column
+from scanfab.tabular import number_of, total_error
 
-__all__ = ["Curve", "abscissa_label", "curves_of"]
+__all__ = ["Curve", "abscissa_label", "curves_of", "is_turned", "short_names"]
 
 FloatArray = npt.NDArray[np.float64]
+Rows = Sequence[Mapping[str, Any]]
+
+LONGEST_NAME = 32
+ABSCISSAE = {
+    "strain": r"axial strain $\varepsilon_a$ in %",
+    "shear_strain": r"shear strain $\varepsilon_q$ in %",
+    None: "frame",
+}
+# contact fabric is anisotropic for certain if its intensity is so many standard errors (about one
+# without any anisotropy), and turned if less than this part of it shows along the loading axis
+CERTAIN, ALONG = 5.0, 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,66 +36,123 @@ class Curve:
     source: str
     variant: str
     x: FloatArray
-    """Axial strain in per cent, or the number of the frame."""
+    """Strain in per cent, or the number of the frame."""
     void: FloatArray
     """alpha_vs_axial, dimensionless."""
     void_scan: FloatArray
-    """Its standard error from the scan."""
-    void_sample: FloatArray
-    """Its standard error from the sample."""
+    """The scan's part of its standard error."""
+    void_total: FloatArray
+    """Its standard error, of scan and sample together."""
     contact: FloatArray
     """alpha_c_axial, dimensionless."""
-    contact_sample: FloatArray
-    """Its standard error: from the sample if the table has it, else as if contacts were
-    independent."""
+    contact_total: FloatArray
+    """Its standard error, which is the sample's; as if contacts were independent where the curve
+    has no other."""
+    contact_alone: bool
+    """Whether contacts are taken as independent."""
+    void_intensity: FloatArray
+    """alpha_vs, dimensionless."""
+    contact_intensity: FloatArray
+    """alpha_c, dimensionless."""
+    angle: FloatArray
+    """Between both major axes, degrees."""
 
 
 def curves_of(rows: Iterable[Mapping[str, Any]]) -> list[Curve]:
     """The curves of a table, in the order in which they first appear."""
     rows = list(rows)
-    use_strain = has_strain(rows)
+    abscissa = strain_column(rows)
     groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for row in rows:
         groups.setdefault((row["source"], row["variant"]), []).append(row)
-    names = _short({source for source, _ in groups})
+    names = short_names(source for source, _ in groups)
     return [
-        _curve(names[source], variant, group, use_strain)
+        _curve(names[source], variant, group, abscissa)
         for (source, variant), group in groups.items()
     ]
 
 
-def has_strain(rows: Sequence[Mapping[str, Any]]) -> bool:
-    """Whether every row has a strain; otherwise the frame's number is the abscissa."""
-    return bool(rows) and all(row["strain"] is not None for row in rows)
-
-
-def abscissa_label(rows: Sequence[Mapping[str, Any]]) -> str:
+def abscissa_label(rows: Rows) -> str:
     """What the abscissa is."""
-    return r"axial strain $\varepsilon_a$ in %" if has_strain(rows) else "frame"
+    return ABSCISSAE[strain_column(rows)]
 
 
-def _curve(
-    source: str, variant: str, group: Sequence[Mapping[str, Any]], use_strain: bool
-) -> Curve:
+def is_turned(rows: Rows) -> bool:
+    """
+    Whether the axial anisotropies miss the fabric, as its axes are not the loading axis.
+
+    So it is in simple shear. The frame whose contacts are most certainly anisotropic tells; where
+    none is, so does what the frames are drawn over.
+    """
+    known = [row for row in rows if None not in _contact_intensity(row)]
+    certainty, along = max(map(_certainty, known), default=(0.0, 1.0))
+    return along < ALONG if certainty > CERTAIN else strain_column(known) == "shear_strain"
+
+
+def _contact_intensity(row: Mapping[str, Any]) -> list[float | None]:
+    names = ("alpha_c", "alpha_c_axial", "alpha_c_axial_se", "alpha_vs")
+    return [number_of(row, name) for name in names]
+
+
+def _certainty(row: Mapping[str, Any]) -> tuple[float, float]:
+    """The intensity over its error, and the part of it that shows along the loading axis."""
+    intensity, axial, error = row["alpha_c"], row["alpha_c_axial"], row["alpha_c_axial_se"]
+    if intensity <= 0 or error <= 0:
+        return 0.0, 1.0
+    return intensity / error, abs(axial) / intensity
+
+
+def _curve(source: str, variant: str, group: Rows, abscissa: str | None) -> Curve:
     def column(name: str) -> FloatArray:
-        values = [number_of(row, name) for row in group]
-        array = np.array([np.nan if value is None else value for value in values], np.float64)
-        return np.where(array < 0, np.nan, array) if name.endswith("_se") else array
+        return _array([number_of(row, name) for row in group])
 
-    sample = column("alpha_c_axial_sample_se")
+    sample = _error([total_error(row, "alpha_c_axial") for row in group])
+    alone = not np.isfinite(sample).any()
     return Curve(
         source=source,
         variant=variant,
-        x=100.0 * column("strain") if use_strain else column("frame"),
+        x=column("frame") if abscissa is None else 100.0 * column(abscissa),
         void=column("alpha_vs_axial"),
-        void_scan=column("alpha_vs_axial_se"),
-        void_sample=column("alpha_vs_axial_sample_se"),
+        void_scan=_error([number_of(row, "alpha_vs_axial_se") for row in group]),
+        void_total=_error([total_error(row, "alpha_vs_axial") for row in group]),
         contact=column("alpha_c_axial"),
-        contact_sample=np.where(np.isnan(sample), column("alpha_c_axial_se"), sample),
+        contact_total=(
+            _error([number_of(row, "alpha_c_axial_se") for row in group]) if alone else sample
+        ),
+        contact_alone=alone,
+        void_intensity=column("alpha_vs"),
+        contact_intensity=column("alpha_c"),
+        angle=column("coaxiality_deg"),
     )
 
 
-def _short(sources: set[str]) -> dict[str, str]:
-    """Sources by the last part of their path where that tells them apart."""
-    last = {source: PurePath(source).name or source for source in sources}
-    return last if len(set(last.values())) == len(last) else {source: source for source in sources}
+def _array(values: Iterable[float | None]) -> FloatArray:
+    return np.array([np.nan if value is None else value for value in values], np.float64)
+
+
+def _error(values: Iterable[float | None]) -> FloatArray:
+    """Tables come from anywhere: what is below zero is no error."""
+    array = _array(values)
+    return np.where(array < 0, np.nan, array)
+
+
+def short_names(sources: Iterable[str], longest: int = LONGEST_NAME) -> dict[str, str]:
+    """Sources by the last part of their path, and not too long, where that tells them apart."""
+    sources = list(dict.fromkeys(sources))
+    for shorten in (_last_part, str):
+        names = {source: _middle_out(shorten(source), longest) for source in sources}
+        if len(set(names.values())) == len(names):
+            return names
+    return {source: f"{number}: {names[source]}" for number, source in enumerate(sources, 1)}
+
+
+def _last_part(source: str) -> str:
+    return PurePath(source).name or source
+
+
+def _middle_out(name: str, longest: int) -> str:
+    """Both ends of a long name, as either may be what matters."""
+    if len(name) <= longest:
+        return name
+    half = (longest - 3) // 2
+    return f"{name[:half]}...{name[-half:]}"

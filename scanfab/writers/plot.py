@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
 
 from scanfab.errors import SettingsError
 from scanfab.writers.files import check_folder, whole_file
@@ -16,14 +19,29 @@ if TYPE_CHECKING:
 
 __all__ = [
     "COLOURS",
+    "COLUMN",
+    "CONTACT",
+    "CONTACT_AXIAL",
+    "CONTACT_INTENSITY",
+    "CONTACT_UNIT",
     "DPI",
     "LOOKS",
     "PLOT_FORMATS",
+    "VOID",
+    "VOID_AXIAL",
+    "VOID_INTENSITY",
+    "VOID_UNIT",
+    "WIDTH",
+    "band",
     "check_plot_file",
+    "letter",
     "new_figure",
     "plain",
     "save_figure",
+    "widen",
 ]
+
+FloatArray = npt.NDArray[np.float64]
 
 PLOT_FORMATS = {
     ".png": "pixels, 300 per inch",
@@ -45,24 +63,34 @@ COLOURS = {
     "black": "#000000",
 }
 
+# variants without rattlers are open and larger, so that one that coincides with its twin is seen
 LOOKS: dict[str, dict[str, Any]] = {
     "a": {"color": COLOURS["blue"], "marker": "o", "ls": "-"},
-    "b": {"color": COLOURS["orange"], "marker": "s", "ls": "--"},
+    "b": {"color": COLOURS["orange"], "marker": "s", "ls": "--", "mfc": "white", "ms": 5.5},
     "c": {"color": COLOURS["vermilion"], "marker": "^", "ls": "-"},
-    "d": {"color": COLOURS["green"], "marker": "D", "ls": "--"},
+    "d": {"color": COLOURS["green"], "marker": "D", "ls": "--", "mfc": "white", "ms": 5.5},
 }
 
-# sized for print: one column is 3.4 inches wide, two are 7
+# the same words in every figure; the columns are alpha_vs_axial, alpha_c_axial, alpha_vs, alpha_c
+VOID, CONTACT = r"$\alpha_{vs}$", r"$\alpha_{c}$"
+VOID_AXIAL, CONTACT_AXIAL = f"{VOID}, axial", f"{CONTACT}, axial"
+VOID_INTENSITY, CONTACT_INTENSITY = f"{VOID}, intensity", f"{CONTACT}, intensity"
+VOID_UNIT, CONTACT_UNIT = r"void  $10^3\,$", r"contacts  $10^2\,$"
+
+# figures of one panel are as wide as a column of a journal, others as one and a half, so that
+# their words are still read on the screen of a phone
+COLUMN, WIDTH = 3.4, 5.4
 STYLE: Any = {
-    "font.size": 8,
-    "axes.labelsize": 8,
-    "axes.titlesize": 8,
+    "font.size": 9,
+    "axes.labelsize": 9,
+    "axes.titlesize": 9,
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.linewidth": 0.7,
-    "xtick.labelsize": 7,
-    "ytick.labelsize": 7,
-    "legend.fontsize": 7,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "legend.fontsize": 8,
+    "legend.title_fontsize": 8,
     "legend.frameon": False,
     "lines.linewidth": 1.1,
     "lines.markersize": 3.5,
@@ -116,3 +144,23 @@ def widen(axes: Axes, smallest: float) -> None:
     if high - low < smallest:
         middle = 0.5 * (low + high)
         axes.set_ylim(middle - 0.5 * smallest, middle + 0.5 * smallest)
+
+
+def letter(panels: Iterable[Axes], titles: Sequence[str] = (), first: int = 0) -> None:
+    """(a), (b) ... above the panels, before their titles; ``first`` panels have letters already."""
+    for place, axes in enumerate(panels):
+        title = titles[place] if place < len(titles) else ""
+        axes.set_title(f"({chr(ord('a') + first + place)}) {title}".rstrip(), loc="left")
+
+
+def band(axes: Axes, x: FloatArray, y: FloatArray, error: FloatArray, colour: Any) -> None:
+    """Shade y ± error; about a point that has no neighbours a bar, as an area needs two."""
+    known = np.isfinite(x + y + error)
+    if not known.any():
+        return
+    axes.fill_between(x, y - error, y + error, color=colour, alpha=0.15, lw=0)
+    beside = np.concatenate([[False], known, [False]])
+    alone = known & ~beside[:-2] & ~beside[2:]
+    if alone.any():
+        low, high = (y - error)[alone], (y + error)[alone]
+        axes.vlines(x[alone], low, high, color=colour, alpha=0.3, lw=5)

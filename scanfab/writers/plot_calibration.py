@@ -3,10 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from scanfab.writers.plot import LOOKS, check_plot_file, new_figure, save_figure
+import numpy as np
+
+from scanfab.tabular import total_error
+from scanfab.writers.curves import short_names
+from scanfab.writers.plot import (
+    LOOKS,
+    VOID_AXIAL,
+    VOID_UNIT,
+    WIDTH,
+    band,
+    check_plot_file,
+    letter,
+    new_figure,
+    plain,
+    save_figure,
+)
 
 __all__ = ["plot_calibration"]
 
@@ -15,13 +31,13 @@ PANELS: dict[str, tuple[str, bool, float | None]] = {
     "spacing": ("spacing of lines $s/r_{min}$", True, 0.1),
     "directions": ("number of directions", True, None),
     "cutoff": ("cut-off $c/r_{min}$", False, 1.0),
-    "rv": ("RV radius / half extent of the sample", False, 0.67),
+    "rv": ("RV radius / half extent", False, 0.67),
 }
 
 
 def plot_calibration(rows: Sequence[Any], path: Path) -> None:
     """
-    Draw alpha_vs_axial over each ladder, with the scan's standard errors.
+    Draw alpha_vs_axial over each ladder: bands are total standard errors, bars the scan's part.
 
     Parameters
     ----------
@@ -36,38 +52,46 @@ def plot_calibration(rows: Sequence[Any], path: Path) -> None:
         If the file's name ends otherwise.
     """
     check_plot_file(path)
-    with new_figure(7.0, 5.2) as figure:
+    with new_figure(WIDTH, 5.2) as figure:
         panels = figure.subplots(2, 2).ravel()
         for panel, ladder in zip(panels, PANELS, strict=True):
             _draw(panel, [row for row in rows if row.ladder == ladder], ladder)
-        panels[0].legend(title="variant")
-        figure.supxlabel(
-            "bars: standard error of the scan; bands: of the sample; dotted: the choice of the "
-            "paper",
-            fontsize="medium",
+        letter(panels)
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(
+            handles,
+            labels,
+            loc="outside upper center",
+            ncols=4,
+            title=f"{_frame(rows)}bands: one total standard error, of scan and sample together\n"
+            "bars: the scan's part; dotted: the choice of the 2017 paper",
         )
         save_figure(figure, path)
 
 
+def _frame(rows: Sequence[Any]) -> str:
+    """What was scanned, as a line of its own."""
+    if not rows:
+        return ""
+    name = plain(short_names([rows[0].source])[rows[0].source])
+    return f"{f'{name}, ' if name else ''}frame {rows[0].frame}\n"
+
+
 def _draw(panel: Any, rows: Sequence[Any], ladder: str) -> None:
-    """One ladder: a curve for each variant, with the sample's own error as a band."""
+    """One ladder: a curve for each variant."""
     label, logarithmic, paper = PANELS[ladder]
     for variant in sorted({row.variant for row in rows}):
         steps = [r for r in rows if r.variant == variant and r.alpha_vs_axial is not None]
-        values = [row.value for row in steps]
-        alphas = [row.alpha_vs_axial for row in steps]
-        colour = LOOKS[variant]["color"]
-        own = [row.alpha_vs_axial_sample_se or 0.0 for row in steps]
-        if ladder in ("cutoff", "rv"):
-            low, high = (
-                [a + sign * e for a, e in zip(alphas, own, strict=True)] for sign in (-1, 1)
-            )
-            panel.fill_between(values, low, high, color=colour, alpha=0.15, linewidth=0)
+        values = np.array([row.value for row in steps])
+        alphas = 1e3 * np.array([row.alpha_vs_axial for row in steps])
+        totals = [total_error(asdict(row), "alpha_vs_axial") for row in steps]
+        errors = 1e3 * np.array([np.nan if one is None else one for one in totals], np.float64)
+        band(panel, values, alphas, errors, LOOKS[variant]["color"])
         panel.errorbar(
             values,
             alphas,
-            yerr=[row.alpha_vs_axial_se or 0.0 for row in steps],
-            label=variant,
+            yerr=[1e3 * (row.alpha_vs_axial_se or 0.0) for row in steps],
+            label=f"variant {variant}",
             **LOOKS[variant],
         )
     if paper is not None:
@@ -75,5 +99,4 @@ def _draw(panel: Any, rows: Sequence[Any], ladder: str) -> None:
     if logarithmic:
         panel.set_xscale("log")
     panel.set_xlabel(label)
-    panel.set_ylabel(r"$\alpha_{vs}$, axial")
-    panel.ticklabel_format(axis="y", style="sci", scilimits=(-2, 2))
+    panel.set_ylabel(VOID_UNIT + VOID_AXIAL)

@@ -10,7 +10,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.writers.plot import COLOURS, DPI, new_figure, save_figure, widen
+from scanfab.writers.plot import (
+    COLOURS,
+    COLUMN,
+    DPI,
+    VOID_AXIAL,
+    VOID_UNIT,
+    WIDTH,
+    band,
+    letter,
+    new_figure,
+    save_figure,
+    widen,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,6 +55,8 @@ FRAMES: tuple[dict[str, Any], ...] = (
     {"color": COLOURS["blue"], "marker": "o", "ls": "--", "markerfacecolor": "white"},
     {"color": COLOURS["vermilion"], "marker": "^", "ls": "-"},
 )
+# of both columns of panels
+WHAT = ("mean void length", "contact normals")
 # rings and rays of the disk that a hemisphere is projected on
 DISK = (41, 121)
 
@@ -96,7 +110,11 @@ class CutoffCurve:
     title: str
     cutoff: FloatArray
     alpha: FloatArray
+    """alpha_vs_axial, dimensionless."""
     error: FloatArray
+    """The scan's part of its standard error."""
+    total: FloatArray
+    """Its standard error, of scan and sample together; NaN where the sample's is not known."""
     chosen: float
 
 
@@ -124,20 +142,15 @@ def disk() -> tuple[FloatArray, FloatArray]:
 
 def plot_rose(path: Path, roses: Sequence[Rose], dpi: int = DPI) -> None:
     """Roses of void lengths and contact normals, a row for each frame."""
-    with new_figure(7.0, 3.3 * len(roses) + 0.3) as figure:
+    with new_figure(WIDTH, 2.9 * len(roses) + 0.7) as figure:
         panels = figure.subplots(len(roses), 2, squeeze=False, subplot_kw={"projection": "polar"})
         for column, kind in enumerate(("void", "contact")):
             rings = [ring for rose in roses for ring in getattr(rose, kind)]
             reach = max((_reach(ring) for ring in rings), default=0.02)
             for row, rose in enumerate(roses):
                 _rose(panels[row, column], getattr(rose, kind), reach)
-        for row, rose in enumerate(roses):
-            for axes, what in zip(
-                panels[row],
-                (r"mean void length $\ell/\bar\ell$", r"contact normals, density $/$ isotropic"),
-                strict=True,
-            ):
-                axes.set_title(f"{what}, {rose.title}", fontsize=8, pad=10)
+        titles = [f"{what}\n{rose.title}" for rose in roses for what in WHAT]
+        letter(panels.ravel(), titles)
         _ring_legend(figure, roses[0].void)
         save_figure(figure, path, dpi)
 
@@ -166,7 +179,7 @@ def _rose(axes: PolarAxes, rings: Sequence[Ring], reach: float) -> None:
     step = _round_down(reach)
     ticks = [1.0 - step, 1.0, 1.0 + step]
     box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.8}
-    axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks], fontsize=6, bbox=box)
+    axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks], fontsize=7, bbox=box)
     axes.set_rlabel_position(100)
     axes.set_xticks(np.radians(np.arange(0, 360, 45)))
     axes.grid(color="0.85", lw=0.5)
@@ -183,34 +196,35 @@ def _ring_legend(figure: Figure, rings: Sequence[Ring]) -> None:
     from matplotlib.lines import Line2D
 
     handles = [Line2D([], [], **look) for _, look in zip(rings, RINGS, strict=False)]
-    labels = [rf"polar angle $\varphi$ = {ring.phi:g}°" for ring in rings]
-    note = r"over the azimuth $\theta$ from x; radii do not start at 0; bars: one standard error"
+    labels = [rf"polar angle $\varphi={ring.phi:g}^\circ$" for ring in rings]
+    note = (
+        "over the azimuth $\\theta$ from x, relative to isotropy; radii do not start at 0\n"
+        "bars: one standard error, of the scan (left), of a count of contacts (right)"
+    )
     figure.legend(
         handles,
         labels,
         loc="outside lower center",
-        ncols=len(labels),
+        ncols=min(len(labels), 3),
         title=note,
-        title_fontproperties={"size": 7},
     )
 
 
 def plot_projection(path: Path, frames: Sequence[Projection], dpi: int = DPI) -> None:
     """The directional distributions on equal-area disks, a row for each frame."""
-    with new_figure(6.4, 2.75 * len(frames) + 0.2) as figure:
+    with new_figure(WIDTH, 2.5 * len(frames) + 0.2) as figure:
         panels = figure.subplots(len(frames), 2, squeeze=False)
         for column, kind in enumerate(("void", "contact")):
             values = [getattr(frame, kind) for frame in frames]
             known = [value for value in values if value is not None]
             largest = max((float(np.abs(value).max()) for value in known), default=1.0)
             drawn = None
-            for axes, frame, value in zip(panels[:, column], frames, values, strict=True):
-                what = "mean void length" if kind == "void" else "contact normals"
-                axes.set_title(f"{what}, {frame.title}", fontsize=8)
+            for axes, value in zip(panels[:, column], values, strict=True):
                 drawn = _disk(axes, value, max(largest, 0.1)) or drawn
             if drawn is not None:
-                bar = figure.colorbar(drawn, ax=panels[:, column], shrink=0.8, pad=0.03)
-                bar.set_label("deviation from the mean over directions in %")
+                bar = figure.colorbar(drawn, ax=panels[:, column], shrink=0.8, pad=0.03, aspect=30)
+                bar.set_label("deviation from the mean in %")
+        letter(panels.ravel(), [f"{what}\n{frame.title}" for frame in frames for what in WHAT])
         save_figure(figure, path, dpi)
 
 
@@ -223,9 +237,9 @@ def _disk(axes: Axes, value: FloatArray | None, largest: float) -> Any:
         style: dict[str, Any] = {"color": "0.35", "lw": 0.4 if polar < 90 else 0.8}
         axes.plot(rho * np.cos(around), rho * np.sin(around), **style)
         if polar < 90:
-            axes.text(rho * 0.7, -rho * 0.7, f"{polar}°", fontsize=6, color="0.25")
+            axes.text(rho * 0.7, -rho * 0.7, rf"${polar}^\circ$", fontsize=7, color="0.25")
     for label, x, y in (("x", 1.1, 0), ("y", 0, 1.1), ("z", 0, 0)):
-        axes.text(x, y, label, ha="center", va="center", fontsize=8)
+        axes.text(x, y, label, ha="center", va="center")
     if value is None:
         axes.text(0, -0.3, "no contacts", ha="center")
         return None
@@ -245,7 +259,7 @@ def _disk(axes: Axes, value: FloatArray | None, largest: float) -> Any:
 
 def plot_histogram(path: Path, samples: Sequence[LengthSample], dpi: int = DPI) -> None:
     """Density of void segment lengths, with the cut-off; an outline for each frame."""
-    with new_figure(3.4, 2.9) as figure:
+    with new_figure(COLUMN, 3.2) as figure:
         axes = figure.subplots()
         longest = max(float(np.quantile(sample.length, 0.999)) for sample in samples)
         edges = np.linspace(0, longest, 41)
@@ -259,33 +273,37 @@ def plot_histogram(path: Path, samples: Sequence[LengthSample], dpi: int = DPI) 
                 ls=look["ls"],
                 lw=1.1,
                 baseline=None,
-                label=f"{sample.title}: {100 * dropped:.0f} % dropped",
+                label=f"{sample.title}:\n{100 * dropped:.0f} % dropped",
             )
         cutoff = samples[-1].cutoff
         axes.axvspan(0, cutoff, color="0.92", zorder=0)
         axes.axvline(cutoff, color="k", lw=0.9, ls=":", label="cut-off")
         axes.set(yscale="log", xlim=(0, longest), ylabel="probability density")
         axes.set(xlabel=r"void segment length / $r_{min}$")
-        axes.legend(loc="upper right")
+        figure.legend(loc="outside upper left", ncols=1)
         save_figure(figure, path, dpi)
 
 
 def plot_cutoffs(path: Path, curves: Sequence[CutoffCurve], dpi: int = DPI) -> None:
     """Void anisotropy over the cut-off, a curve for each frame."""
-    with new_figure(3.4, 2.9) as figure:
+    with new_figure(COLUMN, 3.4) as figure:
         axes = figure.subplots()
         for curve, look in zip(curves, FRAMES, strict=False):
+            band(axes, curve.cutoff, 1e3 * curve.alpha, 1e3 * curve.total, look["color"])
             axes.errorbar(
                 curve.cutoff,
                 1e3 * curve.alpha,
                 yerr=1e3 * np.nan_to_num(curve.error),
                 label=curve.title,
-                elinewidth=0.7,
+                elinewidth=0.9,
                 **look,
             )
         axes.axvline(curves[-1].chosen, color="k", lw=0.9, ls=":", label="cut-off of the table")
         axes.axhline(0, color="0.6", lw=0.6, zorder=0)
-        axes.set(xlabel=r"cut-off / $r_{min}$", ylabel=r"void fabric  $10^{3}\,\alpha_{vs}$")
+        axes.set(xlabel=r"cut-off / $r_{min}$", ylabel=VOID_UNIT + VOID_AXIAL)
         widen(axes, 1.0)
-        figure.legend(loc="outside upper center", ncols=3, columnspacing=1.2)
+        figure.legend(
+            loc="outside upper left",
+            title="bands: one total standard error, scan and sample\nbars: the scan's part",
+        )
         save_figure(figure, path, dpi)

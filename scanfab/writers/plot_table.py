@@ -1,8 +1,9 @@
-"""Figures of fabric tables: evolution, normalised curves, void against contact fabric."""
+"""Figures of fabric tables: evolution, normalised curves, and a page with the correlation too."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,45 +11,79 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.errors import SettingsError
-from scanfab.writers.curves import Curve, abscissa_label, curves_of
-from scanfab.writers.plot import LOOKS, new_figure, plain, save_figure, widen
+from scanfab.errors import ScanfabNote, SettingsError
+from scanfab.writers.curves import Curve, abscissa_label, curves_of, is_turned
+from scanfab.writers.groups import Drawn, Group, grouped
+from scanfab.writers.plot import (
+    CONTACT,
+    CONTACT_AXIAL,
+    CONTACT_INTENSITY,
+    CONTACT_UNIT,
+    VOID,
+    VOID_AXIAL,
+    VOID_INTENSITY,
+    VOID_UNIT,
+    WIDTH,
+    band,
+    letter,
+    new_figure,
+    save_figure,
+    widen,
+)
+from scanfab.writers.plot_correlation import Fit, draw_correlation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure, SubFigure
 
-__all__ = ["TABLE_FIGURES", "Fit", "draw_table", "plot_table"]
+__all__ = ["SIZES", "TABLE_FIGURES", "Fit", "draw_table", "plot_table"]
 
 FloatArray = npt.NDArray[np.float64]
 
 TABLE_FIGURES = {
-    "evolution": "void and contact anisotropy over the strain",
+    "evolution": "void and contact anisotropy over the strain, with their total standard errors",
     "normalised": "both over the strain, each curve divided by its own largest absolute value",
     "correlation": "void against contact anisotropy, with the fitted line and the paper's slope",
 }
 
-# in inches
-SIZES = {"evolution": (7.0, 3.0), "normalised": (7.0, 3.0), "correlation": (5.0, 3.0)}
-PAGE = (7.0, 7.6)
-PAPER_SLOPE = 0.096
-# without rattlers: open and larger, so that a curve that coincides with its twin is still seen
-OPEN = {"b": 5.5, "d": 5.5}
+# in inches, of one row of panels
+SIZES = {"evolution": (WIDTH, 2.9), "normalised": (WIDTH, 2.7), "correlation": (WIDTH, 2.6)}
+# of each further row
+ROW = 2.1
 MOST_MARKERS = 25
-VOID, CONTACT = r"$\alpha_{vs}$", r"$\alpha_{c}$"
 
 
 @dataclass(frozen=True)
-class Fit:
-    """The line of one source and variant, as the comparison has it; dimensionless."""
+class Quantity:
+    """What a column of panels shows: names of a curve's arrays, and the factor of the axis."""
 
-    slope: float
-    slope_se: float | None
-    r2: float | None
-    contact: tuple[float, float]
-    """Smallest and largest contact anisotropy of the fitted frames."""
-    middle: tuple[float, float]
-    """Their mean contact and void anisotropy, which the line goes through."""
+    label: str
+    factor: float
+    values: str
+    total: str | None = None
+    scan: str | None = None
+    smallest: float = 1.0
+    """The axis spans at least this, so that noise does not look like a signal."""
+
+
+AXIAL = (
+    Quantity(VOID_UNIT + VOID_AXIAL, 1e3, "void", "void_total", "void_scan"),
+    Quantity(CONTACT_UNIT + CONTACT_AXIAL, 1e2, "contact", "contact_total"),
+)
+# where the principal axes are not the loading axis
+TURNED = (
+    Quantity(VOID_UNIT + VOID_INTENSITY, 1e3, "void_intensity"),
+    Quantity(CONTACT_UNIT + CONTACT_INTENSITY, 1e2, "contact_intensity"),
+    Quantity("coaxiality, degrees", 1.0, "angle"),
+)
+NORMALISED = (
+    Quantity(f"{VOID_AXIAL} / largest", 1.0, "void", "void_total"),
+    Quantity(f"{CONTACT_AXIAL} / largest", 1.0, "contact", "contact_total"),
+)
+NORMALISED_TURNED = (
+    Quantity(f"{VOID_INTENSITY} / largest", 1.0, "void_intensity"),
+    Quantity(f"{CONTACT_INTENSITY} / largest", 1.0, "contact_intensity"),
+)
 
 
 def plot_table(
@@ -76,7 +111,7 @@ def plot_table(
     SettingsError
         If there is nothing to draw.
     """
-    with new_figure(*(SIZES[name] if name else PAGE)) as figure:
+    with new_figure(*SIZES[name or "evolution"]) as figure:
         draw_table(figure, rows, fits, name)
         save_figure(figure, path)
 
@@ -87,207 +122,144 @@ def draw_table(
     fits: Sequence[Fit | None],
     name: str | None = None,
 ) -> None:
-    """Draw on an empty figure; parameters as for :func:`plot_table`."""
+    """Draw on an empty figure, which gets its size; parameters as for :func:`plot_table`."""
     curves = curves_of(rows)
     if not any(np.isfinite(curve.void).any() for curve in curves):
         raise SettingsError("there is nothing to draw: no row of the table has a void fabric")
-    abscissa = abscissa_label(rows)
+    page = _Page(grouped(curves), abscissa_label(rows), fits, is_turned(rows))
+    if page.turned:
+        _tell_of_turned_axes()
+    names = list(TABLE_FIGURES) if name is None else [name]
+    heights = [page.height(one) for one in names]
+    figure.set_size_inches(WIDTH, sum(heights))
+    parts: Any = [figure]
     if name is None:
-        panels = figure.subplots(3, 2)
-        _evolution(panels[0], curves, abscissa)
-        _normalised(panels[1], curves, abscissa)
-        _correlation(panels[2, 0], panels[2, 1], curves, fits)
-        _letters(panels.ravel()[:5])
-    elif name == "correlation":
-        left, right = figure.subplots(1, 2, width_ratios=(3, 2))
-        _correlation(left, right, curves, fits)
-    else:
-        draw = {"evolution": _evolution, "normalised": _normalised}[name]
-        draw(figure.subplots(1, 2), curves, abscissa)
-    if name != "correlation":
-        _legend(figure, curves, "" if name == "normalised" else _note(curves))
+        parts = figure.subfigures(len(names), 1, height_ratios=heights)
+    for part, one in zip(parts, names, strict=True):
+        page.draw(part, one)
 
 
-def _evolution(panels: Sequence[Axes], curves: Sequence[Curve], abscissa: str) -> None:
-    left, right = panels
-    for curve, look in _with_looks(curves):
-        _band(left, curve.x, 1e3 * curve.void, 1e3 * curve.void_sample, look)
-        _line(left, curve.x, 1e3 * curve.void, 1e3 * curve.void_scan, look)
-        _band(right, curve.x, 1e2 * curve.contact, 1e2 * curve.contact_sample, look)
-        _line(right, curve.x, 1e2 * curve.contact, None, look)
-    for axes, label, smallest in (
-        (left, rf"void fabric  $10^{{3}}\,${VOID}", 1.0),
-        (right, rf"contact fabric  $10^{{2}}\,${CONTACT}", 1.0),
-    ):
-        axes.set(xlabel=abscissa, ylabel=label)
-        _zero(axes)
-        widen(axes, smallest)
+def _tell_of_turned_axes() -> None:
+    warnings.warn(
+        "the loading axis is not the axis of the contact fabric, as in simple shear: alpha_vs, "
+        "alpha_c and the angle between their axes are drawn, not the axial values",
+        ScanfabNote,
+        stacklevel=3,
+    )
 
 
-def _normalised(panels: Sequence[Axes], curves: Sequence[Curve], abscissa: str) -> None:
-    left, right = panels
-    for curve, look in _with_looks(curves):
-        for axes, values in ((left, curve.void), (right, curve.contact)):
-            largest = np.nanmax(np.abs(values), initial=0.0)
-            if largest > 0:
-                _line(axes, curve.x, values / largest, None, look)
-    left.set(xlabel=abscissa, ylabel=rf"{VOID} / max |{VOID}|")
-    right.set(xlabel=abscissa, ylabel=rf"{CONTACT} / max |{CONTACT}|")
-    for axes in panels:
-        _zero(axes)
+class _Page:
+    """Figures of one table, whose panels are lettered through."""
 
+    def __init__(
+        self, groups: list[Group], abscissa: str, fits: Sequence[Fit | None], turned: bool
+    ) -> None:
+        self.groups = groups
+        self.abscissa = abscissa
+        self.fits = fits
+        self.turned = turned
+        self.lettered = 0
 
-def _correlation(
-    axes: Axes, margin: Axes, curves: Sequence[Curve], fits: Sequence[Fit | None]
-) -> None:
-    """Points and lines; the legend, which has numbers, stands in the axes beside."""
-    from matplotlib.lines import Line2D
+    def height(self, name: str) -> float:
+        """Of a figure, in inches: a row of panels for each group, and as many lines of legend."""
+        lines = 0 if name == "correlation" else -(-len(self._entries()) // 2)
+        return SIZES[name][1] + ROW * (len(self.groups) - 1) + 0.15 * max(lines - 2, 0)
 
-    handles: list[Any] = []
-    labels: list[str] = []
-    several = len({curve.source for curve in curves}) > 1
-    for (curve, look), fit in zip(_with_looks(curves), fits, strict=True):
-        points = axes.errorbar(
-            1e2 * curve.contact,
-            1e3 * curve.void,
-            xerr=_bars(1e2 * curve.contact_sample),
-            yerr=_bars(1e3 * curve.void_sample),
-            fmt=look["marker"],
-            color=look["color"],
-            markerfacecolor=look["markerfacecolor"],
-            markersize=look["markersize"],
-            zorder=look["zorder"],
-            elinewidth=0.4,
-            capsize=0,
+    def draw(self, part: Figure | SubFigure, name: str) -> None:
+        """One of the figures."""
+        if name == "correlation":
+            panels = draw_correlation(part, self.groups, self.fits, self.turned)
+            self._letter(panels, [group.title for group in self.groups])
+            return
+        share = name == "normalised"
+        quantities = (AXIAL, TURNED, NORMALISED, NORMALISED_TURNED)[2 * share + self.turned]
+        shape = len(self.groups), len(quantities)
+        columns = part.subplots(*shape, squeeze=False, sharex=True, sharey="col")
+        for group, panels in zip(self.groups, columns, strict=True):
+            for axes, quantity in zip(panels, quantities, strict=True):
+                _draw(axes, group.drawn, quantity, share)
+        for axes in columns[-1]:
+            axes.set_xlabel(self.abscissa)
+            if self.abscissa == "frame":
+                axes.xaxis.get_major_locator().set_params(integer=True)
+        titles = [
+            group.title if place == 0 else ""
+            for group in self.groups
+            for place in range(len(quantities))
+        ]
+        self._letter(columns.ravel().tolist(), titles)
+        self._legend(part, _note(self.groups, quantities, share))
+
+    def _letter(self, panels: Sequence[Axes], titles: Sequence[str]) -> None:
+        letter(panels, titles, self.lettered)
+        self.lettered += len(panels)
+
+    def _entries(self) -> dict[str, dict[str, Any]]:
+        """Names and looks, which all groups share."""
+        return {one.name: one.look for group in self.groups for one in group.drawn}
+
+    def _legend(self, part: Figure | SubFigure, note: str) -> None:
+        """Above the panels, so that it covers no data."""
+        from matplotlib.lines import Line2D
+
+        entries = self._entries()
+        part.legend(
+            [Line2D([], [], **look) for look in entries.values()],
+            list(entries),
+            loc="outside upper center",
+            ncols=min(len(entries), 2 if max(map(len, entries)) > 12 else 4),
+            title=note or None,
         )
-        for bars in points.lines[2]:
-            bars.set_alpha(0.35)
-        if fit is None:
-            handles.append(points)
-            labels.append(f"{_name(curve, several)}: no line")
-            continue
-        ends = np.array(fit.contact)
-        void = fit.middle[1] + fit.slope * (ends - fit.middle[0])
-        (line,) = axes.plot(1e2 * ends, 1e3 * void, color=look["color"], ls=look["ls"], gid="fit")
-        handles.append((line, points))
-        labels.append(f"{_name(curve, several)}: {_spell(fit)}")
-    reach = max((fit.contact[1] for fit in fits if fit is not None), default=0.0)
-    if reach > 0:
-        (paper,) = axes.plot([0, 1e2 * reach], [0, 1e3 * PAPER_SLOPE * reach], "k:", lw=0.9)
-        handles.append(paper)
-        labels.append(f"2017 paper: {PAPER_SLOPE:.3f}")
-    if any(np.isfinite(curve.contact_sample).any() for curve in curves):
-        handles.append(Line2D([], [], color="0.6", lw=0.5))
-        labels.append("one standard error\nof the sample")
-    axes.set(xlabel=rf"contact fabric  $10^{{2}}\,${CONTACT}")
-    axes.set(ylabel=rf"void fabric  $10^{{3}}\,${VOID}")
-    _zero(axes)
-    widen(axes, 1.0)
-    margin.set_axis_off()
-    margin.legend(
-        handles, labels, loc="center left", title=f"slope of {VOID} on {CONTACT}", handlelength=2.5
-    )
 
 
-def _spell(fit: Fit) -> str:
-    """The slope as the table has it, with its error and R² where they exist."""
-    error = "" if fit.slope_se is None else f" ± {fit.slope_se:.3f}"
-    r2 = "" if fit.r2 is None else f"\n$R^2$ = {fit.r2:.3f}"
-    return f"{fit.slope:.3f}{error}{r2}"
-
-
-def _with_looks(curves: Sequence[Curve]) -> list[tuple[Curve, dict[str, Any]]]:
-    """Colour, marker and line by variant; further sources are paler and dotted."""
-    sources = list(dict.fromkeys(curve.source for curve in curves))
-    looks = []
-    for curve in curves:
-        place = sources.index(curve.source)
-        look = {"color": "0.3", "marker": "v", "ls": "-", **LOOKS.get(curve.variant, {})}
-        look["color"] = _paler(look["color"], 0.5 * place / max(len(sources) - 1, 1))
-        if place % 2:
-            look["ls"] = {"-": ":", "--": "-."}[look["ls"]]
-        is_open = curve.variant in OPEN
-        look["markerfacecolor"] = "white" if is_open else look["color"]
-        look["markersize"] = OPEN.get(curve.variant, 3.5)
-        look["zorder"] = 2.0 if is_open else 2.5
-        looks.append((curve, look))
-    return looks
-
-
-def _paler(colour: str, share: float) -> Any:
-    """A colour mixed with a share of white."""
-    from matplotlib.colors import to_rgb
-
-    return tuple((1.0 - share) * part + share for part in to_rgb(colour))
-
-
-def _line(
-    axes: Axes, x: FloatArray, y: FloatArray, error: FloatArray | None, look: Mapping[str, Any]
-) -> None:
-    every = max(1, -(-len(x) // MOST_MARKERS))
-    axes.plot(x, y, markevery=every, **look)
-    if error is not None and np.isfinite(error).any():
-        bars = _bars(error)
-        axes.errorbar(x, y, yerr=bars, fmt="none", ecolor=look["color"], elinewidth=0.7)
-
-
-def _band(
-    axes: Axes, x: FloatArray, y: FloatArray, error: FloatArray, look: Mapping[str, Any]
-) -> None:
-    if np.isfinite(error).any():
-        axes.fill_between(x, y - error, y + error, color=look["color"], alpha=0.13, lw=0)
-
-
-def _bars(error: FloatArray) -> FloatArray | None:
-    return np.nan_to_num(error) if np.isfinite(error).any() else None
-
-
-def _zero(axes: Axes) -> None:
+def _draw(axes: Axes, drawn: Sequence[Drawn], quantity: Quantity, share: bool) -> None:
+    """One panel: values, their total errors as bands, the scan's part as bars."""
+    for one in drawn:
+        values = getattr(one.curve, quantity.values)
+        largest = np.nanmax(np.abs(values), initial=0.0)
+        factor = quantity.factor if not share else 1.0 / largest if largest > 0 else np.nan
+        if quantity.total:
+            error = factor * getattr(one.curve, quantity.total)
+            band(axes, one.curve.x, factor * values, error, one.look["color"])
+        every = max(1, -(-len(values) // MOST_MARKERS))
+        axes.plot(one.curve.x, factor * values, markevery=every, **one.look)
+        if quantity.scan:
+            _bars(axes, one, factor * values, factor * getattr(one.curve, quantity.scan))
+    axes.set_ylabel(quantity.label)
     axes.axhline(0, color="0.6", lw=0.6, zorder=0)
+    widen(axes, quantity.smallest)
 
 
-def _letters(panels: Sequence[Axes]) -> None:
-    for letter, axes in zip("abcdefgh", panels, strict=False):
-        axes.set_title(f"({letter})", loc="left", fontsize=8)
+def _bars(axes: Axes, one: Drawn, values: FloatArray, error: FloatArray) -> None:
+    if np.isfinite(error).any():
+        axes.errorbar(
+            one.curve.x,
+            values,
+            yerr=np.nan_to_num(error),
+            fmt="none",
+            ecolor=one.look["color"],
+            elinewidth=0.9,
+        )
 
 
-def _name(curve: Curve, several: bool) -> str:
-    return f"{curve.variant}, {plain(curve.source)}" if several else curve.variant
+def _note(groups: Sequence[Group], quantities: Sequence[Quantity], share: bool) -> str:
+    """What bands and bars are."""
+    curves = [one.curve for group in groups for one in group.drawn]
+    if not any(quantity.total for quantity in quantities):
+        return "without errors: the table has those of the axial values only"
+    lines = [_band_note(curves)]
+    scan = np.concatenate([curve.void_scan for curve in curves])
+    if np.isfinite(scan).any() and not share:
+        largest = f"{1e3 * np.nanmax(scan):.2g}"
+        lines.append(rf"bars: the scan's part, at most ${largest}\times10^{{-3}}$")
+    return "\n".join(line for line in lines if line)
 
 
-def _legend(figure: Figure, curves: Sequence[Curve], note: str) -> None:
-    """Above the panels, so that it covers no data."""
-    from matplotlib.lines import Line2D
-
-    several = len({curve.source for curve in curves}) > 1
-    meanings = {"a": "whole", "b": "whole, rattlers void", "c": "RV", "d": "RV, rattlers void"}
-    handles: list[Any] = []
-    labels: list[str] = []
-    for curve, look in _with_looks(curves):
-        handles.append(Line2D([], [], **look))
-        meaning = "" if several else f": {meanings.get(curve.variant, '')}"
-        labels.append(f"variant {_name(curve, several)}{meaning}")
-    figure.legend(
-        handles,
-        labels,
-        loc="outside upper center",
-        ncols=min(len(handles), 2 if several else 4),
-        title=note or None,
-        title_fontproperties={"size": 7},
-    )
-
-
-def _note(curves: Sequence[Curve]) -> str:
-    """What bars and bands are."""
-
-    def exists(values: Callable[[Curve], FloatArray]) -> bool:
-        return any(np.isfinite(values(curve)).any() for curve in curves)
-
-    parts = []
-    if exists(lambda curve: curve.void_scan):
-        parts.append("bars: one standard error of the scan")
-    if exists(lambda curve: curve.contact_sample):
-        alone = " (contacts taken as independent)"
-        known = exists(lambda curve: curve.void_sample)
-        parts.append(f"bands: one standard error of the sample{'' if known else alone}")
-    return "; ".join(parts)
+def _band_note(curves: Sequence[Curve]) -> str:
+    void = any(np.isfinite(curve.void_total).any() for curve in curves)
+    contact = any(np.isfinite(curve.contact_total).any() for curve in curves)
+    alone = any(curve.contact_alone for curve in curves)
+    which = "contacts taken as independent" if alone else "the sample's"
+    parts = [f"of {VOID} scan and sample together"] if void else []
+    parts += [f"of {CONTACT} {which}"] if contact else []
+    return f"bands: one total standard error, {', '.join(parts)}" if parts else ""

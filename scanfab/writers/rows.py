@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import csv
 import json
-from dataclasses import asdict, fields
+from dataclasses import asdict, dataclass, fields
+from difflib import get_close_matches
 from pathlib import Path
 from typing import IO, Any, Protocol, get_type_hints
 
 from scanfab.errors import SettingsError
 
-__all__ = ["FILE_FORMATS", "RowWriter", "check_suffix", "row_writer"]
+__all__ = ["FILE_FORMATS", "Excerpt", "RowWriter", "check_suffix", "row_writer"]
+
+# with so many digits every number reads back the same
+ALL_DIGITS = 17
 
 FILE_FORMATS = {
     ".csv": "comma-separated values; numbers read back the same, a missing value is an empty cell",
@@ -19,6 +23,77 @@ FILE_FORMATS = {
     ".jsonl": "JSON lines: one object a line",
     ".parquet": "Apache Parquet (needs pyarrow: pip install 'scanfab[parquet]')",
 }
+
+
+@dataclass(frozen=True)
+class Excerpt:
+    """Which columns of a table are written, and with how many digits."""
+
+    fields: tuple[str, ...] = ()
+    """In the order in which they are written; none: all, as the table has them."""
+    digits: int = ALL_DIGITS
+    """Significant ones, of floats; with 17 the shortest form that reads back the same."""
+
+    @classmethod
+    def make(cls, kind: type, fields_text: str | None, digits: int = ALL_DIGITS) -> Excerpt:
+        """
+        What users ask for, of rows of a kind.
+
+        Raises
+        ------
+        SettingsError
+            If there is no such column, or no such number of digits.
+
+        Examples
+        --------
+        >>> from scanfab.table import Row
+        >>> from scanfab.writers.rows import Excerpt
+        >>> Excerpt.make(Row, "strain,alpha_vs_axial").fields
+        ('strain', 'alpha_vs_axial')
+        """
+        if not 1 <= digits <= ALL_DIGITS:
+            raise SettingsError(f"digits: expected 1 to {ALL_DIGITS} of them, found {digits}")
+        if fields_text is None:
+            return cls(digits=digits)
+        names = tuple(name.strip() for name in fields_text.split(","))
+        known = [field.name for field in fields(kind)]
+        for name in names:
+            if name not in known:
+                raise SettingsError(f"fields: {_no_column(name, known)}")
+            if names.count(name) > 1:
+                raise SettingsError(f"fields: the column {name} is named more than once")
+        return cls(names, digits)
+
+    @property
+    def is_all(self) -> bool:
+        """Whether nothing is left out."""
+        return self == Excerpt()
+
+    def of(self, row: Any) -> dict[str, Any]:
+        """The columns of a row that are written, by name."""
+        values = asdict(row)
+        if self.fields:
+            values = {name: values[name] for name in self.fields}
+        if self.digits == ALL_DIGITS:
+            return values
+        return {name: self._rounded(value) for name, value in values.items()}
+
+    def asked(self) -> dict[str, Any]:
+        """What differs from the default, as a manifest lists it."""
+        asked: dict[str, Any] = {"fields": list(self.fields)} if self.fields else {}
+        return asked if self.digits == ALL_DIGITS else {**asked, "digits": self.digits}
+
+    def _rounded(self, value: Any) -> Any:
+        return float(f"{value:.{self.digits}g}") if isinstance(value, float) else value
+
+
+ALL = Excerpt()
+
+
+def _no_column(name: str, known: list[str]) -> str:
+    near = get_close_matches(name, known, n=1)
+    hint = f"did you mean {near[0]}?" if near else f"the columns are {', '.join(known)}"
+    return f"there is no column {name!r}: {hint}"
 
 
 class RowWriter(Protocol):
@@ -41,14 +116,17 @@ class CsvWriter:
     in the shortest form that reads back the same.
     """
 
-    def __init__(self, stream: IO[str], delimiter: str = ",", header: bool = True) -> None:
+    def __init__(
+        self, stream: IO[str], delimiter: str = ",", header: bool = True, excerpt: Excerpt = ALL
+    ) -> None:
         self.stream = stream
+        self.excerpt = excerpt
         self._writer = csv.writer(stream, delimiter=delimiter, lineterminator="\n")
         self._header = header
 
     def write(self, row: Any) -> None:
         """Write one row."""
-        values = asdict(row)
+        values = self.excerpt.of(row)
         if self._header:
             self._writer.writerow(values)
             self._header = False
@@ -67,12 +145,14 @@ class CsvWriter:
 class JsonLinesWriter:
     """Rows as JSON, one object a line."""
 
-    def __init__(self, stream: IO[str]) -> None:
+    def __init__(self, stream: IO[str], excerpt: Excerpt = ALL) -> None:
         self.stream = stream
+        self.excerpt = excerpt
 
     def write(self, row: Any) -> None:
         """Write one row."""
-        self.stream.write(json.dumps(asdict(row), ensure_ascii=False, allow_nan=False) + "\n")
+        values = self.excerpt.of(row)
+        self.stream.write(json.dumps(values, ensure_ascii=False, allow_nan=False) + "\n")
         self.stream.flush()
 
     def close(self) -> None:
@@ -82,13 +162,14 @@ class JsonLinesWriter:
 class JsonWriter:
     """Rows as one JSON array."""
 
-    def __init__(self, stream: IO[str]) -> None:
+    def __init__(self, stream: IO[str], excerpt: Excerpt = ALL) -> None:
         self.stream = stream
+        self.excerpt = excerpt
         self._before = "[\n"
 
     def write(self, row: Any) -> None:
         """Write one row."""
-        text = json.dumps(asdict(row), ensure_ascii=False, allow_nan=False)
+        text = json.dumps(self.excerpt.of(row), ensure_ascii=False, allow_nan=False)
         self.stream.write(self._before + text)
         self._before = ",\n"
 
@@ -100,14 +181,15 @@ class JsonWriter:
 class ParquetWriter:
     """Rows as a Parquet file, written when closed."""
 
-    def __init__(self, stream: IO[bytes], kind: type) -> None:
+    def __init__(self, stream: IO[bytes], kind: type, excerpt: Excerpt = ALL) -> None:
         self.stream = stream
         self.kind = kind
+        self.excerpt = excerpt
         self._rows: list[dict[str, Any]] = []
 
     def write(self, row: Any) -> None:
         """Keep one row."""
-        self._rows.append(asdict(row))
+        self._rows.append(self.excerpt.of(row))
 
     def close(self) -> None:
         """Write the file."""
@@ -115,13 +197,14 @@ class ParquetWriter:
         from pyarrow import parquet
 
         hints = get_type_hints(self.kind)
-        schema = pyarrow.schema(
-            [(field.name, _arrow_type(pyarrow, hints[field.name])) for field in fields(self.kind)]
-        )
+        names = self.excerpt.fields or [field.name for field in fields(self.kind)]
+        schema = pyarrow.schema([(name, _arrow_type(pyarrow, hints[name])) for name in names])
         parquet.write_table(pyarrow.Table.from_pylist(self._rows, schema=schema), self.stream)
 
 
-def row_writer(suffix: str, stream: IO[Any], kind: type, header: bool = True) -> RowWriter:
+def row_writer(
+    suffix: str, stream: IO[Any], kind: type, header: bool = True, excerpt: Excerpt = ALL
+) -> RowWriter:
     """
     The writer for a file of this suffix.
 
@@ -135,6 +218,8 @@ def row_writer(suffix: str, stream: IO[Any], kind: type, header: bool = True) ->
         The dataclass of the rows.
     header : bool, optional
         Whether CSV and TSV start with the names of the columns.
+    excerpt : Excerpt, optional
+        Which columns, and how many digits.
 
     Raises
     ------
@@ -142,13 +227,13 @@ def row_writer(suffix: str, stream: IO[Any], kind: type, header: bool = True) ->
         If there is no such format, or its package is missing.
     """
     if suffix in (".csv", ".tsv"):
-        return CsvWriter(stream, "\t" if suffix == ".tsv" else ",", header)
+        return CsvWriter(stream, "\t" if suffix == ".tsv" else ",", header, excerpt)
     if suffix == ".jsonl":
-        return JsonLinesWriter(stream)
+        return JsonLinesWriter(stream, excerpt)
     if suffix == ".json":
-        return JsonWriter(stream)
+        return JsonWriter(stream, excerpt)
     check_suffix(Path(f"table{suffix}"))
-    return ParquetWriter(stream, kind)
+    return ParquetWriter(stream, kind, excerpt)
 
 
 def check_suffix(path: Path) -> None:

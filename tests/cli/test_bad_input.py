@@ -361,8 +361,13 @@ def test_positions_outside_a_box_that_is_not_periodic_are_fine(tmp_path, compute
         assert one["contacts"] == other["contacts"]
 
 
-def test_one_grain_far_away_leaves_no_grain_in_the_middle(tmp_path, refusal):
-    assert "holds no grain" in refusal(grains(tmp_path, changed(4, 4000.0)))
+def test_one_grain_far_away_is_too_far_for_the_whole_alone(tmp_path, refusal, compute):
+    file = grains(tmp_path, changed(4, 4000.0))
+    assert "leave out grains that are far away from all others" in refusal(file)
+    found = compute(file, "--variants", "c")
+    assert found.code == 0
+    assert '--boundary "id=7"' in found.err
+    assert found.rows[0]["grains"] == compute(grains(tmp_path), "--variants", "c").rows[0]["grains"]
 
 
 @pytest.mark.parametrize(
@@ -384,9 +389,9 @@ def test_an_rv_without_grains_or_larger_than_the_sample(tmp_path, refusal, optio
 
 def test_an_rv_at_the_surface_is_a_warning(tmp_path, compute):
     file = grains(tmp_path, cubic_rows(8))
-    near, inside = compute(file, "--rv", "0.9"), compute(file, "--rv", "0.5")
+    near, inside = compute(file, "--rv", "0.9"), compute(file, "--rv", "0.7")
     assert near.code == inside.code == 0
-    assert "comes within two of the largest radii" in near.err
+    assert "comes within one of the largest radii" in near.err
     assert "comes within" not in inside.err
 
 

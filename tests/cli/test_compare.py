@@ -18,7 +18,8 @@ from tests.tables import curve
 
 FRAMES = (
     "source frame strain variant alpha_vs_axial alpha_c_axial "
-    "alpha_vs_axial_norm alpha_c_axial_norm"
+    "alpha_vs_axial_norm alpha_c_axial_norm alpha_vs_axial_se alpha_vs_axial_sample_se "
+    "alpha_vs_axial_total_se alpha_c_axial_sample_se shear_strain"
 )
 SUMMARY = "source variant frames slope slope_origin r2 slope_se peak peak_strain final"
 DIFFERENCES = "source frame strain variants difference difference_se"

@@ -135,12 +135,71 @@ def test_without_a_part_everything_is_computed(compute, tmp_path):
     assert one.read_bytes() == two.read_bytes()
 
 
-def test_without_resume_the_part_is_overwritten(compute, stopped, tmp_path):
+@pytest.mark.parametrize("words", [[], ["--seed", "1"], ["--frames", ":1"]])
+def test_without_resume_the_part_is_kept_under_another_name(
+    compute, stopped, tmp_path, capsys, words
+):
+    """And what made it goes on with it there."""
     output = stopped()
-    assert compute(output, "--seed", "1") == 0
+    part = Path(f"{output}.part").read_bytes()
+    assert compute(output, *words) == 0
+    kept = tmp_path / "table.1.csv"
+    told = capsys.readouterr().err
+    assert f"scanfab: note: {output}.part: 5 finished rows of an earlier run are kept as" in told
+    assert f"by -o {kept} --resume" in told
+    assert Path(f"{kept}.part").read_bytes() == part
     whole = tmp_path / "whole.csv"
-    assert compute(whole, "--seed", "1") == 0
+    assert compute(whole, *words) == 0
     assert output.read_bytes() == whole.read_bytes()
+    assert compute(kept, "--resume") == 0
+    assert compute(whole) == 0
+    assert kept.read_bytes() == whole.read_bytes()
+
+
+def test_every_part_gets_a_name_of_its_own(compute, monkeypatch, tmp_path):
+    output = tmp_path / "table.csv"
+    for seed in ("1", "2", "3"):
+        with interrupted_at_row(monkeypatch, 4):
+            assert compute(output, "--seed", seed) == 130
+        _wait_for_frames_under_way()
+    parts = {path.name for path in tmp_path.glob("*.csv.part")}
+    assert parts == {"table.csv.part", "table.1.csv.part", "table.2.csv.part"}
+
+
+def test_an_interrupted_run_says_how_far_it_is_and_how_to_go_on(compute, stopped, capsys):
+    output = stopped()
+    told = capsys.readouterr().err
+    assert told.endswith(
+        "scanfab: interrupted after 2 of 4 frames; the same command with --resume goes on\n"
+    )
+    assert compute(output, "--resume") == 0
+    assert "interrupted" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([], "; the rows printed so far are all: with -o FILE, --resume could go on"),
+        (["-o", "-"], "; the rows printed so far are all: with -o FILE, --resume could go on"),
+    ],
+)
+def test_without_a_file_an_interruption_keeps_nothing(
+    short_series, monkeypatch, capsys, words, said
+):
+    with interrupted_at_row(monkeypatch, 4):
+        assert run(["compute", str(short_series), *FAST, *words]) == 130
+    _wait_for_frames_under_way()
+    assert f"interrupted after 1 of 4 frames{said}" in capsys.readouterr().err
+
+
+def test_an_interruption_before_the_first_frame_is_done_says_so(
+    compute, monkeypatch, tmp_path, capsys
+):
+    with interrupted_at_row(monkeypatch, 2):
+        assert compute(tmp_path / "table.csv") == 130
+    _wait_for_frames_under_way()
+    told = capsys.readouterr().err
+    assert "interrupted before the first frame was finished: nothing is kept" in told
 
 
 def test_a_part_whose_settings_are_lost_is_refused(compute, stopped, capsys):

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from pathlib import Path
 
 import pytest
 
 from scanfab.cli.main import run
+from scanfab.rerun import read_manifest, repeat_command
 from tests.dumps import cubic_rows, dump_text, write
 
 FAST = 'directions = 9\nspacing = "0.5rmin"\ncutoff = "0.2rmin"\n'
@@ -29,7 +31,7 @@ def compute(series, capsys):
         code = run(["compute", str(source), *words])
         printed = capsys.readouterr()
         assert code == 0, printed.err
-        assert "scanfab.toml" not in printed.err
+        assert printed.err.count(f"scanfab: note: options from {series}/scanfab.toml: ") == 1
         return list(csv.DictReader(io.StringIO(printed.out)))
 
     return ask
@@ -40,7 +42,7 @@ def refused(series: Path, text: str, capsys: pytest.CaptureFixture[str]) -> str:
     assert run(["compute", str(series)]) == 2
     printed = capsys.readouterr()
     assert printed.out == ""
-    assert f"{series}/scanfab.toml: " in printed.err
+    assert re.search(f"{series}/scanfab.toml(, line [0-9]+)?: ", printed.err)
     return printed.err
 
 
@@ -78,14 +80,54 @@ def test_several_numbers_are_a_list(compute):
     assert 0 < float(row["solid_fraction"]) < 1
 
 
-def test_other_sections_are_left_alone(compute):
-    assert len(compute("[view]\ncolour = 1\n")) == 4
+@pytest.mark.parametrize("command", ["compute", "inspect", "calibrate", "view"])
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[view]\ncolour = 1\n", "the section [view] has no meaning: options stand in the sec"),
+        ("[computee]\nrv = 0.6\n", "the section [computee] has no meaning"),
+        ("rv = 0.6\n[compute]\n", "the key 'rv' has no meaning: options stand in the section"),
+        ('[compute]\nvariant = "a"\n', "compute has no option 'variant': did you mean 'varian"),
+        ("[compute]\nresume = true\n", "compute has no option 'resume'"),
+        (
+            "[compute]\nrv = 0.6\nboundary = mask=3\n",
+            'line 3: text needs quotes: boundary = "mask=3"',
+        ),
+        ("[compute]\ncutoff = 1rmin # one\n", 'line 2: text needs quotes: cutoff = "1rmin"'),
+    ],
+)
+def test_what_has_no_meaning_is_refused_by_every_command(series, capsys, command, text, message):
+    write(series / "scanfab.toml", text)
+    assert run([command, str(series)]) == 2
+    assert message in capsys.readouterr().err
 
 
-def test_an_unknown_option_is_refused(series, capsys):
-    assert "compute has no option 'variant'" in refused(
-        series, '[compute]\nvariant = "a"\n', capsys
-    )
+def test_every_command_says_which_options_it_takes(series, capsys):
+    """Those that the line does not name, and that are options of the command."""
+    write(series / "scanfab.toml", '[compute]\nrv = 0.6\nboundary = "id=1"\nmin-contacts = 3\n')
+    assert run(["inspect", str(series), "--min-contacts", "2"]) == 0
+    told = capsys.readouterr().err
+    assert f"scanfab: note: options from {series}/scanfab.toml: boundary\n" in told
+    assert run(["inspect", str(series), "--min-contacts", "2", "--boundary", "id=2"]) == 0
+    assert "options from" not in capsys.readouterr().err
+
+
+def test_the_manifest_lists_what_came_from_the_file(series, tmp_path):
+    output = tmp_path / "out" / "table.csv"
+    output.parent.mkdir()
+    write(series / "scanfab.toml", f"[compute]\n{FAST}rv = 0.6\n")
+    assert run(["compute", str(series), "--rv", "0.7", "-o", str(output)]) == 0
+    found = read_manifest(output)
+    assert found["settings_file"] == {
+        "path": f"{series}/scanfab.toml",
+        "used": ["directions", "spacing", "cutoff"],
+        "not_used": ["rv"],
+    }
+    assert found["notes"] == [f"options from {series}/scanfab.toml: directions, spacing, cutoff"]
+    # the file would take its place where the command is repeated
+    command = repeat_command(found["settings"], named=found["settings_file"]["not_used"])
+    assert "--rv 0.7" in command
+    assert "--spacing 0.5rmin" in command
 
 
 @pytest.mark.parametrize(

@@ -36,6 +36,15 @@ def test_one_sphere_in_a_concentric_window():
     assert isotropic(fabric(solids, spacing=0.05, cutoff=0.0))
 
 
+@pytest.mark.parametrize("thinner", [1e-15, 1e-12])
+def test_between_surfaces_that_coincide_there_is_no_segment(thinner):
+    """A sphere that fills its window but for rounding: at c = 0 lines keep nothing of it."""
+    solids = solids_of(Spheres(np.zeros((1, 3)), np.array([1.0 - thinner])), 1.0)
+    assert scan_along(solids, AXES, 0.02, 0.0).kept("c")[1].sum() < 4
+    half = Spheres(np.zeros((1, 3)), np.array([1.0 - 1e-6]))
+    assert scan_along(solids_of(half, 1.0), AXES, 0.02, 0.0).kept("c")[1].sum() > 1000
+
+
 @pytest.mark.parametrize(
     "spheres",
     [

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 
 from scanfab.compare import compare_tables
-from scanfab.errors import SettingsError
+from scanfab.errors import ScanfabNote, SettingsError
 from scanfab.figures import fits_of, plot_rows
-from scanfab.writers.curves import abscissa_label, curves_of
+from scanfab.writers.curves import abscissa_label, curves_of, is_turned, short_names
 from scanfab.writers.plot import check_plot_file, new_figure
-from scanfab.writers.plot_table import PAPER_SLOPE, TABLE_FIGURES, draw_table
-from tests.tables import curve
+from scanfab.writers.plot_correlation import PAPER_SLOPE
+from scanfab.writers.plot_table import TABLE_FIGURES, draw_table
+from tests.tables import curve, sheared
 
 BYTES = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
 
@@ -55,7 +56,7 @@ def test_the_drawn_slope_is_the_table_s(drawn, strain_max):
         (x0, x1), (y0, y1) = 1e-2 * line.get_xdata(), 1e-3 * line.get_ydata()
         assert (y1 - y0) / (x1 - x0) == pytest.approx(one.slope)
     labels = legend_of(figure.axes[1])
-    assert labels[0].startswith(f"c: {summary[0].slope:.3f}")
+    assert labels[0].startswith(f"variant c: RV:\n{summary[0].slope:.3f}")
     assert f"= {summary[0].r2:.3f}" in labels[0]
     assert any(f"{PAPER_SLOPE}" in label for label in labels) == (x1 > 0)
 
@@ -78,7 +79,7 @@ def test_the_slope_s_error_is_in_the_legend(drawn):
 
     with new_figure(5, 3) as figure:
         draw_table(figure, rows, [replace(fit, slope_se=0.0123)], "correlation")
-        assert "± 0.012" in legend_of(figure.axes[1])[0]
+        assert r"$\pm$ 0.012" in legend_of(figure.axes[1])[0]
 
 
 def test_curves_are_the_table_s_numbers(drawn):
@@ -92,16 +93,22 @@ def test_curves_are_the_table_s_numbers(drawn):
     assert normalised == pytest.approx([row["alpha_vs_axial"] / 0.05 for row in rows])
 
 
-def test_errors_of_scan_and_sample_are_bars_and_bands(drawn):
+def test_bands_are_total_errors_and_bars_the_scan_s_part(drawn):
+    """Of the contacts the sample's error is the total; the legend says all of it."""
     rows = [
         {**row, "alpha_vs_axial_sample_se": 2e-3, "alpha_c_axial_sample_se": 1e-2}
         for row in curve()
     ]
-    left, right = drawn(rows, "evolution").axes
+    figure = drawn(rows, "evolution")
+    note = figure.legends[0].get_title().get_text()
+    assert "one total standard error" in note
+    assert "scan and sample together" in note
+    assert r"the scan's part, at most $0.3\times10^{-3}$" in note
+    left, right = figure.axes
     (bars,) = (found for found in left.collections if hasattr(found, "get_segments"))
     heights = [segment[1, 1] - segment[0, 1] for segment in bars.get_segments()]
     assert heights == pytest.approx([2 * 1e3 * 3e-4] * 5)
-    for axes, error in ((left, 2.0), (right, 1.0)):
+    for axes, error in ((left, 1e3 * np.hypot(3e-4, 2e-3)), (right, 1.0)):
         band = axes.collections[0].get_paths()[0].vertices
         at_zero = band[band[:, 0] == 0, 1]
         assert np.ptp(at_zero) == pytest.approx(2 * error)
@@ -137,7 +144,7 @@ def test_noise_does_not_fill_the_panel(drawn):
 
 def test_names_of_sources_are_no_formulas(drawn):
     rows = [*curve("one$x^$"), *curve("_two")]
-    labels = [text.get_text() for text in drawn(rows).legends[0].get_texts()]
+    labels = [text.get_text() for text in drawn(rows, "evolution").legends[0].get_texts()]
     assert labels == [r"variant c, one\$x^\$", "variant c, _two"]
 
 
@@ -148,11 +155,119 @@ def test_sources_are_called_by_the_last_part_of_their_path():
     assert [one.source for one in curves_of(rows)] == ["one/dumps", "two/dumps"]
 
 
-def test_curves_look_different(drawn):
-    rows = [row for v in "abcd" for source in ("x", "y") for row in curve(source, v)]
-    lines = drawn(rows, "normalised").axes[0].lines[:8]
-    looks = {(line.get_color(), line.get_marker(), line.get_linestyle()) for line in lines}
-    assert len(looks) == 8
+def looks_of(axes):
+    # without the caps of error bars
+    lines = [line for line in axes.lines if line.get_marker() not in ("None", "_")]
+    return {(line.get_color(), line.get_marker(), line.get_linestyle()) for line in lines}
+
+
+def titles_of(figure):
+    return [axes.get_title(loc="left") for axes in figure.axes]
+
+
+def test_two_sources_of_four_variants_are_a_row_of_panels_each(drawn):
+    rows = [row for source in ("x", "y") for v in "abcd" for row in curve(source, v)]
+    figure = drawn(rows, "normalised")
+    assert titles_of(figure) == ["(a) x", "(b)", "(c) y", "(d)"]
+    assert [len(looks_of(axes)) for axes in figure.axes] == [4, 4, 4, 4]
+    assert len(figure.legends[0].get_texts()) == 4
+    assert figure.axes[0].get_ylim() == figure.axes[2].get_ylim()
+    figure = drawn(rows, "correlation")
+    assert titles_of(figure)[::2] == ["(a) x", "(b) y"]
+    assert [len(fitted(axes)) for axes in figure.axes[::2]] == [4, 4]
+
+
+def test_many_sources_are_a_row_of_panels_for_each_variant(drawn):
+    rows = [row for source in "pqrstu" for v in "cd" for row in curve(source, v)]
+    figure = drawn(rows, "evolution")
+    assert titles_of(figure)[::2] == ["(a) variant c: RV", "(c) variant d: RV, rattlers void"]
+    assert [len(looks_of(axes)) for axes in figure.axes[::2]] == [6, 6]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == list("pqrstu")
+
+
+def test_each_line_of_several_groups_is_that_of_its_curve(drawn):
+    """The groups order the curves otherwise than the table."""
+    rows = [*curve("x", "c"), *curve("y", "a", 2.0), *curve("x", "a", 3.0), *curve("y", "c", 4.0)]
+    figure = drawn(rows, "correlation")
+    summary = {(one.source, one.variant): one.slope for one in compare_tables(rows).summary}
+    for axes, source in zip(figure.axes[::2], "xy", strict=True):
+        found = [np.ptp(line.get_ydata()) / np.ptp(line.get_xdata()) for line in fitted(axes)]
+        expected = [10 * slope for (one, _), slope in summary.items() if one == source]
+        assert found == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("name", [None, *TABLE_FIGURES])
+def test_all_panels_are_lettered_and_say_which_alpha(drawn, name):
+    figure = drawn(curve(), name)
+    panels = [axes for axes in figure.axes if axes.axison]
+    letters = [axes.get_title(loc="left") for axes in panels]
+    assert letters == [f"({letter})" for letter in "abcde"[: len(panels)]]
+    assert all(axes.get_ylabel().count(", axial") == 1 for axes in panels)
+
+
+def test_a_sheared_cell_has_intensities_and_coaxiality_over_its_shear(drawn):
+    with pytest.warns(ScanfabNote, match="the loading axis is not the axis of the contact fabric"):
+        figure = drawn(sheared(), "evolution")
+    void, contact, angle = figure.axes
+    assert [axes.get_ylabel().count(", intensity") for axes in figure.axes] == [1, 1, 0]
+    assert "shear strain" in void.get_xlabel()
+    rows = sheared()
+    for axes, name, factor in (
+        (void, "alpha_vs", 1e3), (contact, "alpha_c", 1e2), (angle, "coaxiality_deg", 1.0)
+    ):  # fmt: skip
+        line = axes.lines[0]
+        assert line.get_xdata() == pytest.approx([100 * row["shear_strain"] for row in rows])
+        assert line.get_ydata() == pytest.approx([factor * row[name] for row in rows])
+    note = figure.legends[0].get_title().get_text()
+    assert note == "without errors: the table has those of the axial values only"
+
+
+@pytest.mark.filterwarnings("ignore:the loading axis")
+def test_intensities_have_no_line(drawn):
+    figure = drawn(sheared(), "correlation")
+    assert not fitted(figure.axes[0])
+    assert figure.axes[0].get_ylabel().endswith(", intensity")
+
+
+@pytest.mark.parametrize(("axial", "turned"), [(0.9, False), (0.4, True)])
+def test_the_most_certain_frame_tells_whether_the_axes_are_turned(axial, turned):
+    rows = [{**row, "alpha_c_axial": axial * row["alpha_c"]} for row in sheared()]
+    rows[0].update(alpha_c=1.0, alpha_c_axial=0.0, alpha_c_axial_se=1.0)
+    assert is_turned(rows) == turned
+    assert is_turned(curve()) is False
+
+
+def test_one_frame_has_its_error_as_a_bar(drawn):
+    """An area needs two points."""
+    row = {**curve()[2], "alpha_vs_axial_sample_se": 2e-3, "alpha_vs_axial_se": None}
+    figure = drawn([row], "evolution")
+    heights = [
+        np.ptp(segment[:, 1])
+        for found in figure.axes[0].collections
+        if hasattr(found, "get_segments")
+        for segment in found.get_segments()
+    ]
+    assert heights == pytest.approx([4.0])
+
+
+def test_long_names_are_cut_in_the_middle_and_stay_different():
+    names = [f"{'a' * 60}{end}" for end in "xy"]
+    assert short_names(names) == {name: f"{'a' * 14}...{'a' * 13}{name[-1]}" for name in names}
+    alike = [f"{'a' * 30}{end}{'b' * 30}" for end in "xy"]
+    assert len(set(short_names(alike).values())) == 2
+
+
+def test_the_words_of_a_figure_fit_its_width(drawn):
+    """Nothing is cut off, whatever the sources are called."""
+    rows = [row for source in ("p" * 90, "q" * 90) for v in "abcd" for row in curve(source, v)]
+    for name in TABLE_FIGURES:
+        figure = drawn(rows, name)
+        box = figure.get_tightbbox()
+        width, height = figure.get_size_inches()
+        assert box.x0 > -0.02
+        assert box.y0 > -0.02
+        assert box.x1 < width + 0.02
+        assert box.y1 < height + 0.02
 
 
 @pytest.mark.parametrize("rows", [[], [{**row, "alpha_vs_axial": None} for row in curve()]])

@@ -6,6 +6,7 @@ import contextlib
 import csv
 import io
 import math
+import re
 
 import pytest
 from hypothesis import given
@@ -15,7 +16,7 @@ from scanfab.errors import SettingsError
 from scanfab.table import COLUMNS, Row
 from scanfab.tabular import read_rows
 from scanfab.writers.results import ResultFile
-from scanfab.writers.rows import FILE_FORMATS, CsvWriter, check_suffix
+from scanfab.writers.rows import FILE_FORMATS, CsvWriter, Excerpt, check_suffix
 from tests.test_table import a_row
 
 
@@ -186,3 +187,45 @@ def test_rows_of_other_settings_are_gone_before_the_new_settings_stand(tmp_path,
 def test_a_folder_that_does_not_exist_is_refused(tmp_path):
     with pytest.raises(SettingsError, match=r"there is no folder .*nowhere to write to"):
         ResultFile(tmp_path / "nowhere" / "t.csv", Row)
+
+
+def test_digits_are_significant_ones_of_floats_alone():
+    row = a_row(alpha_vs=0.0123456789, frame=123456, mean_length=None, alpha_c=1e-300)
+    found = Excerpt.make(Row, None, 3).of(row)
+    assert (found["alpha_vs"], found["frame"], found["mean_length"]) == (0.0123, 123456, None)
+    assert found["alpha_c"] == 1e-300
+    assert list(found) == list(COLUMNS)
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False), st.integers(1, 17))
+def test_rounded_numbers_stay_as_they_are_when_they_are_rounded_again(value, digits):
+    excerpt = Excerpt.make(Row, None, digits)
+    once = excerpt.of(a_row(alpha_vs=value))["alpha_vs"]
+    assert excerpt.of(a_row(alpha_vs=once))["alpha_vs"] == once
+    assert digits < 17 or once == value
+
+
+@pytest.mark.parametrize("suffix", FILE_FORMATS)
+def test_columns_come_in_the_order_in_which_they_are_named(tmp_path, suffix):
+    path = tmp_path / f"t{suffix}"
+    excerpt = Excerpt.make(Row, "alpha_vs, frame,variant", 2)
+    with ResultFile(path, Row, excerpt).writer({}) as writer:
+        writer.write(a_row(alpha_vs=0.125, frame=3, variant="c"))
+    (row,) = read_rows(path)
+    assert list(row.items()) == [("alpha_vs", 0.12), ("frame", 3), ("variant", "c")]
+
+
+@pytest.mark.parametrize(
+    ("fields", "digits", "message"),
+    [
+        ("alpha_v", 17, "there is no column 'alpha_v': did you mean alpha_vs?"),
+        ("nonsense", 17, "there is no column 'nonsense': the columns are source, frame, step"),
+        ("", 17, "there is no column ''"),
+        ("frame,frame", 17, "the column frame is named more than once"),
+        (None, 0, "digits: expected 1 to 17 of them, found 0"),
+        (None, 18, "digits: expected 1 to 17 of them, found 18"),
+    ],
+)
+def test_columns_and_digits_that_do_not_exist_are_refused(fields, digits, message):
+    with pytest.raises(SettingsError, match=re.escape(message)):
+        Excerpt.make(Row, fields, digits)

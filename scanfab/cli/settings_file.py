@@ -1,0 +1,149 @@
+"""scanfab.toml beside the dumps: options of compute, below those of the command line."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+import click
+from click.core import ParameterSource
+
+__all__ = ["SettingsFile", "fill_from_file", "read_settings_file"]
+
+SECTION = "compute"
+
+
+@dataclass(frozen=True)
+class SettingsFile:
+    """A settings file, and which of its options a command has taken from it."""
+
+    path: Path
+    options: dict[str, Any]
+    """As they stand in the file."""
+    used: tuple[str, ...]
+    """The others are named on the command line, or are none of this command's."""
+
+    def asked(self) -> dict[str, Any]:
+        """As a manifest lists it."""
+        others = [name for name in self.options if name not in self.used]
+        return {"path": str(self.path), "used": list(self.used), "not_used": others}
+
+
+def fill_from_file(
+    ctx: click.Context, sources: tuple[str, ...], options: dict[str, Any]
+) -> tuple[dict[str, Any], SettingsFile | None]:
+    """
+    The options of a command, those that its line does not name from the settings file.
+
+    A note says which; a file that cannot be right is a usage error in every command.
+    """
+    from scanfab.errors import ScanfabNote
+
+    path = _path_beside(sources)
+    if path is None:
+        return options, None
+    given = read_settings_file(path)
+    filled, used = dict(options), []
+    parameters = _by_option(ctx.command)
+    for key, value in given.items():
+        parameter = parameters.get(key)
+        if parameter is None or parameter.name not in options:
+            continue
+        name = str(parameter.name)
+        if ctx.get_parameter_source(name) is ParameterSource.DEFAULT:
+            filled[name] = _from_toml(ctx, path, parameter, value)
+            used.append(key)
+    if used:
+        warnings.warn(f"options from {path}: {', '.join(used)}", ScanfabNote, stacklevel=2)
+    return filled, SettingsFile(path, given, tuple(used))
+
+
+def _path_beside(sources: tuple[str, ...]) -> Path | None:
+    """The settings file beside the dumps; a usage error if the sources have different ones."""
+    from scanfab.opening import SETTINGS_FILE
+
+    folders = {Path(s) if Path(s).is_dir() else Path(s).parent for s in sources if s != "-"}
+    found = [folder / SETTINGS_FILE for folder in sorted(folders)]
+    found = [path for path in found if path.is_file()]
+    if len(found) > 1:
+        raise click.UsageError(
+            f"the sources have several settings files: {', '.join(map(str, found))}; "
+            f"compute them one by one"
+        )
+    return found[0] if found else None
+
+
+def read_settings_file(path: Path) -> dict[str, Any]:
+    """The options in the one section that there may be, all of them known to compute."""
+    import tomllib
+
+    try:
+        text = path.read_text("utf-8")
+        content = tomllib.loads(text)
+    except UnicodeDecodeError as error:
+        raise click.UsageError(f"{path}: {error}") from None
+    except tomllib.TOMLDecodeError as error:
+        raise click.UsageError(f"{path}{_explained(text, error)}") from None
+    for name, value in content.items():
+        if name == SECTION and isinstance(value, dict):
+            continue
+        if name == SECTION:
+            raise click.UsageError(f"{path}: expected a section [{SECTION}]")
+        what = f"section [{name}]" if isinstance(value, dict) else f"key {name!r}"
+        raise click.UsageError(
+            f"{path}: the {what} has no meaning: options stand in the section [{SECTION}]"
+        )
+    options: dict[str, Any] = content.get(SECTION, {})
+    known = _options_of_compute()
+    for key in options:
+        if key not in known:
+            near = get_close_matches(key, known, n=1)
+            hint = f": did you mean {near[0]!r}?" if near else ""
+            raise click.UsageError(f"{path}: compute has no option {key!r}{hint}")
+    return options
+
+
+def _options_of_compute() -> list[str]:
+    """The options that a settings file may hold: those that say what to compute, and how."""
+    from scanfab.cli.compute import OF_THE_LINE, compute
+
+    return [key for key, one in _by_option(compute).items() if one.name not in OF_THE_LINE]
+
+
+def _by_option(command: click.Command) -> dict[str, click.Parameter]:
+    return {
+        name.removeprefix("--"): parameter
+        for parameter in command.params
+        for name in parameter.opts
+        if name.startswith("--")
+    }
+
+
+def _explained(text: str, error: ValueError) -> str:
+    """What is wrong with a file that is no TOML: most often text without quotes."""
+    found = re.search(r"\(at line (\d+), column \d+\)", str(error))
+    if found is None:
+        return f": {error}"
+    line = text.splitlines()[int(found[1]) - 1]
+    bare = re.fullmatch(r"\s*([\w-]+)\s*=\s*([^\s\"'\[{#][^\"'#]*?)\s*(#.*)?", line)
+    if bare is None:
+        return f", line {found[1]}: {line.strip()}: {error}"
+    return f', line {found[1]}: text needs quotes: {bare[1]} = "{bare[2]}"'
+
+
+def _from_toml(ctx: click.Context, path: Path, parameter: click.Parameter, value: Any) -> Any:
+    """A value of the settings file as the command line would give it."""
+    if isinstance(value, list) and not parameter.multiple and parameter.nargs == 1:
+        value = " ".join(map(str, value))  # the numbers of a cell
+    elif parameter.multiple and not isinstance(value, list):
+        value = [value]
+    elif not isinstance(value, list):
+        value = str(value)
+    try:
+        return parameter.type_cast_value(ctx, value)
+    except click.BadParameter as error:
+        raise click.UsageError(f"{path}: {parameter.name}: {error.format_message()}") from None

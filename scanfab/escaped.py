@@ -1,0 +1,127 @@
+"""Grains that flew away: a few, far from all others, that say nothing of the sample's size."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.packing import Packing
+
+__all__ = ["Escaped", "escaped_grains"]
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
+
+# Gap between surfaces from which on grains are far away: so many mean distances between centres,
+# which grains of a dense or a loose sample never have between them, and so many largest radii.
+SPACINGS, RADII = 4.0, 6.0
+# Fewer grains are no crowd that one of them could be far away from.
+FEWEST = 50
+# Grains of the sample that may have escaped, and how many may have flown away together: more are
+# a part of the sample.
+SHARE, TOGETHER = 0.01, 20
+# Grains that tell how far apart they are.
+SOME = 10_000
+
+
+@dataclass(frozen=True, eq=False)
+class Escaped:
+    """Which particles lie far away from all others."""
+
+    grains: BoolArray
+    """Shape (N,)."""
+    gap: float
+    """The smallest gap between one of them and the rest, dump's length unit; 0 without any."""
+
+
+def escaped_grains(packing: Packing, grains: BoolArray) -> Escaped:
+    """
+    Find the grains that lie far outside the others, by their positions and radii alone.
+
+    Only those count that would make the sample larger along a direction that does not repeat.
+
+    Parameters
+    ----------
+    packing : Packing
+        One frame.
+    grains : ndarray of bool, shape (N,)
+        Which of its particles are grains.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab import Packing
+    >>> from scanfab.escaped import escaped_grains
+    >>> grid = np.stack(np.meshgrid(*3 * [np.arange(5.0)]), axis=-1).reshape(-1, 3)
+    >>> packing = Packing(np.vstack([grid, [20.0, 2.0, 2.0]]), 0.5)
+    >>> found = escaped_grains(packing, np.ones(126, bool))
+    >>> np.flatnonzero(found.grains).tolist(), found.gap
+    ([125], 15.0)
+    """
+    none = Escaped(np.zeros(len(packing), bool), 0.0)
+    left = grains.copy()
+    count = int(np.count_nonzero(grains))
+    if count < FEWEST:
+        return none
+    far = _far(packing, grains)
+    flown: list[int] = []
+    for axis, sign in product(_open_axes(packing), (-1.0, 1.0)):
+        while group := _group_at_end(packing, left, axis, sign, far):
+            left[group] = False
+            flown += group
+            if len(flown) > max(SHARE * count, 1):
+                return none
+    if not flown:
+        return none
+    rest = np.flatnonzero(left)
+    return Escaped(grains & ~left, float(min(_gaps(packing, row, rest).min() for row in flown)))
+
+
+def _far(packing: Packing, grains: BoolArray) -> float:
+    """The gap from which on a grain is far away."""
+    rows = np.flatnonzero(grains)
+    some = packing.position[rows[:: len(rows) // SOME + 1]]
+    radius = packing.radius[grains]
+    # of the middle 98 %, whom nothing that flies away moves
+    low, high = np.quantile(some, [0.01, 0.99], axis=0)
+    extent = np.maximum(high - low, 2.0 * radius.mean())
+    spacing = np.cbrt(np.prod(extent / len(rows) ** (1 / 3)))
+    return float(max(SPACINGS * spacing, RADII * radius.max()))
+
+
+def _open_axes(packing: Packing) -> list[int]:
+    """Axes along which nothing repeats: no image of a grain lies elsewhere along them."""
+    if packing.cell is None:
+        return [0, 1, 2]
+    repeats = packing.cell.vectors[list(np.flatnonzero(packing.cell.periodic))]
+    return np.flatnonzero(~np.any(repeats != 0.0, axis=0)).tolist()
+
+
+def _group_at_end(
+    packing: Packing, left: BoolArray, axis: int, sign: float, far: float
+) -> list[int]:
+    """The outermost grain along an axis and those near it; none if there are too many of these."""
+    along, radius = packing.position[:, axis], packing.radius
+    group = [int(np.argmax(np.where(left, sign * along + radius, -np.inf)))]
+    for member in group:
+        # of a large sample few lie in the layer that is near enough
+        layer = far + radius[member] + radius.max()
+        rows = np.flatnonzero(left & (np.abs(along - along[member]) <= layer))
+        near = rows[_gaps(packing, member, rows) <= far]
+        group += [row for row in near.tolist() if row not in group]
+        if len(group) > min(TOGETHER, int(np.count_nonzero(left)) // 2):
+            return []
+    return group
+
+
+def _gaps(packing: Packing, row: int, others: IntArray) -> FloatArray:
+    """Gaps between the surface of a particle and those of others, nearest image."""
+    branch = packing.position[others] - packing.position[row]
+    if packing.cell is not None and packing.is_periodic:
+        branch = branch + packing.cell.nearest_image(branch) @ packing.cell.vectors
+    distance = np.sqrt(np.einsum("ij,ij->i", branch, branch))
+    return np.asarray(distance - packing.radius[others] - packing.radius[row])

@@ -1,0 +1,172 @@
+"""A complete table that a run goes on with: whether its rows are what a run would give now."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from itertools import groupby, pairwise
+from pathlib import Path
+from typing import Any
+
+from scanfab.errors import SettingsError
+from scanfab.pipeline import chosen_frames
+from scanfab.rerun import read_manifest
+from scanfab.series import Series
+from scanfab.settings import Settings
+from scanfab.table import Row
+from scanfab.tabular import read_rows
+from scanfab.writers.results import differing_settings
+
+__all__ = ["FinishedTable", "finished_table"]
+
+# what may differ: inputs are compared by what they hold, and more frames are the point of it
+FREE = ("frames", "sources")
+
+
+@dataclass(frozen=True)
+class FinishedTable:
+    """The rows of a complete table, of frames that have all of theirs."""
+
+    path: Path
+    rows: dict[str, dict[int, list[Row]]]
+    """By source and frame."""
+    frames: slice
+    """What was asked for."""
+    warnings: list[str]
+    """What its manifest says that the user was told."""
+
+    def with_frames(self, series: Sequence[Series], chosen: slice) -> slice:
+        """
+        The frames of the table and those that are chosen now, as one slice.
+
+        Raises
+        ------
+        SettingsError
+            If together they make none: no frame of the table may be lost.
+        """
+        known = {frame for frames in self.rows.values() for frame in frames}
+        if not known or all(known <= set(_up_to(one, chosen, max(known))) for one in series):
+            return chosen
+        last = max(known)
+        more = {frame for one in series for frame in _up_to(one, chosen, last + 1)}
+        # frames that were skipped leave no hole
+        asked = {frame for one in series for frame in _up_to(one, self.frames, last)}
+        every = sorted(known | more | {frame for frame in asked if frame < last})
+        steps = {right - left for left, right in pairwise(every)} or {1}
+        if len(steps) > 1:
+            raise SettingsError(
+                f"frames: {self.path} holds frames {min(known)} to {last}, which with those "
+                f"chosen now make no slice A:B:C: choose --frames so that they do, or another -o "
+                f"FILE"
+            )
+        endless = chosen.stop is None
+        step = steps.pop()
+        return slice(every[0], None if endless else every[-1] + 1, None if step == 1 else step)
+
+
+def _up_to(series: Series, frames: slice, last: int) -> list[int]:
+    """The chosen frames, of a slice without an end those up to a number and the next one."""
+    chosen = chosen_frames(series, frames)
+    if frames.stop is None and (frames.start or 0) >= 0 and (frames.step or 1) > 0:
+        chosen = chosen[: max(len(range(chosen.start, last + 1, chosen.step)), 1)]
+    return list(chosen)
+
+
+def finished_table(
+    path: Path, asked: Mapping[str, Any], series: Sequence[Series], settings: Settings
+) -> FinishedTable:
+    """
+    The finished rows of a complete table.
+
+    Parameters
+    ----------
+    path : Path
+        The table; ``path.manifest.json`` says what it was made of.
+    asked : mapping
+        What is asked for now.
+    series : sequence of Series
+        What is read now.
+    settings : Settings
+        Of the computation.
+
+    Raises
+    ------
+    SettingsError
+        If other settings or other inputs made it, or if nobody knows what did.
+    """
+    manifest = read_manifest(path)
+    if manifest is None:
+        raise _refused(path, f"there is no {path.name}.manifest.json, which says what made it")
+    differing = differing_settings(manifest["settings"], dict(asked), FREE)
+    if differing:
+        raise _refused(path, f"it was made with other settings ({', '.join(differing)})")
+    rows = read_rows(path)
+    if rows and not {"source", "frame"} <= set(rows[0]):
+        raise _refused(path, "it lacks the columns source and frame, which tell its frames")
+    found: dict[str, dict[int, list[Row]]] = {one.name: {} for one in series}
+    for (source, frame), group in groupby(rows, key=lambda row: (row["source"], row["frame"])):
+        if source not in found:
+            raise _refused(path, f"its source {source} is not named now")
+        own = [_row(row) for row in group]
+        if len(own) == settings.rows_per_frame:
+            found[source][frame] = own
+    _check_inputs(path, manifest, series, found)
+    frames = slice(*(manifest["settings"].get("frames") or (None,)))
+    return FinishedTable(path, found, frames, [str(one) for one in manifest.get("warnings", [])])
+
+
+def _row(values: Mapping[str, Any]) -> Row:
+    """A row as it was written; columns that were not are empty, and are not written again."""
+    every: dict[str, Any] = {one.name: values.get(one.name) for one in fields(Row)}
+    return Row(**every)
+
+
+def _refused(path: Path, reason: str) -> SettingsError:
+    return SettingsError(
+        f"{path}: --resume cannot go on with it: {reason}: name another -o FILE, or leave out "
+        f"--resume to compute all frames again"
+    )
+
+
+def _check_inputs(
+    path: Path,
+    manifest: Mapping[str, Any],
+    series: Sequence[Series],
+    rows: Mapping[str, Mapping[int, Any]],
+) -> None:
+    """Refuse a table whose inputs are not what they were, but for frames behind the last one."""
+    before = {str(one.get("path")): one for one in manifest.get("inputs", [])}
+    for gone in before.keys() - {str(file) for one in series for file in one.files()}:
+        raise _refused(path, f"{gone} is not among the files that are read now")
+    for one in series:
+        steps = [step for step, file in one.grains.files.items() if str(file) in before]
+        last = max((step for step in steps if step is not None), default=None)
+        for step, file in (item for f in (one.grains, *one.contacts) for item in f.files.items()):
+            known, is_last = before.get(str(file)), step is None or step == last
+            if known is None and steps and (step is None or last is None or step <= last):
+                raise _refused(path, f"{file} is new, and not behind the last frame")
+            if known is None or _is_same(file, known, may_grow=is_last):
+                continue
+            if not _was_skipped(one, step, rows[one.name]):
+                raise _refused(path, f"{file} has changed since")
+
+
+def _is_same(file: Path, before: Mapping[str, Any], may_grow: bool) -> bool:
+    """Whether a file is what it was, or begins as it was; snapshots may have come behind."""
+    size, length = before.get("size"), file.stat().st_size
+    if not isinstance(size, int) or length < size or (length > size and not may_grow):
+        return False
+    digest = hashlib.sha256()
+    with open(file, "rb") as stream:
+        while size and (part := stream.read(min(size, 1 << 20))):
+            digest.update(part)
+            size -= len(part)
+    return digest.hexdigest() == before.get("sha256")
+
+
+def _was_skipped(series: Series, step: int | None, rows: Mapping[int, Any]) -> bool:
+    """Whether the files of a step have given no row: a broken file may have been mended."""
+    frames = [number for number, frame in enumerate(series) if frame.name_step == step]
+    # a broken file counts as one frame: if there are more, later ones have other numbers now
+    return len(frames) == 1 and frames[0] not in rows

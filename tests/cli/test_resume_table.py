@@ -1,0 +1,245 @@
+"""--resume on a complete table: what is there is taken over, what is missing is computed."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from scanfab import measurement
+from scanfab.cli.main import run
+from scanfab.rerun import read_manifest
+from tests.cli.test_resume import _wait_for_frames_under_way
+from tests.dumps import cubic_rows, dump_text, write
+from tests.interruptions import interrupted_at_row, write_series
+
+FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac")
+
+
+@pytest.fixture(scope="module")
+def five_frames(tmp_path_factory):
+    return write_series(tmp_path_factory.mktemp("five") / "series", 5)
+
+
+@pytest.fixture
+def dumps(five_frames, tmp_path):
+    """A folder whose last two frames are not written yet."""
+    folder = tmp_path / "dumps"
+    folder.mkdir()
+    for path in sorted(five_frames.iterdir(), key=lambda path: int(path.stem[5:]))[:3]:
+        shutil.copy(path, folder)
+    return folder
+
+
+@pytest.fixture
+def compute(dumps, monkeypatch):
+    """The exit code of a run, and how many frames it has scanned."""
+    scan, scanned = measurement.scan_to_tolerance, []
+    monkeypatch.setattr(
+        measurement, "scan_to_tolerance", lambda *words: scanned.append(1) or scan(*words)
+    )
+
+    def compute(output: Path, *words: str, sources: tuple[Path, ...] = (dumps,)) -> tuple[int, int]:
+        scanned.clear()
+        code = run(["compute", *map(str, sources), *FAST, "-o", str(output), *words])
+        return code, len(scanned)
+
+    return compute
+
+
+def add_frames(five_frames: Path, dumps: Path) -> None:
+    for path in five_frames.iterdir():
+        shutil.copy(path, dumps)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".tsv", ".json", ".jsonl", ".parquet"])
+def test_frames_that_came_later_are_added(compute, five_frames, dumps, tmp_path, suffix):
+    table, whole = tmp_path / f"table{suffix}", tmp_path / f"whole{suffix}"
+    assert compute(table) == (0, 3)
+    add_frames(five_frames, dumps)
+    assert compute(table, "--resume", "--workers", "1") == (0, 2)
+    assert compute(whole) == (0, 5)
+    assert table.read_bytes() == whole.read_bytes()
+    one, other = read_manifest(table), read_manifest(whole)
+    assert one["settings"] == other["settings"]
+    assert one["inputs"] == other["inputs"]
+
+
+def test_nothing_is_computed_where_nothing_is_missing(compute, tmp_path):
+    table = tmp_path / "table.csv"
+    assert compute(table) == (0, 3)
+    before = table.read_bytes()
+    assert compute(table, "--resume") == (0, 0)
+    assert table.read_bytes() == before
+
+
+def test_rows_of_several_sources_stay_in_their_order(compute, five_frames, dumps, tmp_path):
+    other = shutil.copytree(five_frames, tmp_path / "other")
+    table, whole = tmp_path / "table.csv", tmp_path / "whole.csv"
+    assert compute(table, sources=(dumps, other)) == (0, 8)
+    add_frames(five_frames, dumps)
+    assert compute(table, "--resume", sources=(dumps, other)) == (0, 2)
+    assert compute(whole, sources=(dumps, other)) == (0, 10)
+    assert table.read_bytes() == whole.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("first", "then", "every", "computed"),
+    [
+        ("1:3", ":3", ":3", 1),
+        (":2", "2:", ":", 1),
+        ("2:", ":2", ":", 2),
+        (":", ":1", ":", 0),
+        ("-1:", "-2:", "-2:", 1),
+        ("::2", "1", ":", 1),
+    ],
+)
+def test_other_frames_join_those_of_the_table(compute, tmp_path, first, then, every, computed):
+    """No frame of the table is lost."""
+    table, whole = tmp_path / "table.csv", tmp_path / "whole.csv"
+    assert compute(table, f"--frames={first}")[0] == 0
+    assert compute(table, "--resume", f"--frames={then}") == (0, computed)
+    assert compute(whole, f"--frames={every}")[0] == 0
+    assert table.read_bytes() == whole.read_bytes()
+    assert run(["report", str(table), "-o", str(tmp_path / "report.html")]) == 0
+
+
+def test_frames_that_make_no_slice_are_refused(compute, tmp_path, five_frames, dumps, capsys):
+    add_frames(five_frames, dumps)
+    table = tmp_path / "table.csv"
+    assert compute(table, "--frames=:2")[0] == 0
+    before = table.read_bytes()
+    assert compute(table, "--resume", "--frames=4:") == (2, 0)
+    assert "holds frames 0 to 1, which with those chosen now make no slice" in (
+        capsys.readouterr().err
+    )
+    assert table.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [(["--seed", "1"], "seed"), (["--digits", "5", "--rv", "0.6"], "digits, rv")],
+)
+def test_other_settings_are_refused_and_named(compute, tmp_path, capsys, words, named):
+    table = tmp_path / "table.csv"
+    assert compute(table)[0] == 0
+    before = table.read_bytes()
+    assert compute(table, "--resume", *words) == (2, 0)
+    told = capsys.readouterr().err
+    assert f"--resume cannot go on with it: it was made with other settings ({named})" in told
+    assert table.read_bytes() == before
+
+
+def test_a_table_without_its_manifest_is_refused(compute, tmp_path, capsys):
+    table = tmp_path / "table.csv"
+    assert compute(table)[0] == 0
+    Path(f"{table}.manifest.json").unlink()
+    assert compute(table, "--resume") == (2, 0)
+    assert "there is no table.csv.manifest.json, which says what made it" in capsys.readouterr().err
+
+
+def _changed(dumps: Path) -> None:
+    path = dumps / "dump_100.txt"
+    path.write_text(path.read_text().replace("0.5", "0.49"))
+
+
+def _earlier(dumps: Path) -> None:
+    write(dumps / "dump_50.txt", dump_text(cubic_rows(), step=50, box=((0, 4),) * 3))
+
+
+def _gone(dumps: Path) -> None:
+    (dumps / "dump_0.txt").unlink()
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (_changed, "dump_100.txt has changed since"),
+        (_earlier, "dump_50.txt is new, and not behind the last frame"),
+        (_gone, "dump_0.txt is not among the files that are read now"),
+    ],
+)
+def test_other_inputs_are_refused(compute, dumps, tmp_path, capsys, change, said):
+    table = tmp_path / "table.csv"
+    assert compute(table)[0] == 0
+    change(dumps)
+    assert compute(table, "--resume") == (2, 0)
+    assert said in capsys.readouterr().err
+
+
+def test_a_dump_of_many_snapshots_may_grow(compute, five_frames, tmp_path):
+    parts = sorted(five_frames.iterdir(), key=lambda path: int(path.stem[5:]))
+    texts = [path.read_text() for path in parts]
+    dump = write(tmp_path / "dump.txt", "".join(texts[:3]))
+    table, whole = tmp_path / "table.csv", tmp_path / "whole.csv"
+    assert compute(table, sources=(dump,)) == (0, 3)
+    write(dump, "".join(texts))
+    assert compute(table, "--resume", sources=(dump,)) == (0, 2)
+    assert compute(whole, sources=(dump,)) == (0, 5)
+    assert table.read_bytes() == whole.read_bytes()
+
+
+def test_a_frame_that_was_skipped_is_tried_again(compute, dumps, tmp_path, capsys):
+    """As long as it cannot be read the exit code is 1; once it can, its rows are there."""
+    second = dumps / "dump_100.txt"
+    good = second.read_text()
+    second.write_text("ITEM: TIMESTEP\n")
+    table, whole = tmp_path / "table.csv", tmp_path / "whole.csv"
+    assert compute(table, "--on-error", "skip") == (1, 2)
+    assert compute(table, "--on-error", "skip", "--resume") == (1, 0)
+    assert "frame 1 skipped" in capsys.readouterr().err
+    # the file was no input that a row was made of, but the manifest lists it
+    second.write_text(good)
+    assert compute(table, "--on-error", "skip", "--resume") == (0, 1)
+    assert compute(whole, "--on-error", "skip") == (0, 3)
+    assert table.read_bytes() == whole.read_bytes()
+
+
+def test_what_is_interrupted_again_goes_on_with_part_and_table(
+    compute, five_frames, dumps, tmp_path, monkeypatch, capsys
+):
+    table, whole = tmp_path / "table.csv", tmp_path / "whole.csv"
+    assert compute(table, "--frames=1:3") == (0, 2)
+    before = table.read_bytes()
+    add_frames(five_frames, dumps)
+    with interrupted_at_row(monkeypatch, 8):
+        assert compute(table, "--resume", "--workers", "1")[0] == 130
+    _wait_for_frames_under_way()
+    assert "interrupted after 3 of 5 frames; the same command goes on" in capsys.readouterr().err
+    assert table.read_bytes() == before
+    assert compute(table, "--resume") == (0, 2)
+    assert compute(whole) == (0, 5)
+    assert table.read_bytes() == whole.read_bytes()
+
+
+def test_warnings_of_the_first_run_stay_in_the_manifest(compute, five_frames, dumps, tmp_path):
+    write(dumps / "notes.md", "nothing")
+    table = tmp_path / "table.csv"
+    assert compute(table)[0] == 0
+    path = Path(f"{table}.manifest.json")
+    found = json.loads(path.read_text())
+    found["warnings"] = ["frame 1: something was told"]
+    path.write_text(json.dumps(found))
+    add_frames(five_frames, dumps)
+    assert compute(table, "--resume")[0] == 0
+    assert read_manifest(table)["warnings"][0] == "frame 1: something was told"
+
+
+def test_columns_and_digits_are_those_of_the_table(compute, five_frames, dumps, tmp_path):
+    words = ("--fields", "source,frame,variant,alpha_vs_axial", "--digits", "4")
+    table, whole = tmp_path / "table.csv", tmp_path / "whole.csv"
+    assert compute(table, *words) == (0, 3)
+    add_frames(five_frames, dumps)
+    assert compute(table, *words, "--resume") == (0, 2)
+    assert compute(whole, *words) == (0, 5)
+    assert table.read_bytes() == whole.read_bytes()
+
+
+def test_a_table_without_its_frames_cannot_be_gone_on_with(compute, tmp_path, capsys):
+    table = tmp_path / "table.csv"
+    words = ("--fields", "strain,alpha_vs_axial")
+    assert compute(table, *words)[0] == 0
+    assert compute(table, *words, "--resume") == (2, 0)
+    assert "it lacks the columns source and frame" in capsys.readouterr().err

@@ -1,0 +1,88 @@
+"""Grains that flew away: what is far from all others moves neither extents nor RV."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab import Cell, Packing, ScanfabWarning, Settings, compute, find_contacts
+from scanfab.escaped import escaped_grains
+from scanfab.plan import make_plan
+from scanfab.variants import Sample
+from tests.lattices import shaken_cubic
+
+SPHERES = shaken_cubic(np.random.default_rng(5), 9)
+
+
+def with_flown(*places, radius=0.5, cell=None) -> Packing:
+    """729 grains in a cube of edge 9, and some elsewhere."""
+    position = np.vstack([SPHERES.position, np.reshape(places, (-1, 3))])
+    radii = np.concatenate([SPHERES.radius, np.full(len(places), radius)])
+    return Packing(position, radii, cell=cell)
+
+
+def escaped_of(packing: Packing) -> list[int]:
+    found = escaped_grains(packing, np.ones(len(packing), bool))
+    return np.flatnonzero(found.grains).tolist()
+
+
+def window_of(packing: Packing):
+    return make_plan(Settings.make(), Sample(packing, np.zeros(len(packing), bool))).window
+
+
+def test_a_grain_far_away_moves_neither_the_rv_nor_the_result_in_it():
+    alone, flown = (find_contacts(one) for one in (with_flown(), with_flown((25, 25, 4))))
+    assert escaped_of(flown) == [729]
+    assert np.array_equal(window_of(alone).center, window_of(flown).center)
+    assert window_of(alone).radius == window_of(flown).radius
+    lines = {"variants": "cd", "directions": "lebedev:9", "spacing": 0.1}
+    with pytest.warns(ScanfabWarning, match=r'frame 0: grain 729 at \(25, 25, 4\): .*"id=729"'):
+        found = compute(flown, **lines)
+    for one, other in zip(compute(alone, **lines), found, strict=True):
+        assert one == other
+
+
+def test_grains_that_flew_away_together_and_to_several_sides_are_all_found():
+    packing = with_flown((30, 4, 4), (31, 4, 4), (4, -30, 4), (4, 4, 1e6))
+    assert escaped_of(packing) == [729, 730, 731, 732]
+    assert escaped_grains(packing, np.ones(733, bool)).gap == pytest.approx(20.5, abs=1.0)
+
+
+@pytest.mark.parametrize("distance", [2.0, 4.0])
+def test_a_grain_some_radii_outside_belongs_to_the_sample(distance):
+    assert escaped_of(with_flown((9 + distance, 4, 4))) == []
+
+
+@pytest.mark.parametrize("scale", [1.0, 3.0, 30.0])
+def test_no_grain_of_an_ordinary_sample_has_escaped(scale):
+    """Dense, loose, or a gas: whatever the distances between neighbours are."""
+    random = np.random.default_rng(1)
+    gas = Packing(scale * 10 * random.random((500, 3)), random.uniform(0.1, 1.0, 500))
+    assert escaped_of(gas) == []
+    assert escaped_of(Packing(scale * SPHERES.position, SPHERES.radius)) == []
+
+
+def test_a_second_part_of_the_sample_has_not_escaped():
+    """Eight of 737 grains are more than one of a hundred."""
+    corners = np.array([[60.0, y, z] for y in (0, 1) for z in range(4)])
+    assert escaped_of(with_flown(*corners)) == []
+
+
+def test_through_a_periodic_face_nothing_is_far_away():
+    """Open along z alone: a grain above the sample has escaped, one beside it has not."""
+    cell = Cell(np.diag([9.0, 9.0, 9.0]), (True, True, False))
+    assert escaped_of(with_flown((25, 4, 4), cell=cell)) == []
+    assert escaped_of(with_flown((4, 4, 40), cell=cell)) == [729]
+
+
+def test_few_grains_have_no_crowd():
+    places = np.array([[0, 0, 0], [50, 0, 0], [0, 90, 0]], float)
+    assert escaped_of(Packing(places, 1.0)) == []
+
+
+def test_strain_of_the_grains_does_not_follow_one_that_flies_away():
+    still = [find_contacts(with_flown((25, 4, 4 + 30 * k))) for k in range(2)]
+    samples = [Sample(one, np.zeros(len(one), bool)) for one in still]
+    lengths = [scanfab.strain.axial_length(one, "grains", (0.0, 0.0, 1.0)) for one in samples]
+    assert lengths[0] == lengths[1] < 10
