@@ -107,7 +107,6 @@ class ScannedFrames:
 
     results: list[FrameResult]
     variant: str
-    settings: Settings
 
 
 def plot_frames(
@@ -171,7 +170,7 @@ def scan_frames(
         If no frame has a void fabric of that variant.
     """
     variant = "c" if "c" in settings.variants else settings.variants[0]
-    return ScannedFrames(_results(series, settings, rows, variant), variant, settings)
+    return ScannedFrames(_results(series, settings, rows, variant), variant)
 
 
 def projections_of(frames: ScannedFrames) -> list[Projection]:

@@ -61,8 +61,8 @@ def void_noise(result: FrameResult) -> float | None:
     scan, sample = (number_of(row, f"alpha_vs_axial_{part}") for part in ("se", "sample_se"))
     if sample is None:
         return None
-    parts = (SCAN_HARMONICS**0.5 * (scan or 0.0), SAMPLE_HARMONICS**0.5 * sample)
-    return 100.0 * 5.0**0.5 * math.hypot(*parts)
+    parts = math.sqrt(SCAN_HARMONICS) * (scan or 0.0), math.sqrt(SAMPLE_HARMONICS) * sample
+    return 100.0 * math.sqrt(5.0) * math.hypot(*parts)
 
 
 def contact_noise(result: FrameResult) -> float | None:

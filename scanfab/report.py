@@ -77,10 +77,11 @@ def make_report(
     ScanfabError
         If a table cannot be read, is no fabric table, or holds no frames.
     """
-    inputs = read_inputs(tables, cutoff, labels)
-    rows = [row for one in inputs for row in one.rows]
-    comparison = compare_tables(rows)
     heard = _Heard()
+    with _listening(heard, tell=True):
+        inputs = read_inputs(tables, cutoff, labels)
+        rows = [row for one in inputs for row in one.rows]
+        comparison = compare_tables(rows)
     sections = [_section(one, heard) for one in inputs]
     asked = [one.manifest["settings"] for one in inputs if one.manifest is not None]
     content = Content(
@@ -161,11 +162,11 @@ def _section(one: Input, heard: _Heard) -> Section:
 
 
 class _listening(warnings.catch_warnings):  # noqa: N801
-    """Collect the texts of warnings and notes."""
+    """Collect the texts of warnings and notes; ``tell`` them too."""
 
-    def __init__(self, heard: _Heard) -> None:
+    def __init__(self, heard: _Heard, tell: bool = False) -> None:
         super().__init__(record=True)
-        self.heard = heard
+        self.heard, self.tell = heard, tell
 
     def __enter__(self) -> Any:
         self.caught = super().__enter__()
@@ -179,3 +180,5 @@ class _listening(warnings.catch_warnings):  # noqa: N801
             elif issubclass(one.category, ScanfabNote):
                 self.heard.notes.append(str(one.message))
         super().__exit__(*details)
+        for one in self.caught or [] if self.tell else []:
+            warnings.warn(one.message, one.category, stacklevel=3)

@@ -126,7 +126,7 @@ def _with_error(value: float | None, error: float | None) -> str:
 
 
 def _spell_error(error: float | None) -> str:
-    return "-" if error is None else f"{error:.2g}"
+    return "-" if error is None else f"{error:#.2g}"
 
 
 def _spell(value: Any) -> str:

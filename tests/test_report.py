@@ -272,13 +272,14 @@ def test_the_error_is_that_of_scan_and_sample_together(page, computed):
     """Results, frame table and caveats quote one error; its parts are called parts."""
     row = next(r for r in computed.rows if (r["frame"], r["variant"]) == (6, "c"))
     parts = row["alpha_vs_axial_se"], row["alpha_vs_axial_sample_se"]
-    total = f"{math.hypot(*parts):.2g}"
+    total = f"{math.hypot(*parts):#.2g}"
+    value = f"{row['alpha_vs_axial']:.{len(total) - 2}f}"
     results = words_of(page[page.index('id="results"') : page.index('id="warnings"')])
-    assert f"{row['alpha_vs_axial']:.5f} ± {total}" in results
-    assert f"± {parts[0]:.2g}" not in words_of(page)
+    assert f"{value} ± {total}" in results
+    assert f"± {parts[0]:#.2g}" not in words_of(page)
     assert "its error: scan" in results
-    assert f" {parts[0]:.2g} " in results
-    line = f"6 c 15 % {row['alpha_vs_axial']:.5f} {total} {parts[0]:.2g} {parts[1]:.2g} "
+    assert f" {parts[0]:#.2g} " in results
+    line = f"6 c 15 % {value} {total} {parts[0]:#.2g} {parts[1]:#.2g} "
     assert line in words_of(page)
     assert f"in variant c ({total} beside" not in results
 
@@ -286,7 +287,7 @@ def test_the_error_is_that_of_scan_and_sample_together(page, computed):
 def test_without_the_sample_s_part_there_is_no_total(table):
     """The scan's error alone is never quoted as the error."""
     text = words_of(page_of([table(curve())]))
-    assert "α vs at 4 % strain -0.03000 its error: scan 0.0003" in text
+    assert "α vs at 4 % strain -0.03000 its error: scan 0.00030" in text
     assert "±" not in text[text.index("its error") : text.index("Straight scan lines")]
 
 

@@ -136,3 +136,11 @@ def test_an_empty_table_is_an_error(table, tmp_path, capsys):
 def test_wrong_usage(table, words, message, capsys):
     assert run(["report", str(table(curve())), *words]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_what_is_doubtful_about_tables_is_told_and_stands_in_the_page(table):
+    paths = [table(curve(), "a.jsonl"), table(curve(), "b.jsonl")]
+    with pytest.warns(match="rows of one that .* holds already count once"):
+        page = page_of(paths)
+    warned = page[page.index('id="warnings"') : page.index('id="sample"')]
+    assert "holds already count once" in warned
