@@ -121,7 +121,8 @@ def _with_error(value: float | None, error: float | None) -> str:
         return "-"
     if error is None or error <= 0:
         return f"{value:.5f}"
-    digits = max(0, 1 - math.floor(math.log10(error)))
+    # of the rounded error: 0.00099999 has the digits of 0.0010
+    digits = max(0, 1 - math.floor(math.log10(float(f"{error:.1e}"))))
     return f"{value:.{digits}f} ± {error:.{digits}f}"
 
 
