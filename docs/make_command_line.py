@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from scanfab.cli.main import COMMANDS, cli
+from scanfab.cli.group import COMMANDS, cli
 from scanfab.compare import DIFFERENCE_MEANINGS, FRAME_MEANINGS, SUMMARY_MEANINGS
 from scanfab.inspection import REPORT_MEANINGS
 from scanfab.ladders import STEP_MEANINGS

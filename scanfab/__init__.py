@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
+# as typing has it, which takes longer to load than all that is needed to answer Ctrl-C
+TYPE_CHECKING = False
 
 if TYPE_CHECKING:
+    from typing import Any
+
     from scanfab.calibration import Calibration, calibrate
     from scanfab.cell import Cell
     from scanfab.compare import compare_tables
@@ -107,6 +109,8 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    from importlib import import_module
+
     if name == "__version__":
         from importlib.metadata import version
 

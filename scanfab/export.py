@@ -22,6 +22,7 @@ from scanfab.settings import Vector
 from scanfab.table import Row
 from scanfab.variants import VARIANTS
 from scanfab.writers import vtk
+from scanfab.writers.files import check_folder
 
 __all__ = ["VtkFolder", "scan_line_sample"]
 
@@ -47,7 +48,7 @@ class VtkFolder:
     Raises
     ------
     SettingsError
-        If the folder cannot be made.
+        If the folder cannot be made or written to.
     """
 
     def __init__(self, folder: Path, axis: Vector, go_on: bool = False) -> None:
@@ -55,6 +56,7 @@ class VtkFolder:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise SettingsError(f"{folder}: cannot be made: {error.strerror}") from None
+        check_folder(folder / "grains.pvd")
         self.folder = folder
         self.axis = axis
         self.go_on = go_on

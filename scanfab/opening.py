@@ -122,7 +122,7 @@ def read_series(
     options = ReadOptions(columns or {}, contact_columns, radius, cell, periodic)
     families = sort_into_families([file for path in paths for file in _files(path)], format)
     grains = _grain_family(paths, families).check()
-    name = os.fspath(given[0]) if len(given) == 1 else _common_folder(paths)
+    name = _as_text(os.fspath(given[0]) if len(given) == 1 else _common_folder(paths))
     own = tuple(family for family in families if family.kind == "contacts")
     _note_passed_over(families, [grains, *own])
     if contacts == "geometric":
@@ -238,8 +238,14 @@ def _named_contacts(contacts: PathLike, format: str | None) -> tuple[Family, ...
     families = sort_into_families(files, format)
     found = tuple(family.check() for family in families if family.kind == "contacts")
     if not found:
-        raise ReadError(f"{contacts}: expected contacts, found none")
+        problem = next((family.problem for family in families if family.problem), None)
+        raise ReadError(problem or f"{contacts}: expected contacts, found none")
     return found
+
+
+def _as_text(name: str) -> str:
+    """A name as a table can hold it: those of files need be no text."""
+    return name.encode("utf-8", "backslashreplace").decode()
 
 
 def _common_folder(paths: list[Path]) -> str:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.errors import ReadError
+from scanfab.streams import check_file_or_pipe
 
 __all__ = ["TEXT_COLUMNS", "is_number", "number_of", "numbers_of", "read_rows", "total_error"]
 
@@ -39,6 +40,7 @@ def read_rows(path: Path | str) -> list[dict[str, Any]]:
     >>> rows[0]["contacts"]
     2076
     """
+    check_file_or_pipe(Path(path))
     try:
         data = sys.stdin.buffer.read() if str(path) == "-" else Path(path).read_bytes()
     except OSError as error:

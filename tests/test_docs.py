@@ -18,7 +18,7 @@ import pytest
 
 import scanfab
 from scanfab import compare, inspection, ladders, table
-from scanfab.cli.main import COMMANDS, cli
+from scanfab.cli.group import COMMANDS, cli
 from scanfab.directions import RULES
 from scanfab.readers.registry import installed_readers
 

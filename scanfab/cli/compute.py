@@ -182,7 +182,7 @@ def compute(
     rattlers removed. Lengths are in the dump's own units.
     """
     from scanfab.cli.console import announce_compiling, is_readable, reported_warnings
-    from scanfab.cli.main import tell_when_ended
+    from scanfab.cli.signals import telling
     from scanfab.manifest import asked_for
     from scanfab.settings import Settings
     from scanfab.table import Row
@@ -215,9 +215,8 @@ def compute(
             with usage_errors():
                 asked = run.go_on(result, asked)
         printed = not is_readable()
-        tell_when_ended(lambda: _standing(run, output, printed))
-        _write(run, asked, result, excerpt)
-        tell_when_ended(None)
+        with telling(lambda: _standing(run, output, printed)):
+            _write(run, asked, result, excerpt)
         for path in _manifests(output, manifest_path):
             _write_manifest(path, asked, run, told, settings_file)
         if plot is not None:
@@ -261,7 +260,7 @@ def _standing(run: Run, output: Path | None, printed: bool) -> str:
         kept = "the rows printed so far are all" if printed else "nothing is kept"
         return f"{run.standing()}; {kept}: with -o FILE, --resume could go on"
     if not run.done:
-        return " before the first frame was finished: nothing is kept"
+        return "before the first frame was finished: nothing is kept"
     again = "the same command" if run.resume else "the same command with --resume"
     return f"{run.standing()}; {again} goes on"
 
@@ -301,4 +300,5 @@ def _write_manifest(
         found["settings_file"] = settings_file.asked()
     text = json.dumps(found, indent=1, ensure_ascii=False)
     with whole_file(path) as part:
-        part.write_text(text + "\n", encoding="utf-8")
+        # names of files need be no text; what replaces their letters is how JSON spells them
+        part.write_text(text + "\n", encoding="utf-8", errors="backslashreplace")

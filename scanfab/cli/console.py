@@ -94,20 +94,20 @@ def is_readable() -> bool:
 
 
 def announce_compiling() -> None:
-    """A line on standard error if the scan has to be compiled first."""
-    from scanfab.kernels.cache import is_kept, when_compiling
+    """A line on standard error if something has to be compiled first."""
+    from scanfab.kernels.cache import when_compiling
+    from scanfab.kernels.folder import kernel_folder
 
-    kept = (
-        "once for each user and version"
-        if is_kept()
-        else "and cannot be kept: NUMBA_CACHE_DIR may name a folder that can be written to"
-    )
+    problem = kernel_folder().problem
+    kept = f"it cannot be kept: {problem}" if problem else "it is kept for later runs"
     quiet = level() is Level.QUIET
     when_compiling(
         lambda: (
             None
             if quiet
-            else click.echo(f"scanfab: compiling the scan, some ten seconds; {kept}", err=True)
+            else click.echo(
+                f"scanfab: compiling what no earlier run has needed, 2 to 20 s; {kept}", err=True
+            )
         )
     )
 

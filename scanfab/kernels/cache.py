@@ -1,61 +1,97 @@
-"""Where compiled kernels are kept: for each user and version of the kernels, or nowhere."""
+"""
+Compiled kernels on disk, each a file of its own: one that is damaged is compiled again.
+
+Numba's own files have an index, and it trusts both: what is cut or garbage ends in an error, and
+code with a wrong byte is run.
+"""
 
 from __future__ import annotations
 
-import atexit
 import gc
 import hashlib
 import os
-import shutil
-import sys
-import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import pickle
+import secrets
+from collections.abc import Callable
+from functools import cache
+from inspect import getfile
 from pathlib import Path
 from typing import Any
 
-import numba
 from numba.core import event
+from numba.core.caching import NullCache
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
 
-__all__ = ["is_kept", "kernel_cache", "remove_unkept", "when_compiling"]
+from scanfab.kernels.folder import is_private, kernel_folder
 
-# bytes that compiled kernels need at most
-ROOM = 4 << 20
-_unkept: list[str] = []
-config: Any = numba.config
+__all__ = ["KernelCache", "when_compiling"]
+
+CHECKSUM = 32
 
 
-@contextmanager
-def kernel_cache() -> Iterator[None]:
-    """Functions that are declared inside are kept in scanfab's folder; all others are not."""
-    before = config.CACHE_DIR
-    given = Path(before) if before else None
-    usual = _usual_folder()
-    if given is not None and _is_writable(given):
-        folder = given
-    elif usual is not None and _is_private(usual) and _is_writable(usual):
-        folder = usual
-    else:
-        # not a folder that others know: what it holds is run
-        folder = Path(tempfile.mkdtemp(prefix="scanfab-kernels-"))
-        _unkept.append(str(folder))
-        atexit.register(remove_unkept)
-    config.CACHE_DIR = str(folder)
+class KernelCache(NullCache):
+    """What Numba asks for the compiled forms of one function, and gives them to."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self.function = function
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The form for these types of arguments; None if it is not there, or not as it was."""
+        target_context.refresh()
+        path = self._path(sig, target_context.codegen())
+        content = None if path is None else _read(path)
+        if content is None:
+            return None
+        try:
+            parts = pickle.loads(content)
+            return CompileResult._rebuild(target_context, *parts)  # type: ignore[no-untyped-call]
+        except Exception:  # of another version, whatever its name says
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep a form, if there is a place for it."""
+        path = self._path(sig, data.codegen)
+        if path is not None and not data.lifted and not data.library.has_dynamic_globals:
+            _write(path, dumps(data._reduce()))  # type: ignore[no-untyped-call]
+
+    def _path(self, sig: Any, codegen: Any) -> Path | None:
+        folder = kernel_folder().path
+        if folder is None:
+            return None
+        function = self.function
+        key = (_source(getfile(function)), function.__qualname__, str(sig), codegen.magic_tuple())
+        name = hashlib.sha256(repr(key).encode()).hexdigest()[:24]
+        return folder / f"{function.__name__}-{name}.kernel"
+
+
+@cache
+def _source(file: str) -> bytes:
+    """What tells one version of a function's file from another."""
+    return hashlib.sha256(Path(file).read_bytes()).digest()
+
+
+def _read(path: Path) -> bytes | None:
+    """What a file holds; None if it is not whole, or if others could have written it."""
     try:
-        yield
-    finally:
-        config.CACHE_DIR = before
+        with open(path, "rb") as file:
+            if not is_private(os.fstat(file.fileno())):
+                return None
+            checksum, content = file.read(CHECKSUM), file.read()
+    except OSError:
+        return None
+    return content if hashlib.sha256(content).digest() == checksum else None
 
 
-def is_kept() -> bool:
-    """Whether what is compiled outlives the process."""
-    return not _unkept
-
-
-def remove_unkept() -> None:
-    """Delete what cannot be kept, at the end of the process."""
-    for folder in _unkept:
-        shutil.rmtree(folder, ignore_errors=True)
+def _write(path: Path, content: bytes) -> None:
+    """Whole or not at all; a full disk is no reason to stop."""
+    part = path.with_suffix(f".{secrets.token_hex(4)}")
+    try:
+        with open(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+            file.write(hashlib.sha256(content).digest() + content)
+        os.replace(part, path)
+    except OSError:
+        part.unlink(missing_ok=True)
 
 
 def when_compiling(tell: Callable[[], None]) -> None:
@@ -85,44 +121,3 @@ class _Compiling(event.Listener):
         self._depth -= 1
         if self._depth == 0:
             gc.enable()
-
-
-def _usual_folder() -> Path | None:
-    """The folder of this user and of these kernels; None if there is no home."""
-    try:
-        home = Path.home()
-    except RuntimeError:
-        return None
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
-    elif sys.platform == "darwin":
-        base = home / "Library" / "Caches"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache")
-    # Numba sees a change of the file that declares a kernel, not of those that it calls
-    sources = hashlib.sha256()
-    for file in sorted(Path(__file__).parent.glob("*.py")):
-        sources.update(file.read_bytes())
-    return base / "scanfab" / f"numba-{numba.__version__}-{sources.hexdigest()[:16]}"
-
-
-def _is_private(folder: Path) -> bool:
-    """Make the folder; whether it belongs to the user and no one else can write to it."""
-    try:
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        status = folder.stat()
-    except OSError:
-        return False
-    return os.name != "posix" or (status.st_uid == os.getuid() and not status.st_mode & 0o022)
-
-
-def _is_writable(folder: Path) -> bool:
-    """Whether there is room for the kernels, if they are not there yet."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        held = any(folder.iterdir())
-        with tempfile.TemporaryFile(dir=folder) as file:
-            file.write(b"\0" * (1 if held else ROOM))
-    except OSError:
-        return False
-    return True

@@ -9,6 +9,8 @@ import numba
 import numpy as np
 from llvmlite.binding import get_host_cpu_name
 
+from scanfab.kernels.cache import KernelCache
+
 __all__ = ["LANES", "ONE", "REORDERED", "ZERO", "Flag", "inner", "kernel"]
 
 # numbers that the compiler's vector instructions take at a time: 256 bits of them, also on
@@ -33,8 +35,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 def kernel(function: Function) -> Function:
     """Compile a function that is called from Python."""
-    compiled: Function = njit(nogil=True, cache=True)(function)
-    return compiled
+    return _kept(njit(nogil=True)(function), function)
 
 
 def inner(**options: Any) -> Callable[[Function], Function]:
@@ -44,7 +45,13 @@ def inner(**options: Any) -> Callable[[Function], Function]:
     Without what Python needs to call it, which would take a sixth of the time to compile it all:
     called from Python it ends the process, so tests call it in a kernel of their own.
     """
-    compile_it: Callable[[Function], Function] = njit(
-        nogil=True, cache=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options
-    )
-    return compile_it
+    compile_it = njit(nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)
+    return lambda function: _kept(compile_it(function), function)
+
+
+def _kept(compiled: Any, function: Function) -> Function:
+    """The compiled function with our cache, as Numba's option ``cache`` gives it another."""
+    if compiled is not function:  # else Numba is switched off
+        compiled._cache = KernelCache(function)
+    same: Function = compiled
+    return same

@@ -7,14 +7,13 @@ Knows the syntax of snapshots, not the meaning of columns.
 from __future__ import annotations
 
 import io
-import mmap
 import re
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -35,6 +34,8 @@ Columns = dict[str, npt.NDArray[Any]]
 
 # a snapshot's header never comes near this size, whatever the number of columns
 HEADER_BYTES = 1 << 16
+# bytes that are searched at a time
+PIECE = 1 << 18
 STEP_KEY = b"ITEM: TIMESTEP"
 COUNT_KEY = re.compile(rb"^ITEM: NUMBER OF (\S+)[ \t]*\r?$", re.MULTILINE)
 
@@ -77,29 +78,24 @@ def index_dump(path: Path) -> list[Snapshot]:
     file = plain(path)
     if file.stat().st_size == 0:
         raise ReadError(f"{path}: the file is empty")
+    # not mapped into memory: where a mapped file is cut meanwhile, the process dies
     with open(file, "rb") as stream:
-        data = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
-        try:
-            starts = _starts(data)
-            if not starts:
-                raise ReadError(f"{path}: expected a line ITEM: TIMESTEP, found none")
-            stops = [*starts[1:], len(data)]
-            if len(starts) > 1 and not _is_complete(data, starts[-1], stops[-1]):
-                warnings.warn(
-                    f"{path}: the last snapshot, number {len(starts)}, is incomplete and is left "
-                    f"out",
-                    ScanfabWarning,
-                    stacklevel=2,
-                )
-                starts.pop()
-            found = [
-                _snapshot(path, data, start, stop)
-                for start, stop in zip(starts, stops, strict=False)
-            ]
-            # a program that was started again may have gone back
-            return sorted(found, key=lambda one: one.step or 0)
-        finally:
-            data.close()
+        starts, size = _starts(stream)
+        if not starts:
+            raise ReadError(f"{path}: expected a line ITEM: TIMESTEP, found none")
+        stops = [*starts[1:], size]
+        if len(starts) > 1 and not _is_complete(stream, starts[-1], stops[-1]):
+            warnings.warn(
+                f"{path}: the last snapshot, number {len(starts)}, is incomplete and is left out",
+                ScanfabWarning,
+                stacklevel=2,
+            )
+            starts.pop()
+        found = [
+            _snapshot(path, stream, start, stop) for start, stop in zip(starts, stops, strict=False)
+        ]
+    # a program that was started again may have gone back
+    return sorted(found, key=lambda one: one.step or 0)
 
 
 def read_block(snapshot: Snapshot) -> DumpBlock:
@@ -213,24 +209,28 @@ def _tolerant(snapshot: Snapshot, body: _Body, count: int) -> FloatArray:
     return values
 
 
-def _starts(data: mmap.mmap) -> list[int]:
-    """Where snapshots begin: UNITS and TIME may stand before TIMESTEP."""
-    starts = []
-    # a single byte is found much faster than a word, and rows hold no colon
-    colon = data.find(b":")
-    while colon >= 0:
-        place = max(colon - len(b"ITEM"), 0)
-        begins = place == 0 or data[place - 1 : place] in (b"\n", b"\xbf")
-        if begins and data[place : place + len(STEP_KEY)] == STEP_KEY:
-            before = BEFORE_STEP.search(data[max(place - 300, 0) : place])
-            starts.append(place - len(before[0]) if before else place)
-        colon = data.find(b":", colon + 1)
-    return starts
+def _starts(stream: IO[bytes]) -> tuple[list[int], int]:
+    """Where snapshots begin (UNITS and TIME may stand before TIMESTEP), and where the file ends."""
+    starts, end, before = [], 0, b"\n"
+    # whole lines, so that no key is cut in two
+    while piece := stream.read(PIECE) + stream.readline(HEADER_BYTES):
+        data, first = before + piece, end - len(before)
+        place = data.find(STEP_KEY, len(before))
+        while place >= 0:
+            # some files begin with a byte order mark
+            if data[place - 1 : place] in (b"\n", b"\xbf"):
+                above = BEFORE_STEP.search(data[max(place - 300, 0) : place])
+                starts.append(first + place - (len(above[0]) if above else 0))
+            place = data.find(STEP_KEY, place + 1)
+        end += len(piece)
+        before = data[-300:]
+    return starts, end
 
 
-def _snapshot(path: Path, data: mmap.mmap, start: int, stop: int) -> Snapshot:
+def _snapshot(path: Path, stream: IO[bytes], start: int, stop: int) -> Snapshot:
+    stream.seek(start)
     # what belongs to the snapshot stands before its count of rows
-    header = data[start : min(start + HEADER_BYTES, stop)].partition(b"ITEM: NUMBER OF")[0]
+    header = stream.read(min(HEADER_BYTES, stop - start)).partition(b"ITEM: NUMBER OF")[0]
     found = dict(STEP_OR_TIME.findall(header))
     try:
         step = int(found[b"TIMESTEP"])
@@ -243,14 +243,19 @@ def _snapshot(path: Path, data: mmap.mmap, start: int, stop: int) -> Snapshot:
     return Snapshot(path, step=step, time=time, start=start, stop=stop)
 
 
-def _is_complete(data: mmap.mmap, start: int, stop: int) -> bool:
+def _is_complete(stream: IO[bytes], start: int, stop: int) -> bool:
     """Whether all rows that the header counts are there, each with its line end."""
-    block = data[start:stop]
+    stream.seek(start)
     try:
-        sections, body = _sections("", block)
-        return block.count(b"\n", body.start) >= _count("", sections)
+        sections, body = _sections("", stream.read(min(HEADER_BYTES, stop - start)))
+        count = _count("", sections)
     except ReadError:
         return False
+    place, rows = stream.seek(start + body.start), 0
+    while place < stop and (piece := stream.read(min(PIECE, stop - place))):
+        rows += piece.count(b"\n")
+        place += len(piece)
+    return rows >= count
 
 
 def _sections(where: str, block: bytes) -> tuple[dict[str, list[str]], _Body]:

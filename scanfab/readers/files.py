@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import atexit
 import bz2
 import gzip
 import lzma
@@ -17,14 +16,15 @@ from pathlib import Path
 from threading import Lock, get_ident
 from typing import IO, Any
 
+from scanfab.ending import at_end
 from scanfab.errors import ReadError
+from scanfab.streams import check_file
 
 __all__ = [
     "COMPRESSED_SUFFIXES",
     "bare_name",
     "first_bytes",
     "plain",
-    "remove_copies",
     "temporary_copy",
 ]
 
@@ -87,7 +87,7 @@ def temporary_copy(stream: IO[bytes], name: str) -> Path:
     """What a stream holds, as a file that goes with the process."""
     if not _folder:
         _folder.append(tempfile.mkdtemp(prefix="scanfab-"))
-        atexit.register(remove_copies)
+        at_end(_remove_copies)
     copy = Path(tempfile.mkdtemp(dir=_folder[0])) / name
     try:
         with open(copy, "wb") as file:
@@ -98,7 +98,7 @@ def temporary_copy(stream: IO[bytes], name: str) -> Path:
     return copy
 
 
-def remove_copies() -> None:
+def _remove_copies() -> None:
     """Delete all temporary copies, at the end of the process."""
     for folder in _folder:
         # under another name no thread that is still reading can put a copy into it
@@ -109,6 +109,7 @@ def remove_copies() -> None:
 
 
 def _opener(path: Path) -> Callable[..., Any]:
+    check_file(path)
     try:
         with open(path, "rb") as stream:
             magic = stream.read(6)

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import os
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
+from scanfab.ending import undone_at_end
 from scanfab.errors import SettingsError
 
-__all__ = ["check_folder", "whole_file"]
+__all__ = ["check_folder", "named_errors", "whole_file"]
 
 
 def check_folder(path: Path) -> None:
@@ -30,18 +33,30 @@ def whole_file(path: Path) -> Iterator[Path]:
     A pipe or a device is written to as it is.
     """
     if _is_stream(path):
-        yield path
+        with named_errors(path):
+            yield path
         return
-    # with the suffix at the end: some libraries tell the format by it
-    part = path.with_name(f"{path.stem}.part{path.suffix}")
+    # with the suffix at the end: some libraries tell the format by it; no other process, and no
+    # user, has a file of this name
+    part = path.with_name(f"{path.stem[:60]}.{secrets.token_hex(4)}.part{path.suffix}")
+    remove = partial(part.unlink, missing_ok=True)
+    with named_errors(path, part), undone_at_end(remove):
+        try:
+            yield part
+            os.replace(part, path)
+        finally:
+            remove()
+
+
+@contextmanager
+def named_errors(name: Path | str, part: Path | None = None) -> Iterator[None]:
+    """Let errors of the system name a file: those of writing name none, or what stands for it."""
     try:
-        yield part
-        if not part.exists():
-            # VTK prints, and goes on
-            raise OSError(f"{path}: cannot be written")
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
+        yield
+    except OSError as error:
+        if error.filename in (None, part, str(part)):
+            error.filename = os.fspath(name)
+        raise
 
 
 def _is_stream(path: Path) -> bool:

@@ -117,7 +117,7 @@ def check_page_file(path: Path) -> None:
 def save_page(path: Path, page: str) -> None:
     """Write a page; the file is complete or untouched."""
     with whole_file(path) as part:
-        part.write_text(page, encoding="utf-8")
+        part.write_text(page, encoding="utf-8", errors="backslashreplace")
 
 
 def render_page(content: Content) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -129,8 +130,11 @@ def save_figure(figure: Figure, path: Path, dpi: int = DPI) -> None:
     """Write PNG, SVG or PDF, by the suffix; the file is complete or untouched."""
     kind = path.suffix.lower().lstrip(".")
     dates = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
+    # in memory first: where the disk is full, the writer of PDF fails with an error of another kind
+    drawn = BytesIO()
+    figure.savefig(drawn, format=kind, dpi=dpi, metadata=dates[kind])
     with whole_file(path) as part:
-        figure.savefig(part, format=kind, dpi=dpi, metadata=dates[kind])
+        part.write_bytes(drawn.getbuffer())
 
 
 def plain(text: str) -> str:

@@ -19,8 +19,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
+from scanfab.ending import undone_at_end
 from scanfab.errors import ScanfabNote, SettingsError
-from scanfab.writers.files import check_folder, whole_file
+from scanfab.writers.files import check_folder, named_errors, whole_file
 from scanfab.writers.rows import ALL, Excerpt, RowWriter, check_suffix, row_writer
 
 __all__ = ["ResultFile", "differing_settings"]
@@ -101,15 +102,12 @@ class ResultFile:
             self._put_part_aside()
         self._write_asked(asked)
         try:
-            with open(self.part, "a" if going_on else "w", newline="", encoding="utf-8") as stream:
+            with undone_at_end(self._remove_empty_part), self._open_part(going_on) as stream:
                 yield row_writer(
                     self._part_suffix, stream, self.kind, not going_on, self._excerpt_of_part
                 )
         except BaseException:
-            if self.part.exists() and not self.part.stat().st_size:
-                # there is nothing to go on with
-                self.part.unlink()
-                self._asked.unlink()
+            self._remove_empty_part()
             raise
         # what stands there is of the table that was FILE before
         self.manifest.unlink(missing_ok=True)
@@ -153,6 +151,18 @@ class ResultFile:
             ScanfabNote,
             stacklevel=4,
         )
+
+    @contextmanager
+    def _open_part(self, going_on: bool) -> Iterator[IO[str]]:
+        mode = "a" if going_on else "w"
+        with named_errors(self.part), open(self.part, mode, newline="", encoding="utf-8") as stream:
+            yield stream
+
+    def _remove_empty_part(self) -> None:
+        """Without a row there is nothing to go on with."""
+        if self.part.exists() and not self.part.stat().st_size:
+            self.part.unlink()
+            self._asked.unlink()
 
     def _write_asked(self, asked: dict[str, Any]) -> None:
         """Whole or not at all, as the process may be killed here too."""

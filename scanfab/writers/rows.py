@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import csv
 import json
+from contextlib import AbstractContextManager
 from dataclasses import asdict, dataclass, fields
 from difflib import get_close_matches
 from pathlib import Path
 from typing import IO, Any, Protocol, get_type_hints
 
 from scanfab.errors import SettingsError
+from scanfab.writers.files import named_errors
 
 __all__ = ["FILE_FORMATS", "Excerpt", "RowWriter", "check_suffix", "row_writer"]
 
@@ -127,16 +129,16 @@ class CsvWriter:
     def write(self, row: Any) -> None:
         """Write one row."""
         values = self.excerpt.of(row)
-        if self._header:
-            self._writer.writerow(values)
-            self._header = False
-        self._writer.writerow(
-            [
-                "" if value is None else repr(float(value)) if isinstance(value, float) else value
-                for value in values.values()
-            ]
-        )
-        self.stream.flush()
+        cells = [
+            "" if value is None else repr(float(value)) if isinstance(value, float) else value
+            for value in values.values()
+        ]
+        with _named_after(self.stream):
+            if self._header:
+                self._writer.writerow(values)
+                self._header = False
+            self._writer.writerow(cells)
+            self.stream.flush()
 
     def close(self) -> None:
         """Nothing comes after the last row."""
@@ -152,8 +154,10 @@ class JsonLinesWriter:
     def write(self, row: Any) -> None:
         """Write one row."""
         values = self.excerpt.of(row)
-        self.stream.write(json.dumps(values, ensure_ascii=False, allow_nan=False) + "\n")
-        self.stream.flush()
+        text = json.dumps(values, ensure_ascii=False, allow_nan=False) + "\n"
+        with _named_after(self.stream):
+            self.stream.write(text)
+            self.stream.flush()
 
     def close(self) -> None:
         """Nothing comes after the last row."""
@@ -234,6 +238,11 @@ def row_writer(
         return JsonWriter(stream, excerpt)
     check_suffix(Path(f"table{suffix}"))
     return ParquetWriter(stream, kind, excerpt)
+
+
+def _named_after(stream: IO[Any]) -> AbstractContextManager[None]:
+    name = str(getattr(stream, "name", ""))
+    return named_errors("standard output" if name == "<stdout>" else name)
 
 
 def check_suffix(path: Path) -> None:

@@ -159,8 +159,22 @@ def save_mesh(mesh: Any, path: Path, fields: Mapping[str, Any]) -> None:
     taken = {*mesh.point_data, *mesh.cell_data}
     for name, values in fields.items():
         mesh.field_data[f"row_{name}" if name in taken else name] = values
+    text = _xml(mesh)
     with whole_file(path) as part:
-        mesh.save(str(part))
+        part.write_text(text, encoding="utf-8", newline="\n")
+
+
+def _xml(mesh: Any) -> str:
+    """The file's content: VTK writes it to memory, as its writer crashes on a full disk."""
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+
+    writer = vtkXMLPolyDataWriter()
+    writer.SetInputData(mesh)
+    writer.SetDataModeToBinary()
+    writer.WriteToOutputStringOn()
+    writer.Write()
+    text: str = writer.GetOutputString()
+    return text
 
 
 class Collection:

@@ -151,12 +151,12 @@ def test_a_closed_pipe_ends_quietly() -> None:
 
 
 def test_interrupt_is_exit_code_130(monkeypatch: pytest.MonkeyPatch) -> None:
-    from scanfab.cli import main
+    from scanfab.cli import group, main
 
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(main.cli, "main", interrupted)
+    monkeypatch.setattr(group.cli, "main", interrupted)
     assert main.run(["compute"]) == 130
 
 

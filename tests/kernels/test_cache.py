@@ -14,7 +14,7 @@ import numba
 import pytest
 
 import scanfab.kernels.sweep
-from scanfab.kernels import cache
+from scanfab.kernels import cache, compiled, folder
 from tests.dumps import cubic_rows, dump_text, write
 
 ROOT = Path(__file__).parents[2]
@@ -24,7 +24,7 @@ PROGRAM = [
     "-c",
     "import sys; from scanfab.cli.main import main; main(['inspect', *sys.argv[1:]])",
 ]
-SAID = "scanfab: compiling the scan"
+SAID = "scanfab: compiling what no earlier run has needed"
 NOWHERE = "/proc/none"
 
 
@@ -64,7 +64,7 @@ def words_of(process):
 
 
 def kept_in(folder):
-    return sorted(path.name for path in Path(folder).rglob("*.nb?"))
+    return sorted(path.name for path in Path(folder).rglob("*.kernel"))
 
 
 only_linux = pytest.mark.skipif(sys.platform != "linux", reason="needs XDG_CACHE_HOME and /proc")
@@ -75,7 +75,7 @@ def test_the_first_run_says_that_it_compiles_and_the_second_need_not(dump, tmp_p
     home = tmp_path / "cache"
     first = words_of(start(dump, home))
     assert first.count(SAID) == 1
-    assert "once for each user and version" in first
+    assert "; it is kept for later runs" in first
     assert len(kept_in(home)) >= 2
     assert SAID not in words_of(start(dump, home))
     assert list((tmp_path / "temporary").iterdir()) == []
@@ -122,7 +122,7 @@ def test_a_package_that_nobody_can_write_to_is_no_obstacle(dump, tmp_path):
 @pytest.mark.parametrize("given", [{}, {"NUMBA_CACHE_DIR": NOWHERE}])
 def test_without_a_home_it_compiles_for_itself_and_leaves_nothing(dump, tmp_path, given):
     words = words_of(start(dump, NOWHERE, HOME=NOWHERE, **given))
-    assert "cannot be kept: NUMBA_CACHE_DIR may name" in words
+    assert "; it cannot be kept: /proc/none" in words
     assert list((tmp_path / "temporary").iterdir()) == []
 
 
@@ -146,27 +146,122 @@ def test_functions_of_others_are_kept_where_they_were():
     assert os.environ.get("NUMBA_CACHE_DIR", "") == numba.config.CACHE_DIR
 
 
-def test_another_kernel_means_another_folder(tmp_path, monkeypatch):
-    monkeypatch.setattr(cache, "__file__", str(tmp_path / "cache.py"))
-    folders = set()
-    for text in ("a", "b", "a"):
-        (tmp_path / "kernel.py").write_text(text)
-        folders.add(cache._usual_folder())
-    assert len(folders) == 2
+@pytest.fixture
+def kept(tmp_path, monkeypatch):
+    """The folder of kernels, which is new."""
+    home = tmp_path / "kernels"
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(home))
+    folder.kernel_folder.cache_clear()
+    yield folder.kernel_folder().path
+    folder.kernel_folder.cache_clear()
+
+
+def twice(x):
+    return 2 * x
+
+
+def compiled_anew() -> bool:
+    """Whether a new process would compile a kernel rather than find it."""
+    function = compiled.kernel(twice)
+    assert function(21) == 42
+    return bool(function.stats.cache_misses)
+
+
+@pytest.mark.parametrize("damage", ["empty", "cut", "garbage", "one bit", "gone", "a folder"])
+def test_what_is_damaged_is_compiled_again_and_replaced(kept, damage):
+    assert compiled_anew()
+    assert not compiled_anew()
+    (file,) = kept.iterdir()
+    content = file.read_bytes()
+    file.unlink()
+    if damage == "a folder":  # cannot be replaced, which is no reason to stop
+        file.mkdir()
+        assert compiled_anew()
+        return
+    wrong = {
+        "empty": b"",
+        "cut": content[: len(content) // 2],
+        "garbage": b"garbage" * 1000,
+        # in the middle of the machine's code
+        "one bit": content[:3000] + bytes([content[3000] ^ 1]) + content[3001:],
+    }
+    if damage in wrong:
+        file.write_bytes(wrong[damage])
+        file.chmod(0o600)
+    assert compiled_anew()
+    assert not compiled_anew()
+    assert len(list(kept.iterdir())) == 1
 
 
 @pytest.mark.skipif(os.name != "posix", reason="needs permissions")
-def test_a_folder_that_others_can_write_to_is_not_trusted(tmp_path):
-    folder = tmp_path / "cache"
-    assert cache._is_private(folder)
-    assert stat.S_IMODE(folder.stat().st_mode) == 0o700
-    folder.chmod(0o777)
-    assert not cache._is_private(folder)
+@pytest.mark.parametrize("which", ["the given folder", "the folder of this version"])
+def test_a_folder_that_others_can_write_to_is_neither_read_nor_written(kept, which):
+    assert compiled_anew()
+    (file,) = kept.iterdir()
+    open_to_all = kept if which == "the folder of this version" else kept.parent
+    open_to_all.chmod(0o777)
+    folder.kernel_folder.cache_clear()
+    assert (
+        f"{open_to_all} is not yours, or others can write to it" in folder.kernel_folder().problem
+    )
+    file.write_bytes(b"not read")
+    assert compiled_anew()
+    assert compiled_anew()
+    assert file.read_bytes() == b"not read"
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs permissions")
+def test_a_file_that_others_can_write_to_is_not_read(kept):
+    assert compiled_anew()
+    (file,) = kept.iterdir()
+    file.chmod(0o666)
+    assert compiled_anew()
+    assert not compiled_anew()
+    assert stat.S_IMODE(file.stat().st_mode) == 0o600
+
+
+@pytest.mark.skipif(os.name != "posix", reason="needs owners")
+def test_what_belongs_to_another_user_is_not_trusted(tmp_path, monkeypatch):
+    status = tmp_path.stat()
+    assert folder.is_private(status)
+    monkeypatch.setattr(os, "getuid", lambda: status.st_uid + 1)
+    assert folder.is_private(status) == (status.st_uid == 0)
+    stranger = os.stat_result((0o040700, 0, 0, 1, status.st_uid + 2, 0, 0, 0, 0, 0))
+    assert not folder.is_private(stranger)
+
+
+def test_no_folder_is_made_for_others_to_write_to(tmp_path):
+    before = os.umask(0)
+    try:
+        folder._make(tmp_path / "one" / "two")
+    finally:
+        os.umask(before)
+    assert folder.is_private((tmp_path / "one").stat())
+    assert folder.is_private((tmp_path / "one" / "two").stat())
+
+
+def test_another_kernel_means_another_folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(folder, "__file__", str(tmp_path / "folder.py"))
+    names = set()
+    for text in ("a", "b", "a"):
+        (tmp_path / "kernel.py").write_text(text)
+        names.add(folder._version())
+    assert len(names) == 2
 
 
 def test_a_full_disk_is_seen_before_kernels_are_compiled(tmp_path, monkeypatch):
     def full(**_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(cache.tempfile, "TemporaryFile", full)
-    assert not cache._is_writable(tmp_path)
+    assert folder._has_room(tmp_path)
+    monkeypatch.setattr(folder.tempfile, "TemporaryFile", full)
+    assert not folder._has_room(tmp_path)
+
+
+def test_a_disk_that_fills_later_is_no_reason_to_stop(kept, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(cache.os, "replace", full)
+    assert compiled_anew()
+    assert list(kept.iterdir()) == []

@@ -330,3 +330,30 @@ def test_a_file_that_was_cut_meanwhile_is_no_endless_search_for_its_lines(tmp_pa
     with pytest.raises(ReadError, match="the header is incomplete"):
         read_block(second)
     assert dump._lines_before(second) == text[:20].count("\n")
+
+
+@pytest.mark.parametrize("piece", [1, 7, 64, 1000])
+@pytest.mark.parametrize("before", ["", "ITEM: UNITS\nlj\nITEM: TIME\n0.25\n"])
+def test_snapshots_are_found_whatever_is_searched_at_a_time(tmp_path, monkeypatch, piece, before):
+    texts = [before + dump_text(step=step) for step in range(20)]
+    path = write(tmp_path / "dump", "\ufeff" + "".join(texts) + " ITEM: TIMESTEP")
+    expected = index_dump(path)
+    monkeypatch.setattr(dump, "PIECE", piece)
+    assert index_dump(path) == expected
+    assert [snapshot.step for snapshot in expected] == list(range(20))
+
+
+@pytest.mark.parametrize("left", [0, 100, 8192, 20000])
+def test_a_file_that_is_cut_while_it_is_indexed_is_an_error(tmp_path, monkeypatch, left):
+    """A program starts again and writes the dump anew: whoever has it mapped is killed."""
+    path = write(tmp_path / "dump", "".join(dump_text(step=step) for step in range(200)))
+    snapshot = dump._snapshot
+
+    def cut(*words):
+        with open(path, "r+b") as stream:
+            stream.truncate(left)
+        return snapshot(*words)
+
+    monkeypatch.setattr(dump, "_snapshot", cut)
+    with pytest.raises(ReadError, match="expected a whole number after ITEM: TIMESTEP"):
+        index_dump(path)

@@ -34,8 +34,34 @@ def test_after_an_error_the_file_is_the_old_one(tmp_path):
 
 
 def test_a_file_that_was_not_written_is_an_error(tmp_path):
-    with pytest.raises(OSError, match=r"a.txt: cannot be written"), whole_file(tmp_path / "a.txt"):
+    with pytest.raises(FileNotFoundError) as caught, whole_file(tmp_path / "a.txt"):
         pass
+    assert caught.value.filename == str(tmp_path / "a.txt")
+
+
+def test_an_error_without_a_name_is_given_that_of_the_file(tmp_path):
+    with pytest.raises(OSError, match="No space") as caught, whole_file(tmp_path / "a.txt"):
+        raise OSError(28, "No space left on device")
+    assert caught.value.filename == str(tmp_path / "a.txt")
+
+
+def test_two_processes_and_the_user_have_files_of_their_own(tmp_path):
+    path = tmp_path / "a.txt"
+    (tmp_path / "a.part.txt").write_text("the user's")
+    with whole_file(path) as one, whole_file(path) as other:
+        assert one != other
+        one.write_text("one")
+        other.write_text("other")
+    assert path.read_text() == "one"
+    assert (tmp_path / "a.part.txt").read_text() == "the user's"
+    assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_a_name_may_be_as_long_as_the_system_lets_it(tmp_path):
+    path = tmp_path / f"{'a' * 250}.txt"
+    with whole_file(path) as part:
+        part.write_text("new")
+    assert path.read_text() == "new"
 
 
 def test_a_folder_that_is_not_there_is_refused(tmp_path):

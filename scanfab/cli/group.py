@@ -1,0 +1,65 @@
+"""The command and its subcommands, which are found when they are used."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from importlib import import_module
+
+import click
+
+__all__ = ["COMMANDS", "cli"]
+
+# one module a command, imported only when the command runs: --help stays fast
+COMMANDS = {
+    "compute": "the fabric table: one row per frame and variant",
+    "compare": "variants side by side, normalised curves, correlation with contact fabric",
+    "inspect": "what the reader sees, nothing computed",
+    "calibrate": "how many lines are enough: ladders of settings, and those it recommends",
+    "report": "one file to hand on: settings, tables, figures, a view that can be turned",
+    "view": "a frame in 3D",
+    "formats": "every reader and writer, its extensions, and the package it comes from",
+}
+
+
+class LazyGroup(click.Group):
+    """A group that knows its commands by name."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in COMMANDS:
+            if ctx.resilient_parsing:
+                return None
+            near = get_close_matches(cmd_name, COMMANDS, n=1)
+            hint = f"Did you mean {near[0]!r}?" if near else f"Choose from {', '.join(COMMANDS)}."
+            raise click.UsageError(f"No such command {cmd_name!r}. {hint}", ctx)
+        command = getattr(import_module(f"scanfab.cli.{cmd_name}"), cmd_name)
+        assert isinstance(command, click.Command)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+def _print_version(ctx: click.Context, param: click.Parameter, value: bool) -> None:
+    if value and not ctx.resilient_parsing:
+        from importlib.metadata import version
+
+        click.echo(f"scanfab {version('scanfab')}")
+        ctx.exit()
+
+
+@click.group(cls=LazyGroup)
+@click.option(
+    "--version",
+    is_flag=True,
+    expose_value=False,
+    is_eager=True,
+    callback=_print_version,
+    help="Show the version and exit.",
+)
+@click.option("--debug", is_flag=True, expose_value=False, help="Show a traceback with an error.")
+def cli() -> None:
+    """The void fabric of granular packings by scan lines, from DEM particle dumps."""

@@ -1,0 +1,89 @@
+"""Ctrl-C and SIGTERM: the process ends at once, and says how far it came."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from types import FrameType
+
+from scanfab.ending import finish
+
+__all__ = [
+    "catch_signals",
+    "flush_streams",
+    "ignore_signals",
+    "interrupted_words",
+    "leave_at_once",
+    "telling",
+]
+
+ENDED: dict[int, str] = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
+# clear the line of progress, and show the cursor that it hides
+PLAIN_LINE = "\r\x1b[2K\x1b[?25h"
+_more: list[Callable[[], str]] = []
+
+
+@contextmanager
+def telling(words: Callable[[], str]) -> Iterator[None]:
+    """In the block these words follow "interrupted", such as "after 4 of 5 frames"."""
+    _more.append(words)
+    try:
+        yield
+    finally:
+        _more.remove(words)
+
+
+def interrupted_words(number: int) -> str:
+    """What is said of a signal that ended the process."""
+    return " ".join([f"scanfab: {ENDED[number]}", *(words() for words in _more[-1:])])
+
+
+def catch_signals() -> None:
+    """From now on signals end the process in our way; one that is ignored stays so."""
+    signal.signal(signal.SIGTERM, _end)
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, _end)
+
+
+def ignore_signals() -> None:
+    """The result stands: a signal would only spoil the exit code."""
+    for late in ENDED:
+        signal.signal(late, signal.SIG_IGN)
+
+
+def _end(number: int, frame: FrameType | None) -> None:
+    """
+    Say it, remove what is temporary, and leave.
+
+    No exception is raised: it would come up anywhere, and extension modules, the compiler and their
+    callbacks swallow it, take it for a failure of their own, or crash.
+    """
+    for again in ENDED:
+        signal.signal(again, signal.SIG_DFL)  # a second one ends even what follows
+    try:
+        words = interrupted_words(number) + "\n"
+        on_terminal = sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
+        # not by the stream, which may be in the middle of a line itself
+        os.write(2, ((PLAIN_LINE if on_terminal else "") + words).encode(errors="replace"))
+    except Exception:  # a closed stream, no memory: it ends all the same
+        pass
+    finally:
+        leave_at_once(128 + number)
+
+
+def leave_at_once(code: int) -> None:
+    """Exit without waiting for the frames that other threads are computing."""
+    try:
+        finish()
+    finally:
+        os._exit(code)
+
+
+def flush_streams() -> None:
+    """Hand on what was printed."""
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError):  # a full disk, a closed pipe: told already
+            stream.flush()

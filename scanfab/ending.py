@@ -1,0 +1,35 @@
+"""What has to be done before the process ends, also where it leaves at once."""
+
+from __future__ import annotations
+
+import atexit
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+
+__all__ = ["at_end", "finish", "undone_at_end"]
+
+Step = Callable[[], object]
+_steps: list[Step] = []
+
+
+def at_end(step: Step) -> None:
+    """Call a function at the end of the process."""
+    _steps.append(step)
+
+
+@contextmanager
+def undone_at_end(step: Step) -> Iterator[None]:
+    """Call a function if the process ends inside the block."""
+    _steps.append(step)
+    try:
+        yield
+    finally:
+        _steps.remove(step)
+
+
+@atexit.register
+def finish() -> None:
+    """Do what is left to be done; the last that was asked for comes first."""
+    while _steps:
+        with suppress(OSError):
+            _steps.pop()()

@@ -1,0 +1,99 @@
+"""The folder of compiled kernels: for each user and version of them, and only if it is safe."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import tempfile
+from functools import cache
+from pathlib import Path
+
+import numba
+
+__all__ = ["Folder", "is_private", "kernel_folder"]
+
+# bytes that compiled kernels need at most
+ROOM = 16 << 20
+
+
+class Folder:
+    """Where kernels are kept, or why they are not."""
+
+    def __init__(self, path: Path | None, problem: str = "") -> None:
+        self.path = path
+        self.problem = problem
+
+
+@cache
+def kernel_folder() -> Folder:
+    """The folder of this user and of these kernels, which is made if it can be."""
+    given = os.environ.get("NUMBA_CACHE_DIR")
+    base = Path(given) if given else _usual_base()
+    if base is None:
+        return Folder(None, "there is no home folder")
+    folder = base / _version()
+    try:
+        _make(folder)
+    except OSError as error:
+        return Folder(None, f"{error.filename}: {error.strerror}")
+    for one in (base, folder):
+        # what it holds is run
+        if not is_private(one.stat()):
+            return Folder(None, f"{one} is not yours, or others can write to it (chmod go-w)")
+    if not _has_room(folder):
+        return Folder(None, f"{folder} cannot be written to")
+    return Folder(folder)
+
+
+def is_private(status: os.stat_result) -> bool:
+    """Whether nobody but the user, or the system itself, can have written to a file or folder."""
+    if os.name != "posix":
+        return True
+    return status.st_uid in (0, os.getuid()) and not status.st_mode & 0o022
+
+
+def _usual_base() -> Path | None:
+    """scanfab's folder in the user's cache; None if there is no home."""
+    try:
+        home = Path.home()
+    except RuntimeError:
+        return None
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = home / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache")
+    return base / "scanfab"
+
+
+def _version() -> str:
+    """
+    The name of the folder, by Numba and by all kernels together.
+
+    A kernel changes with those that it calls, which no stamp of its own file tells.
+    """
+    sources = hashlib.sha256(sys.version.encode())
+    for file in sorted(Path(__file__).parent.glob("*.py")):
+        sources.update(file.read_bytes())
+    return f"numba-{numba.__version__}-{sources.hexdigest()[:16]}"
+
+
+def _make(folder: Path) -> None:
+    """Make a folder, and those above it, for the user alone."""
+    if not folder.is_dir():
+        _make(folder.parent)
+        folder.mkdir(mode=0o700, exist_ok=True)
+
+
+def _has_room(folder: Path) -> bool:
+    """Whether there is room for the kernels, or they are there already."""
+    held = any(folder.iterdir())
+    try:
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(b"\0" * (1 if held else ROOM))
+    except OSError:
+        # a folder of the system that holds them need not be written to
+        return held and not os.access(folder, os.W_OK)
+    return True

@@ -1,0 +1,48 @@
+"""Pipes, devices and sockets, which are no files: whoever opens one may wait for ever."""
+
+from __future__ import annotations
+
+import os
+import stat
+from pathlib import Path
+
+from scanfab.errors import ReadError
+
+__all__ = ["check_file", "check_file_or_pipe"]
+
+KINDS = {
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
+# pipes that a shell or another program has opened for this process
+INHERITED = ("/dev/fd/", "/dev/stdin", "/proc/self/fd/")
+
+
+def check_file(path: Path) -> None:
+    """ReadError if a path that exists is no file."""
+    kind = _kind(path)
+    if kind is not None:
+        raise ReadError(
+            f"{path}: is {kind}, expected a file: what a program writes is read from standard "
+            f"input, as in: zcat dump.gz | scanfab compute - --format NAME"
+        )
+
+
+def check_file_or_pipe(path: Path) -> None:
+    """ReadError if a path is neither a file nor a pipe that a shell made: ``<(command)``."""
+    kind = _kind(path)
+    ready = kind in ("a pipe", "a socket") and os.fspath(path).startswith(INHERITED)
+    if kind is not None and not ready:
+        raise ReadError(
+            f"{path}: is {kind}, expected a table: what a program writes is read from standard "
+            f"input, as - in place of its name"
+        )
+
+
+def _kind(path: Path) -> str | None:
+    try:
+        return KINDS.get(stat.S_IFMT(path.stat().st_mode))
+    except OSError:
+        return None  # whoever opens it says why

@@ -1,0 +1,70 @@
+"""Terminals that know no Greek, and file names that are no text."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from scanfab.cli.main import PLAIN_LETTERS, _shown, run
+from scanfab.tabular import read_rows
+from tests.interruptions import PROGRAM, write_series
+
+FAST = ["--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac"]
+
+
+@pytest.fixture(scope="module")
+def series(tmp_path_factory):
+    return write_series(tmp_path_factory.mktemp("letters") / "series", 3)
+
+
+def on_terminal(words: list[str], **environment: str) -> tuple[int, str]:
+    """Exit code and what a terminal shows of a process."""
+    pty = pytest.importorskip("pty", reason="terminals are POSIX")
+    ours, theirs = pty.openpty()
+    env = {**os.environ, "COLUMNS": "130", "TERM": "dumb", **environment}
+    with subprocess.Popen([*PROGRAM, *words], stdout=theirs, stderr=theirs, env=env) as process:
+        os.close(theirs)
+        shown = b""
+        try:
+            while part := os.read(ours, 1 << 16):
+                shown += part
+        except OSError:  # the other end is closed
+            pass
+    os.close(ours)
+    return process.returncode, shown.decode("ascii")
+
+
+def test_a_terminal_of_ascii_shows_curves_and_greek_in_its_own_letters(series, tmp_path):
+    assert run(["compute", str(series), *FAST, "-o", str(tmp_path / "table.csv")]) == 0
+    code, shown = on_terminal(["compare", str(tmp_path / "table.csv")], PYTHONIOENCODING="ascii")
+    assert code == 0, shown
+    assert "a_vs/max" in shown
+    assert "R^2" in shown
+    assert "#" in shown  # the largest of a curve
+
+
+def test_letters_that_nobody_has_listed_are_spelt():
+    text = "α_vs ± 1 ▁█ ö \udcff"
+    error = UnicodeEncodeError("ascii", text, 0, len(text), "not ASCII")
+    assert _shown(error) == (r"a_vs +- 1 _# \xf6 \udcff", len(text))
+    assert "".join(PLAIN_LETTERS.values()).isascii()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names of files are text elsewhere")
+@pytest.mark.parametrize("name", ["table.csv", "table.json", "table.parquet"])
+def test_a_folder_whose_name_is_no_text_is_computed_and_reported(series, tmp_path, name):
+    folder = os.fsdecode(os.fsencode(tmp_path) + b"/\xff\xc3\xb6")
+    shutil.copytree(series, folder)
+    table = tmp_path / name
+    assert run(["compute", folder, *FAST, "-o", str(table), "--frames", "0"]) == 0
+    assert {row["source"] for row in read_rows(table)} == {rf"{tmp_path}/\udcffö"}
+    manifest = json.loads(Path(f"{table}.manifest.json").read_text("utf-8"))
+    assert manifest["settings"]["sources"] == [folder]
+    if name == "table.csv":
+        assert run(["report", str(table), "-o", str(tmp_path / "report.html")]) == 0

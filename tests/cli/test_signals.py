@@ -1,0 +1,113 @@
+"""Signals that come at any moment: exit code, words, and what is left behind."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+# a shell's background jobs ignore SIGINT
+START = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+WAYS = [("SIGINT", 130, "interrupted"), ("SIGTERM", 143, "terminated")]
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
+
+
+def ended(tmp_path: Path, text: str) -> subprocess.CompletedProcess[str]:
+    """A process whose command line is this function ``run(args)``."""
+    program = f"{START}import os, sys, time\nfrom scanfab.cli import main\n{text}"
+    program += "\nmain.run = run\nmain.main([])"
+    return subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+
+
+@pytest.mark.parametrize(("sent", "code", "word"), WAYS)
+def test_code_that_swallows_exceptions_cannot_hold_a_signal_back(tmp_path, sent, code, word):
+    """As the compiler's callbacks do; Python itself where an object is deleted."""
+    answer = ended(
+        tmp_path,
+        f"""
+class Deaf:
+    def __del__(self):
+        os.kill(os.getpid(), signal.{sent})
+        time.sleep(0.1)
+
+def run(args):
+    Deaf()
+    try:
+        os.kill(os.getpid(), signal.{sent})
+        time.sleep(0.1)
+    except BaseException:
+        pass
+    sys.exit("it went on")
+""",
+    )
+    assert answer.returncode == code
+    assert answer.stderr == f"scanfab: {word}\n"
+
+
+def test_the_message_tells_how_far_the_command_came(tmp_path):
+    answer = ended(
+        tmp_path,
+        """
+from scanfab.cli.signals import telling
+
+def run(args):
+    with telling(lambda: "after 4 of 5 frames"):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(10)
+""",
+    )
+    assert answer.returncode == 130
+    assert answer.stderr == "scanfab: interrupted after 4 of 5 frames\n"
+
+
+def test_words_of_a_command_that_is_over_are_not_told():
+    from scanfab.cli.signals import interrupted_words, telling
+
+    with telling(lambda: "after 1 of 2 frames"):
+        assert interrupted_words(signal.SIGINT) == "scanfab: interrupted after 1 of 2 frames"
+    assert interrupted_words(signal.SIGINT) == "scanfab: interrupted"
+
+
+@pytest.mark.parametrize("rows", [0, 1])
+def test_a_part_without_rows_and_half_a_file_are_removed(tmp_path, rows):
+    answer = ended(
+        tmp_path,
+        f"""
+from pathlib import Path
+from scanfab.table import Row
+from scanfab.writers.files import whole_file
+from scanfab.writers.results import ResultFile
+
+def run(args):
+    with ResultFile(Path("table.csv"), Row).writer({{}}) as writer:
+        for _ in range({rows}):
+            writer.write(Row(**dict.fromkeys(Row.__dataclass_fields__)))
+        with whole_file(Path("figure.png")) as part:
+            part.write_text("half")
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(10)
+""",
+    )
+    assert answer.returncode == 143, answer.stderr
+    left = {path.name for path in tmp_path.iterdir()}
+    assert left == ({"table.csv.part", "table.csv.manifest.json.part"} if rows else set())
+
+
+def test_the_process_hears_signals_before_anything_large_is_imported():
+    code = (
+        "import sys; before = set(sys.modules); import scanfab.cli.main; "
+        "heavy = {'click', 'numpy', 'typing', 're', 'contextlib', 'importlib'}; "
+        "print(*sorted(heavy & (set(sys.modules) - before)))"
+    )
+    words = [sys.executable, "-S", "-c", code]
+    root = str(Path(__file__).parents[2])
+    answer = subprocess.run(
+        words, env={"PYTHONPATH": root}, capture_output=True, text=True, check=True
+    )
+    assert answer.stdout == "\n"
