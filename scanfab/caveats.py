@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from scanfab.directions import direction_rule
@@ -16,6 +18,7 @@ SCATTER = 0.024
 # share of the largest void anisotropy from which an error is worth a word
 NOTABLE = 0.1
 SOME_BIAS = 1e-5
+VOID = "alpha_vs_axial"
 
 
 def caveats_of(rows: Sequence[Mapping[str, Any]], asked: Iterable[Mapping[str, Any]]) -> list[str]:
@@ -30,7 +33,7 @@ def caveats_of(rows: Sequence[Mapping[str, Any]], asked: Iterable[Mapping[str, A
         The settings of their manifests.
     """
     found = [_bias(str(one["directions"])) for one in asked if one.get("directions")]
-    found += [_missing(rows), *_scan_errors(rows), *_few_grains(rows), _few_frames(rows)]
+    found += [_missing(rows), *_unknown_errors(rows), *_large_errors(rows), _few_frames(rows)]
     return [text for text in dict.fromkeys(found) if text]
 
 
@@ -65,46 +68,83 @@ def _groups(rows: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str], list[Map
     return groups
 
 
-def _signal(group: Sequence[Mapping[str, Any]]) -> float:
-    return max(abs(float(row["alpha_vs_axial"])) for row in group)
-
-
-def _scan_errors(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Variants whose scan is too coarse for their signal."""
+def _unknown_errors(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Variants of whose scan no error is known."""
     found = []
     for (source, variant), group in _groups(rows).items():
-        known = numbers_of(group, "alpha_vs_axial_se")
-        if not known:
-            found.append(
-                f"Variant {variant} of {source} has no standard error of the scan: "
-                f"it was made of one replicate."
-            )
-        elif max(known) > NOTABLE * _signal(group):
-            found.append(
-                f"Variant {variant} of {source}: the scan's standard error ({max(known):.1g}) is "
-                f"more than a tenth of the largest void anisotropy ({_signal(group):.2g}). More "
-                f"lines would help: a smaller --tolerance or --spacing."
-            )
+        if numbers_of(group, f"{VOID}_se"):
+            continue
+        why = (
+            "it was made of one replicate"
+            if f"{VOID}_se" in group[0]
+            else f"the table has no column {VOID}_se"
+        )
+        found.append(
+            f"Variant {variant} of {source} has no standard error of the scan: {why}. The errors "
+            f"of this report lack that part."
+        )
     return found
 
 
-def _few_grains(rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """Sources of so few grains that another sample would look different."""
-    small: dict[str, list[str]] = {}
+def _large_errors(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Sources whose total error is large beside their signal, and what would make it smaller."""
+    large: dict[str, list[_Doubt]] = {}
     for (source, variant), group in _groups(rows).items():
-        grains = int(min(numbers_of(group, "grains"), default=0))
-        known = numbers_of(group, "alpha_vs_axial_sample_se")
-        scatter = max(known) if known else SCATTER / max(grains, 1) ** 0.5
-        if grains and scatter > NOTABLE * _signal(group):
-            small.setdefault(source, []).append(
-                f"by about {scatter:.1g} in variant {variant} ({grains} grains, "
-                f"largest value {_signal(group):.2g})"
-            )
+        doubt = _Doubt.of(variant, group)
+        if doubt.total > NOTABLE * doubt.signal:
+            large.setdefault(source, []).append(doubt)
     return [
-        f"{source} has few grains. Another sample of the same material would differ in α_vs "
-        f"{'; '.join(parts)}. More lines cannot help, only more grains."
-        for source, parts in small.items()
+        f"{source}: one standard error of α_vs, of scan and sample together, is more than a tenth "
+        f"of its largest value {'; '.join(map(str, doubts))}. {_what_helps(doubts)}"
+        for source, doubts in large.items()
     ]
+
+
+@dataclass(frozen=True)
+class _Doubt:
+    """How large the errors of one variant are beside its signal."""
+
+    variant: str
+    signal: float
+    scan: float
+    sample: float
+    is_guess: bool
+    """Whether the sample's part is but a rule of thumb."""
+
+    @classmethod
+    def of(cls, variant: str, group: Sequence[Mapping[str, Any]]) -> _Doubt:
+        known = numbers_of(group, f"{VOID}_sample_se")
+        grains = numbers_of(group, "grains")
+        guess = SCATTER / max(min(grains), 1.0) ** 0.5 if grains else 0.0
+        return cls(
+            variant=variant,
+            signal=max(abs(float(row[VOID])) for row in group),
+            scan=max(numbers_of(group, f"{VOID}_se"), default=0.0),
+            sample=max(known, default=guess),
+            is_guess=not known and guess > 0,
+        )
+
+    @property
+    def total(self) -> float:
+        return math.hypot(self.scan, self.sample)
+
+    def __str__(self) -> str:
+        guess = ", guessed from the number of grains" if self.is_guess else ""
+        return (
+            f"in variant {self.variant} ({self.total:.2g} beside {self.signal:.2g}; scan "
+            f"{self.scan:.2g}, sample {self.sample:.2g}{guess})"
+        )
+
+
+def _what_helps(doubts: Sequence[_Doubt]) -> str:
+    # a part that is less than half of the other hardly adds to the whole
+    lines = any(one.scan > 0.5 * one.sample for one in doubts)
+    grains = any(one.sample > 0.5 * one.scan for one in doubts)
+    if lines and not grains:
+        return "More lines would help: a smaller --tolerance or --spacing."
+    if lines:
+        return "It takes more grains, and more lines: a smaller --tolerance or --spacing."
+    return "Only more grains would help; more lines cannot."
 
 
 def _few_frames(rows: Sequence[Mapping[str, Any]]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +41,15 @@ from scanfab.writers.plot_frame import (
     plot_rose,
 )
 
-__all__ = ["FRAME_FIGURES", "parse_figure", "plot_frames"]
+__all__ = [
+    "FRAME_FIGURES",
+    "ScannedFrames",
+    "lengths_of",
+    "parse_figure",
+    "plot_frames",
+    "projections_of",
+    "scan_frames",
+]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -95,6 +103,20 @@ def parse_figure(text: str) -> tuple[str, tuple[float, ...]]:
     return name, angles
 
 
+@dataclass(frozen=True, eq=False)
+class ScannedFrames:
+    """The first and the last frame of a table that have a void fabric, scanned for one variant."""
+
+    results: list[FrameResult]
+    titles: list[str]
+    variant: str
+
+    @property
+    def titled(self) -> list[tuple[FrameResult, str]]:
+        """Each frame with its title."""
+        return list(zip(self.results, self.titles, strict=True))
+
+
 def plot_frames(
     path: Path,
     series: Series,
@@ -110,11 +132,8 @@ def plot_frames(
     ----------
     path : Path
         ``.png``, ``.svg`` or ``.pdf``.
-    series, settings
-        What the table was computed from. The variant is c, if it is among the settings', else
-        the first.
-    rows : sequence of mapping
-        The table.
+    series, settings, rows
+        As for :func:`scan_frames`.
     figure : str
         See :func:`parse_figure`.
     dpi : int, optional
@@ -126,19 +145,53 @@ def plot_frames(
         If there is nothing to draw.
     """
     name, angles = parse_figure(figure)
+    frames = scan_frames(series, settings, rows)
+    if name == "rose":
+        roses = [_rose(*one, frames.variant, angles, settings) for one in frames.titled]
+        plot_rose(path, roses, dpi)
+    elif name == "projection":
+        plot_projection(path, projections_of(frames), dpi)
+    elif name == "histogram":
+        plot_histogram(path, lengths_of(frames), dpi)
+    else:
+        curves = [_cutoffs(*one, frames.variant, settings) for one in frames.titled]
+        plot_cutoffs(path, curves, dpi)
+
+
+def scan_frames(
+    series: Series, settings: Settings, rows: Sequence[Mapping[str, Any]]
+) -> ScannedFrames:
+    """
+    Scan the first and the last frame of a table again, for as many figures as are wanted.
+
+    Parameters
+    ----------
+    series, settings
+        What the table was computed from. The variant is c, if it is among the settings', else
+        the first.
+    rows : sequence of mapping
+        The table.
+
+    Raises
+    ------
+    SettingsError
+        If no frame has a void fabric of that variant.
+    """
     variant = "c" if "c" in settings.variants else settings.variants[0]
     own = [row for row in rows if row["source"] == series.name and row["variant"] == variant]
     results = _results(series, settings, own, variant)
     titles = [_title(one, strain_column(own)) for one in results]
-    every = list(zip(results, titles, strict=True))
-    if name == "rose":
-        plot_rose(path, [_rose(*one, variant, angles, settings) for one in every], dpi)
-    elif name == "projection":
-        plot_projection(path, [_projection(*one, variant) for one in every], dpi)
-    elif name == "histogram":
-        plot_histogram(path, [_lengths(*one, variant) for one in every], dpi)
-    else:
-        plot_cutoffs(path, [_cutoffs(*one, variant, settings) for one in every], dpi)
+    return ScannedFrames(results, titles, variant)
+
+
+def projections_of(frames: ScannedFrames) -> list[Projection]:
+    """What :func:`scanfab.writers.plot_frame.plot_projection` draws."""
+    return [_projection(*one, frames.variant) for one in frames.titled]
+
+
+def lengths_of(frames: ScannedFrames) -> list[LengthSample]:
+    """What :func:`scanfab.writers.plot_frame.plot_histogram` draws."""
+    return [_lengths(*one, frames.variant) for one in frames.titled]
 
 
 def _results(

@@ -1,31 +1,49 @@
-"""One frame of a series as a scene: read, told apart, and with the RV of the series."""
+"""One frame of a series to be looked at: read, told apart, and with the RV of the series."""
 
 from __future__ import annotations
 
 import warnings
-from dataclasses import replace
-from itertools import islice
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 from scanfab.errors import ReadError, ScanfabWarning, SettingsError
 from scanfab.pipeline import boundary_hint, classify
 from scanfab.plan import Plan, make_plan
-from scanfab.scene import Scene, scene_of
+from scanfab.scene import Scene, about_window, scene_of
 from scanfab.series import Frame, Series
-from scanfab.settings import Settings
+from scanfab.settings import STRAIN_MODES, Settings
+from scanfab.strain import StrainFile, axial_length
+from scanfab.variants import Sample
 
-__all__ = ["scene_at"]
+__all__ = ["Look", "look_at"]
 
 
-def scene_at(series: Series, settings: Settings, number: int = 0) -> Scene:
+@dataclass(frozen=True, eq=False)
+class Look:
+    """What there is to see and to say of one frame."""
+
+    scene: Scene
+    number: int
+    """Of the frame, counted from 0."""
+    sample: Sample
+    strain: float | None
+    """Since the first frame that has grains; None where that is not known."""
+    first: Sample | None
+    """The first frame that has grains, which fixes all lengths of the series."""
+    plan: Plan | None
+    """None if the settings do not fit the series."""
+
+
+def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
     """
-    The scene of one frame; nothing is scanned.
+    One frame to be looked at; nothing is scanned.
 
     Parameters
     ----------
     series : Series
         The frames.
     settings : Settings
-        Boundary, rattlers, RV and cut-off count.
+        Boundary, rattlers, RV, cut-off, axis and strain count.
     number : int, optional
         Which frame; negative from the end.
 
@@ -34,39 +52,62 @@ def scene_at(series: Series, settings: Settings, number: int = 0) -> Scene:
     ScanfabError
         If there is no such frame, or it cannot be read.
     """
-    frame = _frame(series, number)
+    number, frame = _frame(series, number)
     sample = classify(frame.read(), settings)
     hint = boundary_hint(sample, settings)
     if hint is not None:
         warnings.warn(hint, ScanfabWarning, stacklevel=2)
-    plan = _plan(series, settings)
+    first = _first(series, settings)
+    plan = None if first is None else _plan(first, settings)
     scene = scene_of(sample, None if plan is None else plan.window)
-    return scene if plan is None else replace(scene, cutoff=plan.cutoff)
+    if plan is not None:
+        scene = about_window(replace(scene, cutoff=plan.cutoff))
+    return Look(scene, number, sample, _strain(number, sample, first, settings), first, plan)
 
 
-def _frame(series: Series, number: int) -> Frame:
-    if number >= 0:
-        found = next(islice(series, number, None), None)
-    else:
-        frames = list(series)
-        found = frames[number] if -number <= len(frames) else None
-    if found is None:
+def _frame(series: Series, number: int) -> tuple[int, Frame]:
+    """The frame, and its number from 0."""
+    count = 0
+    wanted = number
+    if number < 0:
         count = sum(1 for _ in series)
-        raise ReadError(f"{series.name}: has {count} frames, there is no frame {number}")
-    return found
+        wanted = number + count
+    for count, frame in enumerate(series, start=1):
+        if count == wanted + 1:
+            return wanted, frame
+    raise ReadError(f"{series.name}: has {count} frames, there is no frame {number}")
 
 
-def _plan(series: Series, settings: Settings) -> Plan | None:
-    """The plan of the series; None, with a warning, if it cannot be made."""
+def _first(series: Series, settings: Settings) -> Sample | None:
+    """The first frame that has grains."""
     for frame in series:
         try:
             sample = classify(frame.read(), settings)
         except ReadError:
             continue
         if sample.grains.any():
-            try:
-                return make_plan(settings, sample)
-            except SettingsError as error:
-                warnings.warn(f"the RV is not shown: {error}", ScanfabWarning, stacklevel=3)
-                return None
+            return sample
     return None
+
+
+def _plan(first: Sample, settings: Settings) -> Plan | None:
+    """The plan of the series; None, with a warning, if it cannot be made."""
+    try:
+        return make_plan(settings, first)
+    except SettingsError as error:
+        warnings.warn(f"the RV is not shown: {error}", ScanfabWarning, stacklevel=3)
+        return None
+
+
+def _strain(number: int, sample: Sample, first: Sample | None, settings: Settings) -> float | None:
+    """Axial strain as the fabric table has it; None also where it cannot be had."""
+    if settings.strain not in STRAIN_MODES:
+        return StrainFile(Path(settings.strain)).at(number, sample.packing.step)
+    if first is None or not sample.grains.any():
+        return None
+    try:
+        lengths = [axial_length(one, settings.strain, settings.axis) for one in (first, sample)]
+    except SettingsError:
+        return None
+    start, now = lengths
+    return None if not start or now is None else 1.0 - now / start

@@ -1,4 +1,4 @@
-"""The tables of the report: results, frames, settings and inputs, spelt for readers."""
+"""The tables of the report: results, frames and inputs, spelt for readers."""
 
 from __future__ import annotations
 
@@ -8,37 +8,33 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.compare import SummaryRow
-from scanfab.rerun import spelt_settings
-from scanfab.tabular import number_of, numbers_of
+from scanfab.tabular import number_of, numbers_of, total_error
 from scanfab.writers.page import Part
 
-__all__ = ["frame_table", "input_table", "overview", "results_table", "settings_table"]
+__all__ = ["frame_table", "input_table", "overview", "results_tables"]
+
+Row = Mapping[str, Any]
 
 # frames of a source and variant that the table shows
 MOST_FRAMES = 12
 MOST_INPUTS = 20
+VOID, CONTACT = "alpha_vs_axial", "alpha_c_axial"
 
-SETTING_MEANINGS = {
-    "variants": "a whole sample, b without rattlers, c RV, d RV without rattlers",
-    "rv": "radius of the RV over half the smallest extent of the grains",
-    "rv_radius": "radius of the RV, dump's unit",
-    "rv_center": "centre of the RV, dump's unit",
-    "boundary": "particles that are boundary, not grains",
-    "cutoff": "shortest void segment that counts (rmin: smallest grain radius)",
-    "spacing": "distance between neighbouring scan lines",
-    "directions": "rule of the scan directions",
-    "tolerance": "wanted standard error of the scan",
-    "min_contacts": "a grain with fewer contacts is a rattler",
-    "contact_tolerance": "relative tolerance of contacts by geometry",
-    "axis": "loading axis",
-    "strain": "where the axial strain comes from",
-    "frames": "which frames",
-    "seed": "of the random numbers",
-    "contacts": "where the contacts come from",
+# columns of the frame table behind the anisotropies, by the name that readers see
+MORE_COLUMNS = {
+    "grains": "grains",
+    "rattlers": "rattlers",
+    "contacts": "contacts",
+    "coordination": "coordination",
+    "solid_fraction": "solid fraction",
+    "mean_length": "mean void length",
+    "segments": "void segments",
+    "alpha_vs": "void intensity",
+    "alpha_c": "contact intensity",
 }
 
 
-def overview(table: Path, rows: Sequence[Mapping[str, Any]]) -> str:
+def overview(table: Path, rows: Sequence[Row]) -> str:
     """What was measured, in a sentence."""
     if not rows:
         return f"{table}: an empty table."
@@ -58,36 +54,65 @@ def overview(table: Path, rows: Sequence[Mapping[str, Any]]) -> str:
     return "; ".join(parts) + "."
 
 
-def results_table(
-    summary: Iterable[SummaryRow], rows: Sequence[Mapping[str, Any]]
-) -> list[list[str]]:
-    """One line for each source and variant."""
-    lines = []
+def results_tables(summary: Iterable[SummaryRow], rows: Sequence[Row]) -> list[Part]:
+    """A table for each source: a column for each variant, the key numbers first."""
+    sources: dict[str, list[SummaryRow]] = {}
     for one in summary:
-        group = [
-            row
-            for row in rows
-            if (row["source"], row["variant"]) == (one.source, one.variant)
-            and row["alpha_vs_axial"] is not None
+        sources.setdefault(one.source, []).append(one)
+    return [_results(source, lines, rows) for source, lines in sources.items()]
+
+
+def _results(source: str, summary: Sequence[SummaryRow], rows: Sequence[Row]) -> Part:
+    ends = [_ends(one, rows) for one in summary]
+    first, last = [one[0] for one in ends], [one[1] for one in ends]
+    strains = {number_of(row, "strain") for row in (*first, *last) if row}
+    here, there = _where("last", last, len(strains) > 1), _where("first", first, len(strains) > 1)
+    lines = [
+        (f"α_vs{here}", [_value(row, VOID) for row in last]),
+        ("its error: scan", [_spell_error(number_of(row, f"{VOID}_se")) for row in last]),
+        ("its error: sample", [_spell_error(number_of(row, f"{VOID}_sample_se")) for row in last]),
+        (f"α_c{here}", [_value(row, CONTACT) for row in last]),
+    ]
+    if first != last:
+        lines += [
+            (f"α_vs{there}", [_value(row, VOID) for row in first]),
+            (f"α_c{there}", [_value(row, CONTACT) for row in first]),
+            ("slope of α_vs on α_c", [_with_error(one.slope, one.slope_se) for one in summary]),
+            ("R² of that line", [_spell(one.r2) for one in summary]),
+            ("largest α_vs", [_spell(one.peak) for one in summary]),
+            ("frames in the line", [str(one.frames) for one in summary]),
         ]
-        first, last = (group[0], group[-1]) if group else ({}, {})
-        lines.append(
-            [
-                one.source,
-                one.variant,
-                str(one.frames),
-                _with_error(*_pair(first, "alpha_vs_axial")),
-                _with_error(*_pair(last, "alpha_vs_axial")),
-                _with_error(*_pair(last, "alpha_c_axial")),
-                _with_error(one.slope, one.slope_se),
-                _spell(one.r2),
-            ]
-        )
-    return lines
+    shown = [[name, *cells] for name, cells in lines if any(cell != "-" for cell in cells)]
+    return Part(["variant", *(one.variant for one in summary)], shown, title=source)
 
 
-def _pair(row: Mapping[str, Any], name: str) -> tuple[float | None, float | None]:
-    return number_of(row, name), number_of(row, f"{name}_se")
+def _ends(one: SummaryRow, rows: Sequence[Row]) -> tuple[Row, Row]:
+    """The first and the last row of a source and variant that have a void fabric."""
+    group = [
+        row
+        for row in rows
+        if (row["source"], row["variant"]) == (one.source, one.variant) and row[VOID] is not None
+    ]
+    return (group[0], group[-1]) if group else ({}, {})
+
+
+def _where(which: str, rows: Sequence[Row], by_strain: bool) -> str:
+    """At which strain or in which frame, if it is the same for all variants."""
+    row = next((row for row in rows if row), {})
+    if not row or len({one["frame"] for one in rows if one}) > 1:
+        return f", {which} frame that has one"
+    strain = number_of(row, "strain")
+    if strain is None or not by_strain:
+        return f", frame {row['frame']}"
+    return f" at {100 * strain:.3g} % strain"
+
+
+def _value(row: Row, name: str) -> str:
+    """With the total error; without one, the digits that the scan's error leaves."""
+    value, error = number_of(row, name), total_error(row, name)
+    if error is None:
+        return _with_error(value, number_of(row, f"{name}_se")).partition(" ±")[0]
+    return _with_error(value, error)
 
 
 def _with_error(value: float | None, error: float | None) -> str:
@@ -96,8 +121,13 @@ def _with_error(value: float | None, error: float | None) -> str:
         return "-"
     if error is None or error <= 0:
         return f"{value:.5f}"
-    digits = max(0, 1 - math.floor(math.log10(error)))
+    # of the rounded error: 0.00099999 has the digits of 0.0010
+    digits = max(0, 1 - math.floor(math.log10(float(f"{error:.1e}"))))
     return f"{value:.{digits}f} ± {error:.{digits}f}"
+
+
+def _spell_error(error: float | None) -> str:
+    return "-" if error is None else f"{error:#.2g}"
 
 
 def _spell(value: Any) -> str:
@@ -106,47 +136,38 @@ def _spell(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def frame_table(rows: Sequence[Mapping[str, Any]]) -> Part:
-    """The columns that matter most, of some frames."""
-    columns = [
-        "source", "frame", "strain", "variant", "grains", "rattlers", "contacts", "coordination",
-        "solid_fraction", "segments", "mean_length", "alpha_vs", "alpha_vs_axial",
-        "alpha_vs_axial_se", "alpha_vs_axial_sample_se", "alpha_c_axial",
-    ]  # fmt: skip
-    columns = [name for name in columns if any(row.get(name) is not None for row in rows)]
+def frame_table(rows: Sequence[Row]) -> Part:
+    """Some frames, with the anisotropies and their errors in the first columns."""
     numbers = list(dict.fromkeys((row["source"], row["frame"]) for row in rows))
     step = -(-len(numbers) // MOST_FRAMES)
     shown = {*numbers[::step], numbers[-1]}
-    lines = [
-        [_spell(row.get(name)) for name in columns]
-        for row in rows
-        if (row["source"], row["frame"]) in shown
-    ]
+    several = len({row["source"] for row in rows}) > 1
+    table = [_frame_line(row, several) for row in rows if (row["source"], row["frame"]) in shown]
+    columns = [name for name in table[0] if any(line[name] != "-" for line in table)]
     note = "" if len(shown) == len(numbers) else f"{len(shown)} of {len(numbers)} frames are shown."
-    return Part(columns, lines, note)
+    return Part(columns, [[line[name] for name in columns] for line in table], note)
 
 
-def settings_table(asked: Mapping[str, Any]) -> list[tuple[str, str, str]]:
-    """Name, value and meaning of each setting."""
-    spelt = spelt_settings(asked)
-    names = [name for name in asked if name not in ("scanfab", "sources")]
-    return [
-        (
-            name.replace("_", "-"),
-            _plain(spelt.get(name, "auto" if name in ("spacing", "directions") else "-")),
-            SETTING_MEANINGS.get(name, ""),
-        )
-        for name in names
-        if name in spelt or name in SETTING_MEANINGS
-    ]
+def _frame_line(row: Row, several: bool) -> dict[str, str]:
+    strain = number_of(row, "strain")
+    return {
+        "frame": str(row["frame"]),
+        "variant": str(row["variant"]),
+        "strain": "-" if strain is None else f"{100 * strain:.3g} %",
+        "α_vs": _value(row, VOID).partition(" ±")[0],
+        "± total": _spell_error(total_error(row, VOID)),
+        "scan": _spell_error(number_of(row, f"{VOID}_se")),
+        "sample": _spell_error(number_of(row, f"{VOID}_sample_se")),
+        "α_c": _value(row, CONTACT).partition(" ±")[0],
+        "± of α_c": _spell_error(total_error(row, CONTACT)),
+        **{title: _spell(number_or_none(row, name)) for name, title in MORE_COLUMNS.items()},
+        "source": str(row["source"]) if several else "-",
+    }
 
 
-def _plain(value: Any) -> str:
-    if isinstance(value, tuple):
-        return ", ".join(map(str, value))
-    if isinstance(value, dict):
-        return ", ".join(f"{key}={item}" for key, item in value.items())
-    return str(value)
+def number_or_none(row: Row, name: str) -> int | float | None:
+    """As it stands in the table, so that counts stay whole."""
+    return None if number_of(row, name) is None else row[name]
 
 
 def input_table(manifest: Mapping[str, Any]) -> Part:

@@ -14,7 +14,14 @@ from scanfab.opening import open_sources
 from scanfab.series import Series
 from scanfab.settings import Settings
 
-__all__ = ["read_manifest", "reopen", "repeat_command", "restored_settings", "spelt_settings"]
+__all__ = [
+    "READING",
+    "read_manifest",
+    "reopen",
+    "repeat_command",
+    "restored_settings",
+    "spelt_settings",
+]
 
 READING = ("format", "columns", "contact_columns", "radius", "cell", "periodic", "contacts")
 
@@ -147,13 +154,19 @@ def _spell(name: str, value: Any) -> Any:
         raise TypeError
     if name == "axis" and isinstance(value, list):
         return ",".join(map(_number, value))
+    if name == "cutoffs" and isinstance(value, list):
+        return ",".join(_length(one) for one in value)
     if isinstance(value, dict) and {"value", "unit"} <= set(value):
-        return f"{_number(value['value'])}{value['unit']}"
+        return _length(value)
     if name == "boundary":
         return tuple(str(rule["text"]) for rule in value)
     if isinstance(value, list):
         return tuple(value)
     return value
+
+
+def _length(value: Mapping[str, Any]) -> str:
+    return f"{_number(value['value'])}{value['unit']}"
 
 
 def _words(option: str, name: str, value: Any) -> list[str]:

@@ -16,6 +16,7 @@ __all__ = [
     "ContactLines",
     "Grains",
     "Scene",
+    "about_window",
     "contact_lines",
     "grains_of",
     "scene_of",
@@ -80,10 +81,36 @@ class Scene:
 def scene_of(sample: Sample, window: SphereWindow | None) -> Scene:
     """The grains of a frame and its RV."""
     chosen = sample.grains if sample.grains.any() else np.ones(len(sample.packing), bool)
-    center = sample.packing.position[chosen].mean(axis=0) if window is None else window.center
+    center = np.zeros(3) if window is None else window.center
+    if window is None and len(sample.packing):
+        center = sample.packing.position[chosen].mean(axis=0)
     cell = sample.packing.cell if sample.packing.is_periodic else None
     radius = None if window is None else window.radius
     return Scene(grains_of(sample, window), center, radius, cell=cell)
+
+
+def about_window(scene: Scene) -> Scene:
+    """
+    A periodic frame with every grain at its image next to the RV's centre.
+
+    Else an RV near a face, or in a cell that is sheared, would be seen in pieces. Further images
+    that reach into the RV are there too.
+    """
+    cell, grains = scene.cell, scene.grains
+    if cell is None or scene.window_radius is None:
+        return scene
+    branch = grains.position - scene.center
+    nearest = branch + cell.nearest_image(branch) @ cell.vectors
+    images, row = cell.images_near_origin(branch, grains.radius + scene.window_radius)
+    other = np.linalg.norm(images - nearest[row], axis=1) > 1e-6 * grains.radius[row]
+    rows = np.concatenate([np.arange(len(nearest)), row[other]])
+    position = np.concatenate([nearest, images[other]]) + scene.center
+    shown = {
+        name: getattr(grains, name)[rows]
+        for name in ("radius", "id", "contacts", "rattler", "boundary", "in_window")
+    }
+    shown["in_window"] = np.linalg.norm(position - scene.center, axis=1) < scene.window_radius
+    return replace(scene, grains=Grains(position=position, **shown))
 
 
 def section_lines(scene: Scene, axis: npt.ArrayLike) -> Segments:

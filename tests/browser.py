@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import shutil
 import socket
@@ -34,8 +35,14 @@ def missing() -> str:
     return f"install {' and '.join(lacking)}" if lacking else ""
 
 
+PHONE = {"deviceMetrics": {"width": 390, "height": 844, "pixelRatio": 2, "touch": True}}
+
+
 class Browser:
-    """One window; use it in a with block."""
+    """One window, or the screen of a phone; use it in a with block."""
+
+    def __init__(self, phone: bool = False) -> None:
+        self._emulated = {"mobileEmulation": PHONE} if phone else {}
 
     def __enter__(self) -> Browser:
         self._profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
@@ -48,7 +55,8 @@ class Browser:
         self._url = f"http://127.0.0.1:{port}"
         self._wait_for_driver()
         binary = shutil.which("chromium") or shutil.which("chromium-browser")
-        options = {"binary": binary, "args": [*FLAGS, f"--user-data-dir={self._profile.name}"]}
+        flags = [*FLAGS, f"--user-data-dir={self._profile.name}"]
+        options = {"binary": binary, "args": flags, **self._emulated}
         wanted = {
             "goog:chromeOptions": options,
             "goog:loggingPrefs": {"browser": "ALL", "performance": "ALL"},
@@ -103,6 +111,31 @@ class Browser:
             if message["method"] == "Network.requestWillBeSent"
         ]
 
+    def touch(self, *fingers: tuple[int, int, int, int]) -> None:
+        """Fingers press at places of the window, move by so much, and let go."""
+        self._ask("POST", "/actions", {"actions": [_finger(*one) for one in enumerate(fingers)]})
+        self._ask("DELETE", "/actions")
+
+    def wheel(self, x: int, y: int, down: int) -> None:
+        """Turn the wheel at a place of the window."""
+        turn = {"type": "scroll", "x": x, "y": y, "deltaX": 0, "deltaY": down, "duration": 0}
+        self._ask(
+            "POST", "/actions", {"actions": [{"type": "wheel", "id": "w", "actions": [turn]}]}
+        )
+
+    def press(self, key: str) -> None:
+        """Press a key of the keyboard."""
+        presses = [{"type": kind, "value": key} for kind in ("keyDown", "keyUp")]
+        self._ask("POST", "/actions", {"actions": [{"type": "key", "id": "k", "actions": presses}]})
+
+    def picture(self) -> bytes:
+        """The window as PNG."""
+        return base64.b64decode(self._ask("GET", "/screenshot"))
+
+    def printed(self) -> bytes:
+        """The page as PDF."""
+        return base64.b64decode(self._ask("POST", "/print", {"background": True}))
+
     def drag(self, x: int, y: int, dx: int, dy: int) -> None:
         """Press at a place of the window, move, and let go."""
         moves = [
@@ -113,3 +146,15 @@ class Browser:
         ]
         mouse = {"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}}
         self._ask("POST", "/actions", {"actions": [{**mouse, "actions": moves}]})
+
+
+def _finger(number: int, place: tuple[int, int, int, int]) -> dict[str, Any]:
+    x, y, dx, dy = place
+    moves = [
+        {"type": "pointerMove", "duration": 0, "x": x, "y": y},
+        {"type": "pointerDown", "button": LEFT},
+        {"type": "pointerMove", "duration": 200, "x": x + dx, "y": y + dy},
+        {"type": "pointerUp", "button": LEFT},
+    ]
+    touch = {"type": "pointer", "parameters": {"pointerType": "touch"}}
+    return {**touch, "id": f"finger {number}", "actions": moves}

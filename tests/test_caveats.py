@@ -25,16 +25,43 @@ def test_a_biased_rule_is_told_with_its_bias():
 @pytest.mark.parametrize(
     ("values", "part"),
     [
-        ({"alpha_vs_axial_se": 0.01}, "more than a tenth of the largest void anisotropy"),
-        ({"alpha_vs_axial_se": None}, "no standard error"),
-        ({"grains": 20}, "in variant c (20 grains, largest value 0.05)"),
-        ({"alpha_vs_axial_sample_se": 0.02}, "by about 0.02"),
+        (
+            {"alpha_vs_axial_se": None},
+            "standard error of the scan: it was made of one replicate",
+        ),
         ({"alpha_vs_axial": None}, "5 of 5 rows have no void fabric"),
+        (
+            {"alpha_vs_axial_se": 0.01, "alpha_vs_axial_sample_se": 1e-4},
+            "(0.01 beside 0.05; scan 0.01, sample 0.0001). More lines would help",
+        ),
+        (
+            {"alpha_vs_axial_sample_se": 0.02},
+            "(0.02 beside 0.05; scan 0.0003, sample 0.02). Only more grains would help",
+        ),
+        (
+            {"alpha_vs_axial_se": 0.012, "alpha_vs_axial_sample_se": 0.016},
+            "(0.02 beside 0.05; scan 0.012, sample 0.016). It takes more grains, and more lines",
+        ),
+        ({"grains": 20}, "sample 0.0054, guessed from the number of grains)"),
     ],
 )
 def test_what_is_wrong_is_told(values, part):
+    """The error is that of scan and sample together, and what makes it smaller is said."""
     (text,) = caveats_of(rows(**values), [])
     assert part in text
+
+
+def test_parts_that_are_small_alone_can_be_large_together():
+    values = {"alpha_vs_axial_se": 0.004, "alpha_vs_axial_sample_se": 0.004}
+    (text,) = caveats_of(rows(**values), [])
+    assert "(0.0057 beside 0.05;" in text
+
+
+def test_a_column_that_is_not_there_is_no_single_replicate():
+    chosen = [{k: v for k, v in row.items() if k != "alpha_vs_axial_se"} for row in rows()]
+    (text,) = caveats_of(chosen, [])
+    assert "no column alpha_vs_axial_se" in text
+    assert "replicate" not in text
 
 
 def test_the_sample_s_own_error_counts_more_than_the_rule_of_thumb():

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import json
+import math
+import os
 import re
 import shutil
+from datetime import date
 from html import unescape
 from html.parser import HTMLParser
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from scanfab.cli.main import run
-from scanfab.errors import ReadError, SettingsError
+from scanfab.errors import ReadError
+from scanfab.pipeline import compute_rows
 from scanfab.report import make_report
 from scanfab.scene import Scene
 from scanfab.writers.page import MOST_GRAINS, Picture, view_data
@@ -41,10 +46,23 @@ def copied(computed, tmp_path, monkeypatch):
     return table
 
 
+@pytest.fixture(scope="module")
+def page(computed):
+    """The sample's report."""
+    before = Path.cwd()
+    os.chdir(ROOT)
+    try:
+        return page_of([computed.table])
+    finally:
+        os.chdir(before)
+
+
 @pytest.fixture
 def quick(monkeypatch):
     """Without the figures that take another scan."""
-    monkeypatch.setattr("scanfab.report._frame_picture", lambda *_: Picture("data:,", "none"))
+    monkeypatch.setattr(
+        "scanfab.report_frames._pictures", lambda *_: [Picture("data:,", "none", 1)]
+    )
 
 
 def change(table: Path, **changes):
@@ -56,14 +74,17 @@ def change(table: Path, **changes):
     path.write_text(json.dumps(manifest))
 
 
+def page_of(tables, **options):
+    return make_report(tables, **options).page
+
+
 def words_of(page):
     """What a reader sees."""
     text = re.sub(r"<(script|style).*?</\1>", " ", page, flags=re.S)
     return re.sub(r"\s+", " ", unescape(re.sub(r"<[^>]*>", " ", text)))
 
 
-def test_the_sample_is_told_in_full(copied):
-    page = make_report([copied])
+def test_the_sample_is_told_in_full(page):
     text = words_of(page)
     assert "3 frames of sample_data/yade_triaxial; variants a, b, c, d;" in text
     assert "axial strain 0 to 15 %" in text
@@ -74,23 +95,21 @@ def test_the_sample_is_told_in_full(copied):
     assert "boundary mask=3 particles that are boundary" in text
     assert re.search(r"numpy \d+\.\d+", text)
     assert "triaxial-spheres-00000006.vtk.gz" in text
-    assert "sample_data/yade_triaxial has few grains" in text
+    assert "sample_data/yade_triaxial: one standard error of α vs , of scan and sample" in text
     assert page.count("<canvas") == 1
     assert page.count("data:image/") == 5
     assert len(page) < 1_000_000
 
 
-def test_it_needs_nothing_from_elsewhere(copied):
-    page = make_report([copied])
+def test_it_needs_nothing_from_elsewhere(page):
     addresses = re.findall(r"(?:src|href)\s*=\s*[\"']?([^\"'>\s]*)", page)
     assert addresses
-    assert all(one.startswith("data:") for one in addresses)
+    assert all(one.startswith(("data:", "#")) for one in addresses)
     assert "@import" not in page
     assert "http" not in re.sub(r'content="default-src[^"]*"|http-equiv', "", page)
 
 
-def test_the_view_holds_the_grains_of_the_last_frame(copied, computed, quick):
-    page = make_report([copied])
+def test_the_view_holds_the_grains_of_the_last_frame(page, computed):
     data = json.loads(re.search(r'id="data-1">(.*?)</script>', page, re.S)[1])
     assert len(data["spheres"]) == 800
     inside = sum(x * x + y * y + z * z < data["rv"] ** 2 for x, y, z, *_ in data["spheres"])
@@ -98,8 +117,8 @@ def test_the_view_holds_the_grains_of_the_last_frame(copied, computed, quick):
     assert inside == pytest.approx(rows["c"]["grains"], abs=2)
     rattlers = sum(kind == 2 for *_, kind in data["spheres"])
     assert rattlers == rows["a"]["rattlers"]
-    assert any(piece[6] for piece in data["pieces"])
-    assert not all(piece[6] for piece in data["pieces"])
+    assert data["cutoff"] * data["size"] / 1000 == pytest.approx(rows["c"]["cutoff"])
+    assert [one[0] for one in data["axes"]] == ["x", "y", "z (loading)"]
 
 
 def test_a_large_sample_is_thinned():
@@ -118,7 +137,7 @@ def test_a_large_sample_is_thinned():
 
 
 def test_without_a_manifest_it_says_so(table):
-    text = words_of(make_report([table(curve())]))
+    text = words_of(page_of([table(curve())]))
     assert "There is no t.jsonl.manifest.json beside" in text
     assert "the frames are not known, so there is no view" in text
     assert "0.05" in text
@@ -135,7 +154,7 @@ def test_without_a_manifest_it_says_so(table):
 )
 def test_a_source_that_cannot_be_read_again_is_told(copied, changes, message):
     change(copied, **changes)
-    page = make_report([copied])
+    page = page_of([copied])
     assert message in words_of(page)
     assert "<canvas" not in page
     # the figures of the table are there
@@ -146,12 +165,12 @@ def test_a_source_that_has_changed_is_told(copied):
     manifest = json.loads(Path(f"{copied}.manifest.json").read_text())
     manifest["inputs"][0]["size"] += 1
     change(copied, inputs=manifest["inputs"])
-    assert "has changed since the table was computed" in words_of(make_report([copied]))
+    assert "has changed since the table was computed" in words_of(page_of([copied]))
 
 
 def test_warnings_of_the_run_and_of_the_rule_are_told(copied):
     change(copied, sources=["gone"], directions="equal-angle:10", warnings=["what a day"])
-    text = words_of(make_report([copied]))
+    text = words_of(page_of([copied]))
     assert "what a day" in text
     assert "a sample without any anisotropy would get α = 0.43" in text
 
@@ -163,14 +182,14 @@ def test_a_hundred_frames_stay_light(table):
         for variant in "abcd"
         for row in curve()[frame % 5 : frame % 5 + 1]
     ]
-    page = make_report([table(rows)])
+    page = page_of([table(rows)])
     assert len(page) < 800_000
     assert "12 of 100 frames are shown" in words_of(page)
 
 
 @pytest.mark.parametrize("count", [1, 2])
 def test_few_frames_are_no_error(table, count):
-    text = words_of(make_report([table(curve()[:count])]))
+    text = words_of(page_of([table(curve()[:count])]))
     assert "fewer than three frames" in text
 
 
@@ -182,8 +201,10 @@ def test_a_table_without_void_fabric_is_told(table, tmp_path, capsys):
     assert "There is nothing to draw" in words_of(page.read_text("utf-8"))
 
 
-def test_text_is_escaped_everywhere(table):
+def test_text_is_escaped_everywhere(table, monkeypatch):
     """The page's structure does not depend on what the names are."""
+
+    monkeypatch.setattr("scanfab.report._table_pictures", lambda _: [])
 
     class Tags(HTMLParser):
         def __init__(self, page):
@@ -199,7 +220,7 @@ def test_text_is_escaped_everywhere(table):
         asked = {"sources": [source], source: source, "contacts": source, "cutoff": source}
         manifest = {"settings": asked, "versions": {source: source}, "warnings": [source]}
         Path(f"{path}.manifest.json").write_text(json.dumps(manifest))
-        return make_report([path])
+        return page_of([path], title=source, author=source)
 
     harmless = Tags(page("x")).found
     for hostile in (
@@ -214,34 +235,10 @@ def test_text_is_escaped_everywhere(table):
         assert hostile in words_of(text) or hostile.replace("<b>", "") in words_of(text)
 
 
-def test_an_empty_table_is_an_error(table, tmp_path, capsys):
-    path = write(tmp_path / "t.csv", "source,frame,strain,variant,alpha_vs_axial,alpha_c_axial\n")
-    with pytest.raises(SettingsError, match="there is nothing to report"):
-        make_report([path])
-    page = tmp_path / "r.html"
-    page.write_text("precious")
-    assert run(["report", str(path), "-o", str(page)]) == 1
-    assert "nothing to report" in capsys.readouterr().err
-    assert page.read_text() == "precious"
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["-o", "r.pdf"], "reports are HTML"),
-        (["-o", "nowhere/r.html"], "there is no folder"),
-        ([], "Missing option '-o'"),
-    ],
-)
-def test_wrong_usage(table, words, message, capsys):
-    assert run(["report", str(table(curve())), *words]) == 2
-    assert message in capsys.readouterr().err
-
-
 def test_a_damaged_manifest_is_an_error_that_names_it(copied):
     Path(f"{copied}.manifest.json").write_text("{")
     with pytest.raises(ReadError, match=r"fabric\.csv\.manifest\.json"):
-        make_report([copied])
+        page_of([copied])
 
 
 @pytest.mark.parametrize(
@@ -271,14 +268,116 @@ def test_a_manifest_of_odd_values_is_no_traceback(copied, changes, tmp_path, qui
     assert run(["report", str(copied), "-o", str(tmp_path / "r.html")]) in (0, 1)
 
 
-@pytest.mark.parametrize("word", ["x", True, [], {}, float("nan"), -1])
-def test_odd_values_in_columns_that_are_not_needed_are_passed_over(table, tmp_path, word):
-    odd = ("grains", "alpha_c_axial_se", "alpha_vs_axial_sample_se", "alpha_c_axial_sample_se")
-    path = table([{**row, **dict.fromkeys(odd, word)} for row in curve()])
-    assert "<h1>" in make_report([path])
-    plot = tmp_path / "x.png"
-    assert run(["compare", str(path), "--plot", str(plot)]) == 0
+def test_the_error_is_that_of_scan_and_sample_together(page, computed):
+    """Results, frame table and caveats quote one error; its parts are called parts."""
+    row = next(r for r in computed.rows if (r["frame"], r["variant"]) == (6, "c"))
+    parts = row["alpha_vs_axial_se"], row["alpha_vs_axial_sample_se"]
+    total = f"{math.hypot(*parts):#.2g}"
+    value = f"{row['alpha_vs_axial']:.{len(total) - 2}f}"
+    results = words_of(page[page.index('id="results"') : page.index('id="warnings"')])
+    assert f"{value} ± {total}" in results
+    assert f"± {parts[0]:#.2g}" not in words_of(page)
+    assert "its error: scan" in results
+    assert f" {parts[0]:#.2g} " in results
+    line = f"6 c 15 % {value} {total} {parts[0]:#.2g} {parts[1]:#.2g} "
+    assert line in words_of(page)
+    assert f"in variant c ({total} beside" not in results
 
 
-def test_frames_without_a_number_are_no_error(table):
-    assert "<h1>" in make_report([table([{**row, "frame": None} for row in curve()])])
+def test_without_the_sample_s_part_there_is_no_total(table):
+    """The scan's error alone is never quoted as the error."""
+    text = words_of(page_of([table(curve())]))
+    assert "α vs at 4 % strain -0.03000 its error: scan 0.00030" in text
+    assert "±" not in text[text.index("its error") : text.index("Straight scan lines")]
+
+
+def test_the_frame_table_begins_with_what_matters(page):
+    frames = page[page.index('id="frames"') :]
+    heads = [words_of(head).strip() for head in re.findall(r"<th>(.*?)</th>", frames)]
+    assert heads[:9] == [
+        "frame", "variant", "strain", "α vs", "± total", "scan", "sample", "α c", "± of α c"
+    ]  # fmt: skip
+
+
+def test_a_constant_strain_names_no_end(table):
+    text = words_of(page_of([table([{**row, "strain": 0.0} for row in curve()])]))
+    assert "α vs , frame 4 -0.03000" in text
+    assert "α vs , frame 0 0.01000" in text
+
+
+def test_the_sample_is_told_in_numbers(page):
+    text = words_of(page)
+    for part in (
+        "grains 800 in the first frame",
+        "radii smallest 0.0005042, mean 0.0009907, largest 0.001499",
+        "boundary 1000 particles",
+        "cell not periodic",
+        "loading axis z",
+        "cut-off 0.0005042, 1 smallest radii",
+        "centre of the RV 1.368e-05, -4.461e-05, -3.663e-05",
+        "radius of the RV 0.008058, 0.7 of half the sample's smallest extent",
+        "lengths of this report are in the unit of the dump",
+    ):
+        assert part in text
+
+
+def test_pictures_of_frames_share_one_scan_at_the_table_s_tolerance(copied, monkeypatch):
+    scanned = []
+
+    def remember(series, settings, **more):
+        scanned.append(settings)
+        return compute_rows(series, settings, **more)
+
+    monkeypatch.setattr("scanfab.frame_figures.compute_rows", remember)
+    text = words_of(page_of([copied]))
+    assert [one.frames for one in scanned] == [slice(0, 1), slice(6, 7)]
+    assert {one.tolerance for one in scanned} == {5e-4}
+    assert "instead of the table's" not in text
+
+
+def test_a_scan_that_takes_too_long_for_a_picture_is_rougher_and_labelled(copied, monkeypatch):
+    monkeypatch.setattr("scanfab.report_frames.MOST_SEGMENTS", 1e4)
+    assert re.search(
+        r"Scanned to a standard error of 0\.\d+ instead of the table's 0\.0005",
+        words_of(page_of([copied])),
+    )
+
+
+def test_lobes_that_are_noise_are_called_so(page):
+    text = words_of(page)
+    assert re.search(r"Frame 0: lobes of void lengths reach [\d.]+ %, one standard error", text)
+    first, last = re.findall(r"Frame \d: (lobes of void lengths .*?); lobes of contact", text)
+    assert first.endswith("so they are noise")
+    assert not last.endswith("so they are noise")
+
+
+def test_title_author_and_date(table):
+    path = table(curve("dumps/sand"))
+    assert "<title>Void fabric of sand</title>" in page_of([path])
+    page = page_of([path], title="A & B", author="Ann <x>", today=date(2031, 2, 3))
+    assert "<title>A &amp; B</title>" in page
+    assert "<h1>A &amp; B</h1>" in page
+    assert '<meta name="author" content="Ann &lt;x&gt;">' in page
+    assert "Ann <x>, 2031-02-03" in words_of(page).replace("&lt;", "<")
+
+
+def test_the_author_is_whoever_the_system_knows_by_a_full_name(table, tmp_path, monkeypatch):
+    pwd = pytest.importorskip("pwd")
+    page = tmp_path / "r.html"
+    for gecos, said in (("Ann Other,Room 3,,", "Ann Other, 20"), ("ann", ""), ("", "")):
+        user = SimpleNamespace(pw_gecos=gecos, pw_name="ann")
+        monkeypatch.setattr(pwd, "getpwuid", lambda _, user=user: user)
+        assert run(["report", str(table(curve())), "-o", str(page)]) == 0
+        byline = re.search(r'class="byline">(.*?)</p>', page.read_text("utf-8"))
+        assert byline is not None
+        assert byline[1].startswith(said or "20")
+
+
+def test_notes_are_not_warnings(copied, quick):
+    change(copied, sources=["gone"], notes=["a quiet word"], warnings=["a loud word"])
+    page = page_of([copied])
+    warned = page[page.index('id="warnings"') : page.index('id="notes"')]
+    noted = page[page.index('id="notes"') : page.index('id="sample"')]
+    assert "a loud word" in warned
+    assert "a quiet word" not in warned
+    assert "a quiet word" in noted

@@ -66,7 +66,8 @@ def report(computed, tmp_path_factory):
     before = Path.cwd()
     os.chdir(folder)
     try:
-        assert run(["report", table.name, "worse.json", "-o", str(page)]) == 0
+        words = ["--title", WORSE, "--author", WORSE]
+        assert run(["report", table.name, "worse.json", "-o", str(page), *words]) == 0
     finally:
         os.chdir(before)
     return page
@@ -115,27 +116,133 @@ def test_the_view_has_colours_and_turns_when_dragged(page):
 
 
 def test_the_view_is_cut_open_and_zoomed(page):
-    before, _ = page.run(PIXELS)
-    page.run("[...document.querySelectorAll('.key input')].at(-1).click()")
-    page.run(DRAWN)
-    cut, colours = page.run(PIXELS)
-    assert cut != before
-    # kept and dropped void segments
+    before, colours = page.run(PIXELS)
+    # kept and dropped void segments, and the disks in which the plane cuts grains
     assert colours["0"] > 100
     assert colours[str(0xD55E00)] > 20
-    wheel = "new WheelEvent('wheel', {deltaY: -300})"
-    page.run(f"document.querySelector('canvas.view').dispatchEvent({wheel})")
+    assert colours[str(0xB4DDF5)] > 5000
+    page.run("[...document.querySelectorAll('.key input')].at(-1).click()")
     page.run(DRAWN)
-    assert page.run(PIXELS)[0] != cut
+    whole, colours = page.run(PIXELS)
+    assert whole != before
+    assert colours.get(str(0xB4DDF5), 0) < 100
+
+
+def middle_of_the_view(page):
+    page.run("document.querySelector('canvas.view').scrollIntoView({block: 'center'})")
+    box = page.run(
+        "const b = document.querySelector('canvas.view').getBoundingClientRect();"
+        "return [b.left, b.top, b.width, b.height].map(Math.round)"
+    )
+    return box[0] + box[2] // 2, box[1] + box[3] // 2
+
+
+def seen(page):
+    page.run(DRAWN)
+    return page.run(PIXELS)[0]
+
+
+def test_the_wheel_scrolls_the_page_until_the_view_is_clicked(page):
+    x, y = middle_of_the_view(page)
+    before, top = seen(page), page.run("return scrollY")
+    page.wheel(x, y, 120)
+    wait_for(page, f"scrollY > {top}")
+    assert seen(page) == before
+    x, y = middle_of_the_view(page)
+    page.drag(x, y, 0, 0)
+    top = page.run("return scrollY")
+    page.wheel(x, y, -120)
+    assert seen(page) != before
+    assert page.run("return scrollY") == top
+
+
+def wait_for(page, condition):
+    for _ in range(50):
+        if page.run(f"return {condition}"):
+            return
+        page.run(DRAWN)
+    raise AssertionError(condition)
+
+
+@pytest.mark.parametrize("keys", ["+", "-", "\ue012", "\ue013"])
+def test_keys_turn_and_zoom_and_r_and_the_button_reset(page, keys):
+    before = seen(page)
+    page.run("document.querySelector('canvas.view').focus()")
+    page.press(keys)
+    assert seen(page) != before
+    page.press("r")
+    assert seen(page) == before
+    page.press(keys)
+    page.run("document.querySelector('.key button').click()")
+    assert seen(page) == before
+
+
+def test_the_contents_lead_to_the_sections(page):
+    targets = page.run(
+        "return [...document.querySelectorAll('nav a')].map((a) => "
+        "document.getElementById(a.hash.slice(1)).textContent === a.textContent)"
+    )
+    assert len(targets) >= 6
+    assert all(targets)
+
+
+def test_the_results_fit_the_window(page):
+    assert page.run("return document.documentElement.scrollWidth <= innerWidth")
+    reach = "table.getBoundingClientRect().right"
+    assert page.run(f"const table = document.querySelector('table'); return {reach}") < 1200
+
+
+def test_it_can_be_printed(page):
+    assert page.printed().startswith(b"%PDF")
 
 
 def test_hostile_names_are_text(page):
-    assert page.run("return document.title") == "Void fabric report"
+    assert page.run("return document.title") == WORSE
+    assert page.run("return document.querySelector('h1').textContent") == WORSE
+    assert page.run("return document.querySelector('meta[name=author]').content") == WORSE
     assert page.run("return document.querySelectorAll('img:not([alt])').length") == 0
     assert page.run("return document.scripts.length") == 2
     text = page.run("return document.body.innerText")
     assert HOSTILE in text
     assert text.count(WORSE) >= 5
+
+
+@pytest.fixture(scope="module")
+def phone(report):
+    with Browser(phone=True) as one:
+        one.open(report.as_uri())
+        yield one
+
+
+def test_a_phone_shows_the_results_without_scrolling_sideways(phone):
+    assert phone.run("return document.documentElement.scrollWidth") == 390
+    reach = "table.getBoundingClientRect().right"
+    assert phone.run(f"const table = document.querySelector('table'); return {reach}") <= 390
+
+
+def test_figures_on_a_phone_keep_the_size_of_their_letters(phone):
+    widths = phone.run(
+        "return [...document.images].map((one) => one.getBoundingClientRect().width)"
+    )
+    assert widths == phone.run(
+        "return [...document.images].map((one) => Number(one.getAttribute('width')))"
+    )
+
+
+def test_one_finger_scrolls_and_two_turn_and_pinch(phone):
+    x, y = middle_of_the_view(phone)
+    before, top = seen(phone), phone.run("return scrollY")
+    phone.touch((x - 60, y + 60, 0, -120))
+    wait_for(phone, f"scrollY > {top}")
+    assert seen(phone) == before
+    x, y = middle_of_the_view(phone)
+    top = phone.run("return scrollY")
+    phone.touch((x - 60, y - 40, 40, 30), (x + 40, y + 30, 40, 30))
+    assert phone.run("return scrollY") == top
+    turned = seen(phone)
+    assert turned != before
+    phone.touch((x - 30, y - 20, -40, -30), (x + 30, y + 20, 40, 30))
+    assert seen(phone) not in (before, turned)
 
 
 def test_what_is_not_there_is_said(page):

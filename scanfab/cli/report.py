@@ -28,8 +28,32 @@ __all__ = ["report"]
     metavar="FILE.html",
     help="The report.",
 )
+@click.option("--title", metavar="TEXT", help="Title (default: the sources' names).")
+@click.option(
+    "--author", metavar="TEXT", help="Author (default: your full name, if this computer knows it)."
+)
+@click.option(
+    "--cutoff",
+    type=float,
+    metavar="C",
+    help="Take the rows of this cut-off from tables of several; in the tables' unit.",
+)
+@click.option(
+    "--label",
+    "labels",
+    multiple=True,
+    metavar="NAME",
+    help="Name of a table in place of its source, once a table, in their order.",
+)
 @talk_options
-def report(tables: tuple[Path, ...], output: Path) -> int:
+def report(
+    tables: tuple[Path, ...],
+    output: Path,
+    title: str | None,
+    author: str | None,
+    cutoff: float | None,
+    labels: tuple[str, ...],
+) -> int:
     """
     Write a report on fabric tables: one HTML file that opens without a network.
 
@@ -37,17 +61,38 @@ def report(tables: tuple[Path, ...], output: Path) -> int:
     come from TABLE.manifest.json beside it; without it, the report says that they are not known.
     """
     from scanfab.cli.console import announce_compiling, reported_warnings
-    from scanfab.report import has_void_fabric, make_report
+    from scanfab.report import make_report
     from scanfab.writers.page import check_page_file, save_page
 
+    if labels and len(labels) != len(tables):
+        raise click.UsageError(f"--label: expected one a table: {len(tables)}, found {len(labels)}")
     with usage_errors():
         check_page_file(output)
     with reported_warnings():
         announce_compiling()
         with working():
-            page = make_report(tables)
-        save_page(output, page)
-        found = has_void_fabric(tables)
-    if not found:
+            made = make_report(
+                tables,
+                title=title,
+                author=_full_name() if author is None else author,
+                cutoff=cutoff,
+                labels=labels,
+            )
+        save_page(output, made.page)
+    if not made.has_void_fabric:
         click.echo("scanfab: warning: no row of the tables has a void fabric", err=True)
-    return 0 if found else 1
+    return 0 if made.has_void_fabric else 1
+
+
+def _full_name() -> str:
+    """The user's full name; none where the system knows only the name of the account."""
+    import os
+
+    try:
+        import pwd
+
+        user = pwd.getpwuid(os.getuid())
+    except (ImportError, KeyError):  # another system, or a container without such a user
+        return ""
+    name = user.pw_gecos.split(",")[0].strip()
+    return "" if name == user.pw_name else name

@@ -95,13 +95,17 @@ def _show(
 ) -> None:
     from dataclasses import replace
 
-    from scanfab.frame_view import scene_at
+    from scanfab.frame_view import look_at
     from scanfab.scene import section_lines
     from scanfab.writers.view import check_screen, show_scene
 
     if screenshot is None:
         check_screen()
-    scene = scene_at(series, settings, frame)
+    look = look_at(series, settings, frame)
+    scene = look.scene
     if cut:
         scene = replace(scene, lines=section_lines(scene, settings.axis))
-    show_scene(scene, settings.axis, f"{series.name}, frame {frame}", screenshot)
+    strain = "" if look.strain is None else f", axial strain {100 * look.strain:.3g} %"
+    none = "" if look.sample.grains.any() else ", no grains"
+    title = f"{series.name}, frame {look.number}{strain}{none}"
+    show_scene(scene, settings.axis, title, screenshot)

@@ -1,7 +1,12 @@
 "use strict";
-// Spheres on a 2D canvas: far ones first, each a shaded disk drawn once for each colour.
+// Balls on a 2D canvas: far ones first, each a shaded disk drawn once for each colour. Cut open, the
+// plane through the middle that faces the eye cuts them, and scan lines lie in it.
 (function () {
   const DISK = 96;
+  const START = { turn: 0.5, tilt: 0.35, zoom: 1.3 };
+  const FINEST = 6, COARSEST = 0.4;
+  const LINE_ANGLE = Math.PI / 6;
+  const KEPT = "#000000", DROPPED = "#D55E00", RV = "#0072B2", TEXT = "#222222";
 
   function shaded(colour) {
     const disk = document.createElement("canvas");
@@ -21,79 +26,165 @@
     return disk;
   }
 
+  // 1, 2 or 5 times a power of ten, not above the value
+  function rounded(value) {
+    const power = Math.pow(10, Math.floor(Math.log10(value)));
+    return [5, 2, 1].map((step) => step * power).find((step) => step <= value * (1 + 1e-9));
+  }
+
+  // void pieces of parallel lines among disks [u, v, radius]: [u, v, u, v, whether it is kept]
+  function cutLines(disks, data) {
+    const mean = data.spheres.reduce((sum, ball) => sum + ball[3], 0) / data.spheres.length;
+    const reach = data.rv === null ? 1000 : data.rv;
+    const step = Math.max(2.5 * mean, reach / 40);
+    const cos = Math.cos(LINE_ANGLE), sin = Math.sin(LINE_ANGLE);
+    const found = [];
+    for (let offset = -reach + step / 2; offset < reach; offset += step) {
+      const chords = [];
+      for (const [u, v, radius] of disks) {
+        const half = Math.sqrt(radius * radius - Math.pow(cos * v - sin * u - offset, 2));
+        const middle = cos * u + sin * v;
+        if (half > 0) chords.push([middle - half, middle + half]);
+      }
+      const end = Math.sqrt(reach * reach - offset * offset);
+      if (data.rv !== null) chords.push([-Infinity, -end], [end, Infinity]);
+      chords.sort((one, other) => one[0] - other[0]);
+      let solid = chords.length ? chords[0][1] : 0;
+      for (const [from, to] of chords) {
+        if (from > solid) {
+          const at = (t) => [cos * t - sin * offset, sin * t + cos * offset];
+          found.push([...at(solid), ...at(from), from - solid >= data.cutoff]);
+        }
+        solid = Math.max(solid, to);
+      }
+    }
+    return found;
+  }
+
   function start(canvas, data, key) {
     const pen = canvas.getContext("2d");
-    const disks = data.kinds.map((kind) => shaded(kind.colour));
+    const looks = data.kinds.map((kind) => shaded(kind.colour));
     const shown = data.kinds.map(() => true);
-    const state = { turn: 0.5, tilt: 0.35, zoom: 1.3, cut: false };
+    const state = { ...START, cut: true };
     let waiting = false;
+    // canvas pixels a CSS pixel, and canvas pixels a unit of the data
+    let dense = 1, scale = 1, place = null;
+
+    function look() {
+      const ct = Math.cos(state.turn), st = Math.sin(state.turn);
+      const ci = Math.cos(state.tilt), si = Math.sin(state.tilt);
+      scale = state.zoom * 0.36 * canvas.height / 1000;
+      // to the right, up, and towards the eye
+      place = (x, y, z) => {
+        const away = -st * x + ct * y;
+        return [ct * x + st * y, ci * z + si * away, si * z - ci * away];
+      };
+    }
 
     function draw() {
       waiting = false;
-      const ct = Math.cos(state.turn), st = Math.sin(state.turn);
-      const ci = Math.cos(state.tilt), si = Math.sin(state.tilt);
-      const scale = state.zoom * 0.36 * canvas.height / 1000;
-      const cx = canvas.width / 2, cy = canvas.height / 2;
-      // screen x, screen y, and depth, which grows towards the eye
-      function place(x, y, z) {
-        const side = ct * x + st * y, away = -st * x + ct * y;
-        return [cx + scale * side, cy - scale * (ci * z + si * away), si * z - ci * away];
-      }
-      const items = [];
+      look();
+      const balls = [], disks = [], solid = [];
       for (const [x, y, z, r, kind] of data.spheres) {
+        const [u, v, depth] = place(x, y, z);
+        const met = Math.abs(depth) < r ? Math.sqrt(r * r - depth * depth) : 0;
+        if (met > 0) solid.push([u, v, met]);
         if (!shown[kind]) continue;
-        const at = place(x, y, z);
-        if (state.cut && at[2] > 0) continue;
-        items.push([at[2], at, scale * r, kind]);
+        if (!state.cut || depth < 0) balls.push([u, v, r, kind, depth]);
+        if (met > 0) disks.push([u, v, met, kind]);
       }
-      for (const piece of data.pieces) {
-        const a = place(piece[0], piece[1], piece[2]), b = place(piece[3], piece[4], piece[5]);
-        items.push([(a[2] + b[2]) / 2, a, b, piece[6] ? "#000000" : "#D55E00"]);
-      }
-      items.sort((one, other) => one[0] - other[0]);
+      balls.sort((one, other) => one[4] - other[4]);
+      pen.setTransform(1, 0, 0, 1, 0, 0);
       pen.fillStyle = "#ffffff";
       pen.fillRect(0, 0, canvas.width, canvas.height);
-      for (const [, at, size, look] of items) {
-        if (typeof look === "number") {
-          pen.drawImage(disks[look], at[0] - size, at[1] - size, 2 * size, 2 * size);
-        } else {
-          pen.strokeStyle = look;
-          pen.lineWidth = 5;
-          pen.beginPath();
-          pen.moveTo(at[0], at[1]);
-          pen.lineTo(size[0], size[1]);
-          pen.stroke();
-        }
+      pen.setTransform(scale, 0, 0, -scale, canvas.width / 2, canvas.height / 2);
+      for (const [u, v, r, kind] of balls) {
+        // upright, as the light comes from above
+        pen.save();
+        pen.translate(u, v);
+        pen.scale(1, -1);
+        pen.drawImage(looks[kind], -r, -r, 2 * r, 2 * r);
+        pen.restore();
       }
-      if (data.rv !== null) {
-        pen.strokeStyle = "#0072B2";
-        pen.lineWidth = 3;
-        pen.setLineDash([12, 8]);
-        pen.beginPath();
-        pen.arc(cx, cy, scale * data.rv, 0, 2 * Math.PI);
-        pen.stroke();
-        pen.setLineDash([]);
+      if (state.cut) {
+        disks.forEach(drawDisk);
+        cutLines(solid, data).forEach(drawPiece);
       }
-      drawAxes(place(0, 0, 0), place);
+      drawWindow();
+      pen.setTransform(dense, 0, 0, dense, 0, 0);
+      drawAxes();
+      drawScale();
     }
 
-    function drawAxes(origin, place) {
-      pen.font = "26px system-ui, sans-serif";
+    function drawDisk([u, v, radius, kind]) {
+      pen.beginPath();
+      pen.arc(u, v, radius, 0, 2 * Math.PI);
+      pen.fillStyle = data.kinds[kind].pale;
+      pen.fill();
+      pen.strokeStyle = "rgba(0,0,0,0.35)";
+      pen.lineWidth = dense / scale;
+      pen.stroke();
+    }
+
+    function drawPiece([u, v, s, t, kept]) {
+      pen.strokeStyle = kept ? KEPT : DROPPED;
+      pen.lineWidth = 3 * dense / scale;
+      pen.beginPath();
+      pen.moveTo(u, v);
+      pen.lineTo(s, t);
+      pen.stroke();
+    }
+
+    function drawWindow() {
+      if (data.rv === null) return;
+      pen.strokeStyle = RV;
+      pen.lineWidth = 2 * dense / scale;
+      pen.setLineDash([8, 5].map((part) => part * dense / scale));
+      pen.beginPath();
+      pen.arc(0, 0, data.rv, 0, 2 * Math.PI);
+      pen.stroke();
+      pen.setLineDash([]);
+    }
+
+    // x, y, z and the loading axis, in the lower left corner, in CSS pixels
+    function drawAxes() {
+      const left = 50, low = canvas.height / dense - 50, length = 32;
+      pen.font = "13px system-ui, sans-serif";
       pen.textAlign = "center";
       pen.textBaseline = "middle";
-      const length = 70, left = 100, low = canvas.height - 100;
-      [["1", 1, 0, 0], ["2", 0, 1, 0], ["axis", 0, 0, 1]].forEach(([name, x, y, z]) => {
-        const tip = place(x, y, z);
-        const long = length / (state.zoom * 0.36 * canvas.height / 1000);
-        const dx = (tip[0] - origin[0]) * long, dy = (tip[1] - origin[1]) * long;
-        pen.strokeStyle = pen.fillStyle = "#333333";
-        pen.lineWidth = 3;
+      for (const [name, x, y, z] of data.axes) {
+        const [right, up] = place(x, y, z);
+        pen.strokeStyle = TEXT;
+        pen.lineWidth = 1.5;
         pen.beginPath();
         pen.moveTo(left, low);
-        pen.lineTo(left + dx, low + dy);
+        pen.lineTo(left + length * right, low - length * up);
         pen.stroke();
-        pen.fillText(name, left + 1.35 * dx, low + 1.35 * dy);
-      });
+        write(name, left + 1.35 * length * right, low - 1.35 * length * up);
+      }
+    }
+
+    // with a white edge, to be read upon grains
+    function write(text, x, y) {
+      pen.strokeStyle = "#ffffff";
+      pen.lineWidth = 3;
+      pen.strokeText(text, x, y);
+      pen.fillStyle = TEXT;
+      pen.fillText(text, x, y);
+    }
+
+    // a bar with its length in the dump's unit, in the lower right corner
+    function drawScale() {
+      const unit = scale / dense * 1000 / data.size;
+      const length = rounded(110 / unit);
+      const right = canvas.width / dense - 20, low = canvas.height / dense - 24;
+      pen.strokeStyle = TEXT;
+      pen.lineWidth = 3;
+      pen.beginPath();
+      pen.moveTo(right - length * unit, low);
+      pen.lineTo(right, low);
+      pen.stroke();
+      write(String(Number(length.toPrecision(1))), right - length * unit / 2, low - 12);
     }
 
     function redraw() {
@@ -109,8 +200,35 @@
       redraw();
     }
 
+    function zoom(factor) {
+      state.zoom = Math.max(COARSEST, Math.min(FINEST, state.zoom * factor));
+      redraw();
+    }
+
+    function reset() {
+      Object.assign(state, START);
+      redraw();
+    }
+
+    function fit() {
+      dense = window.devicePixelRatio || 1;
+      const box = canvas.getBoundingClientRect();
+      if (box.width === 0) return;
+      canvas.width = Math.round(box.width * dense);
+      canvas.height = Math.round(box.height * dense);
+      draw();
+    }
+
+    listen(canvas, rotate, zoom, reset);
+    controls(key, data, shown, state, redraw, reset);
+    new ResizeObserver(fit).observe(canvas);
+    fit();
+  }
+
+  function listen(canvas, rotate, zoom, reset) {
     let last = null;
     canvas.addEventListener("pointerdown", (event) => {
+      if (event.pointerType === "touch") return;
       last = [event.clientX, event.clientY];
       canvas.setPointerCapture(event.pointerId);
     });
@@ -122,19 +240,59 @@
     for (const name of ["pointerup", "pointercancel"]) {
       canvas.addEventListener(name, () => { last = null; });
     }
-    canvas.addEventListener("wheel", (event) => {
-      event.preventDefault();
-      state.zoom = Math.max(0.4, Math.min(6, state.zoom * Math.exp(-0.001 * event.deltaY)));
-      redraw();
+
+    // two fingers turn and pinch; one scrolls the page
+    let fingers = null;
+    function pair(touches) {
+      const [one, other] = touches;
+      const dx = other.clientX - one.clientX, dy = other.clientY - one.clientY;
+      return {
+        x: (one.clientX + other.clientX) / 2,
+        y: (one.clientY + other.clientY) / 2,
+        apart: Math.max(Math.hypot(dx, dy), 1),
+      };
+    }
+    canvas.addEventListener("touchstart", (event) => {
+      fingers = event.touches.length === 2 ? pair(event.touches) : null;
+      if (fingers) event.preventDefault();
     }, { passive: false });
-    const steps = { ArrowLeft: [0.1, 0], ArrowRight: [-0.1, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1] };
+    canvas.addEventListener("touchmove", (event) => {
+      if (!fingers || event.touches.length !== 2) return;
+      event.preventDefault();
+      const now = pair(event.touches);
+      rotate(-0.01 * (now.x - fingers.x), 0.01 * (now.y - fingers.y));
+      zoom(now.apart / fingers.apart);
+      fingers = now;
+    }, { passive: false });
+    canvas.addEventListener("touchend", () => { fingers = null; });
+
+    // the wheel scrolls the page, until the view is clicked
+    canvas.addEventListener("wheel", (event) => {
+      if (document.activeElement !== canvas) return;
+      event.preventDefault();
+      zoom(Math.exp(-0.001 * event.deltaY));
+    }, { passive: false });
+
+    const keys = {
+      ArrowLeft: () => rotate(0.1, 0),
+      ArrowRight: () => rotate(-0.1, 0),
+      ArrowUp: () => rotate(0, -0.1),
+      ArrowDown: () => rotate(0, 0.1),
+      "+": () => zoom(1.1),
+      "=": () => zoom(1.1),
+      "-": () => zoom(1 / 1.1),
+      r: reset,
+      Escape: () => canvas.blur(),
+    };
     canvas.addEventListener("keydown", (event) => {
-      if (event.key in steps) {
+      if (event.key in keys && !event.ctrlKey && !event.metaKey && !event.altKey) {
         event.preventDefault();
-        rotate(...steps[event.key]);
+        keys[event.key]();
       }
     });
+  }
 
+  function controls(key, data, shown, state, redraw, reset) {
     function box(text, colour, checked, change) {
       const label = document.createElement("label");
       const input = document.createElement("input");
@@ -155,8 +313,12 @@
         box(kind.name, kind.colour, true, (on) => { shown[number] = on; });
       }
     });
-    box("cut open", null, false, (on) => { state.cut = on; });
-    draw();
+    box("cut open", null, state.cut, (on) => { state.cut = on; });
+    const button = document.createElement("button");
+    button.type = "button";
+    button.textContent = "reset";
+    button.addEventListener("click", reset);
+    key.append(button);
   }
 
   for (const canvas of document.querySelectorAll("canvas.view")) {

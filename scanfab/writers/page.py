@@ -21,6 +21,7 @@ __all__ = [
     "Part",
     "Picture",
     "Section",
+    "Shown",
     "check_page_file",
     "render_page",
     "save_page",
@@ -32,8 +33,12 @@ BoolArray = npt.NDArray[np.bool_]
 
 # spheres that a browser turns without effort
 MOST_GRAINS = 4_000
-MOST_PIECES = 1_000
-KIND_COLOURS = (COLOURS["sky"], "#A9AFB5", COLOURS["orange"])
+# of balls in the RV, outside, and of rattlers, and paler where a plane cuts them
+KIND_COLOURS = (
+    (COLOURS["sky"], "#B4DDF5"),
+    ("#C9CED3", "#E8EAEC"),
+    (COLOURS["orange"], "#F5DB9F"),
+)
 
 
 @dataclass(frozen=True)
@@ -43,6 +48,8 @@ class Picture:
     url: str
     """With the scheme ``data:``."""
     caption: str
+    width: int
+    """At which its letters are as large as those of the page, CSS pixels."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +59,19 @@ class Part:
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
     note: str = ""
+    title: str = ""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What the source of a table shows."""
+
+    view: Mapping[str, Any]
+    """From :func:`view_data`."""
+    view_title: str
+    facts: Sequence[tuple[str, str]]
+    """The sample in numbers: what, and how much."""
+    pictures: Sequence[Picture]
 
 
 @dataclass(frozen=True)
@@ -65,20 +85,24 @@ class Section:
     settings: Sequence[tuple[str, str, str]] = ()
     versions: Sequence[tuple[str, str]] = ()
     inputs: Part = field(default_factory=lambda: Part((), ()))
-    view: Mapping[str, Any] | None = None
-    view_title: str = ""
+    shown: Shown | None = None
     no_view: str = ""
-    pictures: Sequence[Picture] = ()
+    """Why nothing is shown."""
 
 
 @dataclass(frozen=True)
 class Content:
     """All that the page tells."""
 
+    title: str
+    author: str
+    date: str
     summary: Sequence[str]
-    results: Sequence[Sequence[str]]
+    results: Sequence[Part]
+    """For each source; the first column names the lines."""
     pictures: Sequence[Picture]
     warnings: Sequence[str]
+    notes: Sequence[str]
     sections: Sequence[Section]
     frames: Part
 
@@ -104,10 +128,22 @@ def render_page(content: Content) -> str:
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
+    environment.filters["symbols"] = _symbols
     folder = files("scanfab.writers")
     template = environment.from_string((folder / "page.html").read_text("utf-8"))
     script = (folder / "page.js").read_text("utf-8")
     return template.render(content=content, script=script)
+
+
+def _symbols(text: str) -> Any:
+    """A text, escaped, with the indices of α set low."""
+    from markupsafe import Markup, escape
+
+    low = {"α_vs": "α<sub>vs</sub>", "α_c": "α<sub>c</sub>"}
+    marked = str(escape(text))
+    for plain, markup in low.items():
+        marked = marked.replace(plain, markup)
+    return Markup(marked)
 
 
 def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
@@ -117,7 +153,7 @@ def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
     Parameters
     ----------
     scene : Scene
-        With ``lines``, if scan lines are to be shown.
+        One frame.
     axis : array_like, shape (3,)
         Is upright.
     """
@@ -127,9 +163,10 @@ def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
     radius = grains.radius[shown]
     nearest = np.argsort(np.linalg.norm(position, axis=1), kind="stable")[:MOST_GRAINS]
     reach = np.linalg.norm(position[nearest], axis=1) + radius[nearest]
-    size = float(reach.max(initial=0.0))
-    scale = 1000.0 / (size or scene.window_radius or 1.0)
-    turn = _upright(np.asarray(axis, dtype=np.float64))
+    size = float(reach.max(initial=0.0)) or scene.window_radius or 1.0
+    scale = 1000.0 / size
+    up = np.asarray(axis, dtype=np.float64)
+    turn = _upright(up)
     kinds = np.where(grains.in_window[shown], 0, 1)
     kinds[grains.rattler[shown]] = 2
     names = ["grains in the RV", "grains outside", "rattlers"]
@@ -138,8 +175,8 @@ def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
     numbers = np.column_stack([position @ turn.T, radius])[nearest] * scale
     return {
         "kinds": [
-            {"name": name, "colour": colour}
-            for name, colour in zip(names, KIND_COLOURS, strict=True)
+            {"name": name, "colour": colour, "pale": pale}
+            for name, (colour, pale) in zip(names, KIND_COLOURS, strict=True)
         ],
         "spheres": [
             [*values, kind]
@@ -147,31 +184,32 @@ def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
                 np.rint(numbers).astype(int).tolist(), kinds[nearest].tolist(), strict=True
             )
         ],
-        "pieces": _pieces(scene, turn, scale),
+        "axes": _axes(up, turn),
         "rv": None if scene.window_radius is None else round(scene.window_radius * scale),
+        "cutoff": scene.cutoff * scale,
+        "size": size,
         "left_out": int(shown.sum() - len(nearest)),
     }
 
 
 def _upright(axis: FloatArray) -> FloatArray:
-    """The rotation (rows) after which the axis is z."""
+    """The rotation (rows) after which the axis is z; keeps x, y and z where it can."""
     across = np.eye(3)[np.argmin(np.abs(axis))]
     first = across - (across @ axis) * axis
     first /= np.linalg.norm(first)
     return np.stack([first, np.cross(axis, first), axis])
 
 
-def _pieces(scene: Scene, turn: FloatArray, scale: float) -> list[list[int]]:
-    """Void segments: both ends, and whether they are kept."""
-    if scene.lines is None:
-        return []
-    lines = scene.lines
-    void = np.flatnonzero(lines.void)[:MOST_PIECES]
-    ends = (lines.ends[void] - scene.center) @ turn.T * scale
-    kept = lines.length[void] >= scene.cutoff
-    return [
-        [*values, int(keep)]
-        for values, keep in zip(
-            np.rint(ends.reshape(-1, 6)).astype(int).tolist(), kept.tolist(), strict=True
-        )
+def _axes(up: FloatArray, turn: FloatArray) -> list[list[Any]]:
+    """Names and unit vectors of x, y, z and the loading axis, as the viewer sees them."""
+    axes = [
+        [f"{name} (loading)" if one @ up > 1.0 - 1e-9 else name, *_rounded(turn @ one)]
+        for name, one in zip("xyz", np.eye(3), strict=True)
     ]
+    if up.max() < 1.0 - 1e-9:
+        axes.append(["loading", *_rounded(turn @ up)])
+    return axes
+
+
+def _rounded(vector: FloatArray) -> list[float]:
+    return [round(part, 4) + 0.0 for part in vector.tolist()]

@@ -15,6 +15,7 @@ from scanfab.errors import ScanfabError
 from scanfab.scene import Grains, Scene
 from scanfab.vtk_log import quiet_vtk
 from scanfab.writers.files import whole_file
+from scanfab.writers.overlay import SIZE, Framing, add_scale, add_words
 from scanfab.writers.plot import COLOURS
 
 __all__ = ["check_screen", "show_scene"]
@@ -26,7 +27,6 @@ ADVICE = (
     "install one of them: on Debian or Ubuntu apt-get install libegl1 libgl1 libosmesa6, or "
     "apt-get install xvfb and run the command under xvfb-run"
 )
-SIZE = (1200, 900)
 
 
 def check_screen() -> None:
@@ -83,21 +83,18 @@ def _show(scene: Scene, up: FloatArray, title: str, screenshot: Path | None) -> 
     )
     toward = np.cross(np.eye(3)[np.argmin(np.abs(up))], up)
     toward /= np.linalg.norm(toward)
-    _add_grains(plotter, scene, toward)
+    look = toward if scene.lines is not None else toward + 0.45 * np.cross(up, toward) + 0.35 * up
+    drawn = _drawn(scene, toward, look)
+    _add_grains(plotter, scene, drawn, toward)
     if scene.window_radius is not None:
         _add_window(plotter, scene, toward)
     if scene.lines is not None:
         _add_lines(plotter, scene)
-    _add_legend(plotter, scene)
-    side = np.cross(up, toward)
-    look = toward if scene.lines is not None else toward + 0.45 * side + 0.35 * up
-    plotter.camera_position = [scene.center + look, scene.center, up]
-    plotter.reset_camera()
-    plotter.camera.zoom(1.12)
-    # to the right, beside the legend
-    plotter.camera.SetWindowCenter(-0.2, 0.0)
+    _framing(scene, drawn, up, look).aim(plotter)
+    add_words(plotter, title, _words(scene))
+    add_scale(plotter)
     plotter.enable_anti_aliasing("ssaa")
-    plotter.add_axes(line_width=3)
+    plotter.add_axes(line_width=3, color="black", viewport=(0.0, 0.0, 0.16, 0.2))
     if screenshot is None:
         plotter.show()
         return
@@ -138,19 +135,45 @@ def classes(grains: Grains, has_window: bool) -> dict[str, tuple[str, BoolArray]
     else:
         found = {
             "grain in the RV": (COLOURS["sky"], held & grains.in_window),
-            "grain outside": ("#A9AFB5", held & ~grains.in_window),
+            "grain outside": ("#D2D7DB", held & ~grains.in_window),
         }
     found["rattler"] = (COLOURS["orange"], grain & grains.rattler)
     return {name: value for name, value in found.items() if value[1].any()}
 
 
-def _add_grains(plotter: Any, scene: Scene, toward: FloatArray) -> None:
+def _drawn(scene: Scene, toward: FloatArray, look: FloatArray) -> BoolArray:
+    """
+    Which grains are drawn.
+
+    Of a section those that reach behind its plane; else those in the RV, and of those outside,
+    which would hide it in front, the half behind its centre.
+    """
+    grains = scene.grains
+    branch = grains.position - scene.center
+    if scene.lines is not None:
+        shown = branch @ toward < grains.radius
+    elif scene.window_radius is not None:
+        shown = grains.in_window | (branch @ look <= 0.0)
+    else:
+        shown = np.ones(len(branch), bool)
+    return np.asarray(shown & ~grains.boundary)
+
+
+def _framing(scene: Scene, drawn: BoolArray, up: FloatArray, look: FloatArray) -> Framing:
+    """About all that is drawn."""
+    points, radius = scene.grains.position[drawn], scene.grains.radius[drawn]
+    if scene.window_radius is not None:
+        points = np.vstack([points, scene.center])
+        radius = np.append(radius, scene.window_radius)
+    return Framing.about(points, radius, up, look)
+
+
+def _add_grains(plotter: Any, scene: Scene, drawn: BoolArray, toward: FloatArray) -> None:
     """Balls; if the scene has lines, cut by the plane through the centre."""
     grains = scene.grains
     height = (grains.position - scene.center) @ toward
-    for colour, chosen in classes(grains, scene.window_radius is not None).values():
-        if scene.lines is not None:
-            chosen = chosen & (height < grains.radius)
+    for colour, kind in classes(grains, scene.window_radius is not None).values():
+        chosen = kind & drawn
         if not chosen.any():
             continue
         balls = _balls(grains.position[chosen], grains.radius[chosen])
@@ -159,7 +182,7 @@ def _add_grains(plotter: Any, scene: Scene, toward: FloatArray) -> None:
             _add_section(
                 plotter, grains, chosen & (height > -grains.radius), height, toward, colour
             )
-        plotter.add_mesh(balls, color=colour, smooth_shading=True, ambient=0.15, specular=0.2)
+        plotter.add_mesh(balls, color=colour, smooth_shading=True, ambient=0.2, specular=0.2)
 
 
 def _balls(position: FloatArray, radius: FloatArray) -> Any:
@@ -225,17 +248,10 @@ def _add_lines(plotter: Any, scene: Scene) -> None:
             plotter.add_mesh(tubes, color=COLOURS[colour], lighting=False)
 
 
-def _add_legend(plotter: Any, scene: Scene) -> None:
-    entries = [
-        [f" {name}", colour]
-        for name, (colour, _) in classes(scene.grains, scene.window_radius is not None).items()
-    ]
+def _words(scene: Scene) -> dict[str, str]:
+    """Names of the legend, each with its colour."""
+    found = classes(scene.grains, scene.window_radius is not None)
+    names = {name: colour for name, (colour, _) in found.items()}
     if scene.lines is not None:
-        entries += [
-            [" void segment: kept", COLOURS["black"]],
-            [" shorter: dropped", COLOURS["vermilion"]],
-        ]
-    if entries:
-        plotter.add_legend(
-            entries, face="circle", bcolor=None, size=(0.3, 0.032 * len(entries)), loc="upper left"
-        )
+        names |= {"void segment kept": COLOURS["black"], "dropped": COLOURS["vermilion"]}
+    return names

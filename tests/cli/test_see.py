@@ -8,6 +8,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from scanfab.cli.main import run
@@ -177,6 +178,74 @@ def test_view_writes_a_picture_of_several_colours(tmp_path, words, monkeypatch):
     colours = image.open(picture).convert("RGB").quantize(8).getcolors()
     assert sum(count > 2000 for count, _ in colours) >= 4
     assert [path.name for path in tmp_path.iterdir()] == ["view.png"]
+
+
+def drawn(path):
+    """Pixels of a picture as numbers from 0 to 255, shape (900, 1200, 3)."""
+    image = pytest.importorskip("PIL.Image")
+    return np.asarray(image.open(path).convert("RGB")).astype(int)
+
+
+@pytest.mark.skipif(not can_draw(), reason="VTK cannot draw here")
+@pytest.mark.parametrize(
+    "words",
+    [
+        [f"{ROOT}/{SAMPLE}", "--boundary", "mask=3", "--frame", "-1"],
+        [f"{ROOT}/{SAMPLE}", "--boundary", "mask=3", "--frame", "-1", "--cut"],
+        [f"{ROOT}/sample_data/liggghts_periodic", "--axis", "1,1,2"],
+        [f"{ROOT}/sample_data/lammps_shear", "--frame", "5"],
+    ],
+)
+@pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabWarning")
+def test_the_sample_fills_the_picture_and_its_rv_is_seen(tmp_path, words):
+    picture = tmp_path / "view.png"
+    assert run(["view", *words, "--screenshot", str(picture)]) == 0
+    pixels = drawn(picture)
+    # between the words above, and the axes and the scale in the corners below
+    middle = (pixels[115:835, 200:1000] < 250).any(axis=2)
+    high = np.flatnonzero(middle.any(axis=1))
+    assert len(high) > 690 or middle.any(axis=0).all()
+    blue = pixels[..., 2] - pixels[..., 0] > 50
+    assert blue.mean() > 0.08
+    across = np.flatnonzero((pixels[115:700] < 250).any(axis=(0, 2)))
+    assert abs(across[0] + across[-1] - 1200) < 60
+
+
+@pytest.mark.skipif(not can_draw(), reason="VTK cannot draw here")
+def test_title_legend_and_scale_are_dark_on_white(tmp_path, series):
+    picture = tmp_path / "view.png"
+    assert run(["view", series, "--screenshot", str(picture)]) == 0
+    dark = (drawn(picture) < 90).all(axis=2)
+    title, legend, scale = dark[20:60], dark[60:100], dark[860:875, 700:]
+    assert title.sum() > 400
+    assert legend.sum() > 300
+    bar = scale.any(axis=0).nonzero()[0]
+    assert 100 < len(bar) < 260
+    assert bar[-1] == pytest.approx(0.98 * 1200 - 700, abs=2)
+
+
+@pytest.mark.skipif(not can_draw(), reason="VTK cannot draw here")
+@pytest.mark.parametrize("words", [[], ["--cut"]])
+def test_a_frame_without_grains_is_shown_as_such(tmp_path, words, monkeypatch):
+    write(tmp_path / "dump_1.txt", dump_text([]))
+    titles = []
+    monkeypatch.setattr("scanfab.writers.view.show_scene", lambda *said: titles.append(said[2]))
+    picture = tmp_path / "view.png"
+    words = [str(tmp_path / "dump_1.txt"), *words, "--screenshot", str(picture)]
+    assert run(["view", *words]) == 0
+    assert titles[0].endswith("frame 0, no grains")
+    monkeypatch.undo()
+    assert run(["view", *words]) == 0
+    assert picture.exists()
+
+
+def test_the_title_names_the_frame_and_its_strain(tmp_path, monkeypatch):
+    titles = []
+    monkeypatch.chdir(ROOT)
+    monkeypatch.setattr("scanfab.writers.view.show_scene", lambda *said: titles.append(said[2]))
+    words = ["--boundary", "mask=3", "--frame", "-1", "--screenshot", str(tmp_path / "x.png")]
+    assert run(["view", SAMPLE, *words]) == 0
+    assert titles == [f"{SAMPLE}, frame 6, axial strain 15 %"]
 
 
 def scanfab(*words, **environment):

@@ -1,0 +1,170 @@
+"""What a report shows of the dumps: a view, the sample in numbers, and pictures of two frames."""
+
+from __future__ import annotations
+
+import base64
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from scanfab.errors import SettingsError
+from scanfab.frame_figures import lengths_of, projections_of, scan_frames
+from scanfab.frame_noise import noise_notes
+from scanfab.frame_view import Look, look_at
+from scanfab.report_inputs import Input
+from scanfab.rerun import reopen, restored_settings
+from scanfab.series import Series
+from scanfab.settings import Length, Settings
+from scanfab.tabular import number_of
+from scanfab.window import SurfaceBox
+from scanfab.writers.page import Picture, Shown, view_data
+from scanfab.writers.plot_frame import plot_histogram, plot_projection
+
+__all__ = ["data_url", "show_frames"]
+
+# segments of a scan that takes about half a minute: pictures that would need more are rougher
+MOST_SEGMENTS = 3e8
+DPI = 130
+# of pictures with two columns and one, CSS pixels
+WIDE, NARROW = 614, 326
+
+
+def show_frames(one: Input) -> Shown:
+    """
+    Read the source of a table again.
+
+    Raises
+    ------
+    ScanfabError, OSError
+        If it has changed, or cannot be read again.
+    """
+    manifest = one.manifest or {}
+    _check_inputs(manifest)
+    asked = manifest["settings"]
+    series, settings = reopen(asked), restored_settings(asked)
+    if settings.cutoffs:
+        settings = replace(settings, cutoffs=(), cutoff=_shown_cutoff(one, settings))
+    look = look_at(series, replace(settings, variants="c"), one.last_frame)
+    strain = one.strain_of(look.number)
+    return Shown(
+        view=view_data(look.scene, settings.axis),
+        view_title=_title(one, look.number, strain),
+        facts=_facts(look, settings),
+        pictures=_pictures(one, series, settings),
+    )
+
+
+def data_url(kind: str, data: bytes) -> str:
+    """A file inside the page."""
+    return f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}"
+
+
+def _check_inputs(manifest: Mapping[str, Any]) -> None:
+    """An error if a file has another size than when it was computed."""
+    for one in manifest.get("inputs") or []:
+        path = Path(str(one.get("path")))
+        if path.exists() and path.stat().st_size != one.get("size"):
+            raise SettingsError(f"{path} has changed since the table was computed")
+
+
+def _shown_cutoff(one: Input, settings: Settings) -> Length:
+    """Of several cut-offs that whose rows are reported."""
+    return settings.cutoff if one.cutoff is None else Length(one.cutoff)
+
+
+def _title(one: Input, frame: int, strain: float | None) -> str:
+    at = "" if strain is None else f", axial strain {100 * strain:.3g} %"
+    return f"{one.rows[0]['source']}, frame {frame}{at}"
+
+
+def _facts(look: Look, settings: Settings) -> list[tuple[str, str]]:
+    """The sample in numbers."""
+    first, plan = look.first, look.plan
+    if first is None:
+        return []
+    radii = first.packing.radius[first.grains]
+    smallest = float(radii.min())
+    facts = [
+        ("grains", f"{int(first.grains.sum())} in the first frame that has grains"),
+        ("radii", f"smallest {smallest:.4g}, mean {radii.mean():.4g}, largest {radii.max():.4g}"),
+        ("boundary", f"{int(first.boundary.sum())} particles" if first.boundary.any() else "none"),
+        ("cell", _cell(look)),
+        ("loading axis", _axis(settings)),
+    ]
+    if plan is None:
+        return facts
+    facts.append(("cut-off", f"{plan.cutoff:.4g}, {plan.cutoff / smallest:.3g} smallest radii"))
+    if plan.window is not None:
+        extent = SurfaceBox.of(first.packing, first.grains).smallest_extent
+        radius = plan.window.radius
+        facts += [
+            ("centre of the RV", ", ".join(f"{one:.4g}" for one in plan.window.center)),
+            (
+                "radius of the RV",
+                f"{radius:.4g}, {2 * radius / extent:.3g} of half the sample's smallest extent, "
+                f"{radius / radii.mean():.3g} mean radii",
+            ),
+        ]
+    return facts
+
+
+def _cell(look: Look) -> str:
+    cell = look.sample.packing.cell
+    if cell is None or not look.sample.packing.is_periodic:
+        return "not periodic"
+    along = "".join(name for name, repeats in zip("xyz", cell.periodic, strict=True) if repeats)
+    vectors = "; ".join(", ".join(f"{part:.4g}" for part in row) for row in cell.vectors)
+    return f"periodic along {along}, vectors ({vectors})"
+
+
+def _axis(settings: Settings) -> str:
+    named = [name for name, part in zip("xyz", settings.axis, strict=True) if part == 1.0]
+    return named[0] if named else ", ".join(f"{part:.4g}" for part in settings.axis)
+
+
+def _pictures(one: Input, series: Series, settings: Settings) -> list[Picture]:
+    """Of the first and the last frame, both from one scan."""
+    # the series may be named otherwise if it was opened from another folder
+    rows = [{**row, "source": series.name} for row in one.first_series]
+    if all(row["alpha_vs_axial"] is None for row in rows):
+        return []
+    drawn = replace(settings, tolerance=_affordable_tolerance(rows, settings))
+    frames = scan_frames(series, drawn, rows)
+    projections, lengths = projections_of(frames), lengths_of(frames)
+    what = f"variant {frames.variant} of {one.rows[0]['source']}"
+    rougher = ""
+    if drawn.tolerance > settings.tolerance:
+        rougher = (
+            f" Scanned to a standard error of {drawn.tolerance:.2g} instead of the table's "
+            f"{settings.tolerance:.2g}, which would take too long for a picture."
+        )
+    return [
+        _picture(
+            lambda path: plot_projection(path, projections, DPI),
+            f"Mean void length and contact normals over all directions, {what}. "
+            f"{noise_notes(frames, projections)}{rougher}",
+            WIDE,
+        ),
+        _picture(
+            lambda path: plot_histogram(path, lengths, DPI),
+            f"Lengths of the void segments, {what}; those below the cut-off are dropped.",
+            NARROW,
+        ),
+    ]
+
+
+def _affordable_tolerance(rows: list[dict[str, Any]], settings: Settings) -> float:
+    """The table's, or as much more as makes the scan short enough to wait for."""
+    most = max((number_of(row, "segments") or 0.0 for row in rows), default=0.0)
+    is_fixed = settings.spacing is not None and settings.directions is not None
+    return settings.tolerance * (1.0 if is_fixed else max(1.0, most / MOST_SEGMENTS) ** 0.5)
+
+
+def _picture(draw: Callable[[Path], None], caption: str, width: int) -> Picture:
+    with tempfile.TemporaryDirectory() as folder:
+        # pixels, as the disks are pixels anyway, and few of them
+        path = Path(folder) / "picture.png"
+        draw(path)
+        return Picture(data_url("image/png", path.read_bytes()), caption, width)
