@@ -31,7 +31,7 @@ TIME = re.compile(rb"<time>\s*([-+.\deE]+)\s*</time>")
 # bytes that are parsed at a time; pieces without a new body or contact after which none will come,
 # and inside one; how deep elements stand in one another
 PIECE = 1 << 16
-BARREN, BARREN_PART = 1024, 256
+BARREN, BARREN_PART = 384, 128
 DEPTH = 200
 
 # where the scene's own values stand
@@ -150,9 +150,10 @@ class _Scene:
                     above.append(element)
                     continue
                 above.pop()
+                if part is None or part == len(above) or element.tag == "px":
+                    self._take(above, element)
                 if part is None or part == len(above):
                     part = None
-                    self._take(above, element)
                     if above:
                         # the parser holds on to it by the one above
                         del above[-1][:]
@@ -165,7 +166,9 @@ class _Scene:
         """An element that is complete; ``above``: the elements that it stands in."""
         tag = element.tag
         if tag == "px" and element.find("iterMadeReal") is not None:
+            # inside the first body that has it, as YADE writes it
             self._take_interaction(element)
+            element.clear()
         elif tag == "px" and _tags(above[-2:]) == ["body", "item"]:
             self._take_body(element)
         elif tag == "isPeriodic" and _tags(above) == SCENE:
@@ -225,8 +228,7 @@ class _Scene:
 def _is_part(above: list[ElementTree.Element], element: ElementTree.Element) -> bool:
     """Whether an element is looked at as a whole, when it is complete."""
     tag = element.tag
-    in_list = bool(above) and above[-1].tag in ("item", "second")
-    return tag == "hSize" or (tag == "px" and in_list)
+    return tag == "hSize" or (tag == "px" and bool(above) and above[-1].tag == "item")
 
 
 def _tags(elements: list[ElementTree.Element]) -> list[str]:
