@@ -35,8 +35,8 @@ GROWTH = 4.0
 SMALLEST_ROUND = 1.1
 # By how much the expected error must be below the tolerance: then that of the replicates, which is
 # reported, is seldom above it, and a scan that goes on until it is below picks few errors that are
-# too small by chance. Where replicates can be added this makes the error surer; where their number R
-# is fixed it stays uncertain by a part of 1/√(2(R - 1)), so many of which the margin leaves.
+# too small by chance. Where replicates can be added this makes the error surer; where their number
+# R is fixed it stays uncertain by a part of 1/√(2(R - 1)), so many of which the margin leaves.
 MARGIN, SIGMAS = 1.1, 1.6
 # of the smallest radius: directions that are empty with lines so close cannot be filled
 CLOSEST = 0.05

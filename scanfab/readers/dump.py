@@ -7,6 +7,7 @@ Knows the syntax of snapshots, not the meaning of columns.
 from __future__ import annotations
 
 import io
+import os
 import re
 import warnings
 from collections.abc import Callable, Sequence
@@ -23,7 +24,7 @@ from scanfab.errors import ReadError, ScanfabWarning
 from scanfab.packing import LazyColumns
 from scanfab.readers.base import Snapshot
 from scanfab.readers.box import dump_cell
-from scanfab.readers.files import plain
+from scanfab.readers.files import check_memory, plain
 from scanfab.readers.numbers import plain_reason
 from scanfab.readers.regular import LARGE, TextTable, read_regular
 
@@ -36,6 +37,9 @@ Columns = dict[str, npt.NDArray[Any]]
 HEADER_BYTES = 1 << 16
 # bytes that are searched at a time
 PIECE = 1 << 18
+# bytes of a word and the blanks around it; those that rows need not fill
+WORD_BYTES = 100
+MUCH_TEXT = 16 << 20
 STEP_KEY = b"ITEM: TIMESTEP"
 COUNT_KEY = re.compile(rb"^ITEM: NUMBER OF (\S+)[ \t]*\r?$", re.MULTILINE)
 
@@ -186,6 +190,7 @@ def _long_table(snapshot: Snapshot, body: _Body, count: int) -> TextTable | None
     path = plain(snapshot.path)
     stop = path.stat().st_size if snapshot.stop is None else snapshot.stop
     start = snapshot.start + body.start
+    _check_size(snapshot, stop - start, len(body.names), count)
     # a row has at least a digit and a blank for each column
     possible = body.names and 2 * count * len(body.names) <= stop - start
     if not possible or stop - start < LARGE:
@@ -197,9 +202,11 @@ def _tolerant(snapshot: Snapshot, body: _Body, count: int) -> FloatArray:
     """All numbers of a snapshot with any white space; says what is wrong in which line."""
     path, names = snapshot.path, body.names
     with open(plain(path), "rb") as stream:
+        stop = os.fstat(stream.fileno()).st_size if snapshot.stop is None else snapshot.stop
+        # the text, the same without empty lines, and its numbers
+        check_memory(path, 4.0 * (stop - snapshot.start))
         stream.seek(snapshot.start)
-        size = None if snapshot.stop is None else snapshot.stop - snapshot.start
-        block = stream.read() if size is None else stream.read(size)
+        block = stream.read(stop - snapshot.start)
     values = _values(path, snapshot, block, body, count)
     if names and values.shape[1] != len(names):
         raise ReadError(
@@ -207,6 +214,15 @@ def _tolerant(snapshot: Snapshot, body: _Body, count: int) -> FloatArray:
             f"{values.shape[1]}"
         )
     return values
+
+
+def _check_size(snapshot: Snapshot, size: int, columns: int, count: int) -> None:
+    """ReadError if there is far more text than rows, as a few bytes can be unpacked to."""
+    if columns and size > MUCH_TEXT + count * columns * WORD_BYTES:
+        raise ReadError(
+            f"{snapshot.path}, step {snapshot.step}: the header counts {count} rows, but {size:,} "
+            f"bytes follow: one of both is damaged"
+        )
 
 
 def _starts(stream: IO[bytes]) -> tuple[list[int], int]:

@@ -10,22 +10,25 @@ import shutil
 import tempfile
 import zlib
 from collections import OrderedDict
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import Lock, get_ident
 from typing import IO, Any
 
 from scanfab.ending import at_end
 from scanfab.errors import ReadError
+from scanfab.memory import free_memory
 from scanfab.streams import check_file
 
 __all__ = [
     "COMPRESSED_SUFFIXES",
     "bare_name",
+    "check_memory",
     "first_bytes",
     "plain",
     "temporary_copy",
+    "unpacked",
 ]
 
 OPENERS: dict[bytes, Callable[..., Any]] = {
@@ -36,6 +39,9 @@ OPENERS: dict[bytes, Callable[..., Any]] = {
 COMPRESSED_SUFFIXES = (".gz", ".bz2", ".xz")
 # decompressed copies of the files used last, for each thread that reads: a frame needs few
 KEPT = 4
+# bytes that are copied at a time, and those that are left to other programs
+PART = 4 << 20
+RESERVE = 1 << 30
 _copies: OrderedDict[tuple[str, int, int], Path] = OrderedDict()
 _threads: set[int] = set()
 _lock = Lock()
@@ -69,11 +75,8 @@ def plain(path: Path) -> Path:
         if key in _copies:
             _copies.move_to_end(key)
             return _copies[key]
-    try:
-        with opener(path, "rb") as packed:
-            copy = temporary_copy(packed, bare_name(path))
-    except (OSError, EOFError, lzma.LZMAError, zlib.error) as error:
-        raise ReadError(f"{path}: cannot be decompressed: {_reason(error)}") from None
+    with unpacked(path) as stream:
+        copy = temporary_copy(stream, bare_name(path))
     with _lock:
         _copies[key] = copy
         surplus = max(len(_copies) - KEPT * len(_threads), 0)
@@ -83,19 +86,69 @@ def plain(path: Path) -> Path:
     return copy
 
 
+@contextmanager
+def unpacked(path: Path) -> Iterator[IO[bytes]]:
+    """The content of a file, as a stream; ReadError if it cannot be read or decompressed."""
+    opener = _opener(path)
+    try:
+        with opener(path, "rb") as stream:
+            yield stream
+    except (OSError, EOFError, lzma.LZMAError, zlib.error) as error:
+        verb = "read" if opener is open else "decompressed"
+        raise ReadError(f"{path}: cannot be {verb}: {_reason(error)}") from None
+
+
+def check_memory(path: Path, needed: float) -> None:
+    """ReadError if there are not so many bytes for what a file holds."""
+    free = free_memory()
+    if needed > free:
+        raise ReadError(
+            f"{path}: needs about {needed / 1e9:.1f} GB of memory to be read, and "
+            f"{free / 1e9:.1f} GB are free"
+        )
+
+
 def temporary_copy(stream: IO[bytes], name: str) -> Path:
-    """What a stream holds, as a file that goes with the process."""
+    """
+    What a stream holds, as a file that goes with the process.
+
+    Raises
+    ------
+    ReadError
+        If it would fill the disk: a few bytes can be decompressed to any number.
+    """
     if not _folder:
         _folder.append(tempfile.mkdtemp(prefix="scanfab-"))
         at_end(_remove_copies)
     copy = Path(tempfile.mkdtemp(dir=_folder[0])) / name
     try:
         with open(copy, "wb") as file:
-            shutil.copyfileobj(stream, file, 1 << 20)
+            while part := stream.read(PART):
+                _check_disk(copy, file.tell())
+                _write(copy, file, part)
     except BaseException:
         shutil.rmtree(copy.parent, ignore_errors=True)
         raise
     return copy
+
+
+def _check_disk(copy: Path, size: int) -> None:
+    disk = shutil.disk_usage(copy.parent)
+    if disk.free < min(RESERVE, disk.total // 20) + PART:
+        raise ReadError(
+            f"{copy.name}: its content fills the disk of {tempfile.gettempdir()}, with {size:,} "
+            f"bytes so far: make room, or name another folder for temporary files by TMPDIR"
+        )
+
+
+def _write(copy: Path, file: IO[bytes], part: bytes) -> None:
+    try:
+        file.write(part)
+    except OSError as error:
+        raise ReadError(
+            f"{copy.name}: its content cannot be written to {tempfile.gettempdir()}: "
+            f"{_reason(error)}: name another folder for temporary files by TMPDIR"
+        ) from None
 
 
 def _remove_copies() -> None:

@@ -14,7 +14,7 @@ from scanfab.limits import MOST
 from scanfab.readers.base import GrainTable, ReadOptions, Snapshot
 from scanfab.readers.box import box_vectors
 from scanfab.readers.columns import grain_table
-from scanfab.readers.files import plain
+from scanfab.readers.files import check_memory, plain
 from scanfab.readers.numbers import rows_of_numbers
 
 __all__ = ["is_data_file", "read_data_grains", "step_of_data"]
@@ -55,6 +55,7 @@ def read_data_grains(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         If the atoms are not of style sphere, or a line is not as it should be.
     """
     path = snapshot.path
+    check_memory(path, 6.0 * plain(path).stat().st_size)
     data = plain(path).read_bytes()
     sections = list(SECTION.finditer(data, len(FIRST_LINE.match(data)[0])))  # type: ignore[index]
     atoms = next((place for place, one in enumerate(sections) if one[1] == b"Atoms"), None)

@@ -56,6 +56,15 @@ UNPACK: dict[bytes, tuple[Callable[[bytes], bytes] | None, int]] = {
 }
 
 
+# bytes of an array that are looked at, and of points for each that they are packed in: they are
+# in 10 to 30 where they stand in a lattice
+LARGE = 16 << 20
+MOST_ALIKE = 100
+# cells for each point: grains have no more contacts on average
+MOST_CELLS = 32
+MOST_COMPONENTS = 64
+
+
 class _Array(NamedTuple):
     """Where an array is, and how large."""
 
@@ -69,9 +78,11 @@ class _Array(NamedTuple):
     is_raw: bool
 
 
-def check_xml(data: bytes) -> None:
-    """Walk through a VTK XML file; FlawError if something does not fit."""
-    _Walk(data).through()
+def check_xml(data: bytes) -> int:
+    """Walk through a VTK XML file; FlawError if something does not fit. The bytes it fills."""
+    walk = _Walk(data)
+    walk.through()
+    return walk.bytes
 
 
 class _Walk:
@@ -94,6 +105,9 @@ class _Walk:
         self.unpack, growth = UNPACK[self.packing]
         # a value takes a byte at least
         self.most = len(data) * growth
+        # of all arrays, unpacked
+        self.bytes = 0
+        self.section = b""
 
     def through(self) -> None:
         """Walk to the end."""
@@ -106,6 +120,7 @@ class _Walk:
             self._check_extent(words)
             if tag[1] == b"Piece":
                 piece = self._counts(words)
+                _check_cell_count(piece)
             elif tag[1] == b"DataArray":
                 name = words.get(b"Name", b"").lower() if is_of_cells else b""
                 known = None if name not in (b"", b"offsets", b"types") else rows
@@ -115,6 +130,7 @@ class _Walk:
                 if {b"connectivity", b"offsets"} <= set(cells):
                     self._check_cells(cells.pop(b"offsets"), cells[b"connectivity"], rows or 0)
             else:
+                self.section = tag[1]
                 cells, is_of_cells = {}, tag[1] in CELLS
                 rows = _rows(tag[1], piece)
 
@@ -151,7 +167,29 @@ class _Walk:
         array = self._found(tag, words, type, expected == 0)
         if array.values < expected:
             raise FlawError(f"{name} has {array.values} of {expected} values")
+        size = array.values * int(type[1])
+        self.bytes += size
+        if self.packing and size > LARGE:
+            components = counts.get(b"Components", 1)
+            self._check_packed(name, array, None if rows is None else expected, components)
         return array
+
+    def _check_packed(
+        self, name: str, array: _Array, expected: int | None, components: int
+    ) -> None:
+        """
+        What kilobytes can be unpacked to must belong to the points.
+
+        An array may be one value over and over, of which a thousand bytes take one; points differ.
+        """
+        own = expected is not None and self.section != b"FieldData"
+        if (not own and name.lower() != "connectivity") or components > MOST_COMPONENTS:
+            raise FlawError(f"{name} has {array.values} values, which no points have")
+        if expected is not None and array.values > expected:
+            raise FlawError(f"{name} has {array.values} values instead of {expected}")
+        packed = sum((array.sizes or [])[3:])
+        if self.section == b"Points" and array.values * int(array.type[1]) > MOST_ALIKE * packed:
+            raise FlawError(f"{array.values // 3} points in {packed} bytes cannot differ")
 
     def _found(
         self, tag: re.Match[bytes], words: dict[bytes, bytes], type: str, is_empty: bool
@@ -230,6 +268,8 @@ class _Walk:
         if self.packing and self.unpack is None:
             return
         ends = self._whole_numbers(offsets)[:count]
+        if connectivity.values > ends.max(initial=0) + LARGE:
+            raise FlawError(f"connectivity has {connectivity.values} values for {count} cells")
         rises = np.all(np.diff(ends, prepend=0) >= 0)
         if not rises or ends.max(initial=0) > connectivity.values:
             raise FlawError("the offsets of the cells are wrong")
@@ -273,6 +313,13 @@ def _rows(section: bytes, piece: dict[bytes, int]) -> int | None:
     if section == b"CellData":
         return sum(count for name, count in piece.items() if name != b"Points")
     return piece.get(section)
+
+
+def _check_cell_count(piece: dict[bytes, int]) -> None:
+    points = piece.get(b"Points", 0)
+    for name, count in piece.items():
+        if count > MOST_CELLS * points + LARGE:
+            raise FlawError(f"NumberOf{_text(name)} cannot be {count} with {points} points")
 
 
 def _unpacked(sizes: list[int]) -> int:

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.errors import ReadError
-from scanfab.readers.files import bare_name, first_bytes, plain
+from scanfab.readers.files import bare_name, check_memory, first_bytes, plain
 from scanfab.readers.flaws import FlawError
 from scanfab.readers.legacy import check_legacy
 from scanfab.readers.markup import check_xml
@@ -100,9 +100,11 @@ def _read_mesh(path: Path) -> Mesh:
 def _refuse_flaws(path: Path) -> None:
     """ReadError for what VTK would read beyond the end of, or take all memory for."""
     file = plain(path)
+    # the libraries have it twice: as it is, and as arrays
+    check_memory(path, 3.0 * file.stat().st_size)
     check = check_legacy if first_bytes(file).startswith(b"# vtk") else check_xml
     try:
-        check(file.read_bytes())
+        check_memory(path, 3.0 * check(file.read_bytes()))
     except FlawError as flaw:
         raise ReadError(f"{path}: the file is damaged or incomplete: {flaw}") from None
 

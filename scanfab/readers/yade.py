@@ -23,7 +23,7 @@ from scanfab.readers.base import (
     Snapshot,
 )
 from scanfab.readers.columns import grain_table
-from scanfab.readers.files import first_bytes, plain
+from scanfab.readers.files import check_memory, first_bytes, plain
 from scanfab.readers.mesh import Mesh
 from scanfab.readers.numbers import rows_of_numbers
 from scanfab.readers.vtk import VtkReader
@@ -122,6 +122,7 @@ def _is_text(path: Path) -> bool:
 
 
 def _numbers(path: Path) -> FloatArray:
+    check_memory(path, 6.0 * plain(path).stat().st_size)
     data = plain(path).read_bytes()
     if all(not line.partition(b"#")[0].strip(BLANKS) for line in data.split(b"\n")):
         return np.zeros((0, 0))  # an empty frame

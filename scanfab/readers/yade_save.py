@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import IO, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +17,7 @@ from scanfab.errors import PackingError, ReadError
 from scanfab.limits import MOST
 from scanfab.readers.base import GrainTable, ReadOptions, Snapshot
 from scanfab.readers.columns import grain_table, whole_numbers
-from scanfab.readers.files import first_bytes, plain
+from scanfab.readers.files import first_bytes, unpacked
 from scanfab.readers.join import join_ids
 
 __all__ = ["is_binary_save", "is_save", "read_save", "snapshot_of_save"]
@@ -25,6 +27,12 @@ IntArray = npt.NDArray[np.int64]
 
 STEP = re.compile(rb"<iter>\s*(\d{1,18})\s*</iter>")
 TIME = re.compile(rb"<time>\s*([-+.\deE]+)\s*</time>")
+
+# bytes that are parsed at a time; pieces without a new body or contact after which none will come,
+# and inside one; how deep elements stand in one another
+PIECE = 1 << 16
+BARREN, BARREN_PART = 384, 128
+DEPTH = 200
 
 # where the scene's own values stand
 SCENE = ["boost_serialization", "scene", "px"]
@@ -113,32 +121,63 @@ class _Scene:
 
     def read(self) -> None:
         """Walk through the file."""
-        tags: list[str] = []
         try:
-            with open(plain(self.path), "rb") as stream:
-                for event, element in ElementTree.iterparse(stream, ("start", "end")):
-                    if event == "start":
-                        tags.append(element.tag)
-                        continue
-                    tags.pop()
-                    self._take(tags, element)
+            with unpacked(self.path) as stream:
+                self._walk(stream)
         except (ElementTree.ParseError, LookupError, ValueError, OverflowError) as error:
             raise ReadError(
                 f"{self.path}: cannot be read as a simulation that YADE saved (O.save): {error}"
             ) from None
 
-    def _take(self, above: list[str], element: ElementTree.Element) -> None:
-        """An element that is complete; ``above``: the tags that it stands in."""
+    def _walk(self, stream: IO[bytes]) -> None:
+        """Parse piece by piece, as long as bodies or contacts come out of it."""
+        found = barren = 0
+        for inside in self._pieces(stream):
+            known = len(self.bodies) + len(self.pairs)
+            barren = barren + 1 if known == found else 0
+            found = known
+            if barren > (BARREN_PART if inside else BARREN):
+                raise ValueError(f"no body and no contact in {barren * PIECE} bytes")
+
+    def _pieces(self, stream: IO[bytes]) -> Iterator[bool]:
+        """For each piece that was parsed, whether it ends inside a body or a contact."""
+        parser: ElementTree.XMLPullParser[Any] = ElementTree.XMLPullParser(("start", "end"))
+        above: list[ElementTree.Element] = []
+        part: int | None = None
+        while piece := stream.read(PIECE):
+            parser.feed(piece)
+            events: Iterator[Any] = parser.read_events()
+            for event, element in events:
+                if event == "start":
+                    if part is None and _is_part(above, element):
+                        part = len(above)
+                    above.append(element)
+                    continue
+                above.pop()
+                if part is None or part == len(above) or element.tag == "px":
+                    self._take(above, element)
+                if part is None or part == len(above):
+                    part = None
+                    if above:
+                        # the parser holds on to it by the one above
+                        del above[-1][:]
+            if len(above) > DEPTH:
+                raise ValueError(f"elements stand in one another {len(above)} deep")
+            yield part is not None
+        parser.close()
+
+    def _take(self, above: list[ElementTree.Element], element: ElementTree.Element) -> None:
+        """An element that is complete; ``above``: the elements that it stands in."""
         tag = element.tag
         if tag == "px" and element.find("iterMadeReal") is not None:
+            # inside the first body that has it, as YADE writes it
             self._take_interaction(element)
             element.clear()
-        elif tag == "px" and above[-2:] == ["body", "item"]:
+        elif tag == "px" and _tags(above[-2:]) == ["body", "item"]:
             self._take_body(element)
-            element.clear()
-        elif tag == "isPeriodic" and above == SCENE:
+        elif tag == "isPeriodic" and _tags(above) == SCENE:
             self.is_periodic = (element.text or "").strip() == "1"
-        elif tag == "hSize" and above == [*SCENE, "cell", "px"]:
+        elif tag == "hSize" and _tags(above) == [*SCENE, "cell", "px"]:
             self.size = [_number(element, f"m{row}{column}") for row, column in np.ndindex(3, 3)]
 
     def _take_body(self, body: ElementTree.Element) -> None:
@@ -189,6 +228,16 @@ class _Scene:
             return Cell(vectors)
         except PackingError as error:
             raise ReadError(f"{self.path}: {error}") from None
+
+
+def _is_part(above: list[ElementTree.Element], element: ElementTree.Element) -> bool:
+    """Whether an element is looked at as a whole, when it is complete."""
+    tag = element.tag
+    return tag == "hSize" or (tag == "px" and bool(above) and above[-1].tag == "item")
+
+
+def _tags(elements: list[ElementTree.Element]) -> list[str]:
+    return [element.tag for element in elements]
 
 
 def _number(element: ElementTree.Element, name: str) -> float:
