@@ -82,7 +82,8 @@ def watched(draw: bool) -> Iterator[Content]:
 
     def savefig(figure: Figure, path: Path, **rest: Any) -> None:
         content.extend(of_figure(figure))
-        save(figure, path, **rest) if draw else Path(path).touch()
+        if draw:
+            save(figure, path, **rest)
 
     def screenshot(plotter: Any, path: str, **rest: Any) -> None:
         content.extend(of_view(plotter))

@@ -6,14 +6,14 @@ import re
 import sys
 from pathlib import Path
 
-__all__ = ["free_memory"]
+__all__ = ["address_space", "free_memory"]
 
 GROUP = Path("/sys/fs/cgroup")
 
 
 def free_memory() -> int:
     """Bytes that this process can still get: of the machine, its container and its own limit."""
-    found = [_of_machine(), _of_container(), _of_process()]
+    found = [_of_machine(), _of_container(), address_space()]
     return max(min((one for one in found if one is not None), default=sys.maxsize), 0)
 
 
@@ -34,8 +34,8 @@ def _of_container() -> int | None:
         return None
 
 
-def _of_process() -> int | None:
-    """What ``ulimit -v`` leaves."""
+def address_space() -> int | None:
+    """What ``ulimit -v`` leaves to this process; None without such a limit."""
     try:
         import resource
 

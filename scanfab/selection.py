@@ -13,7 +13,7 @@ from typing import Any
 
 from scanfab.errors import ScanfabWarning, SettingsError
 from scanfab.table import COLUMNS
-from scanfab.tabular import is_number
+from scanfab.tabular import TEXT_COLUMNS, is_number
 
 __all__ = ["NEEDED", "check_rows", "choose_rows"]
 
@@ -21,11 +21,7 @@ Rows = list[dict[str, Any]]
 
 NEEDED = ("source", "frame", "strain", "variant", "alpha_vs_axial", "alpha_c_axial")
 NAMES = ("source", "variant")
-# odd values in other columns are taken for missing ones
-NUMBERS = (
-    "frame", "strain", "cutoff", "alpha_vs_axial", "alpha_c_axial", "alpha_vs_axial_se",
-    *(name for name in COLUMNS if "_without_" in name),
-)  # fmt: skip
+NUMBERS = tuple(name for name in COLUMNS if name not in TEXT_COLUMNS)
 # columns that no fabric table has, and the table that they give away
 OTHER_TABLES = {
     ("alpha_vs_axial_norm", "alpha_c_axial_norm"): "compare",
@@ -112,6 +108,8 @@ def check_rows(rows: Sequence[Mapping[str, Any]], table: str = "") -> None:
         for name in NUMBERS:
             if row.get(name) is not None and not is_number(row[name]):
                 raise SettingsError(f"{where}: {name}: expected a number, {_found(row[name])}")
+        if row["frame"] is None or row["frame"] % 1 != 0:
+            raise SettingsError(f"{where}: frame: expected a whole number, {_found(row['frame'])}")
 
 
 def _check_columns(where: str, row: Mapping[str, Any]) -> None:

@@ -102,7 +102,7 @@ VALUES = ["abc", True, [1], {"a": [1]}, float("nan"), float("inf"), 10**400, b"x
 
 
 @pytest.mark.parametrize(
-    "column", ["frame", "strain", "alpha_vs_axial", "alpha_c_axial_without_3", "cutoff"]
+    "column", ["frame", "strain", "alpha_vs_axial", "alpha_c_axial_without_3", "coaxiality_deg"]
 )
 @pytest.mark.parametrize("value", VALUES, ids=lambda value: repr(value)[:12])
 def test_a_value_of_another_kind_is_named_by_table_row_and_column(column, value):
@@ -119,6 +119,13 @@ def test_a_value_of_another_kind_is_named_by_table_row_and_column(column, value)
 def test_a_name_of_another_kind_is_named(column, value):
     rows = [*curve()[:2], {**curve()[2], column: value}]
     with pytest.raises(SettingsError, match=f"^t.csv: row 3: {column}: expected a name, found "):
+        choose_rows([("t.csv", rows)])
+
+
+@pytest.mark.parametrize("value", [None, 1.5])
+def test_frames_are_whole_numbers(value):
+    rows = [{**curve()[0], "frame": value}]
+    with pytest.raises(SettingsError, match=r"t.csv: row 1: frame: expected a whole number, found"):
         choose_rows([("t.csv", rows)])
 
 

@@ -268,7 +268,7 @@ def _write_or_say(
         with telling(standing):
             _write(run, asked, result, excerpt)
     except (ScanfabError, OSError):
-        if result is not None and run.done:
+        if result is not None and 0 < run.done < run.frames():
             click.echo(f"scanfab: stopped {standing()}", err=True)
         raise
 

@@ -21,6 +21,10 @@ COMMANDS = {
 }
 
 
+# bytes of addresses that the libraries need before anything is read
+LEAST_SPACE = 1_000_000_000
+
+
 class LazyGroup(click.Group):
     """A group that knows its commands by name."""
 
@@ -51,6 +55,19 @@ def _print_version(ctx: click.Context, param: click.Parameter, value: bool) -> N
         ctx.exit()
 
 
+def _check_limit() -> None:
+    """Some libraries end the process, or wait for ever, where they cannot even be loaded."""
+    from scanfab.errors import ScanfabError
+    from scanfab.memory import address_space
+
+    space = address_space()
+    if space is not None and space < LEAST_SPACE:
+        raise ScanfabError(
+            f"not enough memory: the limit (ulimit -v) leaves {space / 1e6:.0f} MB, "
+            f"{LEAST_SPACE / 1e6:.0f} MB are needed at least"
+        )
+
+
 @click.group(cls=LazyGroup)
 @click.option(
     "--version",
@@ -63,3 +80,4 @@ def _print_version(ctx: click.Context, param: click.Parameter, value: bool) -> N
 @click.option("--debug", is_flag=True, expose_value=False, help="Show a traceback with an error.")
 def cli() -> None:
     """The void fabric of granular packings by scan lines, from DEM particle dumps."""
+    _check_limit()

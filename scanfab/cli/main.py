@@ -11,6 +11,8 @@ import sys
 
 __all__ = ["main", "run"]
 
+# bytes of addresses: with fewer left, whatever fails does so for them
+LITTLE = 200_000_000
 # bars of a curve become those that a keyboard has
 PLAIN_LETTERS = dict(zip("▁▂▃▄▅▆▇█", "_.-:=+*#", strict=True)) | {
     "α": "a",
@@ -93,19 +95,35 @@ def run(args: list[str]) -> int:
     except (KeyboardInterrupt, click.Abort):
         click.echo(interrupted_words(signal.SIGINT), err=True)
         return 128 + signal.SIGINT
-    except (ScanfabError, OSError, MemoryError) as error:
-        if debug:
+    except Exception as error:
+        if debug or not (isinstance(error, ScanfabError | OSError) or _lacks_memory(error)):
             raise
         click.echo(f"scanfab: error: {_describe(error)}", err=True)
         return 1
 
 
-def _describe(error: BaseException) -> str:
+def _lacks_memory(error: Exception) -> bool:
+    """Whether there is no memory: libraries that cannot load their parts raise all kinds."""
+    from scanfab.memory import address_space
+
+    space = address_space()
+    told = any(words in str(error) for words in ("failed to map", "can't start new thread"))
+    return isinstance(error, MemoryError) or told or (space is not None and space < LITTLE)
+
+
+def _describe(error: Exception) -> str:
     import os
     from io import UnsupportedOperation
 
+    from scanfab.errors import ScanfabError
+
     if isinstance(error, UnsupportedOperation):
         return "standard output is closed: name a file with -o"
+    if not isinstance(error, ScanfabError | OSError) and _lacks_memory(error):
+        return (
+            f"not enough memory ({str(error) or type(error).__name__}): fewer --workers need less, "
+            f"and ulimit -v shows the limit"
+        )
     if isinstance(error, OSError) and error.errno and error.strerror == os.strerror(error.errno):
         # whatever writes to files names them
         return f"{error.filename or 'standard output'}: {error.strerror}"

@@ -29,19 +29,19 @@ _more: list[Callable[[], str]] = []
 @contextmanager
 def telling(words: Callable[[], str]) -> Iterator[None]:
     """In the block these words follow "interrupted", such as "after 4 of 5 frames"."""
-    _more.append(words)
+    _more[:] = [words]
     try:
         yield
     except Exception:
-        _more.remove(words)
+        _more.clear()
         raise
-    # where KeyboardInterrupt ended the block, run() still has to say them
-    _more.remove(words)
+    # where KeyboardInterrupt ended the block, the words are still to be said
+    _more.clear()
 
 
 def interrupted_words(number: int) -> str:
     """What is said of a signal that ended the process."""
-    return " ".join([f"scanfab: {ENDED[number]}", *(words() for words in _more[-1:])])
+    return " ".join([f"scanfab: {ENDED[number]}", *(words() for words in _more)])
 
 
 def catch_signals() -> None:

@@ -18,6 +18,7 @@ from typing import IO, Any
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.memory import free_memory
 from scanfab.threads import in_order
 
 __all__ = ["LARGE", "TextTable", "read_regular"]
@@ -28,6 +29,10 @@ LARGE = 8 << 20
 PIECE = 16 << 20
 # pieces under way: while polars parses one in several threads, another is counted, read or copied
 WORKERS = 4
+
+
+# bytes that polars may need with all these pieces; without them it ends the process
+ROOM = 3 << 29
 
 
 @dataclass(frozen=True)
@@ -62,8 +67,11 @@ def read_regular(table: TextTable, columns: Mapping[int, npt.NDArray[Any]]) -> b
     Returns
     -------
     bool
-        False if the table is not regular: what is in the arrays then has no meaning.
+        False if the table is not regular, or memory is short: what is in the arrays then has no
+        meaning.
     """
+    if free_memory() < ROOM:
+        return False
     rows = 0
     for frame in _parsed(table, {place: column.dtype for place, column in columns.items()}):
         if frame is None or rows + frame.height > table.count:

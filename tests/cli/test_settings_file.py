@@ -107,8 +107,9 @@ def test_every_command_says_which_options_it_takes(series, capsys):
     write(series / "scanfab.toml", '[compute]\nrv = 0.6\nboundary = "id=1"\nmin-contacts = 3\n')
     assert run(["inspect", str(series), "--min-contacts", "2"]) == 0
     told = capsys.readouterr().err
-    assert f"scanfab: note: options from {series}/scanfab.toml: boundary\n" in told
-    assert run(["inspect", str(series), "--min-contacts", "2", "--boundary", "id=2"]) == 0
+    assert f"scanfab: note: options from {series}/scanfab.toml: rv, boundary\n" in told
+    named = ["--min-contacts", "2", "--boundary", "id=2", "--rv", "0.5"]
+    assert run(["inspect", str(series), *named]) == 0
     assert "options from" not in capsys.readouterr().err
 
 

@@ -1,0 +1,89 @@
+"""Little memory: one message, exit code 1, no traceback."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from scanfab import memory
+from scanfab.cli import group, main
+from scanfab.readers import regular
+from tests.dumps import cubic_rows, dump_text, write
+from tests.interruptions import PROGRAM
+
+resource = pytest.importorskip("resource", reason="limits of a process are POSIX")
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the size is read from /proc")
+@pytest.mark.parametrize("words", [["compute"], ["inspect"], ["calibrate"]])
+def test_a_limit_that_nothing_can_be_done_with_is_told_at_once(tmp_path, words):
+    dump = write(tmp_path / "dump", dump_text(cubic_rows()))
+    most = 400 << 20
+    answer = subprocess.run(
+        [*PROGRAM, *words, str(dump)],
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (most, most)),
+    )
+    assert answer.returncode == 1, answer.stderr
+    assert answer.stderr.startswith("scanfab: error: not enough memory: the limit (ulimit -v) ")
+    assert len(answer.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        MemoryError(),
+        MemoryError("Allocation failed (probably too large)."),
+        RuntimeError("can't start new thread"),
+        ImportError("libvtkCommonCore.so: failed to map segment from shared object"),
+    ],
+)
+def test_what_fails_for_lack_of_memory_is_one_message(monkeypatch, capsys, error):
+    def fail(*_, **__):
+        raise error
+
+    monkeypatch.setattr(group.cli, "main", fail)
+    assert main.run(["compute"]) == 1
+    told = capsys.readouterr().err
+    assert told.startswith("scanfab: error: not enough memory (")
+    assert "fewer --workers need less" in told
+
+
+def test_where_next_to_nothing_is_left_any_failure_is_one_of_memory(monkeypatch, capsys):
+    def fail(*_, **__):
+        raise NameError("name 'PyLazyFrame' is not defined")
+
+    monkeypatch.setattr(group.cli, "main", fail)
+    with pytest.raises(NameError):  # a mistake of ours is not hidden
+        main.run(["compute"])
+    monkeypatch.setattr(memory, "address_space", lambda: 1_000_000)
+    assert main.run(["compute"]) == 1
+    assert "not enough memory (name 'PyLazyFrame'" in capsys.readouterr().err
+
+
+def test_polars_is_not_asked_where_it_would_end_the_process(tmp_path, monkeypatch):
+    path = tmp_path / "table"
+    path.write_text("1 2\n3 4\n")
+    table, column = regular.TextTable(path, 0, 8, 2, 2), np.zeros(2)
+    assert regular.read_regular(table, {0: column})
+    monkeypatch.setattr(regular, "free_memory", lambda: 1 << 30)
+    assert not regular.read_regular(table, {0: column})
+
+
+def test_what_is_free_is_the_least_of_all_limits(monkeypatch, tmp_path):
+    assert memory.free_memory() > 0
+    monkeypatch.setattr(memory, "address_space", lambda: 1000)
+    assert memory.free_memory() == 1000
+    (tmp_path / "memory.max").write_text("900\n")
+    (tmp_path / "memory.current").write_text("100\n")
+    monkeypatch.setattr(memory, "GROUP", Path(tmp_path))
+    assert memory.free_memory() == 800
+    (tmp_path / "memory.max").write_text("max\n")
+    assert memory.free_memory() == 1000
+    assert group.LEAST_SPACE > main.LITTLE
