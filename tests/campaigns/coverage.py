@@ -37,7 +37,7 @@ SCANS = {
     "spacing": {"tolerance": TOLERANCE / 2, "spacing": "0.5rmin"},
     "fixed": {"directions": "icosahedral:9", "spacing": "0.5rmin"},
 }
-TRUTH = {"tolerance": TOLERANCE / 20, "seed": 1_000_000}
+TRUTH = {"tolerance": TOLERANCE / 80, "seed": 1_000_000}
 EXPECTED, ALLOWED = 0.68, 0.05
 VARIANTS = "abcd"
 
