@@ -11,6 +11,7 @@ import click
 
 from scanfab.cli.options import (
     check_plot,
+    choosing_options,
     completed,
     excerpt_options,
     output_option,
@@ -40,19 +41,7 @@ __all__ = ["compare"]
 @click.option(
     "--strain-max", type=float, metavar="X", help="Leave frames beyond this strain out of the fits."
 )
-@click.option(
-    "--cutoff",
-    type=float,
-    metavar="C",
-    help="Take the rows of this cut-off from tables of several; in the tables' unit.",
-)
-@click.option(
-    "--label",
-    "labels",
-    multiple=True,
-    metavar="NAME",
-    help="Name of a table in place of its source, once a table, in their order.",
-)
+@choosing_options
 @output_option
 @excerpt_options
 @plot_option

@@ -16,6 +16,7 @@ __all__ = [
     "SourceType",
     "axis_option",
     "check_plot",
+    "choosing_options",
     "completed",
     "cutoff_option",
     "excerpt_options",
@@ -198,6 +199,22 @@ cutoff_option = click.option(
     show_default=True,
     metavar="L",
     help="Shortest void segment kept: in the dump's units, or with rmin, rmean, rmax.",
+)
+
+choosing_options = together(
+    click.option(
+        "--cutoff",
+        type=float,
+        metavar="C",
+        help="Take the rows of this cut-off from tables of several; in the tables' unit.",
+    ),
+    click.option(
+        "--label",
+        "labels",
+        multiple=True,
+        metavar="NAME",
+        help="Name of a table in place of its source, once a table, in their order.",
+    ),
 )
 
 axis_option = click.option(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from scanfab.cli.options import usage_errors
+from scanfab.cli.options import choosing_options, usage_errors
 from scanfab.cli.talk import talk_options, working
 
 __all__ = ["report"]
@@ -32,19 +32,7 @@ __all__ = ["report"]
 @click.option(
     "--author", metavar="TEXT", help="Author (default: your full name, if this computer knows it)."
 )
-@click.option(
-    "--cutoff",
-    type=float,
-    metavar="C",
-    help="Take the rows of this cut-off from tables of several; in the tables' unit.",
-)
-@click.option(
-    "--label",
-    "labels",
-    multiple=True,
-    metavar="NAME",
-    help="Name of a table in place of its source, once a table, in their order.",
-)
+@choosing_options
 @talk_options
 def report(
     tables: tuple[Path, ...],
