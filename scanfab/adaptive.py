@@ -37,7 +37,7 @@ SMALLEST_ROUND = 1.1
 # reported, is seldom above it, and a scan that goes on until it is below picks few errors that are
 # too small by chance. Where replicates can be added this makes the error surer; where their number
 # R is fixed it stays uncertain by a part of 1/√(2(R - 1)), so many of which the margin leaves.
-MARGIN, SIGMAS = 1.1, 1.6
+MARGIN, SIGMAS = 1.1, 2.5
 # of the smallest radius: directions that are empty with lines so close cannot be filled
 CLOSEST = 0.05
 # fraction of the directions of a replicate that may keep no segment before lines are set closer

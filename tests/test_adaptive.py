@@ -91,7 +91,7 @@ def test_a_scan_of_a_given_spacing_does_not_stop_at_an_error_that_is_small_by_ch
         plan = make_plan(settings, Sample(centred, np.zeros(len(packing), bool)))
         sums, plan = adaptive.scan_to_tolerance(solids, plan, settings)
         fabric = void_fabric(sums.axes, plan.rule.weights, *sums.kept("c"))
-        assert 1.14 * fabric.expected_error(settings.axis, plan.rule.degree) <= 1e-3
+        assert 1.2 * fabric.expected_error(settings.axis, plan.rule.degree) <= 1e-3
         assert fabric.axial_error(settings.axis) <= 1e-3
 
 
