@@ -6,7 +6,7 @@ import logging
 import math
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from scanfab.adaptive import missing_work
@@ -25,7 +25,13 @@ from scanfab.ladders import (
 )
 from scanfab.measurement import Measurement
 from scanfab.packing import Packing
-from scanfab.pipeline import boundary_hint, chosen_frames, classify, no_such_frames
+from scanfab.pipeline import (
+    classify,
+    frames_of,
+    no_such_frames,
+    refuse_unknown_boundary,
+    tell_doubts,
+)
 from scanfab.plan import Plan, make_plan
 from scanfab.series import Series
 from scanfab.settings import AUTO_RULE, Length, Settings
@@ -115,13 +121,13 @@ class _Calibrator:
         self.name = "" if isinstance(source, Packing) else source.name
         self.settings = settings
         self.first, self.number, self.sample = _samples(source, settings, frame)
+        doubt = self.sample.doubt_of_escaped()
+        if doubt is not None:
+            warnings.warn(f"frame {self.number}: {doubt}", ScanfabWarning, stacklevel=3)
         radius = self.first.packing.radius[self.first.grains]
         self.r_min = float(radius.min())
         # its warnings concern every step
         make_plan(settings, self.first)
-        hint = boundary_hint(self.first, settings)
-        if hint is not None:
-            warnings.warn(hint, ScanfabWarning, stacklevel=3)
 
     def all(self) -> Calibration:
         """The ladders, what they say, and what follows."""
@@ -283,27 +289,26 @@ def _samples(
     source: Packing | Series, settings: Settings, frame: int
 ) -> tuple[Sample, int, Sample]:
     """The first frame that has grains, and the wanted one with its number."""
-    if isinstance(source, Packing):
-        reads: list[Callable[[], Packing]] = [lambda: source]
-    elif isinstance(source, Series):
-        reads = [one.read for one in source]
-    else:
+    if not isinstance(source, Packing | Series):
         raise SettingsError(f"calibrate: expected a Packing or a Series, found {source!r}")
     wanted = slice(frame, frame + 1 if frame != -1 else None)
-    chosen = list(chosen_frames(source, wanted)) if isinstance(source, Series) else [0, -1]
-    number = chosen[0] if chosen else len(reads)
-    if number >= len(reads) or (isinstance(source, Packing) and frame not in (0, -1)):
+    frames = [one for _, one in frames_of(source)]
+    chosen = range(len(frames))[wanted]
+    if not chosen:
         raise no_such_frames(source, wanted)
+    number = chosen[0]
     first: Sample | None = None
-    for place, read in enumerate(reads):
-        sample = classify(read(), settings)
+    for place, one in enumerate(frames):
+        sample = classify(one.read(), settings)
         if first is None and sample.grains.any():
             first = sample
+            refuse_unknown_boundary(source, first, settings)
+            tell_doubts(one, first, settings)
         if place >= number and first is not None:
             break
     if first is None:
         raise PackingError("no frame has any grains: there is nothing to calibrate")
-    sample = sample if place == number else classify(reads[number](), settings)
+    sample = sample if place == number else classify(frames[number].read(), settings)
     if not sample.grains.any():
         raise PackingError(f"frame {number} has no grains: choose another frame")
     return first, number, sample

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from scanfab.errors import ReadError, ScanfabWarning, SettingsError
-from scanfab.pipeline import boundary_hint, classify
+from scanfab.pipeline import classify, refuse_unknown_boundary, tell_doubts
 from scanfab.plan import Plan, make_plan
 from scanfab.scene import Scene, about_window, scene_of
 from scanfab.series import Frame, Series
@@ -54,10 +54,10 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
     """
     number, frame = _frame(series, number)
     sample = classify(frame.read(), settings)
-    hint = boundary_hint(sample, settings)
-    if hint is not None:
-        warnings.warn(hint, ScanfabWarning, stacklevel=2)
+    tell_doubts(frame, sample, settings)
     first = _first(series, settings)
+    if first is not None:
+        refuse_unknown_boundary(series, first, settings)
     plan = None if first is None else _plan(first, settings)
     scene = scene_of(sample, None if plan is None else plan.window)
     if plan is not None:

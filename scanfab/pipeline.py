@@ -36,7 +36,18 @@ from scanfab.table import Row, Table
 from scanfab.threads import in_order
 from scanfab.variants import Sample
 
-__all__ = ["FrameResult", "compute", "compute_rows"]
+__all__ = [
+    "FrameResult",
+    "boundary_hint",
+    "chosen_frames",
+    "classify",
+    "compute",
+    "compute_rows",
+    "frames_of",
+    "no_such_frames",
+    "refuse_unknown_boundary",
+    "tell_doubts",
+]
 
 LOGGER = logging.getLogger("scanfab")
 
@@ -134,19 +145,18 @@ class _Run:
         self.strains = _Strains(settings)
         self.particles = 0
         self.found = False
-        self.has_boundary = False
 
     def jobs(self) -> Iterator[Callable[[int], list[Row]]]:
         """For each chosen frame what computes its rows, with a number of threads."""
         chosen = chosen_frames(self.source, self.settings.frames)
-        for number, frame in _frames(self.source):
+        for number, frame in frames_of(self.source):
             due = number in chosen
             self.found = self.found or due
             due = due and number not in self.done
             if self.plan is None:
                 sample = self._read(number, frame.read)
                 if sample is not None:
-                    self._start(number, frame, sample)
+                    self._start(frame, sample)
                     if due:
                         yield partial(self._rows, number, sample)
             elif due:
@@ -161,35 +171,14 @@ class _Run:
         if self.plan is None:
             _complain_of_no_grains(self.name, self.particles, self.settings)
 
-    def _start(self, number: int, frame: _Readable, sample: Sample) -> None:
+    def _start(self, frame: Readable, sample: Sample) -> None:
         """Make the plan, if the frame has grains."""
         self.particles += len(sample.packing)
-        self.has_boundary = self.has_boundary or bool(sample.boundary.any())
         if sample.grains.any():
-            if self.settings.boundary and not self.has_boundary:
-                self._refuse_unknown_boundary(number, sample)
-            doubts = doubts_of(sample, cell_is_named=frame.cell_is_named)
-            for doubt in (*doubts, cell_doubt(sample, frame.carries, always=False)):
-                if doubt:
-                    warnings.warn(doubt, ScanfabWarning, stacklevel=2)
+            refuse_unknown_boundary(self.source, sample, self.settings)
+            tell_doubts(frame, sample, self.settings)
             self.plan = make_plan(self.settings, sample)
             self.strains.start(sample)
-            hint = boundary_hint(sample, self.settings)
-            if hint is not None and not self.settings.boundary:
-                warnings.warn(hint, ScanfabWarning, stacklevel=2)
-
-    def _refuse_unknown_boundary(self, number: int, sample: Sample) -> None:
-        """An error if the boundary's particles are in no later frame either."""
-        rules = self.settings.boundary
-        for later, frame in _frames(self.source):
-            with suppress(PackingError, ReadError):
-                if later > number and select_boundary(frame.read(), rules).any():
-                    return
-        named = " or ".join(rule.text for rule in rules)
-        raise SettingsError(
-            f"boundary: no particle of any frame has {named}: "
-            f"{existing_values(sample.packing, rules)}"
-        )
 
     def _read(self, number: int, read: Callable[[], Packing]) -> Sample | None:
         """The frame; None if it cannot be read and such frames are to be skipped."""
@@ -258,7 +247,7 @@ def _complain_of_no_grains(name: str, particles: int, settings: Settings) -> Non
     warnings.warn(f"{name}: no frame has any grains", ScanfabWarning, stacklevel=3)
 
 
-class _Readable(Protocol):
+class Readable(Protocol):
     """A frame of a series, or a packing in its place."""
 
     @property
@@ -282,8 +271,34 @@ class _Given:
         return self.packing
 
 
-def _frames(source: Packing | Series) -> Iterator[tuple[int, _Readable]]:
+def frames_of(source: Packing | Series) -> Iterator[tuple[int, Readable]]:
+    """The frames by number; a packing is one."""
     yield from enumerate([_Given(source)] if isinstance(source, Packing) else source)
+
+
+def refuse_unknown_boundary(source: Packing | Series, first: Sample, settings: Settings) -> None:
+    """SettingsError if no frame has any of the boundary's particles, which ``first`` has not."""
+    rules = settings.boundary
+    if not rules or first.boundary.any():
+        return
+    for _, frame in frames_of(source):
+        with suppress(PackingError, ReadError):
+            if select_boundary(frame.read(), rules).any():
+                return
+    named = " or ".join(rule.text for rule in rules)
+    raise SettingsError(
+        f"boundary: no particle of any frame has {named}: {existing_values(first.packing, rules)}"
+    )
+
+
+def tell_doubts(frame: Readable, sample: Sample, settings: Settings) -> None:
+    """Warn of what looks wrong in a frame before anything is measured."""
+    doubts = doubts_of(sample, cell_is_named=frame.cell_is_named)
+    doubts.append(cell_doubt(sample, frame.carries, always=False))
+    if not settings.boundary:
+        doubts.append(boundary_hint(sample, settings) or "")
+    for doubt in filter(None, doubts):
+        warnings.warn(doubt, ScanfabWarning, stacklevel=3)
 
 
 def chosen_frames(source: Packing | Series, frames: slice) -> range:

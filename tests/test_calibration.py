@@ -204,3 +204,17 @@ def test_figure_has_letters_total_errors_and_words(found, tmp_path, monkeypatch)
         if row.value in path.vertices[:, 0]
     ]
     assert any(height == pytest.approx(2 * half) for height in heights)
+
+
+def test_what_looks_wrong_in_the_frame_is_told_here_too(packing):
+    """A grain that flew away, and clumps that are not read as bodies."""
+    count = len(packing) + 1
+    position = np.vstack([packing.position, [90.0, 3.0, 3.0]])
+    radius = np.append(packing.radius, 0.5)
+    bodies = np.repeat(np.arange(count), 2)[:count] + 1
+    flown = find_contacts(Packing(position, radius, columns={"clump": bodies}))
+    with pytest.warns(ScanfabWarning) as told:
+        calibrate(flown, Settings.make(**{**QUICK, "tolerance": 0.02}))
+    texts = [str(one.message) for one in told]
+    assert any("away from all others" in text for text in texts)
+    assert any("clumps are not read as bodies" in text for text in texts)

@@ -165,7 +165,8 @@ def _command_line(ctx: click.Context, source: str, recommended: dict[str, str]) 
     for parameter in ctx.command.params:
         name = str(parameter.name)
         given = ctx.get_parameter_source(name) is ParameterSource.COMMANDLINE
-        if name in OWN or not given:
+        # --quiet and the like are no settings
+        if name in OWN or name not in ctx.params or not given:
             continue
         value = ctx.params[name]
         for one in value if parameter.multiple else [value]:

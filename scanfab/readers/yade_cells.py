@@ -63,12 +63,12 @@ def cell_beside(path: Path, position: FloatArray) -> Cell | None:
     if named is None:
         return None
     number = int(named[2])
-    file = (
-        _exported_cell(path, named[1], number)
-        if exported
-        else _with_any_packing(path.with_name(f"{named[1]}pericell.{named[2]}.vtu"))
-    )
-    file = file or _saved_state(path, named[1], number)
+    if exported:
+        # its number counts files; that of a saved state is a step
+        file = _exported_cell(path, named[1], number)
+    else:
+        beside = _with_any_packing(path.with_name(f"{named[1]}pericell.{named[2]}.vtu"))
+        file = beside or _saved_state(path, named[1], number)
     if file is None:
         return None
     cell = _read_cell(file)

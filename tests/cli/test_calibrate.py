@@ -85,3 +85,16 @@ def test_a_dump_of_one_grain_or_none_is_one_message(calibrate, tmp_path, rows, m
     out, err = calibrate(tmp_path, code=1)
     assert out == ""
     assert message in err
+
+
+@pytest.mark.parametrize("word", ["--quiet", "--verbose"])
+def test_what_is_said_beside_is_no_setting_of_the_recommended_command(calibrate, word):
+    frame = ("--frame", "3", "--variants", "c", "--max-chords", "1e7", word)
+    _, err = calibrate(TRIAXIAL, *QUICK, *frame)
+    assert word not in err.strip().splitlines()[-1]
+    assert "scanfab compute" in err.strip().splitlines()[-1]
+
+
+def test_calibrate_refuses_a_boundary_that_no_particle_has(calibrate):
+    _, err = calibrate(TRIAXIAL, "--boundary", "mask=5", code=1)
+    assert "no particle of any frame has mask=5: mask is 1 or 3" in err

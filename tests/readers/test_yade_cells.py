@@ -134,3 +134,16 @@ def test_a_csv_file_of_cells_that_is_wrong_is_an_error_that_says_where(tmp_path,
     path.write_text(text)
     with pytest.raises(ReadError, match=f"cells.csv.*{message}"):
         scanfab.read_series(STRAINED / "rec_spheres.*", cell=path)
+
+
+def test_a_saved_state_is_no_cell_of_the_exporters_files_which_are_counted(tmp_path):
+    """Number 0 of the exporter is its first file, that of O.save the step 0 of the simulation."""
+    saved = next(STRAINED.glob("saved*.xml*"))
+    step = int("".join(filter(str.isdigit, saved.name.partition(".xml")[0])))
+    spheres = tmp_path / f"x-spheres-{step:08d}.vtk.gz"
+    shutil.copy(STRAINED / "after-spheres-00000001.vtk.gz", spheres)
+    shutil.copy(saved, tmp_path / saved.name.replace("saved", "x"))
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        assert scanfab.read(spheres).cell is None
+    assert not any("the cell is read from" in str(one.message) for one in told)
