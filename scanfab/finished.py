@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from itertools import groupby, pairwise
 from pathlib import Path
@@ -35,6 +35,27 @@ class FinishedTable:
     """What was asked for."""
     warnings: list[str]
     """What its manifest says that the user was told."""
+
+    columns: frozenset[str]
+    """Those that were written."""
+
+    @property
+    def has_void_fabric(self) -> bool:
+        """Whether any row has one; where no column tells, none is known to have none."""
+        telling = {"alpha_vs", "alpha_vs_axial"} & self.columns
+        rows = [row for frames in self.rows.values() for some in frames.values() for row in some]
+        return any(
+            not telling or any(getattr(row, name) is not None for name in telling) for row in rows
+        )
+
+    def check_columns(self, needed: Iterable[str]) -> None:
+        """SettingsError if columns that a figure needs were not written."""
+        lacking = [name for name in needed if name not in self.columns]
+        if any(self.rows.values()) and lacking:
+            raise SettingsError(
+                f"{self.path}: its rows lack {', '.join(lacking)} (--fields), which the figure "
+                f"needs: leave out --plot, or --resume to compute all frames again"
+            )
 
     def with_frames(self, series: Sequence[Series], chosen: slice) -> slice:
         """
@@ -113,7 +134,8 @@ def finished_table(
             found[source][frame] = own
     _check_inputs(path, manifest, series, found)
     frames = slice(*(manifest["settings"].get("frames") or (None,)))
-    return FinishedTable(path, found, frames, [str(one) for one in manifest.get("warnings", [])])
+    told = [str(one) for one in manifest.get("warnings", [])]
+    return FinishedTable(path, found, frames, told, frozenset(rows[0] if rows else ()))
 
 
 def _row(values: Mapping[str, Any]) -> Row:

@@ -48,7 +48,12 @@ class FrameFile:
         self._rows: dict[int, tuple[float, ...]] = {}
         try:
             with open(path, newline="", encoding="utf-8-sig") as stream:
-                self._read(csv.DictReader(stream, skipinitialspace=True), names, optional)
+                rows = csv.DictReader(stream, skipinitialspace=True)
+                try:
+                    self._read(rows, names, optional)
+                except csv.Error as error:  # of a cell that is far too long
+                    line = rows.line_num + 1
+                    raise ReadError(f"{path}, line {line}: {error}, expected numbers") from None
         except UnicodeDecodeError:
             raise ReadError(f"{path}: expected a CSV file, found bytes that are no text") from None
 
@@ -77,7 +82,7 @@ class FrameFile:
         self, line: int, row: dict[str, str], names: Sequence[str]
     ) -> tuple[int, tuple[float, ...]]:
         try:
-            number = int(float(row[self.key]))
+            number = _whole(row[self.key])
             values = tuple(float(row[name]) for name in names)
             is_above = all(value > 0 for value in values[: self._positive])
             if is_above and all(map(math.isfinite, values)):
@@ -87,10 +92,18 @@ class FrameFile:
         above = f" (above 0: {', '.join(names[: self._positive])})" if self._positive else ""
         raise ReadError(
             f"{self.path}, line {line}: expected numbers as {self.key} and {', '.join(names)}"
-            f"{above}, found {row[self.key]!r} and {', '.join(repr(row[name]) for name in names)}"
+            f"{above}, the first a whole one, found {row[self.key]!r} and {', '.join(repr(row[name]) for name in names)}"
         )
 
     def at(self, frame: int, step: int | None) -> tuple[float, ...] | None:
         """The numbers of a frame; None if the file does not name it."""
         number = step if self.key == "step" else frame
         return None if number is None else self._rows.get(number)
+
+
+def _whole(text: str) -> int:
+    """A step or frame, also as 1e3; ValueError if it is none."""
+    number = float(text)
+    if not number.is_integer():
+        raise ValueError
+    return int(number)

@@ -109,7 +109,7 @@ def test_a_missing_column_is_an_error_that_names_the_file(tmp_path, text):
         StrainFile(write(tmp_path / "s.csv", text))
 
 
-@pytest.mark.parametrize("row", ["10,high", ",0.1", "10,", "10"])
+@pytest.mark.parametrize("row", ["10,high", ",0.1", "10,", "10", "10.7,0.1", "1e999,0.1"])
 def test_a_value_that_is_no_number_is_an_error_that_names_the_line(tmp_path, row):
     with pytest.raises(ReadError, match=r"s.csv, line 3: expected numbers as step and strain"):
         StrainFile(write(tmp_path / "s.csv", f"step,strain\n0,0\n{row}\n"))
@@ -119,6 +119,13 @@ def test_a_file_that_is_no_text_is_an_error(tmp_path):
     path = tmp_path / "s.csv"
     path.write_bytes(b"step,strain\n\xff\xfe\x00\n")
     with pytest.raises(ReadError):
+        StrainFile(path)
+
+
+@pytest.mark.parametrize("cell", ["9" * 140_000, "0.\0"])
+def test_a_cell_that_no_csv_file_has_is_an_error_that_names_the_file(tmp_path, cell):
+    path = write(tmp_path / "s.csv", f"step,strain\n0,{cell}\n")
+    with pytest.raises(ReadError, match=r"s\.csv, line 2: .*expected numbers"):
         StrainFile(path)
 
 

@@ -213,6 +213,8 @@ def compute(
         if resume and result is not None:
             with usage_errors():
                 asked = run.go_on(result, asked)
+                if plot is not None and run.table is not None:
+                    run.table.check_columns(_columns_drawn(figure))
         _write_or_say(run, asked, result, excerpt)
         for path in _manifests(output, manifest_path):
             _write_manifest(path, asked, run, told, settings_file)
@@ -239,6 +241,13 @@ def _is_of_frames(figure: str) -> bool:
     return figure not in TABLE_FIGURES
 
 
+def _columns_drawn(figure: str | None) -> tuple[str, ...]:
+    """The columns of the table without which a figure cannot be."""
+    of_curves = ("strain", "alpha_c_axial")
+    needed = () if figure is not None and _is_of_frames(figure) else of_curves
+    return ("variant", "alpha_vs_axial", *needed)
+
+
 def _draw(plot: Path, figure: str | None, run: Run) -> None:
     from scanfab.figures import plot_rows
     from scanfab.frame_figures import plot_frames
@@ -262,7 +271,7 @@ def _write_or_say(
     printed = not is_readable()
 
     def standing() -> str:
-        return _standing(run, result is not None, printed)
+        return _standing(run, result, printed)
 
     try:
         with telling(standing):
@@ -273,11 +282,16 @@ def _write_or_say(
         raise
 
 
-def _standing(run: Run, in_file: bool, printed: bool) -> str:
+def _standing(run: Run, result: ResultFile | None, printed: bool) -> str:
     """How far a run is, and how to go on."""
+    if not run.done and run.table is not None and result is not None:
+        return (
+            f"before the first new frame was finished: {result.path} is as it was; the same "
+            f"command goes on"
+        )
     if not run.done:
         return "before the first frame was finished: nothing is kept"
-    if not in_file:
+    if result is None:
         kept = "the rows printed so far are all" if printed else "nothing is kept"
         return f"{run.standing()}; {kept}: with -o FILE, --resume could go on"
     again = "the same command" if run.resume else "the same command with --resume"

@@ -76,6 +76,8 @@ class Run:
                 self.table = None
         self.part = result.finished_rows(asked, self.settings.rows_per_frame)
         self.found = any(row["alpha_vs"] is not None for row in self.part)
+        if self.table is not None:
+            self.found = self.found or self.table.has_void_fabric
         self.skipped = self._has_gaps(self.part)
         self.kept = list(self.part) if self._keep else []
         self.done = len(self.part) // self.settings.rows_per_frame
@@ -116,7 +118,11 @@ class Run:
                 yield row
                 if number % self.settings.rows_per_frame == 0:
                     self.done += 1
-                    advance()
+                    advance(new=not self._is_taken_over(row))
+
+    def _is_taken_over(self, row: Row) -> bool:
+        """Whether a row stands in the complete FILE."""
+        return self.table is not None and row.frame in self.table.rows[row.source]
 
     def _rows(self) -> Iterator[Row]:
         from scanfab.pipeline import compute_rows

@@ -135,8 +135,23 @@ def _explained(text: str, error: ValueError) -> str:
     return f', line {found[1]}: text needs quotes: {bare[1]} = "{bare[2]}"'
 
 
+def _in_toml(value: Any) -> str:
+    """What kind of value it is, as the file spells it where that is short."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    kinds = {dict: "a table", list: "a list in a list"}
+    return kinds.get(type(value), f"a date or time, {value}")
+
+
 def _from_toml(ctx: click.Context, path: Path, parameter: click.Parameter, value: Any) -> Any:
     """A value of the settings file as the command line would give it."""
+    for one in value if isinstance(value, list) else [value]:
+        # a truth value would count as the number 1
+        if isinstance(one, bool) or not isinstance(one, str | int | float):
+            raise click.UsageError(
+                f"{path}: {parameter.name}: expected numbers or text in quotes, one or a list of "
+                f"them, found {_in_toml(one)}"
+            )
     if isinstance(value, list) and not parameter.multiple and parameter.nargs == 1:
         value = " ".join(map(str, value))  # the numbers of a cell
     elif parameter.multiple and not isinstance(value, list):

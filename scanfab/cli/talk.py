@@ -146,9 +146,11 @@ class _Work:
 @contextmanager
 def working(
     total: Count = lambda: None, done: int = 0, prints: bool = False
-) -> Iterator[Callable[[], None]]:
+) -> Iterator[Callable[..., None]]:
     """
     Show progress while something works; what is yielded is called after each frame.
+
+    With ``new=False`` the frame was taken over from an earlier run, so that it took no time.
 
     On a terminal that is a bar with the time that is left, in a log a line a minute; nothing with
     --quiet. With --verbose each step is a line. What ``prints`` as it goes shows by itself how far
@@ -156,15 +158,16 @@ def working(
     """
     work, chosen = _Work(total, done), level()
     if chosen is Level.QUIET:
-        yield lambda: None
+        yield lambda new=True: None
         return
     with _listening(_say if chosen is Level.VERBOSE else None) as heard:
         on_terminal = chosen is Level.USUAL and sys.stderr.isatty()
         on_terminal = on_terminal and not (prints and sys.stdout.isatty())
         with _bar(work, heard) if on_terminal else _lines(work, heard) as show:
 
-            def advance() -> None:
+            def advance(new: bool = True) -> None:
                 work.done += 1
+                work.before += not new
                 show()
 
             yield advance

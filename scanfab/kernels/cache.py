@@ -13,7 +13,8 @@ import os
 import pickle
 import secrets
 from collections.abc import Callable
-from functools import cache
+from contextlib import suppress
+from functools import cache, partial
 from inspect import getfile
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
+from scanfab.ending import undone_at_end
 from scanfab.kernels.folder import is_private, kernel_folder
 
 __all__ = ["KernelCache", "when_compiling"]
@@ -86,12 +88,14 @@ def _read(path: Path) -> bytes | None:
 def _write(path: Path, content: bytes) -> None:
     """Whole or not at all; a full disk is no reason to stop."""
     part = path.with_suffix(f".{secrets.token_hex(4)}")
-    try:
-        with open(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
-            file.write(hashlib.sha256(content).digest() + content)
-        os.replace(part, path)
-    except OSError:
-        part.unlink(missing_ok=True)
+    remove = partial(part.unlink, missing_ok=True)
+    with suppress(OSError), undone_at_end(remove):
+        try:
+            with open(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+                file.write(hashlib.sha256(content).digest() + content)
+            os.replace(part, path)
+        finally:
+            remove()
 
 
 def when_compiling(tell: Callable[[], None]) -> None:
@@ -101,23 +105,34 @@ def when_compiling(tell: Callable[[], None]) -> None:
     The garbage collector waits while the compiler works: it would take a sixteenth of the time, and
     find next to nothing.
     """
-    event.register("numba:compile", _Compiling(tell))  # type: ignore[no-untyped-call]
+    _listener().tell = tell
+
+
+@cache
+def _listener() -> _Compiling:
+    """The one of this process: another command in it has other words, but no other listener."""
+    listener = _Compiling()
+    event.register("numba:compile", listener)  # type: ignore[no-untyped-call]
+    return listener
 
 
 class _Compiling(event.Listener):
-    def __init__(self, tell: Callable[[], None]) -> None:
-        self._tell: Callable[[], None] | None = tell
+    def __init__(self) -> None:
+        self.tell: Callable[[], None] | None = None
         # a kernel is compiled within the one that calls it
         self._depth = 0
+        self._collects = True
 
     def on_start(self, event: event.Event) -> None:
+        if self._depth == 0:
+            self._collects = gc.isenabled()
         self._depth += 1
         gc.disable()
-        tell, self._tell = self._tell, None
+        tell, self.tell = self.tell, None
         if tell is not None:
             tell()
 
     def on_end(self, event: event.Event) -> None:
         self._depth -= 1
-        if self._depth == 0:
+        if self._depth == 0 and self._collects:
             gc.enable()

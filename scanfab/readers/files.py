@@ -42,6 +42,8 @@ KEPT = 4
 # bytes that are copied at a time, and those that are left to other programs
 PART = 4 << 20
 RESERVE = 1 << 30
+# a copy up to this size is no reason to ask how full the disk is
+SMALL = 64 << 20
 _copies: OrderedDict[tuple[str, int, int], Path] = OrderedDict()
 _threads: set[int] = set()
 _lock = Lock()
@@ -117,23 +119,36 @@ def temporary_copy(stream: IO[bytes], name: str) -> Path:
     ReadError
         If it would fill the disk: a few bytes can be decompressed to any number.
     """
-    if not _folder:
-        _folder.append(tempfile.mkdtemp(prefix="scanfab-"))
-        at_end(_remove_copies)
-    copy = Path(tempfile.mkdtemp(dir=_folder[0])) / name
+    copy = _new_folder(name) / name
     try:
-        with open(copy, "wb") as file:
+        with _of_copy(name):
+            file = open(copy, "wb", buffering=0)
+        with file:
+            size = 0
             while part := stream.read(PART):
-                _check_disk(copy, file.tell())
+                _check_disk(copy, size)
                 _write(copy, file, part)
+                size += len(part)
     except BaseException:
         shutil.rmtree(copy.parent, ignore_errors=True)
         raise
     return copy
 
 
+def _new_folder(name: str) -> Path:
+    """An empty folder for the copy of this name."""
+    with _of_copy(name):
+        if not _folder:
+            _folder.append(tempfile.mkdtemp(prefix="scanfab-"))
+            at_end(_remove_copies)
+        return Path(tempfile.mkdtemp(dir=_folder[0]))
+
+
 def _check_disk(copy: Path, size: int) -> None:
-    disk = shutil.disk_usage(copy.parent)
+    if size < SMALL:
+        return
+    with _of_copy(copy.name):
+        disk = shutil.disk_usage(copy.parent)
     if disk.free < min(RESERVE, disk.total // 20) + PART:
         raise ReadError(
             f"{copy.name}: its content fills the disk of {tempfile.gettempdir()}, with {size:,} "
@@ -142,13 +157,30 @@ def _check_disk(copy: Path, size: int) -> None:
 
 
 def _write(copy: Path, file: IO[bytes], part: bytes) -> None:
+    with _of_copy(copy.name):
+        left = memoryview(part)
+        while left:
+            left = left[file.write(left) :]
+
+
+@contextmanager
+def _of_copy(name: str) -> Iterator[None]:
+    """Let errors of the system be those of the copy: the file that is read is as it should be."""
     try:
-        file.write(part)
+        yield
     except OSError as error:
         raise ReadError(
-            f"{copy.name}: its content cannot be written to {tempfile.gettempdir()}: "
-            f"{_reason(error)}: name another folder for temporary files by TMPDIR"
+            f"{name}: its content cannot be written to {_temporary()}: {_reason(error)}: name "
+            f"another folder for temporary files by TMPDIR"
         ) from None
+
+
+def _temporary() -> str:
+    """The folder for temporary files, which may be none at all."""
+    try:
+        return tempfile.gettempdir()
+    except OSError:
+        return "a temporary file"
 
 
 def _remove_copies() -> None:

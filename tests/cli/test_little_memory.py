@@ -84,6 +84,9 @@ def test_what_is_free_is_the_least_of_all_limits(monkeypatch, tmp_path):
     (tmp_path / "memory.current").write_text("100\n")
     monkeypatch.setattr(memory, "GROUP", Path(tmp_path))
     assert memory.free_memory() == 800
+    # the cache of files that were read is given up where memory is needed
+    (tmp_path / "memory.stat").write_text("file 90\ninactive_file 70\nactive_file 20\n")
+    assert memory.free_memory() == 870
     (tmp_path / "memory.max").write_text("max\n")
     assert memory.free_memory() == 1000
     assert group.LEAST_SPACE > main.LITTLE

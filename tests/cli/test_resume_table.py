@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from scanfab import measurement
+from scanfab.cli import talk
 from scanfab.cli.main import run
 from scanfab.rerun import read_manifest
 from tests.cli.test_resume import _wait_for_frames_under_way
@@ -235,6 +236,81 @@ def test_columns_and_digits_are_those_of_the_table(compute, five_frames, dumps, 
     assert compute(table, *words, "--resume") == (0, 2)
     assert compute(whole, *words) == (0, 5)
     assert table.read_bytes() == whole.read_bytes()
+
+
+FEW = ("--fields", "source,frame,variant,alpha_vs_axial")
+
+
+@pytest.mark.parametrize(
+    "fields", ["source,frame,variant,alpha_vs_axial", "source,frame,alpha_vs", "source,frame"]
+)
+def test_columns_that_were_left_out_are_no_failure(compute, tmp_path, fields):
+    table = tmp_path / "table.csv"
+    assert compute(table, "--fields", fields) == (0, 3)
+    assert compute(table, "--fields", fields, "--resume") == (0, 0)
+
+
+def test_a_figure_without_the_columns_that_it_needs_is_refused(compute, tmp_path, capsys):
+    table, plot = tmp_path / "table.csv", tmp_path / "plot.png"
+    assert compute(table, *FEW) == (0, 3)
+    before = table.read_bytes()
+    assert compute(table, *FEW, "--resume", "--plot", str(plot)) == (2, 0)
+    assert (
+        "its rows lack strain, alpha_c_axial (--fields), which the figure needs: leave out --plot"
+    ) in capsys.readouterr().err
+    assert not plot.exists()
+    assert table.read_bytes() == before
+
+
+def test_a_figure_whose_columns_were_written_is_drawn(compute, tmp_path):
+    table, plot = tmp_path / "table.csv", tmp_path / "plot.png"
+    words = ("--fields", "source,frame,variant,strain,alpha_vs_axial,alpha_c_axial")
+    assert compute(table, *words) == (0, 3)
+    assert compute(table, *words, "--resume", "--plot", str(plot)) == (0, 0)
+    assert plot.stat().st_size > 1000
+
+
+def test_a_figure_of_frames_needs_no_strain(compute, tmp_path):
+    table, plot = tmp_path / "table.csv", tmp_path / "plot.png"
+    assert compute(table, *FEW) == (0, 3)
+    words = ("--resume", "--plot", str(plot), "--figure", "histogram")
+    assert compute(table, *FEW, *words)[0] == 0
+    assert plot.stat().st_size > 1000
+
+
+def test_a_signal_before_the_first_new_frame_says_that_the_table_stands(
+    compute, five_frames, dumps, tmp_path, monkeypatch, capsys
+):
+    table = tmp_path / "table.csv"
+    assert compute(table) == (0, 3)
+    before = table.read_bytes()
+    add_frames(five_frames, dumps)
+    with interrupted_at_row(monkeypatch, 1):
+        assert compute(table, "--resume", "--workers", "1")[0] == 130
+    _wait_for_frames_under_way()
+    assert (
+        f"interrupted before the first new frame was finished: {table} is as it was; the same "
+        f"command goes on"
+    ) in capsys.readouterr().err
+    assert table.read_bytes() == before
+    assert compute(table, "--resume") == (0, 2)
+
+
+def test_frames_that_are_taken_over_take_no_time(
+    compute, five_frames, dumps, tmp_path, monkeypatch
+):
+    """Only those of this run say how long the others will take."""
+    table = tmp_path / "table.csv"
+    assert compute(table) == (0, 3)
+    add_frames(five_frames, dumps)
+    works = []
+    make = talk._Work.__init__
+    monkeypatch.setattr(
+        talk._Work, "__init__", lambda self, *words: works.append(self) or make(self, *words)
+    )
+    assert compute(table, "--resume") == (0, 2)
+    (work,) = works
+    assert (work.done, work.before) == (5, 3)
 
 
 def test_a_table_without_its_frames_cannot_be_gone_on_with(compute, tmp_path, capsys):

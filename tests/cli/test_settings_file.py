@@ -138,6 +138,14 @@ def test_the_manifest_lists_what_came_from_the_file(series, tmp_path):
         ("compute = 3\n", "expected a section [compute]"),
         ('[compute]\nseed = "many"\n', "seed: "),
         ("[compute]\nrv-center = [1, 2]\n", "rv_center: "),
+        ("[compute]\nrv-center = [[1, 2], 2, 3]\n", "rv_center: expected numbers or text in quo"),
+        ("[compute]\nrv-center = [{x = 1}, 2, 3]\n", "found a table"),
+        ("[compute]\nrv-center = [true, 2, 3]\n", "one or a list of them, found true"),
+        ("[compute]\nrv = false\n", "rv: expected numbers or text in quotes"),
+        ("[compute]\naxis = {x = 1}\n", "axis: expected numbers or text in quotes"),
+        ("[compute.rv]\nradius = 1\n", "rv: expected numbers or text in quotes"),
+        ("[compute]\nboundary = [[3]]\n", "found a list in a list"),
+        ("[compute]\nframes = 2020-01-01\n", "found a date or time, 2020-01-01"),
     ],
 )
 def test_a_broken_file_is_named(series, capsys, text, message):

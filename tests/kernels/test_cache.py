@@ -14,6 +14,7 @@ import numba
 import pytest
 
 import scanfab.kernels.sweep
+from scanfab import ending
 from scanfab.kernels import cache, compiled, folder
 from tests.dumps import cubic_rows, dump_text, write
 
@@ -83,7 +84,8 @@ def test_the_first_run_says_that_it_compiles_and_the_second_need_not(dump, tmp_p
 
 def test_the_garbage_collector_waits_until_the_outermost_kernel_is_compiled():
     told = []
-    compiling = cache._Compiling(lambda: told.append(gc.isenabled()))
+    compiling = cache._Compiling()
+    compiling.tell = lambda: told.append(gc.isenabled())
     waits = []
     try:
         for step in (compiling.on_start, compiling.on_start, compiling.on_end, compiling.on_end):
@@ -93,6 +95,29 @@ def test_the_garbage_collector_waits_until_the_outermost_kernel_is_compiled():
         gc.enable()
     assert waits == [True, True, True, False]
     assert len(told) == 1
+
+
+def test_a_garbage_collector_that_was_off_stays_off():
+    compiling = cache._Compiling()
+    gc.disable()
+    try:
+        compiling.on_start(None)
+        compiling.on_end(None)
+        assert not gc.isenabled()
+    finally:
+        gc.enable()
+
+
+def test_commands_of_one_process_share_a_listener():
+    registered = numba.core.event._registered["numba:compile"]
+    told = []
+    cache.when_compiling(lambda: told.append("one"))
+    before = len(registered)
+    cache.when_compiling(lambda: told.append("two"))
+    assert len(registered) == before
+    cache._listener().on_start(None)
+    cache._listener().on_end(None)
+    assert told == ["two"]
 
 
 @only_linux
@@ -265,3 +290,28 @@ def test_a_disk_that_fills_later_is_no_reason_to_stop(kept, monkeypatch):
     monkeypatch.setattr(cache.os, "replace", full)
     assert compiled_anew()
     assert list(kept.iterdir()) == []
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, MemoryError])
+def test_what_is_interrupted_leaves_no_half_a_kernel(tmp_path, monkeypatch, error):
+    def fail(*_):
+        raise error
+
+    monkeypatch.setattr(cache.os, "replace", fail)
+    with pytest.raises(error):
+        cache._write(tmp_path / "one.kernel", b"code")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_process_that_ends_at_once_leaves_no_half_a_kernel(tmp_path, monkeypatch):
+    left = []
+
+    def end(*_):
+        ending.finish()  # as a signal does
+        left.extend(tmp_path.iterdir())
+
+    monkeypatch.setattr(ending, "_steps", [])
+    monkeypatch.setattr(cache.os, "replace", end)
+    with pytest.raises(ValueError):  # the process would be gone
+        cache._write(tmp_path / "one.kernel", b"code")
+    assert left == []

@@ -7,6 +7,8 @@ import bz2
 import gzip
 import io
 import struct
+import sys
+import tempfile
 import zlib
 from pathlib import Path
 from shutil import disk_usage
@@ -139,12 +141,44 @@ def test_far_more_text_than_rows_is_not_read(tmp_path, monkeypatch):
 
 def test_a_copy_does_not_fill_the_disk(tmp_path, monkeypatch):
     path = tmp_path / "dump.gz"
-    path.write_bytes(gzip.compress(bytes(files.PART)))
+    path.write_bytes(gzip.compress(bytes(files.SMALL + files.PART)))
     usage = disk_usage(tmp_path)
     monkeypatch.setattr(
         files.shutil, "disk_usage", lambda _: usage._replace(free=files.PART, total=1 << 40)
     )
     with pytest.raises(ReadError, match=r"its content fills the disk of .* by TMPDIR"):
+        files.plain(path)
+    # what is small is read on a disk that is nearly full, as it always was
+    path.write_bytes(gzip.compress(bytes(files.PART)))
+    assert files.plain(path).stat().st_size == files.PART
+
+
+def test_a_folder_for_copies_that_cannot_be_used_is_named(tmp_path, monkeypatch):
+    path = tmp_path / "dump.gz"
+    path.write_bytes(gzip.compress(dump_text().encode()))
+    gone = tmp_path / "gone"
+    monkeypatch.setattr(tempfile, "tempdir", str(gone))
+    told = rf"^dump: its content cannot be written to {gone}: No such file .* by TMPDIR"
+    monkeypatch.setattr(files, "_folder", [])
+    with pytest.raises(ReadError, match=told):
+        files.plain(path)
+    # made by this process, and removed by someone else since
+    monkeypatch.setattr(files, "_folder", [str(gone / "scanfab-1")])
+    with pytest.raises(ReadError, match=told):
+        files.plain(path)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of a process are POSIX")
+def test_bytes_that_do_not_fit_at_the_end_of_a_copy_are_of_the_copy(tmp_path):
+    """A small copy reaches the disk only when it is flushed."""
+    from tests.cli.test_full_disk import files_up_to
+
+    path = tmp_path / "dump.gz"
+    path.write_bytes(gzip.compress(b"x" * 4000))
+    with (
+        files_up_to(1000),
+        pytest.raises(ReadError, match=r"^dump: its content cannot be written to .*File too"),
+    ):
         files.plain(path)
 
 
