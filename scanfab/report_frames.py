@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import base64
-import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,8 @@ from scanfab.settings import Length, Settings
 from scanfab.tabular import number_of
 from scanfab.window import SurfaceBox
 from scanfab.writers.page import Picture, Shown, view_data
-from scanfab.writers.plot_frame import plot_histogram, plot_projection
+from scanfab.writers.plot import figure_bytes
+from scanfab.writers.plot_frame import drawn_histogram, drawn_projection
 
 __all__ = ["data_url", "show_frames"]
 
@@ -132,7 +132,12 @@ def _pictures(one: Input, series: Series, settings: Settings) -> list[Picture]:
         return []
     drawn = replace(settings, tolerance=_affordable_tolerance(rows, settings))
     frames = scan_frames(series, drawn, rows)
-    projections, lengths = projections_of(frames), lengths_of(frames)
+    projections = projections_of(frames)
+    # pixels, as the disks are pixels anyway, and few of them
+    with drawn_projection(projections) as figure:
+        disks = figure_bytes(figure, "png", DPI)
+    with drawn_histogram(lengths_of(frames)) as figure:
+        histogram = figure_bytes(figure, "png", DPI)
     what = f"variant {frames.variant} of {one.rows[0]['source']}"
     rougher = ""
     if drawn.tolerance > settings.tolerance:
@@ -141,14 +146,14 @@ def _pictures(one: Input, series: Series, settings: Settings) -> list[Picture]:
             f"{settings.tolerance:.2g}, which would take too long for a picture."
         )
     return [
-        _picture(
-            lambda path: plot_projection(path, projections, DPI),
+        Picture(
+            data_url("image/png", disks),
             f"Mean void length and contact normals over all directions, {what}. "
             f"{noise_notes(frames, projections)}{rougher}",
             WIDE,
         ),
-        _picture(
-            lambda path: plot_histogram(path, lengths, DPI),
+        Picture(
+            data_url("image/png", histogram),
             f"Lengths of the void segments, {what}; those below the cut-off are dropped.",
             NARROW,
         ),
@@ -160,11 +165,3 @@ def _affordable_tolerance(rows: list[dict[str, Any]], settings: Settings) -> flo
     most = max((number_of(row, "segments") or 0.0 for row in rows), default=0.0)
     is_fixed = settings.spacing is not None and settings.directions is not None
     return settings.tolerance * (1.0 if is_fixed else max(1.0, most / MOST_SEGMENTS) ** 0.5)
-
-
-def _picture(draw: Callable[[Path], None], caption: str, width: int) -> Picture:
-    with tempfile.TemporaryDirectory() as folder:
-        # pixels, as the disks are pixels anyway, and few of them
-        path = Path(folder) / "picture.png"
-        draw(path)
-        return Picture(data_url("image/png", path.read_bytes()), caption, width)

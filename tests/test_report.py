@@ -335,6 +335,17 @@ def test_pictures_of_frames_share_one_scan_at_the_table_s_tolerance(copied, monk
     assert "instead of the table's" not in text
 
 
+def test_pictures_pass_through_no_file(copied, monkeypatch):
+    """A signal ends the process at once: a folder of the moment would be left behind."""
+
+    def made(*_, **__):
+        raise AssertionError("a temporary file or folder is made")
+
+    monkeypatch.setattr("tempfile.mkdtemp", made)
+    monkeypatch.setattr("tempfile.mkstemp", made)
+    assert page_of([copied]).count("data:image/png") == 2
+
+
 def test_a_scan_that_takes_too_long_for_a_picture_is_rougher_and_labelled(copied, monkeypatch):
     monkeypatch.setattr("scanfab.report_frames.MOST_SEGMENTS", 1e4)
     assert re.search(
