@@ -97,7 +97,7 @@ def _facts(look: Look, settings: Settings) -> list[tuple[str, str]]:
         return facts
     facts.append(("cut-off", f"{plan.cutoff:.4g}, {plan.cutoff / smallest:.3g} smallest radii"))
     if plan.window is not None:
-        extent = SurfaceBox.of(first.packing, first.grains).smallest_extent
+        extent = SurfaceBox.of(first.packing, first.gathered).smallest_extent
         radius = plan.window.radius
         facts += [
             ("centre of the RV", ", ".join(f"{one:.4g}" for one in plan.window.center)),

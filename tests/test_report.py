@@ -22,7 +22,7 @@ from scanfab.report import make_report
 from scanfab.scene import Scene
 from scanfab.writers.page import MOST_GRAINS, Picture, view_data
 from tests.conftest import ROOT
-from tests.dumps import write
+from tests.dumps import cubic_rows, dump_text, write
 from tests.tables import curve
 
 pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.errors.ScanfabNote")
@@ -319,6 +319,15 @@ def test_the_sample_is_told_in_numbers(page):
         "lengths of this report are in the unit of the dump",
     ):
         assert part in text
+
+
+def test_an_rv_is_a_part_of_the_sample_without_grains_that_flew_away(tmp_path, quick):
+    rows = [*cubic_rows(6), (217, 1, 40, 41, 42, 0.5)]
+    dump = write(tmp_path / "dump_0.txt", dump_text(rows, box=((-1, 50),) * 3))
+    table = tmp_path / "t.csv"
+    words = ["--directions", "9", "--spacing", "1rmin", "--variants", "c", "--rv", "0.6"]
+    assert run(["compute", str(dump), *words, "-o", str(table)]) == 0
+    assert ", 0.6 of half the sample's smallest extent" in words_of(page_of([table]))
 
 
 def test_pictures_of_frames_share_one_scan_at_the_table_s_tolerance(copied, monkeypatch):
