@@ -6,7 +6,13 @@ import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from scanfab.errors import ReadError, ScanfabWarning, SettingsError
+from scanfab.errors import (
+    PackingError,
+    ReadError,
+    ScanfabWarning,
+    SettingsError,
+    SkippedFrameWarning,
+)
 from scanfab.pipeline import boundary_hint, classify
 from scanfab.plan import Plan, make_plan
 from scanfab.scene import Scene, about_window, scene_of
@@ -79,11 +85,12 @@ def _frame(series: Series, number: int) -> tuple[int, Frame]:
 
 
 def _first(series: Series, settings: Settings) -> Sample | None:
-    """The first frame that has grains."""
-    for frame in series:
+    """The first frame that has grains; those that are damaged are skipped, as by compute."""
+    for number, frame in enumerate(series):
         try:
             sample = classify(frame.read(), settings)
-        except ReadError:
+        except (PackingError, ReadError) as error:
+            warnings.warn(f"frame {number} skipped: {error}", SkippedFrameWarning, stacklevel=3)
             continue
         if sample.grains.any():
             return sample

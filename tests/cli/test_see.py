@@ -248,6 +248,22 @@ def test_the_title_names_the_frame_and_its_strain(tmp_path, monkeypatch):
     assert titles == [f"{SAMPLE}, frame 6, axial strain 15 %"]
 
 
+def test_damaged_frames_before_the_one_asked_for_are_skipped(tmp_path, monkeypatch, capsys):
+    """A radius of 0 makes no packing, and cut text no frame: the RV is of the third."""
+    flat = [(*cubic_rows()[0][:5], 0), *cubic_rows()[1:]]
+    write(tmp_path / "dump_0.txt", dump_text(flat))
+    write(tmp_path / "dump_1.txt", dump_text(cubic_rows(), step=1)[:-40])
+    write(tmp_path / "dump_2.txt", dump_text(cubic_rows(), step=2))
+    scenes = []
+    monkeypatch.setattr("scanfab.writers.view.show_scene", lambda *said: scenes.append(said[0]))
+    words = ["--screenshot", str(tmp_path / "x.png")]
+    assert run(["view", str(tmp_path), "--frame", "2", *words]) == 0
+    assert scenes[0]. is not None
+    told = capsys.readouterr().err
+    assert told.count("frame 0 skipped: ") == told.count("frame 1 skipped: ") == 1
+    assert run(["view", str(tmp_path), "--frame", "0", *words]) == 1
+
+
 def scanfab(*words, **environment):
     command = [sys.executable, "-c", "from scanfab.cli.main import main; main()", *map(str, words)]
     kept = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
