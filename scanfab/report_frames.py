@@ -47,10 +47,9 @@ def show_frames(one: Input) -> Shown:
     if settings.cutoffs:
         settings = replace(settings, cutoffs=(), cutoff=_shown_cutoff(one, settings))
     look = look_at(series, replace(settings, variants="c"), one.last_frame)
-    strain = one.strain_of(look.number)
     return Shown(
         view=view_data(look.scene, settings.axis),
-        view_title=_title(one, look.number, strain),
+        view_title=_title(one, look.number),
         facts=_facts(look, settings),
         pictures=_pictures(one, series, settings),
     )
@@ -74,9 +73,9 @@ def _shown_cutoff(one: Input, settings: Settings) -> Length:
     return settings.cutoff if one.cutoff is None else Length(one.cutoff)
 
 
-def _title(one: Input, frame: int, strain: float | None) -> str:
-    at = "" if strain is None else f", axial strain {100 * strain:.3g} %"
-    return f"{one.rows[0]['source']}, frame {frame}{at}"
+def _title(one: Input, frame: int) -> str:
+    source = str(one.rows[0]["source"])
+    return ", ".join(filter(None, [source, f"frame {frame}", one.strain_of(frame)]))
 
 
 def _facts(look: Look, settings: Settings) -> list[tuple[str, str]]:
