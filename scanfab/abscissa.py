@@ -7,10 +7,15 @@ from typing import Any
 
 from scanfab.tabular import number_of
 
-__all__ = ["strain_column", "why_not_strain"]
+__all__ = ["STRAINS", "frame_strain_column", "spelt_strain", "strain_column", "why_not_strain"]
 
 Rows = Sequence[Mapping[str, Any]]
 
+# columns of strains: in words, and as the symbol of figures
+STRAINS = {
+    "strain": ("axial strain", r"$\varepsilon_a$"),
+    "shear_strain": ("shear strain", r"$\varepsilon_q$"),
+}
 # strains that differ by less are one strain: a rounding error is no deformation
 SAME = 1e-9
 
@@ -38,8 +43,41 @@ def strain_column(rows: Rows) -> str | None:
     >>> strain_column(rows)
     'shear_strain'
     """
-    found = [name for name in ("strain", "shear_strain") if not _lacking(rows, name)]
+    found = [name for name in STRAINS if not _lacking(rows, name)]
     return found[0] if found and any(map(_is_drawn, rows)) else None
+
+
+def frame_strain_column(row: Mapping[str, Any]) -> str | None:
+    """That column for a single frame, which is not 0 there if either strain is not."""
+    known = [name for name in STRAINS if number_of(row, name) is not None]
+    moved = [name for name in known if abs(row[name]) >= SAME]
+    return next(iter([*moved, *known]), None)
+
+
+def spelt_strain(row: Mapping[str, Any], column: str | None, *, symbol: bool = False) -> str:
+    """
+    The strain of a frame for its title; empty where there is none.
+
+    Parameters
+    ----------
+    row : mapping
+        Of a fabric table.
+    column : str or None
+        See :func:`strain_column`.
+    symbol : bool, optional
+        For a figure, where words take too much room.
+
+    Examples
+    --------
+    >>> from scanfab.abscissa import spelt_strain
+    >>> spelt_strain({"strain": 0.0, "shear_strain": 0.123}, "shear_strain")
+    'shear strain 12.3 %'
+    """
+    value = None if column is None else number_of(row, column)
+    if column is None or value is None:
+        return ""
+    words, sign = STRAINS[column]
+    return f"{f'{sign} =' if symbol else words} {100 * value:.3g} %"
 
 
 def why_not_strain(rows: Rows) -> str | None:

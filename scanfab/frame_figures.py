@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.abscissa import strain_column
+from scanfab.abscissa import spelt_strain, strain_column
 from scanfab.directions import DirectionRule
 from scanfab.distribution import mean_length_function, sphere_points
 from scanfab.errors import SettingsError
@@ -180,7 +180,9 @@ def scan_frames(
     variant = "c" if "c" in settings.variants else settings.variants[0]
     own = [row for row in rows if row["source"] == series.name and row["variant"] == variant]
     results = _results(series, settings, own, variant)
-    titles = [_title(one, strain_column(own)) for one in results]
+    row_of = {row["frame"]: row for row in own}
+    # of the table: what is asked of a strain file now may be another
+    titles = [_title(row_of[one.number], strain_column(own)) for one in results]
     return ScannedFrames(results, titles, variant)
 
 
@@ -211,14 +213,10 @@ def _results(
     return results
 
 
-def _title(result: FrameResult, column: str | None) -> str:
+def _title(row: Mapping[str, Any], column: str | None) -> str:
     """Variant, frame and, if the table has one, the strain."""
-    row = result.rows[0]
-    title = f"variant {row.variant}, frame {result.number}"
-    if column is None:
-        return title
-    symbol = {"strain": "a", "shear_strain": "q"}[column]
-    return rf"{title}, $\varepsilon_{symbol}$ = {100 * getattr(row, column):.3g} %"
+    strain = spelt_strain(row, column, symbol=True)
+    return ", ".join(filter(None, [f"variant {row['variant']}", f"frame {row['frame']}", strain]))
 
 
 def _parts(result: FrameResult) -> tuple[Solids, ScanSums, float, float]:

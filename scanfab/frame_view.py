@@ -6,13 +6,19 @@ import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from scanfab.errors import ReadError, ScanfabWarning, SettingsError
+from scanfab.errors import (
+    PackingError,
+    ReadError,
+    ScanfabWarning,
+    SettingsError,
+    SkippedFrameWarning,
+)
 from scanfab.pipeline import classify, refuse_unknown_boundary, tell_doubts
 from scanfab.plan import Plan, make_plan
 from scanfab.scene import Scene, about_window, scene_of
 from scanfab.series import Frame, Series
 from scanfab.settings import STRAIN_MODES, Settings
-from scanfab.strain import StrainFile, axial_length
+from scanfab.strain import StrainFile, axial_length, shear_strain
 from scanfab.variants import Sample
 
 __all__ = ["Look", "look_at"]
@@ -26,8 +32,9 @@ class Look:
     number: int
     """Of the frame, counted from 0."""
     sample: Sample
-    strain: float | None
-    """Since the first frame that has grains; None where that is not known."""
+    strains: dict[str, float | None]
+    """Axial and shear strain since the first frame that has grains, by the names of their columns
+    in the fabric table; None where that is not known."""
     first: Sample | None
     """The first frame that has grains, which fixes all lengths of the series."""
     plan: Plan | None
@@ -62,7 +69,7 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
     scene = scene_of(sample, None if plan is None else plan.window)
     if plan is not None:
         scene = about_window(replace(scene, cutoff=plan.cutoff))
-    return Look(scene, number, sample, _strain(number, sample, first, settings), first, plan)
+    return Look(scene, number, sample, _strains(number, sample, first, settings), first, plan)
 
 
 def _frame(series: Series, number: int) -> tuple[int, Frame]:
@@ -79,11 +86,12 @@ def _frame(series: Series, number: int) -> tuple[int, Frame]:
 
 
 def _first(series: Series, settings: Settings) -> Sample | None:
-    """The first frame that has grains."""
-    for frame in series:
+    """The first frame that has grains; those that are damaged are skipped, as by compute."""
+    for number, frame in enumerate(series):
         try:
             sample = classify(frame.read(), settings)
-        except ReadError:
+        except (PackingError, ReadError) as error:
+            warnings.warn(f"frame {number} skipped: {error}", SkippedFrameWarning, stacklevel=3)
             continue
         if sample.grains.any():
             return sample
@@ -99,7 +107,16 @@ def _plan(first: Sample, settings: Settings) -> Plan | None:
         return None
 
 
-def _strain(number: int, sample: Sample, first: Sample | None, settings: Settings) -> float | None:
+def _strains(
+    number: int, sample: Sample, first: Sample | None, settings: Settings
+) -> dict[str, float | None]:
+    axial, shear = _axial(number, sample, first, settings), None
+    if first is not None and sample.grains.any():
+        shear = shear_strain(sample.packing.cell, first.packing.cell)
+    return {"strain": axial, "shear_strain": shear}
+
+
+def _axial(number: int, sample: Sample, first: Sample | None, settings: Settings) -> float | None:
     """Axial strain as the fabric table has it; None also where it cannot be had."""
     if settings.strain not in STRAIN_MODES:
         return StrainFile(Path(settings.strain)).at(number, sample.packing.step)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -108,7 +107,7 @@ def _usual_title(rows: Sequence[Mapping[str, Any]]) -> str:
 
 def _table_pictures(rows: Sequence[Mapping[str, Any]]) -> list[Picture]:
     """The figures of the table; none if it has no void fabric."""
-    from scanfab.writers.plot import new_figure
+    from scanfab.writers.plot import figure_bytes, new_figure
     from scanfab.writers.plot_table import SIZES, TABLE_FIGURES, draw_table
 
     fits = fits_of(rows)
@@ -119,9 +118,7 @@ def _table_pictures(rows: Sequence[Mapping[str, Any]]) -> list[Picture]:
                 draw_table(figure, rows, fits, name)
             except SettingsError:
                 return []
-            stream = io.BytesIO()
-            figure.savefig(stream, format="svg", metadata={"Date": None})
-        url = data_url("image/svg+xml", stream.getvalue())
+            url = data_url("image/svg+xml", figure_bytes(figure, "svg"))
         width = round(PIXELS * SIZES[name][0])
         pictures.append(Picture(url, caption[0].upper() + caption[1:], width))
     return pictures

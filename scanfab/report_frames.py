@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import base64
-import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,8 @@ from scanfab.settings import Length, Settings
 from scanfab.tabular import number_of
 from scanfab.window import SurfaceBox
 from scanfab.writers.page import Picture, Shown, view_data
-from scanfab.writers.plot_frame import plot_histogram, plot_projection
+from scanfab.writers.plot import figure_bytes
+from scanfab.writers.plot_frame import drawn_histogram, drawn_projection
 
 __all__ = ["data_url", "show_frames"]
 
@@ -47,10 +47,9 @@ def show_frames(one: Input) -> Shown:
     if settings.cutoffs:
         settings = replace(settings, cutoffs=(), cutoff=_shown_cutoff(one, settings))
     look = look_at(series, replace(settings, variants="c"), one.last_frame)
-    strain = one.strain_of(look.number)
     return Shown(
         view=view_data(look.scene, settings.axis),
-        view_title=_title(one, look.number, strain),
+        view_title=_title(one, look.number),
         facts=_facts(look, settings),
         pictures=_pictures(one, series, settings),
     )
@@ -74,9 +73,9 @@ def _shown_cutoff(one: Input, settings: Settings) -> Length:
     return settings.cutoff if one.cutoff is None else Length(one.cutoff)
 
 
-def _title(one: Input, frame: int, strain: float | None) -> str:
-    at = "" if strain is None else f", axial strain {100 * strain:.3g} %"
-    return f"{one.rows[0]['source']}, frame {frame}{at}"
+def _title(one: Input, frame: int) -> str:
+    source = str(one.rows[0]["source"])
+    return ", ".join(filter(None, [source, f"frame {frame}", one.strain_of(frame)]))
 
 
 def _facts(look: Look, settings: Settings) -> list[tuple[str, str]]:
@@ -97,7 +96,7 @@ def _facts(look: Look, settings: Settings) -> list[tuple[str, str]]:
         return facts
     facts.append(("cut-off", f"{plan.cutoff:.4g}, {plan.cutoff / smallest:.3g} smallest radii"))
     if plan.window is not None:
-        extent = SurfaceBox.of(first.packing, first.grains).smallest_extent
+        extent = SurfaceBox.of(first.packing, first.gathered).smallest_extent
         radius = plan.window.radius
         facts += [
             ("centre of the RV", ", ".join(f"{one:.4g}" for one in plan.window.center)),
@@ -132,7 +131,12 @@ def _pictures(one: Input, series: Series, settings: Settings) -> list[Picture]:
         return []
     drawn = replace(settings, tolerance=_affordable_tolerance(rows, settings))
     frames = scan_frames(series, drawn, rows)
-    projections, lengths = projections_of(frames), lengths_of(frames)
+    projections = projections_of(frames)
+    # pixels, as the disks are pixels anyway, and few of them
+    with drawn_projection(projections) as figure:
+        disks = figure_bytes(figure, "png", DPI)
+    with drawn_histogram(lengths_of(frames)) as figure:
+        histogram = figure_bytes(figure, "png", DPI)
     what = f"variant {frames.variant} of {one.rows[0]['source']}"
     rougher = ""
     if drawn.tolerance > settings.tolerance:
@@ -141,14 +145,14 @@ def _pictures(one: Input, series: Series, settings: Settings) -> list[Picture]:
             f"{settings.tolerance:.2g}, which would take too long for a picture."
         )
     return [
-        _picture(
-            lambda path: plot_projection(path, projections, DPI),
+        Picture(
+            data_url("image/png", disks),
             f"Mean void length and contact normals over all directions, {what}. "
             f"{noise_notes(frames, projections)}{rougher}",
             WIDE,
         ),
-        _picture(
-            lambda path: plot_histogram(path, lengths, DPI),
+        Picture(
+            data_url("image/png", histogram),
             f"Lengths of the void segments, {what}; those below the cut-off are dropped.",
             NARROW,
         ),
@@ -160,11 +164,3 @@ def _affordable_tolerance(rows: list[dict[str, Any]], settings: Settings) -> flo
     most = max((number_of(row, "segments") or 0.0 for row in rows), default=0.0)
     is_fixed = settings.spacing is not None and settings.directions is not None
     return settings.tolerance * (1.0 if is_fixed else max(1.0, most / MOST_SEGMENTS) ** 0.5)
-
-
-def _picture(draw: Callable[[Path], None], caption: str, width: int) -> Picture:
-    with tempfile.TemporaryDirectory() as folder:
-        # pixels, as the disks are pixels anyway, and few of them
-        path = Path(folder) / "picture.png"
-        draw(path)
-        return Picture(data_url("image/png", path.read_bytes()), caption, width)

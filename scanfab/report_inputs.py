@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from scanfab.abscissa import spelt_strain, strain_column
 from scanfab.errors import SettingsError
 from scanfab.rerun import read_manifest
 from scanfab.selection import choose_rows
-from scanfab.tabular import number_of, numbers_of, read_rows
+from scanfab.tabular import numbers_of, read_rows
 
 __all__ = ["Input", "read_inputs"]
 
@@ -37,10 +38,11 @@ class Input:
         filled = [row for row in own if row["alpha_vs_axial"] is not None]
         return int(max(numbers_of(filled, "frame") or numbers_of(own, "frame"), default=0))
 
-    def strain_of(self, frame: int) -> float | None:
-        """As the table has it."""
-        found = [number_of(row, "strain") for row in self.first_series if row["frame"] == frame]
-        return found[0] if found else None
+    def strain_of(self, frame: int) -> str:
+        """In words; empty where the frames of the series have no strain to be told apart by."""
+        own = self.first_series
+        found = [row for row in own if row["frame"] == frame]
+        return spelt_strain(found[0], strain_column(own)) if found else ""
 
 
 def read_inputs(

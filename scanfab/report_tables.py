@@ -7,7 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from scanfab.compare import SummaryRow
+from scanfab.abscissa import STRAINS, spelt_strain, strain_column
+from scanfab.comparison import SummaryRow
 from scanfab.tabular import number_of, numbers_of, total_error
 from scanfab.writers.page import Part
 
@@ -42,15 +43,16 @@ def overview(table: Path, rows: Sequence[Row]) -> str:
     frames = len({(row["source"], row["frame"]) for row in rows})
     variants = ", ".join(sorted({str(row["variant"]) for row in rows}))
     grains = numbers_of(rows, "grains")
-    strains = numbers_of(rows, "strain")
+    column = strain_column(rows)
     parts = [
         f"{frames} {'frame' if frames == 1 else 'frames'} of {', '.join(sources)}",
         f"variants {variants}",
     ]
     if grains:
         parts.append(f"{min(grains):.0f} to {max(grains):.0f} grains")
-    if strains:
-        parts.append(f"axial strain {100 * min(strains):.3g} to {100 * max(strains):.3g} %")
+    if column is not None:
+        strains = numbers_of(rows, column)
+        parts.append(f"{STRAINS[column][0]} {100 * min(strains):.3g} to {100 * max(strains):.3g} %")
     return "; ".join(parts) + "."
 
 
@@ -65,8 +67,11 @@ def results_tables(summary: Iterable[SummaryRow], rows: Sequence[Row]) -> list[P
 def _results(source: str, summary: Sequence[SummaryRow], rows: Sequence[Row]) -> Part:
     ends = [_ends(one, rows) for one in summary]
     first, last = [one[0] for one in ends], [one[1] for one in ends]
-    strains = {number_of(row, "strain") for row in (*first, *last) if row}
-    here, there = _where("last", last, len(strains) > 1), _where("first", first, len(strains) > 1)
+    column = strain_column([row for row in rows if row["source"] == source])
+    strains = {spelt_strain(row, column) for row in (*first, *last)}
+    if len(strains) < 2:
+        column = None
+    here, there = _where("last", last, column), _where("first", first, column)
     lines = [
         (f"α_vs{here}", [_value(row, VOID) for row in last]),
         ("its error: scan", [_spell_error(number_of(row, f"{VOID}_se")) for row in last]),
@@ -96,15 +101,13 @@ def _ends(one: SummaryRow, rows: Sequence[Row]) -> tuple[Row, Row]:
     return (group[0], group[-1]) if group else ({}, {})
 
 
-def _where(which: str, rows: Sequence[Row], by_strain: bool) -> str:
+def _where(which: str, rows: Sequence[Row], column: str | None) -> str:
     """At which strain or in which frame, if it is the same for all variants."""
     row = next((row for row in rows if row), {})
     if not row or len({one["frame"] for one in rows if one}) > 1:
         return f", {which} frame that has one"
-    strain = number_of(row, "strain")
-    if strain is None or not by_strain:
-        return f", frame {row['frame']}"
-    return f" at {100 * strain:.3g} % strain"
+    strain = spelt_strain(row, column)
+    return f" at {strain}" if strain else f", frame {row['frame']}"
 
 
 def _value(row: Row, name: str) -> str:
@@ -141,31 +144,42 @@ def frame_table(rows: Sequence[Row]) -> Part:
     numbers = list(dict.fromkeys((row["source"], row["frame"]) for row in rows))
     step = -(-len(numbers) // MOST_FRAMES)
     shown = {*numbers[::step], numbers[-1]}
-    several = len({row["source"] for row in rows}) > 1
-    table = [_frame_line(row, several) for row in rows if (row["source"], row["frame"]) in shown]
+    sources = {row["source"] for row in rows}
+    # of a source whose strain tells its frames apart badly, what is known of it
+    column = {
+        source: strain_column([row for row in rows if row["source"] == source]) or "strain"
+        for source in sources
+    }
+    table = [
+        _frame_line(row, column[row["source"]], len(sources) > 1)
+        for row in rows
+        if (row["source"], row["frame"]) in shown
+    ]
     columns = [name for name in table[0] if any(line[name] != "-" for line in table)]
     note = "" if len(shown) == len(numbers) else f"{len(shown)} of {len(numbers)} frames are shown."
     return Part(columns, [[line[name] for name in columns] for line in table], note)
 
 
-def _frame_line(row: Row, several: bool) -> dict[str, str]:
-    strain = number_of(row, "strain")
+def _frame_line(row: Row, column: str, several: bool) -> dict[str, str]:
+    strain = number_of(row, column)
+    spelt = "-" if strain is None else f"{100 * strain:.3g} %"
     return {
         "frame": str(row["frame"]),
         "variant": str(row["variant"]),
-        "strain": "-" if strain is None else f"{100 * strain:.3g} %",
+        "strain": spelt if column == "strain" else "-",
+        "shear strain": spelt if column == "shear_strain" else "-",
         "α_vs": _value(row, VOID).partition(" ±")[0],
         "± total": _spell_error(total_error(row, VOID)),
         "scan": _spell_error(number_of(row, f"{VOID}_se")),
         "sample": _spell_error(number_of(row, f"{VOID}_sample_se")),
         "α_c": _value(row, CONTACT).partition(" ±")[0],
         "± of α_c": _spell_error(total_error(row, CONTACT)),
-        **{title: _spell(number_or_none(row, name)) for name, title in MORE_COLUMNS.items()},
+        **{title: _spell(_number(row, name)) for name, title in MORE_COLUMNS.items()},
         "source": str(row["source"]) if several else "-",
     }
 
 
-def number_or_none(row: Row, name: str) -> int | float | None:
+def _number(row: Row, name: str) -> int | float | None:
     """As it stands in the table, so that counts stay whole."""
     return None if number_of(row, name) is None else row[name]
 

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from scanfab.abscissa import strain_column, why_not_strain
+from scanfab.abscissa import (
+    frame_strain_column,
+    spelt_strain,
+    strain_column,
+    why_not_strain,
+)
 from tests.tables import curve, sheared
 
 
@@ -70,6 +75,29 @@ def test_all_sources_need_the_shear():
     assert strain_column([*sheared(), *curve("one")]) is None
     both = [{**row, "shear_strain": row["strain"]} for row in curve("one")]
     assert strain_column([*sheared(), *both]) == "shear_strain"
+
+
+@pytest.mark.parametrize(
+    ("axial", "shear", "column"),
+    [
+        (0.1, 0.2, "strain"),
+        (0.0, 0.2, "shear_strain"),
+        (1e-12, 0.2, "shear_strain"),
+        (None, 0.2, "shear_strain"),
+        (0.0, 0.0, "strain"),
+        (0.0, None, "strain"),
+        (None, None, None),
+    ],
+)
+def test_a_single_frame_has_the_strain_that_is_not_zero(axial, shear, column):
+    assert frame_strain_column({"strain": axial, "shear_strain": shear}) == column
+
+
+def test_a_strain_is_spelt_for_titles():
+    row = {"strain": 0.1234567, "shear_strain": None}
+    assert spelt_strain(row, "strain") == "axial strain 12.3 %"
+    assert spelt_strain(row, "strain", symbol=True) == r"$\varepsilon_a$ = 12.3 %"
+    assert spelt_strain(row, "shear_strain") == spelt_strain(row, None) == ""
 
 
 def test_frames_without_a_void_fabric_do_not_matter():

@@ -160,6 +160,19 @@ def test_without_a_strain_titles_name_the_frame(series, computed, caught, tmp_pa
     ]
 
 
+def test_the_strain_of_a_title_is_that_of_the_table(series, computed, caught, tmp_path):
+    """The file that it came from may have lost a frame since, or say something else."""
+    strains = tmp_path / "strain.csv"
+    strains.write_text("frame,strain\n0,0.5\n")
+    settings = Settings.make(boundary="mask=3", tolerance=5e-4, strain=str(strains))
+    rows = [{**row, "strain": 0.01 * row["frame"]} for row in computed.rows]
+    plot_frames(tmp_path / "x.png", series, settings, rows, "histogram")
+    assert [one.title for one in caught["histogram"]] == [
+        r"variant c, frame 0, $\varepsilon_a$ = 0 %",
+        r"variant c, frame 6, $\varepsilon_a$ = 6 %",
+    ]
+
+
 def test_cut_offs_have_the_total_error_and_the_scan_s_part(series, computed, caught, tmp_path):
     """The sample's part is about the table's, which is of another scan of the same octants."""
     plot_frames(tmp_path / "x.png", series, SETTINGS, computed.rows, "cutoffs")

@@ -20,10 +20,11 @@ from scanfab.errors import ReadError
 from scanfab.pipeline import compute_rows
 from scanfab.report import make_report
 from scanfab.scene import Scene
+from scanfab.tabular import read_rows
 from scanfab.writers.page import MOST_GRAINS, Picture, view_data
 from tests.conftest import ROOT
-from tests.dumps import write
-from tests.tables import curve
+from tests.dumps import cubic_rows, dump_text, write
+from tests.tables import curve, sheared
 
 pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.errors.ScanfabNote")
 
@@ -287,7 +288,7 @@ def test_the_error_is_that_of_scan_and_sample_together(page, computed):
 def test_without_the_sample_s_part_there_is_no_total(table):
     """The scan's error alone is never quoted as the error."""
     text = words_of(page_of([table(curve())]))
-    assert "α vs at 4 % strain -0.03000 its error: scan 0.00030" in text
+    assert "α vs at axial strain 4 % -0.03000 its error: scan 0.00030" in text
     assert "±" not in text[text.index("its error") : text.index("Straight scan lines")]
 
 
@@ -297,6 +298,44 @@ def test_the_frame_table_begins_with_what_matters(page):
     assert heads[:9] == [
         "frame", "variant", "strain", "α vs", "± total", "scan", "sample", "α c", "± of α c"
     ]  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore:shear_strain stands")
+def test_a_sheared_cell_is_told_by_its_shear(table):
+    """As the figures beside the words are over it."""
+    page = page_of([table(sheared())])
+    text = words_of(page)
+    assert "shear strain 0 to 40 %" in text
+    assert "α vs at shear strain 40 %" in text
+    assert "α vs at shear strain 0 %" in text
+    assert "axial strain" not in text[: text.index("Straight scan lines")]
+    frames = page[page.index('id="frames"') :]
+    assert re.findall(r"<th>(.*?)</th>", frames)[:3] == ["frame", "variant", "shear strain"]
+    assert "3 c 30 % " in words_of(frames)
+
+
+def test_sources_of_both_kinds_have_each_their_own_strain(table):
+    page = page_of([table(sheared(), "s.jsonl"), table(curve())])
+    frames = words_of(page[page.index('id="frames"') :])
+    assert "shear strain 0 to 40 %" in words_of(page)
+    assert "axial strain 0 to 4 %" in words_of(page)
+    assert "3 c - 30 % " in frames
+    assert "3 c 3 % - " in frames
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabWarning", "ignore:shear_strain stands")
+def test_the_view_of_a_sheared_cell_has_its_shear_in_the_title(tmp_path, monkeypatch, quick):
+    monkeypatch.chdir(ROOT)
+    table = tmp_path / "t.csv"
+    words = ["--directions", "9", "--spacing", "1rmin", "--variants", "c"]
+    assert (
+        run(["compute", "sample_data/lammps_shear", *words, "--frames", "0::5", "-o", str(table)])
+        == 0
+    )
+    last = read_rows(table)[-1]
+    page = page_of([table])
+    title = f"lammps_shear, frame 5, shear strain {100 * last['shear_strain']:.3g} %"
+    assert title in words_of(page)
 
 
 def test_a_constant_strain_names_no_end(table):
@@ -321,6 +360,15 @@ def test_the_sample_is_told_in_numbers(page):
         assert part in text
 
 
+def test_an_rv_is_a_part_of_the_sample_without_grains_that_flew_away(tmp_path, quick):
+    rows = [*cubic_rows(6), (217, 1, 40, 41, 42, 0.5)]
+    dump = write(tmp_path / "dump_0.txt", dump_text(rows, box=((-1, 50),) * 3))
+    table = tmp_path / "t.csv"
+    words = ["--directions", "9", "--spacing", "1rmin", "--variants", "c", "--rv", "0.6"]
+    assert run(["compute", str(dump), *words, "-o", str(table)]) == 0
+    assert ", 0.6 of half the sample's smallest extent" in words_of(page_of([table]))
+
+
 def test_pictures_of_frames_share_one_scan_at_the_table_s_tolerance(copied, monkeypatch):
     scanned = []
 
@@ -333,6 +381,17 @@ def test_pictures_of_frames_share_one_scan_at_the_table_s_tolerance(copied, monk
     assert [one.frames for one in scanned] == [slice(0, 1), slice(6, 7)]
     assert {one.tolerance for one in scanned} == {5e-4}
     assert "instead of the table's" not in text
+
+
+def test_pictures_pass_through_no_file(copied, monkeypatch):
+    """A signal ends the process at once: a folder of the moment would be left behind."""
+
+    def made(*_, **__):
+        raise AssertionError("a temporary file or folder is made")
+
+    monkeypatch.setattr("tempfile.mkdtemp", made)
+    monkeypatch.setattr("tempfile.mkstemp", made)
+    assert page_of([copied]).count("data:image/png") == 2
 
 
 def test_a_scan_that_takes_too_long_for_a_picture_is_rougher_and_labelled(copied, monkeypatch):

@@ -98,7 +98,7 @@ def test_one_of_several_cut_offs_is_reported(several_cutoffs, tmp_path, capsys):
     assert "cut-off 0.001, 1.98 smallest radii" in text
     assert "--cutoffs 0.0005,0.001" in text
     chosen = [row for row in read_rows(several_cutoffs) if row["cutoff"] == 0.001]
-    assert f"α vs at 15 % strain {chosen[-1]['alpha_vs_axial']:.4f} ±" in text
+    assert f"α vs at axial strain 15 % {chosen[-1]['alpha_vs_axial']:.4f} ±" in text
 
 
 def test_labels_tell_runs_of_one_sample_apart(table, tmp_path, capsys):

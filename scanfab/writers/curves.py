@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.abscissa import strain_column
+from scanfab.abscissa import STRAINS, strain_column
 from scanfab.tabular import number_of, total_error
 
 __all__ = ["Curve", "abscissa_label", "curves_of", "is_turned", "short_names"]
@@ -22,8 +22,7 @@ LONGEST_NAME = 32
 # beyond it nothing can be drawn: in units of the axis it would be infinite
 LARGEST = 1e100
 ABSCISSAE = {
-    "strain": r"axial strain $\varepsilon_a$ in %",
-    "shear_strain": r"shear strain $\varepsilon_q$ in %",
+    **{name: f"{' '.join(spelt)} in %" for name, spelt in STRAINS.items()},
     None: "frame",
 }
 # contact fabric is anisotropic for certain if its intensity is so many standard errors (about one

@@ -35,6 +35,7 @@ __all__ = [
     "WIDTH",
     "band",
     "check_plot_file",
+    "figure_bytes",
     "letter",
     "new_figure",
     "plain",
@@ -126,15 +127,20 @@ def new_figure(width: float, height: float) -> Iterator[Figure]:
         yield Figure(figsize=(width, height), layout="constrained")
 
 
-def save_figure(figure: Figure, path: Path, dpi: int = DPI) -> None:
-    """Write PNG, SVG or PDF, by the suffix; the file is complete or untouched."""
-    kind = path.suffix.lower().lstrip(".")
+def figure_bytes(figure: Figure, kind: str, dpi: int = DPI) -> bytes:
+    """A figure as ``png``, ``svg`` or ``pdf``; no file is made."""
     dates = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
-    # in memory first: where the disk is full, the writer of PDF fails with an error of another kind
     drawn = BytesIO()
     figure.savefig(drawn, format=kind, dpi=dpi, metadata=dates[kind])
+    return drawn.getvalue()
+
+
+def save_figure(figure: Figure, path: Path, dpi: int = DPI) -> None:
+    """Write PNG, SVG or PDF, by the suffix; the file is complete or untouched."""
+    # in memory first: where the disk is full, the writer of PDF fails with an error of another kind
+    drawn = figure_bytes(figure, path.suffix.lower().lstrip("."), dpi)
     with whole_file(path) as part:
-        part.write_bytes(drawn.getbuffer())
+        part.write_bytes(drawn)
 
 
 def plain(text: str) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -36,6 +37,8 @@ __all__ = [
     "Ring",
     "Rose",
     "disk",
+    "drawn_histogram",
+    "drawn_projection",
     "plot_cutoffs",
     "plot_histogram",
     "plot_projection",
@@ -211,6 +214,13 @@ def _ring_legend(figure: Figure, rings: Sequence[Ring]) -> None:
 
 
 def plot_projection(path: Path, frames: Sequence[Projection], dpi: int = DPI) -> None:
+    """Write :func:`drawn_projection` to a file."""
+    with drawn_projection(frames) as figure:
+        save_figure(figure, path, dpi)
+
+
+@contextmanager
+def drawn_projection(frames: Sequence[Projection]) -> Iterator[Figure]:
     """The directional distributions on equal-area disks, a row for each frame."""
     with new_figure(WIDTH, 2.5 * len(frames) + 0.2) as figure:
         panels = figure.subplots(len(frames), 2, squeeze=False)
@@ -225,7 +235,7 @@ def plot_projection(path: Path, frames: Sequence[Projection], dpi: int = DPI) ->
                 bar = figure.colorbar(drawn, ax=panels[:, column], shrink=0.8, pad=0.03, aspect=30)
                 bar.set_label("deviation from the mean in %")
         letter(panels.ravel(), [f"{what}\n{frame.title}" for frame in frames for what in WHAT])
-        save_figure(figure, path, dpi)
+        yield figure
 
 
 def _disk(axes: Axes, value: FloatArray | None, largest: float) -> Any:
@@ -258,6 +268,13 @@ def _disk(axes: Axes, value: FloatArray | None, largest: float) -> Any:
 
 
 def plot_histogram(path: Path, samples: Sequence[LengthSample], dpi: int = DPI) -> None:
+    """Write :func:`drawn_histogram` to a file."""
+    with drawn_histogram(samples) as figure:
+        save_figure(figure, path, dpi)
+
+
+@contextmanager
+def drawn_histogram(samples: Sequence[LengthSample]) -> Iterator[Figure]:
     """Density of void segment lengths, with the cut-off; an outline for each frame."""
     with new_figure(COLUMN, 3.2) as figure:
         axes = figure.subplots()
@@ -281,7 +298,7 @@ def plot_histogram(path: Path, samples: Sequence[LengthSample], dpi: int = DPI) 
         axes.set(yscale="log", xlim=(0, longest), ylabel="probability density")
         axes.set(xlabel=r"void segment length / $r_{min}$")
         figure.legend(loc="outside upper left", ncols=1)
-        save_figure(figure, path, dpi)
+        yield figure
 
 
 def plot_cutoffs(path: Path, curves: Sequence[CutoffCurve], dpi: int = DPI) -> None:

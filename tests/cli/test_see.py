@@ -13,6 +13,8 @@ import pytest
 
 from scanfab.cli.main import run
 from scanfab.figures import fits_of, plot_rows
+from scanfab.opening import read_series
+from scanfab.strain import shear_strain
 from scanfab.tabular import read_rows
 from tests.conftest import ROOT, SAMPLE
 from tests.dumps import cubic_rows, dump_text, write
@@ -246,6 +248,32 @@ def test_the_title_names_the_frame_and_its_strain(tmp_path, monkeypatch):
     words = ["--boundary", "mask=3", "--frame", "-1", "--screenshot", str(tmp_path / "x.png")]
     assert run(["view", SAMPLE, *words]) == 0
     assert titles == [f"{SAMPLE}, frame 6, axial strain 15 %"]
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabWarning")
+def test_the_title_of_a_sheared_cell_has_its_shear(tmp_path, monkeypatch):
+    titles = []
+    monkeypatch.setattr("scanfab.writers.view.show_scene", lambda *said: titles.append(said[2]))
+    source = f"{ROOT}/sample_data/lammps_shear"
+    assert run(["view", source, "--frame", "5", "--screenshot", str(tmp_path / "x.png")]) == 0
+    first, last = (frame.read().cell for frame in [*read_series(source)][::5])
+    assert titles == [f"{source}, frame 5, shear strain {100 * shear_strain(last, first):.3g} %"]
+
+
+def test_damaged_frames_before_the_one_asked_for_are_skipped(tmp_path, monkeypatch, capsys):
+    """A radius of 0 makes no packing, and cut text no frame: the RV is of the third."""
+    flat = [(*cubic_rows()[0][:5], 0), *cubic_rows()[1:]]
+    write(tmp_path / "dump_0.txt", dump_text(flat))
+    write(tmp_path / "dump_1.txt", dump_text(cubic_rows(), step=1)[:-40])
+    write(tmp_path / "dump_2.txt", dump_text(cubic_rows(), step=2))
+    scenes = []
+    monkeypatch.setattr("scanfab.writers.view.show_scene", lambda *said: scenes.append(said[0]))
+    words = ["--screenshot", str(tmp_path / "x.png")]
+    assert run(["view", str(tmp_path), "--frame", "2", *words]) == 0
+    assert scenes[0].window_radius is not None
+    told = capsys.readouterr().err
+    assert told.count("frame 0 skipped: ") == told.count("frame 1 skipped: ") == 1
+    assert run(["view", str(tmp_path), "--frame", "0", *words]) == 1
 
 
 def scanfab(*words, **environment):
