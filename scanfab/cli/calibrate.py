@@ -29,6 +29,7 @@ from scanfab.cli.options import (
 )
 from scanfab.cli.settings_file import fill_from_file
 from scanfab.cli.sources import SourceCommand, open_series, reading_arguments
+from scanfab.cli.tables import Column, print_columns, spelt
 from scanfab.cli.talk import talk_options, tell_inputs, working
 
 if TYPE_CHECKING:
@@ -200,41 +201,25 @@ def _write_rows(found: Calibration, command: str, excerpt: Excerpt) -> None:
 
 def _print(rows: tuple[StepRow, ...]) -> None:
     """One table for each ladder."""
-    from rich.console import Console
-    from rich.table import Table
-
-    console = Console()
     for ladder, steps in groupby(rows, key=lambda row: row.ladder):
-        table = Table(box=None, header_style="bold", pad_edge=False)
-        titles = ("variant", "rule", "bias", "segments", "time", "α_vs axial", "± scan", "± sample")
-        for title in (TITLES[ladder], *titles, "steady"):
-            table.add_column(title, justify="right", no_wrap=True)
-        for row in steps:
-            table.add_row(*_cells(row))
-        console.print(table)
-        console.print()
+        print_columns(_columns(ladder, list(steps)))
+        click.echo()
 
 
-def _cells(row: StepRow) -> list[str]:
-    steady = {None: "", 0: "no", 1: "yes"}[row.steady]
+def _columns(ladder: str, steps: list[StepRow]) -> list[Column]:
+    """What was changed, and what came of it; the rest where there is room."""
+    steady = {None: "", 0: "no", 1: "yes"}
     return [
-        f"{row.value:g}",
-        row.variant,
-        row.rule,
-        f"{row.rule_bias:.2g}" if row.rule_bias > 1e-12 else "0",
-        _spell(row.segments),
-        f"{row.seconds:.2g} s",
-        *(
-            _spell(value)
-            for value in (
-                row.alpha_vs_axial,
-                row.alpha_vs_axial_se,
-                row.alpha_vs_axial_sample_se,
-            )
+        Column(TITLES[ladder], [f"{row.value:g}" for row in steps]),
+        Column("variant", [row.variant for row in steps]),
+        Column("rule", [row.rule for row in steps], 2),
+        Column(
+            "bias", [spelt(row.rule_bias if row.rule_bias > 1e-12 else 0, 2) for row in steps], 4
         ),
-        steady + (" (!)" if row.note else ""),
+        Column("segments", [spelt(row.segments) for row in steps], 3),
+        Column("time", [f"{row.seconds:.2g} s" for row in steps], 1),
+        Column("α_vs axial", [spelt(row.alpha_vs_axial) for row in steps]),
+        Column("± scan", [spelt(row.alpha_vs_axial_se) for row in steps]),
+        Column("± sample", [spelt(row.alpha_vs_axial_sample_se) for row in steps]),
+        Column("steady", [steady[row.steady] + (" (!)" if row.note else "") for row in steps]),
     ]
-
-
-def _spell(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3g}" if isinstance(value, float) else str(value)

@@ -12,6 +12,7 @@ from typing import Any
 import click
 
 from scanfab.cli.options import AS_CSV
+from scanfab.cli.tables import Column, print_columns, spelt
 from scanfab.cli.talk import Level, level
 from scanfab.errors import ScanfabNote, ScanfabWarning, SkippedFrameWarning
 from scanfab.table import Row
@@ -44,7 +45,6 @@ ORDER = (
     "mean_length", "alpha_vs", "alpha_vs_axial", "total", "alpha_vs_axial_se",
     "alpha_vs_axial_sample_se", "alpha_c_axial",
 )  # fmt: skip
-BETWEEN = 2
 
 
 class Told:
@@ -114,37 +114,18 @@ def announce_compiling() -> None:
 
 def print_table(rows: Iterable[Row], excerpt: Excerpt) -> None:
     """A readable table on standard output: the columns that were asked for, or those that fit."""
-    from rich.console import Console
-    from rich.table import Table
-
     from scanfab.tabular import total_error
 
     values = [asdict(row) for row in rows]
     for row in values:
         row["total"] = total_error(row, "alpha_vs_axial")
-    width = Console().width
-    titles = {name: name for name in excerpt.fields} or {**KEYS, **MORE}
-    columns = {
-        name: [titles[name], *(_spell(row[name], excerpt.digits) for row in values)]
-        for name in excerpt.fields or ORDER
-    }
-    widths = {name: max(map(len, cells)) + BETWEEN for name, cells in columns.items()}
-    if not excerpt.fields:
-        for name in reversed(MORE):
-            if sum(widths.values()) - BETWEEN > width:
-                del columns[name], widths[name]
-    # a column is never cut: a terminal that is too narrow for these wraps their lines
-    console = Console(width=max(width, sum(widths.values())))
-    table = Table(box=None, header_style="bold", pad_edge=False, padding=(0, BETWEEN, 0, 0))
-    for name in columns:
-        table.add_column(titles[name], justify="right", no_wrap=True)
-    for cells in zip(*(column[1:] for column in columns.values()), strict=True):
-        table.add_row(*cells)
-    console.print(table)
-
-
-def _spell(value: Any, digits: int) -> str:
-    if value is None:
-        return "-"
     # three digits say enough on a terminal, unless others were asked for
-    return f"{value:.{digits if digits < 17 else 3}g}" if isinstance(value, float) else str(value)
+    digits = excerpt.digits if excerpt.digits < 17 else 3
+    titles = {name: name for name in excerpt.fields} or {**KEYS, **MORE}
+    ranks = {} if excerpt.fields else {name: rank for rank, name in enumerate(MORE, start=1)}
+    print_columns(
+        [
+            Column(titles[name], [spelt(row[name], digits) for row in values], ranks.get(name, 0))
+            for name in excerpt.fields or ORDER
+        ]
+    )

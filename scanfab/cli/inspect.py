@@ -18,6 +18,7 @@ from scanfab.cli.options import (
 )
 from scanfab.cli.settings_file import fill_from_file
 from scanfab.cli.sources import SourceCommand, open_series, reading_arguments
+from scanfab.cli.tables import spelt
 from scanfab.cli.talk import talk_options, tell_inputs, working
 
 if TYPE_CHECKING:
@@ -81,10 +82,6 @@ def _print(report: FrameReport) -> None:
 
 
 def _spell(value: Any) -> str:
-    if value is None:
-        return "-"
-    if isinstance(value, float):
-        return f"{value:.6g}"
     if isinstance(value, list):
         return ", ".join(_spell(item) for item in value)
-    return str(value)
+    return spelt(value, 6)

@@ -5,15 +5,26 @@ from __future__ import annotations
 import csv
 import io
 import shlex
+from dataclasses import replace
 
 import pytest
 
+from scanfab.calibration import Calibration
 from scanfab.cli.main import run
-from scanfab.ladders import STEP_MEANINGS
+from scanfab.ladders import STEP_MEANINGS, StepRow
 from tests.dumps import cubic_rows, dump_text, write
 from tests.truth import TRIAXIAL
 
 QUICK = ("--boundary", "mask=3", "--tolerance", "2e-3", "--max-chords", "3e7", "--workers", "1")
+
+
+STEP = StepRow(
+    source="s", frame=0, ladder="spacing", value=0.1, variant="c", rule="icosahedral:9", degree=5,
+    rule_bias=1.2e-4, directions=46, replicates=16, spacing=1e-4, cutoff=1e-3, rv_radius=None,
+    segments=123456789, seconds=1.234, mean_length=1e-3, alpha_vs_axial=0.123456,
+    alpha_vs_axial_se=0.00123456, alpha_vs_axial_sample_se=0.0123456, steady=1, note="",
+)  # fmt: skip
+FOUND = Calibration((STEP, replace(STEP, ladder="cutoff")), ("nothing found",), {})
 
 
 @pytest.fixture
@@ -43,6 +54,26 @@ def test_rows_on_one_stream_and_words_on_the_other(calibrate, capsys, tmp_path):
     best = [row for row in rows if row["ladder"] == "recommended"]
     for name in ("variant", "alpha_vs_axial", "alpha_vs_axial_se", "segments"):
         assert [row[name] for row in printed] == [row[name] for row in best]
+
+
+@pytest.mark.parametrize("width", [70, 80, 100, 160])
+def test_tables_on_a_terminal_are_not_cut(calibrate, monkeypatch, width):
+    monkeypatch.setenv("COLUMNS", str(width))
+    monkeypatch.setattr("scanfab.cli.console.is_readable", lambda: True)
+    monkeypatch.setattr("scanfab.calibration.calibrate", lambda *_, **__: FOUND)
+    out, _ = calibrate(TRIAXIAL, *QUICK)
+    table = out.split("nothing found")[0].splitlines()
+    assert "…" not in out
+    assert max(map(len, table)) <= width
+    heads = [line for line in table if "variant" in line]
+    assert len(heads) == 2
+    for title in ("r_min", "α_vs axial", "± scan", "± sample", "steady"):
+        assert title in heads[0]
+    for value in ("0.123", "0.00123", "0.0123", "yes"):
+        assert value in table[1].split()
+    present = [title in heads[0] for title in ("time", "rule", "segments", "bias")]
+    assert present == sorted(present, reverse=True)
+    assert all(present) == (width == 160)
 
 
 def test_with_a_file_the_words_are_the_output(calibrate, tmp_path):
