@@ -139,7 +139,7 @@ def _in_toml(value: Any) -> str:
     """What kind of value it is, as the file spells it where that is short."""
     if isinstance(value, bool):
         return str(value).lower()
-    kinds = {dict: "a table", list: "a list in a list"}
+    kinds: dict[type, str] = {dict: "a table", list: "a list in a list"}
     return kinds.get(type(value), f"a date or time, {value}")
 
 

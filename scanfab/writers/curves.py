@@ -21,7 +21,7 @@ Rows = Sequence[Mapping[str, Any]]
 LONGEST_NAME = 32
 # beyond it nothing can be drawn: in units of the axis it would be infinite
 LARGEST = 1e100
-ABSCISSAE = {
+ABSCISSAE: dict[str | None, str] = {
     **{name: f"{' '.join(spelt)} in %" for name, spelt in STRAINS.items()},
     None: "frame",
 }
