@@ -21,10 +21,6 @@ Rows = Sequence[Mapping[str, Any]]
 LONGEST_NAME = 32
 # beyond it nothing can be drawn: in units of the axis it would be infinite
 LARGEST = 1e100
-ABSCISSAE = {
-    **{name: f"{' '.join(spelt)} in %" for name, spelt in STRAINS.items()},
-    None: "frame",
-}
 # contact fabric is anisotropic for certain if its intensity is so many standard errors (about one
 # without any anisotropy), and turned if less than this part of it shows along the loading axis
 CERTAIN, ALONG = 5.0, 0.5
@@ -75,7 +71,8 @@ def curves_of(rows: Iterable[Mapping[str, Any]]) -> list[Curve]:
 
 def abscissa_label(rows: Rows) -> str:
     """What the abscissa is."""
-    return ABSCISSAE[strain_column(rows)]
+    column = strain_column(rows)
+    return "frame" if column is None else f"{' '.join(STRAINS[column])} in %"
 
 
 def is_turned(rows: Rows) -> bool:
