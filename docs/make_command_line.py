@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from scanfab.cli.group import COMMANDS, cli
-from scanfab.compare import DIFFERENCE_MEANINGS, FRAME_MEANINGS, SUMMARY_MEANINGS
+from scanfab.comparison import DIFFERENCE_MEANINGS, FRAME_MEANINGS, SUMMARY_MEANINGS
 from scanfab.inspection import REPORT_MEANINGS
 from scanfab.ladders import STEP_MEANINGS
 from scanfab.table import MEANINGS

@@ -11,31 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.abscissa import strain_column, why_not_strain
-from scanfab.comparison import (
-    DIFFERENCE_MEANINGS,
-    FRAME_MEANINGS,
-    SUMMARY_MEANINGS,
-    Comparison,
-    DifferenceRow,
-    FrameRow,
-    SummaryRow,
-)
+from scanfab.comparison import Comparison, DifferenceRow, FrameRow, SummaryRow
 from scanfab.errors import ScanfabNote, ScanfabWarning, SettingsError
 from scanfab.fabric.jackknife import BLOCKS, variance_without_noise
 from scanfab.selection import check_rows
 from scanfab.tabular import number_of, numbers_of, total_error
 
-__all__ = [
-    "DIFFERENCE_MEANINGS",
-    "FRAME_MEANINGS",
-    "SUMMARY_MEANINGS",
-    "Comparison",
-    "DifferenceRow",
-    "FrameRow",
-    "SummaryRow",
-    "compare_tables",
-    "fitted_points",
-]
+__all__ = ["compare_tables"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -61,7 +43,8 @@ def compare_tables(
     -------
     Comparison
         Rows for frames, for sources and variants, and for pairs of variants; what they hold is in
-        ``FRAME_MEANINGS``, ``SUMMARY_MEANINGS`` and ``DIFFERENCE_MEANINGS``.
+        ``FRAME_MEANINGS``, ``SUMMARY_MEANINGS`` and ``DIFFERENCE_MEANINGS`` of
+        ``scanfab.comparison``; and the points of each fit.
 
     Raises
     ------
@@ -84,29 +67,17 @@ def compare_tables(
     groups = _grouped(rows)
     _tell_of_strains(rows, strain_max)
     column = strain_column(rows)
+    told_apart = {key: _with_strain(group, column) for key, group in groups.items()}
+    points = [_points(group, strain_max) for group in told_apart.values()]
     return Comparison(
         frames=tuple(row for group in groups.values() for row in _normalised(group)),
         summary=tuple(
-            _summary(source, variant, _with_strain(group, column), strain_max)
-            for (source, variant), group in groups.items()
+            _summary(*key, group, fitted, strain_max)
+            for (key, group), fitted in zip(told_apart.items(), points, strict=True)
         ),
         differences=tuple(_differences(groups)),
+        points=tuple(points),
     )
-
-
-def fitted_points(
-    rows: Sequence[Mapping[str, Any]], strain_max: float | None = None
-) -> list[FloatArray]:
-    """
-    Contact and void anisotropy of the frames that enter each fit of :func:`compare_tables`.
-
-    Returns
-    -------
-    list of ndarray, shape (M, 2)
-        In the order of the summary.
-    """
-    column = strain_column(rows)
-    return [_points(_with_strain(group, column), strain_max) for group in _grouped(rows).values()]
 
 
 def _tell_of_strains(rows: Sequence[Mapping[str, Any]], strain_max: float | None) -> None:
@@ -192,9 +163,12 @@ def _largest(group: Sequence[Mapping[str, Any]], name: str) -> float | None:
 
 
 def _summary(
-    source: str, variant: str, group: Sequence[Mapping[str, Any]], strain_max: float | None
+    source: str,
+    variant: str,
+    group: Sequence[Mapping[str, Any]],
+    fitted: FloatArray,
+    strain_max: float | None,
 ) -> SummaryRow:
-    fitted = _points(group, strain_max)
     slope, slope_origin, r2 = _fit(*fitted.T)
     curve = [row for row in group if row["alpha_vs_axial"] is not None]
     peak = max(curve, key=lambda row: abs(row["alpha_vs_axial"]), default=None)

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+import numpy.typing as npt
+
 __all__ = [
     "DIFFERENCE_MEANINGS",
     "FRAME_MEANINGS",
@@ -13,6 +16,8 @@ __all__ = [
     "FrameRow",
     "SummaryRow",
 ]
+
+FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -103,10 +108,13 @@ DIFFERENCE_MEANINGS: dict[str, str] = {
 """What each column holds; anisotropies and strains are dimensionless."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Comparison:
-    """The tables that :func:`compare_tables` makes."""
+    """The tables that :func:`scanfab.compare_tables` makes."""
 
     frames: tuple[FrameRow, ...]
     summary: tuple[SummaryRow, ...]
     differences: tuple[DifferenceRow, ...]
+    points: tuple[FloatArray, ...]
+    """For each row of the summary, contact and void anisotropy of the frames in its fits, shape
+    (frames, 2)."""

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.compare import SummaryRow, compare_tables, fitted_points
+from scanfab.compare import compare_tables
+from scanfab.comparison import Comparison, SummaryRow
 from scanfab.writers.plot_table import TABLE_FIGURES, Fit, plot_table
 
 __all__ = ["TABLE_FIGURES", "fits_of", "plot_rows"]
@@ -19,7 +20,7 @@ def plot_rows(
     path: Path,
     rows: Sequence[Mapping[str, Any]],
     name: str | None = None,
-    strain_max: float | None = None,
+    comparison: Comparison | None = None,
 ) -> None:
     """
     Draw a fabric table.
@@ -32,22 +33,22 @@ def plot_rows(
         Rows by column, as :func:`scanfab.read_rows` returns them.
     name : str, optional
         ``evolution``, ``normalised`` or ``correlation``; all on one page by default.
-    strain_max : float, optional
-        Leave frames beyond this strain out of the fitted lines.
+    comparison : Comparison, optional
+        Of these rows, with the lines to draw; it is made here, with its hints, if there is none.
 
     Raises
     ------
     SettingsError
         If there is nothing to draw.
     """
-    plot_table(path, rows, fits_of(rows, strain_max), name)
+    plot_table(path, rows, fits_of(comparison or compare_tables(rows)), name)
 
 
-def fits_of(rows: Sequence[Mapping[str, Any]], strain_max: float | None = None) -> list[Fit | None]:
+def fits_of(comparison: Comparison) -> list[Fit | None]:
     """The line of each source and variant as ``compare --summary`` has it; None without one."""
-    summary = compare_tables(rows, strain_max=strain_max).summary
-    points = fitted_points(rows, strain_max)
-    return [_fit(one, group) for one, group in zip(summary, points, strict=True)]
+    return [
+        _fit(one, points) for one, points in zip(comparison.summary, comparison.points, strict=True)
+    ]
 
 
 def _fit(summary: SummaryRow, points: npt.NDArray[np.float64]) -> Fit | None:

@@ -15,7 +15,7 @@ from scanfab.frame_result import FrameResult
 from scanfab.tabular import number_of, total_error
 from scanfab.writers.plot_frame import Projection
 
-__all__ = ["noise_notes"]
+__all__ = ["contact_noise", "noise_notes", "void_noise"]
 
 FloatArray = npt.NDArray[np.float64]
 

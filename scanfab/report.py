@@ -11,6 +11,7 @@ from typing import Any
 
 from scanfab.caveats import caveats_of
 from scanfab.compare import compare_tables
+from scanfab.comparison import Comparison
 from scanfab.errors import ScanfabError, ScanfabNote, ScanfabWarning, SettingsError
 from scanfab.figures import fits_of
 from scanfab.report_frames import data_url, show_frames
@@ -89,7 +90,7 @@ def make_report(
         date=(today or datetime.now(UTC).astimezone().date()).isoformat(),
         summary=[overview(one.path, one.rows) for one in inputs],
         results=results_tables(comparison.summary, rows),
-        pictures=[*_table_pictures(rows), *_frame_pictures(sections)],
+        pictures=[*_table_pictures(rows, comparison), *_frame_pictures(sections)],
         warnings=list(dict.fromkeys([*heard.warnings, *caveats_of(rows, asked)])),
         notes=list(dict.fromkeys(heard.notes)),
         sections=sections,
@@ -105,12 +106,12 @@ def _usual_title(rows: Sequence[Mapping[str, Any]]) -> str:
     return f"Void fabric of {', '.join(names) if len(names) < 4 else f'{len(names)} samples'}"
 
 
-def _table_pictures(rows: Sequence[Mapping[str, Any]]) -> list[Picture]:
+def _table_pictures(rows: Sequence[Mapping[str, Any]], comparison: Comparison) -> list[Picture]:
     """The figures of the table; none if it has no void fabric."""
     from scanfab.writers.plot import figure_bytes, new_figure
     from scanfab.writers.plot_table import SIZES, TABLE_FIGURES, draw_table
 
-    fits = fits_of(rows)
+    fits = fits_of(comparison)
     pictures = []
     for name, caption in TABLE_FIGURES.items():
         with new_figure(*SIZES[name]) as figure:

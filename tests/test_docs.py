@@ -17,7 +17,7 @@ import click
 import pytest
 
 import scanfab
-from scanfab import compare, inspection, ladders, table
+from scanfab import comparison, inspection, ladders, table
 from scanfab.cli.group import COMMANDS, cli
 from scanfab.directions import RULES
 from scanfab.readers.registry import installed_readers
@@ -61,9 +61,9 @@ def test_every_option_is_documented(name: str) -> None:
     ("meanings", "row"),
     [
         (table.MEANINGS, table.Row),
-        (compare.FRAME_MEANINGS, compare.FrameRow),
-        (compare.SUMMARY_MEANINGS, compare.SummaryRow),
-        (compare.DIFFERENCE_MEANINGS, compare.DifferenceRow),
+        (comparison.FRAME_MEANINGS, comparison.FrameRow),
+        (comparison.SUMMARY_MEANINGS, comparison.SummaryRow),
+        (comparison.DIFFERENCE_MEANINGS, comparison.DifferenceRow),
         (ladders.STEP_MEANINGS, ladders.StepRow),
         (inspection.REPORT_MEANINGS, inspection.FrameReport),
     ],

@@ -9,6 +9,7 @@ from types import ModuleType
 import pytest
 from PIL import Image
 
+from scanfab.compare import compare_tables
 from scanfab.figures import fits_of
 from scanfab.writers import plot_table
 from scanfab.writers.plot import new_figure
@@ -56,7 +57,7 @@ def test_every_picture_of_the_pages_is_one_of_them():
 
 def content(rows):
     with new_figure(5, 3) as figure:
-        plot_table.draw_table(figure, rows, fits_of(rows))
+        plot_table.draw_table(figure, rows, fits_of(compare_tables(rows)))
         return make_figures.of_figure(figure)
 
 

@@ -8,7 +8,7 @@ from dataclasses import fields
 
 import pytest
 
-from scanfab.compare import DifferenceRow, FrameRow, SummaryRow
+from scanfab.comparison import DifferenceRow, FrameRow, SummaryRow
 from scanfab.errors import ScanfabWarning, SettingsError
 from scanfab.inspection import FrameReport
 from scanfab.ladders import StepRow

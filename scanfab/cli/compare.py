@@ -110,7 +110,7 @@ def compare(
         else:
             _write_csv(chosen, excerpt)
         if plot is not None:
-            plot_rows(plot, rows, figure, strain_max)
+            plot_rows(plot, rows, figure, comparison)
     return 0 if any(row.alpha_vs_axial is not None for row in comparison.frames) else 1
 
 

@@ -18,7 +18,7 @@ from scanfab.errors import ScanfabNote, ScanfabWarning, SkippedFrameWarning
 from scanfab.table import Row
 from scanfab.writers.rows import Excerpt
 
-__all__ = ["announce_compiling", "is_readable", "print_table", "reported_warnings"]
+__all__ = ["Told", "announce_compiling", "is_readable", "print_table", "reported_warnings"]
 
 # titles of the columns that a terminal always shows, and of those for which there may be room, the
 # most telling first

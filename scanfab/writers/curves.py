@@ -75,7 +75,8 @@ def curves_of(rows: Iterable[Mapping[str, Any]]) -> list[Curve]:
 
 def abscissa_label(rows: Rows) -> str:
     """What the abscissa is."""
-    return ABSCISSAE[strain_column(rows)]
+    column = strain_column(rows)
+    return "frame" if column is None else f"{' '.join(STRAINS[column])} in %"
 
 
 def is_turned(rows: Rows) -> bool:

@@ -54,7 +54,7 @@ MOST_MARKERS = 25
 
 
 @dataclass(frozen=True)
-class Quantity:
+class _Quantity:
     """What a column of panels shows: names of a curve's arrays, and the factor of the axis."""
 
     label: str
@@ -67,22 +67,22 @@ class Quantity:
 
 
 AXIAL = (
-    Quantity(VOID_UNIT + VOID_AXIAL, 1e3, "void", "void_total", "void_scan"),
-    Quantity(CONTACT_UNIT + CONTACT_AXIAL, 1e2, "contact", "contact_total"),
+    _Quantity(VOID_UNIT + VOID_AXIAL, 1e3, "void", "void_total", "void_scan"),
+    _Quantity(CONTACT_UNIT + CONTACT_AXIAL, 1e2, "contact", "contact_total"),
 )
 # where the principal axes are not the loading axis
 TURNED = (
-    Quantity(VOID_UNIT + VOID_INTENSITY, 1e3, "void_intensity"),
-    Quantity(CONTACT_UNIT + CONTACT_INTENSITY, 1e2, "contact_intensity"),
-    Quantity("coaxiality, degrees", 1.0, "angle"),
+    _Quantity(VOID_UNIT + VOID_INTENSITY, 1e3, "void_intensity"),
+    _Quantity(CONTACT_UNIT + CONTACT_INTENSITY, 1e2, "contact_intensity"),
+    _Quantity("coaxiality, degrees", 1.0, "angle"),
 )
 NORMALISED = (
-    Quantity(f"{VOID_AXIAL} / largest", 1.0, "void", "void_total"),
-    Quantity(f"{CONTACT_AXIAL} / largest", 1.0, "contact", "contact_total"),
+    _Quantity(f"{VOID_AXIAL} / largest", 1.0, "void", "void_total"),
+    _Quantity(f"{CONTACT_AXIAL} / largest", 1.0, "contact", "contact_total"),
 )
 NORMALISED_TURNED = (
-    Quantity(f"{VOID_INTENSITY} / largest", 1.0, "void_intensity"),
-    Quantity(f"{CONTACT_INTENSITY} / largest", 1.0, "contact_intensity"),
+    _Quantity(f"{VOID_INTENSITY} / largest", 1.0, "void_intensity"),
+    _Quantity(f"{CONTACT_INTENSITY} / largest", 1.0, "contact_intensity"),
 )
 
 
@@ -222,7 +222,7 @@ class _Page:
         )
 
 
-def _draw(axes: Axes, drawn: Sequence[Drawn], quantity: Quantity, share: bool) -> None:
+def _draw(axes: Axes, drawn: Sequence[Drawn], quantity: _Quantity, share: bool) -> None:
     """One panel: values, their total errors as bands, the scan's part as bars."""
     for one in drawn:
         values = getattr(one.curve, quantity.values)
@@ -252,7 +252,7 @@ def _bars(axes: Axes, one: Drawn, values: FloatArray, error: FloatArray) -> None
         )
 
 
-def _note(groups: Sequence[Group], quantities: Sequence[Quantity], share: bool) -> str:
+def _note(groups: Sequence[Group], quantities: Sequence[_Quantity], share: bool) -> str:
     """What bands and bars are."""
     curves = [one.curve for group in groups for one in group.drawn]
     if not any(quantity.total for quantity in quantities):

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from scanfab.cli.main import run
+from scanfab.compare import compare_tables
 from scanfab.figures import fits_of, plot_rows
 from scanfab.opening import read_series
 from scanfab.strain import shear_strain
@@ -95,7 +96,7 @@ def test_compare_draws_the_fit_that_it_prints(table, tmp_path, capsys):
         assert run(["compare", table, "--summary", *words]) == 0
         assert plot.read_bytes().startswith(b"%PDF")
     printed = capsys.readouterr().out.splitlines()[1].split(",")
-    fit = fits_of(read_rows(table), 0.03)[0]
+    fit = fits_of(compare_tables(read_rows(table), strain_max=0.03))[0]
     assert fit is not None
     assert float(printed[3]) == fit.slope
 

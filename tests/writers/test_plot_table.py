@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +29,7 @@ def drawn():
         block = new_figure(7, 7)
         figures.append(block)
         figure = block.__enter__()
-        draw_table(figure, rows, fits_of(rows, strain_max), name)
+        draw_table(figure, rows, fits_of(compare_tables(rows, strain_max=strain_max)), name)
         figure.canvas.draw()
         return figure
 
@@ -72,7 +73,7 @@ def test_the_line_goes_through_the_least_squares_line(drawn):
 
 def test_the_slope_s_error_is_in_the_legend(drawn):
     rows = curve()
-    (fit,) = fits_of(rows)
+    (fit,) = fits_of(compare_tables(rows))
     assert fit is not None
     assert fit.slope_se is None
     from dataclasses import replace
@@ -141,6 +142,14 @@ def test_what_is_too_large_to_draw_is_a_hole(tmp_path, column):
     rows = curve()
     rows[2][column] = 1e308
     plot_rows(tmp_path / "x.png", rows, "evolution")
+
+
+def test_a_comparison_is_made_and_told_once(tmp_path):
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        comparison = compare_tables(sheared())
+        plot_rows(tmp_path / "x.png", sheared(), "evolution", comparison)
+    assert sum("shear_strain stands in" in str(one.message) for one in told) == 1
 
 
 def test_noise_does_not_fill_the_panel(drawn):
