@@ -92,7 +92,8 @@ class FrameFile:
         above = f" (above 0: {', '.join(names[: self._positive])})" if self._positive else ""
         raise ReadError(
             f"{self.path}, line {line}: expected numbers as {self.key} and {', '.join(names)}"
-            f"{above}, the first a whole one, found {row[self.key]!r} and {', '.join(repr(row[name]) for name in names)}"
+            f"{above}, the first a whole one, "
+            f"found {row[self.key]!r} and {', '.join(repr(row[name]) for name in names)}"
         )
 
     def at(self, frame: int, step: int | None) -> tuple[float, ...] | None:

@@ -122,7 +122,7 @@ def temporary_copy(stream: IO[bytes], name: str) -> Path:
     copy = _new_folder(name) / name
     try:
         with _of_copy(name):
-            file = open(copy, "wb", buffering=0)
+            file = open(copy, "wb", buffering=0)  # noqa: SIM115
         with file:
             size = 0
             while part := stream.read(PART):

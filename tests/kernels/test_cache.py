@@ -312,6 +312,6 @@ def test_a_process_that_ends_at_once_leaves_no_half_a_kernel(tmp_path, monkeypat
 
     monkeypatch.setattr(ending, "_steps", [])
     monkeypatch.setattr(cache.os, "replace", end)
-    with pytest.raises(ValueError):  # the process would be gone
+    with pytest.raises(ValueError, match="not in list"):  # the process would be gone
         cache._write(tmp_path / "one.kernel", b"code")
     assert left == []
