@@ -10,8 +10,8 @@ import pyvista
 import scanfab
 from scanfab.errors import ReadError
 from scanfab.readers.base import GrainTable, ReadOptions, Snapshot
-from scanfab.readers.mesh import read_mesh
 from scanfab.readers.liggghts import LiggghtsReader
+from scanfab.readers.mesh import read_mesh
 from scanfab.readers.vtk import VtkReader
 from tests.dumps import write, yade_spheres
 from tests.truth import FLOOR, YADE
