@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.errors import SettingsError
+from scanfab.manifest import strain_file
 from scanfab.pipeline import chosen_frames
 from scanfab.rerun import read_manifest
 from scanfab.series import Series
@@ -155,35 +156,66 @@ def _check_inputs(
     path: Path,
     manifest: Mapping[str, Any],
     series: Sequence[Series],
-    rows: Mapping[str, Mapping[int, Any]],
+    rows: Mapping[str, Mapping[int, list[Row]]],
 ) -> None:
     """Refuse a table whose inputs are not what they were, but for frames behind the last one."""
     before = {str(one.get("path")): one for one in manifest.get("inputs", [])}
-    for gone in before.keys() - {str(file) for one in series for file in one.files()}:
+    strains = strain_file(manifest["settings"])
+    numbers = [strains, *(one.cells.path for one in series if one.cells is not None)]
+    tables = [file for file in numbers if file is not None]
+    read = {*tables, *(file for one in series for file in one.files())}
+    for gone in before.keys() - {str(file) for file in read}:
         raise _refused(path, f"{gone} is not among the files that are read now")
     for one in series:
-        steps = [step for step, file in one.grains.files.items() if str(file) in before]
-        last = max((step for step in steps if step is not None), default=None)
-        for step, file in (item for f in (one.grains, *one.contacts) for item in f.files.items()):
-            known, is_last = before.get(str(file)), step is None or step == last
-            if known is None and steps and (step is None or last is None or step <= last):
-                raise _refused(path, f"{file} is new, and not behind the last frame")
-            if known is None or _is_same(file, known, may_grow=is_last):
-                continue
-            if not _was_skipped(one, step, rows[one.name]):
-                raise _refused(path, f"{file} has changed since")
+        _check_frames(path, before, one, rows[one.name])
+    every = [row for frames in rows.values() for some in frames.values() for row in some]
+    for file in tables:
+        # a longer one may name the strains of frames that had none
+        may_grow = file != strains or all(row.strain is not None for row in every)
+        if not _is_same(file, before.get(str(file)), may_grow, by_lines=True):
+            raise _refused(path, f"{file} has changed since, in more than new lines at its end")
 
 
-def _is_same(file: Path, before: Mapping[str, Any], may_grow: bool) -> bool:
-    """Whether a file is what it was, or begins as it was; snapshots may have come behind."""
+def _check_frames(
+    path: Path, before: Mapping[str, Any], series: Series, rows: Mapping[int, list[Row]]
+) -> None:
+    """Refuse what has changed of the files of a series, and what lies beside them."""
+    grains = series.grains.files
+    steps = [step for step, file in grains.items() if str(file) in before]
+    last = max((step for step in steps if step is not None), default=None)
+    for step, file in (f for one in (series.grains, *series.contacts) for f in one.files.items()):
+        known, is_last = before.get(str(file)), step is None or step == last
+        if known is None and steps and (step is None or last is None or step <= last):
+            raise _refused(path, f"{file} is new, and not behind the last frame")
+        if known is None:
+            continue
+        beside = series.beside(file) if grains.get(step) == file else []
+        changed = [one for one in beside if not _is_same(one, before.get(str(one)))]
+        if not _is_same(file, known, may_grow=is_last):
+            changed.append(file)
+        if changed and not _was_skipped(series, step, rows):
+            what = "has changed since" if str(changed[0]) in before else "is new, beside the grains"
+            raise _refused(path, f"{changed[0]} {what}")
+
+
+def _is_same(
+    file: Path, before: Mapping[str, Any] | None, may_grow: bool = False, by_lines: bool = False
+) -> bool:
+    """Whether a file is what it was, or begins as it was; snapshots or lines have come behind."""
+    if before is None:
+        return False
     size, length = before.get("size"), file.stat().st_size
     if not isinstance(size, int) or length < size or (length > size and not may_grow):
         return False
     digest = hashlib.sha256()
     with open(file, "rb") as stream:
+        part = b"\n"
         while size and (part := stream.read(min(size, 1 << 20))):
             digest.update(part)
             size -= len(part)
+        # a number at the end may have got more digits
+        if by_lines and not part.endswith(b"\n") and stream.read(1) not in (b"", b"\r", b"\n"):
+            return False
     return digest.hexdigest() == before.get("sha256")
 
 

@@ -90,10 +90,10 @@ class FrameFile:
         except (OverflowError, TypeError, ValueError):
             pass
         above = f" (above 0: {', '.join(names[: self._positive])})" if self._positive else ""
-        found = ", ".join(repr(row[name]) for name in names)
         raise ReadError(
             f"{self.path}, line {line}: expected numbers as {self.key} and {', '.join(names)}"
-            f"{above}, the first a whole one, found {row[self.key]!r} and {found}"
+            f"{above}, the first a whole one, "
+            f"found {row[self.key]!r} and {', '.join(repr(row[name]) for name in names)}"
         )
 
     def at(self, frame: int, step: int | None) -> tuple[float, ...] | None:

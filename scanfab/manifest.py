@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import platform
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
@@ -12,9 +12,9 @@ from typing import Any
 
 from scanfab.directions import DirectionRule
 from scanfab.series import Series
-from scanfab.settings import Settings
+from scanfab.settings import STRAIN_MODES, Settings
 
-__all__ = ["asked_for", "manifest", "with_frames"]
+__all__ = ["asked_for", "manifest", "strain_file", "with_frames"]
 
 PACKAGES = (
     "scanfab", "numpy", "numba", "scipy", "meshio", "pyvista", "click", "rich", "h5py",
@@ -69,6 +69,9 @@ def manifest(
         What the user was told.
     """
     files = {path for one in series for path in one.files()}
+    strains = strain_file(asked)
+    if strains is not None:
+        files.add(strains)
     return {
         "settings": asked,
         "seed": asked["seed"],
@@ -83,6 +86,12 @@ def manifest(
         "warnings": list(warnings),
         "notes": list(notes),
     }
+
+
+def strain_file(asked: Mapping[str, Any]) -> Path | None:
+    """The file of ``--strain FILE.csv``."""
+    strain = asked.get("strain", "auto")
+    return None if strain in STRAIN_MODES else Path(strain)
 
 
 def _plain(value: Any) -> Any:

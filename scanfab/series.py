@@ -265,10 +265,18 @@ class Series:
             return snapshots[0] if matches else None
         return next((one for one in snapshots if one.step == grains.step), None)
 
+    def beside(self, path: Path) -> list[Path]:
+        """What lies beside a file of grains and is read with it, such as its cell."""
+        ask = getattr(self.grains.reader, "beside", None)
+        named = self.cells is not None or self.options.cell is not None
+        return [] if named or ask is None else ask(path)
+
     def files(self) -> Iterator[Path]:
         """Every file that the frames come from."""
         for family in (self.grains, *self.contacts):
             yield from family.files.values()
+        for path in self.grains.files.values():
+            yield from self.beside(path)
         if self.cells is not None:
             yield self.cells.path
 

@@ -139,8 +139,9 @@ def _in_toml(value: Any) -> str:
     """What kind of value it is, as the file spells it where that is short."""
     if isinstance(value, bool):
         return str(value).lower()
-    kinds: dict[type, str] = {dict: "a table", list: "a list in a list"}
-    return kinds.get(type(value), f"a date or time, {value}")
+    if isinstance(value, dict):
+        return "a table"
+    return "a list in a list" if isinstance(value, list) else f"a date or time, {value}"
 
 
 def _from_toml(ctx: click.Context, path: Path, parameter: click.Parameter, value: Any) -> Any:

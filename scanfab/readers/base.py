@@ -117,7 +117,9 @@ class Reader(Protocol):
     a format that any program may write can say so with an attribute ``generic = True``: it is asked
     after the others. One whose grain files may list contacts says ``lists_contacts = True``. One
     whose grain files do not all carry their cell has a method ``carries(path)`` that answers with
-    one of :data:`Carries`.
+    one of :data:`Carries`. One that reads other files together with a file of grains, such as that
+    of its cell, has a method ``beside(path)`` that answers with a list of their paths: they are
+    inputs too. It is asked for each file of a series, so it should not open them.
     """
 
     name: str

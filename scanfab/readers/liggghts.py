@@ -106,6 +106,10 @@ class LiggghtsReader:
         """A text dump says which directions are periodic, a VTK file does not."""
         return "cell" if _is_text(first_bytes(path)) else self._vtk.carries(path)
 
+    def beside(self, path: Path) -> list[Path]:
+        """A VTK file has its box beside it."""
+        return self._vtk.beside(path)
+
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
     ) -> JoinedContacts:

@@ -25,7 +25,7 @@ from scanfab.readers.columns import grain_table, has_radius, whole_numbers
 from scanfab.readers.files import bare_name, plain
 from scanfab.readers.join import join_ids, join_positions
 from scanfab.readers.mesh import Mesh, form_of, read_bounds, read_mesh
-from scanfab.readers.yade_cells import cell_beside, is_cell_file
+from scanfab.readers.yade_cells import cell_beside, cell_file, is_cell_file
 
 __all__ = ["VtkReader"]
 
@@ -105,6 +105,11 @@ class VtkReader:
         """LIGGGHTS writes a box beside its files; VTK itself has no cell."""
         return "nothing" if _box_beside(path) is None else "box"
 
+    def beside(self, path: Path) -> list[Path]:
+        """The box of LIGGGHTS and the cell of YADE."""
+        found = (_box_file(path), cell_file(path))
+        return [file for file in found if file is not None]
+
     def _listed(self, index: Path) -> list[Snapshot]:
         """The grain files of a ``.pvd``, in its order."""
         try:
@@ -139,13 +144,18 @@ def _last_number(path: Path) -> int | None:
 
 def _box_beside(path: Path) -> Cell | None:
     """The box that LIGGGHTS writes beside a VTK dump; it does not say what is periodic."""
+    file = _box_file(path)
+    return None if file is None else _read_box(file)
+
+
+def _box_file(path: Path) -> Path | None:
     match = re.fullmatch(r"(.*?)(\d+)\.\w+", bare_name(path))
     if match is None:
         return None
     for suffix in (".vtk", ".vtr", ".vtk.gz", ".vtr.gz"):
         beside = path.with_name(f"{match[1]}boundingBox_{match[2]}{suffix}")
         if beside.is_file():
-            return _read_box(beside)
+            return beside
     return None
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import glob
 import re
 import warnings
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ from scanfab.readers.files import COMPRESSED_SUFFIXES, bare_name
 from scanfab.readers.mesh import read_mesh
 from scanfab.readers.yade_save import is_save, read_save, snapshot_of_save
 
-__all__ = ["cell_beside", "is_cell_file"]
+__all__ = ["cell_beside", "cell_file", "is_cell_file"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -57,19 +58,9 @@ def cell_beside(path: Path, position: FloatArray) -> Cell | None:
     ReadError
         If spheres lie outside: then it is not their cell.
     """
-    name = bare_name(path)
-    exported, recorded = EXPORTED.fullmatch(name), RECORDED.fullmatch(name)
-    named = exported or recorded
-    if named is None:
-        return None
-    number = int(named[2])
-    if exported:
-        # its number counts files; that of a saved state is a step
-        file = _exported_cell(path, named[1], number)
-    else:
-        beside = _with_any_packing(path.with_name(f"{named[1]}pericell.{named[2]}.vtu"))
-        file = beside or _saved_state(path, named[1], number)
+    file = cell_file(path)
     if file is None:
+        _tell_of_doubt(path)
         return None
     cell = _read_cell(file)
     if cell is not None:
@@ -83,24 +74,53 @@ def cell_beside(path: Path, position: FloatArray) -> Cell | None:
     return cell
 
 
-def _exported_cell(path: Path, base: str, number: int) -> Path | None:
-    """The file of the cell, if there is no doubt which one it is."""
-    spheres = _numbered(path.parent, f"{base}-spheres-")
-    cells = _numbered(path.parent, f"{base}-periCell-")
-    if not cells:
+def cell_file(path: Path) -> Path | None:
+    """The file that has the cell of a file of spheres; None if there is none, or a doubt."""
+    folder, name = path.parent, bare_name(path)
+    changed = folder.stat().st_mtime_ns
+    if exported := EXPORTED.fullmatch(name):
+        # its number counts files; that of a saved state is a step
+        return _exported_cells(folder, exported[1], changed).get(int(exported[2]))
+    recorded = RECORDED.fullmatch(name)
+    if recorded is None:
         return None
+    beside = _with_any_packing(path.with_name(f"{recorded[1]}pericell.{recorded[2]}.vtu"))
+    return beside or _saved_state(_saves(folder, recorded[1], changed), int(recorded[2]))
+
+
+# listed once for all files of a folder, as long as none comes or goes
+@lru_cache(maxsize=8)
+def _exported_cells(folder: Path, base: str, changed: int) -> dict[int, Path]:
+    """The cells by the numbers of the spheres; none if there is a doubt which is whose."""
+    spheres, cells = (_numbered(folder, f"{base}-{kind}-") for kind in ("spheres", "periCell"))
     # behind the interactions of its frame a cell has the next number, before them the same one
     pairs = list(zip(sorted(spheres), sorted(cells), strict=False))
-    if len(spheres) == len(cells) and all(two - one in (0, 1) for one, two in pairs):
-        return cells[dict(pairs)[number]]
-    warnings.warn(
-        f"{path.parent / base}-periCell-*: {len(cells)} cells beside {len(spheres)} files of "
-        f"spheres: YADE numbers the cells by the files of interactions, so it cannot be told which "
-        f"cell belongs to which frame: name the cells with --cell FILE.csv",
-        ScanfabWarning,
-        stacklevel=3,
-    )
-    return None
+    if len(spheres) != len(cells) or not all(two - one in (0, 1) for one, two in pairs):
+        return {}
+    return {one: cells[two] for one, two in pairs}
+
+
+@lru_cache(maxsize=8)
+def _saves(folder: Path, base: str, changed: int) -> list[Path]:
+    """Files that may be saved states, as their names begin alike."""
+    return sorted(folder.glob(f"{glob.escape(base)}*.xml*"))
+
+
+def _tell_of_doubt(path: Path) -> None:
+    """Warn if there are cells that ``VTKExporter`` has written."""
+    exported = EXPORTED.fullmatch(bare_name(path))
+    if exported is None:
+        return
+    folder, base = path.parent, exported[1]
+    spheres, cells = (_numbered(folder, f"{base}-{kind}-") for kind in ("spheres", "periCell"))
+    if cells:
+        warnings.warn(
+            f"{folder / base}-periCell-*: {len(cells)} cells beside {len(spheres)} files of "
+            f"spheres: YADE numbers the cells by the files of interactions, so it cannot be told "
+            f"which cell belongs to which frame: name the cells with --cell FILE.csv",
+            ScanfabWarning,
+            stacklevel=3,
+        )
 
 
 def _numbered(folder: Path, start: str) -> dict[int, Path]:
@@ -115,11 +135,11 @@ def _with_any_packing(path: Path) -> Path | None:
     return next((file for file in packed if file.is_file()), None)
 
 
-def _saved_state(path: Path, base: str, step: int) -> Path | None:
-    """The ``O.save`` of the same step, whose name begins alike and bears the number of the step."""
+def _saved_state(files: list[Path], step: int) -> Path | None:
+    """The ``O.save`` of the same step, whose name bears the number of the step too."""
     found = [
         file
-        for file in sorted(path.parent.glob(f"{glob.escape(base)}*.xml*"))
+        for file in files
         if step in map(int, re.findall(r"\d+", bare_name(file)))
         and is_save(file)
         and snapshot_of_save(file).step == step

@@ -21,10 +21,6 @@ Rows = Sequence[Mapping[str, Any]]
 LONGEST_NAME = 32
 # beyond it nothing can be drawn: in units of the axis it would be infinite
 LARGEST = 1e100
-ABSCISSAE: dict[str | None, str] = {
-    **{name: f"{' '.join(spelt)} in %" for name, spelt in STRAINS.items()},
-    None: "frame",
-}
 # contact fabric is anisotropic for certain if its intensity is so many standard errors (about one
 # without any anisotropy), and turned if less than this part of it shows along the loading axis
 CERTAIN, ALONG = 5.0, 0.5

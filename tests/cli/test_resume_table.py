@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import shutil
 from pathlib import Path
@@ -15,6 +16,7 @@ from scanfab.rerun import read_manifest
 from tests.cli.test_resume import _wait_for_frames_under_way
 from tests.dumps import cubic_rows, dump_text, write
 from tests.interruptions import interrupted_at_row, write_series
+from tests.truth import SAMPLE_DATA
 
 FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac")
 
@@ -319,3 +321,81 @@ def test_a_table_without_its_frames_cannot_be_gone_on_with(compute, tmp_path, ca
     assert compute(table, *words)[0] == 0
     assert compute(table, *words, "--resume") == (2, 0)
     assert "it lacks the columns source and frame" in capsys.readouterr().err
+
+
+@pytest.fixture
+def numbers(tmp_path):
+    """A file with a row of text for each of three frames."""
+
+    def write_numbers(header: str, row: str) -> Path:
+        lines = [header, *(f"{100 * frame},{row}" for frame in range(3))]
+        return write(tmp_path / "numbers.csv", "\n".join(lines))
+
+    return write_numbers
+
+
+TABLES = [("--strain", "step,strain", "0.1"), ("--cell", "step,lx,ly,lz", "4,4,4")]
+
+
+@pytest.mark.parametrize(("option", "header", "row"), TABLES)
+def test_numbers_of_the_frames_that_have_changed_are_refused(
+    compute, numbers, tmp_path, capsys, option, header, row
+):
+    table, file = tmp_path / "table.csv", numbers(header, row)
+    assert compute(table, option, str(file)) == (0, 3)
+    assert str(file) in {one["path"] for one in read_manifest(table)["inputs"]}
+    before = table.read_bytes()
+    text = file.read_text()
+    # the second is the last number with one digit more
+    for changed in (text.replace(f"100,{row}", f"100,{row}1"), text + "5"):
+        file.write_text(changed)
+        assert compute(table, option, str(file), "--resume") == (2, 0)
+        assert f"{file} has changed since, in more than new lines" in capsys.readouterr().err
+        assert table.read_bytes() == before
+
+
+@pytest.mark.parametrize(("option", "header", "row"), TABLES)
+def test_numbers_of_the_frames_may_get_more_lines(
+    compute, numbers, five_frames, dumps, tmp_path, option, header, row
+):
+    table, whole, file = tmp_path / "table.csv", tmp_path / "whole.csv", numbers(header, row)
+    assert compute(table, option, str(file)) == (0, 3)
+    file.write_text(f"{file.read_text()}\n300,{row}\n400,{row}\n")
+    add_frames(five_frames, dumps)
+    assert compute(table, option, str(file), "--resume") == (0, 2)
+    assert compute(whole, option, str(file)) == (0, 5)
+    assert table.read_bytes() == whole.read_bytes()
+
+
+def test_strains_that_frames_get_later_are_refused(compute, dumps, tmp_path, capsys):
+    """Their rows have none."""
+    table, file = tmp_path / "table.csv", write(tmp_path / "s.csv", "step,strain\n0,0\n100,0.1\n")
+    assert compute(table, "--strain", str(file)) == (0, 3)
+    assert compute(table, "--strain", str(file), "--resume") == (0, 0)
+    file.write_text(f"{file.read_text()}200,0.2\n")
+    assert compute(table, "--strain", str(file), "--resume") == (2, 0)
+    assert f"{file} has changed since" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("grains", "cell"),
+    [
+        ("before-spheres-*", "before-periCell-*"),
+        ("rec_spheres.*", "rec_pericell.*"),
+        ("saved_spheres.*", "saved_*.xml*"),
+    ],
+)
+def test_a_cell_beside_the_grains_is_an_input(compute, tmp_path, capsys, grains, cell):
+    """As YADE has them."""
+    folder = shutil.copytree(SAMPLE_DATA / "yade_strained", tmp_path / "yade")
+    table = tmp_path / "table.csv"
+    words = ("--variants", "a", "--contacts", "geometric")
+    assert compute(table, *words, sources=(folder / grains,)) == (0, 3)
+    cells = sorted(folder.glob(cell))
+    listed = {one["path"] for one in read_manifest(table)["inputs"]}
+    assert {str(path) for path in cells} <= listed
+    assert compute(table, *words, "--resume", sources=(folder / grains,)) == (0, 0)
+    cells[0].write_bytes(gzip.compress(b"something else"))
+    # the first bytes are those of the step, without which a saved state is none
+    assert compute(table, *words, "--resume", sources=(folder / grains,)) == (2, 0)
+    assert f"{cells[0]} " in capsys.readouterr().err

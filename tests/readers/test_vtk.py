@@ -10,6 +10,7 @@ import pyvista
 import scanfab
 from scanfab.errors import ReadError
 from scanfab.readers.base import GrainTable, ReadOptions, Snapshot
+from scanfab.readers.liggghts import LiggghtsReader
 from scanfab.readers.mesh import read_mesh
 from scanfab.readers.vtk import VtkReader
 from tests.dumps import write, yade_spheres
@@ -356,3 +357,11 @@ def test_which_grain_a_force_acts_on_is_not_guessed(tmp_path):
     grains = GrainTable(POSITION, RADIUS, None, {}, None)
     joined = VtkReader().read_contacts(Snapshot(contacts), ReadOptions(), grains)
     assert joined.contacts.force is None
+
+
+def test_the_box_beside_a_dump_is_told(tmp_path):
+    grains, box = tmp_path / "dump_100.vtk", tmp_path / "dump_boundingBox_100.vtk"
+    reader = VtkReader()
+    assert reader.beside(grains) == []
+    box.write_text("")
+    assert reader.beside(grains) == LiggghtsReader().beside(grains) == [box]
