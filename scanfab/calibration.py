@@ -104,7 +104,8 @@ def calibrate(
     >>> import numpy as np
     >>> from scanfab import Packing, Settings, calibrate
     >>> grid = np.stack(np.meshgrid(*3 * [np.arange(6.0)]), axis=-1).reshape(-1, 3)
-    >>> found = calibrate(Packing(grid, 0.5), Settings.make(variants="c", tolerance=0.01, rv=0.6))
+    >>> settings = Settings.make(variants="c", tolerance=0.01, rv=0.6, contact_tolerance=1e-4)
+    >>> found = calibrate(Packing(grid, 0.5), settings)
     >>> sorted({row.ladder for row in found.rows})
     ['cutoff', 'directions', 'recommended', 'rv', 'spacing']
     """
