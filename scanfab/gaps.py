@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.cell import Cell
 from scanfab.directions import DirectionRule
 from scanfab.kernels.bins import BLOCKS, Bins
 from scanfab.line_grids import drawn_lines, line_frames
@@ -23,6 +22,7 @@ __all__ = ["Blocks", "GapSums", "scan_gaps"]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
+BoolArray = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,15 +54,27 @@ class Blocks:
         return cls(matrix, 0.5 - matrix @ center)
 
     @classmethod
-    def of_cell(cls, cell: Cell, position: FloatArray) -> Blocks:
-        """Halves of a cell's periods; along its other vectors, of what the positions take."""
-        matrix = np.linalg.inv(cell.vectors).T
-        shift = -matrix @ cell.origin
-        along = cell.fractional(position)
+    def of_periods(
+        cls, vectors: FloatArray, origin: FloatArray, periodic: BoolArray, position: FloatArray
+    ) -> Blocks:
+        """
+        Halves of a cell's periods; along its other vectors, of what the positions take.
+
+        Parameters
+        ----------
+        vectors, origin, periodic : ndarray, shapes (3, 3), (3,), (3,)
+            The cell: lattice vectors as rows, its corner, and which vectors repeat.
+        position : ndarray, shape (N, 3)
+            Of the grains, dump's length unit.
+        """
+        inverse = np.linalg.inv(vectors)
+        matrix = inverse.T
+        shift = -matrix @ origin
+        along = (position - origin) @ inverse
         low, high = along.min(axis=0), along.max(axis=0)
         # far less than a period, about the middle
-        scale = np.where(cell.periodic, 1.0, 0.25 / (1.0 + high - low))
-        middle = np.where(cell.periodic, 0.0, 0.5 - scale * 0.5 * (low + high))
+        scale = np.where(periodic, 1.0, 0.25 / (1.0 + high - low))
+        middle = np.where(periodic, 0.0, 0.5 - scale * 0.5 * (low + high))
         return cls(scale[:, None] * matrix, scale * shift + middle)
 
     def of(self, places: FloatArray) -> IntArray:

@@ -143,7 +143,8 @@ def _blocks(sample: Sample, plan: Plan, settings: Settings) -> tuple[Blocks, Blo
     reach = float(np.linalg.norm(high - low)) + radius
     whole = Blocks.about(0.5 * (low + high), reach, settings.axis)
     if packing.cell is not None and packing.is_periodic:
-        whole = Blocks.of_cell(packing.cell, position)
+        cell = packing.cell
+        whole = Blocks.of_periods(cell.vectors, cell.origin, np.array(cell.periodic), position)
     if plan.window is None:
         return whole, whole
     return whole, Blocks.about(plan.window.center, plan.window.radius + radius, settings.axis)
