@@ -123,7 +123,7 @@ def _better_plan(
         better = _with_more_axes(plan, missing)
     elif _too_few_lines(sums, settings) and 0.5 * plan.spacing > closest:
         better = replace(plan, spacing=0.5 * plan.spacing)
-    elif missing >= AFRESH_FROM:
+    elif missing >= AFRESH_FROM and len(solids.grain_radius):
         better = _with_closer_lines(plan, missing, solids, settings)
     growth = len(better.rule) / len(plan.rule) * (plan.spacing / better.spacing) ** 2
     affordable = growth * plan.replicates <= left and is_affordable(solids, better.spacing)

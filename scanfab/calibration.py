@@ -138,8 +138,8 @@ class _Calibrator:
             if variant not in with_fabric:
                 raise SettingsError(
                     f"frame {self.number}: no cut-off leaves a void fabric in variant {variant}: "
-                    f"the sample ({int(self.sample.grains.sum())} grains) is too small for it, or "
-                    f"there is no void"
+                    f"the sample ({int(self.sample.grains.sum())} grains) is too small for it, "
+                    f"there is no void, or all its grains are rattlers"
                 )
         ladders = {
             "spacing": judged(self._spacings()),

@@ -152,6 +152,8 @@ def _blocks(sample: Sample, plan: Plan, settings: Settings) -> tuple[Blocks, Blo
 
 def _block_spacing(solids: Solids) -> float:
     """As close as is of use, but no closer than the sample's scatter is worth."""
+    if not len(solids.grain_radius):
+        return solids.window_radius
     spacing = CLOSE * float(solids.grain_radius.mean())
     axes = BLOCK_REPLICATES * len(direction_rule(AUTO_RULE))
     # a line costs as much as a chord, also if it meets nothing

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -55,9 +56,23 @@ class VariantColumns:
 
     @cached_property
     def fabric(self) -> VoidFabric | None:
-        """The void fabric."""
+        """The void fabric; a window without any solid has none."""
+        if self._no_solid:
+            return None
         kept = self.measurement.kept(self.variant.name, self.place)
         return void_fabric(self.sums.axes, self.plan.rule.weights, *kept)
+
+    @cached_property
+    def _no_solid(self) -> str:
+        """Why the variant's lines meet no grain at all; empty if they do."""
+        window = self.plan.window
+        if self.sample.solids(self.variant, window).any():
+            return ""
+        rattlers = self.sample.solids(replace(self.variant, without_rattlers=False), window).sum()
+        if rattlers:
+            there = " that reach into the RV" if self.variant.in_window else ""
+            return f"no grain is left, all {rattlers}{there} are rattlers"
+        return f"no grain reaches into the {window}"
 
     @cached_property
     def segments(self) -> int:
@@ -174,7 +189,9 @@ class VariantColumns:
                 ScanfabWarning,
                 stacklevel=4,
             )
-        if self.segments == 0:
+        if self._no_solid:
+            message = self._no_solid
+        elif self.segments == 0:
             message = self._too_long(self.plan.cutoffs[self.place])
         elif self.fabric is None:
             message = "in some direction no void segment is kept, so there is no void fabric"

@@ -14,13 +14,16 @@ import numpy.typing as npt
 
 from scanfab.escaped import Escaped, escaped_grains
 from scanfab.packing import Contacts, Packing
-from scanfab.window import SphereWindow
+from scanfab.window import SphereWindow, SurfaceBox
 
 __all__ = ["VARIANTS", "Sample", "Variant"]
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
+
+# grains that a message names
+MOST_NAMED = 20
 
 
 @dataclass(frozen=True)
@@ -70,8 +73,8 @@ class Sample:
 
     @property
     def gathered(self) -> BoolArray:
-        """Grains that have not escaped, which the sample's extents are those of, shape (N,)."""
-        return self.grains & ~self.escaped.grains
+        """Grains that the sample's extents are those of: none that have escaped, shape (N,)."""
+        return self.grains if self.escaped.are_many else self.grains & ~self.escaped.grains
 
     def doubt_of_escaped(self) -> str | None:
         """What to tell of grains that have escaped; None without any."""
@@ -81,11 +84,26 @@ class Sample:
         first, packing = rows[0], self.packing
         place = ", ".join(f"{x:g}" for x in packing.position[first])
         others = f" and {len(rows) - 1} more" if len(rows) > 1 else ""
-        ids = ",".join(str(one) for one in packing.id[rows])
-        return (
+        found = (
             f"grain {packing.id[first]} at ({place}){others}: {self.escaped.gap:g} away from all "
-            f"others, so the sample's extents, RV and octants leave out what has flown away; in a "
-            f'and b it is still solid: --boundary "id={ids}" takes it out'
+            f"others"
+        )
+        ids = ",".join(str(one) for one in packing.id[rows[:MOST_NAMED]])
+        cure = f'--boundary "id={ids}{",..." if len(rows) > MOST_NAMED else ""}"'
+        if not self.escaped.are_many:
+            return (
+                f"{found}, so the sample's extents, RV and octants leave out what has flown away; "
+                f"in a and b it is still solid: {cure} takes it out"
+            )
+        boxes = [
+            SurfaceBox.of(packing, chosen)
+            for chosen in (self.grains, self.grains & ~self.escaped.grains)
+        ]
+        wide, narrow = (" x ".join(f"{x:.4g}" for x in box.high - box.low) for box in boxes)
+        return (
+            f"{found}; these are too many to be left out, so they widen the sample's extents, RV "
+            f"and octants: {wide} with them, {narrow} without; if they have flown away, {cure} "
+            f"takes them out"
         )
 
     @cached_property
@@ -120,6 +138,15 @@ class Sample:
             return self.grains
         assert window is not None
         return self.grains & window.contains(self.packing.position, self.packing)
+
+    def solids(self, variant: Variant, window: SphereWindow | None) -> BoolArray:
+        """Grains of which the variant's lines may meet a part, shape (N,)."""
+        left = self.grains & ~self.removed(variant)
+        if not variant.in_window:
+            return left
+        assert window is not None
+        position, radius = self.packing.position, self.packing.radius
+        return left & (window.distance(position, self.packing) < window.radius + radius)
 
     def contacts_without(self, left_out: BoolArray) -> BoolArray:
         """Contacts of which neither particle is left out, shape (M,)."""

@@ -123,8 +123,27 @@ def test_contacts_that_rounding_has_opened_ask_for_a_tolerance():
     assert "--contact-tolerance 1e-4" in doubt
 
 
-def test_a_loose_cloud_is_no_doubt(loose):
-    assert doubts_of(sample_of(Packing(loose.position, loose.radius * 0.5))) == []
+@pytest.mark.parametrize("factor", [0.5, 0.9])
+def test_a_cloud_without_contacts_is_named_whether_it_is_a_gas_or_a_wrong_unit(loose, factor):
+    (doubt,) = doubts_of(sample_of(Packing(loose.position, loose.radius * factor)))
+    assert doubt.startswith("no contact at all by geometry")
+    assert "right for a gas, else check the units" in doubt
+
+
+def test_contacts_among_the_boundary_alone_are_no_contacts_of_the_grains(loose):
+    """Spheres of a boundary overlap; they must not hide that no grain touches anything."""
+    shell = np.array([[1.0, 0, 0], [1.0001, 0, 0]])
+    packing = Packing(
+        np.vstack([loose.position, shell]), np.append(loose.radius * 0.5, [0.001, 0.001])
+    )
+    boundary = np.arange(len(packing)) >= len(loose)
+    (doubt,) = doubts_of(Sample(find_contacts(packing), boundary))
+    assert doubt.startswith("no contact at all by geometry")
+
+
+def test_a_contact_list_says_itself_that_nothing_touches(loose):
+    far = Packing(loose.position, loose.radius * 0.5, contacts=np.empty((0, 2), int))
+    assert doubts_of(sample_of(far)) == []
 
 
 def test_a_period_that_is_half_empty_is_named_if_it_is_the_user_s():

@@ -10,7 +10,7 @@ from scanfab import Cell, Packing, ScanfabWarning, Settings, compute, find_conta
 from scanfab.escaped import escaped_grains
 from scanfab.plan import make_plan
 from scanfab.variants import Sample
-from tests.lattices import shaken_cubic
+from tests.lattices import ball_points, shaken_cubic
 
 SPHERES = shaken_cubic(np.random.default_rng(5), 9)
 
@@ -22,13 +22,17 @@ def with_flown(*places, radius=0.5, cell=None) -> Packing:
     return Packing(position, radii, cell=cell)
 
 
+def sample_of(packing: Packing) -> Sample:
+    return Sample(packing, np.zeros(len(packing), bool))
+
+
 def escaped_of(packing: Packing) -> list[int]:
-    found = escaped_grains(packing, np.ones(len(packing), bool))
-    return np.flatnonzero(found.grains).tolist()
+    """Those that the extents leave out."""
+    return np.flatnonzero(~sample_of(packing).gathered).tolist()
 
 
 def window_of(packing: Packing):
-    return make_plan(Settings.make(), Sample(packing, np.zeros(len(packing), bool))).window
+    return make_plan(Settings.make(), sample_of(packing)).window
 
 
 def test_a_grain_far_away_moves_neither_the_rv_nor_the_result_in_it():
@@ -49,9 +53,45 @@ def test_grains_that_flew_away_together_and_to_several_sides_are_all_found():
     assert escaped_grains(packing, np.ones(733, bool)).gap == pytest.approx(20.5, abs=1.0)
 
 
-@pytest.mark.parametrize("distance", [2.0, 4.0])
-def test_a_grain_some_radii_outside_belongs_to_the_sample(distance):
+@pytest.mark.parametrize("distance", [0.5, 1.0])
+def test_a_grain_that_sticks_out_belongs_to_the_sample(distance):
     assert escaped_of(with_flown((9 + distance, 4, 4))) == []
+
+
+@pytest.mark.parametrize("distance", [1.5, 2.0, 4.0, 6.0])
+def test_a_grain_farther_outside_than_any_other_does_not_move_the_rv(distance):
+    flown = with_flown((9 + distance, 4, 4))
+    assert escaped_of(flown) == [729]
+    assert np.array_equal(window_of(flown).center, window_of(with_flown()).center)
+
+
+@pytest.mark.parametrize("far", [3.0, 13.0])
+@pytest.mark.parametrize("number", [8, 9, 16, 30])
+def test_more_than_a_few_stay_but_not_without_a_word(number, far):
+    """One in a hundred of 729, and up to four times as many, each on its own."""
+    random = np.random.default_rng(number)
+    directions = random.normal(size=(number, 3))
+    directions /= np.abs(directions).max(axis=1, keepdims=True)
+    packing = with_flown(*(4 + directions * (5 + far + 2 * np.arange(number)[:, None])))
+    assert escaped_of(packing) == []
+    assert np.array_equal(sample_of(packing).gathered, np.ones(729 + number, bool))
+    told = sample_of(packing).doubt_of_escaped()
+    assert "too many to be left out, so they widen" in told
+    assert '--boundary "id=7' in told
+
+
+@pytest.mark.parametrize("solid_fraction", [1e-6, 1e-3, 0.03])
+@pytest.mark.parametrize("count", [60, 1000])
+def test_in_a_gas_no_grain_is_farther_out_than_others(count, solid_fraction):
+    """Neither in a box, nor in a ball, nor in a pyramid with its thin tip."""
+    random = np.random.default_rng(count)
+    radius = random.uniform(0.5, 1.5, count)
+    edge = np.cbrt(4 / 3 * np.pi * np.sum(radius**3) / solid_fraction)
+    for box in random.random((20, count, 3)):
+        ball = ball_points(random, count, 0.6)
+        pyramid = np.column_stack([box[:, :2] * np.cbrt(box[:, 2:]), np.cbrt(box[:, 2])])
+        for shape in (box, ball, pyramid):
+            assert sample_of(Packing(edge * shape, radius)).doubt_of_escaped() is None
 
 
 @pytest.mark.parametrize("scale", [1.0, 3.0, 30.0])

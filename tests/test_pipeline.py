@@ -277,12 +277,17 @@ def test_the_number_of_grains_may_change(tmp_path):
     np.testing.assert_allclose(table["cutoff"], 0.2 * smallest)
 
 
-def test_the_rv_is_that_of_the_first_frame(tmp_path):
+@pytest.mark.parametrize("lines", [SCAN, {"tolerance": 3e-5}], ids=["fixed", "auto"])
+def test_the_rv_is_that_of_the_first_frame(tmp_path, lines):
     large = [(id, type, x, y, z, 1.2 * r) for id, type, x, y, z, r in heap()]
     frames = [heap(), [(id, type, x + 20, y, z, r) for id, type, x, y, z, r in large]]
-    table = scanfab.compute(series_of(tmp_path, frames), variants="c", **SCAN)
+    with pytest.warns(ScanfabWarning, match=r"frame 1, variant c: no grain reaches into the RV"):
+        table = scanfab.compute(series_of(tmp_path, frames), variants="c", **lines)
     assert table[0].grains > 0
     assert table[1].grains == 0
+    # the fabric of an empty window would be that of no sample
+    assert table[1].solid_fraction == 0
+    assert table[1].mean_length is table[1].gvs_xx is table[1].alpha_vs is None
 
 
 def test_contacts_by_geometry_stand_in_for_a_missing_file(tmp_path):
@@ -306,8 +311,19 @@ def test_no_contacts_have_no_contact_fabric():
     assert row.alpha_vs is not None
 
 
+def test_only_rattlers_leave_an_rv_without_a_fabric():
+    packing = packing_of(heap(), contacts=[])
+    with pytest.warns(
+        ScanfabWarning, match=r"variant d: no grain is left, all \d+ that reach into"
+    ):
+        solid, empty = scanfab.compute(packing, variants="cd", **SCAN)
+    assert solid.alpha_vs is not None
+    assert (empty.grains, empty.rattlers, empty.solid_fraction) == (0, solid.grains, 0.0)
+    assert empty.mean_length is empty.alpha_vs is empty.alpha_vs_axial_sample_se is None
+
+
 def test_only_rattlers_leave_nothing_to_scan():
-    with pytest.warns(ScanfabWarning, match="variant b: no void segment reaches the cut-off"):
+    with pytest.warns(ScanfabWarning, match=f"variant b: no grain is left, all {COUNT} are ratt"):
         row = scanfab.compute(packing_of(heap(), contacts=[]), variants="b", **SCAN)[0]
     assert row.grains == 0
     assert row.rattlers == COUNT

@@ -146,6 +146,7 @@ def test_a_series_may_start_with_frames_of_boundary_alone(tmp_path: Path) -> Non
     assert not np.isnan(table["alpha_vs"][1])
 
 
+@pytest.mark.filterwarnings("ignore:no contact at all by geometry")
 def test_with_a_spacing_alone_every_round_has_sixteen_replicates() -> None:
     grid = np.stack(np.meshgrid(*3 * [np.arange(8.0)]), axis=-1).reshape(-1, 3)
     packing = scanfab.Packing(grid, 0.45)

@@ -434,10 +434,10 @@ def test_only_rattlers_leave_variant_b_empty(tmp_path, compute):
     assert whole["alpha_vs"] != ""
     assert without["alpha_vs"] == without["coordination"] == without["alpha_c"] == ""
     assert (without["grains"], without["rattlers"], without["contacts"]) == ("0", "64", "0")
-    assert "variant b: no void segment reaches the cut-off" in answer.err
+    assert "variant b: no grain is left, all 64 are rattlers" in answer.err
 
 
-def test_one_grain_leaves_no_void_unless_it_is_removed(tmp_path, compute):
+def test_one_grain_leaves_no_void_and_no_solid_if_it_is_removed(tmp_path, compute):
     file = grains(tmp_path, [cubic_rows()[0]])
     answer = compute(file, "--variants", "abc")
     assert answer.code == 1
@@ -445,8 +445,10 @@ def test_one_grain_leaves_no_void_unless_it_is_removed(tmp_path, compute):
     assert "nan" not in answer.out.lower()
     assert "variant c: no void segment reaches the cut-off" in answer.err
     removed = compute(file, "--variants", "d")
-    assert removed.code == 0
+    assert removed.code == 1
     assert removed.rows[0]["solid_fraction"] == "0.0"
+    assert removed.rows[0]["alpha_vs"] == removed.rows[0]["mean_length"] == ""
+    assert "variant d: no grain is left, all 1 that reach into the RV are rattlers" in removed.err
 
 
 # the machine

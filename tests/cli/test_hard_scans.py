@@ -69,6 +69,7 @@ def test_rule_with_a_bias_warns_on_the_command_line(answer):
     assert "directions equal-angle:30: an isotropic sample would get alpha = 0." in err
 
 
+@pytest.mark.filterwarnings("ignore:no contact at all by geometry")
 def test_size_ratio_of_a_thousand():
     """Large grains apart in a dust of small ones: void is what the volumes leave."""
     random = np.random.default_rng(0)
