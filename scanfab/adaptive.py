@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from scanfab.directions import direction_rule
+from scanfab.directions import design_of, direction_rule
 from scanfab.errors import ScanfabWarning, SettingsError
 from scanfab.fabric.void import void_fabric
 from scanfab.plan import CLOSE, GROWTH_WITH_SPACING, Plan
@@ -28,7 +28,6 @@ MAX_DIRECTIONS = 3_000
 # where so much is missing, a scan with closer lines and a finer rule, which need fewer segments in
 # all, is worth to start afresh; the rule grows by the other factor at most
 AFRESH_FROM, FINER_UP_TO = 2.0, 8.0
-FINEST = 21
 # a round multiplies the work by this at most: early estimates of the error are uncertain
 GROWTH = 4.0
 # and by this at least, so that there is something to do for several threads
@@ -146,10 +145,8 @@ def _with_closer_lines(plan: Plan, missing: float, solids: Solids, settings: Set
     plan = replace(plan, spacing=spacing)
     if settings.directions is not None or missing <= 1.0:
         return plan
-    # a design of odd degree t has about ((t + 1) / 2)² axes
     axes = math.ceil(min(missing, FINER_UP_TO) * len(plan.rule))
-    degree = min(2 * math.ceil(math.sqrt(axes)) - 1, FINEST)
-    return replace(plan, rule=direction_rule(f"design:{degree}"))
+    return replace(plan, rule=design_of(axes))
 
 
 def _within_budget(plan: Plan, solids: Solids, settings: Settings) -> Plan:

@@ -14,13 +14,15 @@ import numpy.typing as npt
 
 from scanfab.errors import SettingsError
 
-__all__ = ["DirectionRule", "direction_rule"]
+__all__ = ["DirectionRule", "design_of", "direction_rule"]
 
 FloatArray = npt.NDArray[np.float64]
 
 # SciPy's Lebedev rules of these degrees have negative weights: they would amplify noise
 NEGATIVE_LEBEDEV = (13, 25, 27)
 LARGEST_PRODUCT = 999
+# degree of the largest design in designs.csv that is in use
+FINEST = 21
 LEBEDEV_DEGREES = (*range(3, 32, 2), *range(35, 132, 6))
 
 
@@ -141,6 +143,12 @@ def lebedev(degree: float) -> DirectionRule:
     points, weights = lebedev_rule(degrees[0])
     half = _upper_half(points.T)
     return _normalised(f"lebedev:{degrees[0]}", points.T[half], weights[half], degrees[0])
+
+
+def design_of(axes: float) -> DirectionRule:
+    """The spherical design of about so many axes, as far as they go."""
+    # a design of odd degree t has about ((t + 1) / 2)² axes
+    return direction_rule(f"design:{min(2 * math.ceil(math.sqrt(axes)) - 1, FINEST)}")
 
 
 def design(degree: float) -> DirectionRule:

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.adaptive import scan_to_tolerance
-from scanfab.directions import direction_rule
+from scanfab.directions import DirectionRule, design_of, direction_rule
 from scanfab.gaps import Blocks, GapSums, scan_gaps
 from scanfab.plan import CLOSE, Plan
 from scanfab.scan import CellGrains, ScanSums, Solids, most_lines
@@ -25,6 +25,9 @@ FloatArray = npt.NDArray[np.float64]
 # at one distance in mean radii make as many segments for each grain of a small sample as of a large
 # one (about 900 in dense packings), so noise and scatter fall together as grains are added.
 BLOCK_REPLICATES = 2
+# Axes times grains: along the usual directions alone, the error of an RV of a few hundred grains
+# would scatter by a quarter of its value with the seed; along so many by a tenth or less.
+AXES_TIMES_GRAINS = 80_000
 # Chords that this scan may cut: in dense packings of like grains 1,250 a grain are needed. Where
 # grains overlap many times or differ much in size there would be more. Of samples of more than a
 # million grains the scatter is far below any tolerance in use.
@@ -46,6 +49,8 @@ class Measurement:
     """All gaps of the same lines, where more than one cut-off or moment is asked for."""
     blocked: GapSums
     """Gaps of fewer lines, by the octant of their middle."""
+    block_rule: DirectionRule
+    """The directions of these lines."""
     blocks: tuple[Blocks, Blocks]
     """Octants of the whole sample and of the window, of places in the dump's coordinates."""
     moment: int
@@ -98,14 +103,17 @@ def measure(
     if settings.lists_gaps:
         every = range(sums.replicates)
         gaps = scan_gaps(solids, plan.rule, spacing=plan.spacing, replicates=every, **lines)
+    block_rule = _block_rule(solids)
     blocked = scan_gaps(
         solids,
-        direction_rule(AUTO_RULE),
-        spacing=_block_spacing(solids),
+        block_rule,
+        spacing=_block_spacing(solids, block_rule),
         replicates=range(BLOCK_REPLICATES),
         **lines,
     )
-    return Measurement(sample, plan, solids, sums, gaps, blocked, blocks, settings.moment)
+    return Measurement(
+        sample, plan, solids, sums, gaps, blocked, block_rule, blocks, settings.moment
+    )
 
 
 def _solids(sample: Sample, plan: Plan, settings: Settings) -> tuple[Solids, FloatArray]:
@@ -150,12 +158,19 @@ def _blocks(sample: Sample, plan: Plan, settings: Settings) -> tuple[Blocks, Blo
     return whole, Blocks.about(plan.window.center, plan.window.radius + radius, settings.axis)
 
 
-def _block_spacing(solids: Solids) -> float:
+def _block_rule(solids: Solids) -> DirectionRule:
+    """The directions of an auto scan; more of them for fewer grains."""
+    usual = direction_rule(AUTO_RULE)
+    axes = AXES_TIMES_GRAINS / max(len(solids.grain_radius), 1)
+    return usual if axes <= len(usual) else design_of(axes)
+
+
+def _block_spacing(solids: Solids, rule: DirectionRule) -> float:
     """As close as is of use, but no closer than the sample's scatter is worth."""
     if not len(solids.grain_radius):
         return solids.window_radius
     spacing = CLOSE * float(solids.grain_radius.mean())
-    axes = BLOCK_REPLICATES * len(direction_rule(AUTO_RULE))
+    axes = BLOCK_REPLICATES * len(rule)
     # a line costs as much as a chord, also if it meets nothing
     chords = axes * (solids.cross_section / spacing**2 + most_lines(solids, spacing))
     most = min(max(CHORDS_A_GRAIN * len(solids.grain_radius), FEWEST_CHORDS), MOST_CHORDS)

@@ -12,14 +12,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.directions import direction_rule
 from scanfab.errors import ScanfabWarning
 from scanfab.fabric.contact import axial_error, contact_fabric
 from scanfab.fabric.jackknife import BLOCKS, Jackknife, contact_jackknife, void_jackknife
 from scanfab.fabric.tensor import COMPONENTS, FabricTensor
 from scanfab.fabric.void import VoidFabric, void_fabric
 from scanfab.measurement import Measurement
-from scanfab.settings import AUTO_RULE, Settings
+from scanfab.settings import Settings
 from scanfab.table import COLUMNS
 from scanfab.variants import Variant
 
@@ -133,7 +132,7 @@ class VariantColumns:
         words = (self.variant.name, self.place, moment)
         return void_jackknife(
             gaps.axes,
-            direction_rule(AUTO_RULE).weights,
+            self.measurement.block_rule.weights,
             gaps.kept(*words),
             [gaps.kept(*words, without=block) for block in range(BLOCKS)],
             self.settings.axis,
