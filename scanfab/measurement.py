@@ -93,6 +93,8 @@ def measure(
         "variants": settings.variants,
         "seed": settings.seed,
         "workers": settings.workers,
+        # what these scans take is known from the one before them
+        "most_steps": math.inf,
     }
     gaps: GapSums | None = None
     if settings.lists_gaps:
@@ -101,7 +103,7 @@ def measure(
     blocked = scan_gaps(
         solids,
         direction_rule(AUTO_RULE),
-        spacing=_block_spacing(solids),
+        spacing=_block_spacing(solids, sums, plan),
         replicates=range(BLOCK_REPLICATES),
         **lines,
     )
@@ -149,11 +151,12 @@ def _blocks(sample: Sample, plan: Plan, settings: Settings) -> tuple[Blocks, Blo
     return whole, Blocks.about(plan.window.center, plan.window.radius + radius, settings.axis)
 
 
-def _block_spacing(solids: Solids) -> float:
+def _block_spacing(solids: Solids, sums: ScanSums, plan: Plan) -> float:
     """As close as is of use, but no closer than the sample's scatter is worth."""
     spacing = CLOSE * float(solids.grain_radius.mean())
     axes = BLOCK_REPLICATES * len(direction_rule(AUTO_RULE))
+    steps = float(sums.steps.mean()) / len(plan.rule) * (plan.spacing / spacing) ** 2
     # a line costs as much as a chord, also if it meets nothing
-    chords = axes * (solids.cross_section / spacing**2 + most_lines(solids, spacing))
+    chords = axes * (solids.cross_section / spacing**2 + most_lines(solids, spacing) + steps)
     most = min(max(CHORDS_A_GRAIN * len(solids.grain_radius), FEWEST_CHORDS), MOST_CHORDS)
     return spacing * math.sqrt(max(chords / most, 1.0))
