@@ -222,6 +222,7 @@ def test_following_lines_through_an_empty_cell_counts_in_the_budget(
     assert max(spacings) > min(spacings), "the first round was not bounded"
 
 
+@pytest.mark.filterwarnings("ignore::scanfab.ScanfabWarning")
 def test_scan_that_stops_on_an_empty_cell_says_why(nearly_empty):
     with pytest.warns(ScanfabWarning, match="of the work was to follow long void.*--periodic"):
         compute(nearly_empty, tolerance=1e-5, variants="a", max_chords=1e6)
