@@ -123,8 +123,8 @@ class ScanSums:
     """
     Steps of following lines through a periodic medium, beyond what is listed of it, shape (R,).
 
-    A line makes one for each period that it crosses, and one for each grain that it may meet there;
-    a step costs about as much as a chord.
+    A line makes one for each grain of each cell that it crosses; a step costs about as much as a
+    chord.
     """
 
     @property

@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from scanfab.kernels.bins import Bins, bins_along
 from scanfab.kernels.compiled import LANES, ZERO, Flag, inner, kernel
-from scanfab.kernels.follow import follow, has_unfinished, map_face, no_map
+from scanfab.kernels.follow import follow
 from scanfab.kernels.grid import Grid, bounds, open_grid, part_of, strip_of
 from scanfab.kernels.lines import solve_closed
 from scanfab.kernels.lists import (
@@ -114,7 +114,6 @@ def scan_strips(
     by_lists, in_bins = lists.stop.size > 0, bins.cutoffs.size > 0
     rows = max(most_lines(lists) // pitch, 1)
     start, chosen = sort_into_strips(spheres, grid, rows)
-    face = no_map()
     for number in range(start.size - 1):
         strip = strip_of(grid, number, rows, pitch)
         met = chosen[start[number] : start[number + 1]]
@@ -146,13 +145,9 @@ def scan_strips(
                     measured,
                     bins,
                 )
-            # in dense media there is seldom any line that is longer than what was listed
-            if medium is not None and has_unfinished(lines, strip, which, medium[1].length):
-                if face.first.size == 0:
-                    face = map_face(medium[0], medium[1])
+            if medium is not None:
                 follow(
-                    lines, strip, which, medium[0], medium[1], face, least, most_steps,
-                    tally, bins,
+                    lines, strip, which, medium[0], medium[1], least, most_steps, tally, bins,
                 )  # fmt: skip
 
 
