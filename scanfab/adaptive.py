@@ -14,7 +14,14 @@ from scanfab.directions import design_of, direction_rule
 from scanfab.errors import ScanfabWarning, SettingsError
 from scanfab.fabric.void import void_fabric
 from scanfab.plan import CLOSE, GROWTH_WITH_SPACING, Plan
-from scanfab.scan import ScanSums, Solids, is_affordable, most_lines, scan_lines
+from scanfab.scan import (
+    FollowedTooFarError,
+    ScanSums,
+    Solids,
+    is_affordable,
+    most_lines,
+    scan_lines,
+)
 from scanfab.settings import Settings
 from scanfab.spelling import spelt_apart, spelt_time
 
@@ -64,42 +71,79 @@ def scan_to_tolerance(
         With the rule and the spacing of each replicate as they were in the end.
     """
     if not plan.auto:
-        return _scan(solids, plan, settings, range(plan.replicates)), plan
+        every = range(plan.replicates)
+        return _scan(solids, plan, settings, every, settings.max_chords), plan
     plan = _within_budget(plan, solids, settings)
+    planned = plan.spacing
     sums: ScanSums | None = None
     start, stop, spent = 0, plan.replicates, 0.0
     begun = time.perf_counter()
     while True:
-        batch = _scan(solids, plan, settings, range(start, stop))
+        if start == 0:
+            batch, plan = _first_round(solids, plan, settings)
+        else:
+            batch = _scan(solids, plan, settings, range(start, stop))
         # a line costs as much as a chord, also if it meets nothing
         lines = most_lines(solids, plan.spacing) * len(plan.rule)
-        spent += float(batch.chords.sum()) + lines * batch.replicates
+        spent += float(batch.work.sum()) + lines * batch.replicates
         sums = batch if sums is None or start == 0 else ScanSums.concatenate([sums, batch])
         # as many replicates as the budget allows
-        left = (settings.max_chords - spent) / max(float(sums.chords.mean()) + lines, 1.0)
+        left = (settings.max_chords - spent) / max(float(sums.work.mean()) + lines, 1.0)
         counted = _counted_variants(sums, plan, solids, settings, left)
         missing = missing_work(sums, plan, counted)
         rest = min(missing, settings.max_chords / spent) - 1.0
         if rest > 0.0:
             seconds = rest * (time.perf_counter() - begun)
             _tell_progress(sums, plan, counted, where, seconds)
-        better = _better_plan(sums, plan, missing, solids, counted, left) if start == 0 else None
+        better: Plan | None = None
+        if start == 0 and plan.spacing <= planned:
+            better = _better_plan(sums, plan, missing, solids, counted, left)
         if better is not None:
-            plan = better
+            plan, planned = better, better.spacing
             continue
         if missing <= 1.0:
             break
         more = math.ceil(max(min(missing, GROWTH), SMALLEST_ROUND) * stop)
         more = min(more, MAX_REPLICATES, int(stop + left))
         if plan.auto == "directions" or more <= stop:
-            _warn_of_missed_tolerance(missing, spent, settings, where)
+            _warn_of_missed_tolerance(missing, spent, sums, settings, where)
             break
         start, stop = stop, more
     _warn_of_dropped_variants(sums, plan, counted, settings, where)
     return sums, plan
 
 
-def _scan(solids: Solids, plan: Plan, settings: Settings, replicates: range) -> ScanSums:
+def _first_round(solids: Solids, plan: Plan, settings: Settings) -> tuple[ScanSums, Plan]:
+    """
+    Scan the first replicates, with wider lines if following them takes more steps than allowed.
+
+    Only a scan can tell how far lines go through a periodic medium, so one replicate goes ahead,
+    and ends when it has used its share.
+    """
+    every = plan.replicates
+    if solids.medium is None:
+        return _scan(solids, plan, settings, range(every)), plan
+    while True:
+        try:
+            sums = _scan(solids, plan, settings, range(1), settings.max_chords / every)
+            if every > 1:
+                rest = _scan(solids, plan, settings, range(1, every), settings.max_chords)
+                sums = ScanSums.concatenate([sums, rest])
+            return sums, plan
+        except FollowedTooFarError:
+            wider = 2.0 * plan.spacing
+            if plan.auto != "replicates" or wider > _width(solids):
+                raise
+            plan = replace(plan, spacing=wider)
+
+
+def _scan(
+    solids: Solids,
+    plan: Plan,
+    settings: Settings,
+    replicates: range,
+    most_steps: float = math.inf,
+) -> ScanSums:
     return scan_lines(
         solids,
         plan.rule,
@@ -109,6 +153,7 @@ def _scan(solids: Solids, plan: Plan, settings: Settings, replicates: range) -> 
         replicates=replicates,
         seed=settings.seed,
         workers=settings.workers,
+        most_steps=most_steps,
     )
 
 
@@ -256,14 +301,23 @@ def missing_work(sums: ScanSums, plan: Plan, settings: Settings) -> float:
     return max(expected, min(missing, 1.1))
 
 
-def _warn_of_missed_tolerance(factor: float, spent: float, settings: Settings, where: str) -> None:
+def _warn_of_missed_tolerance(
+    factor: float, spent: float, sums: ScanSums, settings: Settings, where: str
+) -> None:
     more = "at least " if factor >= GROWTH else ""
     if factor > FAR_MORE:
         more, factor = "more than ", FAR_MORE
+    why = ""
+    if sums.steps.sum() > sums.chords.sum():
+        why = (
+            f"; {sums.steps.sum() / sums.work.sum():.0%} of the work was to follow long void "
+            f"segments through the images of the cell: is it too large, or periodic where the "
+            f"sample is not (--cell, --periodic)?"
+        )
     warnings.warn(
         f"{where}: the scan stopped after {spent:.2g} chords before the tolerance "
         f"{settings.tolerance:g} was met: alpha_vs_axial_se is what it reached; {more}"
-        f"{factor:.4g} times as many lines would be needed (--max-chords, --tolerance)",
+        f"{factor:.4g} times as many lines would be needed (--max-chords, --tolerance){why}",
         ScanfabWarning,
         stacklevel=3,
     )

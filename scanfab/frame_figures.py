@@ -287,6 +287,7 @@ def _mean_lengths(
         replicates=range(REPLICATES),
         seed=settings.seed,
         workers=settings.workers,
+        most_steps=settings.max_chords,
     )
     sums_of, numbers = rose.kept(variant, 0, settings.moment)
     length, segments = result.scanned.kept(variant)
@@ -371,6 +372,7 @@ def _cutoffs(result: FrameResult, title: str, variant: str, settings: Settings) 
         replicates=range(min(scanned.sums.replicates, 4 * REPLICATES)),
         seed=settings.seed,
         workers=settings.workers,
+        most_steps=settings.max_chords,
     )
     alpha, error, total = np.full((3, len(CUTOFFS)), np.nan)
     for place in range(len(CUTOFFS)):

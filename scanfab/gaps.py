@@ -16,7 +16,7 @@ import numpy.typing as npt
 from scanfab.directions import DirectionRule
 from scanfab.kernels.bins import BLOCKS, Bins
 from scanfab.line_grids import drawn_lines, line_frames
-from scanfab.scan import Solids, in_parts, shortest_gap, tally_frames
+from scanfab.scan import MOST_STEPS, Following, Solids, in_parts, shortest_gap, tally_frames
 
 __all__ = ["Blocks", "GapSums", "scan_gaps"]
 
@@ -153,26 +153,33 @@ def scan_gaps(
     replicates: Iterable[int] = range(16),
     seed: int = 0,
     workers: int = 1,
+    most_steps: float = MOST_STEPS,
 ) -> GapSums:
     """
     Scan as :func:`scanfab.scan_lines` does, with the same lines, and keep more.
 
     Parameters
     ----------
-    solids, rule, spacing, variants, replicates, seed, workers
+    solids, rule, spacing, variants, replicates, seed, workers, most_steps
         As for :func:`scanfab.scan_lines`.
     cutoffs : sequence of float
         In ascending order, dump's length unit.
     blocks : two Blocks
         Of the whole sample and of the window, in the frame of ``solids``.
+
+    Raises
+    ------
+    SettingsError
+        If following lines through a periodic medium takes more steps than allowed.
     """
+    following = Following(most_steps)
     frames, offsets = drawn_lines(rule, seed, replicates)
     least = np.maximum(np.array(cutoffs, dtype=np.float64), shortest_gap(solids))
     affine = np.array([one.affine() for one in blocks])
 
     def some(frames: FloatArray, offsets: FloatArray) -> FloatArray:
         bins = Bins(affine, least, np.zeros((len(frames), 2, 2, BLOCKS * len(least), 3)))
-        tally_frames(solids, frames, offsets, spacing, least[0], variants, bins)
+        tally_frames(solids, frames, offsets, spacing, least[0], variants, bins, following)
         return bins.sums
 
     sums = in_parts(some, frames, offsets, workers)

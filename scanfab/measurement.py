@@ -98,6 +98,8 @@ def measure(
         "variants": settings.variants,
         "seed": settings.seed,
         "workers": settings.workers,
+        # what these scans take is known from the one before them
+        "most_steps": math.inf,
     }
     gaps: GapSums | None = None
     if settings.lists_gaps:
@@ -107,7 +109,7 @@ def measure(
     blocked = scan_gaps(
         solids,
         block_rule,
-        spacing=_block_spacing(solids, block_rule),
+        spacing=_block_spacing(solids, block_rule, sums, plan),
         replicates=range(BLOCK_REPLICATES),
         **lines,
     )
@@ -165,13 +167,14 @@ def _block_rule(solids: Solids) -> DirectionRule:
     return usual if axes <= len(usual) else design_of(axes)
 
 
-def _block_spacing(solids: Solids, rule: DirectionRule) -> float:
+def _block_spacing(solids: Solids, rule: DirectionRule, sums: ScanSums, plan: Plan) -> float:
     """As close as is of use, but no closer than the sample's scatter is worth."""
     if not len(solids.grain_radius):
         return solids.window_radius
     spacing = CLOSE * float(solids.grain_radius.mean())
     axes = BLOCK_REPLICATES * len(rule)
+    steps = float(sums.steps.mean()) / len(plan.rule) * (plan.spacing / spacing) ** 2
     # a line costs as much as a chord, also if it meets nothing
-    chords = axes * (solids.cross_section / spacing**2 + most_lines(solids, spacing))
+    chords = axes * (solids.cross_section / spacing**2 + most_lines(solids, spacing) + steps)
     most = min(max(CHORDS_A_GRAIN * len(solids.grain_radius), FEWEST_CHORDS), MOST_CHORDS)
     return spacing * math.sqrt(max(chords / most, 1.0))

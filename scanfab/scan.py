@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
@@ -20,7 +21,10 @@ from scanfab.line_grids import drawn_lines
 
 __all__ = [
     "MAX_LINES",
+    "MOST_STEPS",
     "CellGrains",
+    "FollowedTooFarError",
+    "Following",
     "ScanSums",
     "Solids",
     "in_parts",
@@ -39,6 +43,8 @@ BoolArray = npt.NDArray[np.bool_]
 # lines of one axis and replicate: more take minutes, even those that meet nothing
 MAX_LINES = 50_000_000
 JOBS_A_THREAD, MOST_AXES = 4, 16
+# steps of following lines through a periodic medium: more take minutes
+MOST_STEPS = 1e10
 # Of the smallest radius: what lies between surfaces that coincide but for rounding is no gap.
 SHORTEST = 1e-9
 # of the spacing and for each variant: spheres of such a radius are scanned as fast row by row as
@@ -113,6 +119,18 @@ class ScanSums:
     """
     channels: IntArray
     """Lines of the whole that meet no grain however far they go, shape (R, 4, D)."""
+    steps: IntArray
+    """
+    Steps of following lines through a periodic medium, beyond what is listed of it, shape (R,).
+
+    A line makes one for each grain of each cell that it crosses; a step costs about as much as a
+    chord.
+    """
+
+    @property
+    def work(self) -> IntArray:
+        """What takes time beside the lines themselves: chords and steps, shape (R,)."""
+        return self.chords + self.steps
 
     @property
     def replicates(self) -> int:
@@ -136,6 +154,48 @@ class ScanSums:
         )
 
 
+class FollowedTooFarError(SettingsError):
+    """To follow the lines of a scan through a periodic medium takes more steps than allowed."""
+
+
+class Following:
+    """
+    The steps that following the lines of a scan has taken, of all its threads together.
+
+    Whether they are too many does not depend on the threads: no part of a scan takes any back.
+    """
+
+    def __init__(self, most: float) -> None:
+        self.most = most
+        self._taken = 0.0
+        self._lock = threading.Lock()
+
+    @property
+    def left(self) -> float:
+        """How many more are allowed."""
+        return self.most - self._taken
+
+    def add(self, steps: float) -> None:
+        """
+        Count the steps of a part of the scan.
+
+        Raises
+        ------
+        FollowedTooFarError
+            If they are too many.
+        """
+        with self._lock:
+            self._taken += steps
+        if self._taken >= self.most:
+            raise FollowedTooFarError(
+                f"void segments that leave the cell are long: following them through its images "
+                f"takes more than {self.most:.2g} steps. Much of the cell is empty, or a variant "
+                f"keeps few grains: check the cell's size (--cell) and its periodic axes "
+                f"(--periodic), choose a wider --spacing or other --variants, or allow more "
+                f"(--max-chords)"
+            )
+
+
 def scan_lines(
     solids: Solids,
     rule: DirectionRule,
@@ -146,6 +206,7 @@ def scan_lines(
     replicates: Iterable[int] = range(16),
     seed: int = 0,
     workers: int = 1,
+    most_steps: float = MOST_STEPS,
 ) -> ScanSums:
     """
     Scan with one square grid of lines for each axis and replicate.
@@ -170,6 +231,8 @@ def scan_lines(
         Numbers of the replicates.
     seed, workers : int, optional
         Seed of the random numbers; threads to use. The result does not depend on the threads.
+    most_steps : float, optional
+        Of following lines through a periodic medium, see :attr:`ScanSums.steps`.
 
     Returns
     -------
@@ -178,7 +241,8 @@ def scan_lines(
     Raises
     ------
     SettingsError
-        If the spacing asks for more lines than can be scanned in reasonable time.
+        If the spacing asks for more lines than can be scanned in reasonable time, or following
+        lines takes more steps than allowed.
 
     Examples
     --------
@@ -195,9 +259,10 @@ def scan_lines(
     """
     _check_spacing(solids, spacing)
     frames, offsets = drawn_lines(rule, seed, replicates)
+    following = Following(most_steps)
 
     def some(frames: FloatArray, offsets: FloatArray) -> FloatArray:
-        return tally_frames(solids, frames, offsets, spacing, cutoff, variants)
+        return tally_frames(solids, frames, offsets, spacing, cutoff, variants, following=following)
 
     return sums_of(frames, in_parts(some, frames, offsets, workers), variants)
 
@@ -245,18 +310,25 @@ def tally_frames(
     cutoff: float,
     variants: str,
     bins: Bins | None = None,
+    following: Following | None = None,
 ) -> FloatArray:
     """
     Scan along given line frames (D, 3, 3) with given shifts (D, 2).
 
     Returns the tallies of each axis and set of solids, shape (D, 2, TALLY_SIZE); where there are
-    bins, the gaps go there instead.
+    bins, the gaps go there instead. ``following`` counts the steps of this and of other parts.
+
+    Raises
+    ------
+    FollowedTooFarError
+        If these are too many.
     """
     first, second = ("a" in variants or "c" in variants), ("b" in variants or "d" in variants)
     whole, window = ("a" in variants or "b" in variants), ("c" in variants or "d" in variants)
     tallies = np.zeros((len(frames), 2, sweep.TALLY_SIZE))
     cutoff = max(cutoff, shortest_gap(solids))
     bins = no_bins(len(frames)) if bins is None else bins
+    following = Following(MOST_STEPS) if following is None else following
     both: Flag = True if first and second else None
     if solids.medium is not None and whole:
         # without a or c, the solids of b and d are the only ones
@@ -264,7 +336,11 @@ def tally_frames(
         if len(medium.radius):
             axes = np.ascontiguousarray(frames[:, 2])
             by_lists = _few_lines(medium.radius, spacing, 1 + (both is not None))
-            scan_cell(medium, axes, offsets, spacing, cutoff, tallies, by_lists, both, bins)
+            scan_cell(
+                medium, axes, offsets, spacing, cutoff, tallies, by_lists, both, bins,
+                following.left,
+            )  # fmt: skip
+            following.add(float(tallies[:, 0, sweep.STEPS].sum()))
         whole = False
     if whole or window:
         solid = slice(None) if first else ~solids.removed
@@ -324,6 +400,7 @@ def sums_of(frames: FloatArray, tallies: FloatArray, variants: str) -> ScanSums:
         line_length=both(sweep.LINE_LENGTH),
         chords=entries[sweep.CHORDS].sum(axis=(1, 2)).astype(np.int64),
         channels=of(sweep.CHANNELS).astype(np.int64),
+        steps=entries[sweep.STEPS].sum(axis=(1, 2)).astype(np.int64),
     )
 
 

@@ -20,6 +20,7 @@ from scanfab import (
 )
 from scanfab.directions import DirectionRule
 from scanfab.plan import REPLICATES, make_plan
+from scanfab.scan import CellGrains, Solids
 from scanfab.settings import AUTO_RULE
 from scanfab.variants import Sample
 from tests.lattices import shaken_cubic
@@ -191,6 +192,63 @@ def test_budget_holds_for_periodic_packings_too(repeated, variants):
         compute(repeated, spacing=0.02, variants=variants, max_chords=1e4)
     with pytest.raises(SettingsError, match="max-chords: 100 leave less than one line for each of"):
         compute(repeated, max_chords=100, variants=variants)
+
+
+@pytest.fixture
+def nearly_empty(packing):
+    """Grains in a cell four times as long, wide and high."""
+    cell = Cell(24.0 * np.eye(3), (True, True, True))
+    return find_contacts(Packing(packing.position, packing.radius, cell=cell))
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.ScanfabWarning")
+@pytest.mark.parametrize("variants", ["a", "ab"])
+def test_following_lines_through_an_empty_cell_counts_in_the_budget(
+    nearly_empty, monkeypatch, variants
+):
+    """Of all scans for the tolerance; those that end early take a part of the budget."""
+    work, spacings = [], []
+
+    def scan(*args, **options):
+        spacings.append(options["spacing"])
+        sums = scan_lines(*args, **options)
+        work.append(int(sums.work.sum()))
+        return sums
+
+    monkeypatch.setattr(adaptive, "scan_lines", scan)
+    row = compute(nearly_empty, tolerance=1e-5, variants=variants, max_chords=3e7)[0]
+    assert row.alpha_vs_axial_se > 1e-5
+    assert 3e6 < sum(work) < 6e7
+    assert max(spacings) > min(spacings), "the first round was not bounded"
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.ScanfabWarning")
+def test_scan_that_stops_on_an_empty_cell_says_why(nearly_empty):
+    with pytest.warns(ScanfabWarning, match="of the work was to follow long void.*--periodic"):
+        compute(nearly_empty, tolerance=1e-5, variants="a", max_chords=3e7)
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.ScanfabWarning")
+def test_fixed_lines_through_an_empty_cell_that_take_too_long_are_refused(nearly_empty):
+    lines = {"spacing": 0.5, "directions": 20, "variants": "a"}
+    compute(nearly_empty, max_chords=1e9, tolerance=1.0, **lines)
+    with pytest.raises(SettingsError, match=r"more than 1e\+03 steps.*--cell.*--periodic"):
+        compute(nearly_empty, max_chords=1e3, tolerance=1.0, **lines)
+
+
+def test_whether_following_takes_too_many_steps_does_not_depend_on_threads(nearly_empty):
+    vectors, none = nearly_empty.cell.vectors, np.zeros(len(nearly_empty.radius), bool)
+    medium = CellGrains(
+        nearly_empty.position, nearly_empty.radius, none, vectors, np.ones(3, dtype=bool)
+    )
+    solids = Solids(np.zeros((0, 3)), np.zeros(0), none[:0], 0.0, medium)
+    lines = {"spacing": 0.5, "cutoff": 0.0, "variants": "a", "replicates": range(2)}
+    rule = direction_rule("lebedev:5")
+    steps = int(scan_lines(solids, rule, **lines).steps.sum())
+    for workers in (1, 3):
+        assert scan_lines(solids, rule, workers=workers, most_steps=steps + 1, **lines)
+        with pytest.raises(SettingsError, match="following them through its images"):
+            scan_lines(solids, rule, workers=workers, most_steps=steps, **lines)
 
 
 def test_fixed_spacing_that_needs_more_chords_than_allowed_is_refused(packing):

@@ -22,7 +22,7 @@ from scanfab.kernels.lists import (
 from scanfab.kernels.periodic import CellGrains, Prism, cell_grid, measured_in
 from scanfab.kernels.projection import Spheres, project, sort_into_strips, sphere_at
 from scanfab.kernels.strips import MOST_LINES, STATE_SIZE, Strip, begin, measure_from
-from scanfab.kernels.sweep import NOTHING, Measured, settle, visit
+from scanfab.kernels.sweep import NOTHING, STEPS, Measured, settle, visit
 
 __all__ = ["scan_axes", "scan_cell"]
 
@@ -105,6 +105,7 @@ def scan_strips(
     window: Flag,
     measured: Measured | None,
     medium: tuple[CellGrains, Prism] | None,
+    most_steps: float,
     bins: Bins,
 ) -> None:
     """Scan a grid strip by strip, so that the lines' state stays in cache."""
@@ -145,7 +146,9 @@ def scan_strips(
                     bins,
                 )
             if medium is not None:
-                follow(lines, strip, which, medium[0], medium[1], least, tally, bins)
+                follow(
+                    lines, strip, which, medium[0], medium[1], least, most_steps, tally, bins,
+                )  # fmt: skip
 
 
 @kernel
@@ -213,6 +216,7 @@ def scan_axes(
                 window,
                 None,
                 None,
+                np.inf,
                 bins_along(bins, frame, axis),
             )
 
@@ -228,12 +232,15 @@ def scan_cell(
     by_lists: bool,
     second: Flag,
     bins: Bins,
+    most_steps: float,
 ) -> None:
     """
     Scan a periodic medium along several directions: the whole of it, that has no edge.
 
-    ``normals`` has shape (D, 3), the rest is as in :func:`scan_axes`.
+    ``normals`` has shape (D, 3), the rest is as in :func:`scan_axes`. When following lines has
+    taken ``most_steps``, all directions together, the scan ends and its tallies are worth nothing.
     """
+    left = most_steps
     lines = np.empty(STATE_SIZE)
     lists = room_for_lists(by_lists or bins.cutoffs.size > 0)
     most = most_lines(lists) - LANES
@@ -244,15 +251,18 @@ def scan_cell(
         here = bins_along(bins, prism.frame, axis)
         for first in range(0, grid.columns, most):
             part = part_of(grid, first, most)
+            if left <= tally[0, STEPS]:
+                return
             # along an axis that is not periodic a line runs from the first solid to the last
             if grains.periodic[prism.third]:
                 medium = grains, prism
                 scan_strips(
                     lines, spheres, part, 0.0, cutoff, tally, lists, second, True, None, measured,
-                    medium, here,
+                    medium, left, here,
                 )  # fmt: skip
             else:
                 scan_strips(
                     lines, spheres, part, 0.0, cutoff, tally, lists, second, True, None, None,
-                    None, here,
+                    None, np.inf, here,
                 )  # fmt: skip
+        left -= tally[0, STEPS]

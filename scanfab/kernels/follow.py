@@ -17,7 +17,7 @@ from scanfab.kernels.bins import (
 from scanfab.kernels.compiled import inner
 from scanfab.kernels.periodic import CellGrains, Prism, cross, dot, shifts
 from scanfab.kernels.strips import BOUND, END, FAR, SET, Strip
-from scanfab.kernels.sweep import CHANNELS, KEPT, LENGTH, VOID, WHOLE
+from scanfab.kernels.sweep import CHANNELS, KEPT, LENGTH, STEPS, VOID, WHOLE
 
 __all__ = ["follow"]
 
@@ -110,11 +110,12 @@ def next_solid(
     u: float,
     v: float,
     after: float,
-) -> float:
+) -> tuple[float, float]:
     """
     Where the line through (u, v) enters the next solid behind a depth, which lies in void.
 
-    FAR if it stays in a channel. ``second``: of the grains that are not removed.
+    FAR if it stays in a channel. And the steps that this took: one for each grain and cell.
+    ``second``: of the grains that are not removed.
     """
     frame, c = prism.frame, grains.vectors[prism.third]
     largest, most = limits
@@ -123,11 +124,12 @@ def next_solid(
     margin = largest * prism.slope
     place = (after - prism.rise_u * u - prism.rise_v * v) / prism.length - margin
     last = way_out(grains, frame, u, v) + 2.0 * largest
-    found = FAR
+    found, steps = FAR, 0.0
     for cells in range(most):
         # spheres that are so far away begin behind what was found, or outside the sample
         if (min(found, last) - after) / prism.length + 2.0 * margin < cells:
             break
+        steps += grains.radius.size
         for g in range(grains.radius.size):
             if second and grains.removed[g]:
                 continue
@@ -139,7 +141,7 @@ def next_solid(
             v1 = v0 + k * dot(c, frame[1]) - v
             n1 = n0 + k * dot(c, frame[2])
             found = min(found, entry(grains, prism, u1, v1, n1, r, after))
-    return found
+    return found, steps
 
 
 @inner()
@@ -150,10 +152,16 @@ def follow(
     grains: CellGrains,
     prism: Prism,
     least: float,
+    most_steps: float,
     tally: FloatArray,
     bins: Bins,
 ) -> None:
-    """Tally the gaps that start in the measured length and end beyond what was listed of it."""
+    """
+    Tally the gaps that start in the measured length and end beyond what was listed of it.
+
+    And the steps that this takes. It ends when the tally of the direction has so many: then all of
+    it is worth nothing.
+    """
     limits = limits_of(grains, prism, which == 1)
     # else a line leaves through a face that does not repeat
     endless = grains.periodic[0] and grains.periodic[1] and grains.periodic[2]
@@ -167,7 +175,11 @@ def follow(
             is_empty = end == -FAR
             if not is_empty and not bound <= end < bound + prism.length:
                 continue
-            start = next_solid(grains, prism, which == 1, limits, u, v, bound if is_empty else end)
+            if tally[0, STEPS] >= most_steps:
+                return
+            after = bound if is_empty else end
+            start, steps = next_solid(grains, prism, which == 1, limits, u, v, after)
+            tally[0, STEPS] += steps
             if start < FAR:
                 if not is_empty:
                     gap = start - end

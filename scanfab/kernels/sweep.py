@@ -48,6 +48,7 @@ __all__ = [
     "LINES",
     "LINE_LENGTH",
     "NOTHING",
+    "STEPS",
     "TALLY_SIZE",
     "VOID",
     "WHOLE",
@@ -67,10 +68,10 @@ Sums = tuple[float, float, float, float, float, float]
 # the compiler leaves out what adds it: unlike 0, it changes no number, not even -0
 NOTHING = -0.0
 # entries of a tally, of the whole and, behind them, of the window; and the chords of all solids;
-# and the lines that stay in a channel of a periodic medium
+# and the lines that stay in a channel of a periodic medium, and the steps of following lines there
 LENGTH, KEPT, VOID, LINES, LINE_LENGTH = range(5)
-WHOLE, WINDOW, CHORDS, CHANNELS = 0, 5, 10, 11
-TALLY_SIZE = 12
+WHOLE, WINDOW, CHORDS, CHANNELS, STEPS = 0, 5, 10, 11, 12
+TALLY_SIZE = 13
 
 
 class Measured(NamedTuple):

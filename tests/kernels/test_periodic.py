@@ -71,10 +71,12 @@ def lines_of(medium, normal, offset, spacing):
     return np.array(feet), measured
 
 
-def tallies_of(medium, normal, offset, spacing, cutoff, second=True, by_lists=False):
+def tallies_of(
+    medium, normal, offset, spacing, cutoff, second=True, by_lists=False, most_steps=np.inf
+):
     tallies = np.zeros((1, 2, sweep.TALLY_SIZE))
     lines = normal[None], offset[None], spacing, cutoff
-    axes.scan_cell(medium, *lines, tallies, by_lists, second or None, no_bins(1))
+    axes.scan_cell(medium, *lines, tallies, by_lists, second or None, no_bins(1), most_steps)
     return tallies[0]
 
 
@@ -200,6 +202,27 @@ def test_grain_that_fills_its_cell_leaves_no_gap():
     assert tally[sweep.KEPT] == 0
     assert tally[sweep.VOID] == pytest.approx(0, abs=1e-9)
     assert tally[sweep.LINES] > 300
+
+
+@pytest.fixture
+def corner():
+    """A thousand grains in an eighth of their cell."""
+    lattice = np.stack(np.meshgrid(*3 * [np.arange(10.0)], indexing="ij"), -1).reshape(-1, 3)
+    position = lattice + np.random.default_rng(4).uniform(-0.2, 0.2, lattice.shape)
+    everywhere = np.ones(3, bool)
+    return CellGrains(
+        position, np.full(1000, 0.4), np.arange(1000) % 5 == 0, 20.0 * np.eye(3), everywhere
+    )
+
+
+def test_following_ends_when_it_has_taken_the_steps_that_it_may(corner):
+    normal, offset = np.array([0.48, 0.6, 0.64]), np.array([0.3, 0.4])
+    every = tallies_of(corner, normal, offset, 0.5, 0.0)[0, sweep.STEPS]
+    for most in (1, 500, 5000):
+        steps = tallies_of(corner, normal, offset, 0.5, 0.0, most_steps=most)[0, sweep.STEPS]
+        # the last line asks every grain in each cell that it crosses
+        assert most <= steps < min(most + 20_000, every)
+    assert tallies_of(corner, normal, offset, 0.5, 0.0, most_steps=0)[0, sweep.STEPS] == 0
 
 
 def test_gaps_equal_those_of_explicit_images_uncompiled():
