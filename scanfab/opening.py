@@ -20,6 +20,7 @@ from scanfab.families import (
 from scanfab.frame_file import FrameFile
 from scanfab.packing import Packing
 from scanfab.readers.base import ReadOptions
+from scanfab.readers.yade_cells import is_cell_file, refuse_as_numbers
 from scanfab.series import ContactsFrom, Series
 
 __all__ = ["READING", "SETTINGS_FILE", "open_sources", "read", "read_series"]
@@ -183,6 +184,8 @@ def open_sources(sources: Sequence[PathLike], **options: Any) -> list[Series]:
 
 def _cell_file(path: PathLike) -> FrameFile:
     """The cells of --cell FILE.csv."""
+    if is_cell_file(Path(path)):
+        raise refuse_as_numbers(Path(path))
     try:
         return FrameFile(Path(path), ["lx", "ly", "lz"], ["xy", "xz", "yz"], positive=3)
     except OSError as error:
