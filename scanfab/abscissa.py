@@ -7,7 +7,14 @@ from typing import Any
 
 from scanfab.tabular import number_of
 
-__all__ = ["STRAINS", "frame_strain_column", "spelt_strain", "strain_column", "why_not_strain"]
+__all__ = [
+    "STRAINS",
+    "frame_strain_column",
+    "is_ambiguous",
+    "spelt_strain",
+    "strain_column",
+    "why_not_strain",
+]
 
 Rows = Sequence[Mapping[str, Any]]
 
@@ -52,6 +59,12 @@ def frame_strain_column(row: Mapping[str, Any]) -> str | None:
     known = [name for name in STRAINS if number_of(row, name) is not None]
     moved = [name for name in known if abs(row[name]) >= SAME]
     return next(iter([*moved, *known]), None)
+
+
+def is_ambiguous(row: Mapping[str, Any]) -> bool:
+    """Whether a single frame has both strains and neither has begun: other frames must tell."""
+    values = [number_of(row, name) for name in STRAINS]
+    return all(value is not None and abs(value) < SAME for value in values)
 
 
 def spelt_strain(row: Mapping[str, Any], column: str | None, *, symbol: bool = False) -> str:

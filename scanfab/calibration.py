@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+import re
 import time
 import warnings
 from collections.abc import Iterator
@@ -317,9 +318,9 @@ def _samples(
 
 def _notes(caught: list[warnings.WarningMessage], row: Row) -> str:
     """The scan's own warnings about one row."""
-    about = f"variant {row.variant}: "
     texts = [str(one.message) for one in caught if issubclass(one.category, ScanfabWarning)]
-    own = [text.split(about, 1)[1] for text in texts if about in text]
+    named = [re.search(r"variants? ([a-d](?:, [a-d])*): (.*)", text) for text in texts]
+    own = [match[2] for match in named if match and row.variant in match[1].split(", ")]
     return "; ".join(
         dict.fromkeys(own + [text for text in texts if "before the tolerance" in text])
     )

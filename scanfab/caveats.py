@@ -9,7 +9,7 @@ from typing import Any
 
 from scanfab.directions import direction_rule
 from scanfab.errors import SettingsError
-from scanfab.tabular import numbers_of
+from scanfab.tabular import number_of, numbers_of
 
 __all__ = ["caveats_of"]
 
@@ -94,15 +94,15 @@ def _large_errors(rows: Sequence[Mapping[str, Any]]) -> list[str]:
         if doubt.total > NOTABLE * doubt.signal:
             large.setdefault(source, []).append(doubt)
     return [
-        f"{source}: one standard error of α_vs, of scan and sample together, is more than a tenth "
-        f"of its largest value {'; '.join(map(str, doubts))}. {_what_helps(doubts)}"
+        f"{source}: where α_vs is largest, its standard error, of scan and sample together, is "
+        f"more than a tenth of it {'; '.join(map(str, doubts))}. {_what_helps(doubts)}"
         for source, doubts in large.items()
     ]
 
 
 @dataclass(frozen=True)
 class _Doubt:
-    """How large the errors of one variant are beside its signal."""
+    """How large the errors of one variant are beside its signal, where that is largest."""
 
     variant: str
     signal: float
@@ -113,13 +113,16 @@ class _Doubt:
 
     @classmethod
     def of(cls, variant: str, group: Sequence[Mapping[str, Any]]) -> _Doubt:
-        known = numbers_of(group, f"{VOID}_sample_se")
-        grains = numbers_of(group, "grains")
-        guess = SCATTER / max(min(grains), 1.0) ** 0.5 if grains else 0.0
+        peak = max(group, key=lambda row: abs(float(row[VOID])))
+        known = numbers_of([peak], f"{VOID}_sample_se") or numbers_of(group, f"{VOID}_sample_se")
+        scans = numbers_of([peak], f"{VOID}_se") or numbers_of(group, f"{VOID}_se")
+        grains = number_of(peak, "grains")
+        guess = 0.0 if grains is None else SCATTER / max(grains, 1.0) ** 0.5
         return cls(
             variant=variant,
-            signal=max(abs(float(row[VOID])) for row in group),
-            scan=max(numbers_of(group, f"{VOID}_se"), default=0.0),
+            signal=abs(float(peak[VOID])),
+            # of the other frames only where the peak's own are not known
+            scan=max(scans, default=0.0),
             sample=max(known, default=guess),
             is_guess=not known and guess > 0,
         )

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import glob
 import os
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from scanfab.errors import ReadError, UnknownFormatError
+from scanfab.errors import ReadError, ScanfabWarning, UnknownFormatError
 from scanfab.families import Family, files_in, own_contacts, sort_into_families
 from scanfab.readers.base import FileKind
 from scanfab.readers.files import first_bytes
 
-__all__ = ["choose_grains", "expanded", "files_of"]
+__all__ = ["PathLike", "choose_grains", "expanded", "files_of", "named_once"]
+
+PathLike = str | os.PathLike[str]
 
 # sub-folders that are looked into for the advice in an error
 MOST_FOLDERS = 50
@@ -20,22 +23,48 @@ MOST_FOLDERS = 50
 TABLE_WORDS = (b"source", b"frame", b"variant", b"alpha_vs")
 
 
-def expanded(source: str | os.PathLike[str]) -> list[Path]:
-    """A path, or the files and folders that a glob names (in quotes, the shell leaves it to us)."""
-    path = Path(source)
-    if path.exists() or not glob.has_magic(os.fspath(source)):
-        return [path]
-    found = [Path(match) for match in sorted(glob.glob(os.fspath(source)))]
+def expanded(source: PathLike) -> list[PathLike]:
+    """
+    A source as it is spelt, or the files and folders that a glob names.
+
+    The shell leaves globs in quotes to us.
+    """
+    if Path(source).exists() or not glob.has_magic(os.fspath(source)):
+        return [source]
+    found: list[PathLike] = [*sorted(glob.glob(os.fspath(source)))]
     if not found:
-        raise ReadError(f"{source}: there is no such file or folder")
+        raise ReadError(f"{source}: there is no such file, folder or glob")
     return found
+
+
+def named_once(sources: Iterable[PathLike]) -> list[PathLike]:
+    """
+    Sources as they are spelt, globs expanded, and each file and folder once.
+
+    Rows that come twice look like two samples, so a warning names what is left out.
+    """
+    first: dict[Path, PathLike] = {}
+    again: list[str] = []
+    for source in (path for one in sources for path in expanded(one)):
+        place = Path(source).resolve()
+        if place in first:
+            before = str(first[place])
+            again.append(before if str(source) == before else f"{source} (as {before})")
+        else:
+            first[place] = source
+    if again:
+        named = ", ".join(again[:5]) + (f" and {len(again) - 5} more" if len(again) > 5 else "")
+        warnings.warn(
+            f"{named}: named twice among the sources, and read once", ScanfabWarning, stacklevel=3
+        )
+    return list(first.values())
 
 
 def files_of(path: Path) -> list[Path]:
     """A file, or the files of a folder."""
     if not path.is_dir():
         if not path.exists():
-            raise ReadError(f"{path}: there is no such file or folder")
+            raise ReadError(f"{path}: there is no such file, folder or glob")
         return [path]
     files = files_in(path)
     if not files:

@@ -16,11 +16,17 @@ from scanfab.errors import ScanfabNote, ScanfabWarning, SettingsError
 from scanfab.fabric.jackknife import BLOCKS, variance_without_noise
 from scanfab.selection import check_rows
 from scanfab.tabular import number_of, numbers_of, total_error
+from scanfab.writers.curves import is_turned
 
 __all__ = ["compare_tables"]
 
 FloatArray = npt.NDArray[np.float64]
 
+TURNED = (
+    "the loading axis is not the axis of the contact fabric, as in simple shear: alpha_vs_axial, "
+    "alpha_c_axial, and with them slope and peak, miss most of the fabric; figures draw alpha_vs, "
+    "alpha_c and the angle between their axes instead; or compute with --axis along the major axis"
+)
 # with fewer points a line says nothing
 FEWEST_FRAMES = 3
 
@@ -66,6 +72,8 @@ def compare_tables(
     rows = list(rows)
     groups = _grouped(rows)
     _tell_of_strains(rows, strain_max)
+    if is_turned(rows):
+        warnings.warn(TURNED, ScanfabNote, stacklevel=2)
     column = strain_column(rows)
     told_apart = {key: _with_strain(group, column) for key, group in groups.items()}
     points = [_points(group, strain_max) for group in told_apart.values()]
@@ -92,6 +100,13 @@ def _tell_of_strains(rows: Sequence[Mapping[str, Any]], strain_max: float | None
     strains = numbers_of(rows, strain_column(rows) or "strain")
     if not strains:
         warnings.warn("strain-max: no frame has a strain, so none is fitted", ScanfabWarning, 3)
+    elif min(strains) > strain_max:
+        warnings.warn(
+            f"strain-max: {strain_max:g} leaves out all frames, so none is fitted: their strains "
+            f"lie between {min(strains):.3g} and {max(strains):.3g} (positive in compression)",
+            ScanfabWarning,
+            stacklevel=3,
+        )
     elif max(strains) <= strain_max:
         warnings.warn(
             f"strain-max: {strain_max:g} leaves out no frame: strains are fractions (5 % is 0.05), "

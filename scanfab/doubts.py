@@ -10,7 +10,7 @@ from scanfab.packing import Packing
 from scanfab.periodicity import fitting_periods
 from scanfab.variants import Sample
 
-__all__ = ["CLUMP_COLUMNS", "cell_doubt", "doubts_of", "refuse_impossible"]
+__all__ = ["CLUMP_COLUMNS", "cell_doubt", "cell_hint", "doubts_of", "refuse_impossible"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -27,6 +27,11 @@ MANY_CONTACTS = 30
 SOLIDS = 20.0
 # of the period, without any grain
 EMPTY = 0.2
+# what formats without a cell lack, and what makes up for it
+CELL_LACKS = {
+    "nothing": ("this format carries no cell", "--cell LX LY LZ"),
+    "box": ("this format has a box, but does not say whether it repeats", "--periodic xyz"),
+}
 
 
 def refuse_impossible(sample: Sample) -> None:
@@ -65,9 +70,9 @@ def doubts_of(sample: Sample, *, cell_is_named: bool = False) -> list[str]:
     return [text for text in texts if text]
 
 
-def cell_doubt(sample: Sample, carries: str, *, always: bool) -> str:
+def cell_doubt(sample: Sample, carries: str) -> str:
     """
-    What to tell of a sample that is not periodic, if its format could not have said so.
+    What to tell of a sample whose opposite faces fit together, if its format has no cell.
 
     Parameters
     ----------
@@ -75,25 +80,27 @@ def cell_doubt(sample: Sample, carries: str, *, always: bool) -> str:
         One frame.
     carries : str
         What its format says of a cell, as :data:`scanfab.readers.base.Carries`.
-    always : bool
-        Not only if opposite faces fit together.
     """
     if carries == "cell" or sample.packing.is_periodic:
         return ""
-    lacks, cure = (
-        ("this format carries no cell", "--cell LX LY LZ")
-        if carries == "nothing"
-        else ("this format has a box, but does not say whether it repeats", "--periodic xyz")
-    )
     periods = fitting_periods(sample.packing)
     found = {axis: period for axis, period in zip("xyz", periods, strict=True) if period}
-    if found:
-        lengths = ", ".join(f"{period:.4g} along {axis}" for axis, period in found.items())
-        return (
-            f"the sample looks periodic: grains of opposite faces touch at a period of {lengths} "
-            f"(roughly); {lacks}: name it with {cure}"
-        )
-    return f"{lacks}; {cure} if the sample is periodic" if always else ""
+    if not found:
+        return ""
+    lacks, cure = CELL_LACKS[carries]
+    lengths = ", ".join(f"{period:.4g} along {axis}" for axis, period in found.items())
+    return (
+        f"the sample looks periodic: grains of opposite faces touch at a period of {lengths} "
+        f"(roughly); {lacks}: name it with {cure}"
+    )
+
+
+def cell_hint(sample: Sample, carries: str) -> str:
+    """What to tell of any sample whose format has no cell: most are open, and nothing is wrong."""
+    if carries == "cell" or sample.packing.is_periodic:
+        return ""
+    lacks, cure = CELL_LACKS[carries]
+    return f"{lacks}; {cure} if the sample is periodic"
 
 
 def _plane(packing: Packing) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -67,14 +68,24 @@ def frame_result(
         warnings.warn(f"frame {number}: {doubt}", ScanfabWarning, stacklevel=2)
     measurement = measure(sample, plan, settings, f"frame {number}")
     rows = []
+    doubts: dict[str, list[str]] = {}
     for variant in settings.variants:
         for place in range(len(plan.cutoffs)):
             row = VariantColumns(measurement, VARIANTS[variant], place, settings)
-            row.warn_of_few_segments(f"frame {number}, variant {variant}")
             rows.append(Row(**frame, variant=variant, **row.columns()))
+            for text in row.doubts():
+                doubts.setdefault(text, []).append(variant)
+    for text, variants in doubts.items():
+        warnings.warn(f"frame {number}, {_named(variants)}: {text}", ScanfabWarning, stacklevel=2)
     if plan.auto and settings.lists_gaps:
         _warn_of_large_errors(rows, plan, settings)
     return FrameResult(name, number, sample, measurement, rows)
+
+
+def _named(variants: Sequence[str]) -> str:
+    """The variants that a message is about, each once."""
+    named = list(dict.fromkeys(variants))
+    return f"variant{'s' if len(named) > 1 else ''} {', '.join(named)}"
 
 
 def _warn_of_large_errors(rows: list[Row], plan: Plan, settings: Settings) -> None:

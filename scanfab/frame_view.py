@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import warnings
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from scanfab.abscissa import frame_strain_column, is_ambiguous
 from scanfab.errors import (
     PackingError,
     ReadError,
@@ -39,6 +41,8 @@ class Look:
     """The first frame that has grains, which fixes all lengths of the series."""
     plan: Plan | None
     """None if the settings do not fit the series."""
+    strain_column: str | None
+    """Which of the strains tells the frames of the series apart."""
 
 
 def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
@@ -69,7 +73,9 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
     scene = scene_of(sample, None if plan is None else plan.window)
     if plan is not None:
         scene = about_window(replace(scene, cutoff=plan.cutoff))
-    return Look(scene, number, sample, _strains(number, sample, first, settings), first, plan)
+    strains = _strains(number, sample, first, settings)
+    column = _strain_column(series, strains, first, settings)
+    return Look(scene, number, sample, strains, first, plan, column)
 
 
 def _frame(series: Series, number: int) -> tuple[int, Frame]:
@@ -114,6 +120,18 @@ def _strains(
     if first is not None and sample.grains.any():
         shear = shear_strain(sample.packing.cell, first.packing.cell)
     return {"strain": axial, "shear_strain": shear}
+
+
+def _strain_column(
+    series: Series, strains: dict[str, float | None], first: Sample | None, settings: Settings
+) -> str | None:
+    """That of the frame; where no strain has begun, that of the last frame that can be read."""
+    frames = list(enumerate(series)) if is_ambiguous(strains) else []
+    for number, frame in reversed(frames):
+        with suppress(PackingError, ReadError):
+            last = classify(frame.read(), settings)
+            return frame_strain_column(_strains(number, last, first, settings))
+    return frame_strain_column(strains)
 
 
 def _axial(number: int, sample: Sample, first: Sample | None, settings: Settings) -> float | None:

@@ -7,9 +7,15 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 
-from scanfab.doubts import cell_doubt, doubts_of, refuse_impossible
+from scanfab.doubts import cell_doubt, cell_hint, doubts_of, refuse_impossible
 from scanfab.errors import PackingError, ReadError, ScanfabNote
-from scanfab.pipeline import boundary_hint, chosen_frames, classify, no_such_frames
+from scanfab.pipeline import (
+    boundary_hint,
+    chosen_frames,
+    classify,
+    no_such_frames,
+    refuse_unknown_boundary,
+)
 from scanfab.plan import rv_of
 from scanfab.series import Frame, Series
 from scanfab.settings import Settings
@@ -86,7 +92,7 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
     Raises
     ------
     ScanfabError
-        If a frame cannot be read.
+        If a frame cannot be read, or no frame has any of the boundary's particles.
     """
     chosen = chosen_frames(series, settings.frames)
     found = False
@@ -95,11 +101,11 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
         if number in chosen:
             found = True
             sample, told = _read(frame, settings)
-            window = window or _rv(sample, settings)
+            window = window or _rv(series, sample, settings)
             yield _report(series.name, number, frame, sample, told, window)
         elif window is None:
             with suppress(PackingError, ReadError):
-                window = _rv(_read(frame, settings)[0], settings)
+                window = _rv(series, _read(frame, settings)[0], settings)
         if number >= chosen.stop - 1:
             break
     if not found:
@@ -118,8 +124,12 @@ def _read(frame: Frame, settings: Settings) -> tuple[Sample, list[str]]:
     return sample, [*told, *_hints(frame, sample, settings)]
 
 
-def _rv(sample: Sample, settings: Settings) -> SphereWindow | None:
-    return rv_of(sample, settings) if sample.grains.any() else None
+def _rv(series: Series, sample: Sample, settings: Settings) -> SphereWindow | None:
+    """The RV, and a word on the boundary, from the first frame that has grains."""
+    if not sample.grains.any():
+        return None
+    refuse_unknown_boundary(series, sample, settings)
+    return rv_of(sample, settings)
 
 
 def _report(
@@ -166,9 +176,12 @@ def _hints(frame: Frame, sample: Sample, settings: Settings) -> list[str]:
         refuse_impossible(sample)
     except PackingError as error:
         hints.append(str(error))
+    no_cell = cell_doubt(sample, frame.carries)
     hints += [
         *doubts_of(sample, cell_is_named=frame.cell_is_named),
-        cell_doubt(sample, frame.carries, always=True),
+        no_cell,
         sample.doubt_of_escaped(),
     ]
+    if not no_cell and (hint := cell_hint(sample, frame.carries)):
+        warnings.warn(hint, ScanfabNote, stacklevel=2)
     return [hint for hint in hints if hint]

@@ -217,9 +217,16 @@ def sentence(ladder: str, rows: Sequence[StepRow]) -> str:
 def sentence_of_recommended(rows: Sequence[StepRow], target: float, sample: float | None) -> str:
     """What the recommended settings reach."""
     own = "unknown" if sample is None else f"{sample:.2g}"
+    error = largest(rows, "alpha_vs_axial_se")
+    missed = ""
+    if error is not None and error > target:
+        missed = (
+            f": {100 * (error / target - 1.0):.2g} % more than wanted, as errors vary with the "
+            f"lines that are drawn; more directions make it smaller"
+        )
     return (
         f"recommended: scan's error {_spell(rows, 'alpha_vs_axial_se')} (wanted {target:.2g}; the "
-        f"sample's own is {own}) in {rows[0].seconds:.2g} s"
+        f"sample's own is {own}) in {rows[0].seconds:.2g} s{missed}"
     )
 
 

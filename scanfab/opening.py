@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import glob
 import os
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from scanfab.choice import choose_grains, expanded, files_of
+from scanfab.choice import PathLike, choose_grains, expanded, files_of, named_once
 from scanfab.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.families import (
     SETTINGS_FILE,
@@ -21,11 +20,13 @@ from scanfab.families import (
 from scanfab.frame_file import FrameFile
 from scanfab.packing import Packing
 from scanfab.readers.base import ReadOptions
+from scanfab.readers.yade_cells import is_cell_file, refuse_as_numbers
 from scanfab.series import ContactsFrom, Series
 
-__all__ = ["SETTINGS_FILE", "open_sources", "read", "read_series"]
+__all__ = ["READING", "SETTINGS_FILE", "open_sources", "read", "read_series"]
 
-PathLike = str | os.PathLike[str]
+READING = ("format", "columns", "contact_columns", "radius", "cell", "periodic", "contacts")
+"""The options of :func:`read_series`, by which commands and manifests know them too."""
 
 
 def read(path: PathLike, *, frame: int = 0, **options: Any) -> Packing:
@@ -85,7 +86,8 @@ def read_series(
     Parameters
     ----------
     source : path or sequence of paths
-        A folder with one series, or its files; globs too. Contact files that lie beside single
+        A folder with one series, or its files; globs too. What is named twice counts once, with a
+        warning. Contact files that lie beside single
         grain files are taken as if the folder had been named, if they are clearly theirs.
     format : str, optional
         Name of the reader; by content if not given.
@@ -125,7 +127,7 @@ def read_series(
     [30000, 60000]
     """
     given = [source] if isinstance(source, str | os.PathLike) else list(source)
-    paths = [path for one in given for path in expanded(one)]
+    paths = [Path(one) for one in named_once(given)]
     cells = None if cell is None or isinstance(cell, tuple | list) else _cell_file(cell)
     one_cell = tuple(cell) if isinstance(cell, tuple | list) else None
     options = ReadOptions(columns or {}, contact_columns, radius, one_cell, periodic)
@@ -161,13 +163,13 @@ def open_sources(sources: Sequence[PathLike], **options: Any) -> list[Series]:
     Parameters
     ----------
     sources : sequence of paths
-        Folders and files.
+        Folders, files and globs; what is named twice counts once, with a warning.
     **options
         See :func:`read_series`.
     """
     groups: list[PathLike | list[PathLike]] = []
     files: list[PathLike] = []
-    for source in (path for one in sources for path in _as_given(one)):
+    for source in named_once(sources):
         if Path(source).is_dir():
             groups.append(source)
         else:
@@ -180,14 +182,10 @@ def open_sources(sources: Sequence[PathLike], **options: Any) -> list[Series]:
     ]
 
 
-def _as_given(source: PathLike) -> Sequence[PathLike]:
-    """What a glob stands for; any other source as it is spelt, which names its series."""
-    found = expanded(source)
-    return [source] if found == [Path(source)] else found
-
-
 def _cell_file(path: PathLike) -> FrameFile:
     """The cells of --cell FILE.csv."""
+    if is_cell_file(Path(path)):
+        raise refuse_as_numbers(Path(path))
     try:
         return FrameFile(Path(path), ["lx", "ly", "lz"], ["xy", "xz", "yz"], positive=3)
     except OSError as error:
@@ -244,14 +242,7 @@ def _lack(family: Family) -> str:
 
 def _named_contacts(contacts: PathLike, format: str | None) -> list[Family]:
     """Contact files from --contacts PATH: a file, a folder or a glob."""
-    path = Path(contacts)
-    files = (
-        files_of(path)
-        if path.exists()
-        else [Path(match) for match in sorted(glob.glob(str(contacts)))]
-    )
-    if not files:
-        raise ReadError(f"{contacts}: there is no such contact file, folder or glob")
+    files = [file for one in expanded(contacts) for file in files_of(Path(one))]
     families = sort_into_families(files, format)
     found = [family for family in families if family.kind == "contacts"]
     if not found:

@@ -277,24 +277,32 @@ def frames_of(source: Packing | Series) -> Iterator[tuple[int, Readable]]:
 
 
 def refuse_unknown_boundary(source: Packing | Series, first: Sample, settings: Settings) -> None:
-    """SettingsError if no frame has any of the boundary's particles, which ``first`` has not."""
-    rules = settings.boundary
-    if not rules or first.boundary.any():
+    """
+    SettingsError if no frame has any of the boundary's particles; a warning if one rule fits none.
+
+    Particles may come in later frames, so those are looked through if the ``first`` has none.
+    """
+    missing = [rule for rule in settings.boundary if not rule.select(first.packing).any()]
+    for _, frame in frames_of(source) if missing else ():
+        with suppress(PackingError, ReadError, SettingsError):
+            packing = frame.read()
+            missing = [rule for rule in missing if not rule.select(packing).any()]
+        if not missing:
+            break
+    if not missing:
         return
-    for _, frame in frames_of(source):
-        with suppress(PackingError, ReadError):
-            if select_boundary(frame.read(), rules).any():
-                return
-    named = " or ".join(rule.text for rule in rules)
-    raise SettingsError(
-        f"boundary: no particle of any frame has {named}: {existing_values(first.packing, rules)}"
-    )
+    named = " or ".join(rule.text for rule in missing)
+    values = existing_values(first.packing, missing)
+    message = f"boundary: no particle of any frame has {named}: {values}"
+    if len(missing) == len(settings.boundary):
+        raise SettingsError(message)
+    warnings.warn(message, ScanfabWarning, stacklevel=3)
 
 
 def tell_doubts(frame: Readable, sample: Sample, settings: Settings) -> None:
     """Warn of what looks wrong in a frame before anything is measured."""
     doubts = doubts_of(sample, cell_is_named=frame.cell_is_named)
-    doubts.append(cell_doubt(sample, frame.carries, always=False))
+    doubts.append(cell_doubt(sample, frame.carries))
     if not settings.boundary:
         doubts.append(boundary_hint(sample, settings) or "")
     for doubt in filter(None, doubts):

@@ -13,7 +13,7 @@ from scanfab.doubts import refuse_impossible
 from scanfab.errors import ScanfabWarning, SettingsError
 from scanfab.settings import AUTO_RULE, Settings
 from scanfab.variants import Sample
-from scanfab.window import SphereWindow, SurfaceBox
+from scanfab.window import RV_MEANING, SphereWindow, SurfaceBox
 
 __all__ = ["CLOSE", "GROWTH_WITH_SPACING", "Plan", "make_plan", "rv_of"]
 
@@ -143,7 +143,8 @@ def _check_window(window: SphereWindow, sample: Sample, box: SurfaceBox, largest
     if room < -2 * largest:
         raise SettingsError(
             f"the {window} reaches {-room:g} beyond the sample, that is more than two of its "
-            f"largest radii ({largest:g}): choose a smaller --rv or another --rv-center"
+            f"largest radii ({largest:g}): choose another --rv-center or a smaller --rv, "
+            f"{RV_MEANING}"
         )
     if room < largest:
         warnings.warn(

@@ -10,20 +10,17 @@ from typing import Any
 
 from scanfab.errors import ReadError, SettingsError
 from scanfab.manifest import asked_for
-from scanfab.opening import open_sources
+from scanfab.opening import READING, open_sources
 from scanfab.series import Series
 from scanfab.settings import Settings
 
 __all__ = [
-    "READING",
     "read_manifest",
     "reopen",
     "repeat_command",
     "restored_settings",
     "spelt_settings",
 ]
-
-READING = ("format", "columns", "contact_columns", "radius", "cell", "periodic", "contacts")
 
 
 def read_manifest(table: Path) -> dict[str, Any] | None:

@@ -266,10 +266,22 @@ class Series:
         return next((one for one in snapshots if one.step == grains.step), None)
 
     def beside(self, path: Path) -> list[Path]:
-        """What lies beside a file of grains and is read with it, such as its cell."""
+        """What is read with a file of grains: its cell, or the dumps that an index names."""
+        listed = self._listed(path) if self.grains.kind == "index" else []
         ask = getattr(self.grains.reader, "beside", None)
         named = self.cells is not None or self.options.cell is not None
-        return [] if named or ask is None else ask(path)
+        if named or ask is None:
+            return listed
+        return [*listed, *(file for one in listed or [path] for file in ask(one))]
+
+    def _listed(self, index: Path) -> list[Path]:
+        """The dumps of an index that are there; a frame that is not has been told of."""
+        assert self.grains.reader is not None
+        try:
+            snapshots = self.grains.reader.snapshots(index)
+        except ReadError:
+            return []
+        return [path for path in dict.fromkeys(one.path for one in snapshots) if path.is_file()]
 
     def files(self) -> Iterator[Path]:
         """Every file that the frames come from."""

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -12,7 +11,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.errors import ScanfabWarning
 from scanfab.fabric.contact import axial_error, contact_fabric
 from scanfab.fabric.jackknife import BLOCKS, Jackknife, contact_jackknife, void_jackknife
 from scanfab.fabric.tensor import COMPONENTS, FabricTensor
@@ -178,30 +176,23 @@ class VariantColumns:
             f"did you mean 1rmin?"
         )
 
-    def warn_of_few_segments(self, where: str) -> None:
-        """Say where there is no void fabric, or a doubtful one, or lines without a grain."""
+    def doubts(self) -> Iterator[str]:
+        """Whether there is no void fabric, or a doubtful one, or lines without a grain."""
         channels = int(self.sums.channels[:, self.which].sum())
         if channels:
             lines = channels + int(self.sums.lines[:, self.which].sum())
-            warnings.warn(
-                f"{where}: {channels} of {lines} lines stay in a channel and meet no grain",
-                ScanfabWarning,
-                stacklevel=4,
-            )
+            yield f"{channels} of {lines} lines stay in a channel and meet no grain"
         if self._no_solid:
-            message = self._no_solid
+            yield self._no_solid
         elif self.segments == 0:
-            message = self._too_long(self.plan.cutoffs[self.place])
+            yield self._too_long(self.plan.cutoffs[self.place])
         elif self.fabric is None:
-            message = "in some direction no void segment is kept, so there is no void fabric"
+            yield "in some direction no void segment is kept, so there is no void fabric"
         elif self.fabric.filled > 0.01:
-            message = (
+            yield (
                 f"{self.fabric.filled:.0%} of the directions keep no void segment in a replicate: "
                 f"choose a smaller spacing"
             )
-        else:
-            return
-        warnings.warn(f"{where}: {message}", ScanfabWarning, stacklevel=4)
 
 
 def _tensor_columns(prefix: str, tensor: FabricTensor | None) -> dict[str, float | None]:

@@ -11,7 +11,10 @@ from scanfab.cell import Cell
 from scanfab.errors import SettingsError
 from scanfab.packing import Packing
 
-__all__ = ["SphereWindow", "SurfaceBox"]
+__all__ = ["RV_MEANING", "SphereWindow", "SurfaceBox"]
+
+# for messages: who writes 70 means per cent
+RV_MEANING = "which is a fraction of half the sample's smallest extent, such as 0.7"
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -53,7 +56,7 @@ class SphereWindow:
         if self.radius > 0.5 * shortest:
             raise SettingsError(
                 f"the {self} is wider than the cell's shortest period ({shortest:g}): "
-                f"choose a smaller --rv"
+                f"choose a smaller --rv, {RV_MEANING}"
             )
 
     def branches(self, points: FloatArray, packing: Packing) -> FloatArray:

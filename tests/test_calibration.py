@@ -16,7 +16,13 @@ from scanfab import (
     compute,
     find_contacts,
 )
-from scanfab.ladders import STEP_MEANINGS, StepRow, first_steady, judged
+from scanfab.ladders import (
+    STEP_MEANINGS,
+    StepRow,
+    first_steady,
+    judged,
+    sentence_of_recommended,
+)
 from tests.lattices import shaken_cubic
 
 QUICK = {"tolerance": 2e-3, "variants": "cd", "rv": 0.6, "workers": 1}
@@ -73,6 +79,16 @@ def test_each_ladder_and_the_settings_have_a_sentence(found):
     ]  # fmt: skip
     assert "the paper's r_min/10" in found.findings[0]
     assert "the paper's 1 r_min" in found.findings[2]
+
+
+@pytest.mark.parametrize(
+    ("error", "missed"),
+    [(2.7e-4, ": 3.8 % more than wanted"), (2.601e-4, ": 0.038 % more"), (2.6e-4, "")],
+)
+def test_a_recommendation_that_misses_what_was_wanted_says_so(error, missed):
+    text = sentence_of_recommended([step(26, 0.01, error, seconds=1.0)], 2.6e-4, 1e-3)
+    assert ("more than wanted" in text) is bool(missed)
+    assert missed in text
 
 
 def test_whole_sample_has_no_ladder_of_rvs(packing):

@@ -57,6 +57,23 @@ def test_parts_that_are_small_alone_can_be_large_together():
     assert "(0.0057 beside 0.05;" in text
 
 
+def test_the_errors_are_those_of_the_frame_with_the_largest_value():
+    """An error of another frame says nothing of the signal."""
+    large = {"alpha_vs_axial_se": 0.02, "alpha_vs_axial_sample_se": 0.03, "grains": 20}
+    small = {"alpha_vs_axial_se": 1e-4, "alpha_vs_axial_sample_se": 1e-4}
+    first, second, peak, *rest = rows(**small)
+    assert caveats_of([{**first, **large}, second, peak, *rest], []) == []
+    (text,) = caveats_of([first, second, {**peak, **large}, *rest], [])
+    assert "(0.036 beside 0.05; scan 0.02, sample 0.03)" in text
+
+
+def test_a_peak_without_an_error_of_its_own_has_that_of_the_others():
+    first, second, peak, *rest = rows(alpha_vs_axial_sample_se=0.02)
+    peak["alpha_vs_axial_sample_se"] = None
+    (text,) = caveats_of([first, second, peak, *rest], [])
+    assert "sample 0.02)" in text
+
+
 def test_a_column_that_is_not_there_is_no_single_replicate():
     chosen = [{k: v for k, v in row.items() if k != "alpha_vs_axial_se"} for row in rows()]
     (text,) = caveats_of(chosen, [])

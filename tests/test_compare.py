@@ -157,6 +157,12 @@ def test_a_largest_strain_that_leaves_out_frames_says_nothing():
         summary_of(curve(), strain_max=0.02)
 
 
+def test_a_largest_strain_that_leaves_out_all_frames_is_a_warning():
+    message = "strain-max: -1 leaves out all frames, so none is fitted: .* between 0 and 0.04"
+    with pytest.warns(ScanfabWarning, match=message):
+        assert summary_of(curve(), strain_max=-1).frames == 0
+
+
 def test_a_largest_strain_that_is_no_number_is_refused():
     with pytest.raises(SettingsError, match="strain-max: expected a number, found nan"):
         summary_of(curve(), strain_max=math.nan)
@@ -167,6 +173,17 @@ def test_of_a_sheared_cell_the_largest_strain_is_the_shear_strain():
         row = summary_of(sheared(), strain_max=0.2)
     assert row.frames == 3
     assert row.peak_strain == 0.4
+
+
+def test_turned_axes_are_told_where_axial_values_are_compared():
+    with pytest.warns(ScanfabNote) as told:
+        compare_tables(sheared())
+    texts = [str(one.message) for one in told]
+    (text,) = [one for one in texts if "loading axis is not the axis of the contact" in one]
+    assert "slope and peak, miss most of the fabric" in text
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        compare_tables(curve())
 
 
 def test_errors_stand_beside_their_values():

@@ -5,9 +5,11 @@ from __future__ import annotations
 import doctest
 import importlib.util
 import inspect
+import math
 import pkgutil
 import re
 import shutil
+import warnings
 from dataclasses import fields
 from importlib import import_module
 from pathlib import Path
@@ -145,6 +147,25 @@ def test_the_pages_speak_of_options_that_exist() -> None:
     for page in PAGES:
         for option in re.findall(r"(?<![\w-])--[a-z][a-z-]+", page.read_text(encoding="utf-8")):
             assert option in known, f"{page.name}: {option}"
+
+
+def test_the_result_in_the_readme_is_that_of_its_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    text = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    told = re.search(
+        r"α_vs of the RV is ([\d.]+) ± ([\d.]+): ([\d.]+) from having drawn these lines, "
+        r"and ([\d.]+) from having these (\d+) grains",
+        text,
+    )
+    assert told is not None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", scanfab.ScanfabNote)
+        series = scanfab.read_series("sample_data/yade_triaxial")
+    row = scanfab.compute(series, boundary="mask=3", frames="-1:")[2]
+    scan, sample = row.alpha_vs_axial_se, row.alpha_vs_axial_sample_se
+    assert row.variant == "c"
+    numbers = [row.alpha_vs_axial, math.hypot(scan, sample), scan, sample]
+    assert [f"{one:.5f}" for one in numbers] + [str(row.grains)] == list(told.groups())
 
 
 def words_and_numbers(text: str) -> tuple[list[str], list[float]]:

@@ -8,7 +8,7 @@ import pytest
 import scanfab
 from scanfab.cell import Cell
 from scanfab.contacts import find_contacts
-from scanfab.doubts import cell_doubt, doubts_of, refuse_impossible
+from scanfab.doubts import cell_doubt, cell_hint, doubts_of, refuse_impossible
 from scanfab.errors import PackingError
 from scanfab.packing import Packing
 from scanfab.variants import Sample
@@ -156,16 +156,16 @@ def test_a_period_that_is_half_empty_is_named_if_it_is_the_user_s():
 @pytest.mark.parametrize("carries", ["nothing", "box"])
 def test_a_format_without_a_cell_is_told_where_it_is_asked_for(loose, carries):
     sample = sample_of(loose)
-    assert cell_doubt(sample, carries, always=False) == ""
+    assert cell_doubt(sample, carries) == ""
     cure = {"nothing": "--cell LX LY LZ", "box": "--periodic xyz"}[carries]
-    assert f"{cure} if the sample is periodic" in cell_doubt(sample, carries, always=True)
-    assert cell_doubt(sample, "cell", always=True) == ""
+    assert f"{cure} if the sample is periodic" in cell_hint(sample, carries)
+    assert cell_hint(sample, "cell") == ""
 
 
 def test_a_periodic_sample_without_its_cell_is_found_out():
     sample = read(YADE / "periodic_x_y_z_r.txt")
     assert len(sample.contacts) < 261
-    doubt = cell_doubt(sample, "nothing", always=False)
+    doubt = cell_doubt(sample, "nothing")
     assert "looks periodic" in doubt
     assert "0.02872 along x, 0.03223 along y, 0.03553 along z" in doubt
 
@@ -174,4 +174,4 @@ def test_a_periodic_sample_with_its_cell_raises_no_doubt():
     packing = scanfab.read(YADE / "periodic_x_y_z_r.txt")
     cell = Cell([0.0286394, 0.0321223, 0.0354697])
     whole = sample_of(Packing(packing.position, packing.radius, cell=cell))
-    assert cell_doubt(whole, "nothing", always=True) == ""
+    assert cell_doubt(whole, "nothing") == cell_hint(whole, "nothing") == ""

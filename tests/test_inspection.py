@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
 
 import pytest
 
 import scanfab
+from scanfab.errors import ScanfabNote, ScanfabWarning
 from scanfab.inspection import FrameReport, inspect_series
 from scanfab.settings import Settings
 from tests.dumps import ROWS, dump_text, pairs_text, write, yade_spheres
@@ -33,19 +35,39 @@ def test_boundary_particles_are_no_grains(tmp_path):
     assert (report.grains, report.boundary) == (2, 1)
 
 
-def test_a_boundary_that_fits_nothing_is_a_warning(tmp_path):
-    (report,) = reports(tmp_path, [dump_text()], boundary="type=9")
-    assert report.warnings == ["boundary: no particle has type=9: type is 1 or 2"]
+def test_a_boundary_that_fits_nothing_in_any_frame_is_an_error(tmp_path):
+    message = "boundary: no particle of any frame has type=9 or id>7: type is 1 or 2; id is 1 or 2"
+    with pytest.raises(scanfab.SettingsError, match=message):
+        reports(tmp_path, [dump_text(), dump_text(step=1)], boundary=["type=9", "id>7"])
+
+
+def test_a_boundary_that_fits_nothing_in_one_frame_is_a_warning(tmp_path):
+    """Here a plate that is put in later."""
+    plate = [*ROWS, (4, 9, 0.9, 0.5, 0.5, 0.1)]
+    texts = [dump_text(), dump_text(plate, step=1)]
+    first, second = reports(tmp_path, texts, boundary="type=9")
+    assert first.warnings == ["boundary: no particle has type=9: type is 1 or 2"]
+    assert (first.boundary, second.boundary, second.warnings) == (0, 1, [])
+
+
+def test_of_several_boundaries_the_one_that_fits_nothing_is_named(tmp_path):
+    with pytest.warns(ScanfabWarning, match="no particle of any frame has type=9: type is") as told:
+        (report,) = reports(tmp_path, [dump_text()], boundary=["type=2", "type=9"])
+    assert len(told) == 1
+    assert (report.boundary, report.warnings) == (1, [])
 
 
 def test_a_format_without_a_cell_is_always_told(tmp_path):
+    """By a note: most samples are open, and nothing is wrong with them."""
     yade_spheres(tmp_path / "a-spheres-0.vtk", [[0, 0, 0], [5, 0, 0]], [1, 1])
-    (report,) = inspect_series(scanfab.read_series(tmp_path), Settings.make())
-    assert report.warnings == [
-        "this format carries no cell; --cell LX LY LZ if the sample is periodic"
-    ]
+    message = "this format carries no cell; --cell LX LY LZ if the sample is periodic"
+    with pytest.warns(ScanfabNote, match=message):
+        (report,) = inspect_series(scanfab.read_series(tmp_path), Settings.make())
+    assert report.warnings == []
     with_cell = scanfab.read_series(tmp_path, cell=(9.0, 9.0, 9.0))
-    assert next(inspect_series(with_cell, Settings.make())).warnings == []
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", ScanfabNote)
+        assert next(inspect_series(with_cell, Settings.make())).warnings == []
 
 
 def test_a_box_that_may_be_periodic_is_told():

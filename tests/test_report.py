@@ -96,7 +96,9 @@ def test_the_sample_is_told_in_full(page):
     assert "boundary mask=3 particles that are boundary" in text
     assert re.search(r"numpy \d+\.\d+", text)
     assert "triaxial-spheres-00000006.vtk.gz" in text
-    assert "sample_data/yade_triaxial: one standard error of α vs , of scan and sample" in text
+    assert (
+        "sample_data/yade_triaxial: where α vs is largest, its standard error, of scan and" in text
+    )
     assert page.count("<canvas") == 1
     assert page.count("data:image/") == 5
     assert len(page) < 1_000_000

@@ -140,7 +140,7 @@ def test_named_contacts_are_required_for_the_frame_that_is_read_only():
 
 @pytest.mark.parametrize("contacts", ["nowhere.txt", "nowhere_*.txt"])
 def test_named_contacts_must_exist(folder, contacts):
-    with pytest.raises(ReadError, match="there is no such contact file, folder or glob"):
+    with pytest.raises(ReadError, match="there is no such file, folder or glob"):
         scanfab.read_series(folder, contacts=folder / contacts)
 
 
@@ -205,7 +205,7 @@ def test_points_without_a_radius_are_passed_over_beside_grains(folder):
 
 @pytest.mark.parametrize("name", ["nothing", "dump_*.txt"])
 def test_a_source_must_exist(tmp_path, name):
-    with pytest.raises(ReadError, match="there is no such file or folder"):
+    with pytest.raises(ReadError, match="there is no such file, folder or glob"):
         scanfab.read_series(tmp_path / name)
 
 

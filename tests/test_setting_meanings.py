@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 from dataclasses import fields
 from pathlib import Path
 
-from scanfab.cli.sources import _READING_NAMES
-from scanfab.rerun import READING
+from scanfab.opening import READING, read_series
 from scanfab.setting_meanings import SETTING_MEANINGS, settings_table
 from scanfab.settings import Settings
 
@@ -17,7 +17,7 @@ def test_every_setting_has_a_meaning():
     settings = {field.name for field in fields(Settings)} - {"workers"}
     assert {*READING, *settings} <= set(SETTING_MEANINGS)
     assert all(SETTING_MEANINGS.values())
-    assert set(READING) == set(_READING_NAMES)
+    assert set(READING) == set(inspect.getfullargspec(read_series).kwonlyargs)
 
 
 def test_every_line_of_a_manifest_is_explained(computed):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import os
 import signal
 import subprocess
@@ -16,6 +17,8 @@ import pyvista
 
 import scanfab
 from scanfab.cli.main import run
+from scanfab.opening import open_sources
+from tests.dumps import cubic_rows, dump_text, write
 
 ROOT = Path(__file__).parents[1]
 YADE = ROOT / "sample_data" / "yade_triaxial"
@@ -121,6 +124,42 @@ def test_a_source_keeps_the_name_that_it_was_given(monkeypatch: pytest.MonkeyPat
         assert scanfab.read_series("./sample_data/yade_triaxial/").name == (
             "./sample_data/yade_triaxial/"
         )
+
+
+@pytest.mark.parametrize("again", ["same", "spelt otherwise", "link", "glob"])
+def test_a_folder_that_is_named_twice_is_read_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], again: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "dumps").mkdir()
+    write(tmp_path / "dumps" / "dump_0.txt", dump_text(cubic_rows()))
+    (tmp_path / "latest").symlink_to("dumps")
+    other = {"same": "dumps", "spelt otherwise": "./dumps/", "link": "latest", "glob": "dum*"}
+    assert run(["inspect", "dumps", other[again], "--json"]) == 0
+    printed = capsys.readouterr()
+    assert [json.loads(line)["source"] for line in printed.out.splitlines()] == ["dumps"]
+    as_named = {"spelt otherwise": "./dumps/ (as dumps)", "link": "latest (as dumps)"}
+    said = f"warning: {as_named.get(again, 'dumps')}: named twice among the sources, and read once"
+    assert printed.err.count(said) == 1
+
+
+def test_a_file_that_is_named_twice_is_one_frame(tmp_path: Path) -> None:
+    files = [
+        write(tmp_path / f"dump_{step}.txt", dump_text(cubic_rows(), step=step)) for step in (0, 9)
+    ]
+    with pytest.warns(scanfab.ScanfabWarning, match=r"dump_0.txt: named twice .* read once"):
+        series = scanfab.read_series([tmp_path / "dump_*.txt", files[0]])
+    assert [frame.step for frame in series] == [0, 9]
+
+
+def test_many_names_that_come_twice_are_one_warning(tmp_path: Path) -> None:
+    files = [
+        write(tmp_path / f"dump_{step}.txt", dump_text(cubic_rows(), step=step))
+        for step in range(7)
+    ]
+    with pytest.warns(scanfab.ScanfabWarning, match=r"dump_4.txt and 2 more: named") as told:
+        assert len(list(open_sources([*files, tmp_path / "*.txt"])[0])) == 7
+    assert len(told) == 1
 
 
 def test_a_series_may_start_with_frames_of_boundary_alone(tmp_path: Path) -> None:

@@ -176,7 +176,8 @@ def compute(
     """
     Compute the fabric table: one row per frame and variant.
 
-    SOURCE is a folder with a series of dumps, files of one series, or - for standard input.
+    SOURCE is a folder with a series of dumps, files of one series, or - for standard input; what is
+    named twice counts once.
 
     Variants: a whole sample; b whole sample, rattlers removed; c representative volume (RV); d RV,
     rattlers removed. Lengths are in the dump's own units.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import glob
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -83,6 +82,17 @@ def _reader_names() -> Iterable[str]:
     return installed_readers()
 
 
+def _expanded(source: str) -> list[Any]:
+    """What a glob names; one that names nothing is a path that does not exist."""
+    from scanfab.choice import expanded
+    from scanfab.errors import ReadError
+
+    try:
+        return [*expanded(source)]
+    except ReadError:
+        return [source]
+
+
 class SourceType(click.Path):
     """A path that exists, or a glob in quotes that names some; it stays as it is."""
 
@@ -91,16 +101,14 @@ class SourceType(click.Path):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Refuse what does not exist."""
-        return value if glob.glob(value) else super().convert(value, param, ctx)
+        for one in _expanded(value):
+            super().convert(one, param, ctx)
+        return value
 
 
 def _expand(ctx: click.Context, param: click.Parameter, sources: tuple[str, ...]) -> Any:
     """What the shell would have made of globs that it was not asked to expand."""
-    found: list[str] = []
-    for source in sources:
-        matches = [] if Path(source).exists() else sorted(glob.glob(source))
-        found += matches or [source]
-    return tuple(found)
+    return tuple(one for source in sources for one in _expanded(source))
 
 
 sources_argument = click.argument(

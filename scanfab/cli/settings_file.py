@@ -98,8 +98,14 @@ def read_settings_file(path: Path) -> dict[str, Any]:
             f"{path}: the {what} has no meaning: options stand in the section [{SECTION}]"
         )
     options: dict[str, Any] = content.get(SECTION, {})
-    known = _options_of_compute()
+    known, of_the_line = _options_of_compute()
     for key in options:
+        if key in of_the_line:
+            raise click.UsageError(
+                f"{path}: {key!r} cannot be set in {path.name}, which says how samples are "
+                f"computed: what is read, where results go and what is told stand on the command "
+                f"line: {of_the_line[key]}"
+            )
         if key not in known:
             near = get_close_matches(key, known, n=1)
             hint = f": did you mean {near[0]!r}?" if near else ""
@@ -107,11 +113,17 @@ def read_settings_file(path: Path) -> dict[str, Any]:
     return options
 
 
-def _options_of_compute() -> list[str]:
-    """The options that a settings file may hold: those that say what to compute, and how."""
+def _options_of_compute() -> tuple[list[str], dict[str, str]]:
+    """The options that a settings file may hold, and the others as a command line has them."""
     from scanfab.cli.compute import OF_THE_LINE, compute
 
-    return [key for key, one in _by_option(compute).items() if one.name not in OF_THE_LINE]
+    others = {
+        key: parameter.opts[0]
+        for parameter in compute.params
+        if parameter.name in OF_THE_LINE
+        for key in (str(parameter.name), parameter.opts[0].lstrip("-"))
+    }
+    return [key for key in _by_option(compute) if key not in others], others
 
 
 def _by_option(command: click.Command) -> dict[str, click.Parameter]:

@@ -16,10 +16,6 @@ if TYPE_CHECKING:
 
 __all__ = ["SourceCommand", "open_series", "reading_arguments"]
 
-_READING_NAMES = (
-    "format", "columns", "contact_columns", "radius", "cell", "periodic", "contacts",
-)  # fmt: skip
-
 
 class SourceCommand(click.Command):
     """A command with sources, whose --cell takes three or six numbers, or a file."""
@@ -40,7 +36,9 @@ class SourceCommand(click.Command):
 
 def reading_arguments(options: dict[str, Any]) -> dict[str, Any]:
     """Take the reading options out of a command's, as arguments of ``read_series``."""
-    taken = {name: options.pop(name) for name in _READING_NAMES}
+    from scanfab.opening import READING
+
+    taken = {name: options.pop(name) for name in READING}
     taken["columns"] = _column_names(taken["columns"])
     taken["cell"] = _cell(taken["cell"])
     _check_periodic(taken["periodic"])

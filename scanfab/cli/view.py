@@ -95,7 +95,7 @@ def _show(
 ) -> None:
     from dataclasses import replace
 
-    from scanfab.abscissa import frame_strain_column, spelt_strain
+    from scanfab.abscissa import spelt_strain
     from scanfab.frame_view import look_at
     from scanfab.scene import section_lines
     from scanfab.writers.view import check_screen, show_scene
@@ -106,7 +106,7 @@ def _show(
     scene = look.scene
     if cut:
         scene = replace(scene, lines=section_lines(scene, settings.axis))
-    strain = spelt_strain(look.strains, frame_strain_column(look.strains))
+    strain = spelt_strain(look.strains, look.strain_column)
     none = "" if look.sample.grains.any() else "no grains"
     title = ", ".join(filter(None, [series.name, f"frame {look.number}", strain, none]))
     show_scene(scene, settings.axis, title, screenshot)

@@ -24,7 +24,7 @@ from scanfab.readers.files import COMPRESSED_SUFFIXES, bare_name
 from scanfab.readers.mesh import read_mesh
 from scanfab.readers.yade_save import is_save, read_save, snapshot_of_save
 
-__all__ = ["cell_beside", "cell_file", "is_cell_file"]
+__all__ = ["cell_beside", "cell_file", "is_cell_file", "refuse_as_numbers"]
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -33,6 +33,8 @@ RECORDED = re.compile(r"(.*)spheres\.(\d+)\.vtu")
 CELL_FILE = re.compile(r".*-periCell-\d+\.vtk|.*pericell\.\d+\.vtu")
 # corners of a cell in both kinds of file, and those at the ends of its vectors
 CORNERS, ORIGIN, ENDS = 8, 4, (7, 5, 0)
+# where XY XZ YZ stand in the vectors
+TILT = ([1, 2, 2], [0, 0, 1])
 # in cells: YADE wraps spheres into the cell, but writes six digits
 ROUNDING = 1e-4
 
@@ -104,6 +106,27 @@ def _exported_cells(folder: Path, base: str, changed: int) -> dict[int, Path]:
 def _saves(folder: Path, base: str, changed: int) -> list[Path]:
     """Files that may be saved states, as their names begin alike."""
     return sorted(folder.glob(f"{glob.escape(base)}*.xml*"))
+
+
+def refuse_as_numbers(path: Path) -> ReadError:
+    """
+    The error for such a file in the place of one with the numbers of all frames.
+
+    It has the cell of one frame: taken for all, it would be wrong without a word.
+    """
+    cell = _read_cell(path)
+    assert cell is not None
+    vectors = cell.vectors
+    numbers = [*np.diag(vectors), *([] if not np.any(tilt := vectors[TILT]) else tilt)]
+    cure = (
+        "lay it beside its spheres, under YADE's own name"
+        if np.any(np.triu(vectors, 1))
+        else f"for this frame alone use --cell {' '.join(f'{one:.9g}' for one in numbers)}"
+    )
+    return ReadError(
+        f"{path}: is the cell of one frame in a VTK file, expected a CSV file with those of all "
+        f"(step, lx, ly, lz): {cure}"
+    )
 
 
 def _tell_of_doubt(path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.errors import ScanfabNote, SettingsError
+from scanfab.errors import SettingsError
 from scanfab.writers.curves import Curve, abscissa_label, curves_of, is_turned
 from scanfab.writers.groups import Drawn, Group, grouped
 from scanfab.writers.plot import (
@@ -127,8 +126,6 @@ def draw_table(
     if not any(np.isfinite(curve.void).any() for curve in curves):
         raise SettingsError("there is nothing to draw: no row of the table has a void fabric")
     page = _Page(grouped(curves), abscissa_label(rows), fits, is_turned(rows))
-    if page.turned:
-        _tell_of_turned_axes()
     names = list(TABLE_FIGURES) if name is None else [name]
     heights = [page.height(one) for one in names]
     figure.set_size_inches(WIDTH, sum(heights))
@@ -137,15 +134,6 @@ def draw_table(
         parts = figure.subfigures(len(names), 1, height_ratios=heights)
     for part, one in zip(parts, names, strict=True):
         page.draw(part, one)
-
-
-def _tell_of_turned_axes() -> None:
-    warnings.warn(
-        "the loading axis is not the axis of the contact fabric, as in simple shear: alpha_vs, "
-        "alpha_c and the angle between their axes are drawn, not the axial values",
-        ScanfabNote,
-        stacklevel=3,
-    )
 
 
 class _Page:

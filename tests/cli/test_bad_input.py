@@ -378,6 +378,10 @@ def test_one_grain_far_away_is_too_far_for_the_whole_alone(tmp_path, refusal, co
         (["--rv-radius", "2", "--rv-center", "6", "2", "2"], "beyond the sample"),
         (["--rv-radius", "4"], "beyond the sample"),
         (["--rv", "3"], "beyond the sample"),
+        (
+            ["--rv", "70"],
+            "--rv, which is a fraction of half the sample's smallest extent, such as 0.7",
+        ),
     ],
 )
 def test_an_rv_without_grains_or_larger_than_the_sample(tmp_path, refusal, options, message):
@@ -420,11 +424,14 @@ def test_a_boundary_that_is_everything(tmp_path, compute):
 
 
 def test_a_cut_off_that_no_segment_reaches_leaves_empty_cells(tmp_path, compute):
-    answer = compute(grains(tmp_path), "--cutoff", "100")
+    answer = compute(grains(tmp_path), "--cutoff", "1000")
     assert answer.code == 1
     assert [row["alpha_vs"] for row in answer.rows] == [""] * 4
     assert float(answer.rows[0]["alpha_c"]) > 0
-    assert "frame 0, variant a: no void segment reaches the cut-off 100" in answer.err
+    told = "frame 0, variants a, b, c, d: no void segment reaches the cut-off 1000, "
+    assert told in answer.err
+    # one word for all variants
+    assert answer.err.count("no void segment") == answer.err.count("did you mean 1rmin?") == 1
 
 
 def test_only_rattlers_leave_variant_b_empty(tmp_path, compute):
@@ -443,7 +450,7 @@ def test_one_grain_leaves_no_void_and_no_solid_if_it_is_removed(tmp_path, comput
     assert answer.code == 1
     assert {row["alpha_vs"] for row in answer.rows} == {""}
     assert "nan" not in answer.out.lower()
-    assert "variant c: no void segment reaches the cut-off" in answer.err
+    assert "variants a, b, c: no void segment reaches the cut-off" in answer.err
     removed = compute(file, "--variants", "d")
     assert removed.code == 1
     assert removed.rows[0]["solid_fraction"] == "0.0"

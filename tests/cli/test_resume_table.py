@@ -7,7 +7,9 @@ import json
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
+import pyvista
 
 from scanfab import measurement
 from scanfab.cli import talk
@@ -321,6 +323,34 @@ def test_a_table_without_its_frames_cannot_be_gone_on_with(compute, tmp_path, ca
     assert compute(table, *words)[0] == 0
     assert compute(table, *words, "--resume") == (2, 0)
     assert "it lacks the columns source and frame" in capsys.readouterr().err
+
+
+def test_the_dumps_that_an_index_names_are_inputs(compute, tmp_path, capsys):
+    dumps = [tmp_path / f"grains_{step}.vtp" for step in (0, 100)]
+    for path in dumps:
+        save_points(path)
+    entries = [f'<DataSet timestep="{k}" file="{path.name}"/>' for k, path in enumerate(dumps)]
+    index = write(
+        tmp_path / "all.pvd",
+        f'<?xml version="1.0"?><VTKFile type="Collection"><Collection>{"".join(entries)}'
+        f"</Collection></VTKFile>",
+    )
+    table = tmp_path / "table.csv"
+    assert compute(table, sources=(index,)) == (0, 2)
+    inputs = [Path(one["path"]) for one in read_manifest(table)["inputs"]]
+    assert inputs == sorted([index, *dumps])
+    assert compute(table, "--resume", sources=(index,)) == (0, 0)
+    save_points(dumps[1], squeeze=0.99)
+    assert compute(table, "--resume", sources=(index,)) == (2, 0)
+    assert "grains_100.vtp has changed since" in capsys.readouterr().err
+
+
+def save_points(path: Path, squeeze: float = 1.0) -> None:
+    """Grains as VTK points with a radius."""
+    rows = np.array(cubic_rows(squeeze=squeeze), float)
+    mesh = pyvista.PolyData(rows[:, 2:5])
+    mesh["radius"] = rows[:, 5]
+    mesh.save(str(path))
 
 
 @pytest.fixture

@@ -261,6 +261,19 @@ def test_the_title_of_a_sheared_cell_has_its_shear(tmp_path, monkeypatch):
     assert titles == [f"{source}, frame 5, shear strain {100 * shear_strain(last, first):.3g} %"]
 
 
+@pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabWarning")
+@pytest.mark.parametrize(
+    ("series", "strain"), [("lammps_shear", "shear strain"), ("liggghts_periodic", "axial strain")]
+)
+def test_the_first_frame_has_the_strain_of_the_others(tmp_path, monkeypatch, series, strain):
+    """Neither has begun there."""
+    titles = []
+    monkeypatch.setattr("scanfab.writers.view.show_scene", lambda *said: titles.append(said[2]))
+    source = f"{ROOT}/sample_data/{series}"
+    assert run(["view", source, "--screenshot", str(tmp_path / "x.png")]) == 0
+    assert titles == [f"{source}, frame 0, {strain} 0 %"]
+
+
 def test_damaged_frames_before_the_one_asked_for_are_skipped(tmp_path, monkeypatch, capsys):
     """A radius of 0 makes no packing, and cut text no frame: the RV is of the third."""
     flat = [(*cubic_rows()[0][:5], 0), *cubic_rows()[1:]]

@@ -88,7 +88,13 @@ def test_several_numbers_are_a_list(compute):
         ("[computee]\nrv = 0.6\n", "the section [computee] has no meaning"),
         ("rv = 0.6\n[compute]\n", "the key 'rv' has no meaning: options stand in the section"),
         ('[compute]\nvariant = "a"\n', "compute has no option 'variant': did you mean 'varian"),
-        ("[compute]\nresume = true\n", "compute has no option 'resume'"),
+        (
+            "[compute]\nresume = true\n",
+            "'resume' cannot be set in scanfab.toml, which says how samples are computed: what is",
+        ),
+        ("[compute]\nquiet = true\n", "told stand on the command line: --quiet"),
+        ('[compute]\nvtk = "v"\n', "'vtk' cannot be set in scanfab.toml"),
+        ('[compute]\noutput = "t.csv"\n', "told stand on the command line: -o"),
         (
             "[compute]\nrv = 0.6\nboundary = mask=3\n",
             'line 3: text needs quotes: boundary = "mask=3"',

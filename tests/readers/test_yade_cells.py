@@ -120,6 +120,27 @@ def test_a_frame_that_the_csv_file_does_not_name_is_an_error_that_names_it(tmp_p
         frames("rec_spheres.*", cell=path)
 
 
+@pytest.mark.parametrize("file", ["after-periCell-00000002.vtk.gz", "rec_pericell.27500.vtu"])
+def test_a_cell_of_yade_as_the_file_of_cells_is_an_error_with_its_numbers(file):
+    """It is that of one frame; the numbers are those that a user may name instead."""
+    with pytest.raises(ReadError, match="is the cell of one frame in a VTK file") as told:
+        frames("rec_spheres.27500*", cell=STRAINED / file)
+    numbers = tuple(map(float, str(told.value).partition("--cell ")[2].split()))
+    assert len(numbers) == 6 if np.any(vectors()[1][np.tril_indices(3, -1)]) else 3
+    (packing,) = frames("rec_spheres.27500*", cell=numbers)
+    np.testing.assert_allclose(packing.cell.vectors, vectors()[1], rtol=0, atol=1e-7)
+
+
+def test_a_turned_cell_of_yade_has_no_such_numbers(tmp_path):
+    text = (SAMPLE_DATA / "yade_formats" / "periodic-periCell-00000001.vtk").read_text()
+    path = tmp_path / "x-periCell-00000001.vtk"
+    # its first vector leaves the axis x
+    path.write_text(text.replace("\n0.0286394 0 0\n", "\n0.0286394 0.001 0\n"))
+    with pytest.raises(ReadError, match="lay it beside its spheres") as told:
+        frames("rec_spheres.27500*", cell=path)
+    assert "--cell" not in str(told.value)
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
