@@ -131,7 +131,8 @@ def test_a_column_that_may_be_the_radius_is_suggested(tmp_path):
 @pytest.mark.parametrize("ending", ["csv", "tsv", "json", "jsonl"])
 def test_a_fabric_table_is_known(tmp_path, ending, capsys):
     grid = [[x, y, z] for x in range(4) for y in range(4) for z in range(4)]
-    table = scanfab.compute(scanfab.Packing(grid, 0.4), variants="a", directions=9, spacing=0.5)
+    lines = {"variants": "a", "directions": 9, "spacing": 0.5, "contact_tolerance": 0.3}
+    table = scanfab.compute(scanfab.Packing(grid, 0.4), **lines)
     path = tmp_path / f"fabric.{ending}"
     with ResultFile(path, scanfab.Row).writer({}) as writer:
         for row in table:

@@ -182,11 +182,14 @@ def _lines(work: _Work, heard: _Latest) -> Iterator[Callable[[], None]]:
         while not ended.wait(EVERY):
             _say(work.state(heard.text) or "at work")
 
-    threading.Thread(target=tell, daemon=True).start()
+    teller = threading.Thread(target=tell, daemon=True)
+    teller.start()
     try:
         yield lambda: None
     finally:
         ended.set()
+        # nothing is said behind the end
+        teller.join()
 
 
 @contextmanager

@@ -76,7 +76,7 @@ def test_cutoff_that_ends_an_auto_scan():
         rows = compute(packing, cutoff=10.0, tolerance=0.01)
     assert [row.segments for row in rows] == [0] * 4
     told = [w for w in caught if "no void segment reaches the cut-off 10" in str(w.message)]
-    assert len(told) == 4
+    assert [str(w.message).split(":")[0] for w in told] == ["frame 0, variants a, b, c, d"]
 
 
 def test_cutoff_of_a_smaller_window_leaves_the_whole_alone():
