@@ -80,8 +80,8 @@ def _unknown_errors(rows: Sequence[Mapping[str, Any]]) -> list[str]:
             else f"the table has no column {VOID}_se"
         )
         found.append(
-            f"Variant {variant} of {source} has no standard error of the scan: {why}. The errors "
-            f"of this report lack that part."
+            f"Variant {variant} of {source} has no standard error of the scan: {why}. Without "
+            f"that part there is no error in all, and none behind ±."
         )
     return found
 

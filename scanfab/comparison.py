@@ -78,7 +78,7 @@ FRAME_MEANINGS: dict[str, str] = {
     "alpha_c_axial_norm": "likewise",
     "alpha_vs_axial_se": "as in the fabric table: the scan's part of the error",
     "alpha_vs_axial_sample_se": "as in the fabric table: the sample's part of the error",
-    "alpha_vs_axial_total_se": "both together, √(scan² + sample²); empty without the sample's",
+    "alpha_vs_axial_total_se": "both together, √(scan² + sample²); empty where either is",
     "alpha_c_axial_sample_se": "as in the fabric table; contacts are counted, not scanned, so this "
     "is all of the error",
     "shear_strain": "as in the fabric table",

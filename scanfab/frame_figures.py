@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +15,8 @@ import numpy.typing as npt
 from scanfab.abscissa import spelt_strain, strain_column
 from scanfab.directions import DirectionRule
 from scanfab.distribution import mean_length_function, sphere_points
-from scanfab.errors import SettingsError
+from scanfab.errors import ScanfabWarning, SettingsError
 from scanfab.fabric.contact import contact_fabric
-from scanfab.fabric.jackknife import BLOCKS, void_jackknife
-from scanfab.fabric.void import void_fabric
 from scanfab.frame_result import FrameResult
 from scanfab.gaps import scan_gaps
 from scanfab.line_grids import line_frames
@@ -25,7 +24,8 @@ from scanfab.pipeline import compute_rows
 from scanfab.scan import ScanSums, Solids
 from scanfab.segments import sample_segments
 from scanfab.series import Series
-from scanfab.settings import Settings
+from scanfab.settings import Length, Settings
+from scanfab.tabular import number_of, total_error
 from scanfab.variants import VARIANTS
 from scanfab.writers.plot import DPI
 from scanfab.writers.plot_frame import (
@@ -145,21 +145,29 @@ def plot_frames(
         If there is nothing to draw.
     """
     name, angles = parse_figure(figure)
+    if name == "cutoffs":
+        with warnings.catch_warnings():
+            # errors that grow with the cut-off are what the figure shows
+            warnings.filterwarnings("ignore", ".* which holds for the mean", ScanfabWarning)
+            frames = scan_frames(series, _over_cutoffs(settings), rows, settings.variants)
+        curves = [_cutoffs(*one, frames.variant) for one in frames.titled]
+        plot_cutoffs(path, curves, dpi)
+        return
     frames = scan_frames(series, settings, rows)
     if name == "rose":
         roses = [_rose(*one, frames.variant, angles, settings) for one in frames.titled]
         plot_rose(path, roses, dpi)
     elif name == "projection":
         plot_projection(path, projections_of(frames), dpi)
-    elif name == "histogram":
-        plot_histogram(path, lengths_of(frames), dpi)
     else:
-        curves = [_cutoffs(*one, frames.variant, settings) for one in frames.titled]
-        plot_cutoffs(path, curves, dpi)
+        plot_histogram(path, lengths_of(frames), dpi)
 
 
 def scan_frames(
-    series: Series, settings: Settings, rows: Sequence[Mapping[str, Any]]
+    series: Series,
+    settings: Settings,
+    rows: Sequence[Mapping[str, Any]],
+    variants: str | None = None,
 ) -> ScannedFrames:
     """
     Scan the first and the last frame of a table again, for as many figures as are wanted.
@@ -171,6 +179,8 @@ def scan_frames(
         the first.
     rows : sequence of mapping
         The table.
+    variants : str, optional
+        Those to scan, that one by default. Only together do they have the lines of the table.
 
     Raises
     ------
@@ -179,7 +189,7 @@ def scan_frames(
     """
     variant = "c" if "c" in settings.variants else settings.variants[0]
     own = [row for row in rows if row["source"] == series.name and row["variant"] == variant]
-    results = _results(series, settings, own, variant)
+    results = _results(series, replace(settings, variants=variants or variant), own, variant)
     row_of = {row["frame"]: row for row in own}
     # of the table: what is asked of a strain file now may be another
     titles = [_title(row_of[one.number], strain_column(own)) for one in results]
@@ -199,7 +209,7 @@ def lengths_of(frames: ScannedFrames) -> list[LengthSample]:
 def _results(
     series: Series, settings: Settings, rows: Sequence[Mapping[str, Any]], variant: str
 ) -> list[FrameResult]:
-    """The first and the last frame, computed again for one variant."""
+    """The first and the last frame that have a void fabric of a variant, computed again."""
     numbers = [row["frame"] for row in rows if row["alpha_vs_axial"] is not None]
     if not numbers:
         raise SettingsError(
@@ -207,7 +217,7 @@ def _results(
         )
     results: list[FrameResult] = []
     for number in sorted({min(numbers), max(numbers)}):
-        one = replace(settings, frames=slice(number, number + 1), variants=variant)
+        one = replace(settings, frames=slice(number, number + 1))
         for _ in compute_rows(series, one, observe=results.append):
             pass
     return results
@@ -358,34 +368,25 @@ def _lengths(result: FrameResult, title: str, variant: str) -> LengthSample:
     return LengthSample(title, found.length[found.void] / smallest, cutoff / smallest)
 
 
-def _cutoffs(result: FrameResult, title: str, variant: str, settings: Settings) -> CutoffCurve:
-    """Axial anisotropy and its standard errors over the cut-off, all by the same lines."""
-    solids, _, chosen, smallest = _parts(result)
-    scanned, rule = result.scanned, result.scanned.plan.rule
-    gaps = scan_gaps(
-        solids,
-        rule,
-        spacing=scanned.plan.spacing,
-        cutoffs=[cutoff * smallest for cutoff in CUTOFFS],
-        blocks=scanned.blocks,
-        variants=variant,
-        replicates=range(min(scanned.sums.replicates, 4 * REPLICATES)),
-        seed=settings.seed,
-        workers=settings.workers,
-        most_steps=settings.max_chords,
+def _over_cutoffs(settings: Settings) -> Settings:
+    """Settings whose rows are the curve, by the lines of the table and with its errors."""
+    lengths = {*(Length(cutoff, "rmin") for cutoff in CUTOFFS), settings.cutoff}
+    return replace(settings, cutoffs=tuple(lengths))
+
+
+def _cutoffs(result: FrameResult, title: str, variant: str) -> CutoffCurve:
+    """The rows of one frame and many cut-offs as a curve."""
+    _, _, chosen, smallest = _parts(result)
+    rows = [asdict(row) for row in result.rows if row.variant == variant]
+
+    def column(values: Iterable[float | None]) -> FloatArray:
+        return np.array([np.nan if one is None else one for one in values], np.float64)
+
+    return CutoffCurve(
+        title,
+        cutoff=column(number_of(row, "cutoff") for row in rows) / smallest,
+        alpha=column(number_of(row, "alpha_vs_axial") for row in rows),
+        error=column(number_of(row, "alpha_vs_axial_se") for row in rows),
+        total=column(total_error(row, "alpha_vs_axial") for row in rows),
+        chosen=chosen / smallest,
     )
-    alpha, error, total = np.full((3, len(CUTOFFS)), np.nan)
-    for place in range(len(CUTOFFS)):
-        kept = gaps.kept(variant, place, settings.moment)
-        fabric = void_fabric(gaps.axes, rule.weights, *kept)
-        if fabric is None:
-            continue
-        alpha[place] = fabric.tensor.axial(settings.axis)
-        error[place] = fabric.axial_error(settings.axis) or np.nan
-        without = [
-            gaps.kept(variant, place, settings.moment, without=block) for block in range(BLOCKS)
-        ]
-        sample = void_jackknife(gaps.axes, rule.weights, kept, without, settings.axis)
-        if sample is not None and sample.error is not None:
-            total[place] = np.hypot(error[place], sample.error)
-    return CutoffCurve(title, np.array(CUTOFFS), alpha, error, total, chosen / smallest)

@@ -82,6 +82,7 @@ def make_report(
         inputs = read_inputs(tables, cutoff, labels)
         rows = [row for one in inputs for row in one.rows]
         comparison = compare_tables(rows)
+        pictures = _table_pictures(rows, comparison)
     sections = [_section(one, heard) for one in inputs]
     asked = [one.manifest["settings"] for one in inputs if one.manifest is not None]
     content = Content(
@@ -90,7 +91,7 @@ def make_report(
         date=(today or datetime.now(UTC).astimezone().date()).isoformat(),
         summary=[overview(one.path, one.rows) for one in inputs],
         results=results_tables(comparison.summary, rows),
-        pictures=[*_table_pictures(rows, comparison), *_frame_pictures(sections)],
+        pictures=[*pictures, *_frame_pictures(sections)],
         warnings=list(dict.fromkeys([*heard.warnings, *caveats_of(rows, asked)])),
         notes=list(dict.fromkeys(heard.notes)),
         sections=sections,
@@ -113,15 +114,15 @@ def _table_pictures(rows: Sequence[Mapping[str, Any]], comparison: Comparison) -
 
     fits = fits_of(comparison)
     pictures = []
-    for name, caption in TABLE_FIGURES.items():
+    for name in TABLE_FIGURES:
         with new_figure(*SIZES[name]) as figure:
             try:
-                draw_table(figure, rows, fits, name)
+                (caption,) = draw_table(figure, rows, fits, name)
             except SettingsError:
                 return []
             url = data_url("image/svg+xml", figure_bytes(figure, "svg"))
         width = round(PIXELS * SIZES[name][0])
-        pictures.append(Picture(url, caption[0].upper() + caption[1:], width))
+        pictures.append(Picture(url, f"{caption}.", width))
     return pictures
 
 

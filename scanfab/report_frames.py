@@ -17,6 +17,7 @@ from scanfab.rerun import reopen, restored_settings
 from scanfab.series import Series
 from scanfab.settings import Length, Settings
 from scanfab.tabular import number_of
+from scanfab.variants import Sample
 from scanfab.window import SurfaceBox
 from scanfab.writers.page import Picture, Shown, view_data
 from scanfab.writers.plot import figure_bytes
@@ -96,17 +97,30 @@ def _facts(look: Look, settings: Settings) -> list[tuple[str, str]]:
         return facts
     facts.append(("cut-off", f"{plan.cutoff:.4g}, {plan.cutoff / smallest:.3g} smallest radii"))
     if plan.window is not None:
-        extent = SurfaceBox.of(first.packing, first.gathered).smallest_extent
         radius = plan.window.radius
         facts += [
             ("centre of the RV", ", ".join(f"{one:.4g}" for one in plan.window.center)),
             (
                 "radius of the RV",
-                f"{radius:.4g}, {2 * radius / extent:.3g} of half the sample's smallest extent, "
+                f"{radius:.4g}, {_part_of_sample(first, look, radius)}, "
                 f"{radius / radii.mean():.3g} mean radii",
             ),
         ]
     return facts
+
+
+def _part_of_sample(first: Sample, look: Look, radius: float) -> str:
+    """The RV beside the sample that it was chosen for, and beside what became of that since."""
+    then = f"{_fraction(first, radius)} of half the sample's smallest extent"
+    if not look.sample.gathered.any() or _fraction(look.sample, radius) == _fraction(first, radius):
+        return then
+    now = f"{_fraction(look.sample, radius)} in frame {look.number}"
+    return f"{then} in the first frame that has grains, {now}"
+
+
+def _fraction(sample: Sample, radius: float) -> str:
+    extent = SurfaceBox.of(sample.packing, sample.gathered).smallest_extent
+    return f"{2 * radius / extent:.3g}"
 
 
 def _cell(look: Look) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 from scanfab.abscissa import STRAINS, spelt_strain, strain_column
 from scanfab.comparison import SummaryRow
 from scanfab.tabular import number_of, numbers_of, total_error
+from scanfab.writers.curves import is_turned
 from scanfab.writers.page import Part
 
 __all__ = ["frame_table", "input_table", "overview", "results_tables"]
@@ -21,6 +22,12 @@ MOST_FRAMES = 12
 MOST_INPUTS = 20
 VOID, CONTACT = "alpha_vs_axial", "alpha_c_axial"
 
+TURNED = (
+    "The loading axis is not the axis of the contact fabric, as in simple shear, so no line of the "
+    "values along it is given. Intensities are largest minus smallest principal value, whichever "
+    "way the axes point: never negative, so noise raises them. The table has no errors of them."
+)
+
 # columns of the frame table behind the anisotropies, by the name that readers see
 MORE_COLUMNS = {
     "grains": "grains",
@@ -30,8 +37,6 @@ MORE_COLUMNS = {
     "solid_fraction": "solid fraction",
     "mean_length": "mean void length",
     "segments": "void segments",
-    "alpha_vs": "void intensity",
-    "alpha_c": "contact intensity",
 }
 
 
@@ -42,18 +47,33 @@ def overview(table: Path, rows: Sequence[Row]) -> str:
     sources = list(dict.fromkeys(str(row["source"]) for row in rows))
     frames = len({(row["source"], row["frame"]) for row in rows})
     variants = ", ".join(sorted({str(row["variant"]) for row in rows}))
-    grains = numbers_of(rows, "grains")
     column = strain_column(rows)
     parts = [
         f"{frames} {'frame' if frames == 1 else 'frames'} of {', '.join(sources)}",
         f"variants {variants}",
     ]
-    if grains:
-        parts.append(f"{min(grains):.0f} to {max(grains):.0f} grains")
+    if numbers_of(rows, "grains"):
+        parts.append(_grains(rows))
     if column is not None:
-        strains = numbers_of(rows, column)
-        parts.append(f"{STRAINS[column][0]} {100 * min(strains):.3g} to {100 * max(strains):.3g} %")
+        strains = [f"{100 * strain:.3g}" for strain in sorted(numbers_of(rows, column))]
+        parts.append(f"{STRAINS[column][0]} {_span(strains)} %")
     return "; ".join(parts) + "."
+
+
+def _grains(rows: Sequence[Row]) -> str:
+    """How many grains each variant has, which are all, those in the RV, or those that carry."""
+    of_variant = {}
+    for variant in sorted({str(row["variant"]) for row in rows}):
+        own = numbers_of([row for row in rows if str(row["variant"]) == variant], "grains")
+        of_variant[variant] = _span([f"{one:.0f}" for one in sorted(own)]) if own else "-"
+    if len(set(of_variant.values())) == 1:
+        return f"{next(iter(of_variant.values()))} grains"
+    return f"grains: {', '.join(f'{number} in {name}' for name, number in of_variant.items())}"
+
+
+def _span(values: Sequence[str]) -> str:
+    """From the first to the last, if they differ as they are spelt."""
+    return values[0] if values[0] == values[-1] else f"{values[0]} to {values[-1]}"
 
 
 def results_tables(summary: Iterable[SummaryRow], rows: Sequence[Row]) -> list[Part]:
@@ -72,6 +92,8 @@ def _results(source: str, summary: Sequence[SummaryRow], rows: Sequence[Row]) ->
     if len(strains) < 2:
         column = None
     here, there = _where("last", last, column), _where("first", first, column)
+    if is_turned([row for row in rows if row["source"] == source]):
+        return _turned_results(source, summary, rows, (here, there))
     lines = [
         (f"α_vs{here}", [_value(row, VOID) for row in last]),
         ("its error: scan", [_spell_error(number_of(row, f"{VOID}_se")) for row in last]),
@@ -87,8 +109,49 @@ def _results(source: str, summary: Sequence[SummaryRow], rows: Sequence[Row]) ->
             ("largest α_vs", [_spell(one.peak) for one in summary]),
             ("frames in the line", [str(one.frames) for one in summary]),
         ]
+    return _part(source, summary, lines)
+
+
+def _part(
+    source: str,
+    summary: Sequence[SummaryRow],
+    lines: Sequence[tuple[str, Sequence[str]]],
+    note: str = "",
+) -> Part:
+    """The lines that are known of some variant."""
     shown = [[name, *cells] for name, cells in lines if any(cell != "-" for cell in cells)]
-    return Part(["variant", *(one.variant for one in summary)], shown, title=source)
+    return Part(["variant", *(one.variant for one in summary)], shown, note, source)
+
+
+def _turned_results(
+    source: str, summary: Sequence[SummaryRow], rows: Sequence[Row], where: tuple[str, str]
+) -> Part:
+    """
+    Of a source whose axes are turned: what is seen whichever way they point, as in its figures.
+
+    There is no line, as the axial values that it would be fitted to miss the fabric.
+    """
+    ends = [_ends(one, rows) for one in summary]
+    lines: list[tuple[str, list[str]]] = []
+    for place, at in zip((1, 0), where, strict=True):
+        lines += [
+            (f"intensity α_vs{at}", [_intensity(row[place], VOID) for row in ends]),
+            (f"intensity α_c{at}", [_intensity(row[place], CONTACT) for row in ends]),
+            (f"angle between their axes{at}", [_degrees(row[place]) for row in ends]),
+            (f"α_vs along the loading axis{at}", [_value(row[place], VOID) for row in ends]),
+        ]
+    return _part(source, summary, list(dict(lines).items()), TURNED)
+
+
+def _intensity(row: Row, axial: str) -> str:
+    """The table has no error of it; it has the digits that the error of the axial value leaves."""
+    error = total_error(row, axial) or number_of(row, f"{axial}_se")
+    return _with_error(number_of(row, axial.removesuffix("_axial")), error).partition(" ±")[0]
+
+
+def _degrees(row: Row) -> str:
+    angle = number_of(row, "coaxiality_deg")
+    return "-" if angle is None else f"{angle:.0f}°"
 
 
 def _ends(one: SummaryRow, rows: Sequence[Row]) -> tuple[Row, Row]:
@@ -150,8 +213,9 @@ def frame_table(rows: Sequence[Row]) -> Part:
         source: strain_column([row for row in rows if row["source"] == source]) or "strain"
         for source in sources
     }
+    turned = is_turned(rows)
     table = [
-        _frame_line(row, column[row["source"]], len(sources) > 1)
+        _frame_line(row, column[row["source"]], len(sources) > 1, turned)
         for row in rows
         if (row["source"], row["frame"]) in shown
     ]
@@ -160,14 +224,21 @@ def frame_table(rows: Sequence[Row]) -> Part:
     return Part(columns, [[line[name] for name in columns] for line in table], note)
 
 
-def _frame_line(row: Row, column: str, several: bool) -> dict[str, str]:
+def _frame_line(row: Row, column: str, several: bool, turned: bool) -> dict[str, str]:
+    """The cells of a row, those first that tell most."""
     strain = number_of(row, column)
+    intensities = {
+        "void intensity": _intensity(row, VOID),
+        "contact intensity": _intensity(row, CONTACT),
+        "angle": _degrees(row) if turned else "-",
+    }
     spelt = "-" if strain is None else f"{100 * strain:.3g} %"
     return {
         "frame": str(row["frame"]),
         "variant": str(row["variant"]),
         "strain": spelt if column == "strain" else "-",
         "shear strain": spelt if column == "shear_strain" else "-",
+        **(intensities if turned else {}),
         "α_vs": _value(row, VOID).partition(" ±")[0],
         "± total": _spell_error(total_error(row, VOID)),
         "scan": _spell_error(number_of(row, f"{VOID}_se")),
@@ -175,6 +246,7 @@ def _frame_line(row: Row, column: str, several: bool) -> dict[str, str]:
         "α_c": _value(row, CONTACT).partition(" ±")[0],
         "± of α_c": _spell_error(total_error(row, CONTACT)),
         **{title: _spell(_number(row, name)) for name, title in MORE_COLUMNS.items()},
+        **({} if turned else intensities),
         "source": str(row["source"]) if several else "-",
     }
 

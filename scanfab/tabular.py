@@ -90,7 +90,7 @@ def total_error(row: Mapping[str, Any], name: str) -> float | None:
     row : mapping
         Of a fabric table.
     name : str
-        ``alpha_vs_axial``: √(scan² + sample²), None where the sample's part is not known.
+        ``alpha_vs_axial``: √(scan² + sample²), None where either part is not known.
         ``alpha_c_axial``: the sample's, as contacts are counted, not scanned.
 
     Examples
@@ -101,9 +101,10 @@ def total_error(row: Mapping[str, Any], name: str) -> float | None:
     0.0005
     """
     sample = number_of(row, f"{name}_sample_se")
-    if name == "alpha_c_axial" or sample is None:
+    if name == "alpha_c_axial":
         return sample
-    return math.hypot(number_of(row, f"{name}_se") or 0.0, sample)
+    scan = number_of(row, f"{name}_se")
+    return None if scan is None or sample is None else math.hypot(scan, sample)
 
 
 def _parse(path: Path | str, text: str) -> Any:

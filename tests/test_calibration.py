@@ -222,6 +222,27 @@ def test_figure_has_letters_total_errors_and_words(found, tmp_path, monkeypatch)
     assert any(height == pytest.approx(2 * half) for height in heights)
 
 
+def test_steps_of_one_replicate_have_no_band(found, tmp_path, monkeypatch):
+    """Of the sample's part alone it claimed to be of both, about a value that was far off."""
+    from scanfab.writers import plot_calibration
+
+    drawn, bands = [], []
+    monkeypatch.setattr(plot_calibration, "save_figure", lambda figure, _: drawn.append(figure))
+    monkeypatch.setattr(plot_calibration, "band", lambda *asked: bands.append(asked))
+    rows = [
+        replace(row, alpha_vs_axial_se=None) if (row.ladder, row.value) == ("spacing", 4) else row
+        for row in found.rows
+    ]
+    assert any(row.alpha_vs_axial_sample_se for row in rows if row.alpha_vs_axial_se is None)
+    plot_calibration.plot_calibration(rows, tmp_path / "ladders.png")
+    for panel, values, _, errors, _ in bands[:2]:
+        assert panel is drawn[0].axes[0]
+        assert np.isnan(errors[values == 4]).all()
+        assert np.isfinite(errors[values < 2]).all()
+    note = drawn[0].legends[0].get_title().get_text()
+    assert "\nno band where either part is not known\n" in note
+
+
 def test_what_looks_wrong_in_the_frame_is_told_here_too(packing):
     """A grain that flew away, and clumps that are not read as bodies."""
     count = len(packing) + 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import asdict
 
 import numpy as np
@@ -12,6 +13,7 @@ from scanfab import frame_figures
 from scanfab.errors import SettingsError
 from scanfab.frame_figures import FRAME_FIGURES, parse_figure, plot_frames
 from scanfab.settings import Settings
+from scanfab.tabular import total_error
 from scanfab.writers import plot_frame
 from scanfab.writers.plot_frame import disk
 from tests.conftest import ROOT, SAMPLE
@@ -174,14 +176,95 @@ def test_the_strain_of_a_title_is_that_of_the_table(series, computed, caught, tm
 
 
 def test_cut_offs_have_the_total_error_and_the_scan_s_part(series, computed, caught, tmp_path):
-    """The sample's part is about the table's, which is of another scan of the same octants."""
+    """At the cut-off of the table what it says there, to the last digit but for rounding."""
     plot_frames(tmp_path / "x.png", series, SETTINGS, computed.rows, "cutoffs")
-    last = caught["cutoffs"][1]
-    (place,) = np.flatnonzero(last.cutoff == 1.0)
-    sample = np.sqrt(last.total[place] ** 2 - last.error[place] ** 2)
-    known = row_of(computed, 6)["alpha_vs_axial_sample_se"]
-    assert sample == pytest.approx(known, rel=0.5)
-    assert np.nanmin(last.total - last.error) > 0
+    for curve, frame in zip(caught["cutoffs"], (0, 6), strict=True):
+        row = row_of(computed, frame)
+        (place,) = np.flatnonzero(curve.cutoff == 1.0)
+        assert curve.alpha[place] == pytest.approx(row["alpha_vs_axial"], rel=1e-9)
+        assert curve.error[place] == pytest.approx(row["alpha_vs_axial_se"], rel=1e-9)
+        total = total_error(row, "alpha_vs_axial")
+        assert curve.total[place] == pytest.approx(total, rel=1e-9)
+    assert np.all(curve.total > curve.error)
+
+
+def test_the_band_of_cut_offs_does_not_vanish_in_a_rough_scan(series, computed, caught, tmp_path):
+    """Nor is it told that errors grow with the cut-off, which is what the figure shows."""
+    settings = Settings.make(boundary="mask=3", tolerance=1e-3)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", scanfab.ScanfabWarning)
+        plot_frames(tmp_path / "x.png", series, settings, computed.rows, "cutoffs")
+    for curve in caught["cutoffs"]:
+        assert np.all(curve.total > curve.error)
+
+
+def test_the_cut_off_of_the_table_is_one_of_the_curve(series, computed, caught, tmp_path):
+    settings = Settings.make(boundary="mask=3", tolerance=2e-3, cutoff="0.8rmin")
+    plot_frames(tmp_path / "x.png", series, settings, computed.rows, "cutoffs")
+    assert all(one.chosen in one.cutoff for one in caught["cutoffs"])
+
+
+def test_a_cut_off_without_a_total_error_is_told(tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(plot_frame, "save_figure", lambda figure, *_: drawn.append(figure))
+    values = np.array([1.0, 2.0, 3.0])
+    for total in (values, np.array([1.0, np.nan, 3.0])):
+        one = plot_frame.CutoffCurve("one", values, values, values, total, 1.0)
+        plot_frame.plot_cutoffs(tmp_path / "x.png", [one])
+    notes = [figure.legends[0].get_title().get_text() for figure in drawn]
+    assert ["(none where either is not known)" in note for note in notes] == [False, True]
+
+
+def rose_of(monkeypatch, tmp_path, angles, error=0.1):
+    """The figure of one frame whose rings are told apart by their angles alone."""
+    drawn = []
+    monkeypatch.setattr(plot_frame, "save_figure", lambda figure, *_: drawn.append(figure))
+    theta = np.arange(0.0, 360.0, 30.0)
+    rings = [
+        plot_frame.Ring(phi, theta, np.full(12, 1.0 + 0.001 * phi), np.full(12, error))
+        for phi in angles
+    ]
+    plot_frame.plot_rose(tmp_path / "x.png", [plot_frame.Rose("one", rings, rings)])
+    return drawn[0]
+
+
+def colours(figure):
+    """Of the lines of each polar angle, and of its words in the legend."""
+    lines = {
+        round(1000 * (line.get_ydata()[0] - 1)): line.get_color()
+        for line in figure.axes[0].lines
+        if line.get_marker() not in ("None", "_")
+    }
+    legend = figure.legends[0]
+    texts = [text.get_text() for text in legend.get_texts()]
+    named = {
+        float(text.split("=")[1].split("^")[0]): handle.get_color()
+        for text, handle in zip(texts, legend.legend_handles, strict=True)
+    }
+    assert named == lines
+    return lines
+
+
+def test_a_polar_angle_has_one_colour_in_all_figures(monkeypatch, tmp_path):
+    usual = colours(rose_of(monkeypatch, tmp_path, (90.0, 60.0, 30.0)))
+    assert colours(rose_of(monkeypatch, tmp_path, (30.0, 60.0, 90.0))) == usual
+    assert colours(rose_of(monkeypatch, tmp_path, (30.0,))) == {30: usual[30]}
+    for angles in ((20.0, 30.0, 45.0, 90.0), (10.0, 20.0, 40.0, 50.0)):
+        found = colours(rose_of(monkeypatch, tmp_path, angles))
+        assert len(set(found.values())) == 4
+        assert all(found[phi] == usual[phi] for phi in found if phi in usual)
+
+
+@pytest.mark.parametrize("error", [0.01, 0.3, 1.5])
+def test_no_bar_of_a_rose_is_cut_and_its_circles_are_in_the_legend(monkeypatch, tmp_path, error):
+    figure = rose_of(monkeypatch, tmp_path, (90.0, 30.0), error)
+    for axes in figure.axes:
+        assert axes.get_ylim()[1] > 1.09 + error
+        assert not any(label.get_text() for label in axes.get_yticklabels())
+    low, ticks = figure.axes[0].get_ylim()[0], figure.axes[0].get_yticks()
+    assert all(tick > low for tick in ticks)
+    said = f"circles: {', '.join(f'{tick:g}' for tick in ticks)} about {low:.3g} (left)"
+    assert said in figure.legends[0].get_title().get_text()
 
 
 @pytest.mark.parametrize("name", ["rose", "projection"])

@@ -17,6 +17,7 @@ import pytest
 
 from scanfab.cli.main import run
 from scanfab.errors import ReadError
+from scanfab.opening import read_series
 from scanfab.pipeline import compute_rows
 from scanfab.report import make_report
 from scanfab.scene import Scene
@@ -316,6 +317,23 @@ def test_a_sheared_cell_is_told_by_its_shear(table):
     assert "3 c 30 % " in words_of(frames)
 
 
+@pytest.mark.filterwarnings("ignore:shear_strain stands", "ignore:the loading axis")
+def test_a_sheared_cell_is_told_to_be_one(table):
+    """Captions, results and notes say what the figures show."""
+    page = page_of([table(sheared())])
+    captions = re.findall(r"<figcaption>(.*?)</figcaption>", page)
+    assert [one.partition(",")[0] for one in captions] == [
+        "Intensity of void and contact anisotropy",
+        "Intensity of void and contact anisotropy",
+        "Void against contact intensity",
+    ]
+    notes = words_of(page[page.index('id="notes"') : page.index('id="sample"')])
+    assert "the loading axis is not the axis of the contact fabric" in notes
+    results = words_of(page[page.index('id="results"') : page.index('id="warnings"')])
+    assert results.index("intensity α vs at") < results.index("α vs along the loading axis")
+    assert "slope of α vs" not in results
+
+
 def test_sources_of_both_kinds_have_each_their_own_strain(table):
     page = page_of([table(sheared(), "s.jsonl"), table(curve())])
     frames = words_of(page[page.index('id="frames"') :])
@@ -360,6 +378,21 @@ def test_the_sample_is_told_in_numbers(page):
         "lengths of this report are in the unit of the dump",
     ):
         assert part in text
+
+
+def test_an_rv_is_told_beside_the_sample_that_it_was_made_for_and_the_one_shown(page, computed):
+    """Under the heading of the last frame, in which the sample is shorter."""
+    found = re.search(
+        r"0\.7 of half the sample's smallest extent in the first frame that has grains, "
+        r"([\d.]+) in frame 6,",
+        words_of(page),
+    )
+    assert found is not None
+    packing = [*read_series(f"{ROOT}/sample_data/yade_triaxial")][6].read()
+    grains = packing.columns["mask"] != 3
+    ends = packing.position[grains], packing.radius[grains, None]
+    extent = ((ends[0] + ends[1]).max(axis=0) - (ends[0] - ends[1]).min(axis=0)).min()
+    assert float(found[1]) == pytest.approx(2 * 0.008058 / extent, rel=1e-2)
 
 
 def test_an_rv_is_a_part_of_the_sample_without_grains_that_flew_away(tmp_path, quick):

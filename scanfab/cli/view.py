@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 
 __all__ = ["view"]
 
+# letters of the source in a title, which has frame and strain behind it
+LONGEST_SOURCE = 60
+
 
 @click.command(cls=SourceCommand)
 @sources_argument
@@ -98,6 +101,7 @@ def _show(
     from scanfab.abscissa import spelt_strain
     from scanfab.frame_view import look_at
     from scanfab.scene import section_lines
+    from scanfab.writers.curves import middle_out
     from scanfab.writers.view import check_screen, show_scene
 
     if screenshot is None:
@@ -108,5 +112,6 @@ def _show(
         scene = replace(scene, lines=section_lines(scene, settings.axis))
     strain = spelt_strain(look.strains, look.strain_column)
     none = "" if look.sample.grains.any() else "no grains"
-    title = ", ".join(filter(None, [series.name, f"frame {look.number}", strain, none]))
+    source = middle_out(series.name, LONGEST_SOURCE)
+    title = ", ".join(filter(None, [source, f"frame {look.number}", strain, none]))
     show_scene(scene, settings.axis, title, screenshot)

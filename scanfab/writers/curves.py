@@ -13,7 +13,15 @@ import numpy.typing as npt
 from scanfab.abscissa import STRAINS, strain_column
 from scanfab.tabular import number_of, total_error
 
-__all__ = ["Curve", "abscissa_label", "curves_of", "is_turned", "short_names"]
+__all__ = [
+    "Curve",
+    "abscissa_label",
+    "abscissa_words",
+    "curves_of",
+    "is_turned",
+    "middle_out",
+    "short_names",
+]
 
 FloatArray = npt.NDArray[np.float64]
 Rows = Sequence[Mapping[str, Any]]
@@ -73,6 +81,12 @@ def abscissa_label(rows: Rows) -> str:
     """What the abscissa is."""
     column = strain_column(rows)
     return "frame" if column is None else f"{' '.join(STRAINS[column])} in %"
+
+
+def abscissa_words(rows: Rows) -> str:
+    """What the abscissa is, in a sentence."""
+    column = strain_column(rows)
+    return "the number of the frame" if column is None else f"the {STRAINS[column][0]}"
 
 
 def is_turned(rows: Rows) -> bool:
@@ -139,7 +153,7 @@ def short_names(sources: Iterable[str], longest: int = LONGEST_NAME) -> dict[str
     """Sources by the last part of their path, and not too long, where that tells them apart."""
     sources = list(dict.fromkeys(sources))
     for shorten in (_last_part, str):
-        names = {source: _middle_out(shorten(source), longest) for source in sources}
+        names = {source: middle_out(shorten(source), longest) for source in sources}
         if len(set(names.values())) == len(names):
             return names
     return {source: f"{number}: {names[source]}" for number, source in enumerate(sources, 1)}
@@ -149,7 +163,7 @@ def _last_part(source: str) -> str:
     return PurePath(source).name or source
 
 
-def _middle_out(name: str, longest: int) -> str:
+def middle_out(name: str, longest: int) -> str:
     """Both ends of a long name, as either may be what matters."""
     if len(name) <= longest:
         return name

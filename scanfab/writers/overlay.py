@@ -18,6 +18,8 @@ SIZE = (1200, 900)
 # of the picture's height: above the sample words, below it the scale
 TOP, BOTTOM = 0.13, 0.07
 MARGIN = 0.02
+# size of letters that can still be read
+SMALLEST = 12
 # in shares of the picture: a disk of the legend, and the bar of the scale
 AROUND = np.linspace(0.0, 2.0 * np.pi, 25)[:-1]
 DISK = 0.0075 * np.column_stack([np.cos(AROUND), SIZE[0] / SIZE[1] * np.sin(AROUND)])
@@ -85,7 +87,7 @@ class Framing:
 
 def add_words(plotter: Any, title: str, names: Mapping[str, str]) -> None:
     """Title and legend above the sample: dark words, each name beside a disk of its colour."""
-    _write(plotter, title, MARGIN, 1.0 - 0.055, 12)
+    _shrink(plotter, _write(plotter, title, MARGIN, 1.0 - 0.055, 12))
     place = MARGIN
     for name, colour in names.items():
         _draw(plotter, DISK + np.array([place + 0.008, 1.0 - 0.088]), colour)
@@ -123,6 +125,15 @@ def _write(plotter: Any, text: str, x: float, y: float, size: int) -> Any:
     return plotter.add_text(
         text, position=(x, y), viewport=True, font_size=size, color="black", font="arial"
     )
+
+
+def _shrink(plotter: Any, words: Any) -> None:
+    """Make words smaller until they fit the width of the picture."""
+    font, box = words.GetTextProperty(), [0.0] * 4
+    words.GetBoundingBox(plotter.renderer, box)
+    while box[1] - box[0] > (1.0 - 2.0 * MARGIN) * SIZE[0] and font.GetFontSize() > SMALLEST:
+        font.SetFontSize(font.GetFontSize() - 1)
+        words.GetBoundingBox(plotter.renderer, box)
 
 
 def _draw(plotter: Any, corners: FloatArray, colour: str) -> Any:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from scanfab.tabular import total_error
 from scanfab.writers.curves import short_names
@@ -63,8 +64,8 @@ def plot_calibration(rows: Sequence[Any], path: Path) -> None:
             labels,
             loc="outside upper center",
             ncols=4,
-            title=f"{_frame(rows)}bands: one total standard error, of scan and sample together\n"
-            "bars: the scan's part; dotted: the choice of the 2017 paper",
+            title=f"{_frame(rows)}bands: one total standard error, of scan and sample together"
+            f"{_missing(rows)}\nbars: the scan's part; dotted: the choice of the 2017 paper",
         )
         save_figure(figure, path)
 
@@ -77,6 +78,18 @@ def _frame(rows: Sequence[Any]) -> str:
     return f"{f'{name}, ' if name else ''}frame {rows[0].frame}\n"
 
 
+def _missing(rows: Sequence[Any]) -> str:
+    """That there are steps without a band, as a line of its own."""
+    return "\nno band where either part is not known" if np.isnan(_totals(rows)).any() else ""
+
+
+def _totals(rows: Sequence[Any]) -> npt.NDArray[np.float64]:
+    """Total errors of the steps that have a void fabric; NaN where they are not known."""
+    known = [row for row in rows if row.alpha_vs_axial is not None]
+    totals = [total_error(asdict(row), "alpha_vs_axial") for row in known]
+    return np.array([np.nan if one is None else one for one in totals], np.float64)
+
+
 def _draw(panel: Any, rows: Sequence[Any], ladder: str) -> None:
     """One ladder: a curve for each variant."""
     label, logarithmic, paper = PANELS[ladder]
@@ -84,9 +97,7 @@ def _draw(panel: Any, rows: Sequence[Any], ladder: str) -> None:
         steps = [r for r in rows if r.variant == variant and r.alpha_vs_axial is not None]
         values = np.array([row.value for row in steps])
         alphas = 1e3 * np.array([row.alpha_vs_axial for row in steps])
-        totals = [total_error(asdict(row), "alpha_vs_axial") for row in steps]
-        errors = 1e3 * np.array([np.nan if one is None else one for one in totals], np.float64)
-        band(panel, values, alphas, errors, LOOKS[variant]["color"])
+        band(panel, values, alphas, 1e3 * _totals(steps), LOOKS[variant]["color"])
         panel.errorbar(
             values,
             alphas,

@@ -49,23 +49,27 @@ class Fit:
 
 def draw_correlation(
     part: Figure | SubFigure, groups: Sequence[Group], fits: Sequence[Fit | None], turned: bool
-) -> list[Axes]:
+) -> tuple[list[Axes], str]:
     """
-    A panel for each group, and beside it the legend, which has the numbers.
+    A panel for each group, beside it the legend, which has the numbers; and a caption.
 
     Where the axes are turned, the intensities are drawn, of which there is no line.
     """
     panels = part.subplots(len(groups), 2, squeeze=False, width_ratios=(3, 2))
+    lines: list[str] = []
     for group, (axes, margin) in zip(groups, panels, strict=True):
         legend = _Legend()
+        fitted = [] if turned else [fits[one.place] for one in group.drawn]
+        lines += ["fitted lines"] * any(fit is not None for fit in fitted)
         for one in group.drawn:
             _points(axes, one, None if turned else fits[one.place], legend, turned)
-        if not turned:
-            _paper(axes, [fits[one.place] for one in group.drawn], legend)
+        lines += ["the paper's slope"] * _paper(axes, fitted, legend)
         _errors(group, legend, turned)
         _label(axes, turned)
         legend.draw(margin, "intensities" if turned else f"slope of {VOID} on {CONTACT}, axial")
-    return [axes for axes, _ in panels]
+    what = "intensity" if turned else "anisotropy along the loading axis"
+    drawn = f"with {' and '.join(dict.fromkeys(lines))}" if lines else "without a line"
+    return [axes for axes, _ in panels], f"Void against contact {what}, {drawn}"
 
 
 class _Legend:
@@ -123,22 +127,30 @@ def _bars(error: FloatArray) -> FloatArray | None:
     return np.nan_to_num(error) if np.isfinite(error).any() else None
 
 
-def _paper(axes: Axes, fits: Sequence[Fit | None], legend: _Legend) -> None:
-    """The slope that the paper prints, through the origin."""
+def _paper(axes: Axes, fits: Sequence[Fit | None], legend: _Legend) -> bool:
+    """The slope that the paper prints, through the origin; whether it is drawn."""
     reach = max((fit.contact[1] for fit in fits if fit is not None), default=0.0)
     if reach > 0:
         (line,) = axes.plot([0, 1e2 * reach], [0, 1e3 * PAPER_SLOPE * reach], "k:", lw=0.9)
         legend.add(line, f"2017 paper: {PAPER_SLOPE:.3f}")
+    return reach > 0
 
 
 def _errors(group: Group, legend: _Legend, turned: bool) -> None:
     from matplotlib.lines import Line2D
 
+    if turned:
+        return
     curves = [one.curve for one in group.drawn]
-    if not turned and any(np.isfinite(curve.contact_total).any() for curve in curves):
-        alone = any(curve.contact_alone for curve in curves)
-        which = f"of {CONTACT}, as if contacts\nwere independent" if alone else "standard error"
-        legend.add(Line2D([], [], color="0.6", lw=0.6), f"one total {which}")
+    void = any(np.isfinite(curve.void_total).any() for curve in curves)
+    contact = any(np.isfinite(curve.contact_total).any() for curve in curves)
+    # the bars themselves: a line without a point would look like the axis through zero
+    shape = {(True, True): "+", (True, False): "|", (False, True): "_"}.get((void, contact))
+    if shape is not None:
+        alone = contact and any(curve.contact_alone for curve in curves)
+        which = f",\nof {CONTACT} as if contacts\nwere independent" if alone else ""
+        bars = Line2D([], [], color="0.4", marker=shape, markersize=11, mew=0.6, ls="none")
+        legend.add(bars, f"one total standard error{which}")
 
 
 def _label(axes: Axes, turned: bool) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -54,6 +54,11 @@ RINGS: tuple[dict[str, Any], ...] = (
     {"color": COLOURS["green"], "marker": "D", "ls": "-."},
     {"color": COLOURS["purple"], "marker": "s", "ls": ":"},
 )
+USUAL_RINGS = dict(zip((90.0, 60.0, 30.0), RINGS, strict=False))
+# of the legend of rings
+MOST_COLUMNS = 3
+# azimuths of smooth curves, degrees
+AROUND = np.linspace(0, 360, 181)
 FRAMES: tuple[dict[str, Any], ...] = (
     {"color": COLOURS["blue"], "marker": "o", "ls": "--", "markerfacecolor": "white"},
     {"color": COLOURS["vermilion"], "marker": "^", "ls": "-"},
@@ -117,7 +122,7 @@ class CutoffCurve:
     error: FloatArray
     """The scan's part of its standard error."""
     total: FloatArray
-    """Its standard error, of scan and sample together; NaN where the sample's is not known."""
+    """Its standard error, of scan and sample together; NaN where either is not known."""
     chosen: float
 
 
@@ -145,27 +150,42 @@ def disk() -> tuple[FloatArray, FloatArray]:
 
 def plot_rose(path: Path, roses: Sequence[Rose], dpi: int = DPI) -> None:
     """Roses of void lengths and contact normals, a row for each frame."""
-    with new_figure(WIDTH, 2.9 * len(roses) + 0.7) as figure:
+    looks = _ring_looks([ring.phi for ring in roses[0].void])
+    entries = -(-len(looks) // MOST_COLUMNS)
+    with new_figure(WIDTH, 3.0 * len(roses) + 0.7 + 0.2 * entries) as figure:
         panels = figure.subplots(len(roses), 2, squeeze=False, subplot_kw={"projection": "polar"})
+        reaches = []
         for column, kind in enumerate(("void", "contact")):
             rings = [ring for rose in roses for ring in getattr(rose, kind)]
             reach = max((_reach(ring) for ring in rings), default=0.02)
+            reaches.append(reach)
             for row, rose in enumerate(roses):
-                _rose(panels[row, column], getattr(rose, kind), reach)
+                _rose(panels[row, column], getattr(rose, kind), reach, looks)
         titles = [f"{what}\n{rose.title}" for rose in roses for what in WHAT]
         letter(panels.ravel(), titles)
-        _ring_legend(figure, roses[0].void)
+        _ring_legend(figure, looks, reaches)
         save_figure(figure, path, dpi)
 
 
+def _ring_looks(angles: Sequence[float]) -> dict[float, dict[str, Any]]:
+    """Of each polar angle; the usual ones keep theirs, whichever others there are."""
+    usual = {phi: look for phi, look in USUAL_RINGS.items() if phi in angles}
+    free = iter([look for look in reversed(RINGS) if look not in usual.values()])
+    return {phi: usual.get(phi) or next(free) for phi in dict.fromkeys(angles)}
+
+
 def _reach(ring: Ring) -> float:
-    """How far the values are from 1, noise of single points left out."""
-    return max(0.02, float(np.nanmax(np.abs(ring.value - 1.0), initial=0.0)))
+    """How far the values, with their errors, and the curve are from 1; at least 0.02."""
+    far = np.abs(ring.value - 1.0) + np.nan_to_num(ring.error)
+    curve = np.ones(1) if ring.curve is None else ring.curve(AROUND)
+    return max(0.02, float(np.nanmax(far, initial=0.0)), float(np.abs(curve - 1.0).max()))
 
 
-def _rose(axes: PolarAxes, rings: Sequence[Ring], reach: float) -> None:
-    around = np.linspace(0, 360, 181)
-    for ring, look in zip(rings, RINGS, strict=False):
+def _rose(
+    axes: PolarAxes, rings: Sequence[Ring], reach: float, looks: Mapping[float, dict[str, Any]]
+) -> None:
+    for ring in rings:
+        look = looks[ring.phi]
         theta, value, error = ring.theta, ring.value, ring.error
         if ring.curve is None:
             # closed, as the last point is followed by the first
@@ -175,15 +195,12 @@ def _rose(axes: PolarAxes, rings: Sequence[Ring], reach: float) -> None:
             np.radians(theta), value, yerr=error, elinewidth=0.5, capsize=0, **{**look, "ls": line}
         )
         if ring.curve is not None:
-            axes.plot(np.radians(around), ring.curve(around), color=look["color"], ls=look["ls"])
-    axes.plot(np.radians(around), np.ones(181), color="0.4", lw=0.6)
-    low = max(0.0, 1.0 - 2.0 * reach)
-    axes.set_ylim(low, 1.0 + 1.15 * reach)
-    step = _round_down(reach)
-    ticks = [1.0 - step, 1.0, 1.0 + step]
-    box = {"facecolor": "white", "edgecolor": "none", "pad": 0.6, "alpha": 0.8}
-    axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks], fontsize=7, bbox=box)
-    axes.set_rlabel_position(100)
+            axes.plot(np.radians(AROUND), ring.curve(AROUND), color=look["color"], ls=look["ls"])
+    axes.plot(np.radians(AROUND), np.ones_like(AROUND), color="0.4", lw=0.6)
+    middle, circles = _scale(reach)
+    axes.set_ylim(middle, 1.0 + 1.1 * reach)
+    # named in the legend: within the panel there is no place where words would not meet the data
+    axes.set_yticks(circles, [])
     axes.set_xticks(np.radians(np.arange(0, 360, 45)))
     axes.grid(color="0.85", lw=0.5)
     axes.spines["polar"].set_color("0.7")
@@ -195,20 +212,34 @@ def _round_down(value: float) -> float:
     return float(max(step for step in (power, 2 * power, 5 * power) if step <= value))
 
 
-def _ring_legend(figure: Figure, rings: Sequence[Ring]) -> None:
+def _scale(reach: float) -> tuple[float, list[float]]:
+    """The value in the middle of a rose, and those of its circles."""
+    middle = max(0.0, 1.0 - 2.0 * reach)
+    step = _round_down(reach)
+    return middle, [one for one in (1.0 - step, 1.0, 1.0 + step) if one > middle]
+
+
+def _ring_legend(
+    figure: Figure, looks: Mapping[float, dict[str, Any]], reaches: Sequence[float]
+) -> None:
     from matplotlib.lines import Line2D
 
-    handles = [Line2D([], [], **look) for _, look in zip(rings, RINGS, strict=False)]
-    labels = [rf"polar angle $\varphi={ring.phi:g}^\circ$" for ring in rings]
+    handles = [Line2D([], [], **look) for look in looks.values()]
+    labels = [rf"polar angle $\varphi={phi:g}^\circ$" for phi in looks]
+    scales = [
+        f"{', '.join(f'{one:g}' for one in circles)} about {middle:.3g}"
+        for middle, circles in map(_scale, reaches)
+    ]
     note = (
-        "over the azimuth $\\theta$ from x, relative to isotropy; radii do not start at 0\n"
+        "over the azimuth $\\theta$ from x, relative to isotropy\n"
+        f"circles: {scales[0]} (left), {scales[1]} (right)\n"
         "bars: one standard error, of the scan (left), of a count of contacts (right)"
     )
     figure.legend(
         handles,
         labels,
         loc="outside lower center",
-        ncols=min(len(labels), 3),
+        ncols=min(len(labels), MOST_COLUMNS),
         title=note,
     )
 
@@ -319,8 +350,11 @@ def plot_cutoffs(path: Path, curves: Sequence[CutoffCurve], dpi: int = DPI) -> N
         axes.axhline(0, color="0.6", lw=0.6, zorder=0)
         axes.set(xlabel=r"cut-off / $r_{min}$", ylabel=VOID_UNIT + VOID_AXIAL)
         widen(axes, 1.0)
+        hole = any((np.isfinite(one.alpha) & ~np.isfinite(one.total)).any() for one in curves)
+        without = "\n(none where either is not known)" if hole else ""
         figure.legend(
             loc="outside upper left",
-            title="bands: one total standard error, scan and sample\nbars: the scan's part",
+            title="bands: one total standard error, scan and sample"
+            f"{without}\nbars: the scan's part",
         )
         save_figure(figure, path, dpi)

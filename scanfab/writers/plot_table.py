@@ -11,7 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.errors import SettingsError
-from scanfab.writers.curves import Curve, abscissa_label, curves_of, is_turned
+from scanfab.writers.curves import (
+    Curve,
+    abscissa_label,
+    abscissa_words,
+    curves_of,
+    is_turned,
+)
 from scanfab.writers.groups import Drawn, Group, grouped
 from scanfab.writers.plot import (
     CONTACT,
@@ -39,11 +45,7 @@ __all__ = ["SIZES", "TABLE_FIGURES", "Fit", "draw_table", "plot_table"]
 
 FloatArray = npt.NDArray[np.float64]
 
-TABLE_FIGURES = {
-    "evolution": "void and contact anisotropy over the strain, with their total standard errors",
-    "normalised": "both over the strain, each curve divided by its own largest absolute value",
-    "correlation": "void against contact anisotropy, with the fitted line and the paper's slope",
-}
+TABLE_FIGURES = ("evolution", "normalised", "correlation")
 
 # in inches, of one row of panels
 SIZES = {"evolution": (WIDTH, 2.9), "normalised": (WIDTH, 2.7), "correlation": (WIDTH, 2.6)}
@@ -61,13 +63,15 @@ class _Quantity:
     values: str
     total: str | None = None
     scan: str | None = None
+    words: str = ""
+    """What it is called in a caption if it has errors."""
     smallest: float = 1.0
     """The axis spans at least this, so that noise does not look like a signal."""
 
 
 AXIAL = (
-    _Quantity(VOID_UNIT + VOID_AXIAL, 1e3, "void", "void_total", "void_scan"),
-    _Quantity(CONTACT_UNIT + CONTACT_AXIAL, 1e2, "contact", "contact_total"),
+    _Quantity(VOID_UNIT + VOID_AXIAL, 1e3, "void", "void_total", "void_scan", "voids"),
+    _Quantity(CONTACT_UNIT + CONTACT_AXIAL, 1e2, "contact", "contact_total", words="contacts"),
 )
 # where the principal axes are not the loading axis
 TURNED = (
@@ -76,8 +80,8 @@ TURNED = (
     _Quantity("coaxiality, degrees", 1.0, "angle"),
 )
 NORMALISED = (
-    _Quantity(f"{VOID_AXIAL} / largest", 1.0, "void", "void_total"),
-    _Quantity(f"{CONTACT_AXIAL} / largest", 1.0, "contact", "contact_total"),
+    _Quantity(f"{VOID_AXIAL} / largest", 1.0, "void", "void_total", words="voids"),
+    _Quantity(f"{CONTACT_AXIAL} / largest", 1.0, "contact", "contact_total", words="contacts"),
 )
 NORMALISED_TURNED = (
     _Quantity(f"{VOID_INTENSITY} / largest", 1.0, "void_intensity"),
@@ -120,30 +124,41 @@ def draw_table(
     rows: Sequence[Mapping[str, Any]],
     fits: Sequence[Fit | None],
     name: str | None = None,
-) -> None:
-    """Draw on an empty figure, which gets its size; parameters as for :func:`plot_table`."""
+) -> list[str]:
+    """
+    Draw on an empty figure, which gets its size; parameters as for :func:`plot_table`.
+
+    Returns
+    -------
+    list of str
+        A caption for each figure: what is drawn.
+    """
     curves = curves_of(rows)
     if not any(np.isfinite(curve.void).any() for curve in curves):
         raise SettingsError("there is nothing to draw: no row of the table has a void fabric")
-    page = _Page(grouped(curves), abscissa_label(rows), fits, is_turned(rows))
+    abscissa = abscissa_label(rows), abscissa_words(rows)
+    page = _Page(grouped(curves), abscissa, fits, is_turned(rows))
     names = list(TABLE_FIGURES) if name is None else [name]
     heights = [page.height(one) for one in names]
     figure.set_size_inches(WIDTH, sum(heights))
     parts: Any = [figure]
     if name is None:
         parts = figure.subfigures(len(names), 1, height_ratios=heights)
-    for part, one in zip(parts, names, strict=True):
-        page.draw(part, one)
+    return [page.draw(part, one) for part, one in zip(parts, names, strict=True)]
 
 
 class _Page:
     """Figures of one table, whose panels are lettered through."""
 
     def __init__(
-        self, groups: list[Group], abscissa: str, fits: Sequence[Fit | None], turned: bool
+        self,
+        groups: list[Group],
+        abscissa: tuple[str, str],
+        fits: Sequence[Fit | None],
+        turned: bool,
     ) -> None:
         self.groups = groups
-        self.abscissa = abscissa
+        self.abscissa, self.over = abscissa
         self.fits = fits
         self.turned = turned
         self.lettered = 0
@@ -153,12 +168,12 @@ class _Page:
         lines = 0 if name == "correlation" else -(-len(self._entries()) // 2)
         return SIZES[name][1] + ROW * (len(self.groups) - 1) + 0.15 * max(lines - 2, 0)
 
-    def draw(self, part: Figure | SubFigure, name: str) -> None:
-        """One of the figures."""
+    def draw(self, part: Figure | SubFigure, name: str) -> str:
+        """One of the figures, and its caption."""
         if name == "correlation":
-            panels = draw_correlation(part, self.groups, self.fits, self.turned)
+            panels, caption = draw_correlation(part, self.groups, self.fits, self.turned)
             self._letter(panels, [group.title for group in self.groups])
-            return
+            return caption
         share = name == "normalised"
         quantities = (AXIAL, TURNED, NORMALISED, NORMALISED_TURNED)[2 * share + self.turned]
         shape = len(self.groups), len(quantities)
@@ -175,6 +190,24 @@ class _Page:
         ]
         self._letter(columns.ravel().tolist(), titles)
         self._legend(part, _note(self.groups, quantities, share))
+        return self._caption(quantities, share)
+
+    def _caption(self, quantities: Sequence[_Quantity], share: bool) -> str:
+        """What is drawn of a figure with an abscissa."""
+        what = "Void and contact anisotropy along the loading axis"
+        if self.turned:
+            angle = ", and the angle between their major axes"
+            what = f"Intensity of void and contact anisotropy{'' if share else angle}"
+        divided = ", each curve divided by its own largest absolute value" if share else ""
+        curves = [one.curve for group in self.groups for one in group.drawn]
+        banded = [
+            quantity.words
+            for quantity in quantities
+            if quantity.total
+            and any(np.isfinite(getattr(curve, quantity.total)).any() for curve in curves)
+        ]
+        errors = f"with total standard errors of {' and '.join(banded)}"
+        return f"{what}, over {self.over}{divided}; {errors if banded else 'without total errors'}"
 
     def _abscissa(self, axes: Axes) -> None:
         from matplotlib.ticker import MaxNLocator

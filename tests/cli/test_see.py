@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -17,6 +18,7 @@ from scanfab.figures import fits_of, plot_rows
 from scanfab.opening import read_series
 from scanfab.strain import shear_strain
 from scanfab.tabular import read_rows
+from scanfab.writers.overlay import add_words
 from tests.conftest import ROOT, SAMPLE
 from tests.dumps import cubic_rows, dump_text, write
 from tests.tables import curve
@@ -251,11 +253,42 @@ def test_the_title_names_the_frame_and_its_strain(tmp_path, monkeypatch):
     assert titles == [f"{SAMPLE}, frame 6, axial strain 15 %"]
 
 
+@pytest.mark.parametrize("letter", "im")
+def test_a_long_path_leaves_frame_and_strain_in_the_picture(tmp_path, monkeypatch, letter):
+    """Both ends of the source are kept, and all words are within the picture."""
+    widths = []
+
+    def measure(plotter, title, names):
+        add_words(plotter, title, names)
+        (words,) = (
+            actor
+            for actor in plotter.renderer.actors.values()
+            if getattr(actor, "GetInput", lambda: None)() == title
+        )
+        box = [0.0] * 4
+        words.GetBoundingBox(plotter.renderer, box)
+        widths.append((title, box[1] - box[0]))
+
+    monkeypatch.setattr("scanfab.writers.view.add_words", measure)
+    monkeypatch.setattr("scanfab.writers.view.check_drawing", lambda: None)
+    monkeypatch.setattr("pyvista.Plotter.screenshot", lambda _, path: Path(path).touch())
+    folder = tmp_path.joinpath(*[letter * 30] * 5)
+    folder.mkdir(parents=True)
+    dumps = folder / "shear"
+    dumps.symlink_to(f"{ROOT}/sample_data/lammps_shear")
+    assert run(["view", str(dumps), "--frame", "5", "--screenshot", str(tmp_path / "x.png")]) == 0
+    ((title, width),) = widths
+    assert title.startswith(str(dumps)[:20])
+    assert re.search(r"/shear, frame 5, shear strain [\d.]+ %$", title)
+    assert 0 < width < 1160
+
+
 @pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabWarning")
 def test_the_title_of_a_sheared_cell_has_its_shear(tmp_path, monkeypatch):
     titles = []
     monkeypatch.setattr("scanfab.writers.view.show_scene", lambda *said: titles.append(said[2]))
-    source = f"{ROOT}/sample_data/lammps_shear"
+    monkeypatch.chdir(ROOT)
+    source = "sample_data/lammps_shear"
     assert run(["view", source, "--frame", "5", "--screenshot", str(tmp_path / "x.png")]) == 0
     first, last = (frame.read().cell for frame in [*read_series(source)][::5])
     assert titles == [f"{source}, frame 5, shear strain {100 * shear_strain(last, first):.3g} %"]

@@ -11,6 +11,7 @@ import pytest
 from scanfab.compare import compare_tables
 from scanfab.errors import ScanfabNote, SettingsError
 from scanfab.figures import fits_of, plot_rows
+from scanfab.tabular import total_error
 from scanfab.writers.curves import abscissa_label, curves_of, is_turned, short_names
 from scanfab.writers.plot import check_plot_file, new_figure
 from scanfab.writers.plot_correlation import PAPER_SLOPE
@@ -246,6 +247,89 @@ def test_intensities_have_no_line(drawn):
     assert figure.axes[0].get_ylabel().endswith(", intensity")
 
 
+def captions(rows):
+    with new_figure(5, 3) as figure:
+        return draw_table(figure, rows, fits_of(compare_tables(rows)))
+
+
+def with_samples(rows):
+    return [
+        {**row, "alpha_vs_axial_sample_se": 2e-3, "alpha_c_axial_sample_se": 1e-2} for row in rows
+    ]
+
+
+def test_captions_say_what_is_drawn():
+    evolution, normalised, correlation = captions(with_samples(curve()))
+    errors = "with total standard errors of voids and contacts"
+    assert evolution == (
+        f"Void and contact anisotropy along the loading axis, over the axial strain; {errors}"
+    )
+    assert normalised.endswith(f"each curve divided by its own largest absolute value; {errors}")
+    assert correlation == (
+        "Void against contact anisotropy along the loading axis, with fitted lines and the "
+        "paper's slope"
+    )
+
+
+@pytest.mark.filterwarnings("ignore:the loading axis", "ignore:shear_strain stands")
+def test_captions_of_turned_axes_promise_no_errors_and_no_line():
+    evolution, normalised, correlation = captions(with_samples(sheared()))
+    assert evolution == (
+        "Intensity of void and contact anisotropy, and the angle between their major axes, over "
+        "the shear strain; without total errors"
+    )
+    assert normalised.startswith("Intensity of void and contact anisotropy, over")
+    assert correlation == "Void against contact intensity, without a line"
+
+
+def test_captions_name_the_frame_where_there_is_no_strain():
+    for caption in captions([{**row, "strain": None} for row in curve()])[:2]:
+        assert ", over the number of the frame" in caption
+        assert "strain" not in caption
+
+
+def test_captions_promise_no_line_that_is_not_drawn():
+    """One frame has none; nor is the paper's slope drawn where all contacts lie below zero."""
+    assert captions(curve()[:1])[2].endswith(", without a line")
+    below = [{**row, "alpha_c_axial": row["alpha_c_axial"] - 1} for row in curve()]
+    assert captions(below)[2].endswith(", with fitted lines")
+
+
+@pytest.mark.parametrize(
+    ("errors", "named"),
+    [
+        ({}, "without total errors"),
+        ({"alpha_vs_axial_sample_se": 2e-3}, "with total standard errors of voids"),
+        ({"alpha_c_axial_sample_se": 2e-3}, "with total standard errors of contacts"),
+    ],
+)
+def test_captions_name_the_errors_that_have_bands(errors, named):
+    assert captions([{**row, **errors} for row in curve()])[0].endswith(f"; {named}")
+
+
+@pytest.mark.parametrize(
+    ("errors", "shape"),
+    [
+        ({"alpha_vs_axial_sample_se": 2e-3, "alpha_c_axial_sample_se": 1e-2}, "+"),
+        ({"alpha_vs_axial_sample_se": 2e-3}, "|"),
+        ({"alpha_c_axial_se": 1e-2}, "_"),
+    ],
+)
+def test_errors_of_the_correlation_look_in_the_legend_as_they_are_drawn(drawn, errors, shape):
+    """A grey line looked like the one through zero."""
+    margin = drawn([{**row, **errors} for row in curve()], "correlation").axes[1]
+    handle = margin.get_legend().legend_handles[-1]
+    assert (handle.get_marker(), handle.get_linestyle()) == (shape, "None")
+    assert legend_of(margin)[-1].startswith("one total standard error")
+
+
+def test_without_the_scan_s_part_there_is_no_band(drawn):
+    """The sample's part alone is no total: a single replicate may be off by far more."""
+    rows = [{**row, "alpha_vs_axial_se": None} for row in with_samples(curve())]
+    assert not drawn(rows, "evolution").axes[0].collections
+    assert total_error(rows[0], "alpha_vs_axial") is None
+
+
 @pytest.mark.parametrize(("axial", "turned"), [(0.9, False), (0.4, True)])
 def test_the_most_certain_frame_tells_whether_the_axes_are_turned(axial, turned):
     rows = [{**row, "alpha_c_axial": axial * row["alpha_c"]} for row in sheared()]
@@ -256,7 +340,7 @@ def test_the_most_certain_frame_tells_whether_the_axes_are_turned(axial, turned)
 
 def test_one_frame_has_its_error_as_a_bar(drawn):
     """An area needs two points."""
-    row = {**curve()[2], "alpha_vs_axial_sample_se": 2e-3, "alpha_vs_axial_se": None}
+    row = {**curve()[2], "alpha_vs_axial_sample_se": 2e-3, "alpha_vs_axial_se": 0.0}
     figure = drawn([row], "evolution")
     assert figure.axes[0].get_xlim() == pytest.approx((1.0, 3.0))
     heights = [
@@ -265,7 +349,8 @@ def test_one_frame_has_its_error_as_a_bar(drawn):
         if hasattr(found, "get_segments")
         for segment in found.get_segments()
     ]
-    assert heights == pytest.approx([4.0])
+    # the band, and the scan's part of nothing
+    assert heights == pytest.approx([4.0, 0.0])
 
 
 def test_long_names_are_cut_in_the_middle_and_stay_different():
