@@ -8,12 +8,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
-    from scanfab.calibration import Calibration, calibrate
-    from scanfab.cell import Cell
-    from scanfab.compare import compare_tables
-    from scanfab.contacts import find_contacts
-    from scanfab.directions import DirectionRule, direction_rule
-    from scanfab.errors import (
+    from scanfab.base.errors import (
         PackingError,
         ReadError,
         ScanfabError,
@@ -22,6 +17,11 @@ if TYPE_CHECKING:
         SettingsError,
         UnknownFormatError,
     )
+    from scanfab.calibration import Calibration, calibrate
+    from scanfab.cell import Cell
+    from scanfab.compare import compare_tables
+    from scanfab.contacts import find_contacts
+    from scanfab.directions import DirectionRule, direction_rule
     from scanfab.fabric.contact import contact_fabric
     from scanfab.fabric.tensor import FabricTensor
     from scanfab.fabric.void import VoidFabric, void_fabric
@@ -44,19 +44,19 @@ _HOME = {
     "DirectionRule": "directions",
     "FabricTensor": "fabric.tensor",
     "Packing": "packing",
-    "PackingError": "errors",
-    "ReadError": "errors",
+    "PackingError": "base.errors",
+    "ReadError": "base.errors",
     "Row": "table",
     "ScanSums": "scan",
-    "ScanfabError": "errors",
-    "ScanfabNote": "errors",
-    "ScanfabWarning": "errors",
+    "ScanfabError": "base.errors",
+    "ScanfabNote": "base.errors",
+    "ScanfabWarning": "base.errors",
     "Series": "series",
     "Settings": "settings",
-    "SettingsError": "errors",
+    "SettingsError": "base.errors",
     "Solids": "scan",
     "Table": "table",
-    "UnknownFormatError": "errors",
+    "UnknownFormatError": "base.errors",
     "VoidFabric": "fabric.void",
     "calibrate": "calibration",
     "compare_tables": "compare",

@@ -10,8 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from scanfab.base.errors import ScanfabWarning, SettingsError
+from scanfab.base.spelling import spelt_apart, spelt_time
 from scanfab.directions import design_of, direction_rule
-from scanfab.errors import ScanfabWarning, SettingsError
 from scanfab.fabric.void import void_fabric
 from scanfab.plan import CLOSE, GROWTH_WITH_SPACING, Plan
 from scanfab.scan import (
@@ -23,7 +24,6 @@ from scanfab.scan import (
     scan_lines,
 )
 from scanfab.settings import Settings
-from scanfab.spelling import spelt_apart, spelt_time
 
 __all__ = ["missing_work", "scan_to_tolerance"]
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.errors import SettingsError
+from scanfab.base.errors import SettingsError
 from scanfab.packing import Packing
 
 __all__ = ["BoundaryRule", "enclosing_class", "existing_values", "select_boundary"]

@@ -11,8 +11,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from scanfab.adaptive import missing_work
+from scanfab.base.errors import PackingError, ScanfabWarning, SettingsError
 from scanfab.directions import direction_rule
-from scanfab.errors import PackingError, ScanfabWarning, SettingsError
 from scanfab.frame_result import frame_result
 from scanfab.ladders import (
     PAPER_CUTOFF,

@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from scanfab.base.errors import SettingsError
 from scanfab.directions import direction_rule
-from scanfab.errors import SettingsError
 from scanfab.tabular import number_of, numbers_of
 
 __all__ = ["caveats_of"]

@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.errors import PackingError
+from scanfab.base.errors import PackingError
 from scanfab.lattice import Lattice, reduced_lattice
 
 __all__ = ["Cell"]

@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from scanfab.errors import ReadError, ScanfabWarning, UnknownFormatError
+from scanfab.base.errors import ReadError, ScanfabWarning, UnknownFormatError
 from scanfab.families import Family, files_in, own_contacts, sort_into_families
 from scanfab.readers.base import FileKind
 from scanfab.readers.files import first_bytes

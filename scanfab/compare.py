@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.abscissa import strain_column, why_not_strain
+from scanfab.base.errors import ScanfabNote, ScanfabWarning, SettingsError
 from scanfab.comparison import Comparison, DifferenceRow, FrameRow, SummaryRow
-from scanfab.errors import ScanfabNote, ScanfabWarning, SettingsError
 from scanfab.fabric.jackknife import BLOCKS, variance_without_noise
 from scanfab.selection import check_rows
 from scanfab.tabular import number_of, numbers_of, total_error

@@ -9,9 +9,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.cast import cast, grains_named
+from scanfab.base.arrays import cast, grains_named
+from scanfab.base.errors import PackingError, ScanfabWarning
 from scanfab.cell import Cell
-from scanfab.errors import PackingError, ScanfabWarning
 
 __all__ = ["ContactList", "Contacts", "Spheres", "resolve_contacts", "warn_of_same_centre"]
 

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.errors import PackingError, SettingsError
 from scanfab.cell import Cell
 from scanfab.contact_list import Contacts, warn_of_same_centre
-from scanfab.errors import PackingError, SettingsError
 from scanfab.kernels.neighbours import (
     Frame,
     Grid,

@@ -12,7 +12,7 @@ from importlib.resources import files
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.errors import SettingsError
+from scanfab.base.errors import SettingsError
 
 __all__ = ["DirectionRule", "design_of", "direction_rule"]
 

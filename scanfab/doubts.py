@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.errors import PackingError
+from scanfab.base.errors import PackingError
 from scanfab.packing import Packing
 from scanfab.periodicity import fitting_periods
 from scanfab.variants import Sample

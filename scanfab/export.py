@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.errors import SettingsError
+from scanfab.base.files import check_folder
 from scanfab.distribution import mean_length_function, sphere_points
-from scanfab.errors import SettingsError
 from scanfab.fabric.tensor import COMPONENTS
 from scanfab.frame_result import FrameResult
 from scanfab.line_grids import line_frames
@@ -22,7 +23,6 @@ from scanfab.settings import Vector
 from scanfab.table import Row
 from scanfab.variants import VARIANTS
 from scanfab.writers import vtk
-from scanfab.writers.files import check_folder
 
 __all__ = ["VtkFolder", "scan_line_sample"]
 

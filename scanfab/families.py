@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from fnmatch import fnmatch
 from pathlib import Path
 
-from scanfab.errors import ReadError, UnknownFormatError
+from scanfab.base.errors import ReadError, UnknownFormatError
 from scanfab.readers.base import FileKind, Reader
 from scanfab.readers.files import bare_name
 from scanfab.readers.registry import reader_for, reader_named

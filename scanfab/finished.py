@@ -9,7 +9,7 @@ from itertools import groupby, pairwise
 from pathlib import Path
 from typing import Any
 
-from scanfab.errors import SettingsError
+from scanfab.base.errors import SettingsError
 from scanfab.manifest import strain_file
 from scanfab.pipeline import chosen_frames
 from scanfab.rerun import read_manifest

@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.abscissa import spelt_strain, strain_column
+from scanfab.base.errors import ScanfabWarning, SettingsError
 from scanfab.directions import DirectionRule
 from scanfab.distribution import mean_length_function, sphere_points
-from scanfab.errors import ScanfabWarning, SettingsError
 from scanfab.fabric.contact import contact_fabric
 from scanfab.frame_result import FrameResult
 from scanfab.gaps import scan_gaps

@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from scanfab.errors import ReadError
+from scanfab.base.errors import ReadError
 
 __all__ = ["FrameFile"]
 

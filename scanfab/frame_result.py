@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from scanfab.errors import ScanfabWarning
+from scanfab.base.errors import ScanfabWarning
+from scanfab.base.spelling import spelt_apart
 from scanfab.measurement import Measurement, measure
 from scanfab.plan import Plan
 from scanfab.settings import Settings
-from scanfab.spelling import spelt_apart
 from scanfab.table import Row
 from scanfab.variant_columns import VariantColumns, no_columns
 from scanfab.variants import VARIANTS, Sample

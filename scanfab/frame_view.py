@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from scanfab.abscissa import frame_strain_column, is_ambiguous
-from scanfab.errors import (
+from scanfab.base.errors import (
     PackingError,
     ReadError,
     ScanfabWarning,

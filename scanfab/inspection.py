@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 
+from scanfab.base.errors import PackingError, ReadError, ScanfabNote
 from scanfab.doubts import cell_doubt, cell_hint, doubts_of, refuse_impossible
-from scanfab.errors import PackingError, ReadError, ScanfabNote
 from scanfab.pipeline import (
     boundary_hint,
     chosen_frames,

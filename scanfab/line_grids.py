@@ -7,8 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.errors import SettingsError
 from scanfab.directions import DirectionRule
-from scanfab.errors import SettingsError
 
 __all__ = ["drawn_lines", "line_frames", "turned_frames"]
 

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.choice import PathLike, choose_grains, expanded, files_of, named_once
-from scanfab.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.families import (
     SETTINGS_FILE,
     Family,

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.cast import cast, grains_named
+from scanfab.base.arrays import cast, grains_named
+from scanfab.base.errors import PackingError
+from scanfab.base.lengths import LEAST, MOST, all_within
 from scanfab.cell import Cell
 from scanfab.contact_list import ContactList, Contacts, Spheres, resolve_contacts
-from scanfab.errors import PackingError
-from scanfab.limits import LEAST, MOST, all_within
 
 __all__ = [
     "ContactList",

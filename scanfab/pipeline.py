@@ -14,17 +14,18 @@ from itertools import chain, islice
 from pathlib import Path
 from typing import Any, Protocol
 
-from scanfab.boundary import enclosing_class, existing_values, select_boundary
-from scanfab.cell import Cell
-from scanfab.contacts import find_contacts
-from scanfab.doubts import cell_doubt, doubts_of
-from scanfab.errors import (
+from scanfab.base.errors import (
     PackingError,
     ReadError,
     ScanfabWarning,
     SettingsError,
     SkippedFrameWarning,
 )
+from scanfab.base.threads import in_order
+from scanfab.boundary import enclosing_class, existing_values, select_boundary
+from scanfab.cell import Cell
+from scanfab.contacts import find_contacts
+from scanfab.doubts import cell_doubt, doubts_of
 from scanfab.frame_result import FrameResult, frame_result
 from scanfab.packing import Packing
 from scanfab.plan import Plan, make_plan
@@ -33,7 +34,6 @@ from scanfab.series import Series
 from scanfab.settings import STRAIN_MODES, Settings
 from scanfab.strain import StrainFile, axial_length, is_flipped, shear_strain
 from scanfab.table import Row, Table
-from scanfab.threads import in_order
 from scanfab.variants import Sample
 
 __all__ = [

@@ -9,10 +9,10 @@ from datetime import UTC, date, datetime
 from pathlib import Path
 from typing import Any
 
+from scanfab.base.errors import ScanfabError, ScanfabNote, ScanfabWarning, SettingsError
 from scanfab.caveats import caveats_of
 from scanfab.compare import compare_tables
 from scanfab.comparison import Comparison
-from scanfab.errors import ScanfabError, ScanfabNote, ScanfabWarning, SettingsError
 from scanfab.figures import fits_of
 from scanfab.report_frames import data_url, show_frames
 from scanfab.report_inputs import Input, read_inputs

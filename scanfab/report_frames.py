@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from scanfab.errors import SettingsError
+from scanfab.base.errors import SettingsError
 from scanfab.frame_figures import lengths_of, projections_of, scan_frames
 from scanfab.frame_noise import noise_notes
 from scanfab.frame_view import Look, look_at

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.abscissa import spelt_strain, strain_column
-from scanfab.errors import SettingsError
+from scanfab.base.errors import SettingsError
 from scanfab.rerun import read_manifest
 from scanfab.selection import choose_rows
 from scanfab.tabular import numbers_of, read_rows

@@ -8,7 +8,7 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
-from scanfab.errors import ReadError, SettingsError
+from scanfab.base.errors import ReadError, SettingsError
 from scanfab.manifest import asked_for
 from scanfab.opening import READING, open_sources
 from scanfab.series import Series

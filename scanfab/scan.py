@@ -10,12 +10,12 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.errors import SettingsError
+from scanfab.base.jit import Flag
 from scanfab.directions import DirectionRule
-from scanfab.errors import SettingsError
 from scanfab.kernels import sweep
 from scanfab.kernels.axes import scan_axes, scan_cell
 from scanfab.kernels.bins import Bins, no_bins
-from scanfab.kernels.compiled import Flag
 from scanfab.kernels.periodic import CellGrains
 from scanfab.line_grids import drawn_lines
 

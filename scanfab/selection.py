@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from scanfab.errors import ScanfabWarning, SettingsError
+from scanfab.base.errors import ScanfabWarning, SettingsError
 from scanfab.table import COLUMNS
 from scanfab.tabular import TEXT_COLUMNS, is_number
 

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from scanfab.errors import PackingError, ReadError, ScanfabWarning
+from scanfab.base.errors import PackingError, ReadError, ScanfabWarning
 from scanfab.families import Family
 from scanfab.frame_file import FrameFile
 from scanfab.packing import Packing, check_lengths

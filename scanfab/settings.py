@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from scanfab.base.errors import SettingsError
 from scanfab.boundary import BoundaryRule
 from scanfab.directions import DirectionRule, direction_rule
-from scanfab.errors import SettingsError
 
 __all__ = [
     "AUTO_RULE",

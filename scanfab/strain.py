@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from scanfab.base.errors import SettingsError
 from scanfab.cell import Cell
-from scanfab.errors import SettingsError
 from scanfab.frame_file import FrameFile
 from scanfab.variants import Sample
 

@@ -11,8 +11,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from scanfab.errors import ReadError
-from scanfab.streams import check_file_or_pipe
+from scanfab.base.errors import ReadError
+from scanfab.base.streams import check_file_or_pipe
 
 __all__ = ["is_number", "number_of", "numbers_of", "read_rows", "total_error"]
 

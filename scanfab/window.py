@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.errors import SettingsError
 from scanfab.cell import Cell
-from scanfab.errors import SettingsError
 from scanfab.packing import Packing
 
 __all__ = ["RV_MEANING", "SphereWindow", "SurfaceBox"]

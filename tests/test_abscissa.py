@@ -10,7 +10,7 @@ from scanfab.abscissa import (
     strain_column,
     why_not_strain,
 )
-from tests.tables import curve, sheared
+from tests.helpers.tables import curve, sheared
 
 
 def without_strain(source):

@@ -23,8 +23,8 @@ from scanfab.plan import REPLICATES, make_plan
 from scanfab.scan import CellGrains, Solids
 from scanfab.settings import AUTO_RULE
 from scanfab.variants import Sample
-from tests.lattices import shaken_cubic
-from tests.scanning import solids_of
+from tests.helpers.lattices import shaken_cubic
+from tests.helpers.scanning import solids_of
 
 
 @pytest.fixture(scope="module")

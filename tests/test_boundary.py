@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from scanfab.base.errors import SettingsError
 from scanfab.boundary import BoundaryRule, enclosing_class, select_boundary
-from scanfab.errors import SettingsError
 from scanfab.packing import Packing
 from scanfab.pipeline import compute
 

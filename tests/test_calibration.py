@@ -23,7 +23,7 @@ from scanfab.ladders import (
     judged,
     sentence_of_recommended,
 )
-from tests.lattices import shaken_cubic
+from tests.helpers.lattices import shaken_cubic
 
 QUICK = {"tolerance": 2e-3, "variants": "cd", "rv": 0.6, "workers": 1}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from scanfab.caveats import caveats_of
-from tests.tables import curve
+from tests.helpers.tables import curve
 
 
 def rows(**values):

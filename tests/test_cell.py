@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from scanfab.base.errors import PackingError
 from scanfab.cell import Cell
-from scanfab.errors import PackingError
-from tests import naive
+from tests.helpers import naive
 
 EDGES = np.array([2.0, 3.0, 4.0])
 TILTED = np.array([[2.0, 0, 0], [0.7, 3, 0], [-0.5, 0.4, 4]])

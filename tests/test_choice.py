@@ -8,11 +8,11 @@ import warnings
 import pytest
 
 import scanfab
+from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.cli.main import run
-from scanfab.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.writers.results import ResultFile
-from tests.dumps import PAIRS, dump_text, pairs_text, write
-from tests.truth import FLOOR, SAMPLE_DATA
+from tests.helpers.dumps import PAIRS, dump_text, pairs_text, write
+from tests.helpers.truth import FLOOR, SAMPLE_DATA
 
 NO_RADIUS = "id type x y z c_rad"
 
@@ -79,7 +79,7 @@ def test_contacts_of_another_folder_are_not_beside(folder, tmp_path):
     assert contacts_of(alone) == [None]
 
 
-@pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabNote")
+@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabNote")
 def test_of_two_series_each_has_the_contacts_of_its_own_prefix(folder):
     series(folder, "run1_dump", "run1_contacts", 9, PAIRS[:1])
     series(folder, "run2_dump", "run2_contacts", 9)
@@ -103,7 +103,7 @@ def test_two_lists_beside_are_not_taken(folder):
         assert contacts_of(folder / "dump_9.txt") == [None]
 
 
-@pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabNote")
+@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabNote")
 def test_the_advice_of_several_series_keeps_the_contacts(folder):
     series(folder, "p5_dump", "p5_contacts", 9, PAIRS[:1])
     with pytest.raises(ReadError, match="several series of grains") as told:
@@ -150,7 +150,7 @@ def test_folders_below_that_hold_series_are_named(folder):
         scanfab.read_series(folder.parent)
 
 
-@pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabNote")
+@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabNote")
 def test_globs_in_quotes_are_expanded(folder, capsys):
     assert contacts_of(f"{folder}/dump_*.txt") == [2, 2]
     assert scanfab.read_series(f"{folder}/dump_*.txt").name == str(folder)
@@ -184,7 +184,7 @@ def test_what_editors_leave_is_no_frame(folder):
         assert contacts_of(folder) == [2, 2]
 
 
-@pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabNote")
+@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabNote")
 def test_the_command_line_takes_a_file_of_cells(tmp_path, capsys):
     strained = SAMPLE_DATA / "yade_strained"
     words = ["inspect", str(strained / "rec_spheres.27500.vtu"), "--json"]

@@ -8,9 +8,9 @@ import warnings
 import numpy as np
 import pytest
 
+from scanfab.base.errors import ScanfabNote, ScanfabWarning, SettingsError
 from scanfab.compare import compare_tables
-from scanfab.errors import ScanfabNote, ScanfabWarning, SettingsError
-from tests.tables import CONTACT, STRAIN, VOID, curve, sheared
+from tests.helpers.tables import CONTACT, STRAIN, VOID, curve, sheared
 
 
 def summary_of(rows, **options):

@@ -10,7 +10,7 @@ from scipy.special import eval_legendre
 from scanfab import SettingsError, direction_rule
 from scanfab.directions import LEBEDEV_DEGREES, NEGATIVE_LEBEDEV
 from scanfab.settings import AUTO_RULE
-from tests.naive import axial
+from tests.helpers.naive import axial
 
 LEBEDEV = [f"lebedev:{degree}" for degree in LEBEDEV_DEGREES if degree not in NEGATIVE_LEBEDEV]
 DESIGNS = [*(f"design:{degree}" for degree in range(3, 22, 2)), "icosahedral:9"]

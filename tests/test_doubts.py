@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 import scanfab
+from scanfab.base.errors import PackingError
 from scanfab.cell import Cell
 from scanfab.contacts import find_contacts
 from scanfab.doubts import cell_doubt, cell_hint, doubts_of, refuse_impossible
-from scanfab.errors import PackingError
 from scanfab.packing import Packing
 from scanfab.variants import Sample
-from tests.truth import BOX, CELL, FLOOR, SAMPLE_DATA, SHEAR, TRIAXIAL, YADE
+from tests.helpers.truth import BOX, CELL, FLOOR, SAMPLE_DATA, SHEAR, TRIAXIAL, YADE
 
 CLUMPS, DISCS = SAMPLE_DATA / "clumps", SAMPLE_DATA / "lammps_discs"
-pytestmark = pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabNote")
+pytestmark = pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabNote")
 
 
 def sample_of(packing):

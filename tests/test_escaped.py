@@ -10,7 +10,7 @@ from scanfab import Cell, Packing, ScanfabWarning, Settings, compute, find_conta
 from scanfab.escaped import escaped_grains
 from scanfab.plan import make_plan
 from scanfab.variants import Sample
-from tests.lattices import ball_points, shaken_cubic
+from tests.helpers.lattices import ball_points, shaken_cubic
 
 SPHERES = shaken_cubic(np.random.default_rng(5), 9)
 

@@ -11,8 +11,8 @@ from scanfab.pipeline import compute_rows
 from scanfab.settings import Settings
 from scanfab.table import COLUMNS
 from scanfab.writers.vtk import Collection
-from tests.dumps import cubic_rows, dump_text, write
-from tests.lattices import shaken_cubic
+from tests.helpers.dumps import cubic_rows, dump_text, write
+from tests.helpers.lattices import shaken_cubic
 
 pyvista = pytest.importorskip("pyvista")
 
@@ -79,7 +79,9 @@ def test_the_surface_gives_back_the_tensor(computed, variant):
         assert share.sum() == pytest.approx(row["mean_length"], rel=2e-3)
 
 
-@pytest.mark.filterwarnings("ignore:frame .* above the tolerance:scanfab.errors.ScanfabWarning")
+@pytest.mark.filterwarnings(
+    "ignore:frame .* above the tolerance:scanfab.base.errors.ScanfabWarning"
+)
 def test_the_surface_has_the_moment_of_the_table(tmp_path):
     packing = scanfab.find_contacts(scanfab.Packing(*shaken_cubic(np.random.default_rng(0), 6)))
     words = {"variants": "c", "tolerance": 2e-3, "moment": 2}
@@ -176,7 +178,7 @@ def test_a_resumed_collection_keeps_its_frames(tmp_path):
     assert list(Collection(path, go_on=True).entries) == ["c.vtp"]
 
 
-@pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabWarning")
+@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
 def test_a_frame_without_grains_and_a_name_beyond_ascii(tmp_path):
     folder = tmp_path / 'grüße<&">'
     folder.mkdir()

@@ -6,9 +6,9 @@ import gzip
 
 import pytest
 
-from scanfab.errors import ReadError, UnknownFormatError
+from scanfab.base.errors import ReadError, UnknownFormatError
 from scanfab.families import sort_into_families
-from tests.dumps import dump_text, pairs_text, write
+from tests.helpers.dumps import dump_text, pairs_text, write
 
 
 def families_of(tmp_path, names, text=None, format=None):

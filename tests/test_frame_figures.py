@@ -10,7 +10,7 @@ import pytest
 
 import scanfab
 from scanfab import frame_figures
-from scanfab.errors import SettingsError
+from scanfab.base.errors import SettingsError
 from scanfab.frame_figures import FRAME_FIGURES, parse_figure, plot_frames
 from scanfab.settings import Settings
 from scanfab.tabular import total_error
@@ -19,7 +19,7 @@ from scanfab.writers.plot_frame import disk
 from tests.conftest import ROOT, SAMPLE
 from tests.writers.test_plot_table import BYTES
 
-pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.errors.ScanfabNote")
+pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.base.errors.ScanfabNote")
 SETTINGS = Settings.make(boundary="mask=3", tolerance=5e-4)
 
 
@@ -65,7 +65,9 @@ def test_the_curve_of_cut_offs_goes_through_the_table(series, computed, caught, 
         assert abs(curve.alpha[place] - row["alpha_vs_axial"]) < near
 
 
-@pytest.mark.filterwarnings("ignore:frame .* above the tolerance:scanfab.errors.ScanfabWarning")
+@pytest.mark.filterwarnings(
+    "ignore:frame .* above the tolerance:scanfab.base.errors.ScanfabWarning"
+)
 def test_figures_have_the_moment_of_the_table(series, caught, tmp_path):
     """The mean of the squares over the mean is far more anisotropic than the mean."""
     words = {"boundary": "mask=3", "tolerance": 5e-4, "moment": 2}

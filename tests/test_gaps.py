@@ -7,9 +7,9 @@ from scanfab import Cell, Solids, direction_rule, scan_lines
 from scanfab.gaps import Blocks, scan_gaps
 from scanfab.line_grids import line_frames, turned_frames
 from scanfab.scan import CellGrains
-from tests import naive
-from tests.lattices import poisson_spheres
-from tests.scanning import ratio, solids_of
+from tests.helpers import naive
+from tests.helpers.lattices import poisson_spheres
+from tests.helpers.scanning import ratio, solids_of
 
 RULE = direction_rule("lebedev:5")
 CUTOFFS = [0.0, 0.3, 0.8, 1.7]

@@ -8,11 +8,11 @@ import warnings
 import pytest
 
 import scanfab
-from scanfab.errors import ScanfabNote, ScanfabWarning
+from scanfab.base.errors import ScanfabNote, ScanfabWarning
 from scanfab.inspection import FrameReport, inspect_series
 from scanfab.settings import Settings
-from tests.dumps import ROWS, dump_text, pairs_text, write, yade_spheres
-from tests.truth import FLOOR, SAMPLE_DATA
+from tests.helpers.dumps import ROWS, dump_text, pairs_text, write, yade_spheres
+from tests.helpers.truth import FLOOR, SAMPLE_DATA
 
 
 def reports(folder, texts, **options):

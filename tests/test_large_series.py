@@ -11,7 +11,7 @@ import scanfab
 from scanfab import series as series_module
 from scanfab.pipeline import compute_rows
 from scanfab.settings import Settings
-from tests.dumps import cubic_rows, dump_text, write
+from tests.helpers.dumps import cubic_rows, dump_text, write
 
 SCAN = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin", "variants": "a"}
 FRAMES = 12

@@ -14,7 +14,7 @@ import scanfab
 from scanfab.cli.main import run
 from scanfab.manifest import asked_for, manifest
 from scanfab.settings import Settings
-from tests.dumps import cubic_rows, dump_text, pairs_text, write
+from tests.helpers.dumps import cubic_rows, dump_text, pairs_text, write
 
 FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "a")
 

@@ -9,8 +9,8 @@ from scanfab import Cell, Packing, ScanfabWarning, Settings, compute, find_conta
 from scanfab.gaps import Blocks
 from scanfab.plan import make_plan
 from scanfab.variants import VARIANTS, Sample
-from tests import naive
-from tests.lattices import shaken_cubic
+from tests.helpers import naive
+from tests.helpers.lattices import shaken_cubic
 
 LINES = {"directions": "lebedev:5", "spacing": 0.15}
 

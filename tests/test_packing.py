@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from scanfab.base.errors import PackingError, ScanfabWarning
 from scanfab.cell import Cell
-from scanfab.errors import PackingError, ScanfabWarning
 from scanfab.packing import ContactList, Packing
 
 ROW = np.array([[0.0, 0, 0], [1.9, 0, 0], [3.8, 0, 0]])

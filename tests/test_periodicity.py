@@ -8,9 +8,9 @@ import pytest
 import scanfab
 from scanfab.packing import Packing
 from scanfab.periodicity import fitting_periods
-from tests.truth import BOX, CELL, FLOOR, PERIODIC, TRIAXIAL, YADE
+from tests.helpers.truth import BOX, CELL, FLOOR, PERIODIC, TRIAXIAL, YADE
 
-pytestmark = pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabNote")
+pytestmark = pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabNote")
 
 
 def without_cell(path):

@@ -14,10 +14,10 @@ from scanfab.figures import fits_of
 from scanfab.writers import plot_table
 from scanfab.writers.plot import new_figure
 from tests.conftest import ROOT
-from tests.tables import curve
+from tests.helpers.tables import curve
 
 # what scanfab tells of the sample does not matter here
-pytestmark = pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabWarning")
+pytestmark = pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
 
 
 def script() -> ModuleType:

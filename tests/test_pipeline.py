@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 import scanfab
+from scanfab.base.errors import ScanfabWarning, SettingsError
 from scanfab.cell import Cell
-from scanfab.errors import ScanfabWarning, SettingsError
 from scanfab.packing import Packing
 from scanfab.pipeline import compute_rows
 from scanfab.settings import Settings
 from scanfab.table import COLUMNS
 from scanfab.writers.rows import CsvWriter
-from tests.dumps import dump_text, pairs_text, write, yade_spheres
+from tests.helpers.dumps import dump_text, pairs_text, write, yade_spheres
 
 SCAN = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin"}
 COUNT = 110

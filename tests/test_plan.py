@@ -18,7 +18,7 @@ from scanfab import (
 from scanfab.plan import CLOSE, FEWEST_LINES, GROWTH_WITH_SPACING, REPLICATES, WIDE, make_plan
 from scanfab.settings import AUTO_RULE
 from scanfab.variants import Sample
-from tests.lattices import shaken_cubic
+from tests.helpers.lattices import shaken_cubic
 
 
 def sample_of(packing, boundary=None):

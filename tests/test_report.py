@@ -15,8 +15,8 @@ from types import SimpleNamespace
 
 import pytest
 
+from scanfab.base.errors import ReadError
 from scanfab.cli.main import run
-from scanfab.errors import ReadError
 from scanfab.opening import read_series
 from scanfab.pipeline import compute_rows
 from scanfab.report import make_report
@@ -24,10 +24,10 @@ from scanfab.scene import Scene
 from scanfab.tabular import read_rows
 from scanfab.writers.page import MOST_GRAINS, Picture, view_data
 from tests.conftest import ROOT
-from tests.dumps import cubic_rows, dump_text, write
-from tests.tables import curve, sheared
+from tests.helpers.dumps import cubic_rows, dump_text, write
+from tests.helpers.tables import curve, sheared
 
-pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.errors.ScanfabNote")
+pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.base.errors.ScanfabNote")
 
 
 @pytest.fixture
@@ -343,7 +343,9 @@ def test_sources_of_both_kinds_have_each_their_own_strain(table):
     assert "3 c 3 % - " in frames
 
 
-@pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabWarning", "ignore:shear_strain stands")
+@pytest.mark.filterwarnings(
+    "ignore::scanfab.base.errors.ScanfabWarning", "ignore:shear_strain stands"
+)
 def test_the_view_of_a_sheared_cell_has_its_shear_in_the_title(tmp_path, monkeypatch, quick):
     monkeypatch.chdir(ROOT)
     table = tmp_path / "t.csv"

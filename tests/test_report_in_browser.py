@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from scanfab.cli.main import run
-from tests.browser import Browser, missing
 from tests.conftest import ROOT, SAMPLE
+from tests.helpers.browser import Browser, missing
 
 pytestmark = pytest.mark.skipif(bool(missing()), reason=missing())
 

@@ -7,16 +7,16 @@ import shutil
 
 import pytest
 
+from scanfab.base.errors import SettingsError
 from scanfab.cli.main import run
-from scanfab.errors import SettingsError
 from scanfab.report import make_report
 from scanfab.tabular import read_rows
 from tests.conftest import ROOT, SAMPLE
-from tests.dumps import write
-from tests.tables import curve
+from tests.helpers.dumps import write
+from tests.helpers.tables import curve
 from tests.test_report import page_of, words_of
 
-pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.errors.ScanfabWarning")
+pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.base.errors.ScanfabWarning")
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import pytest
 
 from scanfab.compare import compare_tables
 from scanfab.report_tables import frame_table, overview, results_tables
-from tests.tables import curve, sheared
+from tests.helpers.tables import curve, sheared
 
 
 def results_of(value, **errors):

@@ -7,9 +7,9 @@ import shlex
 
 import pytest
 
+from scanfab.base.errors import ReadError
 from scanfab.cli.compute import compute
 from scanfab.cli.main import run
-from scanfab.errors import ReadError
 from scanfab.manifest import asked_for
 from scanfab.rerun import read_manifest, reopen, repeat_command, restored_settings
 from scanfab.settings import Settings

@@ -7,7 +7,7 @@ import pytest
 
 import scanfab
 from scanfab.variants import Sample
-from tests.truth import BOX, COMPONENTS, FLOOR, PERIODIC, TRIAXIAL, YADE, csv_rows
+from tests.helpers.truth import BOX, COMPONENTS, FLOOR, PERIODIC, TRIAXIAL, YADE, csv_rows
 
 SCAN = {"directions": 25, "spacing": "3rmin"}
 SHELL = csv_rows(TRIAXIAL / "engine.csv")
@@ -93,7 +93,7 @@ def test_removing_rattlers_removes_those_that_yade_counts(triaxial_table):
     np.testing.assert_array_equal(removed["grains"], SHELL["grains"] - SHELL["rattlers"])
 
 
-@pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabWarning")
+@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
 def test_yades_contacts_are_found_by_geometry_but_for_a_few():
     whole = triaxial(contacts="geometric").select(variant="a")
     assert set(whole["contacts_from"].tolist()) == {"geometric"}
@@ -119,18 +119,18 @@ def test_liggghts_strain_comes_from_a_file(box_table):
     np.testing.assert_allclose(strain, PLATES["strain"], rtol=0, atol=1e-4)
 
 
-@pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabWarning")
+@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
 def test_the_extent_of_the_grains_follows_the_plates():
     strain = box("grains").select(variant="a")["strain"]
     np.testing.assert_allclose(strain, PLATES["strain"], rtol=0, atol=1e-2)
 
 
-@pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabWarning")
+@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
 def test_without_walls_in_the_table_there_is_no_strain_by_itself():
     assert np.isnan(box("auto")["strain"]).all()
 
 
-@pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabWarning")
+@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
 def test_liggghts_contacts_are_found_by_geometry_but_for_a_few(strain_file):
     whole = box(strain_file, contacts="geometric").select(variant="a")
     assert np.abs(whole["contacts"] - PLATES["contacts"]).max() <= 3

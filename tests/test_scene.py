@@ -9,7 +9,7 @@ import scanfab
 from scanfab.scene import Scene, contact_lines, grains_of, scene_of, section_lines
 from scanfab.variants import Sample
 from scanfab.window import SphereWindow
-from tests.lattices import simple_cubic
+from tests.helpers.lattices import simple_cubic
 
 
 @pytest.fixture

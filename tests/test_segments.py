@@ -7,8 +7,8 @@ import pytest
 
 from scanfab.line_grids import line_frames
 from scanfab.segments import Segments, cut_lines, grid_points, sample_segments
-from tests import naive
-from tests.lattices import shaken_cubic
+from tests.helpers import naive
+from tests.helpers.lattices import shaken_cubic
 
 
 @pytest.fixture

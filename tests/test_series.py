@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab.errors import (
+from scanfab.base.errors import (
     PackingError,
     ReadError,
     ScanfabNote,
@@ -17,8 +17,8 @@ from scanfab.errors import (
     UnknownFormatError,
 )
 from scanfab.opening import open_sources
-from tests.dumps import PAIRS, ROWS, dump_text, pairs_text, write
-from tests.truth import FLOOR, id_pairs
+from tests.helpers.dumps import PAIRS, ROWS, dump_text, pairs_text, write
+from tests.helpers.truth import FLOOR, id_pairs
 
 STEPS = (9, 10, 100)
 
@@ -184,7 +184,7 @@ def test_unknown_files_are_passed_over_with_one_note(folder):
 
 
 @pytest.mark.parametrize("name", ["photo.vtu", "log.gz"])
-@pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabWarning")
+@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
 def test_a_damaged_file_beside_the_series_is_passed_over(folder, name):
     damaged = {"photo.vtu": b'<VTKFile type="UnstructuredGrid">', "log.gz": b"\x1f\x8b\x08broken"}
     (folder / name).write_bytes(damaged[name])

@@ -7,10 +7,10 @@ import dataclasses
 import numpy as np
 import pytest
 
+from scanfab.base.errors import SettingsError
 from scanfab.directions import direction_rule
-from scanfab.errors import SettingsError
 from scanfab.settings import Length, Settings, parse_axis, parse_frames, parse_length
-from tests.dumps import write
+from tests.helpers.dumps import write
 
 RADII = {"rmin": 0.5, "rmean": 1.0, "rmax": 2.0}
 

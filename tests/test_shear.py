@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import scanfab
+from scanfab.base.errors import ScanfabWarning
 from scanfab.cell import Cell
-from scanfab.errors import ScanfabWarning
 from scanfab.strain import is_flipped, shear_strain
-from tests.dumps import cubic_rows, dump_text, write
-from tests.lattices import rotation
-from tests.truth import SHEAR
+from tests.helpers.dumps import cubic_rows, dump_text, write
+from tests.helpers.lattices import rotation
+from tests.helpers.truth import SHEAR
 
 EDGE = 4.0
 SCAN = {"variants": "a", "directions": 9, "spacing": "1rmin", "cutoff": 0}

@@ -18,7 +18,7 @@ import pyvista
 import scanfab
 from scanfab.cli.main import run
 from scanfab.opening import open_sources
-from tests.dumps import cubic_rows, dump_text, write
+from tests.helpers.dumps import cubic_rows, dump_text, write
 
 ROOT = Path(__file__).parents[1]
 YADE = ROOT / "sample_data" / "yade_triaxial"

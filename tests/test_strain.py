@@ -7,13 +7,13 @@ import contextlib
 import numpy as np
 import pytest
 
+from scanfab.base.errors import ReadError, SettingsError
 from scanfab.cell import Cell
-from scanfab.errors import ReadError, SettingsError
 from scanfab.packing import Packing
 from scanfab.settings import AXES
 from scanfab.strain import StrainFile, axial_length
 from scanfab.variants import Sample
-from tests.dumps import write
+from tests.helpers.dumps import write
 
 POSITION = np.array([[1.0, 1, 1], [2, 3, 5], [1, 1, 0], [4, 4, 9]])
 BOUNDARY = np.array([False, False, True, True])

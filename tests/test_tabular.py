@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from scanfab.errors import ReadError
+from scanfab.base.errors import ReadError
 from scanfab.tabular import read_rows
-from tests.dumps import write
+from tests.helpers.dumps import write
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import pytest
 from scanfab import Cell, Packing, contact_fabric, find_contacts
 from scanfab.variants import VARIANTS, Sample
 from scanfab.window import SphereWindow
-from tests.lattices import shaken_cubic
+from tests.helpers.lattices import shaken_cubic
 
 A, B, C, D = (VARIANTS[name] for name in "abcd")
 

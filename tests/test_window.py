@@ -5,7 +5,7 @@ import pytest
 
 from scanfab import Cell, Packing, SettingsError, compute
 from scanfab.window import SphereWindow, SurfaceBox
-from tests.lattices import shaken_cubic
+from tests.helpers.lattices import shaken_cubic
 
 CELL = Cell([10.0, 8.0, 6.0], origin=(-1.0, 2.0, 3.0))
 ALL = np.ones(4, bool)

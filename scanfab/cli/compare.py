@@ -72,10 +72,10 @@ def compare(
     input. Per frame: both anisotropies, also divided by their own largest absolute value; with
     --summary, per source and variant: the slope of void on contact fabric. On a terminal both.
     """
+    from scanfab.base.errors import SettingsError
     from scanfab.cli.comparison_tables import print_comparison
     from scanfab.cli.console import is_readable, reported_warnings
     from scanfab.compare import compare_tables
-    from scanfab.errors import SettingsError
     from scanfab.figures import TABLE_FIGURES, plot_rows
     from scanfab.selection import choose_rows
     from scanfab.tabular import read_rows

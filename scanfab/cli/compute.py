@@ -182,11 +182,11 @@ def compute(
     Variants: a whole sample; b whole sample, rattlers removed; c representative volume (RV); d RV,
     rattlers removed. Lengths are in the dump's own units.
     """
+    from scanfab.base.files import check_folder
     from scanfab.cli.console import announce_compiling, reported_warnings
     from scanfab.manifest import asked_for
     from scanfab.settings import Settings
     from scanfab.table import Row
-    from scanfab.writers.files import check_folder
     from scanfab.writers.results import ResultFile
     from scanfab.writers.rows import Excerpt
 
@@ -265,9 +265,9 @@ def _write_or_say(
     run: Run, asked: dict[str, Any], result: ResultFile | None, excerpt: Excerpt
 ) -> None:
     """Write the rows; where that is interrupted or fails, say how far it is and how to go on."""
+    from scanfab.base.errors import ScanfabError
     from scanfab.cli.console import is_readable
     from scanfab.cli.signals import telling
-    from scanfab.errors import ScanfabError
 
     printed = not is_readable()
 
@@ -324,8 +324,8 @@ def _manifests(output: Path | None, asked: Path | None) -> list[Path]:
 def _write_manifest(
     path: Path, asked: dict[str, Any], run: Run, told: Told, settings_file: SettingsFile | None
 ) -> None:
+    from scanfab.base.files import whole_file
     from scanfab.manifest import manifest
-    from scanfab.writers.files import whole_file
 
     # what was told of the rows that an earlier run has finished
     before = run.table.warnings if run.table is not None else []

@@ -11,10 +11,10 @@ from typing import Any
 
 import click
 
+from scanfab.base.errors import ScanfabNote, ScanfabWarning, SkippedFrameWarning
 from scanfab.cli.options import AS_CSV
 from scanfab.cli.tables import Column, print_columns, spelt
 from scanfab.cli.talk import Level, level
-from scanfab.errors import ScanfabNote, ScanfabWarning, SkippedFrameWarning
 from scanfab.table import Row
 from scanfab.writers.rows import Excerpt
 
@@ -95,8 +95,8 @@ def is_readable() -> bool:
 
 def announce_compiling() -> None:
     """A line on standard error if something has to be compiled first."""
-    from scanfab.kernels.cache import when_compiling
-    from scanfab.kernels.folder import kernel_folder
+    from scanfab.base.kernel_cache import when_compiling
+    from scanfab.base.kernel_folder import kernel_folder
 
     problem = kernel_folder().problem
     kept = f"it cannot be kept: {problem}" if problem else "it is kept for later runs"

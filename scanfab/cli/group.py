@@ -57,8 +57,8 @@ def _print_version(ctx: click.Context, param: click.Parameter, value: bool) -> N
 
 def _check_limit() -> None:
     """Some libraries end the process, or wait for ever, where they cannot even be loaded."""
-    from scanfab.errors import ScanfabError
-    from scanfab.memory import address_space
+    from scanfab.base.errors import ScanfabError
+    from scanfab.base.memory import address_space
 
     space = address_space()
     if space is not None and space < LEAST_SPACE:

@@ -79,9 +79,9 @@ def run(args: list[str]) -> int:
     """The command line's exit code; errors become one message on standard error."""
     import click
 
+    from scanfab.base.errors import ScanfabError
     from scanfab.cli.group import cli
     from scanfab.cli.signals import interrupted_words
-    from scanfab.errors import ScanfabError
 
     # wherever it stands: the group knows it only for its help
     debug = "--debug" in args
@@ -104,7 +104,7 @@ def run(args: list[str]) -> int:
 
 def _lacks_memory(error: Exception) -> bool:
     """Whether there is no memory: libraries that cannot load their parts raise all kinds."""
-    from scanfab.memory import address_space
+    from scanfab.base.memory import address_space
 
     space = address_space()
     told = any(words in str(error) for words in ("failed to map", "can't start new thread"))
@@ -115,7 +115,7 @@ def _describe(error: Exception) -> str:
     import os
     from io import UnsupportedOperation
 
-    from scanfab.errors import ScanfabError
+    from scanfab.base.errors import ScanfabError
 
     if isinstance(error, UnsupportedOperation):
         return "standard output is closed: name a file with -o"

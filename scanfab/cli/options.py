@@ -57,7 +57,7 @@ def completed(
 @contextmanager
 def usage_errors(before: str = "") -> Iterator[None]:
     """Settings that cannot be are wrong usage; ``before`` stands before the message."""
-    from scanfab.errors import SettingsError, UnknownFormatError
+    from scanfab.base.errors import SettingsError, UnknownFormatError
 
     try:
         yield
@@ -84,8 +84,8 @@ def _reader_names() -> Iterable[str]:
 
 def _expanded(source: str) -> list[Any]:
     """What a glob names; one that names nothing is a path that does not exist."""
+    from scanfab.base.errors import ReadError
     from scanfab.choice import expanded
-    from scanfab.errors import ReadError
 
     try:
         return [*expanded(source)]

@@ -60,7 +60,7 @@ class Run:
 
         A part is of the run that was interrupted last, so it counts, whatever FILE holds.
         """
-        from scanfab.errors import SettingsError
+        from scanfab.base.errors import SettingsError
         from scanfab.finished import finished_table
         from scanfab.manifest import with_frames
 

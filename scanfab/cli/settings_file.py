@@ -41,7 +41,7 @@ def fill_from_file(
 
     A note says which; a file that cannot be right is a usage error in every command.
     """
-    from scanfab.errors import ScanfabNote
+    from scanfab.base.errors import ScanfabNote
 
     path = _path_beside(sources)
     if path is None:

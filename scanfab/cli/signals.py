@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 
-from scanfab.ending import finish
+from scanfab.base.ending import finish
 
 __all__ = [
     "catch_signals",

@@ -51,7 +51,7 @@ def open_series(sources: tuple[str, ...], reading: dict[str, Any]) -> list[Serie
     """The series of a command line; ``-`` is one that comes by standard input."""
     from dataclasses import replace
 
-    from scanfab.errors import ReadError
+    from scanfab.base.errors import ReadError
     from scanfab.opening import open_sources, read_series
     from scanfab.readers.files import temporary_copy
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from scanfab.spelling import spelt_time
+from scanfab.base.spelling import spelt_time
 
 if TYPE_CHECKING:
     from scanfab.series import Series

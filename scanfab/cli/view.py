@@ -70,10 +70,10 @@ def view(
     SOURCE is as for scanfab compute; boundary particles are not drawn, and the loading axis is
     upright.
     """
+    from scanfab.base.errors import SettingsError
+    from scanfab.base.files import check_folder
     from scanfab.cli.console import announce_compiling, reported_warnings
-    from scanfab.errors import SettingsError
     from scanfab.settings import Settings
-    from scanfab.writers.files import check_folder
 
     with reported_warnings():
         options, _ = fill_from_file(ctx, sources, options)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.jit import LANES, ZERO, Flag, inner, kernel
 from scanfab.kernels.bins import Bins, bins_along
-from scanfab.kernels.compiled import LANES, ZERO, Flag, inner, kernel
 from scanfab.kernels.follow import follow
 from scanfab.kernels.grid import Grid, bounds, open_grid, part_of, strip_of
 from scanfab.kernels.lines import solve_closed

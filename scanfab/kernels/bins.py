@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.kernels.compiled import Flag, inner
+from scanfab.base.jit import Flag, inner
 from scanfab.kernels.strips import FAR
 from scanfab.kernels.sweep import Measured, whole_gap
 

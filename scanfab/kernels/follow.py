@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.jit import inner
 from scanfab.kernels.bins import (
     GAP_HIGH,
     GAP_LOW,
@@ -14,7 +15,6 @@ from scanfab.kernels.bins import (
     add_gaps,
     room_for_gaps,
 )
-from scanfab.kernels.compiled import inner
 from scanfab.kernels.periodic import CellGrains, Prism, cross, dot, shifts
 from scanfab.kernels.strips import BOUND, END, FAR, SET, Strip
 from scanfab.kernels.sweep import CHANNELS, KEPT, LENGTH, STEPS, VOID, WHOLE

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.kernels.compiled import inner
+from scanfab.base.jit import inner
 from scanfab.kernels.strips import Strip
 
 __all__ = ["Grid", "bounds", "cover", "open_grid", "part_of", "sheared_grid", "strip_of"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.jit import ZERO, Flag, inner
 from scanfab.kernels.bins import (
     GAP_HIGH,
     GAP_LOW,
@@ -14,7 +15,6 @@ from scanfab.kernels.bins import (
     add_gaps,
     room_for_gaps,
 )
-from scanfab.kernels.compiled import ZERO, Flag, inner
 from scanfab.kernels.projection import Spheres, number_from, sort_by, sphere_at
 from scanfab.kernels.strips import BOUND, END, FAR, SET, Strip, span
 from scanfab.kernels.sweep import Measured, add, counted, moved

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.jit import LANES, ONE, REORDERED, ZERO, Flag, inner
 from scanfab.kernels.bins import (
     GAP_HIGH,
     GAP_LOW,
@@ -23,7 +24,6 @@ from scanfab.kernels.bins import (
     add_gaps,
     room_for_gaps,
 )
-from scanfab.kernels.compiled import LANES, ONE, REORDERED, ZERO, Flag, inner
 from scanfab.kernels.projection import Spheres, sphere_at
 from scanfab.kernels.strips import BOUND, END, FAR, GAP_END, GAP_START, SET, Strip, span
 from scanfab.kernels.sweep import CHORDS, Measured, add, both, meet, moved

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.kernels.compiled import inner, kernel
+from scanfab.base.jit import inner, kernel
 
 __all__ = [
     "Frame",

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.kernels.compiled import ZERO, inner
+from scanfab.base.jit import ZERO, inner
 from scanfab.kernels.grid import Grid, sheared_grid
 from scanfab.kernels.projection import Spheres, in_order, order_of, range_of, room_for_spheres
 from scanfab.kernels.sweep import Measured

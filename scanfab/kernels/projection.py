@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.kernels.compiled import ONE, ZERO, inner
+from scanfab.base.jit import ONE, ZERO, inner
 from scanfab.kernels.grid import Grid
 from scanfab.kernels.strips import FAR, Sphere, span
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.kernels.compiled import REORDERED, Flag, inner
+from scanfab.base.jit import REORDERED, Flag, inner
 
 __all__ = [
     "BOUND",

@@ -26,7 +26,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.kernels.compiled import LANES, REORDERED, Flag, inner
+from scanfab.base.jit import LANES, REORDERED, Flag, inner
 from scanfab.kernels.strips import (
     BOUND,
     END,

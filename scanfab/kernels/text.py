@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.kernels.compiled import kernel
+from scanfab.base.jit import kernel
 
 __all__ = ["count_spaces"]
 

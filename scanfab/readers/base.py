@@ -10,8 +10,8 @@ from typing import Any, Literal, NamedTuple, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.errors import SettingsError
 from scanfab.cell import Cell
-from scanfab.errors import SettingsError
 from scanfab.packing import ContactList
 
 __all__ = [

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.errors import ReadError
+from scanfab.base.lengths import all_within
 from scanfab.boundary import CLASS_COLUMNS
 from scanfab.cell import Cell
 from scanfab.doubts import CLUMP_COLUMNS
-from scanfab.errors import ReadError
-from scanfab.limits import all_within
 from scanfab.packing import LazyColumns, lies_within
 from scanfab.readers.base import GrainTable, ReadOptions
 

@@ -19,8 +19,8 @@ from typing import IO, Any
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.errors import ReadError, ScanfabWarning
 from scanfab.cell import Cell
-from scanfab.errors import ReadError, ScanfabWarning
 from scanfab.packing import LazyColumns
 from scanfab.readers.base import Snapshot
 from scanfab.readers.box import dump_cell

@@ -16,10 +16,10 @@ from pathlib import Path
 from threading import Lock, get_ident
 from typing import IO, Any
 
-from scanfab.ending import at_end
-from scanfab.errors import ReadError
-from scanfab.memory import free_memory
-from scanfab.streams import check_file
+from scanfab.base.ending import at_end
+from scanfab.base.errors import ReadError
+from scanfab.base.memory import free_memory
+from scanfab.base.streams import check_file
 
 __all__ = [
     "COMPRESSED_SUFFIXES",

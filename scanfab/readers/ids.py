@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.errors import ReadError
+from scanfab.base.errors import ReadError
 from scanfab.readers.base import GrainTable
 from scanfab.readers.join import rows_of_ids
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.errors import ReadError
-from scanfab.limits import MOST
+from scanfab.base.errors import ReadError
+from scanfab.base.lengths import MOST
 from scanfab.packing import ContactList
 from scanfab.readers.base import GrainTable, JoinedContacts
 

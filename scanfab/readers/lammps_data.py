@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.errors import PackingError, ReadError
+from scanfab.base.lengths import MOST
 from scanfab.cell import Cell
-from scanfab.errors import PackingError, ReadError
-from scanfab.limits import MOST
 from scanfab.readers.base import GrainTable, ReadOptions, Snapshot
 from scanfab.readers.box import box_vectors
 from scanfab.readers.columns import grain_table

@@ -17,12 +17,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.errors import ReadError
+from scanfab.base.errors import ReadError
+from scanfab.base.logs import quiet_vtk
 from scanfab.readers.files import bare_name, check_memory, first_bytes, plain
 from scanfab.readers.flaws import FlawError
 from scanfab.readers.legacy import check_legacy
 from scanfab.readers.markup import check_xml
-from scanfab.vtk_log import quiet_vtk
 
 __all__ = ["Mesh", "form_of", "read_bounds", "read_mesh"]
 

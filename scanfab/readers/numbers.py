@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.errors import ReadError
+from scanfab.base.errors import ReadError
 
 __all__ = ["plain_reason", "rows_of_numbers"]
 

@@ -8,7 +8,7 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 
-from scanfab.errors import ReadError, ScanfabWarning, UnknownFormatError
+from scanfab.base.errors import ReadError, ScanfabWarning, UnknownFormatError
 from scanfab.readers.base import Reader
 from scanfab.readers.files import bare_name
 

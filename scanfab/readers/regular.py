@@ -18,8 +18,8 @@ from typing import IO, Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.memory import free_memory
-from scanfab.threads import in_order
+from scanfab.base.memory import free_memory
+from scanfab.base.threads import in_order
 
 __all__ = ["LARGE", "TextTable", "read_regular"]
 

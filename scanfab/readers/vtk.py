@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.errors import ReadError
+from scanfab.base.lengths import MOST
 from scanfab.cell import Cell
-from scanfab.errors import ReadError
-from scanfab.limits import MOST
 from scanfab.packing import ContactList
 from scanfab.readers.base import (
     Carries,

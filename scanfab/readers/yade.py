@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.errors import PackingError, ReadError
+from scanfab.base.lengths import MOST
 from scanfab.cell import Cell
-from scanfab.errors import PackingError, ReadError
-from scanfab.limits import MOST
 from scanfab.readers.base import (
     Carries,
     FileKind,

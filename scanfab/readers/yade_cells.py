@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.errors import PackingError, ReadError, ScanfabNote, ScanfabWarning
 from scanfab.cell import Cell
-from scanfab.errors import PackingError, ReadError, ScanfabNote, ScanfabWarning
 from scanfab.readers.base import ReadOptions
 from scanfab.readers.files import COMPRESSED_SUFFIXES, bare_name
 from scanfab.readers.mesh import read_mesh

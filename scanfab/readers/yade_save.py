@@ -12,9 +12,9 @@ from typing import IO, Any
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.errors import PackingError, ReadError
+from scanfab.base.lengths import MOST
 from scanfab.cell import Cell
-from scanfab.errors import PackingError, ReadError
-from scanfab.limits import MOST
 from scanfab.readers.base import GrainTable, ReadOptions, Snapshot
 from scanfab.readers.columns import grain_table, whole_numbers
 from scanfab.readers.files import first_bytes, unpacked

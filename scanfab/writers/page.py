@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.errors import SettingsError
+from scanfab.base.errors import SettingsError
+from scanfab.base.files import check_folder, whole_file
 from scanfab.scene import Scene
-from scanfab.writers.files import check_folder, whole_file
 from scanfab.writers.plot import COLOURS
 
 __all__ = [

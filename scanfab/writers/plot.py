@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.errors import SettingsError
-from scanfab.writers.files import check_folder, whole_file
+from scanfab.base.errors import SettingsError
+from scanfab.base.files import check_folder, whole_file
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

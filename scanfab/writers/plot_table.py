@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.errors import SettingsError
+from scanfab.base.errors import SettingsError
 from scanfab.writers.curves import (
     Curve,
     abscissa_label,

@@ -19,9 +19,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
-from scanfab.ending import undone_at_end
-from scanfab.errors import ScanfabNote, SettingsError
-from scanfab.writers.files import check_folder, named_errors, whole_file
+from scanfab.base.ending import undone_at_end
+from scanfab.base.errors import ScanfabNote, SettingsError
+from scanfab.base.files import check_folder, named_errors, whole_file
 from scanfab.writers.rows import ALL, Excerpt, RowWriter, check_suffix, row_writer
 
 __all__ = ["ResultFile", "differing_settings"]

@@ -10,8 +10,8 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import IO, Any, Protocol, get_type_hints
 
-from scanfab.errors import SettingsError
-from scanfab.writers.files import named_errors
+from scanfab.base.errors import SettingsError
+from scanfab.base.files import named_errors
 
 __all__ = ["FILE_FORMATS", "Excerpt", "RowWriter", "check_suffix", "row_writer"]
 

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.errors import ScanfabError
+from scanfab.base.errors import ScanfabError
+from scanfab.base.files import whole_file
+from scanfab.base.logs import quiet_vtk
 from scanfab.scene import Grains, Scene
-from scanfab.vtk_log import quiet_vtk
-from scanfab.writers.files import whole_file
 from scanfab.writers.overlay import SIZE, Framing, add_scale, add_words
 from scanfab.writers.plot import COLOURS
 

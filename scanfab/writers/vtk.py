@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.files import whole_file
 from scanfab.scene import ContactLines, Grains
 from scanfab.segments import Segments
-from scanfab.writers.files import whole_file
 
 __all__ = [
     "Collection",

@@ -18,7 +18,7 @@ from pathlib import Path
 from random import Random
 
 from scanfab.writers.rows import FILE_FORMATS
-from tests.interruptions import Interrupter, write_series
+from tests.helpers.interruptions import Interrupter, write_series
 
 OPTIONS = ("--tolerance", "6e-4")
 

@@ -22,8 +22,16 @@ import pytest
 from scanfab.cli.main import run
 from scanfab.readers import registry
 from scanfab.writers.rows import CsvWriter
-from tests.dumps import PAIRS, cubic_rows, dump_text, pairs_text, write, yade_lines, yade_spheres
-from tests.interruptions import PROGRAM
+from tests.helpers.dumps import (
+    PAIRS,
+    cubic_rows,
+    dump_text,
+    pairs_text,
+    write,
+    yade_lines,
+    yade_spheres,
+)
+from tests.helpers.interruptions import PROGRAM
 
 SCAN = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin")
 BOX = ((0, 4),) * 3

@@ -12,8 +12,8 @@ import pytest
 from scanfab.calibration import Calibration
 from scanfab.cli.main import run
 from scanfab.ladders import STEP_MEANINGS, StepRow
-from tests.dumps import cubic_rows, dump_text, write
-from tests.truth import TRIAXIAL
+from tests.helpers.dumps import cubic_rows, dump_text, write
+from tests.helpers.truth import TRIAXIAL
 
 QUICK = ("--boundary", "mask=3", "--tolerance", "2e-3", "--max-chords", "3e7", "--workers", "1")
 

@@ -13,8 +13,8 @@ import pytest
 from scanfab.cli.main import run
 from scanfab.tabular import read_rows
 from scanfab.writers.rows import FILE_FORMATS
-from tests.dumps import write
-from tests.tables import curve
+from tests.helpers.dumps import write
+from tests.helpers.tables import curve
 
 FRAMES = (
     "source frame strain variant alpha_vs_axial alpha_c_axial "

@@ -6,7 +6,7 @@ import pytest
 
 from scanfab.cli.comparison_tables import print_comparison
 from scanfab.compare import compare_tables
-from tests.tables import curve, sheared
+from tests.helpers.tables import curve, sheared
 
 HEADS = {
     *("source", "variant", "slope", "±", "R²", "peak", "final", "frames", "α_vs", "α_c"),

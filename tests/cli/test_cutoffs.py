@@ -12,10 +12,10 @@ from scanfab import Packing, compute, direction_rule, find_contacts
 from scanfab.cli.main import run
 from scanfab.line_grids import line_frames, turned_frames
 from scanfab.table import COLUMNS
-from tests import naive
-from tests.interruptions import interrupted_at_row
-from tests.lattices import shaken_cubic
-from tests.truth import TRIAXIAL
+from tests.helpers import naive
+from tests.helpers.interruptions import interrupted_at_row
+from tests.helpers.lattices import shaken_cubic
+from tests.helpers.truth import TRIAXIAL
 
 FILES = sorted(str(path) for path in TRIAXIAL.glob("*0000000[012].vtk.gz"))
 LINES = ("--directions", "lebedev:5", "--spacing", "0.7rmin", "--boundary", "mask=3")

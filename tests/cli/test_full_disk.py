@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from scanfab.cli.main import run
-from tests.interruptions import PROGRAM, write_series
+from tests.helpers.interruptions import PROGRAM, write_series
 
 resource = pytest.importorskip("resource", reason="limits of a process are POSIX")
 FAST = ["--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac"]

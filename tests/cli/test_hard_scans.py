@@ -10,7 +10,7 @@ import pytest
 
 from scanfab import Packing, ScanfabWarning, compute
 from scanfab.cli.main import run
-from tests.dumps import cubic_rows, dump_text, write
+from tests.helpers.dumps import cubic_rows, dump_text, write
 
 
 @pytest.fixture

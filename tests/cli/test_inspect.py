@@ -7,7 +7,7 @@ import json
 import pytest
 
 from scanfab.cli.main import run
-from tests.dumps import cubic_rows, dump_text, pairs_text, write
+from tests.helpers.dumps import cubic_rows, dump_text, pairs_text, write
 
 KEYS = (
     "source frame step time format grains boundary radius_min radius_max contacts contacts_from "

@@ -13,7 +13,7 @@ import pytest
 
 from scanfab.cli.main import PLAIN_LETTERS, _shown, run
 from scanfab.tabular import read_rows
-from tests.interruptions import PROGRAM, write_series
+from tests.helpers.interruptions import PROGRAM, write_series
 
 FAST = ["--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac"]
 

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scanfab import memory
+from scanfab.base import memory
 from scanfab.cli import group, main
 from scanfab.readers import regular
-from tests.dumps import cubic_rows, dump_text, write
-from tests.interruptions import PROGRAM
+from tests.helpers.dumps import cubic_rows, dump_text, write
+from tests.helpers.interruptions import PROGRAM
 
 resource = pytest.importorskip("resource", reason="limits of a process are POSIX")
 

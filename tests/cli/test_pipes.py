@@ -13,8 +13,8 @@ import time
 import pytest
 
 from scanfab.cli.main import run
-from tests.dumps import cubic_rows, dump_text, write
-from tests.interruptions import PROGRAM
+from tests.helpers.dumps import cubic_rows, dump_text, write
+from tests.helpers.interruptions import PROGRAM
 
 FAST = ["--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin"]
 

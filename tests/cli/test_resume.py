@@ -13,7 +13,7 @@ import pytest
 
 from scanfab.cli.main import run
 from scanfab.writers.rows import CsvWriter, JsonLinesWriter
-from tests.interruptions import Interrupter, interrupted_at_row, write_series
+from tests.helpers.interruptions import Interrupter, interrupted_at_row, write_series
 
 # about a second of scanning
 OPTIONS = ("--tolerance", "1e-3")

@@ -16,9 +16,9 @@ from scanfab.cli import talk
 from scanfab.cli.main import run
 from scanfab.rerun import read_manifest
 from tests.cli.test_resume import _wait_for_frames_under_way
-from tests.dumps import cubic_rows, dump_text, write
-from tests.interruptions import interrupted_at_row, write_series
-from tests.truth import SAMPLE_DATA
+from tests.helpers.dumps import cubic_rows, dump_text, write
+from tests.helpers.interruptions import interrupted_at_row, write_series
+from tests.helpers.truth import SAMPLE_DATA
 
 FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac")
 

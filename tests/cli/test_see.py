@@ -20,8 +20,8 @@ from scanfab.strain import shear_strain
 from scanfab.tabular import read_rows
 from scanfab.writers.overlay import add_words
 from tests.conftest import ROOT, SAMPLE
-from tests.dumps import cubic_rows, dump_text, write
-from tests.tables import curve
+from tests.helpers.dumps import cubic_rows, dump_text, write
+from tests.helpers.tables import curve
 
 FAST = ["--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac"]
 
@@ -160,7 +160,7 @@ def test_a_vtk_folder_that_cannot_be_made_is_wrong_usage(series, tmp_path, capsy
 
 
 def can_draw() -> bool:
-    from scanfab.errors import ScanfabError
+    from scanfab.base.errors import ScanfabError
     from scanfab.writers.view import check_drawing
 
     try:
@@ -201,7 +201,7 @@ def drawn(path):
         [f"{ROOT}/sample_data/lammps_shear", "--frame", "5"],
     ],
 )
-@pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabWarning")
+@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
 def test_the_sample_fills_the_picture_and_its_rv_is_seen(tmp_path, words):
     picture = tmp_path / "view.png"
     assert run(["view", *words, "--screenshot", str(picture)]) == 0
@@ -283,7 +283,7 @@ def test_a_long_path_leaves_frame_and_strain_in_the_picture(tmp_path, monkeypatc
     assert 0 < width < 1160
 
 
-@pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabWarning")
+@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
 def test_the_title_of_a_sheared_cell_has_its_shear(tmp_path, monkeypatch):
     titles = []
     monkeypatch.setattr("scanfab.writers.view.show_scene", lambda *said: titles.append(said[2]))
@@ -294,7 +294,7 @@ def test_the_title_of_a_sheared_cell_has_its_shear(tmp_path, monkeypatch):
     assert titles == [f"{source}, frame 5, shear strain {100 * shear_strain(last, first):.3g} %"]
 
 
-@pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabWarning")
+@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
 @pytest.mark.parametrize(
     ("series", "strain"), [("lammps_shear", "shear strain"), ("liggghts_periodic", "axial strain")]
 )

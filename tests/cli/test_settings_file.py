@@ -11,7 +11,7 @@ import pytest
 
 from scanfab.cli.main import run
 from scanfab.rerun import read_manifest, repeat_command
-from tests.dumps import cubic_rows, dump_text, write
+from tests.helpers.dumps import cubic_rows, dump_text, write
 
 FAST = 'directions = 9\nspacing = "0.5rmin"\ncutoff = "0.2rmin"\n'
 

@@ -81,7 +81,7 @@ def test_a_part_without_rows_and_half_a_file_are_removed(tmp_path, rows):
         f"""
 from pathlib import Path
 from scanfab.table import Row
-from scanfab.writers.files import whole_file
+from scanfab.base.files import whole_file
 from scanfab.writers.results import ResultFile
 
 def run(args):

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from scanfab.cli.main import run
-from tests.dumps import cubic_rows, dump_text, write
-from tests.interruptions import PROGRAM
+from tests.helpers.dumps import cubic_rows, dump_text, write
+from tests.helpers.interruptions import PROGRAM
 
 pytestmark = [
     pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="the system has no named pipes"),

@@ -11,8 +11,8 @@ import pytest
 from scanfab.cli import talk
 from scanfab.cli.main import run
 from scanfab.cli.talk import working
-from tests.dumps import write
-from tests.interruptions import write_series
+from tests.helpers.dumps import write
+from tests.helpers.interruptions import write_series
 
 FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin")
 

@@ -5,7 +5,7 @@ import pytest
 
 from scanfab import contact_fabric
 from scanfab.fabric.contact import axial_error
-from tests import naive
+from tests.helpers import naive
 
 
 def random_normals(count, seed=0):

@@ -11,9 +11,9 @@ from scanfab.fabric.jackknife import (
     void_jackknife,
 )
 from scanfab.gaps import Blocks, scan_gaps
-from tests import naive
-from tests.lattices import Spheres, poisson_spheres
-from tests.scanning import solids_of
+from tests.helpers import naive
+from tests.helpers.lattices import Spheres, poisson_spheres
+from tests.helpers.scanning import solids_of
 
 AXIS = np.array([0.6, 0.0, 0.8])
 

@@ -5,8 +5,8 @@ import pytest
 
 from scanfab import FabricTensor
 from scanfab.fabric.tensor import axial
-from tests import naive
-from tests.lattices import rotation
+from tests.helpers import naive
+from tests.helpers.lattices import rotation
 
 
 def random_tensor(random):

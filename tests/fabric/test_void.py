@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scanfab import direction_rule, void_fabric
-from tests import naive
+from tests.helpers import naive
 
 RULE = direction_rule("lebedev:5")
 D = len(RULE)

@@ -12,8 +12,8 @@ import pyvista
 import scanfab
 from scanfab.cell import Cell
 from scanfab.packing import Packing
-from tests.dumps import dump_text, local_text, write, yade_lines, yade_spheres
-from tests.truth import COMPONENTS
+from tests.helpers.dumps import dump_text, local_text, write, yade_lines, yade_spheres
+from tests.helpers.truth import COMPONENTS
 
 EDGES = np.array([6.0, 6.6, 7.2])
 SCAN = {"directions": 25, "spacing": 0.2, "rv": 0.7, "cutoff": "0.2rmin"}

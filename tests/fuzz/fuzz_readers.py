@@ -83,7 +83,7 @@ def fuzz(reader: str, runs: int, out: Path, folder: Path) -> None:
 
     with atheris.instrument_imports(include=["scanfab", "meshio.vtk", "meshio.vtu", "meshio.xdmf"]):
         from scanfab.readers.registry import installed_readers
-        from tests import fuzzing
+        from tests.helpers import fuzzing
 
         installed_readers()
     _write_corpus(fuzzing, reader, folder)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tests.lattices import Spheres, poisson_spheres, separate_spheres
-from tests.scanning import Z, fabric, isotropic, mean_lengths, ratio, scan_along, solids_of
+from tests.helpers.lattices import Spheres, poisson_spheres, separate_spheres
+from tests.helpers.scanning import Z, fabric, isotropic, mean_lengths, ratio, scan_along, solids_of
 
 AXES = np.array([[0, 0, 1], [1, 0, 0], [0.6, 0, 0.8], [-0.48, 0.6, 0.64]])
 NOTHING = Spheres(np.zeros((0, 3)), np.zeros(0))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scanfab import Cell, ContactList, Packing, compute, contact_fabric, find_contacts
-from tests.lattices import face_centred_cubic, shaken_cubic, simple_cubic
+from tests.helpers.lattices import face_centred_cubic, shaken_cubic, simple_cubic
 
 TOLERANCE = 1e-4
 

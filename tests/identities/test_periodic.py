@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scanfab import Cell, Packing, ScanfabWarning, compute, find_contacts
-from tests.lattices import Spheres
+from tests.helpers.lattices import Spheres
 
 EDGES = np.array([6.0, 5.0, 7.0])
 RV = {"rv_radius": 2.0, "variants": "cd"}

@@ -13,8 +13,8 @@ from scanfab import (
     scan_lines,
 )
 from scanfab.scan import CellGrains
-from tests import naive
-from tests.scanning import ratio
+from tests.helpers import naive
+from tests.helpers.scanning import ratio
 
 UNIT_CELL = np.eye(3), np.ones(3, bool)
 LOOK = {"variants": "ab", "tolerance": 1.0, "contact_tolerance": 1e-4, "seed": 3}

@@ -6,8 +6,8 @@ import pytest
 from scanfab import Packing, compute, contact_fabric, find_contacts, void_fabric
 from scanfab.directions import direction_rule
 from scanfab.line_grids import line_frames
-from tests.lattices import Spheres, poisson_spheres, rotation, shaken_cubic
-from tests.scanning import fabric, scan_frames, solids_of
+from tests.helpers.lattices import Spheres, poisson_spheres, rotation, shaken_cubic
+from tests.helpers.scanning import fabric, scan_frames, solids_of
 
 WINDOW, SPACING, CUTOFF = 3.0, 0.3, 0.4
 RULE = direction_rule("lebedev:9")

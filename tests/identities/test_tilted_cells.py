@@ -7,8 +7,8 @@ import pytest
 
 import scanfab
 from scanfab import Cell, ContactList, Packing, PackingError, contact_fabric, find_contacts
-from tests.lattices import face_centred_cubic, shaken_cubic
-from tests.truth import CELL as LIGGGHTS
+from tests.helpers.lattices import face_centred_cubic, shaken_cubic
+from tests.helpers.truth import CELL as LIGGGHTS
 
 TOLERANCE = 1e-4
 # of a face-centred cubic lattice of unit cubes: one grain a cell

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from scanfab import Packing, ScanfabWarning, compute
-from tests.lattices import Spheres, separate_spheres, shaken_cubic
-from tests.scanning import Z, mean_lengths, scan_along, solids_of
+from tests.helpers.lattices import Spheres, separate_spheres, shaken_cubic
+from tests.helpers.scanning import Z, mean_lengths, scan_along, solids_of
 
 
 def joined(*parts):

@@ -6,15 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
+from scanfab.base.jit import LANES
 from scanfab.kernels import axes, lists, strips, sweep
 from scanfab.kernels.bins import no_bins
-from scanfab.kernels.compiled import LANES
 from scanfab.kernels.grid import cover, strip_of
 from scanfab.kernels.projection import order_of, project, range_of
 from scanfab.line_grids import line_frames
-from tests import naive
-from tests.lattices import ball_points, poisson_spheres, rotation
-from tests.uncompiled import run_uncompiled
+from tests.helpers import naive
+from tests.helpers.lattices import ball_points, poisson_spheres, rotation
+from tests.helpers.uncompiled import run_uncompiled
 
 RUNS_OF_A_KIND = 300
 # row by row, and over lists of chords

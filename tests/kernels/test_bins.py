@@ -7,10 +7,10 @@ from scanfab.gaps import Blocks
 from scanfab.kernels import axes, sweep
 from scanfab.kernels.bins import BLOCKS, Bins
 from scanfab.line_grids import line_frames
-from tests import naive
+from tests.helpers import naive
+from tests.helpers.lattices import rotation
+from tests.helpers.uncompiled import run_uncompiled
 from tests.kernels.test_axes import KINDS, line_words, overlapping
-from tests.lattices import rotation
-from tests.uncompiled import run_uncompiled
 
 RUNS_OF_A_KIND = 60
 REACH = 30.0

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from scanfab import Cell, Packing, PackingError, find_contacts
 from scanfab.contacts import overlapping_pairs
 from scanfab.kernels.neighbours import Frame, Grid, Pairs, fill_grid, pairs_within, sort_pairs
-from tests import naive
-from tests.uncompiled import run_uncompiled
+from tests.helpers import naive
+from tests.helpers.uncompiled import run_uncompiled
 
 
 def canonical(contacts):

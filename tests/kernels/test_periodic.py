@@ -7,9 +7,9 @@ from numba import njit
 from scanfab.kernels import axes, periodic, sweep
 from scanfab.kernels.bins import no_bins
 from scanfab.kernels.periodic import CellGrains
-from tests import naive
+from tests.helpers import naive
+from tests.helpers.uncompiled import run_uncompiled
 from tests.kernels.test_axes import WAYS
-from tests.uncompiled import run_uncompiled
 
 PERIODS = [(1, 1, 1), (1, 1, 0), (0, 1, 1), (1, 0, 1), (1, 0, 0), (0, 0, 1)]
 

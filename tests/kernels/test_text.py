@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scanfab.kernels.text import PIECE, count_spaces
-from tests.uncompiled import run_uncompiled
+from tests.helpers.uncompiled import run_uncompiled
 
 
 def counted(text):

@@ -7,9 +7,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import scanfab
-from scanfab.errors import ScanfabError
+from scanfab.base.errors import ScanfabError
 from scanfab.readers.base import ReadOptions
-from tests.fuzzing import (
+from tests.helpers.fuzzing import (
     NAMES,
     OPTIONS,
     READERS,

@@ -17,11 +17,11 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab.errors import ReadError
+from scanfab.base.errors import ReadError
 from scanfab.readers import dump, files, yade_save
 from scanfab.readers.flaws import FlawError
 from scanfab.readers.markup import check_xml
-from tests.dumps import dump_text, write
+from tests.helpers.dumps import dump_text, write
 
 BLOCK = 1 << 20
 ZEROS = zlib.compress(bytes(BLOCK))

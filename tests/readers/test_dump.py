@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scanfab.errors import ReadError, ScanfabWarning
+from scanfab.base.errors import ReadError, ScanfabWarning
 from scanfab.readers import dump
 from scanfab.readers.base import Snapshot
 from scanfab.readers.dump import index_dump, read_block, row_word
-from tests.dumps import ROWS, dump_text, write
+from tests.helpers.dumps import ROWS, dump_text, write
 
 
 @pytest.fixture(autouse=True, params=["small", "large"])

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from scanfab.errors import ReadError
+from scanfab.base.errors import ReadError
 from scanfab.readers import files
 
 TEXT = b"ITEM: TIMESTEP\n" * 1000

@@ -11,15 +11,23 @@ import pyvista
 from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
 
 import scanfab
-from scanfab.errors import PackingError, ReadError
+from scanfab.base.errors import PackingError, ReadError
 from scanfab.readers.base import GrainTable, ReadOptions, Snapshot
 from scanfab.readers.liggghts import LiggghtsReader
 from scanfab.readers.mesh import read_mesh
 from scanfab.readers.vtk import VtkReader
 from scanfab.readers.yade import YadeReader
-from tests.dumps import ROWS, dump_text, local_text, pairs_text, write, yade_lines, yade_spheres
-from tests.fuzzing import only_scanfabs_warnings
-from tests.truth import YADE
+from tests.helpers.dumps import (
+    ROWS,
+    dump_text,
+    local_text,
+    pairs_text,
+    write,
+    yade_lines,
+    yade_spheres,
+)
+from tests.helpers.fuzzing import only_scanfabs_warnings
+from tests.helpers.truth import YADE
 
 POINTS = "POINTS 2 double\n0 0 0 2 0 0\n"
 

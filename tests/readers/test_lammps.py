@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab.errors import ReadError
+from scanfab.base.errors import ReadError
 from scanfab.readers.registry import reader_for
-from tests.dumps import PAIRS, ROWS, dump_text, local_text, write
-from tests.truth import FLOOR, SHEAR, id_pairs, lammps_fabric
+from tests.helpers.dumps import PAIRS, ROWS, dump_text, local_text, write
+from tests.helpers.truth import FLOOR, SHEAR, id_pairs, lammps_fabric
 
 FORMS = SHEAR / "forms"
 COLUMNS = (

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab.errors import ReadError, UnknownFormatError
+from scanfab.base.errors import ReadError, UnknownFormatError
 from scanfab.readers.registry import reader_for
-from tests.dumps import PAIRS, ROWS, dump_text, local_text, pairs_text, write
-from tests.truth import (
+from tests.helpers.dumps import PAIRS, ROWS, dump_text, local_text, pairs_text, write
+from tests.helpers.truth import (
     FLOOR,
     PERIODIC,
     SIX_DIGITS,

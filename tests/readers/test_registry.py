@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab.errors import ReadError, ScanfabWarning, UnknownFormatError
+from scanfab.base.errors import ReadError, ScanfabWarning, UnknownFormatError
 from scanfab.packing import ContactList
 from scanfab.readers import registry
 from scanfab.readers.base import GrainTable, JoinedContacts, Snapshot
 from scanfab.readers.registry import load_readers, reader_for, reader_named
-from tests.dumps import dump_text, write
-from tests.truth import FLOOR, YADE
+from tests.helpers.dumps import dump_text, write
+from tests.helpers.truth import FLOOR, YADE
 
 
 class NumbersReader:

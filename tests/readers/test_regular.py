@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab.errors import ReadError
+from scanfab.base.errors import ReadError
 from scanfab.readers import dump, regular
 from scanfab.readers.regular import TextTable, read_regular
-from tests.dumps import ROWS, dump_text, write
+from tests.helpers.dumps import ROWS, dump_text, write
 
 WIDTH = 3
 

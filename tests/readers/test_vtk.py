@@ -8,13 +8,13 @@ import pytest
 import pyvista
 
 import scanfab
-from scanfab.errors import ReadError
+from scanfab.base.errors import ReadError
 from scanfab.readers.base import GrainTable, ReadOptions, Snapshot
 from scanfab.readers.liggghts import LiggghtsReader
 from scanfab.readers.mesh import read_mesh
 from scanfab.readers.vtk import VtkReader
-from tests.dumps import write, yade_spheres
-from tests.truth import FLOOR, YADE
+from tests.helpers.dumps import write, yade_spheres
+from tests.helpers.truth import FLOOR, YADE
 
 POSITION = np.array([[0.0, 0, 0], [1.9, 0, 0], [3.8, 0, 0.25], [5.6, 0.5, 0]])
 RADIUS = np.array([1.0, 1.0, 1.1, 0.9])

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 import scanfab
+from scanfab.base.errors import ReadError
 from scanfab.cell import Cell
-from scanfab.errors import ReadError
 from scanfab.readers.registry import reader_for
-from tests.dumps import write, yade_lines, yade_spheres
-from tests.truth import (
+from tests.helpers.dumps import write, yade_lines, yade_spheres
+from tests.helpers.truth import (
     SIX_DIGITS,
     YADE,
     assert_same_vectors,

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab.errors import ReadError, ScanfabNote, ScanfabWarning
-from tests.truth import SAMPLE_DATA, csv_rows
+from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
+from tests.helpers.truth import SAMPLE_DATA, csv_rows
 
 STRAINED = SAMPLE_DATA / "yade_strained"
 TRUTH = csv_rows(STRAINED / "truth.csv")
-pytestmark = pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabNote")
+pytestmark = pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabNote")
 
 
 def vectors():

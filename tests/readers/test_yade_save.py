@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab.errors import ReadError
+from scanfab.base.errors import ReadError
 from scanfab.readers.registry import reader_for
-from tests.dumps import small_save, write
-from tests.truth import (
+from tests.helpers.dumps import small_save, write
+from tests.helpers.truth import (
     YADE,
     assert_same_vectors,
     csv_rows,

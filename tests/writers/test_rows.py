@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scanfab.errors import SettingsError
+from scanfab.base.errors import SettingsError
 from scanfab.table import COLUMNS, Row
 from scanfab.tabular import read_rows
 from scanfab.writers.results import ResultFile

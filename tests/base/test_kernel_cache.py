@@ -14,9 +14,11 @@ import numba
 import pytest
 
 import scanfab.kernels.sweep
-from scanfab import ending
-from scanfab.kernels import cache, compiled, folder
-from tests.dumps import cubic_rows, dump_text, write
+from scanfab.base import ending
+from scanfab.base import jit as compiled
+from scanfab.base import kernel_cache as cache
+from scanfab.base import kernel_folder as folder
+from tests.helpers.dumps import cubic_rows, dump_text, write
 
 ROOT = Path(__file__).parents[2]
 # the contacts need a kernel, and only a small one
@@ -266,12 +268,26 @@ def test_no_folder_is_made_for_others_to_write_to(tmp_path):
 
 
 def test_another_kernel_means_another_folder(tmp_path, monkeypatch):
-    monkeypatch.setattr(folder, "__file__", str(tmp_path / "folder.py"))
+    monkeypatch.setattr(folder, "__file__", str(tmp_path / "base" / "kernel_folder.py"))
+    kernel = tmp_path / "scan" / "kernels" / "axes.py"
+    kernel.parent.mkdir(parents=True)
     names = set()
     for text in ("a", "b", "a"):
-        (tmp_path / "kernel.py").write_text(text)
+        kernel.write_text(text)
         names.add(folder._version())
     assert len(names) == 2
+
+
+def test_no_kernel_is_left_out_of_the_name_of_the_folder():
+    """Else a kernel that has changed would be served as it was."""
+    hashed = {path.relative_to(ROOT / "scanfab") for path in folder.kernel_files()}
+    compiled_files = {
+        path.relative_to(ROOT / "scanfab")
+        for path in (ROOT / "scanfab").rglob("*.py")
+        if "@kernel" in path.read_text() or "@inner" in path.read_text()
+    }
+    assert len(compiled_files) >= 11
+    assert compiled_files <= hashed
 
 
 def test_a_full_disk_is_seen_before_kernels_are_compiled(tmp_path, monkeypatch):

@@ -68,6 +68,19 @@ def _usual_base() -> Path | None:
     return base / "scanfab"
 
 
+def kernel_files() -> list[Path]:
+    """All files that kernels are made of: those of every room, and how they are compiled."""
+    package = Path(__file__).parents[1]
+    patterns = (
+        "*/kernels.py",
+        "*/*/kernels.py",
+        "*/kernels/*.py",
+        "base/jit.py",
+        "base/kernel_*.py",
+    )
+    return sorted(file for pattern in patterns for file in package.glob(pattern))
+
+
 def _version() -> str:
     """
     The name of the folder, by Numba and by all kernels together.
@@ -75,7 +88,7 @@ def _version() -> str:
     A kernel changes with those that it calls, which no stamp of its own file tells.
     """
     sources = hashlib.sha256(sys.version.encode())
-    for file in sorted(Path(__file__).parent.glob("*.py")):
+    for file in kernel_files():
         sources.update(file.read_bytes())
     return f"numba-{numba.__version__}-{sources.hexdigest()[:16]}"
 

@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
-from scanfab.ending import undone_at_end
-from scanfab.errors import SettingsError
+from scanfab.base.ending import undone_at_end
+from scanfab.base.errors import SettingsError
 
 __all__ = ["check_folder", "named_errors", "whole_file"]
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-SAMPLE_DATA = Path(__file__).parent.parent / "sample_data"
+SAMPLE_DATA = Path(__file__).parents[2] / "sample_data"
 FLOOR = SAMPLE_DATA / "liggghts_formats" / "floor"
 PERIODIC = SAMPLE_DATA / "liggghts_formats" / "periodic"
 YADE = SAMPLE_DATA / "yade_formats"

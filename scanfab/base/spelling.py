@@ -11,7 +11,7 @@ def spelt_time(seconds: float) -> str:
 
     Examples
     --------
-    >>> from scanfab.spelling import spelt_time
+    >>> from scanfab.base.spelling import spelt_time
     >>> [spelt_time(seconds) for seconds in (0.2, 70, 840, 9000)]
     ['1 s', '70 s', '14 min', '2.5 h']
     """
@@ -26,7 +26,7 @@ def spelt_apart(value: float, limit: float) -> tuple[str, str]:
 
     Examples
     --------
-    >>> from scanfab.spelling import spelt_apart
+    >>> from scanfab.base.spelling import spelt_apart
     >>> spelt_apart(0.00100041, 0.001)
     ('0.0010004', '0.001')
     """

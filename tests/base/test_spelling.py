@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from scanfab.spelling import spelt_apart, spelt_time
+from scanfab.base.spelling import spelt_apart, spelt_time
 
 
 @pytest.mark.parametrize(

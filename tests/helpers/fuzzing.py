@@ -14,13 +14,13 @@ import meshio
 import numpy as np
 import pyvista
 
-from scanfab.errors import ScanfabError, ScanfabWarning
+from scanfab.base.errors import ScanfabError, ScanfabWarning
 from scanfab.families import Family
 from scanfab.readers.base import GrainTable, ReadOptions
 from scanfab.readers.mesh import read_bounds
 from scanfab.readers.registry import reader_for, reader_named
 from scanfab.series import Series
-from tests.dumps import (
+from tests.helpers.dumps import (
     PAIRS,
     ROWS,
     dump_text,
@@ -30,7 +30,7 @@ from tests.dumps import (
     yade_lines,
     yade_spheres,
 )
-from tests.truth import FLOOR, PERIODIC, YADE
+from tests.helpers.truth import FLOOR, PERIODIC, YADE
 
 READERS = ("lammps", "liggghts", "vtk", "yade")
 NAMES = ("f_1.txt", "f_1.vtk", "f_1.vtp", "f_1.vtu", "f_1.pvd", "f_1.xdmf", "f_1.txt.gz", "f_1.xml")

@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 from scanfab.writers.rows import CsvWriter
-from tests.dumps import cubic_rows, dump_text, write
+from tests.helpers.dumps import cubic_rows, dump_text, write
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
 PROGRAM = [sys.executable, "-c", "from scanfab.cli.main import main; main()"]

@@ -24,8 +24,8 @@ from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
-from scanfab.ending import undone_at_end
-from scanfab.kernels.folder import is_private, kernel_folder
+from scanfab.base.ending import undone_at_end
+from scanfab.base.kernel_folder import is_private, kernel_folder
 
 __all__ = ["KernelCache", "when_compiling"]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.lattices import shaken_cubic
+from tests.helpers.lattices import shaken_cubic
 
 UNIT_BOX = ((0, 1), (0, 1), (0, 1))
 NAMES = "id type x y z radius"

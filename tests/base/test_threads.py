@@ -8,7 +8,7 @@ from functools import partial
 
 import pytest
 
-from scanfab.threads import in_order
+from scanfab.base.threads import in_order
 
 
 @pytest.mark.parametrize("most", [1, 3, 20])

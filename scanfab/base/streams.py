@@ -6,7 +6,7 @@ import os
 import stat
 from pathlib import Path
 
-from scanfab.errors import ReadError
+from scanfab.base.errors import ReadError
 
 __all__ = ["check_file", "check_file_or_pipe"]
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.errors import PackingError
+from scanfab.base.errors import PackingError
 
 __all__ = ["cast", "grains_named"]
 

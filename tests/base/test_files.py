@@ -5,7 +5,7 @@ import os
 import pytest
 
 from scanfab import SettingsError
-from scanfab.writers.files import check_folder, whole_file
+from scanfab.base.files import check_folder, whole_file
 
 
 def test_what_is_written_takes_the_place_of_the_file(tmp_path):

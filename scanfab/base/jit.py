@@ -9,7 +9,7 @@ import numba
 import numpy as np
 from llvmlite.binding import get_host_cpu_name
 
-from scanfab.kernels.cache import KernelCache
+from scanfab.base.kernel_cache import KernelCache
 
 __all__ = ["LANES", "ONE", "REORDERED", "ZERO", "Flag", "inner", "kernel"]
 
