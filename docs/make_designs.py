@@ -1,5 +1,5 @@
 """
-Compute the antipodal spherical designs of scanfab/designs.csv; prints the table.
+Compute the antipodal spherical designs of scanfab/scan/designs.csv; prints the table.
 
 N axes with equal weights integrate every polynomial to the odd degree t: odd ones vanish by
 symmetry, and the sums of the even spherical harmonics are made to vanish by Gauss-Newton steps from

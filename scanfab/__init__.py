@@ -21,14 +21,14 @@ if TYPE_CHECKING:
     from scanfab.cell import Cell
     from scanfab.compare import compare_tables
     from scanfab.contacts import find_contacts
-    from scanfab.directions import DirectionRule, direction_rule
     from scanfab.fabric.contact import contact_fabric
     from scanfab.fabric.tensor import FabricTensor
     from scanfab.fabric.void import VoidFabric, void_fabric
     from scanfab.opening import read, read_series
     from scanfab.packing import ContactList, Contacts, Packing
     from scanfab.pipeline import compute
-    from scanfab.scan import ScanSums, Solids, scan_lines
+    from scanfab.scan.directions import DirectionRule, direction_rule
+    from scanfab.scan.scan import ScanSums, Solids, scan_lines
     from scanfab.series import Series
     from scanfab.settings import Settings
     from scanfab.table import COLUMNS, Row, Table
@@ -41,20 +41,20 @@ _HOME = {
     "Cell": "cell",
     "ContactList": "packing",
     "Contacts": "packing",
-    "DirectionRule": "directions",
+    "DirectionRule": "scan.directions",
     "FabricTensor": "fabric.tensor",
     "Packing": "packing",
     "PackingError": "base.errors",
     "ReadError": "base.errors",
     "Row": "table",
-    "ScanSums": "scan",
+    "ScanSums": "scan.scan",
     "ScanfabError": "base.errors",
     "ScanfabNote": "base.errors",
     "ScanfabWarning": "base.errors",
     "Series": "series",
     "Settings": "settings",
     "SettingsError": "base.errors",
-    "Solids": "scan",
+    "Solids": "scan.scan",
     "Table": "table",
     "UnknownFormatError": "base.errors",
     "VoidFabric": "fabric.void",
@@ -62,12 +62,12 @@ _HOME = {
     "compare_tables": "compare",
     "compute": "pipeline",
     "contact_fabric": "fabric.contact",
-    "direction_rule": "directions",
+    "direction_rule": "scan.directions",
     "find_contacts": "contacts",
     "read": "opening",
     "read_rows": "tabular",
     "read_series": "opening",
-    "scan_lines": "scan",
+    "scan_lines": "scan.scan",
     "void_fabric": "fabric.void",
 }
 

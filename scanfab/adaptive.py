@@ -12,10 +12,10 @@ import numpy as np
 
 from scanfab.base.errors import ScanfabWarning, SettingsError
 from scanfab.base.spelling import spelt_apart, spelt_time
-from scanfab.directions import design_of, direction_rule
 from scanfab.fabric.void import void_fabric
 from scanfab.plan import CLOSE, GROWTH_WITH_SPACING, Plan
-from scanfab.scan import (
+from scanfab.scan.directions import design_of, direction_rule
+from scanfab.scan.scan import (
     FollowedTooFarError,
     ScanSums,
     Solids,

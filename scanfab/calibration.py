@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 from scanfab.adaptive import missing_work
 from scanfab.base.errors import PackingError, ScanfabWarning, SettingsError
-from scanfab.directions import direction_rule
 from scanfab.frame_result import frame_result
 from scanfab.ladders import (
     PAPER_CUTOFF,
@@ -34,6 +33,7 @@ from scanfab.pipeline import (
     tell_doubts,
 )
 from scanfab.plan import Plan, make_plan
+from scanfab.scan.directions import direction_rule
 from scanfab.series import Series
 from scanfab.settings import AUTO_RULE, Length, Settings
 from scanfab.table import Row

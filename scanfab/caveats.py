@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from scanfab.base.errors import SettingsError
-from scanfab.directions import direction_rule
+from scanfab.scan.directions import direction_rule
 from scanfab.tabular import number_of, numbers_of
 
 __all__ = ["caveats_of"]

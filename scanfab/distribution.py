@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.directions import direction_rule
+from scanfab.scan.directions import direction_rule
 
 __all__ = ["EvenFunction", "fit_even", "mean_length_function", "sphere_points"]
 

@@ -14,15 +14,15 @@ import numpy.typing as npt
 
 from scanfab.abscissa import spelt_strain, strain_column
 from scanfab.base.errors import ScanfabWarning, SettingsError
-from scanfab.directions import DirectionRule
 from scanfab.distribution import mean_length_function, sphere_points
 from scanfab.fabric.contact import contact_fabric
 from scanfab.frame_result import FrameResult
-from scanfab.gaps import scan_gaps
-from scanfab.line_grids import line_frames
 from scanfab.pipeline import compute_rows
-from scanfab.scan import ScanSums, Solids
-from scanfab.segments import sample_segments
+from scanfab.scan.directions import DirectionRule
+from scanfab.scan.gaps import scan_gaps
+from scanfab.scan.lines import line_frames
+from scanfab.scan.scan import ScanSums, Solids
+from scanfab.scan.segments import sample_segments
 from scanfab.series import Series
 from scanfab.settings import Length, Settings
 from scanfab.tabular import number_of, total_error

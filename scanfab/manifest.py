@@ -10,7 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from scanfab.directions import DirectionRule
+from scanfab.scan.directions import DirectionRule
 from scanfab.series import Series
 from scanfab.settings import STRAIN_MODES, Settings
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from scanfab.base.errors import ScanfabWarning, SettingsError
-from scanfab.directions import DirectionRule, direction_rule
 from scanfab.doubts import refuse_impossible
+from scanfab.scan.directions import DirectionRule, direction_rule
 from scanfab.settings import AUTO_RULE, Settings
 from scanfab.variants import Sample
 from scanfab.window import RV_MEANING, SphereWindow, SurfaceBox

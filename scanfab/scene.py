@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.cell import Cell
-from scanfab.segments import Segments, cut_lines
+from scanfab.scan.segments import Segments, cut_lines
 from scanfab.variants import Sample
 from scanfab.window import SphereWindow
 

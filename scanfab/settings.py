@@ -12,7 +12,7 @@ from typing import Literal
 
 from scanfab.base.errors import SettingsError
 from scanfab.boundary import BoundaryRule
-from scanfab.directions import DirectionRule, direction_rule
+from scanfab.scan.directions import DirectionRule, direction_rule
 
 __all__ = [
     "AUTO_RULE",

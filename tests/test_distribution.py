@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scanfab.directions import direction_rule
 from scanfab.distribution import fit_even, mean_length_function, sphere_points
+from scanfab.scan.directions import direction_rule
 
 
 def even(n):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scanfab.base.errors import SettingsError
-from scanfab.directions import direction_rule
+from scanfab.scan.directions import direction_rule
 from scanfab.settings import Length, Settings, parse_axis, parse_frames, parse_length
 from tests.helpers.dumps import write
 

@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.files import whole_file
+from scanfab.scan.segments import Segments
 from scanfab.scene import ContactLines, Grains
-from scanfab.segments import Segments
 
 __all__ = [
     "Collection",

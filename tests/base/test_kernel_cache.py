@@ -13,7 +13,7 @@ from pathlib import Path
 import numba
 import pytest
 
-import scanfab.kernels.sweep
+import scanfab.scan.kernels.sweep
 from scanfab.base import ending
 from scanfab.base import jit as compiled
 from scanfab.base import kernel_cache as cache
@@ -169,7 +169,7 @@ def test_numbas_own_variable_counts(dump, tmp_path):
 
 
 def test_functions_of_others_are_kept_where_they_were():
-    assert scanfab.kernels.sweep
+    assert scanfab.scan.kernels.sweep
     assert os.environ.get("NUMBA_CACHE_DIR", "") == numba.config.CACHE_DIR
 
 

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 from numba import njit
 
-from scanfab.directions import DirectionRule
-from scanfab.line_grids import line_frames
-from scanfab.scan import Solids, scan_lines
+from scanfab.scan.directions import DirectionRule
+from scanfab.scan.lines import line_frames
+from scanfab.scan.scan import Solids, scan_lines
 from tests.benchmarks.packings import PAPER, dense
 from tests.benchmarks.timing import interleaved, table
 

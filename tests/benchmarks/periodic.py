@@ -6,8 +6,8 @@ import time
 
 import numpy as np
 
-from scanfab.directions import direction_rule
-from scanfab.scan import CellGrains, Solids, scan_lines
+from scanfab.scan.directions import direction_rule
+from scanfab.scan.scan import CellGrains, Solids, scan_lines
 from tests.benchmarks.packings import relaxed_cell
 from tests.benchmarks.timing import interleaved, table
 

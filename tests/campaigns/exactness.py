@@ -19,7 +19,7 @@ import time
 
 import numpy as np
 
-from tests.kernels import test_axes, test_bins
+from tests.scan.kernels import test_axes, test_bins
 
 MOST_OVERLAP = 0.6
 MOST_RATIO = 50.0

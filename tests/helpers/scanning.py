@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.directions import direction_rule
 from scanfab.fabric.void import void_fabric
-from scanfab.line_grids import line_frames
-from scanfab.scan import ScanSums, Solids, scan_lines, sums_of, tally_frames
+from scanfab.scan.directions import direction_rule
+from scanfab.scan.lines import line_frames
+from scanfab.scan.scan import ScanSums, Solids, scan_lines, sums_of, tally_frames
 
 Z = np.array([[0.0, 0.0, 1.0]])
 

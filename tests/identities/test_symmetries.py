@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from scanfab import Packing, compute, contact_fabric, find_contacts, void_fabric
-from scanfab.directions import direction_rule
-from scanfab.line_grids import line_frames
+from scanfab.scan.directions import direction_rule
+from scanfab.scan.lines import line_frames
 from tests.helpers.lattices import Spheres, poisson_spheres, rotation, shaken_cubic
 from tests.helpers.scanning import fabric, scan_frames, solids_of
 

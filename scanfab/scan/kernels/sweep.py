@@ -27,7 +27,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.jit import LANES, REORDERED, Flag, inner
-from scanfab.kernels.strips import (
+from scanfab.scan.kernels.strips import (
     BOUND,
     END,
     FAR,

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from scanfab import Cell, Solids, direction_rule, scan_lines
-from scanfab.gaps import Blocks, scan_gaps
-from scanfab.line_grids import line_frames, turned_frames
-from scanfab.scan import CellGrains
+from scanfab.scan.gaps import Blocks, scan_gaps
+from scanfab.scan.lines import line_frames, turned_frames
+from scanfab.scan.scan import CellGrains
 from tests.helpers import naive
 from tests.helpers.lattices import poisson_spheres
 from tests.helpers.scanning import ratio, solids_of

@@ -7,11 +7,11 @@ from hypothesis import strategies as st
 from numba import njit
 
 from scanfab.base.jit import LANES
-from scanfab.kernels import axes, lists, strips, sweep
-from scanfab.kernels.bins import no_bins
-from scanfab.kernels.grid import cover, strip_of
-from scanfab.kernels.projection import order_of, project, range_of
-from scanfab.line_grids import line_frames
+from scanfab.scan.kernels import axes, lists, strips, sweep
+from scanfab.scan.kernels.bins import no_bins
+from scanfab.scan.kernels.grid import cover, strip_of
+from scanfab.scan.kernels.projection import order_of, project, range_of
+from scanfab.scan.lines import line_frames
 from tests.helpers import naive
 from tests.helpers.lattices import ball_points, poisson_spheres, rotation
 from tests.helpers.uncompiled import run_uncompiled
@@ -340,8 +340,8 @@ def test_sweep_equals_the_slow_twin_uncompiled():
     """As plain Python the kernel also finds an index out of range."""
     code = (
         "import numpy as np\n"
-        "from scanfab.kernels import axes\n"
-        "from tests.kernels import test_axes as here\n"
+        "from scanfab.scan.kernels import axes\n"
+        "from tests.scan.kernels import test_axes as here\n"
         "assert not hasattr(axes.scan_axes, 'py_func')\n"
         "np.seterr(invalid='ignore')\n"
         "for kind in here.KINDS:\n"

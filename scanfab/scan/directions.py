@@ -92,7 +92,7 @@ def direction_rule(text: str) -> DirectionRule:
 
     Examples
     --------
-    >>> from scanfab.directions import direction_rule
+    >>> from scanfab.scan.directions import direction_rule
     >>> rule = direction_rule("lebedev:11")
     >>> len(rule), rule.degree
     (25, 11)
@@ -153,7 +153,7 @@ def design_of(axes: float) -> DirectionRule:
 
 def design(degree: float) -> DirectionRule:
     """The antipodal spherical design of this degree or the next that the package has."""
-    table = np.loadtxt(str(files("scanfab") / "designs.csv"), delimiter=",", comments="#")
+    table = np.loadtxt(str(files("scanfab.scan") / "designs.csv"), delimiter=",", comments="#")
     degrees = np.unique(table[:, 0])
     if not 1 <= degree <= degrees[-1]:
         raise SettingsError(

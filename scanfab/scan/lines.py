@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import SettingsError
-from scanfab.directions import DirectionRule
+from scanfab.scan.directions import DirectionRule
 
 __all__ = ["drawn_lines", "line_frames", "turned_frames"]
 
@@ -22,7 +22,7 @@ def line_frames(axes: FloatArray) -> FloatArray:
     Examples
     --------
     >>> import numpy as np
-    >>> from scanfab.line_grids import line_frames
+    >>> from scanfab.scan.lines import line_frames
     >>> line_frames(np.array([[0.0, 0.0, 1.0]]))[0]
     array([[1., 0., 0.],
            [0., 1., 0.],

@@ -2,7 +2,7 @@
 Strips of scan lines: where the lines are, which of them a sphere reaches, and their state.
 
 The state is three numbers a line for each set of solids, the running end of the solid and the two
-ends of the last gap, and one more; what they are for, :mod:`scanfab.kernels.sweep` says.
+ends of the last gap, and one more; what they are for, :mod:`scanfab.scan.kernels.sweep` says.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.jit import inner
-from scanfab.kernels.strips import Strip
+from scanfab.scan.kernels.strips import Strip
 
 __all__ = ["Grid", "bounds", "cover", "open_grid", "part_of", "sheared_grid", "strip_of"]
 

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.jit import Flag, inner
-from scanfab.kernels.strips import FAR
-from scanfab.kernels.sweep import Measured, whole_gap
+from scanfab.scan.kernels.strips import FAR
+from scanfab.scan.kernels.sweep import Measured, whole_gap
 
 __all__ = [
     "BLOCKS",

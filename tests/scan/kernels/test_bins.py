@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from scanfab.gaps import Blocks
-from scanfab.kernels import axes, sweep
-from scanfab.kernels.bins import BLOCKS, Bins
-from scanfab.line_grids import line_frames
+from scanfab.scan.gaps import Blocks
+from scanfab.scan.kernels import axes, sweep
+from scanfab.scan.kernels.bins import BLOCKS, Bins
+from scanfab.scan.lines import line_frames
 from tests.helpers import naive
 from tests.helpers.lattices import rotation
 from tests.helpers.uncompiled import run_uncompiled
-from tests.kernels.test_axes import KINDS, line_words, overlapping
+from tests.scan.kernels.test_axes import KINDS, line_words, overlapping
 
 RUNS_OF_A_KIND = 60
 REACH = 30.0
@@ -93,7 +93,7 @@ def test_binned_gaps_equal_the_slow_twin_uncompiled():
     """As plain Python the kernel also finds an index out of range."""
     run_uncompiled(
         "import numpy as np\n"
-        "from tests.kernels import test_bins as here\n"
+        "from tests.scan.kernels import test_bins as here\n"
         "assert not hasattr(here.axes.scan_axes, 'py_func')\n"
         "np.seterr(invalid='ignore')\n"
         "for kind in here.KINDS:\n"

@@ -79,7 +79,7 @@ def cut_lines(
     Examples
     --------
     >>> import numpy as np
-    >>> from scanfab.segments import cut_lines
+    >>> from scanfab.scan.segments import cut_lines
     >>> cut_lines(np.zeros((1, 3)), np.ones(1), np.eye(3), np.zeros((1, 2)), 3.0).length
     array([2., 2., 2.])
     """

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.jit import inner
-from scanfab.kernels.bins import (
+from scanfab.scan.kernels.bins import (
     GAP_HIGH,
     GAP_LOW,
     LINE_BOUND,
@@ -15,9 +15,9 @@ from scanfab.kernels.bins import (
     add_gaps,
     room_for_gaps,
 )
-from scanfab.kernels.periodic import CellGrains, Prism, cross, dot, shifts
-from scanfab.kernels.strips import BOUND, END, FAR, SET, Strip
-from scanfab.kernels.sweep import CHANNELS, KEPT, LENGTH, STEPS, VOID, WHOLE
+from scanfab.scan.kernels.periodic import CellGrains, Prism, cross, dot, shifts
+from scanfab.scan.kernels.strips import BOUND, END, FAR, SET, Strip
+from scanfab.scan.kernels.sweep import CHANNELS, KEPT, LENGTH, STEPS, VOID, WHOLE
 
 __all__ = ["follow"]
 

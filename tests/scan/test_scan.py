@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from scanfab import Packing, SettingsError, compute, direction_rule, scan_lines
-from scanfab.line_grids import line_frames, turned_frames
-from scanfab.scan import MAX_LINES, ScanSums
+from scanfab.scan.lines import line_frames, turned_frames
+from scanfab.scan.scan import MAX_LINES, ScanSums
 from tests.helpers import naive
 from tests.helpers.lattices import Spheres, poisson_spheres, separate_spheres, shaken_cubic
 from tests.helpers.scanning import fabric, solids_of

@@ -16,9 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.jit import ZERO, inner
-from scanfab.kernels.grid import Grid, sheared_grid
-from scanfab.kernels.projection import Spheres, in_order, order_of, range_of, room_for_spheres
-from scanfab.kernels.sweep import Measured
+from scanfab.scan.kernels.grid import Grid, sheared_grid
+from scanfab.scan.kernels.projection import Spheres, in_order, order_of, range_of, room_for_spheres
+from scanfab.scan.kernels.sweep import Measured
 
 __all__ = [
     "CellGrains",

@@ -6,11 +6,11 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.jit import LANES, ZERO, Flag, inner, kernel
-from scanfab.kernels.bins import Bins, bins_along
-from scanfab.kernels.follow import follow
-from scanfab.kernels.grid import Grid, bounds, open_grid, part_of, strip_of
-from scanfab.kernels.lines import solve_closed
-from scanfab.kernels.lists import (
+from scanfab.scan.kernels.bins import Bins, bins_along
+from scanfab.scan.kernels.follow import follow
+from scanfab.scan.kernels.grid import Grid, bounds, open_grid, part_of, strip_of
+from scanfab.scan.kernels.lines import solve_closed
+from scanfab.scan.kernels.lists import (
     LISTED_LINES,
     Lists,
     bin_last_gaps,
@@ -19,10 +19,10 @@ from scanfab.kernels.lists import (
     room_for_lists,
     sweep_lists,
 )
-from scanfab.kernels.periodic import CellGrains, Prism, cell_grid, measured_in
-from scanfab.kernels.projection import Spheres, project, sort_into_strips, sphere_at
-from scanfab.kernels.strips import MOST_LINES, STATE_SIZE, Strip, begin, measure_from
-from scanfab.kernels.sweep import NOTHING, STEPS, Measured, settle, visit
+from scanfab.scan.kernels.periodic import CellGrains, Prism, cell_grid, measured_in
+from scanfab.scan.kernels.projection import Spheres, project, sort_into_strips, sphere_at
+from scanfab.scan.kernels.strips import MOST_LINES, STATE_SIZE, Strip, begin, measure_from
+from scanfab.scan.kernels.sweep import NOTHING, STEPS, Measured, settle, visit
 
 __all__ = ["scan_axes", "scan_cell"]
 
@@ -186,10 +186,10 @@ def scan_axes(
     tallies : shape (D, 2, TALLY_SIZE)
         Zeros; the results for each axis and set of solids.
     by_lists : bool
-        Whether to list the chords of each line first, see :mod:`scanfab.kernels.lists`: faster
+        Whether to list the chords of each line first, see :mod:`scanfab.scan.kernels.lists`: faster
         where a sphere meets few lines. For bins they are listed anyhow.
     second, whole, window : True or None
-        What is counted, see :mod:`scanfab.kernels.sweep`.
+        What is counted, see :mod:`scanfab.scan.kernels.sweep`.
     bins : Bins
         Where every gap is added, instead of to the tallies, if there are any.
     """

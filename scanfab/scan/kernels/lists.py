@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.jit import LANES, ONE, REORDERED, ZERO, Flag, inner
-from scanfab.kernels.bins import (
+from scanfab.scan.kernels.bins import (
     GAP_HIGH,
     GAP_LOW,
     LINE_BOUND,
@@ -24,9 +24,9 @@ from scanfab.kernels.bins import (
     add_gaps,
     room_for_gaps,
 )
-from scanfab.kernels.projection import Spheres, sphere_at
-from scanfab.kernels.strips import BOUND, END, FAR, GAP_END, GAP_START, SET, Strip, span
-from scanfab.kernels.sweep import CHORDS, Measured, add, both, meet, moved
+from scanfab.scan.kernels.projection import Spheres, sphere_at
+from scanfab.scan.kernels.strips import BOUND, END, FAR, GAP_END, GAP_START, SET, Strip, span
+from scanfab.scan.kernels.sweep import CHORDS, Measured, add, both, meet, moved
 
 __all__ = [
     "LISTED_LINES",

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.jit import ZERO, Flag, inner
-from scanfab.kernels.bins import (
+from scanfab.scan.kernels.bins import (
     GAP_HIGH,
     GAP_LOW,
     LINE_BOUND,
@@ -15,9 +15,9 @@ from scanfab.kernels.bins import (
     add_gaps,
     room_for_gaps,
 )
-from scanfab.kernels.projection import Spheres, number_from, sort_by, sphere_at
-from scanfab.kernels.strips import BOUND, END, FAR, SET, Strip, span
-from scanfab.kernels.sweep import Measured, add, counted, moved
+from scanfab.scan.kernels.projection import Spheres, number_from, sort_by, sphere_at
+from scanfab.scan.kernels.strips import BOUND, END, FAR, SET, Strip, span
+from scanfab.scan.kernels.sweep import Measured, add, counted, moved
 
 __all__ = ["solve_closed"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scanfab.line_grids import line_frames
-from scanfab.segments import Segments, cut_lines, grid_points, sample_segments
+from scanfab.scan.lines import line_frames
+from scanfab.scan.segments import Segments, cut_lines, grid_points, sample_segments
 from tests.helpers import naive
 from tests.helpers.lattices import shaken_cubic
 

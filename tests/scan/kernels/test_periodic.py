@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from numba import njit
 
-from scanfab.kernels import axes, periodic, sweep
-from scanfab.kernels.bins import no_bins
-from scanfab.kernels.periodic import CellGrains
+from scanfab.scan.kernels import axes, periodic, sweep
+from scanfab.scan.kernels.bins import no_bins
+from scanfab.scan.kernels.periodic import CellGrains
 from tests.helpers import naive
 from tests.helpers.uncompiled import run_uncompiled
-from tests.kernels.test_axes import WAYS
+from tests.scan.kernels.test_axes import WAYS
 
 PERIODS = [(1, 1, 1), (1, 1, 0), (0, 1, 1), (1, 0, 1), (1, 0, 0), (0, 0, 1)]
 
@@ -228,7 +228,7 @@ def test_following_ends_when_it_has_taken_the_steps_that_it_may(corner):
 def test_gaps_equal_those_of_explicit_images_uncompiled():
     run_uncompiled(
         "import numpy as np\n"
-        "from tests.kernels import test_periodic as here\n"
+        "from tests.scan.kernels import test_periodic as here\n"
         "np.seterr(invalid='ignore')\n"
         "for periods in here.PERIODS:\n"
         "    for seed in range(2):\n"

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.jit import ONE, ZERO, inner
-from scanfab.kernels.grid import Grid
-from scanfab.kernels.strips import FAR, Sphere, span
+from scanfab.scan.kernels.grid import Grid
+from scanfab.scan.kernels.strips import FAR, Sphere, span
 
 __all__ = [
     "Spheres",

@@ -12,12 +12,12 @@ import numpy.typing as npt
 
 from scanfab.base.errors import SettingsError
 from scanfab.base.jit import Flag
-from scanfab.directions import DirectionRule
-from scanfab.kernels import sweep
-from scanfab.kernels.axes import scan_axes, scan_cell
-from scanfab.kernels.bins import Bins, no_bins
-from scanfab.kernels.periodic import CellGrains
-from scanfab.line_grids import drawn_lines
+from scanfab.scan.directions import DirectionRule
+from scanfab.scan.kernels import sweep
+from scanfab.scan.kernels.axes import scan_axes, scan_cell
+from scanfab.scan.kernels.bins import Bins, no_bins
+from scanfab.scan.kernels.periodic import CellGrains
+from scanfab.scan.lines import drawn_lines
 
 __all__ = [
     "MAX_LINES",

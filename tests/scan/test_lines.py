@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scanfab import direction_rule
-from scanfab.line_grids import line_frames
+from scanfab.scan.lines import line_frames
 
 
 def test_frames_are_orthonormal_and_right_handed():

@@ -1,8 +1,8 @@
 """
 The gap scan: all void segments, by the octant of their middle and by cut-off.
 
-Slower than :mod:`scanfab.scan`, about twice where lines are far apart, and for what that cannot
-tell: the sample's own scatter, every cut-off in one pass, and higher moments of the lengths.
+Slower than :mod:`scanfab.scan.scan`, about twice where lines are far apart, and for what that
+cannot tell: the sample's own scatter, every cut-off in one pass, and higher moments of the lengths.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.directions import DirectionRule
-from scanfab.kernels.bins import BLOCKS, Bins
-from scanfab.line_grids import drawn_lines, line_frames
-from scanfab.scan import MOST_STEPS, Following, Solids, in_parts, shortest_gap, tally_frames
+from scanfab.scan.directions import DirectionRule
+from scanfab.scan.kernels.bins import BLOCKS, Bins
+from scanfab.scan.lines import drawn_lines, line_frames
+from scanfab.scan.scan import MOST_STEPS, Following, Solids, in_parts, shortest_gap, tally_frames
 
 __all__ = ["Blocks", "GapSums", "scan_gaps"]
 
@@ -84,7 +84,7 @@ class Blocks:
         Examples
         --------
         >>> import numpy as np
-        >>> from scanfab.gaps import Blocks
+        >>> from scanfab.scan.gaps import Blocks
         >>> Blocks.about(np.zeros(3), 1.0).of(np.array([[-0.1, -0.2, -0.3], [0.1, -0.2, 0.3]]))
         array([0, 5])
         """

@@ -1,0 +1,1 @@
+"""Scan lines through spheres, as sums over their void segments: arrays in, sums out."""

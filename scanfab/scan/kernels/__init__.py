@@ -1,0 +1,1 @@
+"""Numba kernels: numbers and arrays in and out; no options, no defaults, no errors."""
