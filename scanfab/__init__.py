@@ -18,14 +18,14 @@ if TYPE_CHECKING:
         UnknownFormatError,
     )
     from scanfab.calibration import Calibration, calibrate
-    from scanfab.cell import Cell
     from scanfab.compare import compare_tables
-    from scanfab.contacts import find_contacts
     from scanfab.fabric.contact import contact_fabric
     from scanfab.fabric.tensor import FabricTensor
     from scanfab.fabric.void import VoidFabric, void_fabric
     from scanfab.opening import read, read_series
-    from scanfab.packing import ContactList, Contacts, Packing
+    from scanfab.packing.cell import Cell
+    from scanfab.packing.packing import ContactList, Contacts, Packing
+    from scanfab.packing.search import find_contacts
     from scanfab.pipeline import compute
     from scanfab.scan.directions import DirectionRule, direction_rule
     from scanfab.scan.scan import ScanSums, Solids, scan_lines
@@ -38,12 +38,12 @@ if TYPE_CHECKING:
 _HOME = {
     "COLUMNS": "table",
     "Calibration": "calibration",
-    "Cell": "cell",
-    "ContactList": "packing",
-    "Contacts": "packing",
+    "Cell": "packing.cell",
+    "ContactList": "packing.packing",
+    "Contacts": "packing.packing",
     "DirectionRule": "scan.directions",
     "FabricTensor": "fabric.tensor",
-    "Packing": "packing",
+    "Packing": "packing.packing",
     "PackingError": "base.errors",
     "ReadError": "base.errors",
     "Row": "table",
@@ -63,7 +63,7 @@ _HOME = {
     "compute": "pipeline",
     "contact_fabric": "fabric.contact",
     "direction_rule": "scan.directions",
-    "find_contacts": "contacts",
+    "find_contacts": "packing.search",
     "read": "opening",
     "read_rows": "tabular",
     "read_series": "opening",

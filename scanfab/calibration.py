@@ -24,7 +24,8 @@ from scanfab.ladders import (
     sentence_of_recommended,
 )
 from scanfab.measurement import Measurement
-from scanfab.packing import Packing
+from scanfab.packing.packing import Packing
+from scanfab.packing.sample import Sample
 from scanfab.pipeline import (
     classify,
     frames_of,
@@ -37,7 +38,6 @@ from scanfab.scan.directions import direction_rule
 from scanfab.series import Series
 from scanfab.settings import AUTO_RULE, Length, Settings
 from scanfab.table import Row
-from scanfab.variants import Sample
 
 __all__ = ["Calibration", "calibrate"]
 

@@ -16,12 +16,12 @@ from scanfab.base.files import check_folder
 from scanfab.distribution import mean_length_function, sphere_points
 from scanfab.fabric.tensor import COMPONENTS
 from scanfab.frame_result import FrameResult
+from scanfab.packing.sample import VARIANTS
 from scanfab.scan.lines import line_frames
 from scanfab.scan.segments import Segments, sample_segments
 from scanfab.scene import contact_lines, grains_of, scene_of
 from scanfab.settings import Vector
 from scanfab.table import Row
-from scanfab.variants import VARIANTS
 from scanfab.writers import vtk
 
 __all__ = ["VtkFolder", "scan_line_sample"]

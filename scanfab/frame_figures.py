@@ -17,6 +17,7 @@ from scanfab.base.errors import ScanfabWarning, SettingsError
 from scanfab.distribution import mean_length_function, sphere_points
 from scanfab.fabric.contact import contact_fabric
 from scanfab.frame_result import FrameResult
+from scanfab.packing.sample import VARIANTS
 from scanfab.pipeline import compute_rows
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.gaps import scan_gaps
@@ -26,7 +27,6 @@ from scanfab.scan.segments import sample_segments
 from scanfab.series import Series
 from scanfab.settings import Length, Settings
 from scanfab.tabular import number_of, total_error
-from scanfab.variants import VARIANTS
 from scanfab.writers.plot import DPI
 from scanfab.writers.plot_frame import (
     CutoffCurve,

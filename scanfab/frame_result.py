@@ -10,11 +10,11 @@ from typing import Any
 from scanfab.base.errors import ScanfabWarning
 from scanfab.base.spelling import spelt_apart
 from scanfab.measurement import Measurement, measure
+from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.plan import Plan
 from scanfab.settings import Settings
 from scanfab.table import Row
 from scanfab.variant_columns import VariantColumns, no_columns
-from scanfab.variants import VARIANTS, Sample
 
 __all__ = ["FrameResult", "frame_result"]
 

@@ -15,13 +15,13 @@ from scanfab.base.errors import (
     SettingsError,
     SkippedFrameWarning,
 )
+from scanfab.packing.sample import Sample
 from scanfab.pipeline import classify, refuse_unknown_boundary, tell_doubts
 from scanfab.plan import Plan, make_plan
 from scanfab.scene import Scene, about_window, scene_of
 from scanfab.series import Frame, Series
 from scanfab.settings import STRAIN_MODES, Settings
 from scanfab.strain import StrainFile, axial_length, shear_strain
-from scanfab.variants import Sample
 
 __all__ = ["Look", "look_at"]
 

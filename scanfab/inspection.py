@@ -8,7 +8,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from scanfab.base.errors import PackingError, ReadError, ScanfabNote
-from scanfab.doubts import cell_doubt, cell_hint, doubts_of, refuse_impossible
+from scanfab.packing.doubts import cell_doubt, cell_hint, doubts_of, refuse_impossible
+from scanfab.packing.sample import VARIANTS, Sample
+from scanfab.packing.window import SphereWindow, SurfaceBox
 from scanfab.pipeline import (
     boundary_hint,
     chosen_frames,
@@ -19,8 +21,6 @@ from scanfab.pipeline import (
 from scanfab.plan import rv_of
 from scanfab.series import Frame, Series
 from scanfab.settings import Settings
-from scanfab.variants import VARIANTS, Sample
-from scanfab.window import SphereWindow, SurfaceBox
 
 __all__ = ["REPORT_MEANINGS", "FrameReport", "inspect_series"]
 

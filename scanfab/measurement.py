@@ -10,12 +10,12 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.adaptive import scan_to_tolerance
+from scanfab.packing.sample import Sample, Variant
 from scanfab.plan import CLOSE, Plan
 from scanfab.scan.directions import DirectionRule, design_of, direction_rule
 from scanfab.scan.gaps import Blocks, GapSums, scan_gaps
 from scanfab.scan.scan import CellGrains, ScanSums, Solids, most_lines
 from scanfab.settings import AUTO_RULE, Settings
-from scanfab.variants import Sample, Variant
 
 __all__ = ["Measurement", "measure"]
 

@@ -18,7 +18,7 @@ from scanfab.families import (
     sort_into_families,
 )
 from scanfab.frame_file import FrameFile
-from scanfab.packing import Packing
+from scanfab.packing.packing import Packing
 from scanfab.readers.base import ReadOptions
 from scanfab.readers.yade_cells import is_cell_file, refuse_as_numbers
 from scanfab.series import ContactsFrom, Series

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from scanfab.base.errors import ScanfabWarning, SettingsError
-from scanfab.doubts import refuse_impossible
+from scanfab.packing.doubts import refuse_impossible
+from scanfab.packing.sample import Sample
+from scanfab.packing.window import RV_MEANING, SphereWindow, SurfaceBox
 from scanfab.scan.directions import DirectionRule, direction_rule
 from scanfab.settings import AUTO_RULE, Settings
-from scanfab.variants import Sample
-from scanfab.window import RV_MEANING, SphereWindow, SurfaceBox
 
 __all__ = ["CLOSE", "GROWTH_WITH_SPACING", "Plan", "make_plan", "rv_of"]
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.cell import Cell
+from scanfab.packing.cell import Cell
+from scanfab.packing.sample import Sample
+from scanfab.packing.window import SphereWindow
 from scanfab.scan.segments import Segments, cut_lines
-from scanfab.variants import Sample
-from scanfab.window import SphereWindow
 
 __all__ = [
     "ContactLines",

@@ -14,7 +14,7 @@ import numpy as np
 from scanfab.base.errors import PackingError, ReadError, ScanfabWarning
 from scanfab.families import Family
 from scanfab.frame_file import FrameFile
-from scanfab.packing import Packing, check_lengths
+from scanfab.packing.packing import Packing, check_lengths
 from scanfab.readers.base import (
     Carries,
     GrainTable,

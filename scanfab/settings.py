@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Literal
 
 from scanfab.base.errors import SettingsError
-from scanfab.boundary import BoundaryRule
+from scanfab.packing.boundary import BoundaryRule
 from scanfab.scan.directions import DirectionRule, direction_rule
 
 __all__ = [

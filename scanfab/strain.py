@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from scanfab.base.errors import SettingsError
-from scanfab.cell import Cell
 from scanfab.frame_file import FrameFile
-from scanfab.variants import Sample
+from scanfab.packing.cell import Cell
+from scanfab.packing.sample import Sample
 
 __all__ = ["StrainFile", "axial_length", "is_flipped", "shear_strain"]
 

@@ -16,9 +16,9 @@ from scanfab.fabric.jackknife import BLOCKS, Jackknife, contact_jackknife, void_
 from scanfab.fabric.tensor import COMPONENTS, FabricTensor
 from scanfab.fabric.void import VoidFabric, void_fabric
 from scanfab.measurement import Measurement
+from scanfab.packing.sample import Variant
 from scanfab.settings import Settings
 from scanfab.table import COLUMNS
-from scanfab.variants import Variant
 
 __all__ = ["FRAME_COLUMNS", "VariantColumns", "no_columns"]
 

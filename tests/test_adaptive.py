@@ -18,11 +18,11 @@ from scanfab import (
     scan_lines,
     void_fabric,
 )
+from scanfab.packing.sample import Sample
 from scanfab.plan import REPLICATES, make_plan
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.scan import CellGrains, Solids
 from scanfab.settings import AUTO_RULE
-from scanfab.variants import Sample
 from tests.helpers.lattices import shaken_cubic
 from tests.helpers.scanning import solids_of
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from scanfab import Cell, Packing, ScanfabWarning, Settings, compute, find_contacts
+from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.plan import make_plan
 from scanfab.scan.gaps import Blocks
-from scanfab.variants import VARIANTS, Sample
 from tests.helpers import naive
 from tests.helpers.lattices import shaken_cubic
 

@@ -11,8 +11,8 @@ import pytest
 
 import scanfab
 from scanfab.base.errors import ScanfabWarning, SettingsError
-from scanfab.cell import Cell
-from scanfab.packing import Packing
+from scanfab.packing.cell import Cell
+from scanfab.packing.packing import Packing
 from scanfab.pipeline import compute_rows
 from scanfab.settings import Settings
 from scanfab.table import COLUMNS

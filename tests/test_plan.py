@@ -15,9 +15,9 @@ from scanfab import (
     compute,
     find_contacts,
 )
+from scanfab.packing.sample import Sample
 from scanfab.plan import CLOSE, FEWEST_LINES, GROWTH_WITH_SPACING, REPLICATES, WIDE, make_plan
 from scanfab.settings import AUTO_RULE
-from scanfab.variants import Sample
 from tests.helpers.lattices import shaken_cubic
 
 

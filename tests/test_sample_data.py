@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab.variants import Sample
+from scanfab.packing.sample import Sample
 from tests.helpers.truth import BOX, COMPONENTS, FLOOR, PERIODIC, TRIAXIAL, YADE, csv_rows
 
 SCAN = {"directions": 25, "spacing": "3rmin"}

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import scanfab
+from scanfab.packing.sample import Sample
+from scanfab.packing.window import SphereWindow
 from scanfab.scene import Scene, contact_lines, grains_of, scene_of, section_lines
-from scanfab.variants import Sample
-from scanfab.window import SphereWindow
 from tests.helpers.lattices import simple_cubic
 
 

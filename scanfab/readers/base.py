@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import SettingsError
-from scanfab.cell import Cell
-from scanfab.packing import ContactList
+from scanfab.packing.cell import Cell
+from scanfab.packing.packing import ContactList
 
 __all__ = [
     "Carries",

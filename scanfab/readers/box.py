@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.lengths import MOST
-from scanfab.cell import Cell
+from scanfab.packing.cell import Cell
 
 __all__ = ["box_of_bounds", "box_vectors", "dump_cell"]
 

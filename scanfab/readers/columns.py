@@ -12,10 +12,10 @@ import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
 from scanfab.base.lengths import all_within
-from scanfab.boundary import CLASS_COLUMNS
-from scanfab.cell import Cell
-from scanfab.doubts import CLUMP_COLUMNS
-from scanfab.packing import LazyColumns, lies_within
+from scanfab.packing.boundary import CLASS_COLUMNS
+from scanfab.packing.cell import Cell
+from scanfab.packing.doubts import CLUMP_COLUMNS
+from scanfab.packing.packing import LazyColumns, lies_within
 from scanfab.readers.base import GrainTable, ReadOptions
 
 __all__ = [

@@ -20,8 +20,8 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import ReadError, ScanfabWarning
-from scanfab.cell import Cell
-from scanfab.packing import LazyColumns
+from scanfab.packing.cell import Cell
+from scanfab.packing.packing import LazyColumns
 from scanfab.readers.base import Snapshot
 from scanfab.readers.box import dump_cell
 from scanfab.readers.files import check_memory, plain

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
 from scanfab.base.lengths import MOST
-from scanfab.packing import ContactList
+from scanfab.packing.packing import ContactList
 from scanfab.readers.base import GrainTable, JoinedContacts
 
 __all__ = ["count_walls", "join_ids", "join_positions", "rows_of_ids"]

@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
 from scanfab.base.lengths import MOST
-from scanfab.cell import Cell
-from scanfab.packing import ContactList
+from scanfab.packing.cell import Cell
+from scanfab.packing.packing import ContactList
 from scanfab.readers.base import (
     Carries,
     FileKind,

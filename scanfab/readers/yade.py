@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.lengths import MOST
-from scanfab.cell import Cell
+from scanfab.packing.cell import Cell
 from scanfab.readers.base import (
     Carries,
     FileKind,

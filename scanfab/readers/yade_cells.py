@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError, ScanfabNote, ScanfabWarning
-from scanfab.cell import Cell
+from scanfab.packing.cell import Cell
 from scanfab.readers.base import ReadOptions
 from scanfab.readers.files import COMPRESSED_SUFFIXES, bare_name
 from scanfab.readers.mesh import read_mesh

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.lengths import MOST
-from scanfab.cell import Cell
+from scanfab.packing.cell import Cell
 from scanfab.readers.base import GrainTable, ReadOptions, Snapshot
 from scanfab.readers.columns import grain_table, whole_numbers
 from scanfab.readers.files import first_bytes, unpacked

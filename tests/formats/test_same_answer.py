@@ -10,8 +10,8 @@ import pytest
 import pyvista
 
 import scanfab
-from scanfab.cell import Cell
-from scanfab.packing import Packing
+from scanfab.packing.cell import Cell
+from scanfab.packing.packing import Packing
 from tests.helpers.dumps import dump_text, local_text, write, yade_lines, yade_spheres
 from tests.helpers.truth import COMPONENTS
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scanfab.base.errors import ReadError, SettingsError
-from scanfab.cell import Cell
+from scanfab.packing.cell import Cell
 from scanfab.readers.base import ReadOptions
 from scanfab.readers.columns import grain_table, has_radius, user_cell
 

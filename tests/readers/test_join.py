@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scanfab.base.errors import ReadError
-from scanfab.cell import Cell
+from scanfab.packing.cell import Cell
 from scanfab.readers.base import GrainTable
 from scanfab.readers.join import join_ids, join_positions, rows_of_ids
 

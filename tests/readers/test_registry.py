@@ -10,7 +10,7 @@ import pytest
 
 import scanfab
 from scanfab.base.errors import ReadError, ScanfabWarning, UnknownFormatError
-from scanfab.packing import ContactList
+from scanfab.packing.packing import ContactList
 from scanfab.readers import registry
 from scanfab.readers.base import GrainTable, JoinedContacts, Snapshot
 from scanfab.readers.registry import load_readers, reader_for, reader_named

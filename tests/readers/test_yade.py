@@ -13,7 +13,7 @@ import pytest
 
 import scanfab
 from scanfab.base.errors import ReadError
-from scanfab.cell import Cell
+from scanfab.packing.cell import Cell
 from scanfab.readers.registry import reader_for
 from tests.helpers.dumps import write, yade_lines, yade_spheres
 from tests.helpers.truth import (

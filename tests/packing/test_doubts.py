@@ -7,11 +7,11 @@ import pytest
 
 import scanfab
 from scanfab.base.errors import PackingError
-from scanfab.cell import Cell
-from scanfab.contacts import find_contacts
-from scanfab.doubts import cell_doubt, cell_hint, doubts_of, refuse_impossible
-from scanfab.packing import Packing
-from scanfab.variants import Sample
+from scanfab.packing.cell import Cell
+from scanfab.packing.doubts import cell_doubt, cell_hint, doubts_of, refuse_impossible
+from scanfab.packing.packing import Packing
+from scanfab.packing.sample import Sample
+from scanfab.packing.search import find_contacts
 from tests.helpers.truth import BOX, CELL, FLOOR, SAMPLE_DATA, SHEAR, TRIAXIAL, YADE
 
 CLUMPS, DISCS = SAMPLE_DATA / "clumps", SAMPLE_DATA / "lammps_discs"

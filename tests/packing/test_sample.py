@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from scanfab import Cell, Packing, contact_fabric, find_contacts
-from scanfab.variants import VARIANTS, Sample
-from scanfab.window import SphereWindow
+from scanfab.packing.sample import VARIANTS, Sample
+from scanfab.packing.window import SphereWindow
 from tests.helpers.lattices import shaken_cubic
 
 A, B, C, D = (VARIANTS[name] for name in "abcd")

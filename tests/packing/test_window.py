@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scanfab import Cell, Packing, SettingsError, compute
-from scanfab.window import SphereWindow, SurfaceBox
+from scanfab.packing.window import SphereWindow, SurfaceBox
 from tests.helpers.lattices import shaken_cubic
 
 CELL = Cell([10.0, 8.0, 6.0], origin=(-1.0, 2.0, 3.0))

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import SettingsError
-from scanfab.packing import Packing
+from scanfab.packing.packing import Packing
 
 __all__ = ["BoundaryRule", "enclosing_class", "existing_values", "select_boundary"]
 
@@ -39,7 +39,7 @@ class BoundaryRule:
     Examples
     --------
     >>> from scanfab import Packing
-    >>> from scanfab.boundary import BoundaryRule
+    >>> from scanfab.packing.boundary import BoundaryRule
     >>> packing = Packing([[0, 0, 0], [3, 0, 0]], 1.0, columns={"type": [1, 2]})
     >>> BoundaryRule.parse("type=2").select(packing)
     array([False,  True])

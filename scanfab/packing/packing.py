@@ -13,8 +13,8 @@ import numpy.typing as npt
 from scanfab.base.arrays import cast, grains_named
 from scanfab.base.errors import PackingError
 from scanfab.base.lengths import LEAST, MOST, all_within
-from scanfab.cell import Cell
-from scanfab.contact_list import ContactList, Contacts, Spheres, resolve_contacts
+from scanfab.packing.cell import Cell
+from scanfab.packing.contacts import ContactList, Contacts, Spheres, resolve_contacts
 
 __all__ = [
     "ContactList",

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from scanfab.base.arrays import cast, grains_named
 from scanfab.base.errors import PackingError, ScanfabWarning
-from scanfab.cell import Cell
+from scanfab.packing.cell import Cell
 
 __all__ = ["ContactList", "Contacts", "Spheres", "resolve_contacts", "warn_of_same_centre"]
 

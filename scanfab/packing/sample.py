@@ -12,9 +12,9 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.escaped import Escaped, escaped_grains
-from scanfab.packing import Contacts, Packing
-from scanfab.window import SphereWindow, SurfaceBox
+from scanfab.packing.escaped import Escaped, escaped_grains
+from scanfab.packing.packing import Contacts, Packing
+from scanfab.packing.window import SphereWindow, SurfaceBox
 
 __all__ = ["VARIANTS", "Sample", "Variant"]
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import PackingError
-from scanfab.lattice import Lattice, reduced_lattice
+from scanfab.packing.lattice import Lattice, reduced_lattice
 
 __all__ = ["Cell"]
 

@@ -7,9 +7,9 @@ import pytest
 
 import scanfab
 from scanfab import Cell, Packing, ScanfabWarning, Settings, compute, find_contacts
-from scanfab.escaped import escaped_grains
+from scanfab.packing.escaped import escaped_grains
+from scanfab.packing.sample import Sample
 from scanfab.plan import make_plan
-from scanfab.variants import Sample
 from tests.helpers.lattices import ball_points, shaken_cubic
 
 SPHERES = shaken_cubic(np.random.default_rng(5), 9)

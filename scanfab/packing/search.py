@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, SettingsError
-from scanfab.cell import Cell
-from scanfab.contact_list import Contacts, warn_of_same_centre
-from scanfab.kernels.neighbours import (
+from scanfab.packing.cell import Cell
+from scanfab.packing.contacts import Contacts, warn_of_same_centre
+from scanfab.packing.kernels import (
     Frame,
     Grid,
     Pairs,
@@ -21,7 +21,7 @@ from scanfab.kernels.neighbours import (
     pairs_within,
     sort_pairs,
 )
-from scanfab.packing import Packing
+from scanfab.packing.packing import Packing
 
 __all__ = ["find_contacts", "overlapping_pairs"]
 

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import SettingsError
-from scanfab.cell import Cell
-from scanfab.packing import Packing
+from scanfab.packing.cell import Cell
+from scanfab.packing.packing import Packing
 
 __all__ = ["RV_MEANING", "SphereWindow", "SurfaceBox"]
 

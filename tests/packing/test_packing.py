@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from scanfab.base.errors import PackingError, ScanfabWarning
-from scanfab.cell import Cell
-from scanfab.packing import ContactList, Packing
+from scanfab.packing.cell import Cell
+from scanfab.packing.packing import ContactList, Packing
 
 ROW = np.array([[0.0, 0, 0], [1.9, 0, 0], [3.8, 0, 0]])
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from scanfab.base.errors import PackingError
-from scanfab.cell import Cell
+from scanfab.packing.cell import Cell
 from tests.helpers import naive
 
 EDGES = np.array([2.0, 3.0, 4.0])

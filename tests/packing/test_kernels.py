@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scanfab import Cell, Packing, PackingError, find_contacts
-from scanfab.contacts import overlapping_pairs
-from scanfab.kernels.neighbours import Frame, Grid, Pairs, fill_grid, pairs_within, sort_pairs
+from scanfab.packing.kernels import Frame, Grid, Pairs, fill_grid, pairs_within, sort_pairs
+from scanfab.packing.search import overlapping_pairs
 from tests.helpers import naive
 from tests.helpers.uncompiled import run_uncompiled
 
@@ -253,8 +253,8 @@ def test_bins_list_every_sphere_once_in_its_bin():
 def test_contacts_equal_the_slow_twin_uncompiled():
     code = (
         "import numpy as np\n"
-        "from scanfab.kernels import neighbours\n"
-        "from tests.kernels import test_neighbours as here\n"
+        "from scanfab.packing import kernels as neighbours\n"
+        "from tests.packing import test_kernels as here\n"
         "assert not hasattr(neighbours.pairs_within, 'py_func')\n"
         "for seed in range(15):\n"
         "    here.check_random_open(np.random.default_rng(seed))\n"

@@ -6,9 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import PackingError
-from scanfab.packing import Packing
-from scanfab.periodicity import fitting_periods
-from scanfab.variants import Sample
+from scanfab.packing.packing import Packing
+from scanfab.packing.periodicity import fitting_periods
+from scanfab.packing.sample import Sample
 
 __all__ = ["CLUMP_COLUMNS", "cell_doubt", "cell_hint", "doubts_of", "refuse_impossible"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.packing import Packing
+from scanfab.packing.packing import Packing
 
 __all__ = ["fitting_periods"]
 

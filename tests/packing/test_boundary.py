@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from scanfab.base.errors import SettingsError
-from scanfab.boundary import BoundaryRule, enclosing_class, select_boundary
-from scanfab.packing import Packing
+from scanfab.packing.boundary import BoundaryRule, enclosing_class, select_boundary
+from scanfab.packing.packing import Packing
 from scanfab.pipeline import compute
 
 COUNT = 6

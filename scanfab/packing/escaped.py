@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import KDTree
 
-from scanfab.packing import Packing
+from scanfab.packing.packing import Packing
 
 __all__ = ["Escaped", "escaped_grains"]
 
@@ -60,7 +60,7 @@ def escaped_grains(packing: Packing, grains: BoolArray) -> Escaped:
     --------
     >>> import numpy as np
     >>> from scanfab import Packing
-    >>> from scanfab.escaped import escaped_grains
+    >>> from scanfab.packing.escaped import escaped_grains
     >>> grid = np.stack(np.meshgrid(*3 * [np.arange(5.0)]), axis=-1).reshape(-1, 3)
     >>> packing = Packing(np.vstack([grid, [20.0, 2.0, 2.0]]), 0.5)
     >>> found = escaped_grains(packing, np.ones(126, bool))
