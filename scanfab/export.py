@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from scanfab.base.errors import SettingsError
 from scanfab.base.files import check_folder
-from scanfab.distribution import mean_length_function, sphere_points
+from scanfab.fabric.distribution import mean_length_function, sphere_points
 from scanfab.fabric.tensor import COMPONENTS
 from scanfab.frame_result import FrameResult
 from scanfab.packing.sample import VARIANTS

@@ -14,8 +14,8 @@ import numpy.typing as npt
 
 from scanfab.abscissa import spelt_strain, strain_column
 from scanfab.base.errors import ScanfabWarning, SettingsError
-from scanfab.distribution import mean_length_function, sphere_points
 from scanfab.fabric.contact import contact_fabric
+from scanfab.fabric.distribution import mean_length_function, sphere_points
 from scanfab.frame_result import FrameResult
 from scanfab.packing.sample import VARIANTS
 from scanfab.pipeline import compute_rows

@@ -9,7 +9,7 @@ from dataclasses import asdict
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.distribution import HIGHEST_DEGREE, sphere_points
+from scanfab.fabric.distribution import HIGHEST_DEGREE, sphere_points
 from scanfab.frame_figures import CONCENTRATION, ScannedFrames
 from scanfab.frame_result import FrameResult
 from scanfab.tabular import number_of, total_error

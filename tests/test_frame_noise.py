@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from scanfab import frame_noise
-from scanfab.distribution import fit_even, sphere_points
 from scanfab.fabric.contact import axial_error
+from scanfab.fabric.distribution import fit_even, sphere_points
 from scanfab.frame_figures import _smoothed_density
 from scanfab.frame_noise import contact_noise, noise_notes, void_noise
 from scanfab.writers.plot_frame import Projection

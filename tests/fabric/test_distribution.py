@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scanfab.distribution import fit_even, mean_length_function, sphere_points
+from scanfab.fabric.distribution import fit_even, mean_length_function, sphere_points
 from scanfab.scan.directions import direction_rule
 
 

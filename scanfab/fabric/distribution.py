@@ -61,7 +61,7 @@ def fit_even(axes: FloatArray, values: FloatArray, weights: FloatArray) -> EvenF
     Examples
     --------
     >>> import numpy as np
-    >>> from scanfab.distribution import fit_even, sphere_points
+    >>> from scanfab.fabric.distribution import fit_even, sphere_points
     >>> n = sphere_points()[0]
     >>> f = fit_even(n, 1 + n[:, 2] ** 2, np.ones(len(n)))
     >>> round(float(f([0, 0, 1])), 12)
