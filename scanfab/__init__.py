@@ -22,14 +22,14 @@ if TYPE_CHECKING:
     from scanfab.fabric.contact import contact_fabric
     from scanfab.fabric.tensor import FabricTensor
     from scanfab.fabric.void import VoidFabric, void_fabric
-    from scanfab.opening import read, read_series
+    from scanfab.io.opening import read, read_series
+    from scanfab.io.series import Series
     from scanfab.packing.cell import Cell
     from scanfab.packing.packing import ContactList, Contacts, Packing
     from scanfab.packing.search import find_contacts
     from scanfab.pipeline import compute
     from scanfab.scan.directions import DirectionRule, direction_rule
     from scanfab.scan.scan import ScanSums, Solids, scan_lines
-    from scanfab.series import Series
     from scanfab.settings import Settings
     from scanfab.table import COLUMNS, Row, Table
     from scanfab.tabular import read_rows
@@ -51,7 +51,7 @@ _HOME = {
     "ScanfabError": "base.errors",
     "ScanfabNote": "base.errors",
     "ScanfabWarning": "base.errors",
-    "Series": "series",
+    "Series": "io.series",
     "Settings": "settings",
     "SettingsError": "base.errors",
     "Solids": "scan.scan",
@@ -64,9 +64,9 @@ _HOME = {
     "contact_fabric": "fabric.contact",
     "direction_rule": "scan.directions",
     "find_contacts": "packing.search",
-    "read": "opening",
+    "read": "io.opening",
     "read_rows": "tabular",
-    "read_series": "opening",
+    "read_series": "io.opening",
     "scan_lines": "scan.scan",
     "void_fabric": "fabric.void",
 }

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from scanfab.adaptive import missing_work
 from scanfab.base.errors import PackingError, ScanfabWarning, SettingsError
 from scanfab.frame_result import frame_result
+from scanfab.io.series import Series
 from scanfab.ladders import (
     PAPER_CUTOFF,
     PAPER_SPACING,
@@ -35,7 +36,6 @@ from scanfab.pipeline import (
 )
 from scanfab.plan import Plan, make_plan
 from scanfab.scan.directions import direction_rule
-from scanfab.series import Series
 from scanfab.settings import AUTO_RULE, Length, Settings
 from scanfab.table import Row
 

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.base.errors import SettingsError
+from scanfab.io.series import Series
 from scanfab.manifest import strain_file
 from scanfab.pipeline import chosen_frames
 from scanfab.rerun import read_manifest
-from scanfab.series import Series
 from scanfab.settings import Settings
 from scanfab.table import Row
 from scanfab.tabular import read_rows

@@ -15,11 +15,11 @@ from scanfab.base.errors import (
     SettingsError,
     SkippedFrameWarning,
 )
+from scanfab.io.series import Frame, Series
 from scanfab.packing.sample import Sample
 from scanfab.pipeline import classify, refuse_unknown_boundary, tell_doubts
 from scanfab.plan import Plan, make_plan
 from scanfab.scene import Scene, about_window, scene_of
-from scanfab.series import Frame, Series
 from scanfab.settings import STRAIN_MODES, Settings
 from scanfab.strain import StrainFile, axial_length, shear_strain
 

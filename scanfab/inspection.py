@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from scanfab.base.errors import PackingError, ReadError, ScanfabNote
+from scanfab.io.series import Frame, Series
 from scanfab.packing.doubts import cell_doubt, cell_hint, doubts_of, refuse_impossible
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import SphereWindow, SurfaceBox
@@ -19,7 +20,6 @@ from scanfab.pipeline import (
     refuse_unknown_boundary,
 )
 from scanfab.plan import rv_of
-from scanfab.series import Frame, Series
 from scanfab.settings import Settings
 
 __all__ = ["REPORT_MEANINGS", "FrameReport", "inspect_series"]

@@ -10,8 +10,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from scanfab.io.series import Series
 from scanfab.scan.directions import DirectionRule
-from scanfab.series import Series
 from scanfab.settings import STRAIN_MODES, Settings
 
 __all__ = ["asked_for", "manifest", "strain_file", "with_frames"]

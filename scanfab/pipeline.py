@@ -23,6 +23,8 @@ from scanfab.base.errors import (
 )
 from scanfab.base.threads import in_order
 from scanfab.frame_result import FrameResult, frame_result
+from scanfab.io.reader import Carries
+from scanfab.io.series import Series
 from scanfab.packing.boundary import enclosing_class, existing_values, select_boundary
 from scanfab.packing.cell import Cell
 from scanfab.packing.doubts import cell_doubt, doubts_of
@@ -30,8 +32,6 @@ from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample
 from scanfab.packing.search import find_contacts
 from scanfab.plan import Plan, make_plan
-from scanfab.readers.base import Carries
-from scanfab.series import Series
 from scanfab.settings import STRAIN_MODES, Settings
 from scanfab.strain import StrainFile, axial_length, is_flipped, shear_strain
 from scanfab.table import Row, Table

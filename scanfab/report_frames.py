@@ -12,11 +12,11 @@ from scanfab.base.errors import SettingsError
 from scanfab.frame_figures import lengths_of, projections_of, scan_frames
 from scanfab.frame_noise import noise_notes
 from scanfab.frame_view import Look, look_at
+from scanfab.io.series import Series
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import SurfaceBox
 from scanfab.report_inputs import Input
 from scanfab.rerun import reopen, restored_settings
-from scanfab.series import Series
 from scanfab.settings import Length, Settings
 from scanfab.tabular import number_of
 from scanfab.writers.page import Picture, Shown, view_data

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.base.errors import ReadError, SettingsError
+from scanfab.io.opening import READING, open_sources
+from scanfab.io.series import Series
 from scanfab.manifest import asked_for
-from scanfab.opening import READING, open_sources
-from scanfab.series import Series
 from scanfab.settings import Settings
 
 __all__ = [

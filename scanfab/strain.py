@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from scanfab.base.errors import SettingsError
-from scanfab.frame_file import FrameFile
+from scanfab.io.frame_csv import FrameFile
 from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
 

@@ -21,7 +21,7 @@ import pytest
 import scanfab
 from scanfab import comparison, inspection, ladders, table
 from scanfab.cli.group import COMMANDS, cli
-from scanfab.readers.registry import installed_readers
+from scanfab.io.registry import installed_readers
 from scanfab.scan.directions import RULES
 
 ROOT = Path(__file__).parents[1]

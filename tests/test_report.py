@@ -17,7 +17,7 @@ import pytest
 
 from scanfab.base.errors import ReadError
 from scanfab.cli.main import run
-from scanfab.opening import read_series
+from scanfab.io.opening import read_series
 from scanfab.pipeline import compute_rows
 from scanfab.report import make_report
 from scanfab.scene import Scene

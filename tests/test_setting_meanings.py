@@ -7,7 +7,7 @@ import json
 from dataclasses import fields
 from pathlib import Path
 
-from scanfab.opening import READING, read_series
+from scanfab.io.opening import READING, read_series
 from scanfab.setting_meanings import SETTING_MEANINGS, settings_table
 from scanfab.settings import Settings
 

@@ -11,7 +11,7 @@ __all__ = ["formats"]
 def formats() -> None:
     """List every reader and writer, its extensions, and the package it comes from."""
     from scanfab.cli.console import reported_warnings
-    from scanfab.readers.registry import installed_readers
+    from scanfab.io.registry import installed_readers
     from scanfab.writers.plot import PLOT_FORMATS
     from scanfab.writers.rows import FILE_FORMATS
 

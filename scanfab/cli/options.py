@@ -77,7 +77,7 @@ def together(*options: Callable[[Command], Command]) -> Callable[[Command], Comm
 
 
 def _reader_names() -> Iterable[str]:
-    from scanfab.readers.registry import installed_readers
+    from scanfab.io.registry import installed_readers
 
     return installed_readers()
 
@@ -85,7 +85,7 @@ def _reader_names() -> Iterable[str]:
 def _expanded(source: str) -> list[Any]:
     """What a glob names; one that names nothing is a path that does not exist."""
     from scanfab.base.errors import ReadError
-    from scanfab.choice import expanded
+    from scanfab.io.grain_files import expanded
 
     try:
         return [*expanded(source)]

@@ -11,8 +11,8 @@ from scanfab.cli.options import usage_errors
 
 if TYPE_CHECKING:
     from scanfab.finished import FinishedTable
+    from scanfab.io.series import Series
     from scanfab.pipeline import Observer
-    from scanfab.series import Series
     from scanfab.settings import Settings
     from scanfab.table import Row
     from scanfab.writers.results import ResultFile

@@ -12,7 +12,7 @@ import click
 from scanfab.cli.options import usage_errors
 
 if TYPE_CHECKING:
-    from scanfab.series import Series
+    from scanfab.io.series import Series
 
 __all__ = ["SourceCommand", "open_series", "reading_arguments"]
 
@@ -36,7 +36,7 @@ class SourceCommand(click.Command):
 
 def reading_arguments(options: dict[str, Any]) -> dict[str, Any]:
     """Take the reading options out of a command's, as arguments of ``read_series``."""
-    from scanfab.opening import READING
+    from scanfab.io.opening import READING
 
     taken = {name: options.pop(name) for name in READING}
     taken["columns"] = _column_names(taken["columns"])
@@ -52,8 +52,8 @@ def open_series(sources: tuple[str, ...], reading: dict[str, Any]) -> list[Serie
     from dataclasses import replace
 
     from scanfab.base.errors import ReadError
-    from scanfab.opening import open_sources, read_series
-    from scanfab.readers.files import temporary_copy
+    from scanfab.io.files import temporary_copy
+    from scanfab.io.opening import open_sources, read_series
 
     if "-" not in sources:
         return open_sources(sources, **reading)
@@ -111,7 +111,7 @@ def _check_periodic(letters: str | None) -> None:
 
 
 def _check_format(name: str) -> None:
-    from scanfab.readers.registry import reader_named
+    from scanfab.io.registry import reader_named
 
     with usage_errors("--format: "):
         reader_named(name)

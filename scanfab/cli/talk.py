@@ -16,7 +16,7 @@ import click
 from scanfab.base.spelling import spelt_time
 
 if TYPE_CHECKING:
-    from scanfab.series import Series
+    from scanfab.io.series import Series
 
 __all__ = ["Level", "level", "talk_options", "tell_inputs", "working"]
 

@@ -21,7 +21,7 @@ from scanfab.cli.sources import SourceCommand, open_series, reading_arguments
 from scanfab.cli.talk import talk_options
 
 if TYPE_CHECKING:
-    from scanfab.series import Series
+    from scanfab.io.series import Series
     from scanfab.settings import Settings
 
 __all__ = ["view"]

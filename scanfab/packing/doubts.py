@@ -79,7 +79,7 @@ def cell_doubt(sample: Sample, carries: str) -> str:
     sample : Sample
         One frame.
     carries : str
-        What its format says of a cell, as :data:`scanfab.readers.base.Carries`.
+        What its format says of a cell, as :data:`scanfab.io.reader.Carries`.
     """
     if carries == "cell" or sample.packing.is_periodic:
         return ""

@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 
 from scanfab.cli.main import run
-from scanfab.readers import registry
+from scanfab.io import registry
 from scanfab.writers.rows import CsvWriter
 from tests.helpers.dumps import (
     PAIRS,
@@ -475,7 +475,7 @@ def test_a_file_that_nobody_may_read(tmp_path, refusal, monkeypatch):
     def forbidden(path, *_):
         raise PermissionError(errno.EACCES, "Permission denied", str(path))
 
-    monkeypatch.setattr("scanfab.readers.files.open", forbidden, raising=False)
+    monkeypatch.setattr("scanfab.io.files.open", forbidden, raising=False)
     assert refusal(file) == f"{file}: cannot be read: Permission denied"
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from scanfab.base import memory
 from scanfab.cli import group, main
-from scanfab.readers import regular
+from scanfab.io.parse import text_table as regular
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.interruptions import PROGRAM
 

@@ -15,11 +15,11 @@ import numpy as np
 import pyvista
 
 from scanfab.base.errors import ScanfabError, ScanfabWarning
-from scanfab.families import Family
-from scanfab.readers.base import GrainTable, ReadOptions
-from scanfab.readers.mesh import read_bounds
-from scanfab.readers.registry import reader_for, reader_named
-from scanfab.series import Series
+from scanfab.io.families import Family
+from scanfab.io.parse.vtk_mesh import read_bounds
+from scanfab.io.reader import GrainTable, ReadOptions
+from scanfab.io.registry import reader_for, reader_named
+from scanfab.io.series import Series
 from tests.helpers.dumps import (
     PAIRS,
     ROWS,

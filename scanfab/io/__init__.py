@@ -1,0 +1,1 @@
+"""From files, as users name them, to series of frames."""

@@ -1,0 +1,289 @@
+"""From the columns of a dump, by name, to positions, radii and ids."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, MutableMapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.base.errors import ReadError
+from scanfab.base.lengths import all_within
+from scanfab.io.reader import GrainTable, ReadOptions
+from scanfab.packing.boundary import CLASS_COLUMNS
+from scanfab.packing.cell import Cell
+from scanfab.packing.doubts import CLUMP_COLUMNS
+from scanfab.packing.packing import LazyColumns, lies_within
+
+__all__ = [
+    "grain_table",
+    "has_radius",
+    "room_for_columns",
+    "user_cell",
+    "whole_numbers",
+]
+
+FloatArray = npt.NDArray[np.float64]
+Columns = Mapping[str, npt.NDArray[Any]]
+
+# names are compared without regard to case
+RADIUS_NAMES = ("radius", "radii", "rad", "r", "f_radius")
+DIAMETER_NAMES = ("diameter", "diam")
+ID_NAMES = ("id", "ids", "particle_id", "particleid", "body_id", "bodyid")
+# other names that a radius may have, such as c_rad and f_r[1]
+LIKE_A_RADIUS = re.compile(r"(?i)rad(i|$|[^a-z])|(^|_)r($|\[)")
+# coordinates in the order of preference, and whether they are fractions of the box
+POSITION_NAMES = (("x y z", False), ("xu yu zu", False), ("xs ys zs", True), ("xsu ysu zsu", True))
+
+# no grain is further from a periodic cell, in cells
+MOST_TURNS = 1e9
+# whole numbers below 2^53 are exact as decimals
+MOST_DECIMAL = 2.0**53 - 1.0
+
+
+def has_radius(names: Sequence[str]) -> bool:
+    """Whether some column is a radius or a diameter."""
+    lower = {name.lower() for name in names}
+    return bool(lower & {*RADIUS_NAMES, *DIAMETER_NAMES})
+
+
+def room_for_columns(
+    options: ReadOptions, names: Sequence[str], count: int
+) -> tuple[dict[str, npt.NDArray[Any]], dict[str, npt.NDArray[Any]]]:
+    """
+    Empty arrays for those of a dump's columns that :func:`grain_table` or most users ask for.
+
+    Returns them by the dump's names, where they are to be filled in, and by the names that
+    ``grain_table`` knows: coordinates are columns of one array, ``position``.
+    """
+    coordinates = {name for system, _ in POSITION_NAMES for name in system.split()}
+    known = {
+        *coordinates,
+        *RADIUS_NAMES,
+        *DIAMETER_NAMES,
+        *ID_NAMES,
+        *CLASS_COLUMNS,
+        *CLUMP_COLUMNS,
+    }
+    own = options.columns
+    id = own.get("id", _first_of(ID_NAMES, names))
+    columns: dict[str, npt.NDArray[Any]] = {
+        name: np.empty(count, np.int64 if name == id else np.float64)
+        for name in names
+        if name.lower() in known or name in own.values()
+    }
+    for system, scaled in POSITION_NAMES:
+        found = [_first_of((name,), names) for name in system.split()]
+        chosen = [name for name in found if name is not None]
+        if len(chosen) < 3:
+            continue
+        named = not set(own.values()) <= set(names) - set(chosen) or own.keys() & set("xyz")
+        if scaled or named:
+            break
+        position = np.empty((count, 3))
+        filled = columns | dict(zip(chosen, position.T, strict=True))
+        others = {name: column for name, column in columns.items() if name not in chosen}
+        return filled, others | {"position": position}
+    return columns, columns
+
+
+def grain_table(
+    path: Path, columns: Columns, cell: Cell | None, options: ReadOptions, where: str = ""
+) -> GrainTable:
+    """
+    Sort out which column is what.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    columns : mapping of str to ndarray
+        All columns by the dump's names, N rows each; coordinates may be a column ``position`` of
+        shape (N, 3).
+    cell : Cell, optional
+        From the dump.
+    options : ReadOptions
+        Names, radius and cell from the user.
+    where : str, optional
+        For messages, such as ``", step 100"``.
+
+    Raises
+    ------
+    ReadError
+        If coordinates or radii cannot be found.
+    """
+    rest = columns.copy() if isinstance(columns, LazyColumns) else dict(columns)
+    named = _named_by_user(path, rest, options)
+    cell = user_cell(path, cell, options)
+    position = _position(path, rest, named, cell, where)
+    _refuse_far(path, position, cell, where)
+    position.flags.writeable = False  # so that the packing need not copy it
+    radius = _radius(path, rest, named, len(position), options, where)
+    id = named.get("id", _take(rest, ID_NAMES))
+    return GrainTable(
+        position,
+        radius,
+        None if id is None else whole_numbers(path, id, where),
+        rest,
+        cell,
+    )
+
+
+def user_cell(path: Path, cell: Cell | None, options: ReadOptions) -> Cell | None:
+    """The dump's cell with the user's --cell and --periodic on top."""
+    periodic: tuple[bool, bool, bool] | None = None
+    if options.periodic is not None:
+        periodic = (
+            "x" in options.periodic,
+            "y" in options.periodic,
+            "z" in options.periodic,
+        )
+    if options.cell is not None:
+        lx, ly, lz, xy, xz, yz = (*options.cell, 0.0, 0.0, 0.0)[:6]
+        vectors = [[lx, 0, 0], [xy, ly, 0], [xz, yz, lz]]
+        origin = np.zeros(3) if cell is None else cell.origin
+        return Cell(vectors, periodic or (True, True, True), origin)
+    if periodic is None:
+        return cell
+    if cell is None:
+        raise ReadError(
+            f"{path}: --periodic {options.periodic} was asked for, but the dump names no cell: "
+            f"give it with --cell LX LY LZ"
+        )
+    return Cell(cell.vectors, periodic, cell.origin)
+
+
+def _named_by_user(
+    path: Path, rest: MutableMapping[str, Any], options: ReadOptions
+) -> dict[str, Any]:
+    """Columns that the user named, taken out of the rest."""
+    named = {}
+    for standard, own in options.columns.items():
+        if own not in rest:
+            raise ReadError(
+                f"{path}: there is no column {own!r} to serve as {standard}; "
+                f"the columns are {', '.join(rest)}"
+            )
+        named[standard] = rest.pop(own)
+    for standard in [name for name in named if name not in ("x", "y", "z", "id", "radius")]:
+        rest[standard] = named.pop(standard)
+    return named
+
+
+def _position(
+    path: Path, rest: MutableMapping[str, Any], named: dict[str, Any], cell: Cell | None, where: str
+) -> FloatArray:
+    if "position" in rest:
+        return _lengths(path, rest.pop("position"), "a coordinate", where)
+    for names, scaled in POSITION_NAMES:
+        found = [
+            named[axis] if axis in named else _take(rest, (name,), keep=True)
+            for name, axis in zip(names.split(), "xyz", strict=True)
+        ]
+        if any(column is None for column in found):
+            continue
+        for name in names.split():
+            _take(rest, (name,))
+        position = _lengths(path, np.column_stack(found), "a coordinate", where)
+        if not scaled:
+            return position
+        if cell is None:
+            raise ReadError(f"{path}{where}: {names} are fractions of a box, but there is no box")
+        # what is not finite is the packing's to refuse
+        with np.errstate(over="ignore", invalid="ignore"):
+            return np.asarray(cell.origin + position @ cell.vectors)
+    raise ReadError(
+        f"{path}{where}: no coordinates: expected the columns x y z (or xu yu zu, xs ys zs), "
+        f"found {', '.join(rest) or 'none'}; name them with --columns x=...,y=...,z=..."
+    )
+
+
+def _refuse_far(path: Path, position: FloatArray, cell: Cell | None, where: str) -> None:
+    """An error if rounding would be all that is left of a position once it is in the cell."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        if cell is None or lies_within(cell, position, -MOST_TURNS, MOST_TURNS):
+            return
+        turns = np.abs(cell.fractional(position[np.isfinite(position).all(axis=1)]))
+    if np.any(turns > MOST_TURNS):
+        raise ReadError(
+            f"{path}{where}: a grain is {turns.max():g} cells away from the cell: has the cell the "
+            f"unit of the coordinates?"
+        )
+
+
+def _radius(
+    path: Path,
+    rest: MutableMapping[str, Any],
+    named: dict[str, Any],
+    count: int,
+    options: ReadOptions,
+    where: str,
+) -> FloatArray:
+    if options.radius is not None:
+        if "radius" in named or has_radius(list(rest)):
+            raise ReadError(
+                f"{path}{where}: --radius is for dumps without radii, but this one has them: "
+                f"leave it out"
+            )
+        return np.full(count, options.radius)
+    if "radius" in named:
+        return _lengths(path, named["radius"], "a radius", where)
+    radius = _take(rest, RADIUS_NAMES)
+    if radius is not None:
+        return _lengths(path, radius, "a radius", where)
+    diameter = _take(rest, DIAMETER_NAMES)
+    if diameter is not None:
+        return 0.5 * _lengths(path, diameter, "a diameter", where)
+    like = next((name for name in rest if LIKE_A_RADIUS.search(name)), "...")
+    raise ReadError(
+        f"{path}{where}: no radius: expected a column radius (or diameter), found "
+        f"{', '.join(rest) or 'none'}; name it with --columns radius={like}"
+        f"{'' if like == '...' else ' (if that is one)'}, or give one radius for all grains with "
+        f"--radius"
+    )
+
+
+def _take(rest: MutableMapping[str, Any], names: Sequence[str], keep: bool = False) -> Any:
+    """The first column that has one of the names; taken out of the rest unless kept."""
+    found = _first_of(names, list(rest))
+    if found is None:
+        return None
+    return rest[found] if keep else rest.pop(found)
+
+
+def _first_of(known: Sequence[str], names: Sequence[str]) -> str | None:
+    """The first name that is one of those known, in the order of these."""
+    lower = {name.lower(): name for name in reversed(names)}
+    return next((lower[name] for name in known if name in lower), None)
+
+
+def whole_numbers(path: Path, values: npt.ArrayLike, where: str = "") -> npt.NDArray[np.int64]:
+    """Ids as whole numbers; ReadError if they are not."""
+    numbers = np.asarray(values)
+    if numbers.ndim != 1 or not _are_whole(numbers):
+        raise ReadError(
+            f"{path}{where}: ids must be whole numbers, below 2^53 where they are read as decimals"
+        )
+    whole = numbers.astype(np.int64, copy=False)
+    whole.flags.writeable = False  # so that the packing need not copy it
+    return whole
+
+
+def _are_whole(numbers: npt.NDArray[Any]) -> bool:
+    if numbers.dtype == np.int64 or numbers.size == 0:
+        return True
+    # larger decimals may have been rounded; comparisons with NaN are false
+    if numbers.dtype.kind == "f" and not all_within(numbers, -MOST_DECIMAL, MOST_DECIMAL):
+        return False
+    return numbers.dtype.kind in "biuf" and bool(np.all(numbers == numbers.astype(np.int64)))
+
+
+def _lengths(path: Path, values: npt.ArrayLike, what: str, where: str) -> FloatArray:
+    """Numbers that may be lengths; which of them cannot be is the packing's to say."""
+    array = np.asarray(values)
+    if array.dtype.kind not in "biuf":
+        raise ReadError(f"{path}{where}: expected numbers for {what}, found {array.dtype}")
+    return array.astype(np.float64, copy=False)

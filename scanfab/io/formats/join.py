@@ -1,0 +1,200 @@
+"""Contacts to rows of the grain table: by ids, or by the positions of both centres."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.base.errors import ReadError
+from scanfab.base.lengths import MOST
+from scanfab.io.reader import GrainTable, JoinedContacts
+from scanfab.packing.packing import ContactList
+
+__all__ = ["count_walls", "join_ids", "join_positions", "rows_of_ids"]
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+# an end of a contact within this fraction of a radius from a centre belongs to that grain
+SAME_PLACE = 0.01
+
+
+def rows_of_ids(grains: GrainTable, ids: npt.ArrayLike) -> IntArray:
+    """Rows of the grains with these ids; -1 where no grain has the id."""
+    wanted = np.asarray(ids)
+    if grains.id is None or len(grains.id) == 0:
+        return np.full(wanted.shape, -1, dtype=np.int64)
+    order = np.argsort(grains.id)
+    place = np.minimum(np.searchsorted(grains.id[order], wanted), len(order) - 1)
+    rows = order[place]
+    return np.where(grains.id[rows] == wanted, rows, -1)
+
+
+def join_ids(
+    path: Path,
+    grains: GrainTable,
+    ids: IntArray,
+    force: FloatArray | None,
+    *,
+    walls: bool,
+    image: IntArray | None = None,
+) -> JoinedContacts:
+    """
+    Join contacts that name grains by id.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    grains : GrainTable
+        With ids.
+    ids : ndarray, shape (M, 2)
+        As the file names them.
+    force : ndarray, shape (M, 3), optional
+        Force on the second grain.
+    walls : bool
+        Whether one of the two ids may be a wall's, which is no grain.
+    image : ndarray of int, shape (M, 3), optional
+        Lattice translation of the second grain, from the positions of the table.
+
+    Raises
+    ------
+    ReadError
+        If a contact names a grain that does not exist.
+    """
+    if grains.id is None:
+        raise ReadError(f"{path}: names grains by id, but the grain file has no ids")
+    rows = rows_of_ids(grains, ids)
+    return _join(
+        path,
+        ContactList(rows, image, force),
+        walls,
+        lambda contact, end: f"names the grain {ids[contact, end]}",
+        len(grains.radius),
+    )
+
+
+def join_positions(
+    path: Path, grains: GrainTable, ends: FloatArray, force: FloatArray | None
+) -> JoinedContacts:
+    """
+    Join contacts that are lines between centres; an end where no grain is belongs to a wall.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    grains : GrainTable
+        Wrapped into the cell here, as the ends are.
+    ends : ndarray, shape (M, 2, 3)
+        Both centres, dump's length unit.
+    force : ndarray, shape (M, 3), optional
+        Force on the second grain.
+
+    Raises
+    ------
+    ReadError
+        If both ends of a contact are where no grain is.
+    """
+    points = ends.reshape(-1, 3)
+    for what, numbers in (("a contact ends", points), ("a grain is", grains.position)):
+        if not np.all(np.abs(numbers) < MOST):
+            raise ReadError(f"{path}: {what} at coordinates that are no finite numbers")
+    if not np.all((grains.radius > 0) & (grains.radius < MOST)):
+        raise ReadError(f"{path}: the radii of the grains must be finite and larger than zero")
+    rows = np.full(len(points), -1, dtype=np.int64)
+    if len(grains.position) and len(points):
+        rows = _grains_at(grains, points)
+        if grains.cell is None or not grains.cell.is_periodic:
+            _refuse_images(path, grains, rows.reshape(-1, 2), ends)
+    return _join(
+        path,
+        ContactList(rows.reshape(-1, 2), force=force),
+        True,
+        lambda contact, end: f"ends at {ends[contact, end].tolist()}, where no grain is",
+        len(grains.radius),
+    )
+
+
+def _refuse_images(path: Path, grains: GrainTable, rows: IntArray, ends: FloatArray) -> None:
+    """
+    Ends at periodic images of grains are no walls.
+
+    An image has two coordinates in common with its grain (in a cell that is not tilted), and lies
+    at the distance of a contact; a wall's reference point does so by chance at most.
+    """
+    from scipy.spatial import KDTree
+
+    one = np.flatnonzero((rows < 0).sum(axis=1) == 1)
+    if len(one) == 0 or len(grains.radius) < 2:
+        return
+    lost = np.argmax(rows[one] < 0, axis=1)
+    partner = rows[one, 1 - lost]
+    point = ends[one, lost]
+    length = np.linalg.norm(point - ends[one, 1 - lost], axis=1)
+    near = SAME_PLACE * float(grains.radius.min())
+    image = np.zeros(len(one), dtype=bool)
+    for two in ([0, 1], [0, 2], [1, 2]):
+        distance, nearest = KDTree(grains.position[:, two]).query(point[:, two], k=2)
+        for k in range(2):
+            reach = grains.radius[partner] + grains.radius[nearest[:, k]]
+            other = (nearest[:, k] != partner) & (distance[:, k] < near)
+            image |= other & (length > 0.5 * reach) & (length < 1.05 * reach)
+    if image.sum() > 0.5 * len(one):
+        raise ReadError(
+            f"{path}: {image.sum()} contacts end at periodic images of grains, but the sample has "
+            f"no cell: name it with --cell LX LY LZ (and --periodic)"
+        )
+
+
+def count_walls(rows: IntArray, count: int) -> IntArray:
+    """How often each of ``count`` grains occurs."""
+    return np.bincount(rows, minlength=count).astype(np.int64)
+
+
+def _grains_at(grains: GrainTable, points: FloatArray) -> IntArray:
+    """Rows of the grains whose centres are at the points; -1 where there is none."""
+    from scipy.spatial import KDTree
+
+    position, radius, row = grains.position, grains.radius, np.arange(len(grains.position))
+    if grains.cell is not None and grains.cell.is_periodic:
+        points, position = grains.cell.wrap(points), grains.cell.wrap(position)
+        # rounding may put a point and its centre on opposite faces: images just outside help
+        margin = min(SAME_PLACE * float(radius.max()), float(grains.cell.heights.min()))
+        images, of, _ = grains.cell.images(position, margin)
+        position = np.concatenate([position, images])
+        row = np.concatenate([row, of])
+    distance, nearest = KDTree(position).query(points)
+    same = distance < SAME_PLACE * radius[row[nearest]]
+    return np.where(same, row[nearest], -1)
+
+
+def _join(
+    path: Path,
+    listed: ContactList,
+    walls: bool,
+    describe: Callable[[int, int], str],
+    count: int,
+) -> JoinedContacts:
+    """Tell contacts of two grains from contacts with a wall (one row is -1) and from errors."""
+    rows = np.asarray(listed.pairs)
+    unknown = rows < 0
+    wrong = unknown.all(axis=1) if walls else unknown.any(axis=1)
+    if wrong.any():
+        contact = int(np.argmax(wrong))
+        end = int(np.argmax(unknown[contact]))
+        raise ReadError(
+            f"{path}: contact {contact + 1} {describe(contact, end)}, which is not in the grain "
+            f"file ({np.count_nonzero(wrong)} of {len(rows)} contacts): do both files belong to "
+            f"the same step? A periodic sample also needs its cell (--cell)"
+        )
+    both = ~unknown.any(axis=1)
+    with_wall = rows[~both].max(axis=1)
+    image, force = (
+        None if values is None else np.asarray(values)[both]
+        for values in (listed.image, listed.force)
+    )
+    return JoinedContacts(ContactList(rows[both], image, force), count_walls(with_wall, count))

@@ -1,0 +1,215 @@
+"""LAMMPS: ``dump custom`` and ``dump local`` text, and ``write_data``."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.base.errors import ReadError
+from scanfab.io.files import first_bytes
+from scanfab.io.formats.dump_grains import dump_kind, read_dump_grains
+from scanfab.io.formats.ids import are_ids, are_whole, refuse_rounded_ids
+from scanfab.io.formats.join import join_ids, rows_of_ids
+from scanfab.io.formats.lammps_data import is_data_file, read_data_grains, step_of_data
+from scanfab.io.parse.text_dump import DumpBlock, index_dump, read_block, row_word
+from scanfab.io.reader import (
+    Carries,
+    FileKind,
+    GrainTable,
+    JoinedContacts,
+    ReadOptions,
+    Snapshot,
+)
+
+__all__ = ["LammpsReader"]
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+# LIGGGHTS writes neither of these items, and its bounds with six digits
+LAMMPS_ITEMS = re.compile(
+    rb"^ITEM: (?:UNITS|TIME)[ \t]*\r?$"
+    rb"|^ITEM: BOX BOUNDS[^\n]*\n-?\d\.\d{16}e[-+]\d+ "
+    rb"|^ITEM: BOX BOUNDS abc origin",
+    re.MULTILINE,
+)
+
+# names of --contact-columns: ids, force on the first grain, its tangential part if apart from it
+IDS = ("id1", "id2")
+FORCE = ("fx", "fy", "fz")
+TANGENTIAL = ("tx", "ty", "tz")
+
+# in r1 + r2: where no gap is wider, the list is one of contacts, and the rest is rounding
+ROUNDING = 1e-3
+# in r1 + r2: pairs that LAMMPS lists are not further apart, unless the columns are no ids
+NEIGHBOURS = 2.0
+# of the rows of a list of neighbours
+NEARLY_ALL = 0.98
+
+
+class LammpsReader:
+    """Reader plugin for what LAMMPS dumps."""
+
+    name = "lammps"
+    description = "LAMMPS dump custom and dump local (text), write_data of atom_style sphere"
+    extensions = (".lammpstrj", ".lmp", ".data", ".local")
+
+    def recognises(self, path: Path) -> bool:
+        """What LAMMPS writes and LIGGGHTS does not: units, time, bounds with all digits."""
+        head = first_bytes(path)
+        return is_data_file(head) or (
+            row_word(head) is not None and LAMMPS_ITEMS.search(head) is not None
+        )
+
+    def kind(self, path: Path) -> FileKind:
+        """Grains are ATOMS; whatever else a text dump counts are contacts."""
+        head = first_bytes(path, 1 << 16)
+        if is_data_file(head):
+            return "grains"
+        return "other" if row_word(head) is None else dump_kind(head)
+
+    def snapshots(self, path: Path) -> list[Snapshot]:
+        """By ``ITEM: TIMESTEP``; a data file is one."""
+        head = first_bytes(path)
+        if is_data_file(head):
+            return [Snapshot(path, step=step_of_data(head))]
+        return index_dump(path)
+
+    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+        """Columns by their names; of a data file by the atom style."""
+        if is_data_file(first_bytes(snapshot.path)):
+            return read_data_grains(snapshot, options)
+        return read_dump_grains(snapshot, options)
+
+    def carries(self, path: Path) -> Carries:
+        """A data file has a box without boundary flags."""
+        return "box" if is_data_file(first_bytes(path)) else "cell"
+
+    def read_contacts(
+        self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
+    ) -> JoinedContacts:
+        """
+        Pairs of ``compute property/local`` that touch, with the force of ``compute pair/local``.
+
+        Which column is what follows from ``--contact-columns``; without it the ids are found by
+        their values, if there is no doubt, and no force is read.
+        """
+        path = snapshot.path
+        if is_data_file(first_bytes(path)):
+            raise ReadError(f"{path}: a data file holds no contacts")
+        block = read_block(snapshot)
+        if len(block.values) == 0:
+            return join_ids(path, grains, np.zeros((0, 2), np.int64), None, walls=False)
+        if grains.id is None:
+            raise ReadError(f"{path}: names grains by id, but the grain file has no ids")
+        refuse_rounded_ids(path, block.values, grains)
+        places = _named_places(path, options.contact_columns, block)
+        ids = _ids(path, block, places, grains)
+        force = _force_on_second(block, places)
+        touching = _touching(grains, rows_of_ids(grains, ids), force)
+        if force is not None:
+            force = force[touching]
+        return join_ids(path, grains, ids[touching], force, walls=False)
+
+
+def _named_places(path: Path, text: str | None, block: DumpBlock) -> dict[str, int]:
+    """Columns by their meaning, from ``id1=c_ids[1],id2=c_ids[2],...``; empty without it."""
+    if text is None:
+        return {}
+    pairs = [part.partition("=") for part in text.split(",")]
+    named = {key.strip(): own.strip() for key, _, own in pairs}
+    known = ({*IDS}, {*IDS, *FORCE}, {*IDS, *FORCE, *TANGENTIAL})
+    if set(named) not in known or not all(named.values()):
+        raise ReadError(
+            f"{path}: --contact-columns: expected id1=NAME,id2=NAME, and fx, fy, fz (with tx, ty, "
+            f"tz) for the force on the first grain, found {text!r}; "
+            f"the columns are {', '.join(block.names)}"
+        )
+    for own in named.values():
+        if own not in block.names:
+            raise ReadError(
+                f"{path}: --contact-columns: there is no column {own!r}; "
+                f"the columns are {', '.join(block.names)}"
+            )
+    return {key: block.names.index(own) for key, own in named.items()}
+
+
+def _ids(path: Path, block: DumpBlock, places: dict[str, int], grains: GrainTable) -> IntArray:
+    """Both ids of each row, shape (M, 2)."""
+    columns = [places[key] for key in IDS] if places else _id_columns(block.values, grains)
+    if columns is None:
+        raise ReadError(
+            f"{path}: cannot tell which columns are the two ids of a contact: the ids may belong "
+            f"to another step; or name them with --contact-columns "
+            f'"id1=NAME,id2=NAME"; the columns are {", ".join(block.names)}'
+        )
+    listed = block.values[:, columns]
+    if not (are_whole(listed) and np.all(np.abs(listed) < 2.0**53)):
+        raise ReadError(
+            f"{path}: expected ids in the columns {columns[0] + 1} and {columns[1] + 1}"
+        )
+    return listed.astype(np.int64)
+
+
+def _id_columns(values: FloatArray, grains: GrainTable) -> list[int] | None:
+    """Two neighbouring columns that name neighbouring grains; None unless there is one choice."""
+    found = [
+        [place, place + 1]
+        for place in range(values.shape[1] - 1)
+        if _name_neighbours(values[:, place : place + 2], grains)
+    ]
+    return found[0] if len(found) == 1 else None
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def _name_neighbours(values: FloatArray, grains: GrainTable) -> bool:
+    """Whether they are ids of grains that lie side by side, and hardly any pair occurs twice."""
+    if not all(are_ids(values[:, k], grains) for k in range(2)):
+        return False
+    # a pair through several images occurs as often; two types of grains do all the time
+    if len(np.unique(np.sort(values, axis=1), axis=0)) < 0.5 * len(values):
+        return False
+    rows = rows_of_ids(grains, values)
+    gap = _gaps(grains, rows[(rows >= 0).all(axis=1)])
+    return bool(np.mean(gap < NEIGHBOURS - 1.0) > NEARLY_ALL)
+
+
+def _gaps(grains: GrainTable, rows: IntArray) -> FloatArray:
+    """Gaps between the surfaces of pairs of grains, nearest image, in r1 + r2."""
+    branch = grains.position[rows[:, 1]] - grains.position[rows[:, 0]]
+    if grains.cell is not None and np.all(np.isfinite(branch)):
+        branch = branch + grains.cell.nearest_image(branch) @ grains.cell.vectors
+    gaps: FloatArray = np.linalg.norm(branch, axis=1) / grains.radius[rows].sum(axis=1) - 1.0
+    return gaps
+
+
+@np.errstate(all="ignore")
+def _touching(
+    grains: GrainTable, rows: IntArray, force: FloatArray | None
+) -> npt.NDArray[np.bool_]:
+    """
+    Which pairs are contacts: LAMMPS lists all pairs within a cut-off, unless told otherwise.
+
+    Without a wide gap all are. Else those with a force, or without a force column those that
+    overlap. What is no grain stays, for the error that names it.
+    """
+    known = (rows >= 0).all(axis=1)
+    gap = np.zeros(len(rows))
+    gap[known] = _gaps(grains, rows[known])
+    if not np.any(gap > ROUNDING):
+        return np.ones(len(rows), dtype=bool)
+    touches = gap < 0 if force is None else force.any(axis=1)
+    return np.asarray(touches | ~known)
+
+
+def _force_on_second(block: DumpBlock, places: dict[str, int]) -> FloatArray | None:
+    """LAMMPS has the force on the first grain, its normal and tangential part apart."""
+    if FORCE[0] not in places:
+        return None
+    force = block.values[:, [places[key] for key in FORCE]]
+    if TANGENTIAL[0] in places:
+        force = force + block.values[:, [places[key] for key in TANGENTIAL]]
+    return -force

@@ -1,0 +1,242 @@
+"""
+LIGGGHTS: ``dump custom`` and ``dump local`` text, and its VTK files.
+
+In ``dump local`` the column names say nothing. ``compute pair/gran/local`` and ``wall/gran/local``
+write their values in an order of their own, whatever the order of the keywords.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.base.errors import ReadError
+from scanfab.io.files import first_bytes
+from scanfab.io.formats.dump_grains import dump_kind, read_dump_grains
+from scanfab.io.formats.ids import MOST_ROWS, are_ids, are_whole, refuse_rounded_ids
+from scanfab.io.formats.join import count_walls, join_ids, rows_of_ids
+from scanfab.io.formats.vtk import VtkReader
+from scanfab.io.parse.text_dump import DumpBlock, index_dump, read_block, row_word
+from scanfab.io.parse.vtk_mesh import Mesh
+from scanfab.io.reader import (
+    Carries,
+    FileKind,
+    GrainTable,
+    JoinedContacts,
+    ReadOptions,
+    Snapshot,
+)
+
+__all__ = ["LiggghtsReader"]
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+# values of compute pair/gran/local in the order in which they are written, and how many
+PAIR_VALUES = {
+    "pos": 6,
+    "vel": 6,
+    "id": 3,
+    "force": 3,
+    "force_normal": 3,
+    "force_tangential": 3,
+    "torque": 3,
+    "torque_normal": 3,
+    "torque_tangential": 3,
+    "history": 3,
+    "contactArea": 1,
+    "delta": 1,
+    "contactPoint": 3,
+    "ms_id": 2,
+    "heatFlux": 1,
+}
+
+
+class LiggghtsVtkReader(VtkReader):
+    """The VTK files of LIGGGHTS."""
+
+    # a contact list names grains only
+    walls = False
+
+    def force_on_second(self, mesh: Mesh) -> FloatArray | None:
+        """The file has the force on the first grain."""
+        force = mesh.line_arrays.get("force")
+        return None if force is None else -force
+
+
+class LiggghtsReader:
+    """Reader plugin for what LIGGGHTS dumps."""
+
+    name = "liggghts"
+    description = "LIGGGHTS dump custom and dump local (text), dump custom/vtk, local/gran/vtk"
+    extensions = (".liggghts", ".dump", ".vtk", ".vtp", ".vtu")
+
+    def __init__(self) -> None:
+        self._vtk = LiggghtsVtkReader()
+
+    def recognises(self, path: Path) -> bool:
+        """An ``ITEM:`` dump, or a legacy VTK file that names LIGGGHTS."""
+        head = first_bytes(path)
+        return _is_text(head) or (
+            head.startswith(b"# vtk DataFile")
+            and b"LIGGGHTS" in head.partition(b"\n")[2].partition(b"\n")[0]
+        )
+
+    def kind(self, path: Path) -> FileKind:
+        """Grains are ATOMS; whatever else a text dump counts are contacts."""
+        head = first_bytes(path, 1 << 16)
+        if not _is_text(head):
+            return self._vtk.kind(path)
+        return dump_kind(head)
+
+    def snapshots(self, path: Path) -> list[Snapshot]:
+        """By ``ITEM: TIMESTEP``; a VTK file is one."""
+        return index_dump(path) if _is_text(first_bytes(path)) else self._vtk.snapshots(path)
+
+    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+        """Columns in any order and any subset that suffices; of repeated names the first counts."""
+        if not _is_text(first_bytes(snapshot.path)):
+            return self._vtk.read_grains(snapshot, options)
+        return read_dump_grains(snapshot, options)
+
+    def carries(self, path: Path) -> Carries:
+        """A text dump says which directions are periodic, a VTK file does not."""
+        return "cell" if _is_text(first_bytes(path)) else self._vtk.carries(path)
+
+    def beside(self, path: Path) -> list[Path]:
+        """A VTK file has its box beside it."""
+        return self._vtk.beside(path)
+
+    def read_contacts(
+        self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
+    ) -> JoinedContacts:
+        """
+        Pairs of ``pair/gran/local``, or grains of ``wall/gran/local``.
+
+        Which column is what follows from ``--contact-columns``, the keywords of the compute, or
+        from the values: two columns of ids of the grain file, then the periodic flag 0 or 1.
+        """
+        path = snapshot.path
+        if not _is_text(first_bytes(path)):
+            return self._vtk.read_contacts(snapshot, options, grains)
+        block = read_block(snapshot)
+        if len(block.values) == 0:
+            pairs = np.zeros((0, 2), np.int64)
+            return join_ids(path, grains, pairs, None, walls=False)
+        if grains.id is None:
+            raise ReadError(f"{path}: names grains by id, but the grain file has no ids")
+        refuse_rounded_ids(path, block.values, grains)
+        place, force = _given_places(path, options.contact_columns, block)
+        if place is None:
+            place = _pair_column(block.values, grains)
+            force = None if place is None else _force_column(block.values, place, grains)
+            wall = _wall_column(block.values, grains) if place is None else None
+            if wall is not None:
+                return JoinedContacts(None, _wall_contacts(path, block.values[:, wall], grains))
+        if place is None:
+            raise ReadError(
+                f"{path}: cannot tell which columns are the two ids of a contact: the ids may "
+                f"belong to another step; or name the keywords of the compute with "
+                f'--contact-columns "pos id force ..."; a dump of LAMMPS is read with '
+                f"--format lammps"
+            )
+        listed = block.values[:, place : place + 2]
+        if not (are_whole(listed) and np.all(np.abs(listed) < 2.0**53)):
+            raise ReadError(f"{path}: expected ids in the columns {place + 1} and {place + 2}")
+        ids = listed.astype(np.int64)
+        # the file has the force on the first grain
+        on_second = None if force is None else -block.values[:, force : force + 3]
+        return join_ids(path, grains, ids, on_second, walls=False)
+
+
+def _is_text(head: bytes) -> bool:
+    return row_word(head) is not None
+
+
+def _given_places(
+    path: Path, keywords: str | None, block: DumpBlock
+) -> tuple[int | None, int | None]:
+    """First column of the ids and of the force, from the keywords of the compute."""
+    if keywords is None:
+        return None, None
+    words = keywords.split()
+    sizes = dict(PAIR_VALUES)
+    for word in words:
+        match = re.fullmatch(r"history:(\d+)", word)
+        if match:
+            sizes["history"] = int(match[1])
+    asked = {word.partition(":")[0] for word in words}
+    unknown = asked - set(sizes)
+    if unknown or "id" not in asked:
+        raise ReadError(
+            f"{path}: --contact-columns: expected keywords of compute pair/gran/local, id among "
+            f"them ({', '.join(sizes)}), found {keywords!r}"
+        )
+    places, place = {}, 0
+    for word, size in sizes.items():
+        if word in asked:
+            places[word] = place
+            place += size
+    if place != block.values.shape[1]:
+        raise ReadError(
+            f"{path}: --contact-columns {keywords!r} makes {place} columns, the file has "
+            f"{block.values.shape[1]}"
+        )
+    return places["id"], places.get("force")
+
+
+def _pair_column(values: FloatArray, grains: GrainTable) -> int | None:
+    """First of the three columns id1, id2, periodic flag; None if there is not just one choice."""
+    candidates = [
+        place
+        for place in range(values.shape[1] - 2)
+        if np.isin(values[:, place + 2], (0, 1)).all()
+        and are_ids(values[:, place], grains)
+        and are_ids(values[:, place + 1], grains)
+        and np.all(values[:, place] != values[:, place + 1])
+    ]
+    return candidates[0] if len(candidates) == 1 else None
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def _force_column(values: FloatArray, place: int, grains: GrainTable) -> int | None:
+    """The three columns behind the periodic flag, if they push the first grain off the second."""
+    force = values[:, place + 3 : place + 6]
+    if force.shape[1] < 3:
+        return None
+    first, second = rows_of_ids(grains, values[:, place : place + 2]).T
+    branch = grains.position[second] - grains.position[first]
+    if grains.cell is not None:
+        branch = branch + grains.cell.nearest_image(branch) @ grains.cell.vectors
+    pushed = np.sum(force * branch, axis=1) < 0
+    # damping makes the force of a few contacts attractive
+    return place + 3 if pushed.mean() > 0.9 else None
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def _wall_column(values: FloatArray, grains: GrainTable) -> int | None:
+    """The grains' ids of a wall/gran/local file: behind wall and triangle, and a listed centre."""
+    for place in range(5, values.shape[1]):
+        if not are_ids(values[:, place], grains) or not are_whole(values[:, place - 2 : place]):
+            continue
+        rows = rows_of_ids(grains, values[:, place])
+        centres, size = grains.position[rows], grains.radius[rows]
+        for start in range(place - 4):
+            distance = np.linalg.norm(values[:, start : start + 3] - centres, axis=1)
+            if np.mean(distance < 0.01 * size) > MOST_ROWS:
+                return place
+    return None
+
+
+def _wall_contacts(path: Path, ids: FloatArray, grains: GrainTable) -> IntArray:
+    """Contacts with walls of each grain."""
+    rows = rows_of_ids(grains, ids)
+    if np.any(rows < 0):
+        raise ReadError(
+            f"{path}: names the grain {ids[np.argmin(rows)]:g}, which is not in the grain file: "
+            f"do both files belong to the same step?"
+        )
+    return count_walls(rows, len(grains.radius))

@@ -1,0 +1,169 @@
+"""VTK files: grains as points with a radius, contacts as lines between centres."""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.base.errors import ReadError
+from scanfab.base.lengths import MOST
+from scanfab.io.files import bare_name, plain
+from scanfab.io.formats.columns import grain_table, has_radius, whole_numbers
+from scanfab.io.formats.join import join_ids, join_positions
+from scanfab.io.formats.yade_cells import cell_beside, cell_file, is_cell_file
+from scanfab.io.parse.vtk_mesh import Mesh, form_of, read_bounds, read_mesh
+from scanfab.io.reader import (
+    Carries,
+    FileKind,
+    GrainTable,
+    JoinedContacts,
+    ReadOptions,
+    Snapshot,
+)
+from scanfab.packing.cell import Cell
+from scanfab.packing.packing import ContactList
+
+__all__ = ["VtkReader"]
+
+FloatArray = npt.NDArray[np.float64]
+
+# other kinds of VTK files are grids and indexes of files
+HOLDING_POINTS = ("PolyData", "POLYDATA", "UnstructuredGrid", "UNSTRUCTURED_GRID", "Xdmf")
+
+
+class VtkReader:
+    """Reader plugin for VTK files of any origin."""
+
+    name = "vtk"
+    description = "any VTK point cloud with a radius; contacts as lines (also .pvd series)"
+    extensions: tuple[str, ...] = (".vtk", ".vtp", ".vtu", ".pvd", ".xdmf", ".xmf")
+    generic = True
+    lists_contacts = True
+    # whether one end of a contact may be a wall, which is not in the grain file
+    walls = True
+
+    def recognises(self, path: Path) -> bool:
+        """By the first line of legacy VTK, or the root element of the XML formats."""
+        return form_of(path) is not None
+
+    def kind(self, path: Path) -> FileKind:
+        """Lines are contacts, points without any other cells are grains."""
+        form = form_of(path)
+        if form == "Collection":
+            return "index"
+        if form not in HOLDING_POINTS:
+            return "other"
+        if is_cell_file(path):
+            return "cell"
+        mesh = read_mesh(path)
+        if mesh.has_faces:
+            return "other"
+        if len(mesh.points) == 0:
+            # an empty frame; VTK may have dropped its arrays
+            return "grains" if b"radi" in plain(path).read_bytes().lower() else "other"
+        if has_radius(list(mesh.point_arrays)):
+            return "grains"
+        return "contacts" if len(mesh.lines) else "points"
+
+    def snapshots(self, path: Path) -> list[Snapshot]:
+        """One, and only its name may say which step it is; those that a ``.pvd`` lists."""
+        return self._listed(path) if form_of(path) == "Collection" else [Snapshot(path)]
+
+    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+        """Points and their arrays, with the box of LIGGGHTS or the cell of YADE beside them."""
+        mesh = read_mesh(snapshot.path)
+        columns = {**mesh.point_arrays, "position": mesh.points}
+        if len(mesh.points) == 0:
+            columns["radius"] = np.zeros(0)
+        cell = _box_beside(snapshot.path)
+        if cell is None and options.cell is None:
+            cell = cell_beside(snapshot.path, mesh.points)
+        grains = grain_table(snapshot.path, columns, cell, options)
+        if len(mesh.lines) == 0:
+            return grains
+        # lines between the grains' own points
+        return grains._replace(contacts=ContactList(mesh.lines, force=self.force_on_second(mesh)))
+
+    def read_contacts(
+        self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
+    ) -> JoinedContacts:
+        """Lines; by the arrays id1 and id2 where grains have ids, else by their ends."""
+        mesh = read_mesh(snapshot.path)
+        force = self.force_on_second(mesh)
+        ids = [mesh.line_arrays.get(name) for name in ("id1", "id2")]
+        named = [whole_numbers(snapshot.path, values) for values in ids if values is not None]
+        if grains.id is not None and len(named) == 2:
+            pairs = np.column_stack(named)
+            return join_ids(snapshot.path, grains, pairs, force, walls=self.walls)
+        return join_positions(snapshot.path, grains, mesh.points[mesh.lines], force)
+
+    def carries(self, path: Path) -> Carries:
+        """LIGGGHTS writes a box beside its files; VTK itself has no cell."""
+        return "nothing" if _box_beside(path) is None else "box"
+
+    def beside(self, path: Path) -> list[Path]:
+        """The box of LIGGGHTS and the cell of YADE."""
+        found = (_box_file(path), cell_file(path))
+        return [file for file in found if file is not None]
+
+    def _listed(self, index: Path) -> list[Snapshot]:
+        """The grain files of a ``.pvd``, in its order."""
+        try:
+            root = ElementTree.parse(plain(index)).getroot()
+            entries = [
+                (index.parent / entry.attrib["file"], float(entry.attrib["timestep"]))
+                for entry in root.iter("DataSet")
+            ]
+        except (ElementTree.ParseError, LookupError, ValueError) as error:
+            raise ReadError(f"{index}: cannot be read as a list of VTK files: {error}") from None
+        kinds: dict[str, FileKind] = {}
+        found = []
+        for path, time in entries:
+            # parts of one name hold the same; some are boxes and contacts
+            family = re.sub(r"\d+", "*", path.name)
+            kinds.setdefault(family, "other")
+            if kinds[family] == "other":
+                kinds[family] = self.kind(path)
+            if kinds[family] in ("grains", "points"):
+                found.append(Snapshot(path, step=_last_number(path), time=time))
+        return found
+
+    def force_on_second(self, mesh: Mesh) -> FloatArray | None:
+        """Force on the second grain, shape (M, 3); None: which one it acts on is not known."""
+        return None
+
+
+def _last_number(path: Path) -> int | None:
+    numbers = re.findall(r"\d+", Path(bare_name(path)).stem)
+    return int(numbers[-1]) if numbers else None
+
+
+def _box_beside(path: Path) -> Cell | None:
+    """The box that LIGGGHTS writes beside a VTK dump; it does not say what is periodic."""
+    file = _box_file(path)
+    return None if file is None else _read_box(file)
+
+
+def _box_file(path: Path) -> Path | None:
+    match = re.fullmatch(r"(.*?)(\d+)\.\w+", bare_name(path))
+    if match is None:
+        return None
+    for suffix in (".vtk", ".vtr", ".vtk.gz", ".vtr.gz"):
+        beside = path.with_name(f"{match[1]}boundingBox_{match[2]}{suffix}")
+        if beside.is_file():
+            return beside
+    return None
+
+
+def _read_box(path: Path) -> Cell | None:
+    bounds = read_bounds(path)
+    if bounds is None:
+        return None
+    edges = bounds[:, 1] - bounds[:, 0]
+    if not np.all((edges > 0) & (np.abs(bounds).max(axis=1) < MOST)):
+        return None
+    return Cell(edges, (False, False, False), bounds[:, 0])

@@ -1,0 +1,194 @@
+"""YADE: text exports, ``SpherePack.save``, ``VTKExporter``, ``VTKRecorder`` and ``O.save``."""
+
+from __future__ import annotations
+
+import base64
+import re
+import struct
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.base.errors import PackingError, ReadError
+from scanfab.base.lengths import MOST
+from scanfab.io.files import check_memory, first_bytes, plain
+from scanfab.io.formats.columns import grain_table
+from scanfab.io.formats.vtk import VtkReader
+from scanfab.io.formats.yade_save import is_binary_save, is_save, read_save, snapshot_of_save
+from scanfab.io.parse.number_rows import rows_of_numbers
+from scanfab.io.parse.vtk_mesh import Mesh
+from scanfab.io.reader import (
+    Carries,
+    FileKind,
+    GrainTable,
+    JoinedContacts,
+    ReadOptions,
+    Snapshot,
+)
+from scanfab.packing.cell import Cell
+
+__all__ = ["YadeReader"]
+
+FloatArray = npt.NDArray[np.float64]
+
+# legacy VTK by VTKExporter: VTK itself writes no dot behind the version
+EXPORTER_HEAD = b"# vtk DataFile Version 3.0.\n"
+# as numpy has them
+BLANKS = b" \t\n\r\v\f\x1c\x1d\x1e\x1f\x85\xa0"
+PERIODIC_HEAD = b"##PERIODIC::"
+TEXT_HEADS = (b"#format ", PERIODIC_HEAD)
+
+
+class YadeReader(VtkReader):
+    """Reader plugin for what YADE exports."""
+
+    name = "yade"
+    description = "YADE export.VTKExporter, VTKRecorder, export.text, export.textExt, O.save (XML)"
+    extensions = (".vtk", ".vtu", ".vtp", ".txt", ".xml", ".yade")
+    generic = False
+
+    def recognises(self, path: Path) -> bool:
+        """YADE's own first lines, or the arrays of VTKRecorder's interactions."""
+        head = first_bytes(path)
+        return (
+            head.startswith((EXPORTER_HEAD, *TEXT_HEADS))
+            or (b"<VTKFile" in head and b'Name="forceN"' in head)
+            or is_save(path)
+            or is_binary_save(path)
+        )
+
+    def kind(self, path: Path) -> FileKind:
+        """A text export and a saved simulation hold grains."""
+        if is_binary_save(path):
+            raise ReadError(
+                f"{path}: YADE's binary format can be read by the same build of YADE only: load it "
+                f"there, and save it as XML: O.save('name.xml.bz2')"
+            )
+        return "grains" if _is_text(path) or is_save(path) else super().kind(path)
+
+    def snapshots(self, path: Path) -> list[Snapshot]:
+        """One; a saved simulation says which step it is."""
+        return [snapshot_of_save(path)] if is_save(path) else super().snapshots(path)
+
+    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+        """Text columns by the names of the first line; VTK arrays by their own."""
+        if is_save(snapshot.path):
+            return read_save(snapshot, options)
+        if not _is_text(snapshot.path):
+            return super().read_grains(snapshot, options)
+        path = snapshot.path
+        lines = first_bytes(path, 1 << 14).decode("utf-8", "replace").splitlines()
+        values = _numbers(path)
+        names, cell = _text_columns(path, lines, values.shape[1] if values.size else None)
+        values = values.reshape(-1, len(names))
+        columns = dict(zip(names, values.T, strict=True))
+        return grain_table(path, columns, cell, options)
+
+    def read_contacts(
+        self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
+    ) -> JoinedContacts:
+        """Lines between centres; a wall's end is where no grain is."""
+        if _is_text(snapshot.path):
+            raise ReadError(f"{snapshot.path}: YADE's text export holds no contacts")
+        if is_save(snapshot.path):
+            raise ReadError(
+                f"{snapshot.path}: a saved simulation is no contact list for other grains: "
+                f"compute it by itself"
+            )
+        _refuse_lost_lines(snapshot.path)
+        return super().read_contacts(snapshot, options, grains)
+
+    def carries(self, path: Path) -> Carries:
+        """A saved simulation and ``SpherePack.save`` say whether the sample is periodic."""
+        says = first_bytes(path).startswith(PERIODIC_HEAD) or is_save(path)
+        return "cell" if says else super().carries(path)
+
+    def force_on_second(self, mesh: Mesh) -> FloatArray | None:
+        """YADE's forces act on the second body."""
+        arrays = mesh.line_arrays
+        names = ["force"]
+        if "normalForce" in arrays and "shearForce" in arrays:
+            names = ["normalForce", "shearForce"]
+        forces = [arrays.get(name, np.zeros(0)) for name in names]
+        if any(force.shape != (len(mesh.lines), 3) for force in forces):
+            return None
+        return np.asarray(sum(forces), dtype=np.float64)
+
+
+def _is_text(path: Path) -> bool:
+    return first_bytes(path).startswith(TEXT_HEADS)
+
+
+def _numbers(path: Path) -> FloatArray:
+    check_memory(path, 6.0 * plain(path).stat().st_size)
+    data = plain(path).read_bytes()
+    if all(not line.partition(b"#")[0].strip(BLANKS) for line in data.split(b"\n")):
+        return np.zeros((0, 0))  # an empty frame
+    return rows_of_numbers(path, data)
+
+
+def _text_columns(path: Path, lines: list[str], count: int | None) -> tuple[list[str], Cell | None]:
+    """Names of the columns and the cell, from the first lines; count is None without rows."""
+    head = lines[0]
+    if head.startswith("##PERIODIC::"):
+        try:
+            edges = [float(word) for word in head.removeprefix("##PERIODIC::").split()]
+            if not all(abs(edge) < MOST for edge in edges):
+                raise ValueError
+            cell = Cell(edges)
+        except (ValueError, PackingError):
+            raise ReadError(f"{path}, line 1: expected three lengths, found {head!r}") from None
+        names = ["x", "y", "z", "r", "clumpId"][:count]
+    else:
+        cell = None
+        names = head.removeprefix("#format").strip().split("_")
+        if names[-1] == "attrs":
+            named = re.fullmatch(r"#\s*(x y z r( .*)?)", lines[1]) if len(lines) > 1 else None
+            names = named[1].split() if named else names[:-1]
+            names += [f"attr{number}" for number in range(1, (count or 0) - len(names) + 1)]
+    if count is not None and len(names) != count:
+        raise ReadError(f"{path}: the first line names {len(names)} columns, the rows have {count}")
+    return names, cell
+
+
+def _refuse_lost_lines(path: Path) -> None:
+    """
+    VTKRecorder loses the lines that cross a periodic cell, but writes their values.
+
+    The values then belong to other contacts than those that they stand at.
+    """
+    head = first_bytes(path)
+    if b"<VTKFile" not in head or b'Name="forceN"' not in head:
+        return
+    lines, values = _count_lines_and_values(path)
+    if values is not None and values > lines:
+        raise ReadError(
+            f"{path}: {values} values for {lines} contacts: YADE's VTKRecorder loses the contacts "
+            f"that cross a periodic cell; export them with export.VTKExporter.exportInteractions, "
+            f"or find them by geometry (--contacts geometric)"
+        )
+
+
+def _count_lines_and_values(path: Path) -> tuple[int, int | None]:
+    """Lines by the header, and values of forceN by its data; None if packed in another way."""
+    try:
+        root = ElementTree.parse(plain(path)).getroot()
+        piece = next(root.iter("Piece"))
+        lines = int(piece.attrib["NumberOfLines"])
+        array = next(a for a in piece.iter("DataArray") if a.attrib.get("Name") == "forceN")
+        if array.attrib["format"] == "ascii":
+            # <InformationKey> children hold numbers too: those behind them are the values
+            text = (array.text or "") + "".join(child.tail or "" for child in array)
+            return lines, len(text.split())
+        appended = root.find("AppendedData")
+        if appended is None or appended.attrib.get("encoding") != "base64":
+            return lines, None
+        offset = int(array.attrib["offset"])
+        data = (appended.text or "").strip().removeprefix("_")[offset : offset + 64]
+        # blocks, bytes of a full block, bytes of the last one if it is not full
+        blocks, full, last = struct.unpack("<3I", base64.b64decode(data[:16]))
+        return lines, (blocks * full if last == 0 else (blocks - 1) * full + last) // 8
+    except (ElementTree.ParseError, StopIteration, LookupError, ValueError, struct.error) as error:
+        raise ReadError(f"{path}: cannot be read as VTKRecorder's file: {error}") from None

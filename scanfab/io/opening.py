@@ -1,0 +1,267 @@
+"""From folders and files, as users name them, to series of frames."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
+from scanfab.io.families import (
+    SETTINGS_FILE,
+    Family,
+    families_beside,
+    own_contacts,
+    sort_into_families,
+)
+from scanfab.io.formats.yade_cells import is_cell_file, refuse_as_numbers
+from scanfab.io.frame_csv import FrameFile
+from scanfab.io.grain_files import PathLike, choose_grains, expanded, files_of, named_once
+from scanfab.io.reader import ReadOptions
+from scanfab.io.series import ContactsFrom, Series
+from scanfab.packing.packing import Packing
+
+__all__ = ["READING", "SETTINGS_FILE", "open_sources", "read", "read_series"]
+
+READING = ("format", "columns", "contact_columns", "radius", "cell", "periodic", "contacts")
+"""The options of :func:`read_series`, by which commands and manifests know them too."""
+
+
+def read(path: PathLike, *, frame: int = 0, **options: Any) -> Packing:
+    """
+    Read one frame.
+
+    Parameters
+    ----------
+    path : path
+        A particle file; its contact file beside it is read too, as by :func:`read_series`.
+    frame : int, optional
+        Which snapshot, if the file holds several; negative from the end.
+    **options
+        See :func:`read_series`.
+
+    Returns
+    -------
+    Packing
+
+    Raises
+    ------
+    ScanfabError
+        If the file cannot be read, or has no such frame.
+
+    Examples
+    --------
+    >>> import scanfab
+    >>> packing = scanfab.read(
+    ...     "sample_data/yade_triaxial/triaxial-spheres-00000000.vtk.gz",
+    ...     contacts="sample_data/yade_triaxial/triaxial-intrs-00000000.vtk.gz",
+    ... )
+    >>> len(packing)
+    1800
+    """
+    frames = list(read_series(path, **options))
+    try:
+        chosen = frames[frame]
+    except IndexError:
+        raise ReadError(f"{path}: has {len(frames)} frames, there is no frame {frame}") from None
+    return chosen.read()
+
+
+def read_series(
+    source: PathLike | Sequence[PathLike],
+    *,
+    format: str | None = None,
+    contacts: str | PathLike = "auto",
+    columns: dict[str, str] | None = None,
+    contact_columns: str | None = None,
+    radius: float | None = None,
+    cell: tuple[float, ...] | PathLike | None = None,
+    periodic: str | None = None,
+) -> Series:
+    """
+    Open a series of frames: a folder, a file, or several files.
+
+    Parameters
+    ----------
+    source : path or sequence of paths
+        A folder with one series, or its files; globs too. What is named twice counts once, with a
+        warning. Contact files that lie beside single
+        grain files are taken as if the folder had been named, if they are clearly theirs.
+    format : str, optional
+        Name of the reader; by content if not given.
+    contacts : str or path, optional
+        ``auto``: from contact files if there are any, else by geometry; ``file``; ``geometric``; or
+        a file, folder or glob, matched by step.
+    columns : dict, optional
+        Standard names to the file's own, such as ``{"radius": "c_rad"}``.
+    contact_columns : str, optional
+        Keywords of LIGGGHTS' ``compute pair/gran/local``, or LAMMPS' columns by their meaning:
+        ``"id1=c_ids[1],id2=c_ids[2]"``.
+    radius : float, optional
+        Radius for dumps without one, dump's length unit.
+    cell : tuple of float or path, optional
+        LX LY LZ or LX LY LZ XY XZ YZ, for formats that do not carry it; or a CSV file with the cell
+        of each frame: columns ``step`` or ``frame``, ``lx ly lz``, and ``xy xz yz`` if tilted.
+    periodic : str, optional
+        Letters out of xyz.
+
+    Returns
+    -------
+    Series
+
+    Raises
+    ------
+    UnknownFormatError
+        If no reader knows the files.
+    ReadError
+        If there is no series, or more than one.
+
+    Examples
+    --------
+    >>> import scanfab
+    >>> folder = "sample_data/liggghts_periodic"
+    >>> series = scanfab.read_series([f"{folder}/dump_{step}.txt.gz" for step in (60000, 30000)])
+    >>> [frame.read().step for frame in series]
+    [30000, 60000]
+    """
+    given = [source] if isinstance(source, str | os.PathLike) else list(source)
+    paths = [Path(one) for one in named_once(given)]
+    cells = None if cell is None or isinstance(cell, tuple | list) else _cell_file(cell)
+    one_cell = tuple(cell) if isinstance(cell, tuple | list) else None
+    options = ReadOptions(columns or {}, contact_columns, radius, one_cell, periodic)
+    families = sort_into_families([file for path in paths for file in files_of(path)], format)
+    grains = choose_grains(paths, families, radius is not None).check()
+    name = _as_text(os.fspath(given[0]) if len(paths) == len(given) == 1 else _common_folder(paths))
+    own = [family for family in families if family.kind == "contacts"]
+    _note_passed_over(families, [grains, *own])
+
+    def series(files: Sequence[Family], contacts_from: ContactsFrom) -> Series:
+        checked = tuple(family.check() for family in files)
+        return Series(name, grains, checked, contacts_from, options, cells)
+
+    if contacts == "geometric":
+        return series((), "geometric")
+    if contacts not in ("auto", "file"):
+        return series(_named_contacts(contacts, format), "path")
+    if not own and not any(path.is_dir() for path in paths):
+        own, beside = _contacts_beside(grains, format), True
+    else:
+        beside = False
+    if contacts == "file" and not own:
+        if not getattr(grains.reader, "lists_contacts", False):
+            raise ReadError(f"{name}: --contacts file was asked for, but there is no contact file")
+        return series((), "grains")
+    return series(own, "path" if contacts == "file" else "beside" if beside else "auto")
+
+
+def open_sources(sources: Sequence[PathLike], **options: Any) -> list[Series]:
+    """
+    The series of a command line: one for each folder, and one for all single files together.
+
+    Parameters
+    ----------
+    sources : sequence of paths
+        Folders, files and globs; what is named twice counts once, with a warning.
+    **options
+        See :func:`read_series`.
+    """
+    groups: list[PathLike | list[PathLike]] = []
+    files: list[PathLike] = []
+    for source in named_once(sources):
+        if Path(source).is_dir():
+            groups.append(source)
+        else:
+            if not files:
+                groups.append(files)
+            files.append(source)
+    return [
+        read_series(group[0] if isinstance(group, list) and len(group) == 1 else group, **options)
+        for group in groups
+    ]
+
+
+def _cell_file(path: PathLike) -> FrameFile:
+    """The cells of --cell FILE.csv."""
+    if is_cell_file(Path(path)):
+        raise refuse_as_numbers(Path(path))
+    try:
+        return FrameFile(Path(path), ["lx", "ly", "lz"], ["xy", "xz", "yz"], positive=3)
+    except OSError as error:
+        raise ReadError(f"{path}: cannot be read: {os.strerror(error.errno or 0)}") from None
+
+
+def _contacts_beside(grains: Family, format: str | None) -> list[Family]:
+    """
+    The contact files in the folder of single grain files, as if the folder had been named.
+
+    Told by a note; also where it is not clear whose contacts they are, and they are left alone.
+    """
+    if grains.kind == "index":
+        return []
+    beside = families_beside(grains, format)
+    rivals = [family for family in beside if family.kind in ("grains", grains.kind)]
+    contacts = [family for family in beside if family.kind == "contacts" and family.clash is None]
+    own, doubtful = own_contacts(grains, rivals, contacts)
+    if own:
+        _note(f"contacts are read from {_patterns(own)}, beside the grains")
+    elif doubtful:
+        _note(
+            f"{_patterns(doubtful)}: contacts beside the grains, but it is not clear whose they "
+            f"are: name them with --contacts, or they are left alone"
+        )
+    return own
+
+
+def _patterns(families: Sequence[Family]) -> str:
+    return ", ".join(family.pattern for family in families)
+
+
+def _note(text: str) -> None:
+    warnings.warn(text, ScanfabNote, stacklevel=4)
+
+
+def _note_passed_over(families: Sequence[Family], used: Sequence[Family]) -> None:
+    """One note for the files that do not enter, and a warning for each that is damaged."""
+    unused = [
+        one for one in families if one not in used and one.problem is None and one.kind != "cell"
+    ]
+    if unused:
+        names = ", ".join(Path(one.pattern).name + _lack(one) for one in unused[:5])
+        more = f" and {len(unused) - 5} more" if len(unused) > 5 else ""
+        _note(f"passed over, neither grains nor contacts: {names}{more}")
+    for family in families:
+        if family.problem is not None:
+            warnings.warn(f"passed over: {family.problem}", ScanfabWarning, stacklevel=3)
+
+
+def _lack(family: Family) -> str:
+    return " (no radius: --radius)" if family.kind == "points" else ""
+
+
+def _named_contacts(contacts: PathLike, format: str | None) -> list[Family]:
+    """Contact files from --contacts PATH: a file, a folder or a glob."""
+    files = [file for one in expanded(contacts) for file in files_of(Path(one))]
+    families = sort_into_families(files, format)
+    found = [family for family in families if family.kind == "contacts"]
+    if not found:
+        problem = next((family.problem for family in families if family.problem), None)
+        if problem is not None:
+            raise ReadError(problem)
+        kinds = {"grains": "grains", "points": "points without a radius", "cell": "a cell"}
+        what = sorted({kinds.get(one.kind, "walls, or something else") for one in families})
+        raise ReadError(f"{contacts}: expected contacts, found {' and '.join(what)}")
+    return found
+
+
+def _as_text(name: str) -> str:
+    """A name as a table can hold it: those of files need be no text."""
+    return name.encode("utf-8", "backslashreplace").decode()
+
+
+def _common_folder(paths: list[Path]) -> str:
+    folders = [str(path.parent) for path in paths]
+    if len({path.is_absolute() for path in paths}) > 1:
+        folders = [os.path.abspath(folder) for folder in folders]
+    return os.path.commonpath(folders) or "."

@@ -1,0 +1,1 @@
+"""The syntax of files, and nothing of what it means."""

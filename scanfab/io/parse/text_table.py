@@ -1,0 +1,171 @@
+"""
+Long tables of text with one blank between two words: parsed by polars, and only where it is needed.
+
+What is not regular (runs of blanks, tabs, words, lines of another width) is left to the tolerant
+parser of the format, which reads it or says what is wrong in which line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from threading import Lock
+from typing import IO, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.base.memory import free_memory
+from scanfab.base.threads import in_order
+
+__all__ = ["LARGE", "TextTable", "read_regular"]
+
+# bytes; a smaller table is parsed before polars is loaded
+LARGE = 8 << 20
+# bytes that are parsed at a time: the memory of one piece serves the next, which is faster than new
+PIECE = 16 << 20
+# pieces under way: while polars parses one in several threads, another is counted, read or copied
+WORKERS = 4
+
+
+# bytes that polars may need with all these pieces; without them it ends the process
+ROOM = 3 << 29
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """Where a table stands in an uncompressed file."""
+
+    path: Path
+    start: int
+    """First byte of the first row."""
+    stop: int
+    """Byte behind the last row."""
+    width: int
+    """Number of columns."""
+    count: int
+    """Number of rows."""
+
+
+def read_regular(table: TextTable, columns: Mapping[int, npt.NDArray[Any]]) -> bool:
+    """
+    Read some columns of a table, if it is regular.
+
+    Every number is the double nearest to the text, as Python's float() has it, or just the whole
+    number that the text is.
+
+    Parameters
+    ----------
+    table : TextTable
+        What to read.
+    columns : mapping of int to ndarray
+        Where the columns, from 0, are to be put: each of shape (count,), float64 or int64.
+
+    Returns
+    -------
+    bool
+        False if the table is not regular, or memory is short: what is in the arrays then has no
+        meaning.
+    """
+    if free_memory() < ROOM:
+        return False
+    rows = 0
+    for frame in _parsed(table, {place: column.dtype for place, column in columns.items()}):
+        if frame is None or rows + frame.height > table.count:
+            return False
+        for place, column in columns.items():
+            _put(frame[f"{place}"].get_chunks(), column[rows : rows + frame.height])
+        rows += frame.height
+    return rows == table.count
+
+
+def _put(parts: list[Any], column: npt.NDArray[Any]) -> None:
+    """Series of polars one behind the other into an array."""
+    start = 0
+    for part in parts:
+        column[start : start + len(part)] = part.to_numpy()
+        start += len(part)
+
+
+def _parsed(table: TextTable, kinds: Mapping[int, np.dtype[Any]]) -> Iterator[Any]:
+    """The data frames of the table's pieces, in their order; None for one that is not regular."""
+    # opened once: the file may be replaced by another while it is read
+    with open(table.path, "rb") as file, ThreadPoolExecutor(WORKERS) as pool:
+        file.seek(table.start)
+        # polars sees an empty word behind such a line
+        behind = file.readline().endswith(b" \n")
+        pieces, lock = list(_pieces(file, table)), Lock()
+
+        def parse(start: int, stop: int) -> Any:
+            with lock:
+                file.seek(start)
+                text = file.read(stop - start)
+            return _parse_piece(text, table.width, kinds, behind)
+
+        jobs = (partial(parse, *piece) for piece in pieces)
+        yield from in_order(pool, jobs, 2 * WORKERS)
+
+
+def _pieces(file: IO[bytes], table: TextTable) -> Iterator[tuple[int, int]]:
+    """First bytes, and those behind the last, of parts of the table that are whole lines."""
+    start = table.start
+    while start < table.stop:
+        place = file.seek(start + PIECE)
+        stop = min(place + len(file.readline()), table.stop)
+        yield start, stop
+        start = stop
+
+
+def _parse_piece(text: bytes, width: int, kinds: Mapping[int, np.dtype[Any]], behind: bool) -> Any:
+    """
+    The columns of some lines; None if they are not regular.
+
+    If no two blanks stand together but at the end of each line, the words that polars sees are
+    those of the line. If besides there are just as many as there should be, and no line lacks its
+    last word, no line has a word more either.
+    """
+    from scanfab.io.parse.kernels import count_spaces
+
+    # a last line without its end may lack digits; a byte order mark would be passed over
+    if not text.endswith(b"\n") or not text[:1].isascii():
+        return None
+    frame = _parse(text, width, kinds, behind)
+    if frame is None:
+        return None
+    rows = frame.height
+    blanks_at_ends = rows * behind
+    expected = rows * (width + behind), blanks_at_ends, blanks_at_ends
+    return frame if count_spaces(np.frombuffer(text, np.uint8)) == expected else None
+
+
+def _parse(text: bytes, width: int, kinds: Mapping[int, np.dtype[Any]], behind: bool) -> Any:
+    """The columns as polars sees them; None if a line has too few, or a word is no such number."""
+    import polars
+
+    names = [f"{place}" for place in range(width)]
+    schema: dict[str, Any] = dict.fromkeys(names, polars.Float64)
+    schema |= {names[place]: polars.Int64 for place, kind in kinds.items() if kind == np.int64}
+    if behind:
+        schema["behind"] = polars.String
+    wanted = list(dict.fromkeys([*(names[place] for place in kinds), names[-1]]))
+    try:
+        frame = (
+            polars.scan_csv(
+                text,
+                has_header=False,
+                separator=" ",
+                quote_char=None,
+                schema=schema,
+                encoding="utf8-lossy",  # numbers are none, and nothing else is kept
+                truncate_ragged_lines=True,  # blanks are counted elsewhere
+                glob=False,
+            )
+            .select(wanted)
+            .collect()
+        )
+    except (polars.exceptions.PolarsError, OSError):  # the latter: like a compressed file
+        return None
+    return None if any(frame.null_count().row(0)) else frame

@@ -1,0 +1,230 @@
+"""
+Coverage-guided fuzzing of the readers; not part of the test suite.
+
+    pip install atheris
+    python tests/campaigns/fuzz_readers.py --runs 200000 [--out FOLDER] [READER ...]
+
+All readers by default. One line for each reader at the end; inputs that broke it stand in the
+folder, each with what happened beside it. One process fuzzes until it breaks, or grows old, and
+another then goes on with the corpus that it leaves.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import mmap
+import os
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+from pathlib import Path
+from random import Random
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+
+SECONDS, MEGABYTES = 10, 1024
+# executions of one process: what atheris' tracing leaks stays below the limit of memory
+RUNS_OF_A_PROCESS = 5_000
+LONGEST = 20_000
+KEPT_OF_A_KIND = 3
+COUNTER = struct.Struct("<q")
+RAM = Path("/dev/shm")
+
+
+def main() -> None:
+    """The processes of each reader, one after the other."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("readers", nargs="*", metavar="READER", default=[])
+    parser.add_argument("--runs", type=int, default=200_000, help="executions of each reader")
+    parser.add_argument("--out", type=Path, default=Path("fuzz_findings"))
+    parser.add_argument("--process", type=Path, help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    if given.process is not None:
+        fuzz(given.readers[0], given.runs, given.out, given.process)
+        return
+    for reader in given.readers or ("lammps", "liggghts", "vtk", "yade"):
+        supervise(reader, given.runs, given.out / reader)
+
+
+def supervise(reader: str, runs: int, out: Path) -> None:
+    """Fuzz one reader, with a new process after each that ends; print the summary."""
+    out.mkdir(parents=True, exist_ok=True)
+    began, done, ended = time.monotonic(), 0, 0
+    with tempfile.TemporaryDirectory(dir=RAM if RAM.is_dir() else None) as name:
+        folder = Path(name)
+        (folder / "corpus").mkdir()
+        while done < runs:
+            (folder / "count").write_bytes(COUNTER.pack(0))
+            chunk = min(runs - done, RUNS_OF_A_PROCESS)
+            command = [sys.executable, __file__, reader, f"--runs={chunk}", f"--out={out}"]
+            with open(out / "log.report", "ab") as log:
+                code = subprocess.call([*command, f"--process={folder}"], stdout=log, stderr=log)
+            executed = COUNTER.unpack((folder / "count").read_bytes())[0]
+            done, ended = done + executed, ended + (code != 0)
+            if executed == 0:
+                sys.exit(f"{reader}: the process ends at once, see {out / 'log.report'}")
+    findings = sorted(path.name for path in out.iterdir() if path.suffix != ".report")
+    kinds = {name.partition("-")[0] for name in findings}
+    print(
+        f"{reader}: {done} executions, {time.monotonic() - began:.0f} s, {ended} processes broken, "
+        f"{len(kinds)} kinds of findings in {len(findings)} inputs",
+        flush=True,
+    )
+
+
+def fuzz(reader: str, runs: int, out: Path, folder: Path) -> None:
+    """Fuzz in this process until it has made its runs, or breaks."""
+    import atheris
+
+    with atheris.instrument_imports(include=["scanfab", "meshio.vtk", "meshio.vtu", "meshio.xdmf"]):
+        from scanfab.io.registry import installed_readers
+        from tests.helpers import fuzzing
+
+        installed_readers()
+    _write_corpus(fuzzing, reader, folder)
+    fuzzing.companion_grains(reader)
+    execution = _Execution(fuzzing, reader, out, folder)
+
+    def mutate(data: bytes, most: int, seed: int) -> bytes:
+        random = Random(seed)
+        if random.random() < 0.25:
+            return atheris.Mutate(data, most)
+        head = bytes(
+            [random.randrange(256) if random.random() < 0.1 else byte for byte in data[:2]]
+        )
+        return (head + fuzzing.mutate(data[2:], random))[:most]
+
+    options = {
+        "runs": runs,
+        "timeout": SECONDS,
+        "rss_limit_mb": MEGABYTES,
+        "max_len": LONGEST,
+        "artifact_prefix": f"{out}/process.",
+    }
+    arguments = [f"-{name}={value}" for name, value in options.items()]
+    atheris.Setup(
+        [sys.argv[0], *arguments, str(folder / "corpus")], execution, custom_mutator=mutate
+    )
+    atheris.Fuzz()
+
+
+def _write_corpus(fuzzing, reader: str, folder: Path) -> None:
+    """Two bytes before each file choose its ending and the options; they mutate as well."""
+    if any((folder / "corpus").iterdir()):
+        return
+    (folder / "seeds").mkdir()
+    endings = [Path(name).suffix for name in fuzzing.NAMES]
+    for number, (name, data) in enumerate(fuzzing.seeds(reader, folder / "seeds")):
+        suffix = Path(name).suffix
+        place = endings.index(suffix) if suffix in endings else 0
+        (folder / "corpus" / f"seed_{number}").write_bytes(bytes([place, 0]) + data)
+
+
+class _Execution:
+    """What is done with each input."""
+
+    def __init__(self, fuzzing, reader: str, out: Path, folder: Path) -> None:
+        self.fuzzing, self.reader, self.out, self.folder = fuzzing, reader, out, folder
+        with open(folder / "count", "r+b") as file:
+            self.counter = mmap.mmap(file.fileno(), COUNTER.size)
+        self.printed = tempfile.TemporaryFile()  # noqa: SIM115
+        self.count, self.peak = 0, _peak()
+
+    def __call__(self, data: bytes) -> None:
+        fuzzing = self.fuzzing
+        self.count += 1
+        self.counter[:] = COUNTER.pack(self.count)
+        if len(data) < 2:
+            return
+        name = fuzzing.NAMES[data[0] % len(fuzzing.NAMES)]
+        # a name of its own, since decompressed copies are kept by name, time and size
+        path = self.folder / name.replace("f_1", f"f_{self.count % 1000}")
+        path.write_bytes(data[2:])
+        options = fuzzing.OPTIONS[data[1] % len(fuzzing.OPTIONS)]
+        began = time.monotonic()
+        silence = _Silence(self.printed)
+        try:
+            with silence:
+                fuzzing.read_everything(path, self.reader, options)
+        except (Exception, SystemExit) as error:
+            _keep(self.out, data, path.suffix, error)
+        finally:
+            path.unlink()
+        self._check(data, path.suffix, time.monotonic() - began, silence.said)
+
+    def _check(self, data: bytes, suffix: str, seconds: float, said: bytes) -> None:
+        """Nothing printed, not slow, and no memory: libFuzzer asks for it once a second only."""
+        more = _peak() - self.peak
+        problems = {
+            f"printed: {said[:200]!r}": bool(said),
+            f"slow: {seconds:.0f} s": seconds > SECONDS / 2,
+            f"memory: {more} MB": more > MEGABYTES,
+        }
+        for problem, is_there in problems.items():
+            if is_there:
+                _keep(self.out, data, suffix, self.fuzzing.ForbiddenError(problem))
+        if more > MEGABYTES:
+            os._exit(1)  # the peak never falls
+
+
+def _peak() -> int:
+    """The most memory that the process ever asked for, touched or not, in MB."""
+    with open("/proc/self/status") as status:
+        line = next(line for line in status if line.startswith("VmPeak"))
+    return int(line.split()[1]) >> 10
+
+
+def _keep(out: Path, data: bytes, suffix: str, error: BaseException) -> None:
+    """The input and the traceback, unless there are enough of that kind."""
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [frame for frame in frames if "/scanfab/" in frame.filename]
+    place = f"{Path(own[-1].filename).stem}_{own[-1].lineno}" if own else ""
+    if not own:
+        # what was printed or warned of: numbers and names in the message differ
+        words = str(error).replace("_", " ").split()
+        place = "_".join("".join(filter(str.isalpha, word)) for word in words[:5])
+    kind = f"{type(error).__name__}_{place}"
+    if len(list(out.glob(f"{kind}-*{suffix}"))) >= KEPT_OF_A_KIND:
+        return
+    target = out / f"{kind}-{hashlib.sha1(data).hexdigest()[:8]}{suffix}"
+    target.write_bytes(data[2:])
+    text = "".join(traceback.format_exception(error))
+    target.with_name(target.name + ".report").write_text(
+        f"options {data[1] % 8}, ending {suffix}\n{text}"
+    )
+
+
+class _Silence:
+    """Keeps what is printed, by Python or C++, for one execution."""
+
+    def __init__(self, file) -> None:
+        self.file, self.said = file.fileno(), b""
+
+    def __enter__(self) -> _Silence:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        self.kept = os.dup(1), os.dup(2)
+        os.dup2(self.file, 1)
+        os.dup2(self.file, 2)
+        return self
+
+    def __exit__(self, *_) -> None:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        for number, kept in zip((1, 2), self.kept, strict=True):
+            os.dup2(kept, number)
+            os.close(kept)
+        size = os.lseek(self.file, 0, os.SEEK_CUR)
+        if size:
+            self.said = os.pread(self.file, size, 0)
+            os.ftruncate(self.file, 0)
+            os.lseek(self.file, 0, os.SEEK_SET)
+
+
+if __name__ == "__main__":
+    main()

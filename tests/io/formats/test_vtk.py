@@ -1,0 +1,367 @@
+"""VTK files of any origin: clouds with a radius, lines between centres, and what is refused."""
+
+from __future__ import annotations
+
+import meshio
+import numpy as np
+import pytest
+import pyvista
+
+import scanfab
+from scanfab.base.errors import ReadError
+from scanfab.io.formats.liggghts import LiggghtsReader
+from scanfab.io.formats.vtk import VtkReader
+from scanfab.io.parse.vtk_mesh import read_mesh
+from scanfab.io.reader import GrainTable, ReadOptions, Snapshot
+from tests.helpers.dumps import write, yade_spheres
+from tests.helpers.truth import FLOOR, YADE
+
+POSITION = np.array([[0.0, 0, 0], [1.9, 0, 0], [3.8, 0, 0.25], [5.6, 0.5, 0]])
+RADIUS = np.array([1.0, 1.0, 1.1, 0.9])
+LINES = np.array([[0, 1], [1, 2], [2, 3]])
+
+
+def polydata(path, binary=False, **arrays):
+    cloud = pyvista.PolyData(POSITION)
+    for name, values in arrays.items():
+        cloud[name] = values
+    cloud.save(path, binary=binary)
+    return path
+
+
+def grid(path, file_format=None, **arrays):
+    cells = [("vertex", np.arange(len(POSITION))[:, None])]
+    meshio.Mesh(POSITION, cells, point_data=arrays).write(path, file_format=file_format)
+    return path
+
+
+def vtk_grid(path, binary=False, **arrays):
+    cloud = pyvista.PolyData(POSITION).cast_to_unstructured_grid()
+    for name, values in arrays.items():
+        cloud.point_data[name] = values
+    cloud.save(path, binary=binary)
+    return path
+
+
+def lines_of_points(path, **arrays):
+    flat = np.column_stack([np.full(len(LINES), 2), LINES]).ravel()
+    mesh = pyvista.PolyData(POSITION, lines=flat)
+    for name, values in arrays.items():
+        mesh.cell_data[name] = values
+    mesh.save(path, binary=False)
+    return path
+
+
+WRITERS = {
+    "legacy ASCII POLYDATA": ("a.vtk", polydata, {}),
+    "legacy BINARY POLYDATA": ("a.vtk", polydata, {"binary": True}),
+    "legacy ASCII UNSTRUCTURED_GRID": ("a.vtk", vtk_grid, {}),
+    "legacy BINARY UNSTRUCTURED_GRID": ("a.vtk", vtk_grid, {"binary": True}),
+    "old legacy ASCII": ("a.vtk", grid, {"file_format": "vtk42"}),
+    "new legacy BINARY": ("a.vtk", grid, {"file_format": "vtk51"}),
+    "ASCII .vtp": ("a.vtp", polydata, {}),
+    "binary .vtp": ("a.vtp", polydata, {"binary": True}),
+    "ASCII .vtu": ("a.vtu", vtk_grid, {}),
+    "binary .vtu": ("a.vtu", vtk_grid, {"binary": True}),
+    "meshio's .vtu": ("a.vtu", grid, {}),
+    "meshio's .xdmf": ("a.xdmf", grid, {}),
+}
+
+
+@pytest.mark.parametrize("form", WRITERS)
+def test_every_form_holds_the_same_grains(tmp_path, form):
+    name, writer, options = WRITERS[form]
+    type = np.array([1, 2, 1, 2])
+    packing = scanfab.read(writer(tmp_path / name, radius=RADIUS, type=type, **options))
+    np.testing.assert_allclose(packing.position, POSITION, atol=1e-6)
+    np.testing.assert_allclose(packing.radius, RADIUS, rtol=1e-7)
+    np.testing.assert_array_equal(packing.columns["type"], type)
+
+
+@pytest.mark.parametrize(
+    "name", ["radius", "radii", "Radius", "RADIUS", "rad", "r", "diameter", "Diameter"]
+)
+@pytest.mark.parametrize("writer", [polydata, grid])
+def test_a_radius_has_many_names(tmp_path, writer, name):
+    values = 2 * RADIUS if "iameter" in name else RADIUS
+    path = writer(tmp_path / "a.vtu" if writer is grid else tmp_path / "a.vtp", **{name: values})
+    assert VtkReader().kind(path) == "grains"
+    np.testing.assert_allclose(scanfab.read(path).radius, RADIUS)
+
+
+def test_points_without_a_radius_are_points(tmp_path):
+    path = polydata(tmp_path / "a.vtp", mass=RADIUS)
+    assert VtkReader().kind(path) == "points"
+    with pytest.raises(ReadError, match=r"no radius.*found mass.*--columns radius=.*--radius"):
+        scanfab.read(path)
+
+
+def test_points_take_the_users_radius_or_column(tmp_path):
+    path = polydata(tmp_path / "a.vtp", size=RADIUS)
+    np.testing.assert_allclose(scanfab.read(path, columns={"radius": "size"}).radius, RADIUS)
+    np.testing.assert_array_equal(scanfab.read(path, radius=0.5).radius, [0.5] * 4)
+
+
+def test_ids_are_those_of_the_file(tmp_path):
+    path = polydata(tmp_path / "a.vtp", radius=RADIUS, Id=np.array([7.0, 3, 9, 1000001]))
+    np.testing.assert_array_equal(scanfab.read(path).id, [7, 3, 9, 1000001])
+
+
+def test_arrays_of_vertex_cells_are_arrays_of_grains(tmp_path):
+    cells = [("vertex", np.arange(4)[:, None])]
+    mesh = meshio.Mesh(POSITION, cells, cell_data={"radius": [RADIUS]})
+    mesh.write(tmp_path / "a.vtu")
+    np.testing.assert_allclose(scanfab.read(tmp_path / "a.vtu").radius, RADIUS)
+
+
+def test_vectors_stay_vectors(tmp_path):
+    path = polydata(tmp_path / "a.vtp", radius=RADIUS, v=POSITION)
+    assert scanfab.read(path).columns["v"].shape == (4, 3)
+
+
+def test_flat_points_get_a_third_coordinate(tmp_path):
+    cells = [("vertex", np.arange(4)[:, None])]
+    mesh = meshio.Mesh(POSITION[:, :2], cells, point_data={"radius": RADIUS})
+    mesh.write(tmp_path / "a.xdmf")
+    np.testing.assert_array_equal(scanfab.read(tmp_path / "a.xdmf").position[:, 2], 0)
+
+
+@pytest.mark.parametrize("ending", [".vtp", ".vtk"])
+def test_lines_between_centres_are_contacts(tmp_path, ending):
+    spheres = polydata(tmp_path / "spheres.vtp", radius=RADIUS)
+    contacts = lines_of_points(tmp_path / f"lines{ending}")
+    packing = scanfab.read(spheres, contacts=contacts)
+    np.testing.assert_array_equal(packing.contacts.pairs, LINES)
+    assert packing.contacts.force is None
+
+
+def test_line_cells_of_a_grid_are_contacts(tmp_path):
+    spheres = grid(tmp_path / "spheres.vtu", radius=RADIUS)
+    for name in ("lines.vtu", "lines.vtk", "lines.xdmf"):
+        meshio.Mesh(POSITION, [("line", LINES)]).write(tmp_path / name)
+        packing = scanfab.read(spheres, contacts=tmp_path / name)
+        np.testing.assert_array_equal(packing.contacts.pairs, LINES)
+
+
+def test_lines_with_ids_name_grains_by_id(tmp_path):
+    ids = np.array([40, 10, 30, 20])
+    spheres = polydata(tmp_path / "spheres.vtp", radius=RADIUS, id=ids)
+    first, second = ids[LINES].T.astype(float)
+    contacts = lines_of_points(tmp_path / "lines.vtp", id1=second, id2=first)
+    packing = scanfab.read(spheres, contacts=contacts)
+    np.testing.assert_array_equal(packing.contacts.pairs, LINES[:, ::-1])
+
+
+def test_a_longer_line_joins_its_ends(tmp_path):
+    spheres = polydata(tmp_path / "spheres.vtp", radius=RADIUS)
+    middle = 0.5 * (POSITION[0] + POSITION[1])
+    mesh = pyvista.PolyData(np.vstack([POSITION, middle]), lines=np.array([3, 0, 4, 1, 2, 1, 2]))
+    mesh.save(tmp_path / "lines.vtp")
+    packing = scanfab.read(spheres, contacts=tmp_path / "lines.vtp")
+    np.testing.assert_array_equal(packing.contacts.pairs, [[0, 1], [1, 2]])
+
+
+def test_arrays_of_vertices_do_not_shift_those_of_lines(tmp_path):
+    mesh = pyvista.PolyData(
+        POSITION,
+        verts=np.column_stack([np.ones(4, int), np.arange(4)]).ravel(),
+        lines=np.array([2, 0, 1, 2, 1, 2]),
+    )
+    mesh.cell_data["kn"] = np.arange(6.0)
+    mesh.save(tmp_path / "both.vtp")
+    np.testing.assert_array_equal(read_mesh(tmp_path / "both.vtp").line_arrays["kn"], [4, 5])
+
+
+@pytest.mark.parametrize("name", ["a.vtk", "a.vtp", "a.stl"])
+def test_a_mesh_of_triangles_is_a_wall(tmp_path, name):
+    pyvista.Plane().triangulate().save(tmp_path / name)
+    with pytest.raises(ReadError, match=r"no grains|no reader knows"):
+        scanfab.read(tmp_path / name)
+
+
+def test_a_wall_with_an_array_called_radius_is_still_a_wall(tmp_path):
+    plane = pyvista.Plane().triangulate()
+    plane["radius"] = np.ones(plane.n_points)
+    plane.save(tmp_path / "wall.vtp")
+    assert VtkReader().kind(tmp_path / "wall.vtp") == "other"
+
+
+def test_image_data_is_neither_grains_nor_contacts(tmp_path):
+    pyvista.ImageData(dimensions=(3, 3, 3)).save(tmp_path / "a.vti")
+    assert VtkReader().kind(tmp_path / "a.vti") == "other"
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "STRUCTURED_POINTS\nDIMENSIONS 2 2 2\nORIGIN 0 0 0\nSPACING 1 1 1\n",
+        "RECTILINEAR_GRID\nDIMENSIONS 2 2 2\nX_COORDINATES 2 double\n0 1\n"
+        "Y_COORDINATES 2 double\n0 1\nZ_COORDINATES 2 double\n0 1\n",
+    ],
+)
+def test_legacy_grids_are_neither_grains_nor_contacts(tmp_path, head):
+    path = write(tmp_path / "a.vtk", f"# vtk DataFile Version 3.0\nbox\nASCII\nDATASET {head}")
+    assert VtkReader().kind(path) == "other"
+
+
+@pytest.mark.parametrize("name", ["all_30000.vtm", "liggghts_simulation.pvd"])
+def test_an_index_of_other_files_beside_the_grains_is_passed_over(tmp_path, name):
+    (tmp_path / name).write_bytes((FLOOR / "vtm" / name).read_bytes())
+    polydata(tmp_path / "grains_30000.vtp", radius=RADIUS)
+    with pytest.warns(scanfab.ScanfabNote, match="passed over"):
+        (frame,) = scanfab.read_series(tmp_path)
+    assert len(frame.read()) == 4
+
+
+def test_an_empty_legacy_frame_has_no_grains(tmp_path, capfd):
+    text = (
+        "# vtk DataFile Version 3.0\nframe\nASCII\nDATASET POLYDATA\nPOINTS 0 float\n"
+        "VERTICES 0 0\nPOINT_DATA 0\nSCALARS radius float 1\nLOOKUP_TABLE default\n"
+    )
+    path = write(tmp_path / "a.vtk", text)
+    assert VtkReader().kind(path) == "grains"
+    assert len(scanfab.read(path)) == 0
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("ending", [".vtp", ".vtu"])
+def test_an_empty_xml_frame_has_no_grains(tmp_path, ending, capfd):
+    root, piece = (
+        ("PolyData", 'NumberOfPoints="0" NumberOfVerts="0" NumberOfLines="0" NumberOfPolys="0"')
+        if ending == ".vtp"
+        else ("UnstructuredGrid", 'NumberOfPoints="0" NumberOfCells="0"')
+    )
+    text = (
+        f'<VTKFile type="{root}" version="0.1" byte_order="LittleEndian"><{root}><Piece {piece}>'
+        '<PointData><DataArray type="Float64" Name="radius" format="ascii"></DataArray></PointData>'
+        '<Points><DataArray type="Float64" NumberOfComponents="3" format="ascii"></DataArray>'
+        "</Points>"
+        '<Cells><DataArray type="Int32" Name="connectivity" format="ascii"></DataArray>'
+        '<DataArray type="Int32" Name="offsets" format="ascii"></DataArray>'
+        '<DataArray type="UInt8" Name="types" format="ascii"></DataArray></Cells>'
+        f"</Piece></{root}></VTKFile>"
+    )
+    assert len(scanfab.read(write(tmp_path / f"a{ending}", text))) == 0
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_grid_of_points_without_cells_is_a_cloud(tmp_path, capfd):
+    text = (
+        '<VTKFile type="UnstructuredGrid" version="0.1" byte_order="LittleEndian">'
+        '<UnstructuredGrid><Piece NumberOfPoints="2" NumberOfCells="0"><Points>'
+        '<DataArray type="Float32" Name="Position" NumberOfComponents="3" format="ascii">'
+        "0 0 0 1 0 0</DataArray></Points><PointData>"
+        '<DataArray type="Float32" Name="Radius" format="ascii">0.5 0.5</DataArray></PointData>'
+        '<Cells><DataArray type="Int32" Name="connectivity" format="ascii"></DataArray>'
+        '<DataArray type="Int32" Name="offsets" format="ascii"></DataArray>'
+        '<DataArray type="UInt8" Name="types" format="ascii"></DataArray></Cells>'
+        "</Piece></UnstructuredGrid></VTKFile>"
+    )
+    packing = scanfab.read(write(tmp_path / "a.vtu", text))
+    np.testing.assert_array_equal(packing.radius, [0.5, 0.5])
+    assert capfd.readouterr() == ("", "")
+
+
+SOURCES = {
+    "legacy POLYDATA": YADE / "periodic-spheres-00000000.vtk.gz",
+    "legacy grid": YADE / "periodic-periCell-00000001.vtk",
+    "ASCII .vtp": FLOOR / "grains_30000.vtp",
+    "binary .vtp": FLOOR / "grains_binary_30000.vtp",
+    "legacy BINARY": FLOOR / "grains_binary_30000.vtk",
+    "ASCII .vtu": FLOOR / "grains_30000.vtu",
+    "zlib .vtu": YADE / "zlib_spheres.30000.vtu",
+}
+
+
+@pytest.mark.parametrize("form", SOURCES)
+@pytest.mark.parametrize("keep", [0.2, 0.5, 0.8])
+def test_a_file_cut_off_is_an_error_that_prints_nothing(tmp_path, form, keep, capfd):
+    from scanfab.io.files import plain
+
+    source = SOURCES[form]
+    data = plain(source).read_bytes()
+    path = tmp_path / source.name.removesuffix(".gz")
+    path.write_bytes(data[: int(keep * len(data))])
+    with pytest.raises(ReadError, match=path.name):
+        scanfab.read(path)
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("array", ["radius", "id", "mask"])
+@pytest.mark.parametrize("behind", [100, 101, 1000, 1003])
+def test_an_array_cut_off_is_not_filled_with_what_memory_holds(tmp_path, array, behind):
+    count = 400
+    values = np.full(count, 0.25)
+    path = yade_spheres(
+        tmp_path / "a.vtk", np.eye(3)[np.arange(count) % 3], values, id=range(count), mask=values
+    )
+    data = path.read_bytes()
+    path.write_bytes(data[: data.find(f"SCALARS {array}".encode()) + behind])
+    with pytest.raises(ReadError, match=r"a\.vtk"):
+        read_mesh(path)
+
+
+def nonsense(path, dataset="POLYDATA"):
+    return write(path, f"# vtk DataFile Version 3.0\nx\nASCII\nDATASET {dataset}\nnot at all\n")
+
+
+@pytest.mark.parametrize("dataset", ["POLYDATA", "UNSTRUCTURED_GRID", "NONSENSE"])
+def test_nonsense_behind_the_header_is_an_error_that_prints_nothing(tmp_path, dataset, capfd):
+    with pytest.raises(ReadError, match=r"a\.vtk"):
+        scanfab.read(nonsense(tmp_path / "a.vtk", dataset))
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("type", ["UnstructuredGrid", "PolyData", "Hyperoctree"])
+def test_xml_without_content_is_an_error_that_prints_nothing(tmp_path, type, capfd):
+    path = write(tmp_path / "a.vtu", f'<?xml version="1.0"?>\n<VTKFile type="{type}"></VTKFile>\n')
+    with pytest.raises(ReadError, match=r"a\.vtu"):
+        scanfab.read(path)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_meshio_does_not_end_the_program(tmp_path, capfd):
+    path = write(tmp_path / "a.xdmf", '<?xml version="1.0"?>\n<Xdmf Version="1.0"></Xdmf>\n')
+    with pytest.raises(ReadError, match="meshio"):
+        scanfab.read(path)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_an_exit_of_meshio_becomes_an_error(tmp_path, monkeypatch, capfd):
+    def stop(*_):
+        print("Error: cannot read")
+        raise SystemExit(1)
+
+    monkeypatch.setattr(meshio.xdmf, "read", stop)
+    path = grid(tmp_path / "a.xdmf", radius=RADIUS)
+    with pytest.raises(ReadError, match="cannot be read as VTK"):
+        read_mesh(path)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_file_that_is_no_vtk_is_refused(tmp_path):
+    with pytest.raises(ReadError, match="expected a VTK file, found something else"):
+        read_mesh(write(tmp_path / "a.vtk", "hello"))
+
+
+def test_vtk_is_loud_again_afterwards(tmp_path):
+    from vtkmodules.vtkCommonCore import vtkLogger
+
+    before = vtkLogger.GetCurrentVerbosityCutoff()
+    read_mesh(polydata(tmp_path / "a.vtp", radius=RADIUS))
+    assert vtkLogger.GetCurrentVerbosityCutoff() == before
+
+
+def test_which_grain_a_force_acts_on_is_not_guessed(tmp_path):
+    contacts = lines_of_points(tmp_path / "lines.vtp", force=np.ones((3, 3)))
+    grains = GrainTable(POSITION, RADIUS, None, {}, None)
+    joined = VtkReader().read_contacts(Snapshot(contacts), ReadOptions(), grains)
+    assert joined.contacts.force is None
+
+
+def test_the_box_beside_a_dump_is_told(tmp_path):
+    grains, box = tmp_path / "dump_100.vtk", tmp_path / "dump_boundingBox_100.vtk"
+    reader = VtkReader()
+    assert reader.beside(grains) == []
+    box.write_text("")
+    assert reader.beside(grains) == LiggghtsReader().beside(grains) == [box]

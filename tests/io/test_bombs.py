@@ -1,0 +1,197 @@
+"""Files of kilobytes that unpack to gigabytes: refused by what they hold, long before the end."""
+
+from __future__ import annotations
+
+import base64
+import bz2
+import gzip
+import io
+import struct
+import sys
+import tempfile
+import zlib
+from pathlib import Path
+from shutil import disk_usage
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab.base.errors import ReadError
+from scanfab.io import files
+from scanfab.io.formats import yade_save
+from scanfab.io.parse import text_dump as dump
+from scanfab.io.parse.vtk_flaws import FlawError
+from scanfab.io.parse.vtk_xml import check_xml
+from tests.helpers.dumps import dump_text, write
+
+BLOCK = 1 << 20
+ZEROS = zlib.compress(bytes(BLOCK))
+HEAD = b'<boost_serialization signature="serialization::archive"><scene><px>'
+
+
+def packed(data: bytes = b"", zeros: int = 0) -> str:
+    """An array in blocks, as VTK packs it: some data, or so many blocks of zeros."""
+    blocks = [ZEROS] * zeros or [zlib.compress(data)]
+    size = BLOCK if zeros else len(data)
+    sizes = struct.pack(f"<{3 + len(blocks)}Q", len(blocks), size, 0, *map(len, blocks))
+    return base64.b64encode(sizes).decode() + base64.b64encode(b"".join(blocks)).decode()
+
+
+def polydata(count: int, points: str, *arrays: str, lines: int = 0) -> bytes:
+    return (
+        '<VTKFile type="PolyData" byte_order="LittleEndian" header_type="UInt64" '
+        'compressor="vtkZLibDataCompressor"><PolyData>'
+        f'<Piece NumberOfPoints="{count}" NumberOfLines="{lines}"><PointData>{"".join(arrays)}'
+        f"</PointData><Points>{array('Points', points, 3)}</Points></Piece></PolyData></VTKFile>"
+    ).encode()
+
+
+def array(name: str, content: str, components: int = 1) -> str:
+    return (
+        f'<DataArray type="Float64" Name="{name}" NumberOfComponents="{components}" '
+        f'format="binary">{content}</DataArray>'
+    )
+
+
+def some_points(count: int) -> str:
+    return packed(np.random.default_rng(0).uniform(size=3 * count).tobytes())
+
+
+def test_an_array_that_is_longer_than_the_points_is_refused():
+    data = polydata(100, some_points(100), array("radius", packed(zeros=600)))
+    with pytest.raises(FlawError, match="radius has 78643200 values instead of 100"):
+        check_xml(data)
+
+
+def test_a_point_cannot_have_a_million_values():
+    wide = array("a", packed(zeros=600), 600 * BLOCK // 800)
+    with pytest.raises(FlawError, match="a has 78643200 values, which no points have"):
+        check_xml(polydata(100, some_points(100), wide))
+
+
+def test_points_cannot_all_be_alike():
+    data = polydata(24 * BLOCK // 24, packed(zeros=24))
+    with pytest.raises(FlawError, match=r"1048576 points in 24.* bytes cannot differ"):
+        check_xml(data)
+
+
+def test_there_are_not_a_thousand_lines_for_each_point():
+    with pytest.raises(FlawError, match="NumberOfLines cannot be 100000000 with 30000 points"):
+        check_xml(polydata(30_000, some_points(30_000), lines=100_000_000))
+
+
+def test_an_array_of_one_value_is_no_bomb():
+    """All grains of one radius: a thousand bytes in one."""
+    count = 3 * BLOCK
+    radii = array("radius", packed(zeros=24))
+    lattice = np.stack(np.meshgrid(np.arange(128.0), np.arange(128.0), np.arange(192.0)), -1)
+    assert check_xml(polydata(count, packed(lattice.tobytes()), radii)) == 4 * 8 * count
+
+
+def test_what_does_not_fit_into_memory_is_told(tmp_path, monkeypatch):
+    monkeypatch.setattr(files, "free_memory", lambda: 1_000_000)
+    path = tmp_path / "a.vtp"
+    path.write_bytes(polydata(100_000, some_points(100_000)))
+    with pytest.raises(ReadError, match=r"needs about 0.0 GB of memory .*and 0.0 GB are free"):
+        scanfab.read(path)
+
+
+@pytest.mark.parametrize(
+    ("start", "unit", "told"),
+    [
+        (HEAD, b"<a/>", "no body and no contact in"),
+        (HEAD, b"<a>", "elements stand in one another"),
+        (HEAD + b"<a>", b"x", "no body and no contact in"),
+        (HEAD + b'<a b="', b"x", "no body and no contact in"),
+        (HEAD + b"<item><px>", b"<a/>", "no body and no contact in"),
+    ],
+)
+def test_endless_xml_is_left_early(tmp_path, monkeypatch, start, unit, told):
+    monkeypatch.setattr(yade_save, "BARREN", 8)
+    monkeypatch.setattr(yade_save, "BARREN_PART", 2)
+    path = tmp_path / "save.xml.bz2"
+    # streams one behind the other are one file
+    path.write_bytes(bz2.compress(start) + 1000 * bz2.compress(unit * (BLOCK // len(unit))))
+    with pytest.raises(ReadError, match=f"as a simulation that YADE saved .*{told}"):
+        scanfab.read(path)
+
+
+def test_elements_that_are_not_looked_at_are_let_go():
+    scene = yade_save._Scene(Path("save.xml"))
+    above: list[int] = []
+
+    def counted(tags, element):
+        above.append(sum(len(one) for one in tags))
+
+    scene._take = counted  # type: ignore[method-assign]
+    text = HEAD + b"<a><b/></a>" * 50_000 + b"</px></scene></boost_serialization>"
+    list(scene._pieces(io.BytesIO(text)))
+    assert len(above) > 100_000
+    # no more than those of a piece of the file
+    assert max(above) < 7_000
+
+
+def test_far_more_text_than_rows_is_not_read(tmp_path, monkeypatch):
+    monkeypatch.setattr(dump, "MUCH_TEXT", 10_000)
+    text = dump_text() + " " * 20_000 + "\n"
+    path = tmp_path / "dump.gz"
+    path.write_bytes(gzip.compress(text.encode()))
+    with pytest.raises(ReadError, match=r"the header counts \d+ rows, but 20,\d+ bytes follow"):
+        scanfab.read(path)
+
+
+def test_a_copy_does_not_fill_the_disk(tmp_path, monkeypatch):
+    path = tmp_path / "dump.gz"
+    path.write_bytes(gzip.compress(bytes(files.SMALL + files.PART)))
+    usage = disk_usage(tmp_path)
+    monkeypatch.setattr(
+        files.shutil, "disk_usage", lambda _: usage._replace(free=files.PART, total=1 << 40)
+    )
+    with pytest.raises(ReadError, match=r"its content fills the disk of .* by TMPDIR"):
+        files.plain(path)
+    # what is small is read on a disk that is nearly full, as it always was
+    path.write_bytes(gzip.compress(bytes(files.PART)))
+    assert files.plain(path).stat().st_size == files.PART
+
+
+def test_a_folder_for_copies_that_cannot_be_used_is_named(tmp_path, monkeypatch):
+    path = tmp_path / "dump.gz"
+    path.write_bytes(gzip.compress(dump_text().encode()))
+    gone = tmp_path / "gone"
+    monkeypatch.setattr(tempfile, "tempdir", str(gone))
+    told = rf"^dump: its content cannot be written to {gone}: No such file .* by TMPDIR"
+    monkeypatch.setattr(files, "_folder", [])
+    with pytest.raises(ReadError, match=told):
+        files.plain(path)
+    # made by this process, and removed by someone else since
+    monkeypatch.setattr(files, "_folder", [str(gone / "scanfab-1")])
+    with pytest.raises(ReadError, match=told):
+        files.plain(path)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of a process are POSIX")
+def test_bytes_that_do_not_fit_at_the_end_of_a_copy_are_of_the_copy(tmp_path):
+    """A small copy reaches the disk only when it is flushed."""
+    from tests.cli.test_full_disk import files_up_to
+
+    path = tmp_path / "dump.gz"
+    path.write_bytes(gzip.compress(b"x" * 4000))
+    with (
+        files_up_to(1000),
+        pytest.raises(ReadError, match=r"^dump: its content cannot be written to .*File too"),
+    ):
+        files.plain(path)
+
+
+def test_a_full_disk_of_temporary_files_is_named(tmp_path, monkeypatch):
+    path = write(tmp_path / "dump", dump_text())
+    packed_path = tmp_path / "dump.gz"
+    packed_path.write_bytes(gzip.compress(path.read_bytes()))
+
+    class Full:
+        def write(self, _):
+            raise OSError(28, "No space left on device")
+
+    with pytest.raises(ReadError, match=r"dump: its content cannot be written to .*: No space"):
+        files._write(Path("dump"), Full(), b"x")

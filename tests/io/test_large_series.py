@@ -1,0 +1,75 @@
+"""Series of very many frames: a frame is read when its turn comes, and none is kept."""
+
+from __future__ import annotations
+
+import time
+import weakref
+
+import pytest
+
+import scanfab
+from scanfab.io import series as series_module
+from scanfab.pipeline import compute_rows
+from scanfab.settings import Settings
+from tests.helpers.dumps import cubic_rows, dump_text, write
+
+SCAN = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin", "variants": "a"}
+FRAMES = 12
+
+
+@pytest.fixture
+def series(tmp_path):
+    for frame in range(FRAMES):
+        text = dump_text(cubic_rows(squeeze=1 - 0.01 * frame), step=frame)
+        write(tmp_path / f"dump_{frame}.txt", text)
+    return scanfab.read_series(tmp_path)
+
+
+@pytest.fixture
+def packings(monkeypatch):
+    """Weak references to the packings that frames were read into."""
+    found = []
+
+    class Watched(scanfab.Packing):
+        def __init__(self, *words, **named):
+            super().__init__(*words, **named)
+            found.append(weakref.ref(self))
+
+    monkeypatch.setattr(series_module, "Packing", Watched)
+    return found
+
+
+def alive(packings):
+    return sum(reference() is not None for reference in packings)
+
+
+def test_ten_thousand_files_open_within_seconds(tmp_path):
+    text = dump_text()
+    for step in range(10_000):
+        write(tmp_path / f"dump_{step}.txt", text)
+    start = time.perf_counter()
+    packing = next(iter(scanfab.read_series(tmp_path))).read()
+    assert time.perf_counter() - start < 4
+    assert len(packing) == 3
+
+
+def test_a_frame_is_read_when_its_turn_comes(series, packings):
+    rows = compute_rows(series, Settings.make(workers=1, **SCAN))
+    assert next(rows).frame == 0
+    assert len(packings) <= 2
+    assert [row.frame for row in rows] == list(range(1, FRAMES))
+
+
+@pytest.mark.parametrize("workers", [1, 2, 3])
+def test_memory_holds_one_frame_a_worker(series, packings, workers):
+    # one more for each row that is taken while the next frame is read
+    most = max(
+        alive(packings) for _ in compute_rows(series, Settings.make(workers=workers, **SCAN))
+    )
+    assert len(packings) == FRAMES
+    assert most <= workers + 2
+
+
+def test_frames_in_parallel_give_the_same_rows(series):
+    tables = [scanfab.compute(series, workers=workers, **SCAN).rows for workers in (1, 2, 3, 16)]
+    assert all(table == tables[0] for table in tables)

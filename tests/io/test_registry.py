@@ -1,0 +1,178 @@
+"""Readers found through entry points: broken plugins, clashes, and foreign plugins at work."""
+
+from __future__ import annotations
+
+from importlib.metadata import EntryPoint
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab.base.errors import ReadError, ScanfabWarning, UnknownFormatError
+from scanfab.io import registry
+from scanfab.io.reader import GrainTable, JoinedContacts, Snapshot
+from scanfab.io.registry import load_readers, reader_for, reader_named
+from scanfab.packing.packing import ContactList
+from tests.helpers.dumps import dump_text, write
+from tests.helpers.truth import FLOOR, YADE
+
+
+class NumbersReader:
+    """A foreign plugin: a first line that names the kind, then numbers."""
+
+    name = "numbers"
+    description = "numbers in rows"
+    extensions = (".numbers",)
+
+    def recognises(self, path):
+        return path.read_bytes().startswith(b"numbers of ")
+
+    def kind(self, path):
+        return path.read_text().split()[2]
+
+    def snapshots(self, path):
+        return [Snapshot(path)]
+
+    def read_grains(self, snapshot, options):
+        values = self._values(snapshot)
+        return GrainTable(values[:, :3], values[:, 3], None, {}, None)
+
+    def read_contacts(self, snapshot, options, grains):
+        pairs = self._values(snapshot)[:, :2].astype(int)
+        return JoinedContacts(ContactList(pairs), np.zeros(len(grains.radius), int))
+
+    def _values(self, snapshot):
+        try:
+            return np.loadtxt(snapshot.path, skiprows=1, ndmin=2)
+        except ValueError as error:
+            raise ReadError(f"{snapshot.path}: {error}") from None
+
+
+class FailingReader:
+    """A plugin that cannot be made."""
+
+    def __init__(self):
+        raise RuntimeError("needs a licence")
+
+
+class Point:
+    """An entry point of an installed package, without the package."""
+
+    def __init__(self, name, load, package="some-package"):
+        self.name, self.value, self.load = name, name, load
+        self.dist = SimpleNamespace(name=package) if package else None
+
+
+@pytest.fixture
+def with_plugin(monkeypatch):
+    """The built-in readers, and a foreign one."""
+    built_in = dict(registry.installed_readers())
+    foreign = load_readers([Point("numbers", lambda: NumbersReader)])
+    monkeypatch.setattr(registry, "installed_readers", lambda: {**built_in, **foreign})
+
+
+def test_the_built_in_readers_are_installed_like_any_other():
+    installed = registry.installed_readers()
+    assert {"liggghts", "vtk", "yade"} <= set(installed)
+    for name, one in installed.items():
+        assert one.reader.name == name
+        assert one.reader.description
+        assert all(ending.startswith(".") for ending in one.reader.extensions)
+    assert installed["yade"].package == "scanfab"
+
+
+def test_a_plugin_that_cannot_be_made_is_one_warning_with_its_name():
+    points = [Point("broken", lambda: FailingReader), Point("numbers", lambda: NumbersReader)]
+    with pytest.warns(ScanfabWarning, match="'broken' of some-package .*RuntimeError: needs a lic"):
+        found = load_readers(points)
+    assert list(found) == ["numbers"]
+
+
+def test_a_plugin_that_cannot_be_imported_is_one_warning_with_its_name():
+    missing = EntryPoint("absent", "a_module_that_is_not_there:Reader", registry.GROUP)
+    with pytest.warns(
+        ScanfabWarning, match="'absent' of unknown package .*ModuleNotFoundError"
+    ) as seen:
+        assert load_readers([missing]) == {}
+    assert len(seen) == 1
+
+
+def test_two_packages_with_one_name_are_an_error_that_names_both():
+    points = [
+        Point("numbers", lambda: NumbersReader, "one"),
+        Point("numbers", lambda: NumbersReader, "two"),
+    ]
+    with pytest.raises(UnknownFormatError, match="'numbers': one and two; remove one of them"):
+        load_readers(points)
+
+
+def test_a_broken_plugin_does_not_clash():
+    points = [
+        Point("numbers", lambda: NumbersReader, "one"),
+        Point("numbers", lambda: FailingReader, "two"),
+    ]
+    with pytest.warns(ScanfabWarning, match="of two cannot be loaded"):
+        assert load_readers(points)["numbers"].package == "one"
+
+
+def test_a_plugin_without_a_package_is_loaded():
+    found = load_readers([Point("numbers", lambda: NumbersReader, None)])
+    assert found["numbers"].package == "unknown package"
+
+
+@pytest.mark.usefixtures("with_plugin")
+def test_a_foreign_plugin_reads_a_series_like_the_built_in_ones(tmp_path):
+    for step in (9, 10):
+        write(tmp_path / f"g_{step}.dat", f"numbers of grains\n0 0 0 1\n1.9 0 0 1\n0 0 {step} 1\n")
+        write(tmp_path / f"c_{step}.dat", "numbers of contacts\n0 1\n")
+    frames = [frame.read() for frame in scanfab.read_series(tmp_path)]
+    assert [frame.step for frame in frames] == [9, 10]
+    assert [len(frame) for frame in frames] == [3, 3]
+    np.testing.assert_array_equal(frames[1].contacts.pairs, [[0, 1]])
+
+
+@pytest.mark.usefixtures("with_plugin")
+def test_a_foreign_plugin_can_be_named(tmp_path):
+    assert reader_named("numbers").name == "numbers"
+    path = write(tmp_path / "a.txt", "numbers of grains\n0 0 0 1\n")
+    assert len(scanfab.read(path, format="numbers")) == 1
+
+
+@pytest.mark.usefixtures("with_plugin")
+def test_an_error_of_a_foreign_plugin_is_passed_on(tmp_path):
+    path = write(tmp_path / "a.txt", "numbers of grains\n0 0 zero 1\n")
+    with pytest.raises(ReadError, match=r"a\.txt: could not convert"):
+        scanfab.read(path)
+
+
+def test_a_name_that_does_not_exist_is_an_error_that_lists_those_that_do():
+    with pytest.raises(UnknownFormatError, match=r"no reader called 'pfc'.* liggghts, vtk, yade"):
+        reader_named("pfc")
+    with pytest.raises(UnknownFormatError, match="no reader called 'pfc'"):
+        scanfab.read(FLOOR / "tutorial.txt", format="pfc")
+
+
+@pytest.mark.parametrize(
+    ("path", "name"),
+    [
+        (FLOOR / "tutorial.txt.gz", "liggghts"),
+        (FLOOR / "pairs_all.txt.gz", "liggghts"),
+        (FLOOR / "grains_30000.vtk", "liggghts"),
+        (FLOOR / "grains_30000.vtp", "vtk"),
+        (YADE / "noid-spheres-00000000.vtk.gz", "yade"),
+        (YADE / "text.txt", "yade"),
+    ],
+)
+def test_a_reader_is_found_by_the_content(path, name):
+    assert reader_for(path).name == name
+
+
+def test_no_reader_is_found_for_other_files(tmp_path):
+    for name in ("log.txt", "deck.vtk", "notes.dump", "x.vtu"):
+        assert reader_for(write(tmp_path / name, "hello\n")) is None
+
+
+def test_the_name_of_a_file_does_not_matter(tmp_path):
+    assert reader_for(write(tmp_path / "x.vtu", dump_text())).name == "liggghts"
+    assert reader_for(write(tmp_path / "no_ending_at_all", dump_text())).name == "liggghts"

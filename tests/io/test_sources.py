@@ -1,0 +1,221 @@
+"""What may stand on a command line as a source, and what is paired with what."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import pyvista
+
+import scanfab
+from scanfab.cli.main import run
+from scanfab.io.opening import open_sources
+from tests.helpers.dumps import cubic_rows, dump_text, write
+
+ROOT = Path(__file__).parents[2]
+YADE = ROOT / "sample_data" / "yade_triaxial"
+FLOOR = ROOT / "sample_data" / "liggghts_formats" / "floor"
+FAST = ["--directions", "9", "--spacing", "1rmin", "--variants", "c"]
+
+POSITION = np.array([[0.0, 0, 0], [1.9, 0, 0], [3.8, 0, 0], [1.9, 1.9, 0]])
+PAIRS = np.array([[0, 1], [1, 2], [1, 3]])
+
+
+def grains_with_lines(path: Path, vertices: bool = False) -> Path:
+    """One VTK file with grains as points and contacts as lines between them."""
+    lines = np.column_stack([np.full(3, 2), PAIRS]).ravel()
+    verts = np.column_stack([np.full(4, 1), np.arange(4)]).ravel() if vertices else None
+    mesh = pyvista.PolyData(POSITION, verts=verts, lines=lines)
+    mesh["radius"] = np.ones(4)
+    if path.suffix == ".vtu":
+        mesh = mesh.cast_to_unstructured_grid()
+    mesh.save(str(path))
+    return path
+
+
+@pytest.mark.parametrize("vertices", [False, True])
+@pytest.mark.parametrize("ending", [".vtk", ".vtp", ".vtu"])
+def test_one_vtk_file_may_hold_grains_and_contacts(
+    tmp_path: Path, ending: str, vertices: bool
+) -> None:
+    packing = scanfab.read(grains_with_lines(tmp_path / f"both{ending}", vertices))
+    assert packing.contacts is not None
+    assert packing.contacts.source == "file"
+    assert packing.contacts.pairs.tolist() == PAIRS.tolist()
+
+
+def test_contacts_by_geometry_leave_the_file_s_own_out(tmp_path: Path) -> None:
+    file = grains_with_lines(tmp_path / "both.vtp")
+    assert scanfab.read(file, contacts="geometric").contacts is None
+
+
+def test_a_pvd_file_is_a_series_with_times(tmp_path: Path) -> None:
+    for step in (100, 200):
+        grains_with_lines(tmp_path / f"grains_{step}.vtp")
+    box = pyvista.Box().cast_to_unstructured_grid()
+    box.save(str(tmp_path / "box_100.vtu"))
+    index = tmp_path / "all.pvd"
+    index.write_text(
+        '<?xml version="1.0"?><VTKFile type="Collection"><Collection>'
+        '<DataSet timestep="0.5" file="grains_100.vtp"/>'
+        '<DataSet timestep="0.5" file="box_100.vtu"/>'
+        '<DataSet timestep="1.5" file="grains_200.vtp"/></Collection></VTKFile>'
+    )
+    frames = [frame.read() for frame in scanfab.read_series(index)]
+    assert [(frame.step, frame.time, len(frame)) for frame in frames] == [
+        (100, 0.5, 4),
+        (200, 1.5, 4),
+    ]
+
+
+def test_a_pvd_file_that_is_cut_is_a_read_error(tmp_path: Path) -> None:
+    index = tmp_path / "all.pvd"
+    index.write_text('<?xml version="1.0"?><VTKFile type="Collection"><Collection><DataSet ')
+    with pytest.raises(scanfab.ReadError, match="cannot be read as a list of VTK files"):
+        next(iter(scanfab.read_series(index))).read()
+
+
+def test_standard_input_is_a_series(monkeypatch: pytest.MonkeyPatch, capsys) -> None:
+    dump = (FLOOR / "multi.txt").read_bytes()
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(dump)))
+    code = run(["compute", "-", "--format", "liggghts", *FAST, "--periodic", ""])
+    printed = capsys.readouterr()
+    assert code == 0, printed.err
+    lines = printed.out.splitlines()
+    assert len(lines) == 4
+    assert all(line.startswith("-,") for line in lines[1:])
+
+
+def test_standard_input_needs_a_format(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["compute", "-"]) == 2
+    assert "--format" in capsys.readouterr().err
+
+
+def test_files_of_different_steps_are_no_frame(tmp_path: Path) -> None:
+    spheres = tmp_path / "triaxial-spheres-00000003.vtk.gz"
+    lines = tmp_path / "triaxial-intrs-00000004.vtk.gz"
+    for file in (spheres, lines):
+        file.write_bytes((YADE / file.name).read_bytes())
+    with pytest.warns(scanfab.ScanfabWarning, match="no contact file for step 3"):
+        packing = next(iter(scanfab.read_series(tmp_path))).read()
+    assert packing.contacts is None
+
+
+def test_absolute_and_relative_paths_mix(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for step in (1, 2):
+        grains_with_lines(tmp_path / f"grains_{step}.vtp")
+    series = scanfab.read_series(["grains_1.vtp", tmp_path / "grains_2.vtp"])
+    assert len(list(series)) == 2
+    assert series.name == str(tmp_path)
+
+
+def test_a_source_keeps_the_name_that_it_was_given(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    with pytest.warns(scanfab.ScanfabNote):
+        assert scanfab.read_series("./sample_data/yade_triaxial/").name == (
+            "./sample_data/yade_triaxial/"
+        )
+
+
+@pytest.mark.parametrize("again", ["same", "spelt otherwise", "link", "glob"])
+def test_a_folder_that_is_named_twice_is_read_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], again: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "dumps").mkdir()
+    write(tmp_path / "dumps" / "dump_0.txt", dump_text(cubic_rows()))
+    (tmp_path / "latest").symlink_to("dumps")
+    other = {"same": "dumps", "spelt otherwise": "./dumps/", "link": "latest", "glob": "dum*"}
+    assert run(["inspect", "dumps", other[again], "--json"]) == 0
+    printed = capsys.readouterr()
+    assert [json.loads(line)["source"] for line in printed.out.splitlines()] == ["dumps"]
+    as_named = {"spelt otherwise": "./dumps/ (as dumps)", "link": "latest (as dumps)"}
+    said = f"warning: {as_named.get(again, 'dumps')}: named twice among the sources, and read once"
+    assert printed.err.count(said) == 1
+
+
+def test_a_file_that_is_named_twice_is_one_frame(tmp_path: Path) -> None:
+    files = [
+        write(tmp_path / f"dump_{step}.txt", dump_text(cubic_rows(), step=step)) for step in (0, 9)
+    ]
+    with pytest.warns(scanfab.ScanfabWarning, match=r"dump_0.txt: named twice .* read once"):
+        series = scanfab.read_series([tmp_path / "dump_*.txt", files[0]])
+    assert [frame.step for frame in series] == [0, 9]
+
+
+def test_many_names_that_come_twice_are_one_warning(tmp_path: Path) -> None:
+    files = [
+        write(tmp_path / f"dump_{step}.txt", dump_text(cubic_rows(), step=step))
+        for step in range(7)
+    ]
+    with pytest.warns(scanfab.ScanfabWarning, match=r"dump_4.txt and 2 more: named") as told:
+        assert len(list(open_sources([*files, tmp_path / "*.txt"])[0])) == 7
+    assert len(told) == 1
+
+
+def test_a_series_may_start_with_frames_of_boundary_alone(tmp_path: Path) -> None:
+    head = "ITEM: TIMESTEP\n{0}\nITEM: NUMBER OF ATOMS\n{1}\nITEM: BOX BOUNDS ff ff ff\n" + 3 * (
+        "-9 9\n"
+    )
+    names = "ITEM: ATOMS id type x y z radius\n"
+    walls = "".join(f"{k + 1} 2 {5 * (k == 0)} {5 * (k == 1)} {5 * (k == 2)} 0.1\n" for k in (0, 1))
+    grains = "3 1 0 0 0 1\n4 1 2 0 0 1\n5 1 0 2 0 1\n"
+    path = tmp_path / "dump.txt"
+    path.write_text(head.format(0, 2) + names + walls + head.format(1, 5) + names + walls + grains)
+    table = scanfab.compute(
+        scanfab.read_series(path),
+        boundary="type=2",
+        variants="c",
+        rv=1.5,
+        directions=9,
+        cutoff=0,
+        spacing=0.1,
+    )
+    assert table["grains"].tolist() == [0, 3]
+    assert np.isnan(table["alpha_vs"][0])
+    assert not np.isnan(table["alpha_vs"][1])
+
+
+@pytest.mark.filterwarnings("ignore:no contact at all by geometry")
+def test_with_a_spacing_alone_every_round_has_sixteen_replicates() -> None:
+    grid = np.stack(np.meshgrid(*3 * [np.arange(8.0)]), axis=-1).reshape(-1, 3)
+    packing = scanfab.Packing(grid, 0.45)
+    table = scanfab.compute(packing, variants="c", spacing=0.7, tolerance=5e-3, cutoff=0.2)
+    assert table["replicates"][0] == 16
+    assert table["alpha_vs_axial_se"][0] <= 5e-3
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
+@pytest.mark.parametrize(("sent", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+def test_a_signal_ends_the_process_with_its_code(sent: int, code: int, tmp_path: Path) -> None:
+    output = tmp_path / "table.csv"
+    program = "from scanfab.cli.main import main; main()"
+    command = [sys.executable, "-c", program, "compute", str(YADE), "--boundary", "mask=3"]
+    with subprocess.Popen(
+        [*command, "--tolerance", "2e-5", "-o", str(output)],
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "TMPDIR": str(tmp_path)},
+    ) as process:
+        part = Path(f"{output}.part")
+        for _ in range(600):
+            if part.exists() and part.stat().st_size > 0:
+                break
+            time.sleep(0.1)
+        process.send_signal(sent)
+        _, errors = process.communicate(timeout=60)
+    assert process.returncode == code
+    assert "Traceback" not in errors
+    assert not output.exists()
+    assert part.read_text().startswith("source,frame")
+    left = {file.name for file in tmp_path.iterdir()}
+    assert left == {"table.csv.part", "table.csv.manifest.json.part"}
