@@ -7,10 +7,10 @@ from pathlib import Path
 import click
 
 from scanfab.cli.group import COMMANDS, cli
-from scanfab.comparison import DIFFERENCE_MEANINGS, FRAME_MEANINGS, SUMMARY_MEANINGS
 from scanfab.inspection import REPORT_MEANINGS
 from scanfab.ladders import STEP_MEANINGS
-from scanfab.table import MEANINGS
+from scanfab.table.comparison import DIFFERENCE_MEANINGS, FRAME_MEANINGS, SUMMARY_MEANINGS
+from scanfab.table.table import MEANINGS
 
 PAGE = Path(__file__).parent / "command-line.md"
 

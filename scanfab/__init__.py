@@ -18,7 +18,6 @@ if TYPE_CHECKING:
         UnknownFormatError,
     )
     from scanfab.calibration import Calibration, calibrate
-    from scanfab.compare import compare_tables
     from scanfab.fabric.contact import contact_fabric
     from scanfab.fabric.tensor import FabricTensor
     from scanfab.fabric.void import VoidFabric, void_fabric
@@ -31,12 +30,13 @@ if TYPE_CHECKING:
     from scanfab.scan.directions import DirectionRule, direction_rule
     from scanfab.scan.scan import ScanSums, Solids, scan_lines
     from scanfab.settings import Settings
-    from scanfab.table import COLUMNS, Row, Table
-    from scanfab.tabular import read_rows
+    from scanfab.table.compare import compare_tables
+    from scanfab.table.reading import read_rows
+    from scanfab.table.table import COLUMNS, Row, Table
 
 # numpy, numba and the readers are loaded by the first name that needs them
 _HOME = {
-    "COLUMNS": "table",
+    "COLUMNS": "table.table",
     "Calibration": "calibration",
     "Cell": "packing.cell",
     "ContactList": "packing.packing",
@@ -46,7 +46,7 @@ _HOME = {
     "Packing": "packing.packing",
     "PackingError": "base.errors",
     "ReadError": "base.errors",
-    "Row": "table",
+    "Row": "table.table",
     "ScanSums": "scan.scan",
     "ScanfabError": "base.errors",
     "ScanfabNote": "base.errors",
@@ -55,17 +55,17 @@ _HOME = {
     "Settings": "settings",
     "SettingsError": "base.errors",
     "Solids": "scan.scan",
-    "Table": "table",
+    "Table": "table.table",
     "UnknownFormatError": "base.errors",
     "VoidFabric": "fabric.void",
     "calibrate": "calibration",
-    "compare_tables": "compare",
+    "compare_tables": "table.compare",
     "compute": "pipeline",
     "contact_fabric": "fabric.contact",
     "direction_rule": "scan.directions",
     "find_contacts": "packing.search",
     "read": "io.opening",
-    "read_rows": "tabular",
+    "read_rows": "table.reading",
     "read_series": "io.opening",
     "scan_lines": "scan.scan",
     "void_fabric": "fabric.void",

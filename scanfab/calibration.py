@@ -37,7 +37,7 @@ from scanfab.pipeline import (
 from scanfab.plan import Plan, make_plan
 from scanfab.scan.directions import direction_rule
 from scanfab.settings import AUTO_RULE, Length, Settings
-from scanfab.table import Row
+from scanfab.table.table import Row
 
 __all__ = ["Calibration", "calibrate"]
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from scanfab.base.errors import SettingsError
 from scanfab.scan.directions import direction_rule
-from scanfab.tabular import number_of, numbers_of
+from scanfab.table.reading import number_of, numbers_of
 
 __all__ = ["caveats_of"]
 

@@ -21,7 +21,7 @@ from scanfab.scan.lines import line_frames
 from scanfab.scan.segments import Segments, sample_segments
 from scanfab.scene import contact_lines, grains_of, scene_of
 from scanfab.settings import Vector
-from scanfab.table import Row
+from scanfab.table.table import Row
 from scanfab.writers import vtk
 
 __all__ = ["VtkFolder", "scan_line_sample"]

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.compare import compare_tables
-from scanfab.comparison import Comparison, SummaryRow
+from scanfab.table.compare import compare_tables
+from scanfab.table.comparison import Comparison, SummaryRow
 from scanfab.writers.plot_table import TABLE_FIGURES, Fit, plot_table
 
 __all__ = ["TABLE_FIGURES", "fits_of", "plot_rows"]

@@ -15,9 +15,9 @@ from scanfab.manifest import strain_file
 from scanfab.pipeline import chosen_frames
 from scanfab.rerun import read_manifest
 from scanfab.settings import Settings
-from scanfab.table import Row
-from scanfab.tabular import read_rows
-from scanfab.writers.results import differing_settings
+from scanfab.table.reading import read_rows
+from scanfab.table.result_file import differing_settings
+from scanfab.table.table import Row
 
 __all__ = ["FinishedTable", "finished_table"]
 

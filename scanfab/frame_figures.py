@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.abscissa import spelt_strain, strain_column
 from scanfab.base.errors import ScanfabWarning, SettingsError
 from scanfab.fabric.contact import contact_fabric
 from scanfab.fabric.distribution import mean_length_function, sphere_points
@@ -26,7 +25,8 @@ from scanfab.scan.lines import line_frames
 from scanfab.scan.scan import ScanSums, Solids
 from scanfab.scan.segments import sample_segments
 from scanfab.settings import Length, Settings
-from scanfab.tabular import number_of, total_error
+from scanfab.table.abscissa import spelt_strain, strain_column
+from scanfab.table.reading import number_of, total_error
 from scanfab.writers.plot import DPI
 from scanfab.writers.plot_frame import (
     CutoffCurve,

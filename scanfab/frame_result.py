@@ -13,7 +13,7 @@ from scanfab.measurement import Measurement, measure
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.plan import Plan
 from scanfab.settings import Settings
-from scanfab.table import Row
+from scanfab.table.table import Row
 from scanfab.variant_columns import VariantColumns, no_columns
 
 __all__ = ["FrameResult", "frame_result"]

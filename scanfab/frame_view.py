@@ -7,7 +7,6 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from scanfab.abscissa import frame_strain_column, is_ambiguous
 from scanfab.base.errors import (
     PackingError,
     ReadError,
@@ -22,6 +21,7 @@ from scanfab.plan import Plan, make_plan
 from scanfab.scene import Scene, about_window, scene_of
 from scanfab.settings import STRAIN_MODES, Settings
 from scanfab.strain import StrainFile, axial_length, shear_strain
+from scanfab.table.abscissa import frame_strain_column, is_ambiguous
 
 __all__ = ["Look", "look_at"]
 

@@ -34,7 +34,7 @@ from scanfab.packing.search import find_contacts
 from scanfab.plan import Plan, make_plan
 from scanfab.settings import STRAIN_MODES, Settings
 from scanfab.strain import StrainFile, axial_length, is_flipped, shear_strain
-from scanfab.table import Row, Table
+from scanfab.table.table import Row, Table
 
 __all__ = [
     "FrameResult",

@@ -18,7 +18,7 @@ from scanfab.packing.window import SurfaceBox
 from scanfab.report_inputs import Input
 from scanfab.rerun import reopen, restored_settings
 from scanfab.settings import Length, Settings
-from scanfab.tabular import number_of
+from scanfab.table.reading import number_of
 from scanfab.writers.page import Picture, Shown, view_data
 from scanfab.writers.plot import figure_bytes
 from scanfab.writers.plot_frame import drawn_histogram, drawn_projection

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from scanfab.abscissa import spelt_strain, strain_column
 from scanfab.base.errors import SettingsError
 from scanfab.rerun import read_manifest
-from scanfab.selection import choose_rows
-from scanfab.tabular import numbers_of, read_rows
+from scanfab.table.abscissa import spelt_strain, strain_column
+from scanfab.table.reading import numbers_of, read_rows
+from scanfab.table.selection import choose_rows
 
 __all__ = ["Input", "read_inputs"]
 

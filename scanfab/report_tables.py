@@ -7,10 +7,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from scanfab.abscissa import STRAINS, spelt_strain, strain_column
-from scanfab.comparison import SummaryRow
-from scanfab.tabular import number_of, numbers_of, total_error
-from scanfab.writers.curves import is_turned
+from scanfab.table.abscissa import STRAINS, spelt_strain, strain_column
+from scanfab.table.comparison import SummaryRow
+from scanfab.table.curves import is_turned
+from scanfab.table.reading import number_of, numbers_of, total_error
 from scanfab.writers.page import Part
 
 __all__ = ["frame_table", "input_table", "overview", "results_tables"]

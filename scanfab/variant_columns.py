@@ -18,7 +18,7 @@ from scanfab.fabric.void import VoidFabric, void_fabric
 from scanfab.measurement import Measurement
 from scanfab.packing.sample import Variant
 from scanfab.settings import Settings
-from scanfab.table import COLUMNS
+from scanfab.table.table import COLUMNS
 
 __all__ = ["FRAME_COLUMNS", "VariantColumns", "no_columns"]
 

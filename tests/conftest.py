@@ -9,7 +9,7 @@ from typing import NamedTuple
 import pytest
 
 from scanfab.cli.main import run
-from scanfab.tabular import read_rows
+from scanfab.table.reading import read_rows
 
 ROOT = Path(__file__).parents[1]
 SAMPLE = "sample_data/yade_triaxial"

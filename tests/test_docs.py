@@ -19,10 +19,11 @@ import click
 import pytest
 
 import scanfab
-from scanfab import comparison, inspection, ladders, table
+from scanfab import inspection, ladders
 from scanfab.cli.group import COMMANDS, cli
 from scanfab.io.registry import installed_readers
 from scanfab.scan.directions import RULES
+from scanfab.table import comparison, table
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"

@@ -9,7 +9,7 @@ import scanfab
 from scanfab.export import VtkFolder
 from scanfab.pipeline import compute_rows
 from scanfab.settings import Settings
-from scanfab.table import COLUMNS
+from scanfab.table.table import COLUMNS
 from scanfab.writers.vtk import Collection
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.lattices import shaken_cubic

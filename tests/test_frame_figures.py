@@ -13,7 +13,7 @@ from scanfab import frame_figures
 from scanfab.base.errors import SettingsError
 from scanfab.frame_figures import FRAME_FIGURES, parse_figure, plot_frames
 from scanfab.settings import Settings
-from scanfab.tabular import total_error
+from scanfab.table.reading import total_error
 from scanfab.writers import plot_frame
 from scanfab.writers.plot_frame import disk
 from tests.conftest import ROOT, SAMPLE

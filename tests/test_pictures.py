@@ -9,8 +9,8 @@ from types import ModuleType
 import pytest
 from PIL import Image
 
-from scanfab.compare import compare_tables
 from scanfab.figures import fits_of
+from scanfab.table.compare import compare_tables
 from scanfab.writers import plot_table
 from scanfab.writers.plot import new_figure
 from tests.conftest import ROOT

@@ -15,8 +15,8 @@ from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 from scanfab.pipeline import compute_rows
 from scanfab.settings import Settings
-from scanfab.table import COLUMNS
-from scanfab.writers.rows import CsvWriter
+from scanfab.table.table import COLUMNS
+from scanfab.table.writing import CsvWriter
 from tests.helpers.dumps import dump_text, pairs_text, write, yade_spheres
 
 SCAN = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin"}

@@ -21,7 +21,7 @@ from scanfab.io.opening import read_series
 from scanfab.pipeline import compute_rows
 from scanfab.report import make_report
 from scanfab.scene import Scene
-from scanfab.tabular import read_rows
+from scanfab.table.reading import read_rows
 from scanfab.writers.page import MOST_GRAINS, Picture, view_data
 from tests.conftest import ROOT
 from tests.helpers.dumps import cubic_rows, dump_text, write

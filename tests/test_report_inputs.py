@@ -10,7 +10,7 @@ import pytest
 from scanfab.base.errors import SettingsError
 from scanfab.cli.main import run
 from scanfab.report import make_report
-from scanfab.tabular import read_rows
+from scanfab.table.reading import read_rows
 from tests.conftest import ROOT, SAMPLE
 from tests.helpers.dumps import write
 from tests.helpers.tables import curve

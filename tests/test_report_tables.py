@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from scanfab.compare import compare_tables
 from scanfab.report_tables import frame_table, overview, results_tables
+from scanfab.table.compare import compare_tables
 from tests.helpers.tables import curve, sheared
 
 

@@ -35,7 +35,7 @@ from scanfab.cli.talk import talk_options, tell_inputs, working
 if TYPE_CHECKING:
     from scanfab.calibration import Calibration
     from scanfab.ladders import StepRow
-    from scanfab.writers.rows import Excerpt
+    from scanfab.table.writing import Excerpt
 
 __all__ = ["calibrate"]
 
@@ -126,9 +126,9 @@ def calibrate(
     from scanfab.cli.console import announce_compiling, is_readable, reported_warnings
     from scanfab.ladders import StepRow
     from scanfab.settings import Settings
+    from scanfab.table.result_file import ResultFile
+    from scanfab.table.writing import Excerpt
     from scanfab.writers.plot_calibration import plot_calibration
-    from scanfab.writers.results import ResultFile
-    from scanfab.writers.rows import Excerpt
 
     check_plot(plot, None, ())
     with reported_warnings():
@@ -190,7 +190,7 @@ def _show(found: Calibration, command: str, tables: bool) -> None:
 
 def _write_rows(found: Calibration, command: str, excerpt: Excerpt) -> None:
     """The steps on one stream, and what was found on the other."""
-    from scanfab.writers.rows import CsvWriter
+    from scanfab.table.writing import CsvWriter
 
     writer = CsvWriter(sys.stdout, excerpt=excerpt)
     for row in found.rows:

@@ -21,7 +21,7 @@ from scanfab.cli.options import (
 from scanfab.cli.talk import talk_options
 
 if TYPE_CHECKING:
-    from scanfab.writers.rows import Excerpt
+    from scanfab.table.writing import Excerpt
 
 __all__ = ["compare"]
 
@@ -75,11 +75,11 @@ def compare(
     from scanfab.base.errors import SettingsError
     from scanfab.cli.comparison_tables import print_comparison
     from scanfab.cli.console import is_readable, reported_warnings
-    from scanfab.compare import compare_tables
     from scanfab.figures import TABLE_FIGURES, plot_rows
-    from scanfab.selection import choose_rows
-    from scanfab.tabular import read_rows
-    from scanfab.writers.rows import Excerpt, check_suffix
+    from scanfab.table.compare import compare_tables
+    from scanfab.table.reading import read_rows
+    from scanfab.table.selection import choose_rows
+    from scanfab.table.writing import Excerpt, check_suffix
 
     check_plot(plot, figure, TABLE_FIGURES)
     if summary and differences:
@@ -115,7 +115,7 @@ def compare(
 
 
 def _write_csv(rows: Sequence[Any], excerpt: Excerpt) -> None:
-    from scanfab.writers.rows import CsvWriter
+    from scanfab.table.writing import CsvWriter
 
     writer = CsvWriter(sys.stdout, excerpt=excerpt)
     for row in rows:
@@ -123,7 +123,7 @@ def _write_csv(rows: Sequence[Any], excerpt: Excerpt) -> None:
 
 
 def _write_file(rows: Sequence[Any], output: Path, excerpt: Excerpt) -> None:
-    from scanfab.writers.results import ResultFile
+    from scanfab.table.result_file import ResultFile
 
     with ResultFile(output, type(rows[0]), excerpt).writer({}) as writer:
         for row in rows:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from scanfab.cli.tables import GAP, Column, print_columns, spelt, width_of
 
 if TYPE_CHECKING:
-    from scanfab.comparison import Comparison, FrameRow, SummaryRow
+    from scanfab.table.comparison import Comparison, FrameRow, SummaryRow
 
 __all__ = ["print_comparison"]
 
@@ -26,7 +26,7 @@ def print_comparison(comparison: Comparison) -> None:
     """The summary, with a bar of the evolution for each curve, then the frames."""
     from rich.console import Console
 
-    from scanfab.writers.curves import short_names
+    from scanfab.table.curves import short_names
 
     console = Console()
     names = short_names((row.source for row in comparison.summary), max(12, console.width // 5))
@@ -75,7 +75,7 @@ def _curves(comparison: Comparison, longest: int) -> Titled:
 
 
 def _frames(rows: Sequence[FrameRow]) -> Titled:
-    from scanfab.abscissa import strain_column
+    from scanfab.table.abscissa import strain_column
 
     sheared = strain_column([asdict(row) for row in rows]) == "shear_strain"
     return [

@@ -33,8 +33,8 @@ from scanfab.cli.talk import talk_options, tell_inputs
 
 if TYPE_CHECKING:
     from scanfab.cli.console import Told
-    from scanfab.writers.results import ResultFile
-    from scanfab.writers.rows import Excerpt
+    from scanfab.table.result_file import ResultFile
+    from scanfab.table.writing import Excerpt
 
 __all__ = ["OF_THE_LINE", "compute"]
 
@@ -186,9 +186,9 @@ def compute(
     from scanfab.cli.console import announce_compiling, reported_warnings
     from scanfab.manifest import asked_for
     from scanfab.settings import Settings
-    from scanfab.table import Row
-    from scanfab.writers.results import ResultFile
-    from scanfab.writers.rows import Excerpt
+    from scanfab.table.result_file import ResultFile
+    from scanfab.table.table import Row
+    from scanfab.table.writing import Excerpt
 
     if resume and output is None:
         raise click.UsageError("--resume goes with -o FILE")
@@ -302,7 +302,7 @@ def _standing(run: Run, result: ResultFile | None, printed: bool) -> str:
 def _write(run: Run, asked: dict[str, Any], result: ResultFile | None, excerpt: Excerpt) -> None:
     """Write the rows as they come."""
     from scanfab.cli.console import is_readable, print_table
-    from scanfab.writers.rows import CsvWriter
+    from scanfab.table.writing import CsvWriter
 
     if result is not None:
         with result.writer(asked, run.resume) as writer:

@@ -15,8 +15,8 @@ from scanfab.base.errors import ScanfabNote, ScanfabWarning, SkippedFrameWarning
 from scanfab.cli.options import AS_CSV
 from scanfab.cli.tables import Column, print_columns, spelt
 from scanfab.cli.talk import Level, level
-from scanfab.table import Row
-from scanfab.writers.rows import Excerpt
+from scanfab.table.table import Row
+from scanfab.table.writing import Excerpt
 
 __all__ = ["Told", "announce_compiling", "is_readable", "print_table", "reported_warnings"]
 
@@ -114,7 +114,7 @@ def announce_compiling() -> None:
 
 def print_table(rows: Iterable[Row], excerpt: Excerpt) -> None:
     """A readable table on standard output: the columns that were asked for, or those that fit."""
-    from scanfab.tabular import total_error
+    from scanfab.table.reading import total_error
 
     values = [asdict(row) for row in rows]
     for row in values:

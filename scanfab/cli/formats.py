@@ -12,8 +12,8 @@ def formats() -> None:
     """List every reader and writer, its extensions, and the package it comes from."""
     from scanfab.cli.console import reported_warnings
     from scanfab.io.registry import installed_readers
+    from scanfab.table.writing import FILE_FORMATS
     from scanfab.writers.plot import PLOT_FORMATS
-    from scanfab.writers.rows import FILE_FORMATS
 
     with reported_warnings():
         lines = [

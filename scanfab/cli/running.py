@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from scanfab.io.series import Series
     from scanfab.pipeline import Observer
     from scanfab.settings import Settings
-    from scanfab.table import Row
-    from scanfab.writers.results import ResultFile
+    from scanfab.table.result_file import ResultFile
+    from scanfab.table.table import Row
 
 __all__ = ["Run"]
 

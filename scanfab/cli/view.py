@@ -98,10 +98,10 @@ def _show(
 ) -> None:
     from dataclasses import replace
 
-    from scanfab.abscissa import spelt_strain
     from scanfab.frame_view import look_at
     from scanfab.scene import section_lines
-    from scanfab.writers.curves import middle_out
+    from scanfab.table.abscissa import spelt_strain
+    from scanfab.table.curves import middle_out
     from scanfab.writers.view import check_screen, show_scene
 
     if screenshot is None:

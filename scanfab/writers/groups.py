@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from scanfab.writers.curves import Curve
+from scanfab.table.curves import Curve
 from scanfab.writers.plot import COLOURS, LOOKS, plain
 
 __all__ = ["Drawn", "Group", "grouped"]

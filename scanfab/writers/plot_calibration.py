@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.tabular import total_error
-from scanfab.writers.curves import short_names
+from scanfab.table.curves import short_names
+from scanfab.table.reading import total_error
 from scanfab.writers.plot import (
     LOOKS,
     VOID_AXIAL,

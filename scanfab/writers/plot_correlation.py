@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.writers.curves import Curve
+from scanfab.table.curves import Curve
 from scanfab.writers.groups import Drawn, Group
 from scanfab.writers.plot import (
     CONTACT,

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import SettingsError
-from scanfab.writers.curves import (
+from scanfab.table.curves import (
     Curve,
     abscissa_label,
     abscissa_words,

@@ -17,7 +17,7 @@ import tempfile
 from pathlib import Path
 from random import Random
 
-from scanfab.writers.rows import FILE_FORMATS
+from scanfab.table.writing import FILE_FORMATS
 from tests.helpers.interruptions import Interrupter, write_series
 
 OPTIONS = ("--tolerance", "6e-4")

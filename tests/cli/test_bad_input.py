@@ -21,7 +21,7 @@ import pytest
 
 from scanfab.cli.main import run
 from scanfab.io import registry
-from scanfab.writers.rows import CsvWriter
+from scanfab.table.writing import CsvWriter
 from tests.helpers.dumps import (
     PAIRS,
     cubic_rows,

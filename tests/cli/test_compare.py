@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from scanfab.cli.main import run
-from scanfab.tabular import read_rows
-from scanfab.writers.rows import FILE_FORMATS
+from scanfab.table.reading import read_rows
+from scanfab.table.writing import FILE_FORMATS
 from tests.helpers.dumps import write
 from tests.helpers.tables import curve
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from scanfab.cli.comparison_tables import print_comparison
-from scanfab.compare import compare_tables
+from scanfab.table.compare import compare_tables
 from tests.helpers.tables import curve, sheared
 
 HEADS = {

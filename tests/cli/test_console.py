@@ -7,9 +7,9 @@ import re
 import pytest
 
 from scanfab.cli.console import KEYS, MORE, print_table
-from scanfab.table import Row
-from scanfab.writers.rows import Excerpt
-from tests.test_table import a_row
+from scanfab.table.table import Row
+from scanfab.table.writing import Excerpt
+from tests.table.test_table import a_row
 
 ROWS = [
     a_row(

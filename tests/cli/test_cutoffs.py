@@ -11,7 +11,7 @@ import pytest
 from scanfab import Packing, compute, direction_rule, find_contacts
 from scanfab.cli.main import run
 from scanfab.scan.lines import line_frames, turned_frames
-from scanfab.table import COLUMNS
+from scanfab.table.table import COLUMNS
 from tests.helpers import naive
 from tests.helpers.interruptions import interrupted_at_row
 from tests.helpers.lattices import shaken_cubic

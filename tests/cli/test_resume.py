@@ -12,7 +12,7 @@ from random import Random
 import pytest
 
 from scanfab.cli.main import run
-from scanfab.writers.rows import CsvWriter, JsonLinesWriter
+from scanfab.table.writing import CsvWriter, JsonLinesWriter
 from tests.helpers.interruptions import Interrupter, interrupted_at_row, write_series
 
 # about a second of scanning

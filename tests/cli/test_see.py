@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from scanfab.cli.main import run
-from scanfab.compare import compare_tables
 from scanfab.figures import fits_of, plot_rows
 from scanfab.io.opening import read_series
 from scanfab.strain import shear_strain
-from scanfab.tabular import read_rows
+from scanfab.table.compare import compare_tables
+from scanfab.table.reading import read_rows
 from scanfab.writers.overlay import add_words
 from tests.conftest import ROOT, SAMPLE
 from tests.helpers.dumps import cubic_rows, dump_text, write

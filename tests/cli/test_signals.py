@@ -80,9 +80,9 @@ def test_a_part_without_rows_and_half_a_file_are_removed(tmp_path, rows):
         tmp_path,
         f"""
 from pathlib import Path
-from scanfab.table import Row
+from scanfab.table.table import Row
 from scanfab.base.files import whole_file
-from scanfab.writers.results import ResultFile
+from scanfab.table.result_file import ResultFile
 
 def run(args):
     with ResultFile(Path("table.csv"), Row).writer({{}}) as writer:

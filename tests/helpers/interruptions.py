@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from scanfab.writers.rows import CsvWriter
+from scanfab.table.writing import CsvWriter
 from tests.helpers.dumps import cubic_rows, dump_text, write
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)

@@ -10,7 +10,7 @@ import pytest
 import scanfab
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.cli.main import run
-from scanfab.writers.results import ResultFile
+from scanfab.table.result_file import ResultFile
 from tests.helpers.dumps import PAIRS, dump_text, pairs_text, write
 from tests.helpers.truth import FLOOR, SAMPLE_DATA
 

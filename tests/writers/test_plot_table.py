@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from scanfab.base.errors import ScanfabNote, SettingsError
-from scanfab.compare import compare_tables
 from scanfab.figures import fits_of, plot_rows
-from scanfab.tabular import total_error
-from scanfab.writers.curves import abscissa_label, curves_of, is_turned, short_names
+from scanfab.table.compare import compare_tables
+from scanfab.table.curves import abscissa_label, curves_of, is_turned, short_names
+from scanfab.table.reading import total_error
 from scanfab.writers.plot import check_plot_file, new_figure
 from scanfab.writers.plot_correlation import PAPER_SLOPE
 from scanfab.writers.plot_table import TABLE_FIGURES, draw_table

@@ -22,7 +22,7 @@ from typing import IO, Any
 from scanfab.base.ending import undone_at_end
 from scanfab.base.errors import ScanfabNote, SettingsError
 from scanfab.base.files import check_folder, named_errors, whole_file
-from scanfab.writers.rows import ALL, Excerpt, RowWriter, check_suffix, row_writer
+from scanfab.table.writing import ALL, Excerpt, RowWriter, check_suffix, row_writer
 
 __all__ = ["ResultFile", "differing_settings"]
 
@@ -170,7 +170,7 @@ class ResultFile:
             part.write_text(json.dumps(asked, indent=1), "utf-8")
 
     def _rows(self) -> list[dict[str, Any]]:
-        from scanfab.tabular import read_rows
+        from scanfab.table.reading import read_rows
 
         return read_rows(self.part) if self.part.stat().st_size else []
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from scanfab.tabular import number_of
+from scanfab.table.reading import number_of
 
 __all__ = [
     "STRAINS",
@@ -44,7 +44,7 @@ def strain_column(rows: Rows) -> str | None:
 
     Examples
     --------
-    >>> from scanfab.abscissa import strain_column
+    >>> from scanfab.table.abscissa import strain_column
     >>> rows = [dict(source="s", frame=k, strain=0.0, shear_strain=0.1 * k, alpha_vs_axial=0.0)
     ...         for k in range(3)]
     >>> strain_column(rows)
@@ -82,7 +82,7 @@ def spelt_strain(row: Mapping[str, Any], column: str | None, *, symbol: bool = F
 
     Examples
     --------
-    >>> from scanfab.abscissa import spelt_strain
+    >>> from scanfab.table.abscissa import spelt_strain
     >>> spelt_strain({"strain": 0.0, "shear_strain": 0.123}, "shear_strain")
     'shear strain 12.3 %'
     """

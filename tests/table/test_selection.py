@@ -9,11 +9,11 @@ from dataclasses import fields
 import pytest
 
 from scanfab.base.errors import ScanfabWarning, SettingsError
-from scanfab.comparison import DifferenceRow, FrameRow, SummaryRow
 from scanfab.inspection import FrameReport
 from scanfab.ladders import StepRow
-from scanfab.selection import choose_rows
-from scanfab.tabular import number_of
+from scanfab.table.comparison import DifferenceRow, FrameRow, SummaryRow
+from scanfab.table.reading import number_of
+from scanfab.table.selection import choose_rows
 from tests.helpers.tables import curve
 
 CUTOFFS = (0.0, 0.00080000001, 0.0016)

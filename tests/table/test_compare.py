@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from scanfab.base.errors import ScanfabNote, ScanfabWarning, SettingsError
-from scanfab.compare import compare_tables
+from scanfab.table.compare import compare_tables
 from tests.helpers.tables import CONTACT, STRAIN, VOID, curve, sheared
 
 

@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from scanfab.table import COLUMNS, Row, Table
+from scanfab.table.table import COLUMNS, Row, Table
 
 # the columns that scripts rely on
 FIXED = """

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.abscissa import strain_column, why_not_strain
 from scanfab.base.errors import ScanfabNote, ScanfabWarning, SettingsError
-from scanfab.comparison import Comparison, DifferenceRow, FrameRow, SummaryRow
 from scanfab.fabric.jackknife import BLOCKS, variance_without_noise
-from scanfab.selection import check_rows
-from scanfab.tabular import number_of, numbers_of, total_error
-from scanfab.writers.curves import is_turned
+from scanfab.table.abscissa import strain_column, why_not_strain
+from scanfab.table.comparison import Comparison, DifferenceRow, FrameRow, SummaryRow
+from scanfab.table.curves import is_turned
+from scanfab.table.reading import number_of, numbers_of, total_error
+from scanfab.table.selection import check_rows
 
 __all__ = ["compare_tables"]
 
@@ -50,7 +50,7 @@ def compare_tables(
     Comparison
         Rows for frames, for sources and variants, and for pairs of variants; what they hold is in
         ``FRAME_MEANINGS``, ``SUMMARY_MEANINGS`` and ``DIFFERENCE_MEANINGS`` of
-        ``scanfab.comparison``; and the points of each fit.
+        ``scanfab.table.comparison``; and the points of each fit.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def compare_tables(
 
     Examples
     --------
-    >>> from scanfab.compare import compare_tables
+    >>> from scanfab.table.compare import compare_tables
     >>> rows = [
     ...     dict(source="s", frame=k, strain=0.01 * k, variant="c",
     ...          alpha_vs_axial=0.1 * x, alpha_c_axial=x)

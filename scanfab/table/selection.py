@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.base.errors import ScanfabWarning, SettingsError
-from scanfab.table import COLUMNS
-from scanfab.tabular import TEXT_COLUMNS, is_number
+from scanfab.table.reading import TEXT_COLUMNS, is_number
+from scanfab.table.table import COLUMNS
 
 __all__ = ["NEEDED", "check_rows", "choose_rows"]
 
@@ -47,8 +47,8 @@ def choose_rows(
     Parameters
     ----------
     tables : iterable of (name, rows)
-        The name, for messages, and the rows by column, as :func:`scanfab.tabular.read_rows` returns
-        them.
+        The name, for messages, and the rows by column, as
+        :func:`scanfab.table.reading.read_rows` returns them.
     cutoff : float, optional
         Keep the rows of this cut-off, in the unit of the tables, to three digits.
     labels : sequence of str, optional
@@ -62,7 +62,7 @@ def choose_rows(
 
     Examples
     --------
-    >>> from scanfab.selection import choose_rows
+    >>> from scanfab.table.selection import choose_rows
     >>> row = dict(source="s", frame=0, strain=None, variant="c", cutoff=1.0,
     ...            alpha_vs_axial=0.01, alpha_c_axial=0.1)
     >>> table = [row, {**row, "cutoff": 2.0}]

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.abscissa import STRAINS, strain_column
-from scanfab.tabular import number_of, total_error
+from scanfab.table.abscissa import STRAINS, strain_column
+from scanfab.table.reading import number_of, total_error
 
 __all__ = [
     "Curve",

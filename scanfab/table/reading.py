@@ -35,7 +35,7 @@ def read_rows(path: Path | str) -> list[dict[str, Any]]:
 
     Examples
     --------
-    >>> from scanfab.tabular import read_rows
+    >>> from scanfab.table.reading import read_rows
     >>> rows = read_rows("sample_data/yade_triaxial/engine.csv")
     >>> rows[0]["contacts"]
     2076
@@ -95,7 +95,7 @@ def total_error(row: Mapping[str, Any], name: str) -> float | None:
 
     Examples
     --------
-    >>> from scanfab.tabular import total_error
+    >>> from scanfab.table.reading import total_error
     >>> row = {"alpha_vs_axial_se": 3e-4, "alpha_vs_axial_sample_se": 4e-4}
     >>> round(total_error(row, "alpha_vs_axial"), 7)
     0.0005

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from scanfab.abscissa import (
+from scanfab.table.abscissa import (
     frame_strain_column,
     spelt_strain,
     strain_column,

@@ -13,11 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scanfab.base.errors import SettingsError
-from scanfab.table import COLUMNS, Row
-from scanfab.tabular import read_rows
-from scanfab.writers.results import ResultFile
-from scanfab.writers.rows import FILE_FORMATS, CsvWriter, Excerpt, check_suffix
-from tests.test_table import a_row
+from scanfab.table.reading import read_rows
+from scanfab.table.result_file import ResultFile
+from scanfab.table.table import COLUMNS, Row
+from scanfab.table.writing import FILE_FORMATS, CsvWriter, Excerpt, check_suffix
+from tests.table.test_table import a_row
 
 
 def result_in(folder):
@@ -179,7 +179,7 @@ def test_rows_of_other_settings_are_gone_before_the_new_settings_stand(tmp_path,
     def killed(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("scanfab.writers.results.os.replace", killed)
+    monkeypatch.setattr("scanfab.table.result_file.os.replace", killed)
     interrupt(result, {"seed": 1}, [a_row()])
     assert result.finished_rows({"seed": 1}, 1) == []
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from scanfab.base.errors import ReadError
-from scanfab.tabular import read_rows
+from scanfab.table.reading import read_rows
 from tests.helpers.dumps import write
 
 

@@ -48,8 +48,8 @@ class Excerpt:
 
         Examples
         --------
-        >>> from scanfab.table import Row
-        >>> from scanfab.writers.rows import Excerpt
+        >>> from scanfab.table.table import Row
+        >>> from scanfab.table.writing import Excerpt
         >>> Excerpt.make(Row, "strain,alpha_vs_axial").fields
         ('strain', 'alpha_vs_axial')
         """

@@ -1,0 +1,1 @@
+"""The fabric table: rows, files of them, and tables side by side."""
