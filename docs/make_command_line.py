@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 
 from scanfab.cli.group import COMMANDS, cli
-from scanfab.inspection import REPORT_MEANINGS
-from scanfab.ladders import STEP_MEANINGS
+from scanfab.pipeline.inspection import REPORT_MEANINGS
+from scanfab.pipeline.ladders import STEP_MEANINGS
 from scanfab.table.comparison import DIFFERENCE_MEANINGS, FRAME_MEANINGS, SUMMARY_MEANINGS
 from scanfab.table.table import MEANINGS
 

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
         SettingsError,
         UnknownFormatError,
     )
-    from scanfab.calibration import Calibration, calibrate
     from scanfab.fabric.contact import contact_fabric
     from scanfab.fabric.tensor import FabricTensor
     from scanfab.fabric.void import VoidFabric, void_fabric
@@ -26,10 +25,11 @@ if TYPE_CHECKING:
     from scanfab.packing.cell import Cell
     from scanfab.packing.packing import ContactList, Contacts, Packing
     from scanfab.packing.search import find_contacts
-    from scanfab.pipeline import compute
+    from scanfab.pipeline.calibration import Calibration, calibrate
+    from scanfab.pipeline.compute import compute
+    from scanfab.pipeline.settings import Settings
     from scanfab.scan.directions import DirectionRule, direction_rule
     from scanfab.scan.scan import ScanSums, Solids, scan_lines
-    from scanfab.settings import Settings
     from scanfab.table.compare import compare_tables
     from scanfab.table.reading import read_rows
     from scanfab.table.table import COLUMNS, Row, Table
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 # numpy, numba and the readers are loaded by the first name that needs them
 _HOME = {
     "COLUMNS": "table.table",
-    "Calibration": "calibration",
+    "Calibration": "pipeline.calibration",
     "Cell": "packing.cell",
     "ContactList": "packing.packing",
     "Contacts": "packing.packing",
@@ -52,15 +52,15 @@ _HOME = {
     "ScanfabNote": "base.errors",
     "ScanfabWarning": "base.errors",
     "Series": "io.series",
-    "Settings": "settings",
+    "Settings": "pipeline.settings",
     "SettingsError": "base.errors",
     "Solids": "scan.scan",
     "Table": "table.table",
     "UnknownFormatError": "base.errors",
     "VoidFabric": "fabric.void",
-    "calibrate": "calibration",
+    "calibrate": "pipeline.calibration",
     "compare_tables": "table.compare",
-    "compute": "pipeline",
+    "compute": "pipeline.compute",
     "contact_fabric": "fabric.contact",
     "direction_rule": "scan.directions",
     "find_contacts": "packing.search",

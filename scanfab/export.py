@@ -15,12 +15,12 @@ from scanfab.base.errors import SettingsError
 from scanfab.base.files import check_folder
 from scanfab.fabric.distribution import mean_length_function, sphere_points
 from scanfab.fabric.tensor import COMPONENTS
-from scanfab.frame_result import FrameResult
 from scanfab.packing.sample import VARIANTS
+from scanfab.pipeline.frame import FrameResult
+from scanfab.pipeline.settings import Vector
 from scanfab.scan.lines import line_frames
 from scanfab.scan.segments import Segments, sample_segments
 from scanfab.scene import contact_lines, grains_of, scene_of
-from scanfab.settings import Vector
 from scanfab.table.table import Row
 from scanfab.writers import vtk
 

@@ -15,16 +15,16 @@ import numpy.typing as npt
 from scanfab.base.errors import ScanfabWarning, SettingsError
 from scanfab.fabric.contact import contact_fabric
 from scanfab.fabric.distribution import mean_length_function, sphere_points
-from scanfab.frame_result import FrameResult
 from scanfab.io.series import Series
 from scanfab.packing.sample import VARIANTS
-from scanfab.pipeline import compute_rows
+from scanfab.pipeline.compute import compute_rows
+from scanfab.pipeline.frame import FrameResult
+from scanfab.pipeline.settings import Length, Settings
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.gaps import scan_gaps
 from scanfab.scan.lines import line_frames
 from scanfab.scan.scan import ScanSums, Solids
 from scanfab.scan.segments import sample_segments
-from scanfab.settings import Length, Settings
 from scanfab.table.abscissa import spelt_strain, strain_column
 from scanfab.table.reading import number_of, total_error
 from scanfab.writers.plot import DPI

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from scanfab.fabric.distribution import HIGHEST_DEGREE, sphere_points
 from scanfab.frame_figures import CONCENTRATION, ScannedFrames
-from scanfab.frame_result import FrameResult
+from scanfab.pipeline.frame import FrameResult
 from scanfab.table.reading import number_of, total_error
 from scanfab.writers.plot_frame import Projection
 

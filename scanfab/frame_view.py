@@ -16,11 +16,11 @@ from scanfab.base.errors import (
 )
 from scanfab.io.series import Frame, Series
 from scanfab.packing.sample import Sample
-from scanfab.pipeline import classify, refuse_unknown_boundary, tell_doubts
-from scanfab.plan import Plan, make_plan
+from scanfab.pipeline.compute import classify, refuse_unknown_boundary, tell_doubts
+from scanfab.pipeline.plan import Plan, make_plan
+from scanfab.pipeline.settings import STRAIN_MODES, Settings
+from scanfab.pipeline.strain import StrainFile, axial_length, shear_strain
 from scanfab.scene import Scene, about_window, scene_of
-from scanfab.settings import STRAIN_MODES, Settings
-from scanfab.strain import StrainFile, axial_length, shear_strain
 from scanfab.table.abscissa import frame_strain_column, is_ambiguous
 
 __all__ = ["Look", "look_at"]

@@ -12,10 +12,10 @@ from typing import Any
 from scanfab.base.errors import ScanfabError, ScanfabNote, ScanfabWarning, SettingsError
 from scanfab.caveats import caveats_of
 from scanfab.figures import fits_of
+from scanfab.pipeline.repeat import repeat_command
 from scanfab.report_frames import data_url, show_frames
 from scanfab.report_inputs import Input, read_inputs
 from scanfab.report_tables import frame_table, input_table, overview, results_tables
-from scanfab.rerun import repeat_command
 from scanfab.setting_meanings import settings_table
 from scanfab.table.compare import compare_tables
 from scanfab.table.comparison import Comparison

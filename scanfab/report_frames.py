@@ -15,9 +15,9 @@ from scanfab.frame_view import Look, look_at
 from scanfab.io.series import Series
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import SurfaceBox
+from scanfab.pipeline.repeat import reopen, restored_settings
+from scanfab.pipeline.settings import Length, Settings
 from scanfab.report_inputs import Input
-from scanfab.rerun import reopen, restored_settings
-from scanfab.settings import Length, Settings
 from scanfab.table.reading import number_of
 from scanfab.writers.page import Picture, Shown, view_data
 from scanfab.writers.plot import figure_bytes

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.base.errors import SettingsError
-from scanfab.rerun import read_manifest
+from scanfab.pipeline.repeat import read_manifest
 from scanfab.table.abscissa import spelt_strain, strain_column
 from scanfab.table.reading import numbers_of, read_rows
 from scanfab.table.selection import choose_rows

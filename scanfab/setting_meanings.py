@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from scanfab.rerun import spelt_settings
+from scanfab.pipeline.repeat import spelt_settings
 
 __all__ = ["SETTING_MEANINGS", "settings_table"]
 

@@ -19,9 +19,9 @@ import click
 import pytest
 
 import scanfab
-from scanfab import inspection, ladders
 from scanfab.cli.group import COMMANDS, cli
 from scanfab.io.registry import installed_readers
+from scanfab.pipeline import inspection, ladders
 from scanfab.scan.directions import RULES
 from scanfab.table import comparison, table
 

@@ -7,8 +7,8 @@ import pytest
 
 import scanfab
 from scanfab.export import VtkFolder
-from scanfab.pipeline import compute_rows
-from scanfab.settings import Settings
+from scanfab.pipeline.compute import compute_rows
+from scanfab.pipeline.settings import Settings
 from scanfab.table.table import COLUMNS
 from scanfab.writers.vtk import Collection
 from tests.helpers.dumps import cubic_rows, dump_text, write

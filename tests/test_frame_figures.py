@@ -12,7 +12,7 @@ import scanfab
 from scanfab import frame_figures
 from scanfab.base.errors import SettingsError
 from scanfab.frame_figures import FRAME_FIGURES, parse_figure, plot_frames
-from scanfab.settings import Settings
+from scanfab.pipeline.settings import Settings
 from scanfab.table.reading import total_error
 from scanfab.writers import plot_frame
 from scanfab.writers.plot_frame import disk

@@ -18,7 +18,7 @@ import pytest
 from scanfab.base.errors import ReadError
 from scanfab.cli.main import run
 from scanfab.io.opening import read_series
-from scanfab.pipeline import compute_rows
+from scanfab.pipeline.compute import compute_rows
 from scanfab.report import make_report
 from scanfab.scene import Scene
 from scanfab.table.reading import read_rows

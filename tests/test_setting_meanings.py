@@ -8,8 +8,8 @@ from dataclasses import fields
 from pathlib import Path
 
 from scanfab.io.opening import READING, read_series
+from scanfab.pipeline.settings import Settings
 from scanfab.setting_meanings import SETTING_MEANINGS, settings_table
-from scanfab.settings import Settings
 
 
 def test_every_setting_has_a_meaning():

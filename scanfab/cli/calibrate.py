@@ -33,8 +33,8 @@ from scanfab.cli.tables import Column, print_columns, spelt
 from scanfab.cli.talk import talk_options, tell_inputs, working
 
 if TYPE_CHECKING:
-    from scanfab.calibration import Calibration
-    from scanfab.ladders import StepRow
+    from scanfab.pipeline.calibration import Calibration
+    from scanfab.pipeline.ladders import StepRow
     from scanfab.table.writing import Excerpt
 
 __all__ = ["calibrate"]
@@ -122,10 +122,10 @@ def calibrate(
 
     On a terminal a readable table; else the steps as CSV, and what they show on standard error.
     """
-    from scanfab.calibration import calibrate as calibrate_series
     from scanfab.cli.console import announce_compiling, is_readable, reported_warnings
-    from scanfab.ladders import StepRow
-    from scanfab.settings import Settings
+    from scanfab.pipeline.calibration import calibrate as calibrate_series
+    from scanfab.pipeline.ladders import StepRow
+    from scanfab.pipeline.settings import Settings
     from scanfab.table.result_file import ResultFile
     from scanfab.table.writing import Excerpt
     from scanfab.writers.plot_calibration import plot_calibration

@@ -184,8 +184,8 @@ def compute(
     """
     from scanfab.base.files import check_folder
     from scanfab.cli.console import announce_compiling, reported_warnings
-    from scanfab.manifest import asked_for
-    from scanfab.settings import Settings
+    from scanfab.pipeline.manifest import asked_for
+    from scanfab.pipeline.settings import Settings
     from scanfab.table.result_file import ResultFile
     from scanfab.table.table import Row
     from scanfab.table.writing import Excerpt
@@ -325,7 +325,7 @@ def _write_manifest(
     path: Path, asked: dict[str, Any], run: Run, told: Told, settings_file: SettingsFile | None
 ) -> None:
     from scanfab.base.files import whole_file
-    from scanfab.manifest import manifest
+    from scanfab.pipeline.manifest import manifest
 
     # what was told of the rows that an earlier run has finished
     before = run.table.warnings if run.table is not None else []

@@ -22,7 +22,7 @@ from scanfab.cli.tables import spelt
 from scanfab.cli.talk import talk_options, tell_inputs, working
 
 if TYPE_CHECKING:
-    from scanfab.inspection import FrameReport
+    from scanfab.pipeline.inspection import FrameReport
 
 __all__ = ["inspect"]
 
@@ -44,8 +44,8 @@ def inspect(ctx: click.Context, /, sources: tuple[str, ...], as_json: bool, **op
     Nothing is computed; contacts are found by geometry where no file lists them.
     """
     from scanfab.cli.console import announce_compiling, reported_warnings
-    from scanfab.inspection import inspect_series
-    from scanfab.settings import Settings
+    from scanfab.pipeline.inspection import inspect_series
+    from scanfab.pipeline.settings import Settings
 
     with reported_warnings():
         options, _ = fill_from_file(ctx, sources, options)

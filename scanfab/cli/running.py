@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 from scanfab.cli.options import usage_errors
 
 if TYPE_CHECKING:
-    from scanfab.finished import FinishedTable
     from scanfab.io.series import Series
-    from scanfab.pipeline import Observer
-    from scanfab.settings import Settings
+    from scanfab.pipeline.compute import Observer
+    from scanfab.pipeline.resume import FinishedTable
+    from scanfab.pipeline.settings import Settings
     from scanfab.table.result_file import ResultFile
     from scanfab.table.table import Row
 
@@ -61,8 +61,8 @@ class Run:
         A part is of the run that was interrupted last, so it counts, whatever FILE holds.
         """
         from scanfab.base.errors import SettingsError
-        from scanfab.finished import finished_table
-        from scanfab.manifest import with_frames
+        from scanfab.pipeline.manifest import with_frames
+        from scanfab.pipeline.resume import finished_table
 
         if result.path.is_file():
             try:
@@ -85,7 +85,7 @@ class Run:
 
     def _has_gaps(self, done: list[dict[str, Any]]) -> bool:
         """Whether an earlier run has skipped frames between those that it has written."""
-        from scanfab.pipeline import chosen_frames
+        from scanfab.pipeline.compute import chosen_frames
 
         for one in self.series:
             written = {row["frame"] for row in done if row["source"] == one.name}
@@ -125,7 +125,7 @@ class Run:
         return self.table is not None and row.frame in self.table.rows[row.source]
 
     def _rows(self) -> Iterator[Row]:
-        from scanfab.pipeline import compute_rows
+        from scanfab.pipeline.compute import compute_rows
 
         last = self.part[-1] if self.part else None
         names = [one.name for one in self.series]

@@ -22,7 +22,7 @@ from scanfab.cli.talk import talk_options
 
 if TYPE_CHECKING:
     from scanfab.io.series import Series
-    from scanfab.settings import Settings
+    from scanfab.pipeline.settings import Settings
 
 __all__ = ["view"]
 
@@ -73,7 +73,7 @@ def view(
     from scanfab.base.errors import SettingsError
     from scanfab.base.files import check_folder
     from scanfab.cli.console import announce_compiling, reported_warnings
-    from scanfab.settings import Settings
+    from scanfab.pipeline.settings import Settings
 
     with reported_warnings():
         options, _ = fill_from_file(ctx, sources, options)

@@ -9,9 +9,9 @@ from dataclasses import replace
 
 import pytest
 
-from scanfab.calibration import Calibration
 from scanfab.cli.main import run
-from scanfab.ladders import STEP_MEANINGS, StepRow
+from scanfab.pipeline.calibration import Calibration
+from scanfab.pipeline.ladders import STEP_MEANINGS, StepRow
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.truth import TRIAXIAL
 
@@ -60,7 +60,7 @@ def test_rows_on_one_stream_and_words_on_the_other(calibrate, capsys, tmp_path):
 def test_tables_on_a_terminal_are_not_cut(calibrate, monkeypatch, width):
     monkeypatch.setenv("COLUMNS", str(width))
     monkeypatch.setattr("scanfab.cli.console.is_readable", lambda: True)
-    monkeypatch.setattr("scanfab.calibration.calibrate", lambda *_, **__: FOUND)
+    monkeypatch.setattr("scanfab.pipeline.calibration.calibrate", lambda *_, **__: FOUND)
     out, _ = calibrate(TRIAXIAL, *QUICK)
     table = out.split("nothing found")[0].splitlines()
     assert "…" not in out

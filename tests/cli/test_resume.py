@@ -100,7 +100,7 @@ def test_every_format_is_the_same_when_resumed(compute, stopped, tmp_path, suffi
 
 def test_finished_frames_are_not_computed_again(compute, stopped, short_series, monkeypatch):
     output, computed = stopped(), []
-    from scanfab import measurement
+    from scanfab.pipeline import measurement
 
     scan = measurement.scan_to_tolerance
     monkeypatch.setattr(

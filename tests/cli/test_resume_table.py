@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 import pyvista
 
-from scanfab import measurement
 from scanfab.cli import talk
 from scanfab.cli.main import run
-from scanfab.rerun import read_manifest
+from scanfab.pipeline import measurement
+from scanfab.pipeline.repeat import read_manifest
 from tests.cli.test_resume import _wait_for_frames_under_way
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.interruptions import interrupted_at_row, write_series

@@ -15,7 +15,7 @@ import pytest
 from scanfab.cli.main import run
 from scanfab.figures import fits_of, plot_rows
 from scanfab.io.opening import read_series
-from scanfab.strain import shear_strain
+from scanfab.pipeline.strain import shear_strain
 from scanfab.table.compare import compare_tables
 from scanfab.table.reading import read_rows
 from scanfab.writers.overlay import add_words

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from scanfab.cli.main import run
-from scanfab.rerun import read_manifest, repeat_command
+from scanfab.pipeline.repeat import read_manifest, repeat_command
 from tests.helpers.dumps import cubic_rows, dump_text, write
 
 FAST = 'directions = 9\nspacing = "0.5rmin"\ncutoff = "0.2rmin"\n'

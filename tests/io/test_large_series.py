@@ -9,8 +9,8 @@ import pytest
 
 import scanfab
 from scanfab.io import series as series_module
-from scanfab.pipeline import compute_rows
-from scanfab.settings import Settings
+from scanfab.pipeline.compute import compute_rows
+from scanfab.pipeline.settings import Settings
 from tests.helpers.dumps import cubic_rows, dump_text, write
 
 SCAN = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin", "variants": "a"}

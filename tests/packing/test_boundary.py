@@ -8,7 +8,7 @@ import pytest
 from scanfab.base.errors import SettingsError
 from scanfab.packing.boundary import BoundaryRule, enclosing_class, select_boundary
 from scanfab.packing.packing import Packing
-from scanfab.pipeline import compute
+from scanfab.pipeline.compute import compute
 
 COUNT = 6
 

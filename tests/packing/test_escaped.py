@@ -9,7 +9,7 @@ import scanfab
 from scanfab import Cell, Packing, ScanfabWarning, Settings, compute, find_contacts
 from scanfab.packing.escaped import escaped_grains
 from scanfab.packing.sample import Sample
-from scanfab.plan import make_plan
+from scanfab.pipeline.plan import make_plan
 from tests.helpers.lattices import ball_points, shaken_cubic
 
 SPHERES = shaken_cubic(np.random.default_rng(5), 9)
@@ -124,5 +124,7 @@ def test_few_grains_have_no_crowd():
 def test_strain_of_the_grains_does_not_follow_one_that_flies_away():
     still = [find_contacts(with_flown((25, 4, 4 + 30 * k))) for k in range(2)]
     samples = [Sample(one, np.zeros(len(one), bool)) for one in still]
-    lengths = [scanfab.strain.axial_length(one, "grains", (0.0, 0.0, 1.0)) for one in samples]
+    lengths = [
+        scanfab.pipeline.strain.axial_length(one, "grains", (0.0, 0.0, 1.0)) for one in samples
+    ]
     assert lengths[0] == lengths[1] < 10

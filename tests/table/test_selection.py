@@ -9,8 +9,8 @@ from dataclasses import fields
 import pytest
 
 from scanfab.base.errors import ScanfabWarning, SettingsError
-from scanfab.inspection import FrameReport
-from scanfab.ladders import StepRow
+from scanfab.pipeline.inspection import FrameReport
+from scanfab.pipeline.ladders import StepRow
 from scanfab.table.comparison import DifferenceRow, FrameRow, SummaryRow
 from scanfab.table.reading import number_of
 from scanfab.table.selection import choose_rows

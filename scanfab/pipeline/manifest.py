@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.io.series import Series
+from scanfab.pipeline.settings import STRAIN_MODES, Settings
 from scanfab.scan.directions import DirectionRule
-from scanfab.settings import STRAIN_MODES, Settings
 
 __all__ = ["asked_for", "manifest", "strain_file", "with_frames"]
 

@@ -11,8 +11,8 @@ from typing import Any
 from scanfab.base.errors import ReadError, SettingsError
 from scanfab.io.opening import READING, open_sources
 from scanfab.io.series import Series
-from scanfab.manifest import asked_for
-from scanfab.settings import Settings
+from scanfab.pipeline.manifest import asked_for
+from scanfab.pipeline.settings import Settings
 
 __all__ = [
     "read_manifest",
@@ -76,9 +76,9 @@ def repeat_command(
 
     Examples
     --------
-    >>> from scanfab.manifest import asked_for
-    >>> from scanfab.rerun import repeat_command
-    >>> from scanfab.settings import Settings
+    >>> from scanfab.pipeline.manifest import asked_for
+    >>> from scanfab.pipeline.repeat import repeat_command
+    >>> from scanfab.pipeline.settings import Settings
     >>> repeat_command(asked_for(["dumps"], {}, Settings.make(boundary="type=2", seed=3)))
     'scanfab compute dumps --boundary type=2 --seed 3'
     """

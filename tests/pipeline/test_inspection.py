@@ -9,8 +9,8 @@ import pytest
 
 import scanfab
 from scanfab.base.errors import ScanfabNote, ScanfabWarning
-from scanfab.inspection import FrameReport, inspect_series
-from scanfab.settings import Settings
+from scanfab.pipeline.inspection import FrameReport, inspect_series
+from scanfab.pipeline.settings import Settings
 from tests.helpers.dumps import ROWS, dump_text, pairs_text, write, yade_spheres
 from tests.helpers.truth import FLOOR, SAMPLE_DATA
 

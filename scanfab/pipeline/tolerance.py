@@ -13,7 +13,8 @@ import numpy as np
 from scanfab.base.errors import ScanfabWarning, SettingsError
 from scanfab.base.spelling import spelt_apart, spelt_time
 from scanfab.fabric.void import void_fabric
-from scanfab.plan import CLOSE, GROWTH_WITH_SPACING, Plan
+from scanfab.pipeline.plan import CLOSE, GROWTH_WITH_SPACING, Plan
+from scanfab.pipeline.settings import Settings
 from scanfab.scan.directions import design_of, direction_rule
 from scanfab.scan.scan import (
     FollowedTooFarError,
@@ -23,7 +24,6 @@ from scanfab.scan.scan import (
     most_lines,
     scan_lines,
 )
-from scanfab.settings import Settings
 
 __all__ = ["missing_work", "scan_to_tolerance"]
 

@@ -8,7 +8,7 @@ import pytest
 import scanfab
 from scanfab.base.errors import ScanfabWarning
 from scanfab.packing.cell import Cell
-from scanfab.strain import is_flipped, shear_strain
+from scanfab.pipeline.strain import is_flipped, shear_strain
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.lattices import rotation
 from tests.helpers.truth import SHEAR

@@ -16,7 +16,7 @@ from scanfab import (
     compute,
     find_contacts,
 )
-from scanfab.ladders import (
+from scanfab.pipeline.ladders import (
     STEP_MEANINGS,
     StepRow,
     first_steady,

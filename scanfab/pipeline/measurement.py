@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.adaptive import scan_to_tolerance
 from scanfab.packing.sample import Sample, Variant
-from scanfab.plan import CLOSE, Plan
+from scanfab.pipeline.plan import CLOSE, Plan
+from scanfab.pipeline.settings import AUTO_RULE, Settings
+from scanfab.pipeline.tolerance import scan_to_tolerance
 from scanfab.scan.directions import DirectionRule, design_of, direction_rule
 from scanfab.scan.gaps import Blocks, GapSums, scan_gaps
 from scanfab.scan.scan import CellGrains, ScanSums, Solids, most_lines
-from scanfab.settings import AUTO_RULE, Settings
 
 __all__ = ["Measurement", "measure"]
 

@@ -13,8 +13,8 @@ import scanfab
 from scanfab.base.errors import ScanfabWarning, SettingsError
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
-from scanfab.pipeline import compute_rows
-from scanfab.settings import Settings
+from scanfab.pipeline.compute import compute_rows
+from scanfab.pipeline.settings import Settings
 from scanfab.table.table import COLUMNS
 from scanfab.table.writing import CsvWriter
 from tests.helpers.dumps import dump_text, pairs_text, write, yade_spheres

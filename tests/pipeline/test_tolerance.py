@@ -11,7 +11,6 @@ from scanfab import (
     ScanfabWarning,
     Settings,
     SettingsError,
-    adaptive,
     compute,
     direction_rule,
     find_contacts,
@@ -19,10 +18,11 @@ from scanfab import (
     void_fabric,
 )
 from scanfab.packing.sample import Sample
-from scanfab.plan import REPLICATES, make_plan
+from scanfab.pipeline import tolerance as adaptive
+from scanfab.pipeline.plan import REPLICATES, make_plan
+from scanfab.pipeline.settings import AUTO_RULE
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.scan import CellGrains, Solids
-from scanfab.settings import AUTO_RULE
 from tests.helpers.lattices import shaken_cubic
 from tests.helpers.scanning import solids_of
 

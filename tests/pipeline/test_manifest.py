@@ -12,8 +12,8 @@ import pytest
 
 import scanfab
 from scanfab.cli.main import run
-from scanfab.manifest import asked_for, manifest
-from scanfab.settings import Settings
+from scanfab.pipeline.manifest import asked_for, manifest
+from scanfab.pipeline.settings import Settings
 from tests.helpers.dumps import cubic_rows, dump_text, pairs_text, write
 
 FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "a")

@@ -10,11 +10,19 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from scanfab.adaptive import missing_work
 from scanfab.base.errors import PackingError, ScanfabWarning, SettingsError
-from scanfab.frame_result import frame_result
 from scanfab.io.series import Series
-from scanfab.ladders import (
+from scanfab.packing.packing import Packing
+from scanfab.packing.sample import Sample
+from scanfab.pipeline.compute import (
+    classify,
+    frames_of,
+    no_such_frames,
+    refuse_unknown_boundary,
+    tell_doubts,
+)
+from scanfab.pipeline.frame import frame_result
+from scanfab.pipeline.ladders import (
     PAPER_CUTOFF,
     PAPER_SPACING,
     StepRow,
@@ -24,19 +32,11 @@ from scanfab.ladders import (
     sentence,
     sentence_of_recommended,
 )
-from scanfab.measurement import Measurement
-from scanfab.packing.packing import Packing
-from scanfab.packing.sample import Sample
-from scanfab.pipeline import (
-    classify,
-    frames_of,
-    no_such_frames,
-    refuse_unknown_boundary,
-    tell_doubts,
-)
-from scanfab.plan import Plan, make_plan
+from scanfab.pipeline.measurement import Measurement
+from scanfab.pipeline.plan import Plan, make_plan
+from scanfab.pipeline.settings import AUTO_RULE, Length, Settings
+from scanfab.pipeline.tolerance import missing_work
 from scanfab.scan.directions import direction_rule
-from scanfab.settings import AUTO_RULE, Length, Settings
 from scanfab.table.table import Row
 
 __all__ = ["Calibration", "calibrate"]

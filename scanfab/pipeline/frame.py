@@ -9,12 +9,12 @@ from typing import Any
 
 from scanfab.base.errors import ScanfabWarning
 from scanfab.base.spelling import spelt_apart
-from scanfab.measurement import Measurement, measure
 from scanfab.packing.sample import VARIANTS, Sample
-from scanfab.plan import Plan
-from scanfab.settings import Settings
+from scanfab.pipeline.measurement import Measurement, measure
+from scanfab.pipeline.plan import Plan
+from scanfab.pipeline.settings import Settings
+from scanfab.pipeline.variant_columns import VariantColumns, no_columns
 from scanfab.table.table import Row
-from scanfab.variant_columns import VariantColumns, no_columns
 
 __all__ = ["FrameResult", "frame_result"]
 

@@ -12,15 +12,15 @@ from scanfab.io.series import Frame, Series
 from scanfab.packing.doubts import cell_doubt, cell_hint, doubts_of, refuse_impossible
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import SphereWindow, SurfaceBox
-from scanfab.pipeline import (
+from scanfab.pipeline.compute import (
     boundary_hint,
     chosen_frames,
     classify,
     no_such_frames,
     refuse_unknown_boundary,
 )
-from scanfab.plan import rv_of
-from scanfab.settings import Settings
+from scanfab.pipeline.plan import rv_of
+from scanfab.pipeline.settings import Settings
 
 __all__ = ["REPORT_MEANINGS", "FrameReport", "inspect_series"]
 

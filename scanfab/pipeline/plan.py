@@ -12,8 +12,8 @@ from scanfab.base.errors import ScanfabWarning, SettingsError
 from scanfab.packing.doubts import refuse_impossible
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import RV_MEANING, SphereWindow, SurfaceBox
+from scanfab.pipeline.settings import AUTO_RULE, Settings
 from scanfab.scan.directions import DirectionRule, direction_rule
-from scanfab.settings import AUTO_RULE, Settings
 
 __all__ = ["CLOSE", "GROWTH_WITH_SPACING", "Plan", "make_plan", "rv_of"]
 

@@ -15,9 +15,9 @@ from scanfab.fabric.contact import axial_error, contact_fabric
 from scanfab.fabric.jackknife import BLOCKS, Jackknife, contact_jackknife, void_jackknife
 from scanfab.fabric.tensor import COMPONENTS, FabricTensor
 from scanfab.fabric.void import VoidFabric, void_fabric
-from scanfab.measurement import Measurement
 from scanfab.packing.sample import Variant
-from scanfab.settings import Settings
+from scanfab.pipeline.measurement import Measurement
+from scanfab.pipeline.settings import Settings
 from scanfab.table.table import COLUMNS
 
 __all__ = ["FRAME_COLUMNS", "VariantColumns", "no_columns"]

@@ -22,7 +22,6 @@ from scanfab.base.errors import (
     SkippedFrameWarning,
 )
 from scanfab.base.threads import in_order
-from scanfab.frame_result import FrameResult, frame_result
 from scanfab.io.reader import Carries
 from scanfab.io.series import Series
 from scanfab.packing.boundary import enclosing_class, existing_values, select_boundary
@@ -31,9 +30,10 @@ from scanfab.packing.doubts import cell_doubt, doubts_of
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample
 from scanfab.packing.search import find_contacts
-from scanfab.plan import Plan, make_plan
-from scanfab.settings import STRAIN_MODES, Settings
-from scanfab.strain import StrainFile, axial_length, is_flipped, shear_strain
+from scanfab.pipeline.frame import FrameResult, frame_result
+from scanfab.pipeline.plan import Plan, make_plan
+from scanfab.pipeline.settings import STRAIN_MODES, Settings
+from scanfab.pipeline.strain import StrainFile, axial_length, is_flipped, shear_strain
 from scanfab.table.table import Row, Table
 
 __all__ = [

@@ -55,7 +55,7 @@ def parse_length(name: str, text: str | float | Length) -> Length:
 
     Examples
     --------
-    >>> from scanfab.settings import parse_length
+    >>> from scanfab.pipeline.settings import parse_length
     >>> parse_length("cutoff", "0.5rmin")
     Length(value=0.5, unit='rmin')
     """
@@ -80,7 +80,7 @@ def parse_lengths(name: str, text: str | float | Iterable[str | float]) -> tuple
 
     Examples
     --------
-    >>> from scanfab.settings import parse_lengths
+    >>> from scanfab.pipeline.settings import parse_lengths
     >>> [length.value for length in parse_lengths("cutoffs", "0:1rmin:0.5rmin")]
     [0.0, 0.5, 1.0]
     """

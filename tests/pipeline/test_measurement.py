@@ -7,7 +7,7 @@ import pytest
 
 from scanfab import Cell, Packing, ScanfabWarning, Settings, compute, find_contacts
 from scanfab.packing.sample import VARIANTS, Sample
-from scanfab.plan import make_plan
+from scanfab.pipeline.plan import make_plan
 from scanfab.scan.gaps import Blocks
 from tests.helpers import naive
 from tests.helpers.lattices import shaken_cubic

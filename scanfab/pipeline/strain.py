@@ -87,7 +87,7 @@ def shear_strain(cell: Cell | None, first: Cell | None) -> float | None:
     Examples
     --------
     >>> from scanfab import Cell
-    >>> from scanfab.strain import shear_strain
+    >>> from scanfab.pipeline.strain import shear_strain
     >>> sheared = Cell([[1, 0, 0], [0.5, 1, 0], [0, 0, 1]])
     >>> round(shear_strain(sheared, Cell([1.0, 1.0, 1.0])), 4)
     0.2857

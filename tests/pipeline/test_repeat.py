@@ -10,9 +10,9 @@ import pytest
 from scanfab.base.errors import ReadError
 from scanfab.cli.compute import compute
 from scanfab.cli.main import run
-from scanfab.manifest import asked_for
-from scanfab.rerun import read_manifest, reopen, repeat_command, restored_settings
-from scanfab.settings import Settings
+from scanfab.pipeline.manifest import asked_for
+from scanfab.pipeline.repeat import read_manifest, reopen, repeat_command, restored_settings
+from scanfab.pipeline.settings import Settings
 from tests.conftest import ROOT, SAMPLE
 
 COMMANDS = [
@@ -41,7 +41,7 @@ def asked_by(command, monkeypatch, tmp_path):
         found.update(asked_for(sources, reading, settings))
         raise ReadError("enough")
 
-    monkeypatch.setattr("scanfab.manifest.asked_for", remember)
+    monkeypatch.setattr("scanfab.pipeline.manifest.asked_for", remember)
     # sources need not exist for this
     monkeypatch.setattr(compute.params[0].type, "exists", False)
     with pytest.raises(ReadError, match="enough"):

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from scanfab.base.errors import SettingsError
+from scanfab.pipeline.settings import Length, Settings, parse_axis, parse_frames, parse_length
 from scanfab.scan.directions import direction_rule
-from scanfab.settings import Length, Settings, parse_axis, parse_frames, parse_length
 from tests.helpers.dumps import write
 
 RADII = {"rmin": 0.5, "rmean": 1.0, "rmax": 2.0}

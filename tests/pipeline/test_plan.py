@@ -16,8 +16,15 @@ from scanfab import (
     find_contacts,
 )
 from scanfab.packing.sample import Sample
-from scanfab.plan import CLOSE, FEWEST_LINES, GROWTH_WITH_SPACING, REPLICATES, WIDE, make_plan
-from scanfab.settings import AUTO_RULE
+from scanfab.pipeline.plan import (
+    CLOSE,
+    FEWEST_LINES,
+    GROWTH_WITH_SPACING,
+    REPLICATES,
+    WIDE,
+    make_plan,
+)
+from scanfab.pipeline.settings import AUTO_RULE
 from tests.helpers.lattices import shaken_cubic
 
 

@@ -11,10 +11,10 @@ from typing import Any
 
 from scanfab.base.errors import SettingsError
 from scanfab.io.series import Series
-from scanfab.manifest import strain_file
-from scanfab.pipeline import chosen_frames
-from scanfab.rerun import read_manifest
-from scanfab.settings import Settings
+from scanfab.pipeline.compute import chosen_frames
+from scanfab.pipeline.manifest import strain_file
+from scanfab.pipeline.repeat import read_manifest
+from scanfab.pipeline.settings import Settings
 from scanfab.table.reading import read_rows
 from scanfab.table.result_file import differing_settings
 from scanfab.table.table import Row

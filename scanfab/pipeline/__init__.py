@@ -1,0 +1,1 @@
+"""From settings and frames to rows: the one room that knows all the steps."""
