@@ -27,7 +27,7 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from scanfab.cli.main import run
-from scanfab.writers import view
+from scanfab.viz import window3d as view
 
 ROOT = Path(__file__).parents[1]
 PICTURES = ROOT / "docs" / "figures"

@@ -9,10 +9,10 @@ from types import ModuleType
 import pytest
 from PIL import Image
 
-from scanfab.figures import fits_of
 from scanfab.table.compare import compare_tables
-from scanfab.writers import plot_table
-from scanfab.writers.plot import new_figure
+from scanfab.viz.figures import of_tables as plot_table
+from scanfab.viz.figures.fitted import fits_of
+from scanfab.viz.figures.style import new_figure
 from tests.conftest import ROOT
 from tests.helpers.tables import curve
 
@@ -74,7 +74,7 @@ def test_other_numbers_words_and_colours_are_told(monkeypatch):
     monkeypatch.setitem(plot_table.SIZES, "evolution", (5.4, 3.5))
     assert make_figures.differences(before, content(rows))
     monkeypatch.undo()
-    monkeypatch.setattr("scanfab.writers.groups.MEANINGS", {"c": "another word"})
+    monkeypatch.setattr("scanfab.viz.figures.groups.MEANINGS", {"c": "another word"})
     assert make_figures.differences(before, content(rows))
 
 

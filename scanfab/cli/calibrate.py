@@ -128,7 +128,7 @@ def calibrate(
     from scanfab.pipeline.settings import Settings
     from scanfab.table.result_file import ResultFile
     from scanfab.table.writing import Excerpt
-    from scanfab.writers.plot_calibration import plot_calibration
+    from scanfab.viz.figures.calibration import plot_calibration
 
     check_plot(plot, None, ())
     with reported_warnings():

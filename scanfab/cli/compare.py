@@ -75,11 +75,11 @@ def compare(
     from scanfab.base.errors import SettingsError
     from scanfab.cli.comparison_tables import print_comparison
     from scanfab.cli.console import is_readable, reported_warnings
-    from scanfab.figures import TABLE_FIGURES, plot_rows
     from scanfab.table.compare import compare_tables
     from scanfab.table.reading import read_rows
     from scanfab.table.selection import choose_rows
     from scanfab.table.writing import Excerpt, check_suffix
+    from scanfab.viz.figures.fitted import TABLE_FIGURES, plot_rows
 
     check_plot(plot, figure, TABLE_FIGURES)
     if summary and differences:

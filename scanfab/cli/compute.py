@@ -227,8 +227,8 @@ def compute(
 def _check_figure(plot: Path | None, figure: str | None) -> None:
     if plot is None and figure is None:
         return
-    from scanfab.figures import TABLE_FIGURES
-    from scanfab.frame_figures import FRAME_FIGURES, parse_figure
+    from scanfab.viz.figures.fitted import TABLE_FIGURES
+    from scanfab.viz.figures.scanned import FRAME_FIGURES, parse_figure
 
     check_plot(plot, figure, [*TABLE_FIGURES, *FRAME_FIGURES])
     if figure is not None and _is_of_frames(figure):
@@ -237,7 +237,7 @@ def _check_figure(plot: Path | None, figure: str | None) -> None:
 
 
 def _is_of_frames(figure: str) -> bool:
-    from scanfab.figures import TABLE_FIGURES
+    from scanfab.viz.figures.fitted import TABLE_FIGURES
 
     return figure not in TABLE_FIGURES
 
@@ -250,8 +250,8 @@ def _columns_drawn(figure: str | None) -> tuple[str, ...]:
 
 
 def _draw(plot: Path, figure: str | None, run: Run) -> None:
-    from scanfab.figures import plot_rows
-    from scanfab.frame_figures import plot_frames
+    from scanfab.viz.figures.fitted import plot_rows
+    from scanfab.viz.figures.scanned import plot_frames
 
     if not run.found:
         click.echo(f"scanfab: {plot} is not drawn: no row has a void fabric", err=True)

@@ -13,7 +13,7 @@ def formats() -> None:
     from scanfab.cli.console import reported_warnings
     from scanfab.io.registry import installed_readers
     from scanfab.table.writing import FILE_FORMATS
-    from scanfab.writers.plot import PLOT_FORMATS
+    from scanfab.viz.figures.style import PLOT_FORMATS
 
     with reported_warnings():
         lines = [

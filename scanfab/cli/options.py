@@ -287,7 +287,7 @@ plot_option = click.option(
 
 def check_plot(plot: Path | None, figure: str | None, figures: Iterable[str]) -> None:
     """A usage error if no such figure can be drawn to such a file."""
-    from scanfab.writers.plot import check_plot_file
+    from scanfab.viz.figures.style import check_plot_file
 
     if plot is None:
         if figure is not None:

@@ -49,8 +49,8 @@ def report(
     come from TABLE.manifest.json beside it; without it, the report says that they are not known.
     """
     from scanfab.cli.console import announce_compiling, reported_warnings
-    from scanfab.report import make_report
-    from scanfab.writers.page import check_page_file, save_page
+    from scanfab.viz.report.page import check_page_file, save_page
+    from scanfab.viz.report.report import make_report
 
     if labels and len(labels) != len(tables):
         raise click.UsageError(f"--label: expected one a table: {len(tables)}, found {len(labels)}")

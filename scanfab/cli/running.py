@@ -156,7 +156,7 @@ def _vtk_folders(
     """What writes the ParaView files of each series, in folders of their own if several."""
     if folder is None:
         return [None] * len(series)
-    from scanfab.export import VtkFolder
+    from scanfab.viz.paraview import VtkFolder
 
     folders = [folder / f"series-{number}" for number in range(1, len(series) + 1)]
     with usage_errors():

@@ -98,11 +98,11 @@ def _show(
 ) -> None:
     from dataclasses import replace
 
-    from scanfab.frame_view import look_at
-    from scanfab.scene import section_lines
     from scanfab.table.abscissa import spelt_strain
     from scanfab.table.curves import middle_out
-    from scanfab.writers.view import check_screen, show_scene
+    from scanfab.viz.frame_view import look_at
+    from scanfab.viz.scene import section_lines
+    from scanfab.viz.window3d import check_screen, show_scene
 
     if screenshot is None:
         check_screen()

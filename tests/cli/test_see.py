@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 from scanfab.cli.main import run
-from scanfab.figures import fits_of, plot_rows
 from scanfab.io.opening import read_series
 from scanfab.pipeline.strain import shear_strain
 from scanfab.table.compare import compare_tables
 from scanfab.table.reading import read_rows
-from scanfab.writers.overlay import add_words
+from scanfab.viz.figures.fitted import fits_of, plot_rows
+from scanfab.viz.overlay import add_words
 from tests.conftest import ROOT, SAMPLE
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.tables import curve
@@ -161,7 +161,7 @@ def test_a_vtk_folder_that_cannot_be_made_is_wrong_usage(series, tmp_path, capsy
 
 def can_draw() -> bool:
     from scanfab.base.errors import ScanfabError
-    from scanfab.writers.view import check_drawing
+    from scanfab.viz.window3d import check_drawing
 
     try:
         check_drawing()
@@ -234,7 +234,7 @@ def test_title_legend_and_scale_are_dark_on_white(tmp_path, series):
 def test_a_frame_without_grains_is_shown_as_such(tmp_path, words, monkeypatch):
     write(tmp_path / "dump_1.txt", dump_text([]))
     titles = []
-    monkeypatch.setattr("scanfab.writers.view.show_scene", lambda *said: titles.append(said[2]))
+    monkeypatch.setattr("scanfab.viz.window3d.show_scene", lambda *said: titles.append(said[2]))
     picture = tmp_path / "view.png"
     words = [str(tmp_path / "dump_1.txt"), *words, "--screenshot", str(picture)]
     assert run(["view", *words]) == 0
@@ -247,7 +247,7 @@ def test_a_frame_without_grains_is_shown_as_such(tmp_path, words, monkeypatch):
 def test_the_title_names_the_frame_and_its_strain(tmp_path, monkeypatch):
     titles = []
     monkeypatch.chdir(ROOT)
-    monkeypatch.setattr("scanfab.writers.view.show_scene", lambda *said: titles.append(said[2]))
+    monkeypatch.setattr("scanfab.viz.window3d.show_scene", lambda *said: titles.append(said[2]))
     words = ["--boundary", "mask=3", "--frame", "-1", "--screenshot", str(tmp_path / "x.png")]
     assert run(["view", SAMPLE, *words]) == 0
     assert titles == [f"{SAMPLE}, frame 6, axial strain 15 %"]
@@ -269,8 +269,8 @@ def test_a_long_path_leaves_frame_and_strain_in_the_picture(tmp_path, monkeypatc
         words.GetBoundingBox(plotter.renderer, box)
         widths.append((title, box[1] - box[0]))
 
-    monkeypatch.setattr("scanfab.writers.view.add_words", measure)
-    monkeypatch.setattr("scanfab.writers.view.check_drawing", lambda: None)
+    monkeypatch.setattr("scanfab.viz.window3d.add_words", measure)
+    monkeypatch.setattr("scanfab.viz.window3d.check_drawing", lambda: None)
     monkeypatch.setattr("pyvista.Plotter.screenshot", lambda _, path: Path(path).touch())
     folder = tmp_path.joinpath(*[letter * 30] * 5)
     folder.mkdir(parents=True)
@@ -286,7 +286,7 @@ def test_a_long_path_leaves_frame_and_strain_in_the_picture(tmp_path, monkeypatc
 @pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
 def test_the_title_of_a_sheared_cell_has_its_shear(tmp_path, monkeypatch):
     titles = []
-    monkeypatch.setattr("scanfab.writers.view.show_scene", lambda *said: titles.append(said[2]))
+    monkeypatch.setattr("scanfab.viz.window3d.show_scene", lambda *said: titles.append(said[2]))
     monkeypatch.chdir(ROOT)
     source = "sample_data/lammps_shear"
     assert run(["view", source, "--frame", "5", "--screenshot", str(tmp_path / "x.png")]) == 0
@@ -301,7 +301,7 @@ def test_the_title_of_a_sheared_cell_has_its_shear(tmp_path, monkeypatch):
 def test_the_first_frame_has_the_strain_of_the_others(tmp_path, monkeypatch, series, strain):
     """Neither has begun there."""
     titles = []
-    monkeypatch.setattr("scanfab.writers.view.show_scene", lambda *said: titles.append(said[2]))
+    monkeypatch.setattr("scanfab.viz.window3d.show_scene", lambda *said: titles.append(said[2]))
     source = f"{ROOT}/sample_data/{series}"
     assert run(["view", source, "--screenshot", str(tmp_path / "x.png")]) == 0
     assert titles == [f"{source}, frame 0, {strain} 0 %"]
@@ -314,7 +314,7 @@ def test_damaged_frames_before_the_one_asked_for_are_skipped(tmp_path, monkeypat
     write(tmp_path / "dump_1.txt", dump_text(cubic_rows(), step=1)[:-40])
     write(tmp_path / "dump_2.txt", dump_text(cubic_rows(), step=2))
     scenes = []
-    monkeypatch.setattr("scanfab.writers.view.show_scene", lambda *said: scenes.append(said[0]))
+    monkeypatch.setattr("scanfab.viz.window3d.show_scene", lambda *said: scenes.append(said[0]))
     words = ["--screenshot", str(tmp_path / "x.png")]
     assert run(["view", str(tmp_path), "--frame", "2", *words]) == 0
     assert scenes[0].window_radius is not None

@@ -190,7 +190,7 @@ def test_steps_beyond_the_budget_are_left_out_with_a_word(packing):
 
 
 def test_figure_has_four_panels_with_labels(found, tmp_path):
-    from scanfab.writers.plot_calibration import plot_calibration
+    from scanfab.viz.figures.calibration import plot_calibration
 
     for suffix, start in ((".png", b"\x89PNG"), (".svg", b"<?xml"), (".pdf", b"%PDF")):
         plot_calibration(found.rows, tmp_path / f"ladders{suffix}")
@@ -201,7 +201,7 @@ def test_figure_has_four_panels_with_labels(found, tmp_path):
 
 
 def test_figure_has_letters_total_errors_and_words(found, tmp_path, monkeypatch):
-    from scanfab.writers import plot_calibration
+    from scanfab.viz.figures import calibration as plot_calibration
 
     drawn = []
     monkeypatch.setattr(plot_calibration, "save_figure", lambda figure, _: drawn.append(figure))
@@ -224,7 +224,7 @@ def test_figure_has_letters_total_errors_and_words(found, tmp_path, monkeypatch)
 
 def test_steps_of_one_replicate_have_no_band(found, tmp_path, monkeypatch):
     """Of the sample's part alone it claimed to be of both, about a value that was far off."""
-    from scanfab.writers import plot_calibration
+    from scanfab.viz.figures import calibration as plot_calibration
 
     drawn, bands = [], []
     monkeypatch.setattr(plot_calibration, "save_figure", lambda figure, _: drawn.append(figure))

@@ -1,0 +1,113 @@
+"""The ladders of a calibration as a figure of four panels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.table.curves import short_names
+from scanfab.table.reading import total_error
+from scanfab.viz.figures.style import (
+    LOOKS,
+    VOID_AXIAL,
+    VOID_UNIT,
+    WIDTH,
+    band,
+    check_plot_file,
+    letter,
+    new_figure,
+    plain,
+    save_figure,
+)
+
+__all__ = ["plot_calibration"]
+
+# ladder: label of the axis, whether it is logarithmic, and the paper's choice
+PANELS: dict[str, tuple[str, bool, float | None]] = {
+    "spacing": ("spacing of lines $s/r_{min}$", True, 0.1),
+    "directions": ("number of directions", True, None),
+    "cutoff": ("cut-off $c/r_{min}$", False, 1.0),
+    "rv": ("RV radius / half extent", False, 0.67),
+}
+
+
+def plot_calibration(rows: Sequence[Any], path: Path) -> None:
+    """
+    Draw alpha_vs_axial over each ladder: bands are total standard errors, bars the scan's part.
+
+    Parameters
+    ----------
+    rows : sequence of StepRow
+        Of :func:`scanfab.calibrate`; lengths of the axes are relative to r_min.
+    path : Path
+        ``.png``, ``.svg`` or ``.pdf``.
+
+    Raises
+    ------
+    SettingsError
+        If the file's name ends otherwise.
+    """
+    check_plot_file(path)
+    with new_figure(WIDTH, 5.2) as figure:
+        panels = figure.subplots(2, 2).ravel()
+        for panel, ladder in zip(panels, PANELS, strict=True):
+            _draw(panel, [row for row in rows if row.ladder == ladder], ladder)
+        letter(panels)
+        handles, labels = panels[0].get_legend_handles_labels()
+        figure.legend(
+            handles,
+            labels,
+            loc="outside upper center",
+            ncols=4,
+            title=f"{_frame(rows)}bands: one total standard error, of scan and sample together"
+            f"{_missing(rows)}\nbars: the scan's part; dotted: the choice of the 2017 paper",
+        )
+        save_figure(figure, path)
+
+
+def _frame(rows: Sequence[Any]) -> str:
+    """What was scanned, as a line of its own."""
+    if not rows:
+        return ""
+    name = plain(short_names([rows[0].source])[rows[0].source])
+    return f"{f'{name}, ' if name else ''}frame {rows[0].frame}\n"
+
+
+def _missing(rows: Sequence[Any]) -> str:
+    """That there are steps without a band, as a line of its own."""
+    return "\nno band where either part is not known" if np.isnan(_totals(rows)).any() else ""
+
+
+def _totals(rows: Sequence[Any]) -> npt.NDArray[np.float64]:
+    """Total errors of the steps that have a void fabric; NaN where they are not known."""
+    known = [row for row in rows if row.alpha_vs_axial is not None]
+    totals = [total_error(asdict(row), "alpha_vs_axial") for row in known]
+    return np.array([np.nan if one is None else one for one in totals], np.float64)
+
+
+def _draw(panel: Any, rows: Sequence[Any], ladder: str) -> None:
+    """One ladder: a curve for each variant."""
+    label, logarithmic, paper = PANELS[ladder]
+    for variant in sorted({row.variant for row in rows}):
+        steps = [r for r in rows if r.variant == variant and r.alpha_vs_axial is not None]
+        values = np.array([row.value for row in steps])
+        alphas = 1e3 * np.array([row.alpha_vs_axial for row in steps])
+        band(panel, values, alphas, 1e3 * _totals(steps), LOOKS[variant]["color"])
+        panel.errorbar(
+            values,
+            alphas,
+            yerr=[1e3 * (row.alpha_vs_axial_se or 0.0) for row in steps],
+            label=f"variant {variant}",
+            **LOOKS[variant],
+        )
+    if paper is not None:
+        panel.axvline(paper, color="0.6", linewidth=0.8, linestyle=":")
+    if logarithmic:
+        panel.set_xscale("log")
+    panel.set_xlabel(label)
+    panel.set_ylabel(VOID_UNIT + VOID_AXIAL)

@@ -1,0 +1,102 @@
+"""Which curves share a panel, and how each of them looks there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from scanfab.table.curves import Curve
+from scanfab.viz.figures.style import COLOURS, LOOKS, plain
+
+__all__ = ["Drawn", "Group", "grouped"]
+
+Look = dict[str, Any]
+
+# of curves that are told apart by their sources
+SOURCE_LOOKS: tuple[Look, ...] = tuple(
+    {"color": COLOURS[colour], "marker": marker, "ls": line}
+    for colour, marker, line in zip(
+        ("blue", "vermilion", "green", "purple", "orange", "sky", "black"),
+        "o^DsvPX",
+        ("-", "--", "-.", ":", "-", "--", "-."),
+        strict=True,
+    )
+)
+OTHER: Look = {"color": "0.3", "marker": "v", "ls": "-"}
+MEANINGS = {"a": "whole", "b": "whole, rattlers void", "c": "RV", "d": "RV, rattlers void"}
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """A curve, its place among all of the table, its look and its name in the legend."""
+
+    curve: Curve
+    place: int
+    look: Look
+    name: str
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """The curves of one panel; the title is empty if there is one group alone."""
+
+    title: str
+    drawn: list[Drawn]
+
+
+def grouped(curves: Sequence[Curve]) -> list[Group]:
+    """
+    One source, or one variant of all sources, a panel: whichever makes fewer panels.
+
+    Several curves of several sources in one panel could not be told apart.
+    """
+    sources = list(dict.fromkeys(curve.source for curve in curves))
+    variants = sorted({curve.variant for curve in curves})
+    if len(sources) == 1:
+        return [_group("", curves, curves, _by_variant(True))]
+    if len(variants) == 1:
+        return [_group("", curves, curves, _by_source(sources, f"variant {variants[0]}, "))]
+    if len(sources) <= len(variants):
+        return [
+            _group(plain(source), curves, _of(curves, "source", source), _by_variant(False))
+            for source in sources
+        ]
+    return [
+        _group(_spelt(variant), curves, _of(curves, "variant", variant), _by_source(sources))
+        for variant in variants
+    ]
+
+
+def _of(curves: Sequence[Curve], name: str, value: str) -> list[Curve]:
+    return [curve for curve in curves if getattr(curve, name) == value]
+
+
+def _group(
+    title: str,
+    curves: Sequence[Curve],
+    chosen: Sequence[Curve],
+    looks: Callable[[Curve], tuple[Look, str]],
+) -> Group:
+    return Group(title, [Drawn(one, curves.index(one), *looks(one)) for one in chosen])
+
+
+def _by_variant(spelt: bool) -> Callable[[Curve], tuple[Look, str]]:
+    def look(curve: Curve) -> tuple[Look, str]:
+        name = _spelt(curve.variant) if spelt else f"variant {curve.variant}"
+        return LOOKS.get(curve.variant, OTHER), name
+
+    return look
+
+
+def _by_source(sources: Sequence[str], before: str = "") -> Callable[[Curve], tuple[Look, str]]:
+    def look(curve: Curve) -> tuple[Look, str]:
+        place = sources.index(curve.source) % len(SOURCE_LOOKS)
+        return SOURCE_LOOKS[place], f"{before}{plain(curve.source)}"
+
+    return look
+
+
+def _spelt(variant: str) -> str:
+    meaning = MEANINGS.get(variant)
+    return f"variant {variant}" if meaning is None else f"variant {variant}: {meaning}"

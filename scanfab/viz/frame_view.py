@@ -1,0 +1,148 @@
+"""One frame of a series to be looked at: read, told apart, and with the RV of the series."""
+
+from __future__ import annotations
+
+import warnings
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from scanfab.base.errors import (
+    PackingError,
+    ReadError,
+    ScanfabWarning,
+    SettingsError,
+    SkippedFrameWarning,
+)
+from scanfab.io.series import Frame, Series
+from scanfab.packing.sample import Sample
+from scanfab.pipeline.compute import classify, refuse_unknown_boundary, tell_doubts
+from scanfab.pipeline.plan import Plan, make_plan
+from scanfab.pipeline.settings import STRAIN_MODES, Settings
+from scanfab.pipeline.strain import StrainFile, axial_length, shear_strain
+from scanfab.table.abscissa import frame_strain_column, is_ambiguous
+from scanfab.viz.scene import Scene, about_window, scene_of
+
+__all__ = ["Look", "look_at"]
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """What there is to see and to say of one frame."""
+
+    scene: Scene
+    number: int
+    """Of the frame, counted from 0."""
+    sample: Sample
+    strains: dict[str, float | None]
+    """Axial and shear strain since the first frame that has grains, by the names of their columns
+    in the fabric table; None where that is not known."""
+    first: Sample | None
+    """The first frame that has grains, which fixes all lengths of the series."""
+    plan: Plan | None
+    """None if the settings do not fit the series."""
+    strain_column: str | None
+    """Which of the strains tells the frames of the series apart."""
+
+
+def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
+    """
+    One frame to be looked at; nothing is scanned.
+
+    Parameters
+    ----------
+    series : Series
+        The frames.
+    settings : Settings
+        Boundary, rattlers, RV, cut-off, axis and strain count.
+    number : int, optional
+        Which frame; negative from the end.
+
+    Raises
+    ------
+    ScanfabError
+        If there is no such frame, or it cannot be read.
+    """
+    number, frame = _frame(series, number)
+    sample = classify(frame.read(), settings)
+    tell_doubts(frame, sample, settings)
+    first = _first(series, settings)
+    if first is not None:
+        refuse_unknown_boundary(series, first, settings)
+    plan = None if first is None else _plan(first, settings)
+    scene = scene_of(sample, None if plan is None else plan.window)
+    if plan is not None:
+        scene = about_window(replace(scene, cutoff=plan.cutoff))
+    strains = _strains(number, sample, first, settings)
+    column = _strain_column(series, strains, first, settings)
+    return Look(scene, number, sample, strains, first, plan, column)
+
+
+def _frame(series: Series, number: int) -> tuple[int, Frame]:
+    """The frame, and its number from 0."""
+    count = 0
+    wanted = number
+    if number < 0:
+        count = sum(1 for _ in series)
+        wanted = number + count
+    for count, frame in enumerate(series, start=1):
+        if count == wanted + 1:
+            return wanted, frame
+    raise ReadError(f"{series.name}: has {count} frames, there is no frame {number}")
+
+
+def _first(series: Series, settings: Settings) -> Sample | None:
+    """The first frame that has grains; those that are damaged are skipped, as by compute."""
+    for number, frame in enumerate(series):
+        try:
+            sample = classify(frame.read(), settings)
+        except (PackingError, ReadError) as error:
+            warnings.warn(f"frame {number} skipped: {error}", SkippedFrameWarning, stacklevel=3)
+            continue
+        if sample.grains.any():
+            return sample
+    return None
+
+
+def _plan(first: Sample, settings: Settings) -> Plan | None:
+    """The plan of the series; None, with a warning, if it cannot be made."""
+    try:
+        return make_plan(settings, first)
+    except SettingsError as error:
+        warnings.warn(f"the RV is not shown: {error}", ScanfabWarning, stacklevel=3)
+        return None
+
+
+def _strains(
+    number: int, sample: Sample, first: Sample | None, settings: Settings
+) -> dict[str, float | None]:
+    axial, shear = _axial(number, sample, first, settings), None
+    if first is not None and sample.grains.any():
+        shear = shear_strain(sample.packing.cell, first.packing.cell)
+    return {"strain": axial, "shear_strain": shear}
+
+
+def _strain_column(
+    series: Series, strains: dict[str, float | None], first: Sample | None, settings: Settings
+) -> str | None:
+    """That of the frame; where no strain has begun, that of the last frame that can be read."""
+    frames = list(enumerate(series)) if is_ambiguous(strains) else []
+    for number, frame in reversed(frames):
+        with suppress(PackingError, ReadError):
+            last = classify(frame.read(), settings)
+            return frame_strain_column(_strains(number, last, first, settings))
+    return frame_strain_column(strains)
+
+
+def _axial(number: int, sample: Sample, first: Sample | None, settings: Settings) -> float | None:
+    """Axial strain as the fabric table has it; None also where it cannot be had."""
+    if settings.strain not in STRAIN_MODES:
+        return StrainFile(Path(settings.strain)).at(number, sample.packing.step)
+    if first is None or not sample.grains.any():
+        return None
+    try:
+        lengths = [axial_length(one, settings.strain, settings.axis) for one in (first, sample)]
+    except SettingsError:
+        return None
+    start, now = lengths
+    return None if not start or now is None else 1.0 - now / start

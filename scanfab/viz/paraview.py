@@ -1,0 +1,163 @@
+"""Computed frames as ParaView files: which kinds there are, and what each holds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.base.errors import SettingsError
+from scanfab.base.files import check_folder
+from scanfab.fabric.distribution import mean_length_function, sphere_points
+from scanfab.fabric.tensor import COMPONENTS
+from scanfab.packing.sample import VARIANTS
+from scanfab.pipeline.frame import FrameResult
+from scanfab.pipeline.settings import Vector
+from scanfab.scan.lines import line_frames
+from scanfab.scan.segments import Segments, sample_segments
+from scanfab.table.table import Row
+from scanfab.viz import vtk_files as vtk
+from scanfab.viz.scene import contact_lines, grains_of, scene_of
+
+__all__ = ["VtkFolder", "scan_line_sample"]
+
+FloatArray = npt.NDArray[np.float64]
+
+LINES = 120
+TEXT_FIELDS = ("source", "variant", "contacts_from")
+
+
+class VtkFolder:
+    """
+    A folder of ParaView files, to be called with each computed frame of one series.
+
+    Parameters
+    ----------
+    folder : Path
+        Is made if it does not exist.
+    axis : tuple of float
+        Loading axis, along which half of the scan lines run.
+    go_on : bool, optional
+        Keep the frames of an earlier run in the collections.
+
+    Raises
+    ------
+    SettingsError
+        If the folder cannot be made or written to.
+    """
+
+    def __init__(self, folder: Path, axis: Vector, go_on: bool = False) -> None:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise SettingsError(f"{folder}: cannot be made: {error.strerror}") from None
+        check_folder(folder / "grains.pvd")
+        self.folder = folder
+        self.axis = axis
+        self.go_on = go_on
+        self._collections: dict[str, vtk.Collection] = {}
+        # frames come from several threads, and VTK is not made for that
+        self._lock = Lock()
+
+    def __call__(self, result: FrameResult) -> None:
+        """Write all files of a frame."""
+        with self._lock:
+            window = None if result.measurement is None else result.measurement.plan.window
+            fields = _fields(result.rows)
+            self._save("grains", vtk.grain_mesh(grains_of(result.sample, window)), result, fields)
+            contacts = vtk.contact_mesh(contact_lines(result.sample, window))
+            self._save("contacts", contacts, result, fields)
+            if window is not None:
+                surface = vtk.window_mesh(window.center, window.radius)
+                self._save("window", surface, result, fields)
+            for row in result.rows:
+                self._save_variant(result, row)
+
+    def _save_variant(self, result: FrameResult, row: Row) -> None:
+        fields = _fields([row])
+        if result.measurement is None:
+            return
+        center = scene_of(result.sample, result.measurement.plan.window).center
+        lines = scan_line_sample(result, row.variant, self.axis)
+        mesh = vtk.line_mesh(lines, result.measurement.plan.cutoff)
+        self._save(f"lines-{row.variant}", mesh, result, fields)
+        sums = result.measurement.sums
+        kept = result.measurement.kept(row.variant)
+        function = mean_length_function(sums.axes, *kept)
+        if function is not None and row.alpha_vs is not None:
+            points, weights = sphere_points()
+            surface = vtk.distribution_mesh(points, function(points), weights)
+            self._save(f"distribution-{row.variant}", surface, result, fields)
+        tensors = _tensors(row)
+        if tensors:
+            size = 0.3 * _reach(result)
+            mesh = vtk.ellipsoid_mesh(tensors, center, size)
+            self._save(f"ellipsoids-{row.variant}", mesh, result, fields)
+            mesh = vtk.tensor_points(tensors, center)
+            self._save(f"tensors-{row.variant}", mesh, result, fields)
+
+    def _save(self, kind: str, mesh: Any, result: FrameResult, fields: Mapping[str, Any]) -> None:
+        file = f"{kind}_{result.number:06d}.vtp"
+        vtk.save_mesh(mesh, self.folder / file, fields)
+        if kind not in self._collections:
+            path = self.folder / f"{kind}.pvd"
+            self._collections[kind] = vtk.Collection(path, self.go_on)
+        self._collections[kind].add(file, _time(result))
+
+
+def scan_line_sample(
+    result: FrameResult, variant: str, axis: Vector, lines: int = LINES
+) -> Segments:
+    """A few scan lines along the loading axis and across it, in the dump's coordinates."""
+    position, radius, reach = result.scanned.spheres_of(VARIANTS[variant])
+    frame = line_frames(np.array([axis]))[0]
+    # along the axis, and along the first direction across it
+    frames = np.stack([frame, np.roll(frame, -1, axis=0)])
+    found = sample_segments(position, radius, frames, lines, reach)
+    center = scene_of(result.sample, result.scanned.plan.window).center
+    return replace(found, ends=found.ends + center)
+
+
+def _time(result: FrameResult) -> float:
+    """Time of the dump, else its step, else the frame's number."""
+    packing = result.sample.packing
+    known = [value for value in (packing.time, packing.step) if value is not None]
+    return float(known[0] if known else result.number)
+
+
+def _reach(result: FrameResult) -> float:
+    position, _, reach = result.scanned.spheres_of(VARIANTS[result.rows[-1].variant])
+    return reach or float(np.linalg.norm(position, axis=1).max())
+
+
+def _tensors(row: Row) -> dict[str, FloatArray]:
+    """The row's tensors that exist, shape (3, 3)."""
+    found = {}
+    for name in ("gvs", "gc"):
+        matrix = np.empty((3, 3))
+        for component, (i, j) in COMPONENTS.items():
+            value = getattr(row, f"{name}_{component}")
+            matrix[i, j] = matrix[j, i] = np.nan if value is None else value
+        if np.isfinite(matrix).all():
+            found[name] = matrix
+    return found
+
+
+def _fields(rows: list[Row]) -> dict[str, Any]:
+    """The rows' values by column, one for each row; NaN where there is none."""
+    columns: dict[str, Any] = {}
+    for name in asdict(rows[0]):
+        values = [getattr(row, name) for row in rows]
+        if name in TEXT_FIELDS:
+            # VTK's texts are ASCII
+            columns[name] = [str(v).encode("ascii", "backslashreplace").decode() for v in values]
+        else:
+            columns[name] = np.array(
+                [np.nan if value is None else value for value in values], np.float64
+            )
+    return columns

@@ -1,0 +1,78 @@
+"""How large the lobes in pictures of all directions are by chance alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.fabric.distribution import HIGHEST_DEGREE, sphere_points
+from scanfab.pipeline.frame import FrameResult
+from scanfab.table.reading import number_of, total_error
+from scanfab.viz.figures.of_frames import Projection
+from scanfab.viz.figures.scanned import CONCENTRATION, ScannedFrames
+
+__all__ = ["contact_noise", "noise_notes", "void_noise"]
+
+FloatArray = npt.NDArray[np.float64]
+
+# a lobe is a sum of harmonics, each with √5 times the error of the axial anisotropy α: of the
+# sample those of the second degree, five, as it hardly differs in finer ones; of the scan all that
+# are fitted, as lines of different directions are independent
+SAMPLE_HARMONICS = 5
+SCAN_HARMONICS = sum(2 * degree + 1 for degree in range(2, HIGHEST_DEGREE + 1, 2))
+# where nothing but noise is, the largest lobe of a picture is 2 to 3 times its standard error
+CHANCE = 3.0
+
+
+def noise_notes(frames: ScannedFrames, projections: Sequence[Projection]) -> str:
+    """
+    What chance alone makes of the lobes of each frame, in words.
+
+    The error of a lobe is of scan and sample together, as if it were the same in all directions.
+    """
+    notes = []
+    for result, picture in zip(frames.results, projections, strict=True):
+        known = [
+            _note(what, error, deviation)
+            for what, error, deviation in (
+                ("void lengths", void_noise(result), picture.void),
+                ("contact normals", contact_noise(result), picture.contact),
+            )
+            if error is not None and deviation is not None
+        ]
+        if known:
+            notes.append(f"Frame {result.number}: {'; '.join(known)}.")
+    return " ".join(notes)
+
+
+def _note(what: str, error: float, deviation: FloatArray) -> str:
+    largest = float(np.abs(deviation).max())
+    text = f"lobes of {what} reach {largest:.2g} %, one standard error is {error:.2g} %"
+    return f"{text}, so they are noise" if largest < CHANCE * error else text
+
+
+def void_noise(result: FrameResult) -> float | None:
+    """Standard error of a lobe of the mean void length, per cent of the mean."""
+    row = asdict(result.rows[0])
+    scan, sample = (number_of(row, f"alpha_vs_axial_{part}") for part in ("se", "sample_se"))
+    if sample is None:
+        return None
+    parts = math.sqrt(SCAN_HARMONICS) * (scan or 0.0), math.sqrt(SAMPLE_HARMONICS) * sample
+    return 100.0 * math.sqrt(5.0) * math.hypot(*parts)
+
+
+def contact_noise(result: FrameResult) -> float | None:
+    """Standard error of the smoothed density of contact normals, per cent of the mean."""
+    row = asdict(result.rows[0])
+    alone, error = number_of(row, "alpha_c_axial_se"), total_error(row, "alpha_c_axial")
+    if not alone or error is None:
+        return None
+    points, weights = sphere_points()
+    kernel = np.exp(CONCENTRATION * points[:, 2] ** 2)
+    spread = float(weights @ kernel**2) / float(weights @ kernel) ** 2 - 1.0
+    # neighbouring contacts are not independent: by how much is known of the anisotropy
+    return 100.0 * math.sqrt(spread / row["contacts"]) * error / alone

@@ -1,0 +1,180 @@
+"""What a report shows of the dumps: a view, the sample in numbers, and pictures of two frames."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from scanfab.base.errors import SettingsError
+from scanfab.io.series import Series
+from scanfab.packing.sample import Sample
+from scanfab.packing.window import SurfaceBox
+from scanfab.pipeline.repeat import reopen, restored_settings
+from scanfab.pipeline.settings import Length, Settings
+from scanfab.table.reading import number_of
+from scanfab.viz.figures.of_frames import drawn_histogram, drawn_projection
+from scanfab.viz.figures.scanned import lengths_of, projections_of, scan_frames
+from scanfab.viz.figures.style import figure_bytes
+from scanfab.viz.frame_view import Look, look_at
+from scanfab.viz.report.frame_noise import noise_notes
+from scanfab.viz.report.inputs import Input
+from scanfab.viz.report.page import Picture, Shown, view_data
+
+__all__ = ["data_url", "show_frames"]
+
+# segments of a scan that takes about half a minute: pictures that would need more are rougher
+MOST_SEGMENTS = 3e8
+DPI = 130
+# of pictures with two columns and one, CSS pixels
+WIDE, NARROW = 614, 326
+
+
+def show_frames(one: Input) -> Shown:
+    """
+    Read the source of a table again.
+
+    Raises
+    ------
+    ScanfabError, OSError
+        If it has changed, or cannot be read again.
+    """
+    manifest = one.manifest or {}
+    _check_inputs(manifest)
+    asked = manifest["settings"]
+    series, settings = reopen(asked), restored_settings(asked)
+    if settings.cutoffs:
+        settings = replace(settings, cutoffs=(), cutoff=_shown_cutoff(one, settings))
+    look = look_at(series, replace(settings, variants="c"), one.last_frame)
+    return Shown(
+        view=view_data(look.scene, settings.axis),
+        view_title=_title(one, look.number),
+        facts=_facts(look, settings),
+        pictures=_pictures(one, series, settings),
+    )
+
+
+def data_url(kind: str, data: bytes) -> str:
+    """A file inside the page."""
+    return f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}"
+
+
+def _check_inputs(manifest: Mapping[str, Any]) -> None:
+    """An error if a file has another size than when it was computed."""
+    for one in manifest.get("inputs") or []:
+        path = Path(str(one.get("path")))
+        if path.exists() and path.stat().st_size != one.get("size"):
+            raise SettingsError(f"{path} has changed since the table was computed")
+
+
+def _shown_cutoff(one: Input, settings: Settings) -> Length:
+    """Of several cut-offs that whose rows are reported."""
+    return settings.cutoff if one.cutoff is None else Length(one.cutoff)
+
+
+def _title(one: Input, frame: int) -> str:
+    source = str(one.rows[0]["source"])
+    return ", ".join(filter(None, [source, f"frame {frame}", one.strain_of(frame)]))
+
+
+def _facts(look: Look, settings: Settings) -> list[tuple[str, str]]:
+    """The sample in numbers."""
+    first, plan = look.first, look.plan
+    if first is None:
+        return []
+    radii = first.packing.radius[first.grains]
+    smallest = float(radii.min())
+    facts = [
+        ("grains", f"{int(first.grains.sum())} in the first frame that has grains"),
+        ("radii", f"smallest {smallest:.4g}, mean {radii.mean():.4g}, largest {radii.max():.4g}"),
+        ("boundary", f"{int(first.boundary.sum())} particles" if first.boundary.any() else "none"),
+        ("cell", _cell(look)),
+        ("loading axis", _axis(settings)),
+    ]
+    if plan is None:
+        return facts
+    facts.append(("cut-off", f"{plan.cutoff:.4g}, {plan.cutoff / smallest:.3g} smallest radii"))
+    if plan.window is not None:
+        radius = plan.window.radius
+        facts += [
+            ("centre of the RV", ", ".join(f"{one:.4g}" for one in plan.window.center)),
+            (
+                "radius of the RV",
+                f"{radius:.4g}, {_part_of_sample(first, look, radius)}, "
+                f"{radius / radii.mean():.3g} mean radii",
+            ),
+        ]
+    return facts
+
+
+def _part_of_sample(first: Sample, look: Look, radius: float) -> str:
+    """The RV beside the sample that it was chosen for, and beside what became of that since."""
+    then = f"{_fraction(first, radius)} of half the sample's smallest extent"
+    if not look.sample.gathered.any() or _fraction(look.sample, radius) == _fraction(first, radius):
+        return then
+    now = f"{_fraction(look.sample, radius)} in frame {look.number}"
+    return f"{then} in the first frame that has grains, {now}"
+
+
+def _fraction(sample: Sample, radius: float) -> str:
+    extent = SurfaceBox.of(sample.packing, sample.gathered).smallest_extent
+    return f"{2 * radius / extent:.3g}"
+
+
+def _cell(look: Look) -> str:
+    cell = look.sample.packing.cell
+    if cell is None or not look.sample.packing.is_periodic:
+        return "not periodic"
+    along = "".join(name for name, repeats in zip("xyz", cell.periodic, strict=True) if repeats)
+    vectors = "; ".join(", ".join(f"{part:.4g}" for part in row) for row in cell.vectors)
+    return f"periodic along {along}, vectors ({vectors})"
+
+
+def _axis(settings: Settings) -> str:
+    named = [name for name, part in zip("xyz", settings.axis, strict=True) if part == 1.0]
+    return named[0] if named else ", ".join(f"{part:.4g}" for part in settings.axis)
+
+
+def _pictures(one: Input, series: Series, settings: Settings) -> list[Picture]:
+    """Of the first and the last frame, both from one scan."""
+    # the series may be named otherwise if it was opened from another folder
+    rows = [{**row, "source": series.name} for row in one.first_series]
+    if all(row["alpha_vs_axial"] is None for row in rows):
+        return []
+    drawn = replace(settings, tolerance=_affordable_tolerance(rows, settings))
+    frames = scan_frames(series, drawn, rows)
+    projections = projections_of(frames)
+    # pixels, as the disks are pixels anyway, and few of them
+    with drawn_projection(projections) as figure:
+        disks = figure_bytes(figure, "png", DPI)
+    with drawn_histogram(lengths_of(frames)) as figure:
+        histogram = figure_bytes(figure, "png", DPI)
+    what = f"variant {frames.variant} of {one.rows[0]['source']}"
+    rougher = ""
+    if drawn.tolerance > settings.tolerance:
+        rougher = (
+            f" Scanned to a standard error of {drawn.tolerance:.2g} instead of the table's "
+            f"{settings.tolerance:.2g}, which would take too long for a picture."
+        )
+    return [
+        Picture(
+            data_url("image/png", disks),
+            f"Mean void length and contact normals over all directions, {what}. "
+            f"{noise_notes(frames, projections)}{rougher}",
+            WIDE,
+        ),
+        Picture(
+            data_url("image/png", histogram),
+            f"Lengths of the void segments, {what}; those below the cut-off are dropped.",
+            NARROW,
+        ),
+    ]
+
+
+def _affordable_tolerance(rows: list[dict[str, Any]], settings: Settings) -> float:
+    """The table's, or as much more as makes the scan short enough to wait for."""
+    most = max((number_of(row, "segments") or 0.0 for row in rows), default=0.0)
+    is_fixed = settings.spacing is not None and settings.directions is not None
+    return settings.tolerance * (1.0 if is_fixed else max(1.0, most / MOST_SEGMENTS) ** 0.5)

@@ -1,0 +1,215 @@
+"""The report as one HTML page: everything inside, nothing fetched, all text escaped."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.base.errors import SettingsError
+from scanfab.base.files import check_folder, whole_file
+from scanfab.viz.figures.style import COLOURS
+from scanfab.viz.scene import Scene
+
+__all__ = [
+    "Content",
+    "Part",
+    "Picture",
+    "Section",
+    "Shown",
+    "check_page_file",
+    "render_page",
+    "save_page",
+    "view_data",
+]
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+# spheres that a browser turns without effort
+MOST_GRAINS = 4_000
+# of balls in the RV, outside, and of rattlers, and paler where a plane cuts them
+KIND_COLOURS = (
+    (COLOURS["sky"], "#B4DDF5"),
+    ("#C9CED3", "#E8EAEC"),
+    (COLOURS["orange"], "#F5DB9F"),
+)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure inside the page."""
+
+    url: str
+    """With the scheme ``data:``."""
+    caption: str
+    width: int
+    """At which its letters are as large as those of the page, CSS pixels."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """A table to be shown."""
+
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    note: str = ""
+    title: str = ""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What the source of a table shows."""
+
+    view: Mapping[str, Any]
+    """From :func:`view_data`."""
+    view_title: str
+    facts: Sequence[tuple[str, str]]
+    """The sample in numbers: what, and how much."""
+    pictures: Sequence[Picture]
+
+
+@dataclass(frozen=True)
+class Section:
+    """What is known of one computation."""
+
+    title: str
+    missing: str = ""
+    """Why nothing is known."""
+    command: str = ""
+    settings: Sequence[tuple[str, str, str]] = ()
+    versions: Sequence[tuple[str, str]] = ()
+    inputs: Part = field(default_factory=lambda: Part((), ()))
+    shown: Shown | None = None
+    no_view: str = ""
+    """Why nothing is shown."""
+
+
+@dataclass(frozen=True)
+class Content:
+    """All that the page tells."""
+
+    title: str
+    author: str
+    date: str
+    summary: Sequence[str]
+    results: Sequence[Part]
+    """For each source; the first column names the lines."""
+    pictures: Sequence[Picture]
+    warnings: Sequence[str]
+    notes: Sequence[str]
+    sections: Sequence[Section]
+    frames: Part
+
+
+def check_page_file(path: Path) -> None:
+    """SettingsError if no page can be written to a file of this name."""
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise SettingsError(f"{path}: reports are HTML: name a file that ends in .html")
+    check_folder(path)
+
+
+def save_page(path: Path, page: str) -> None:
+    """Write a page; the file is complete or untouched."""
+    with whole_file(path) as part:
+        part.write_text(page, encoding="utf-8", errors="backslashreplace")
+
+
+def render_page(content: Content) -> str:
+    """The page."""
+    import jinja2
+
+    # escapes everything, and JSON in scripts too (the filter tojson)
+    environment = jinja2.Environment(
+        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters["symbols"] = _symbols
+    folder = files("scanfab.viz.report")
+    template = environment.from_string((folder / "page.html").read_text("utf-8"))
+    script = (folder / "page.js").read_text("utf-8")
+    return template.render(content=content, script=script)
+
+
+def _symbols(text: str) -> Any:
+    """A text, escaped, with the indices of α set low."""
+    from markupsafe import Markup, escape
+
+    low = {"α_vs": "α<sub>vs</sub>", "α_c": "α<sub>c</sub>"}
+    marked = str(escape(text))
+    for plain, markup in low.items():
+        marked = marked.replace(plain, markup)
+    return Markup(marked)
+
+
+def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
+    """
+    A scene for the page's viewer: whole numbers, thousandths of the half size of the scene.
+
+    Parameters
+    ----------
+    scene : Scene
+        One frame.
+    axis : array_like, shape (3,)
+        Is upright.
+    """
+    grains = scene.grains
+    shown = ~grains.boundary
+    position = grains.position[shown] - scene.center
+    radius = grains.radius[shown]
+    nearest = np.argsort(np.linalg.norm(position, axis=1), kind="stable")[:MOST_GRAINS]
+    reach = np.linalg.norm(position[nearest], axis=1) + radius[nearest]
+    size = float(reach.max(initial=0.0)) or scene.window_radius or 1.0
+    scale = 1000.0 / size
+    up = np.asarray(axis, dtype=np.float64)
+    turn = _upright(up)
+    kinds = np.where(grains.in_window[shown], 0, 1)
+    kinds[grains.rattler[shown]] = 2
+    names = ["grains in the RV", "grains outside", "rattlers"]
+    if scene.window_radius is None:
+        names[1] = "grains"
+    numbers = np.column_stack([position @ turn.T, radius])[nearest] * scale
+    return {
+        "kinds": [
+            {"name": name, "colour": colour, "pale": pale}
+            for name, (colour, pale) in zip(names, KIND_COLOURS, strict=True)
+        ],
+        "spheres": [
+            [*values, kind]
+            for values, kind in zip(
+                np.rint(numbers).astype(int).tolist(), kinds[nearest].tolist(), strict=True
+            )
+        ],
+        "axes": _axes(up, turn),
+        "rv": None if scene.window_radius is None else round(scene.window_radius * scale),
+        "cutoff": scene.cutoff * scale,
+        "size": size,
+        "left_out": int(shown.sum() - len(nearest)),
+    }
+
+
+def _upright(axis: FloatArray) -> FloatArray:
+    """The rotation (rows) after which the axis is z; keeps x, y and z where it can."""
+    across = np.eye(3)[np.argmin(np.abs(axis))]
+    first = across - (across @ axis) * axis
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(axis, first), axis])
+
+
+def _axes(up: FloatArray, turn: FloatArray) -> list[list[Any]]:
+    """Names and unit vectors of x, y, z and the loading axis, as the viewer sees them."""
+    axes = [
+        [f"{name} (loading)" if one @ up > 1.0 - 1e-9 else name, *_rounded(turn @ one)]
+        for name, one in zip("xyz", np.eye(3), strict=True)
+    ]
+    if up.max() < 1.0 - 1e-9:
+        axes.append(["loading", *_rounded(turn @ up)])
+    return axes
+
+
+def _rounded(vector: FloatArray) -> list[float]:
+    return [round(part, 4) + 0.0 for part in vector.tolist()]

@@ -1,0 +1,189 @@
+"""The report: what a table says, in plain words, tables, figures and a view that can be turned."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, date, datetime
+from pathlib import Path
+from typing import Any
+
+from scanfab.base.errors import ScanfabError, ScanfabNote, ScanfabWarning, SettingsError
+from scanfab.pipeline.repeat import repeat_command
+from scanfab.table.compare import compare_tables
+from scanfab.table.comparison import Comparison
+from scanfab.viz.figures.fitted import fits_of
+from scanfab.viz.report.caveats import caveats_of
+from scanfab.viz.report.frames import data_url, show_frames
+from scanfab.viz.report.inputs import Input, read_inputs
+from scanfab.viz.report.page import Content, Picture, Section, Shown, render_page
+from scanfab.viz.report.setting_meanings import settings_table
+from scanfab.viz.report.tables import frame_table, input_table, overview, results_tables
+
+__all__ = ["Report", "make_report"]
+
+
+# CSS pixels an inch
+PIXELS = 96
+
+
+@dataclass(frozen=True)
+class Report:
+    """A report on fabric tables."""
+
+    page: str
+    """HTML that needs nothing else."""
+    has_void_fabric: bool
+    """Whether any row of the tables has one."""
+
+
+@dataclass
+class _Heard:
+    """What the makers of a table were told, and what is told now; each text once."""
+
+    warnings: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+def make_report(
+    tables: Sequence[Path],
+    *,
+    title: str | None = None,
+    author: str = "",
+    cutoff: float | None = None,
+    labels: Sequence[str] | None = None,
+    today: date | None = None,
+) -> Report:
+    """
+    The report on fabric tables as one HTML page that needs nothing else.
+
+    Parameters
+    ----------
+    tables : sequence of Path
+        Tables of :func:`scanfab.compute`; settings and versions come from the manifest beside
+        each, ``TABLE.manifest.json``, and the view from the source that it names.
+    title, author : str, optional
+        Of the page; by default the sources' names, and none.
+    cutoff : float, optional
+        Report the rows of this cut-off, if the tables have several.
+    labels : sequence of str, optional
+        A name for each table in place of its source.
+    today : date, optional
+        The date of the report.
+
+    Raises
+    ------
+    ScanfabError
+        If a table cannot be read, is no fabric table, or holds no frames.
+    """
+    heard = _Heard()
+    with _listening(heard, tell=True):
+        inputs = read_inputs(tables, cutoff, labels)
+        rows = [row for one in inputs for row in one.rows]
+        comparison = compare_tables(rows)
+        pictures = _table_pictures(rows, comparison)
+    sections = [_section(one, heard) for one in inputs]
+    asked = [one.manifest["settings"] for one in inputs if one.manifest is not None]
+    content = Content(
+        title=title or _usual_title(rows),
+        author=author,
+        date=(today or datetime.now(UTC).astimezone().date()).isoformat(),
+        summary=[overview(one.path, one.rows) for one in inputs],
+        results=results_tables(comparison.summary, rows),
+        pictures=[*pictures, *_frame_pictures(sections)],
+        warnings=list(dict.fromkeys([*heard.warnings, *caveats_of(rows, asked)])),
+        notes=list(dict.fromkeys(heard.notes)),
+        sections=sections,
+        frames=frame_table(rows),
+    )
+    found = any(row["alpha_vs_axial"] is not None for row in rows)
+    return Report(render_page(content), found)
+
+
+def _usual_title(rows: Sequence[Mapping[str, Any]]) -> str:
+    sources = list(dict.fromkeys(str(row["source"]) for row in rows))
+    names = [Path(source).name or source for source in sources]
+    return f"Void fabric of {', '.join(names) if len(names) < 4 else f'{len(names)} samples'}"
+
+
+def _table_pictures(rows: Sequence[Mapping[str, Any]], comparison: Comparison) -> list[Picture]:
+    """The figures of the table; none if it has no void fabric."""
+    from scanfab.viz.figures.of_tables import SIZES, TABLE_FIGURES, draw_table
+    from scanfab.viz.figures.style import figure_bytes, new_figure
+
+    fits = fits_of(comparison)
+    pictures = []
+    for name in TABLE_FIGURES:
+        with new_figure(*SIZES[name]) as figure:
+            try:
+                (caption,) = draw_table(figure, rows, fits, name)
+            except SettingsError:
+                return []
+            url = data_url("image/svg+xml", figure_bytes(figure, "svg"))
+        width = round(PIXELS * SIZES[name][0])
+        pictures.append(Picture(url, f"{caption}.", width))
+    return pictures
+
+
+def _frame_pictures(sections: Sequence[Section]) -> list[Picture]:
+    return [picture for one in sections if one.shown for picture in one.shown.pictures]
+
+
+def _section(one: Input, heard: _Heard) -> Section:
+    """What the manifest says, and what the source shows; ``heard`` gets the warnings."""
+    if one.manifest is None:
+        missing = (
+            f"There is no {one.path.name}.manifest.json beside {one.path}: settings, versions and "
+            f"inputs are not known. scanfab compute writes it with -o."
+        )
+        return Section(title=str(one.path), missing=missing)
+    asked = one.manifest["settings"]
+    heard.warnings += map(str, one.manifest.get("warnings") or [])
+    heard.notes += map(str, one.manifest.get("notes") or [])
+    shown: Shown | None = None
+    no_view = ""
+    if one.rows:
+        try:
+            with _listening(heard):
+                shown = show_frames(one)
+        except (ScanfabError, OSError) as error:
+            no_view = f"The view is left out: {error}."
+    return Section(
+        title=str(one.path),
+        command=repeat_command(asked, one.path.name, _overridden(one.manifest)),
+        settings=settings_table(asked),
+        versions=[(str(k), str(v)) for k, v in (one.manifest.get("versions") or {}).items()],
+        inputs=input_table(one.manifest),
+        no_view=no_view,
+        shown=shown,
+    )
+
+
+def _overridden(manifest: Mapping[str, Any]) -> list[str]:
+    """Options of the settings file beside the dumps that the command line has overridden."""
+    found = manifest.get("settings_file")
+    return [str(name) for name in found.get("not_used", [])] if isinstance(found, dict) else []
+
+
+class _listening(warnings.catch_warnings):  # noqa: N801
+    """Collect the texts of warnings and notes; ``tell`` them too."""
+
+    def __init__(self, heard: _Heard, tell: bool = False) -> None:
+        super().__init__(record=True)
+        self.heard, self.tell = heard, tell
+
+    def __enter__(self) -> Any:
+        self.caught = super().__enter__()
+        warnings.simplefilter("always")
+        return self.caught
+
+    def __exit__(self, *details: Any) -> None:
+        for one in self.caught or []:
+            if issubclass(one.category, ScanfabWarning):
+                self.heard.warnings.append(str(one.message))
+            elif issubclass(one.category, ScanfabNote):
+                self.heard.notes.append(str(one.message))
+        super().__exit__(*details)
+        for one in self.caught or [] if self.tell else []:
+            warnings.warn(one.message, one.category, stacklevel=3)

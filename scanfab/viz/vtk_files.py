@@ -1,0 +1,232 @@
+"""ParaView files: one a frame and kind, and one collection (.pvd) a kind that knows the times."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.base.files import whole_file
+from scanfab.scan.segments import Segments
+from scanfab.viz.scene import ContactLines, Grains
+
+__all__ = [
+    "Collection",
+    "contact_mesh",
+    "distribution_mesh",
+    "ellipsoid_mesh",
+    "grain_mesh",
+    "line_mesh",
+    "save_mesh",
+    "tensor_points",
+    "window_mesh",
+]
+
+FloatArray = npt.NDArray[np.float64]
+
+SOLID, DROPPED, KEPT = 0, 1, 2
+
+
+def grain_mesh(grains: Grains) -> Any:
+    """Points with what is known of each particle."""
+    import pyvista
+
+    mesh = pyvista.PolyData(grains.position) if len(grains.position) else pyvista.PolyData()
+    _add(
+        mesh.point_data,
+        {
+            "radius": grains.radius,
+            "id": grains.id,
+            "contacts": grains.contacts,
+            "rattler": grains.rattler.astype(np.uint8),
+            "boundary": grains.boundary.astype(np.uint8),
+            "in_window": grains.in_window.astype(np.uint8),
+        },
+    )
+    return mesh
+
+
+def contact_mesh(contacts: ContactLines) -> Any:
+    """A line from centre to centre for each contact."""
+    mesh = _lines(contacts.ends)
+    data: dict[str, npt.ArrayLike] = {
+        "normal": contacts.normal,
+        "boundary": contacts.boundary.astype(np.uint8),
+        "in_window": contacts.in_window.astype(np.uint8),
+    }
+    if contacts.force is not None:
+        data["force"] = contacts.force
+    _add(mesh.cell_data, data)
+    return mesh
+
+
+def line_mesh(segments: Segments, cutoff: float) -> Any:
+    """
+    Scan lines in pieces: ``state`` is 0 in solids, 1 in dropped and 2 in kept void segments.
+    """
+    mesh = _lines(segments.ends)
+    length = segments.length
+    kept = segments.void & (length >= cutoff)
+    _add(
+        mesh.cell_data,
+        {
+            "length": length,
+            "void": segments.void.astype(np.uint8),
+            "kept": kept.astype(np.uint8),
+            "state": np.where(segments.void, np.where(kept, KEPT, DROPPED), SOLID),
+            "line": segments.line,
+        },
+    )
+    return mesh
+
+
+def window_mesh(center: FloatArray, radius: float) -> Any:
+    """The surface of the RV."""
+    import pyvista
+
+    return pyvista.Icosphere(radius=radius, center=tuple(center), nsub=4)
+
+
+def distribution_mesh(directions: FloatArray, mean_length: FloatArray, weight: FloatArray) -> Any:
+    """
+    ℓ(n) as a closed surface about the origin, at ℓ in each direction n.
+
+    Parameters
+    ----------
+    directions : ndarray, shape (P, 3)
+        Unit vectors all over the sphere.
+    mean_length : ndarray, shape (P,)
+        ℓ(n), dump's length unit.
+    weight : ndarray, shape (P,)
+        Quadrature weights of the directions, sum 1.
+    """
+    import pyvista
+
+    mesh = pyvista.PolyData.from_regular_faces(
+        mean_length[:, None] * directions, _triangles(directions)
+    )
+    mean = float(weight @ mean_length)
+    _add(
+        mesh.point_data,
+        {
+            "mean_length": mean_length,
+            "weight": weight,
+            "direction": directions,
+            "deviation": mean_length / mean - 1.0,
+        },
+    )
+    return mesh
+
+
+def ellipsoid_mesh(tensors: Mapping[str, FloatArray], center: FloatArray, size: float) -> Any:
+    """
+    Fabric tensors as ellipsoids side by side along x; isotropy gives spheres of radius ``size``.
+
+    The half axes are 3 size times the principal values; ``kind`` numbers the tensors.
+    """
+    import pyvista
+
+    parts = []
+    for kind, matrix in enumerate(tensors.values()):
+        ball = pyvista.Icosphere(radius=1.0, nsub=3)
+        place = center + 2.5 * size * (kind - 0.5 * (len(tensors) - 1)) * np.eye(3)[0]
+        ball.points = np.asarray(ball.points) @ (3.0 * size * matrix) + place
+        ball.point_data["kind"] = np.full(ball.n_points, kind)
+        parts.append(ball)
+    mesh = pyvista.merge(parts, merge_points=False) if parts else pyvista.PolyData()
+    return mesh if isinstance(mesh, pyvista.PolyData) else mesh.extract_surface()
+
+
+def tensor_points(tensors: Mapping[str, FloatArray], center: FloatArray) -> Any:
+    """One point in the middle of the sample, 9-component arrays: for the Tensor Glyph filter."""
+    import pyvista
+
+    mesh = pyvista.PolyData(center[None])
+    _add(mesh.point_data, {name: matrix.reshape(1, 9) for name, matrix in tensors.items()})
+    return mesh
+
+
+def save_mesh(mesh: Any, path: Path, fields: Mapping[str, Any]) -> None:
+    """
+    Write a mesh with field data; the file is complete or untouched.
+
+    A field with the name of an array of the mesh is called ``row_NAME``: viewers ask by name.
+    """
+    taken = {*mesh.point_data, *mesh.cell_data}
+    for name, values in fields.items():
+        mesh.field_data[f"row_{name}" if name in taken else name] = values
+    text = _xml(mesh)
+    with whole_file(path) as part:
+        part.write_text(text, encoding="utf-8", newline="\n")
+
+
+def _xml(mesh: Any) -> str:
+    """The file's content: VTK writes it to memory, as its writer crashes on a full disk."""
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+
+    writer = vtkXMLPolyDataWriter()
+    writer.SetInputData(mesh)
+    writer.SetDataModeToBinary()
+    writer.WriteToOutputStringOn()
+    writer.Write()
+    text: str = writer.GetOutputString()
+    return text
+
+
+class Collection:
+    """A ``.pvd``: the files of one kind with their times; whole after each frame."""
+
+    ENTRY = re.compile(r'<DataSet timestep="([^"]*)" file="([^"]*)"/>')
+
+    def __init__(self, path: Path, go_on: bool = False) -> None:
+        """``go_on``: keep the entries of an earlier run."""
+        self.path = path
+        self.entries: dict[str, float] = {}
+        if go_on and path.exists():
+            for time, file in self.ENTRY.findall(path.read_text("utf-8")):
+                self.entries[file] = float(time)
+
+    def add(self, file: str, time: float) -> None:
+        """One more file, in the folder of the collection."""
+        self.entries[file] = time
+        lines = [
+            f'    <DataSet timestep="{time!r}" file="{file}"/>'
+            for file, time in sorted(self.entries.items(), key=lambda entry: (entry[1], entry[0]))
+        ]
+        text = (
+            '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
+            + "\n".join(lines)
+            + "\n  </Collection>\n</VTKFile>\n"
+        )
+        with whole_file(self.path) as part:
+            part.write_text(text, encoding="utf-8")
+
+
+def _lines(ends: FloatArray) -> Any:
+    """A line for each pair of ends, shape (K, 2, 3)."""
+    import pyvista
+
+    if len(ends) == 0:
+        return pyvista.PolyData()
+    return pyvista.line_segments_from_points(ends.reshape(-1, 3))
+
+
+def _add(data: Any, arrays: Mapping[str, npt.ArrayLike]) -> None:
+    for name, values in arrays.items():
+        if np.size(values):  # pyvista takes no empty arrays
+            data[name] = np.ascontiguousarray(values)
+
+
+def _triangles(directions: FloatArray) -> Any:
+    """Triangles between points on a sphere, all seen counter-clockwise from outside."""
+    from scipy.spatial import ConvexHull
+
+    corners = ConvexHull(directions).simplices.astype(np.int64)
+    a, b, c = directions[corners].transpose(1, 0, 2)
+    inward = np.einsum("ti,ti->t", np.cross(b - a, c - a), a) < 0
+    corners[inward] = corners[inward, ::-1]
+    return corners

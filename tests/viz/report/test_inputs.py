@@ -1,0 +1,146 @@
+"""Which tables a report takes, and in what words it refuses others."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import pytest
+
+from scanfab.base.errors import SettingsError
+from scanfab.cli.main import run
+from scanfab.table.reading import read_rows
+from scanfab.viz.report.report import make_report
+from tests.conftest import ROOT, SAMPLE
+from tests.helpers.dumps import write
+from tests.helpers.tables import curve
+from tests.viz.report.test_report import page_of, words_of
+
+pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.base.errors.ScanfabWarning")
+
+
+@pytest.fixture
+def table(tmp_path):
+    def make(rows, name="t.jsonl"):
+        return write(tmp_path / name, "".join(json.dumps(row) + "\n" for row in rows))
+
+    return make
+
+
+@pytest.fixture
+def copied(computed, tmp_path):
+    """The sample's table alone."""
+    return shutil.copy(computed.table, tmp_path / "fabric.csv")
+
+
+@pytest.mark.parametrize("word", ["x", True, [], {}, float("nan")])
+def test_odd_values_are_refused_by_table_row_and_column(table, word):
+    rows = curve()
+    rows[2]["alpha_vs_axial_sample_se"] = word
+    with pytest.raises(SettingsError, match=r"t\.jsonl: row 3: alpha_vs_axial_sample_se: expected"):
+        make_report([table(rows)])
+
+
+@pytest.mark.parametrize("words", [[], ["--summary"], ["--differences"]])
+def test_a_table_of_compare_is_refused(copied, tmp_path, capsys, words):
+    """It was reported as made of one replicate."""
+    other, page = tmp_path / "other.csv", tmp_path / "r.html"
+    assert run(["compare", str(copied), *words, "-o", str(other)]) == 0
+    assert run(["report", str(other), "-o", str(page)]) == 1
+    told = capsys.readouterr().err
+    assert f"{other}: this is a table of scanfab compare" in told
+    assert "expected one of scanfab compute" in told
+    assert not page.exists()
+
+
+def test_an_engine_s_table_is_refused(tmp_path, capsys):
+    table = ROOT / SAMPLE / "engine.csv"
+    assert run(["report", str(table), "-o", str(tmp_path / "r.html")]) == 1
+    assert f"{table}: there is no column" in capsys.readouterr().err
+
+
+def test_few_columns_are_enough(table):
+    few = ("frame", "variant", "alpha_vs_axial", "alpha_c_axial")
+    text = words_of(page_of([table([{name: row[name] for name in few} for row in curve()])]))
+    assert "5 frames of t; variants c." in text
+    assert "no column alpha_vs_axial_se" in text
+    with pytest.raises(SettingsError, match="there is no column variant"):
+        make_report([table([{k: v for k, v in row.items() if k != "variant"} for row in curve()])])
+
+
+def test_a_table_is_read_once(table, monkeypatch):
+    """It may come by a pipe."""
+    read = []
+    monkeypatch.setattr(
+        "scanfab.viz.report.inputs.read_rows", lambda path: read.append(path) or read_rows(path)
+    )
+    path = table(curve())
+    assert make_report([path]).has_void_fabric
+    assert read == [path]
+
+
+@pytest.fixture(scope="module")
+def several_cutoffs(tmp_path_factory):
+    """A table of two cut-offs, which differ from what the scan is made for."""
+    table = tmp_path_factory.mktemp("cutoffs") / "fabric.csv"
+    words = ["--boundary", "mask=3", "--tolerance", "1e-3", "--frames", "0::3", "--variants", "c"]
+    source = str(ROOT / SAMPLE)
+    assert run(["compute", source, *words, "--cutoffs", "0.0005,0.001", "-o", str(table)]) == 0
+    return table
+
+
+def test_one_of_several_cut_offs_is_reported(several_cutoffs, tmp_path, capsys):
+    page = tmp_path / "r.html"
+    assert run(["report", str(several_cutoffs), "-o", str(page)]) == 1
+    assert "choose the rows of one cut-off with --cutoff" in capsys.readouterr().err
+    assert run(["report", str(several_cutoffs), "--cutoff", "0.001", "-o", str(page)]) == 0
+    text = words_of(page.read_text("utf-8"))
+    assert "cut-off 0.001, 1.98 smallest radii" in text
+    assert "--cutoffs 0.0005,0.001" in text
+    chosen = [row for row in read_rows(several_cutoffs) if row["cutoff"] == 0.001]
+    assert f"α vs at axial strain 15 % {chosen[-1]['alpha_vs_axial']:.4f} ±" in text
+
+
+def test_labels_tell_runs_of_one_sample_apart(table, tmp_path, capsys):
+    words = [str(table(curve(), "a.jsonl")), str(table(curve(factor=2.0), "b.jsonl"))]
+    page = tmp_path / "r.html"
+    assert run(["report", *words, "-o", str(page)]) == 1
+    assert "--label NAME" in capsys.readouterr().err
+    labels = ["--label", "old", "--label", "new"]
+    assert run(["report", *words, *labels, "-o", str(page)]) == 0
+    text = words_of(page.read_text("utf-8"))
+    assert "Void fabric of old, new" in text
+    assert run(["report", *words, "--label", "old", "-o", str(page)]) == 2
+    assert "--label: expected one a table: 2, found 1" in capsys.readouterr().err
+
+
+def test_an_empty_table_is_an_error(table, tmp_path, capsys):
+    path = write(tmp_path / "t.csv", "source,frame,strain,variant,alpha_vs_axial,alpha_c_axial\n")
+    with pytest.raises(SettingsError, match="there is nothing to report"):
+        page_of([path])
+    page = tmp_path / "r.html"
+    page.write_text("precious")
+    assert run(["report", str(path), "-o", str(page)]) == 1
+    assert "nothing to report" in capsys.readouterr().err
+    assert page.read_text() == "precious"
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["-o", "r.pdf"], "reports are HTML"),
+        (["-o", "nowhere/r.html"], "there is no folder"),
+        ([], "Missing option '-o'"),
+    ],
+)
+def test_wrong_usage(table, words, message, capsys):
+    assert run(["report", str(table(curve())), *words]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_what_is_doubtful_about_tables_is_told_and_stands_in_the_page(table):
+    paths = [table(curve(), "a.jsonl"), table(curve(), "b.jsonl")]
+    with pytest.warns(match="rows of one that .* holds already count once"):
+        page = page_of(paths)
+    warned = page[page.index('id="warnings"') : page.index('id="sample"')]
+    assert "holds already count once" in warned

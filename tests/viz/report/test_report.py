@@ -1,0 +1,479 @@
+"""The report's content: what it says with and without manifest and source, and how large it is."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+import shutil
+from datetime import date
+from html import unescape
+from html.parser import HTMLParser
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+
+from scanfab.base.errors import ReadError
+from scanfab.cli.main import run
+from scanfab.io.opening import read_series
+from scanfab.pipeline.compute import compute_rows
+from scanfab.table.reading import read_rows
+from scanfab.viz.report.page import MOST_GRAINS, Picture, view_data
+from scanfab.viz.report.report import make_report
+from scanfab.viz.scene import Scene
+from tests.conftest import ROOT
+from tests.helpers.dumps import cubic_rows, dump_text, write
+from tests.helpers.tables import curve, sheared
+
+pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.base.errors.ScanfabNote")
+
+
+@pytest.fixture
+def table(tmp_path):
+    def make(rows, name="t.jsonl"):
+        return write(tmp_path / name, "".join(json.dumps(row) + "\n" for row in rows))
+
+    return make
+
+
+@pytest.fixture
+def copied(computed, tmp_path, monkeypatch):
+    """The sample's table and manifest in a folder of their own, opened from the repository."""
+    monkeypatch.chdir(ROOT)
+    table = tmp_path / "fabric.csv"
+    for end in ("", ".manifest.json"):
+        shutil.copy(f"{computed.table}{end}", f"{table}{end}")
+    return table
+
+
+@pytest.fixture(scope="module")
+def page(computed):
+    """The sample's report."""
+    before = Path.cwd()
+    os.chdir(ROOT)
+    try:
+        return page_of([computed.table])
+    finally:
+        os.chdir(before)
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Without the figures that take another scan."""
+    monkeypatch.setattr(
+        "scanfab.viz.report.frames._pictures", lambda *_: [Picture("data:,", "none", 1)]
+    )
+
+
+def change(table: Path, **changes):
+    path = Path(f"{table}.manifest.json")
+    manifest = json.loads(path.read_text())
+    for name, value in changes.items():
+        target = manifest if name in manifest else manifest["settings"]
+        target[name] = value
+    path.write_text(json.dumps(manifest))
+
+
+def page_of(tables, **options):
+    return make_report(tables, **options).page
+
+
+def words_of(page):
+    """What a reader sees."""
+    text = re.sub(r"<(script|style).*?</\1>", " ", page, flags=re.S)
+    return re.sub(r"\s+", " ", unescape(re.sub(r"<[^>]*>", " ", text)))
+
+
+def test_the_sample_is_told_in_full(page):
+    text = words_of(page)
+    assert "3 frames of sample_data/yade_triaxial; variants a, b, c, d;" in text
+    assert "axial strain 0 to 15 %" in text
+    assert (
+        "scanfab compute sample_data/yade_triaxial --boundary mask=3 --tolerance 0.0005 "
+        "--frames 0::3 -o fabric.csv" in text
+    )
+    assert "boundary mask=3 particles that are boundary" in text
+    assert re.search(r"numpy \d+\.\d+", text)
+    assert "triaxial-spheres-00000006.vtk.gz" in text
+    assert (
+        "sample_data/yade_triaxial: where α vs is largest, its standard error, of scan and" in text
+    )
+    assert page.count("<canvas") == 1
+    assert page.count("data:image/") == 5
+    assert len(page) < 1_000_000
+
+
+def test_it_needs_nothing_from_elsewhere(page):
+    addresses = re.findall(r"(?:src|href)\s*=\s*[\"']?([^\"'>\s]*)", page)
+    assert addresses
+    assert all(one.startswith(("data:", "#")) for one in addresses)
+    assert "@import" not in page
+    assert "http" not in re.sub(r'content="default-src[^"]*"|http-equiv', "", page)
+
+
+def test_the_view_holds_the_grains_of_the_last_frame(page, computed):
+    data = json.loads(re.search(r'id="data-1">(.*?)</script>', page, re.S)[1])
+    assert len(data["spheres"]) == 800
+    inside = sum(x * x + y * y + z * z < data["rv"] ** 2 for x, y, z, *_ in data["spheres"])
+    rows = {row["variant"]: row for row in computed.rows if row["frame"] == 6}
+    assert inside == pytest.approx(rows["c"]["grains"], abs=2)
+    rattlers = sum(kind == 2 for *_, kind in data["spheres"])
+    assert rattlers == rows["a"]["rattlers"]
+    assert data["cutoff"] * data["size"] / 1000 == pytest.approx(rows["c"]["cutoff"])
+    assert [one[0] for one in data["axes"]] == ["x", "y", "z (loading)"]
+
+
+def test_a_large_sample_is_thinned():
+    import numpy as np
+
+    from scanfab.viz.scene import Grains
+
+    count = 3 * MOST_GRAINS
+    position = np.random.default_rng(0).uniform(-1, 1, (count, 3))
+    no = np.zeros(count, bool)
+    grains = Grains(position, np.full(count, 0.01), np.arange(count), no * 1, no, no, no)
+    data = view_data(Scene(grains, np.zeros(3), None), (0, 0, 1))
+    assert len(data["spheres"]) == MOST_GRAINS
+    assert data["left_out"] == 2 * MOST_GRAINS
+    assert max(abs(number) for sphere in data["spheres"] for number in sphere) <= 1000
+
+
+def test_without_a_manifest_it_says_so(table):
+    text = words_of(page_of([table(curve())]))
+    assert "There is no t.jsonl.manifest.json beside" in text
+    assert "the frames are not known, so there is no view" in text
+    assert "0.05" in text
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"sources": ["gone"]}, "The view is left out: the source gone is not there any more."),
+        ({"sources": ["-"]}, "The view is left out: the frames came by standard input"),
+        ({"boundary": [{"text": "mask"}]}, "The view is left out: boundary: expected COLUMN=VALUE"),
+        ({"rv": 0.0}, "The view is left out: rv: expected a fraction above 0"),
+    ],
+)
+def test_a_source_that_cannot_be_read_again_is_told(copied, changes, message):
+    change(copied, **changes)
+    page = page_of([copied])
+    assert message in words_of(page)
+    assert "<canvas" not in page
+    # the figures of the table are there
+    assert page.count("data:image/") == 3
+
+
+def test_a_source_that_has_changed_is_told(copied):
+    manifest = json.loads(Path(f"{copied}.manifest.json").read_text())
+    manifest["inputs"][0]["size"] += 1
+    change(copied, inputs=manifest["inputs"])
+    assert "has changed since the table was computed" in words_of(page_of([copied]))
+
+
+def test_warnings_of_the_run_and_of_the_rule_are_told(copied):
+    change(copied, sources=["gone"], directions="equal-angle:10", warnings=["what a day"])
+    text = words_of(page_of([copied]))
+    assert "what a day" in text
+    assert "a sample without any anisotropy would get α = 0.43" in text
+
+
+def test_a_hundred_frames_stay_light(table):
+    rows = [
+        {**row, "frame": frame, "strain": 0.002 * frame, "variant": variant, "grains": 5000}
+        for frame in range(100)
+        for variant in "abcd"
+        for row in curve()[frame % 5 : frame % 5 + 1]
+    ]
+    page = page_of([table(rows)])
+    assert len(page) < 800_000
+    assert "12 of 100 frames are shown" in words_of(page)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_few_frames_are_no_error(table, count):
+    text = words_of(page_of([table(curve()[:count])]))
+    assert "fewer than three frames" in text
+
+
+def test_a_table_without_void_fabric_is_told(table, tmp_path, capsys):
+    path = table([{**row, "alpha_vs_axial": None} for row in curve()])
+    page = tmp_path / "r.html"
+    assert run(["report", str(path), "-o", str(page)]) == 1
+    assert "no row of the tables has a void fabric" in capsys.readouterr().err
+    assert "There is nothing to draw" in words_of(page.read_text("utf-8"))
+
+
+def test_text_is_escaped_everywhere(table, monkeypatch):
+    """The page's structure does not depend on what the names are."""
+
+    monkeypatch.setattr("scanfab.viz.report.report._table_pictures", lambda *_: [])
+
+    class Tags(HTMLParser):
+        def __init__(self, page):
+            super().__init__()
+            self.found = []
+            self.feed(page)
+
+        def handle_starttag(self, tag, attrs):
+            self.found.append((tag, sorted(name for name, _ in attrs)))
+
+    def page(source):
+        path = table(curve(source))
+        asked = {"sources": [source], source: source, "contacts": source, "cutoff": source}
+        manifest = {"settings": asked, "versions": {source: source}, "warnings": [source]}
+        Path(f"{path}.manifest.json").write_text(json.dumps(manifest))
+        return page_of([path], title=source, author=source)
+
+    harmless = Tags(page("x")).found
+    for hostile in (
+        "<img src=x onerror=alert(1)>",
+        "\"'><b>",
+        "</script><b>",
+        "{{ 7 * 7 }}",
+        "&lt;",
+    ):
+        text = page(hostile)
+        assert Tags(text).found == harmless
+        assert hostile in words_of(text) or hostile.replace("<b>", "") in words_of(text)
+
+
+def test_a_damaged_manifest_is_an_error_that_names_it(copied):
+    Path(f"{copied}.manifest.json").write_text("{")
+    with pytest.raises(ReadError, match=r"fabric\.csv\.manifest\.json"):
+        page_of([copied])
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"frames": [1]},
+        {"frames": "x"},
+        {"boundary": [{}]},
+        {"boundary": [3]},
+        {"cutoff": {"value": "x", "unit": 3}},
+        {"cutoff": []},
+        {"axis": ["x"]},
+        {"rv": {}},
+        {"columns": "x"},
+        {"variants": 3},
+        {"inputs": 3},
+        {"inputs": [3]},
+        {"versions": 3},
+        {"warnings": 3},
+        {"sources": [3]},
+        {"directions": 3},
+        {"seed": "x"},
+    ],
+)
+def test_a_manifest_of_odd_values_is_no_traceback(copied, changes, tmp_path, quick):
+    change(copied, **changes)
+    assert run(["report", str(copied), "-o", str(tmp_path / "r.html")]) in (0, 1)
+
+
+def test_the_error_is_that_of_scan_and_sample_together(page, computed):
+    """Results, frame table and caveats quote one error; its parts are called parts."""
+    row = next(r for r in computed.rows if (r["frame"], r["variant"]) == (6, "c"))
+    parts = row["alpha_vs_axial_se"], row["alpha_vs_axial_sample_se"]
+    total = f"{math.hypot(*parts):#.2g}"
+    value = f"{row['alpha_vs_axial']:.{len(total) - 2}f}"
+    results = words_of(page[page.index('id="results"') : page.index('id="warnings"')])
+    assert f"{value} ± {total}" in results
+    assert f"± {parts[0]:#.2g}" not in words_of(page)
+    assert "its error: scan" in results
+    assert f" {parts[0]:#.2g} " in results
+    line = f"6 c 15 % {value} {total} {parts[0]:#.2g} {parts[1]:#.2g} "
+    assert line in words_of(page)
+    assert f"in variant c ({total} beside" not in results
+
+
+def test_without_the_sample_s_part_there_is_no_total(table):
+    """The scan's error alone is never quoted as the error."""
+    text = words_of(page_of([table(curve())]))
+    assert "α vs at axial strain 4 % -0.03000 its error: scan 0.00030" in text
+    assert "±" not in text[text.index("its error") : text.index("Straight scan lines")]
+
+
+def test_the_frame_table_begins_with_what_matters(page):
+    frames = page[page.index('id="frames"') :]
+    heads = [words_of(head).strip() for head in re.findall(r"<th>(.*?)</th>", frames)]
+    assert heads[:9] == [
+        "frame", "variant", "strain", "α vs", "± total", "scan", "sample", "α c", "± of α c"
+    ]  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore:shear_strain stands")
+def test_a_sheared_cell_is_told_by_its_shear(table):
+    """As the figures beside the words are over it."""
+    page = page_of([table(sheared())])
+    text = words_of(page)
+    assert "shear strain 0 to 40 %" in text
+    assert "α vs at shear strain 40 %" in text
+    assert "α vs at shear strain 0 %" in text
+    assert "axial strain" not in text[: text.index("Straight scan lines")]
+    frames = page[page.index('id="frames"') :]
+    assert re.findall(r"<th>(.*?)</th>", frames)[:3] == ["frame", "variant", "shear strain"]
+    assert "3 c 30 % " in words_of(frames)
+
+
+@pytest.mark.filterwarnings("ignore:shear_strain stands", "ignore:the loading axis")
+def test_a_sheared_cell_is_told_to_be_one(table):
+    """Captions, results and notes say what the figures show."""
+    page = page_of([table(sheared())])
+    captions = re.findall(r"<figcaption>(.*?)</figcaption>", page)
+    assert [one.partition(",")[0] for one in captions] == [
+        "Intensity of void and contact anisotropy",
+        "Intensity of void and contact anisotropy",
+        "Void against contact intensity",
+    ]
+    notes = words_of(page[page.index('id="notes"') : page.index('id="sample"')])
+    assert "the loading axis is not the axis of the contact fabric" in notes
+    results = words_of(page[page.index('id="results"') : page.index('id="warnings"')])
+    assert results.index("intensity α vs at") < results.index("α vs along the loading axis")
+    assert "slope of α vs" not in results
+
+
+def test_sources_of_both_kinds_have_each_their_own_strain(table):
+    page = page_of([table(sheared(), "s.jsonl"), table(curve())])
+    frames = words_of(page[page.index('id="frames"') :])
+    assert "shear strain 0 to 40 %" in words_of(page)
+    assert "axial strain 0 to 4 %" in words_of(page)
+    assert "3 c - 30 % " in frames
+    assert "3 c 3 % - " in frames
+
+
+@pytest.mark.filterwarnings(
+    "ignore::scanfab.base.errors.ScanfabWarning", "ignore:shear_strain stands"
+)
+def test_the_view_of_a_sheared_cell_has_its_shear_in_the_title(tmp_path, monkeypatch, quick):
+    monkeypatch.chdir(ROOT)
+    table = tmp_path / "t.csv"
+    words = ["--directions", "9", "--spacing", "1rmin", "--variants", "c"]
+    assert (
+        run(["compute", "sample_data/lammps_shear", *words, "--frames", "0::5", "-o", str(table)])
+        == 0
+    )
+    last = read_rows(table)[-1]
+    page = page_of([table])
+    title = f"lammps_shear, frame 5, shear strain {100 * last['shear_strain']:.3g} %"
+    assert title in words_of(page)
+
+
+def test_a_constant_strain_names_no_end(table):
+    text = words_of(page_of([table([{**row, "strain": 0.0} for row in curve()])]))
+    assert "α vs , frame 4 -0.03000" in text
+    assert "α vs , frame 0 0.01000" in text
+
+
+def test_the_sample_is_told_in_numbers(page):
+    text = words_of(page)
+    for part in (
+        "grains 800 in the first frame",
+        "radii smallest 0.0005042, mean 0.0009907, largest 0.001499",
+        "boundary 1000 particles",
+        "cell not periodic",
+        "loading axis z",
+        "cut-off 0.0005042, 1 smallest radii",
+        "centre of the RV 1.368e-05, -4.461e-05, -3.663e-05",
+        "radius of the RV 0.008058, 0.7 of half the sample's smallest extent",
+        "lengths of this report are in the unit of the dump",
+    ):
+        assert part in text
+
+
+def test_an_rv_is_told_beside_the_sample_that_it_was_made_for_and_the_one_shown(page, computed):
+    """Under the heading of the last frame, in which the sample is shorter."""
+    found = re.search(
+        r"0\.7 of half the sample's smallest extent in the first frame that has grains, "
+        r"([\d.]+) in frame 6,",
+        words_of(page),
+    )
+    assert found is not None
+    packing = [*read_series(f"{ROOT}/sample_data/yade_triaxial")][6].read()
+    grains = packing.columns["mask"] != 3
+    ends = packing.position[grains], packing.radius[grains, None]
+    extent = ((ends[0] + ends[1]).max(axis=0) - (ends[0] - ends[1]).min(axis=0)).min()
+    assert float(found[1]) == pytest.approx(2 * 0.008058 / extent, rel=1e-2)
+
+
+def test_an_rv_is_a_part_of_the_sample_without_grains_that_flew_away(tmp_path, quick):
+    rows = [*cubic_rows(6), (217, 1, 40, 41, 42, 0.5)]
+    dump = write(tmp_path / "dump_0.txt", dump_text(rows, box=((-1, 50),) * 3))
+    table = tmp_path / "t.csv"
+    words = ["--directions", "9", "--spacing", "1rmin", "--variants", "c", "--rv", "0.6"]
+    assert run(["compute", str(dump), *words, "-o", str(table)]) == 0
+    assert ", 0.6 of half the sample's smallest extent" in words_of(page_of([table]))
+
+
+def test_pictures_of_frames_share_one_scan_at_the_table_s_tolerance(copied, monkeypatch):
+    scanned = []
+
+    def remember(series, settings, **more):
+        scanned.append(settings)
+        return compute_rows(series, settings, **more)
+
+    monkeypatch.setattr("scanfab.viz.figures.scanned.compute_rows", remember)
+    text = words_of(page_of([copied]))
+    assert [one.frames for one in scanned] == [slice(0, 1), slice(6, 7)]
+    assert {one.tolerance for one in scanned} == {5e-4}
+    assert "instead of the table's" not in text
+
+
+def test_pictures_pass_through_no_file(copied, monkeypatch):
+    """A signal ends the process at once: a folder of the moment would be left behind."""
+
+    def made(*_, **__):
+        raise AssertionError("a temporary file or folder is made")
+
+    monkeypatch.setattr("tempfile.mkdtemp", made)
+    monkeypatch.setattr("tempfile.mkstemp", made)
+    assert page_of([copied]).count("data:image/png") == 2
+
+
+def test_a_scan_that_takes_too_long_for_a_picture_is_rougher_and_labelled(copied, monkeypatch):
+    monkeypatch.setattr("scanfab.viz.report.frames.MOST_SEGMENTS", 1e4)
+    assert re.search(
+        r"Scanned to a standard error of 0\.\d+ instead of the table's 0\.0005",
+        words_of(page_of([copied])),
+    )
+
+
+def test_lobes_that_are_noise_are_called_so(page):
+    text = words_of(page)
+    assert re.search(r"Frame 0: lobes of void lengths reach [\d.]+ %, one standard error", text)
+    first, last = re.findall(r"Frame \d: (lobes of void lengths .*?); lobes of contact", text)
+    assert first.endswith("so they are noise")
+    assert not last.endswith("so they are noise")
+
+
+def test_title_author_and_date(table):
+    path = table(curve("dumps/sand"))
+    assert "<title>Void fabric of sand</title>" in page_of([path])
+    page = page_of([path], title="A & B", author="Ann <x>", today=date(2031, 2, 3))
+    assert "<title>A &amp; B</title>" in page
+    assert "<h1>A &amp; B</h1>" in page
+    assert '<meta name="author" content="Ann &lt;x&gt;">' in page
+    assert "Ann <x>, 2031-02-03" in words_of(page).replace("&lt;", "<")
+
+
+def test_the_author_is_whoever_the_system_knows_by_a_full_name(table, tmp_path, monkeypatch):
+    pwd = pytest.importorskip("pwd")
+    page = tmp_path / "r.html"
+    for gecos, said in (("Ann Other,Room 3,,", "Ann Other, 20"), ("ann", ""), ("", "")):
+        user = SimpleNamespace(pw_gecos=gecos, pw_name="ann")
+        monkeypatch.setattr(pwd, "getpwuid", lambda _, user=user: user)
+        assert run(["report", str(table(curve())), "-o", str(page)]) == 0
+        byline = re.search(r'class="byline">(.*?)</p>', page.read_text("utf-8"))
+        assert byline is not None
+        assert byline[1].startswith(said or "20")
+
+
+def test_notes_are_not_warnings(copied, quick):
+    change(copied, sources=["gone"], notes=["a quiet word"], warnings=["a loud word"])
+    page = page_of([copied])
+    warned = page[page.index('id="warnings"') : page.index('id="notes"')]
+    noted = page[page.index('id="notes"') : page.index('id="sample"')]
+    assert "a loud word" in warned
+    assert "a quiet word" not in warned
+    assert "a quiet word" in noted

@@ -1,0 +1,31 @@
+"""Every setting is explained to the readers of a report."""
+
+from __future__ import annotations
+
+import inspect
+import json
+from dataclasses import fields
+from pathlib import Path
+
+from scanfab.io.opening import READING, read_series
+from scanfab.pipeline.settings import Settings
+from scanfab.viz.report.setting_meanings import SETTING_MEANINGS, settings_table
+
+
+def test_every_setting_has_a_meaning():
+    """A setting that is new needs a line in SETTING_MEANINGS."""
+    settings = {field.name for field in fields(Settings)} - {"workers"}
+    assert {*READING, *settings} <= set(SETTING_MEANINGS)
+    assert all(SETTING_MEANINGS.values())
+    assert set(READING) == set(inspect.getfullargspec(read_series).kwonlyargs)
+
+
+def test_every_line_of_a_manifest_is_explained(computed):
+    manifest = json.loads(Path(f"{computed.table}.manifest.json").read_text("utf-8"))
+    lines = settings_table(manifest["settings"])
+    assert len(lines) > 20
+    assert all(name and value and meaning for name, value, meaning in lines)
+
+
+def test_a_setting_that_nobody_knows_is_shown():
+    assert settings_table({"sources": ["x"], "unheard": 3}) == [("unheard", "3", "")]

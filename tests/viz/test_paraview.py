@@ -1,0 +1,196 @@
+"""ParaView files, read back by pyvista: every array is there, and says what the table says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab.pipeline.compute import compute_rows
+from scanfab.pipeline.settings import Settings
+from scanfab.table.table import COLUMNS
+from scanfab.viz.paraview import VtkFolder
+from scanfab.viz.vtk_files import Collection
+from tests.helpers.dumps import cubic_rows, dump_text, write
+from tests.helpers.lattices import shaken_cubic
+
+pyvista = pytest.importorskip("pyvista")
+
+ARRAYS = {
+    "grains": {"radius", "id", "contacts", "rattler", "boundary", "in_window"},
+    "contacts": {"normal", "force", "boundary", "in_window"},
+    "window": set(),
+    "lines": {"length", "void", "kept", "state", "line"},
+    "distribution": {"mean_length", "weight", "direction", "deviation"},
+    "ellipsoids": {"kind"},
+    "tensors": {"gvs", "gc"},
+}
+FRAME_KINDS = ("grains", "contacts", "window")
+KINDS = [
+    *FRAME_KINDS,
+    *(f"{kind}-{v}" for v in "abcd" for kind in ARRAYS if kind not in FRAME_KINDS),
+]
+
+
+def tensor(row, name):
+    xx, yy, zz, xy, xz, yz = (row[f"{name}_{c}"] for c in ("xx", "yy", "zz", "xy", "xz", "yz"))
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_file_has_its_arrays_and_the_row(computed, kind):
+    files = sorted(computed.vtk.glob(f"{kind}_*.vtp"))
+    assert len(files) == 3
+    for file in files:
+        mesh = pyvista.read(file)
+        assert mesh.n_points > 0
+        arrays = {*mesh.point_data, *mesh.cell_data}
+        assert arrays >= ARRAYS[kind.split("-")[0]]
+        assert {name.removeprefix("row_") for name in mesh.field_data} == set(COLUMNS)
+        frame = int(mesh.field_data["frame"][0])
+        rows = [row for row in computed.rows if row["frame"] == frame]
+        if "-" in kind:
+            rows = [row for row in rows if row["variant"] == kind[-1]]
+        assert list(mesh.field_data["variant"]) == [row["variant"] for row in rows]
+        expected = [row["alpha_vs_axial"] for row in rows]
+        assert mesh.field_data["alpha_vs_axial"].tolist() == expected
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_collection_leads_to_every_frame(computed, kind):
+    reader = pyvista.get_reader(computed.vtk / f"{kind}.pvd")
+    assert reader.time_values == [0.0, 3.0, 6.0]
+    reader.set_active_time_value(6.0)
+    assert reader.read()[0].field_data["frame"][0] == 6
+
+
+@pytest.mark.parametrize("variant", "abcd")
+def test_the_surface_gives_back_the_tensor(computed, variant):
+    for row in computed.rows:
+        if row["variant"] != variant:
+            continue
+        mesh = pyvista.read(computed.vtk / f"distribution-{variant}_{row['frame']:06d}.vtp")
+        direction = mesh.points / np.linalg.norm(mesh.points, axis=1)[:, None]
+        assert direction == pytest.approx(np.asarray(mesh["direction"]), abs=1e-12)
+        share = mesh["weight"] * mesh["mean_length"]
+        found = np.einsum("p,pi,pj->ij", share, direction, direction) / share.sum()
+        # a small part of the scan's error, as both come from the same sums
+        assert np.abs(found - tensor(row, "gvs")).max() < 0.2 * row["alpha_vs_axial_se"]
+        assert share.sum() == pytest.approx(row["mean_length"], rel=2e-3)
+
+
+@pytest.mark.filterwarnings(
+    "ignore:frame .* above the tolerance:scanfab.base.errors.ScanfabWarning"
+)
+def test_the_surface_has_the_moment_of_the_table(tmp_path):
+    packing = scanfab.find_contacts(scanfab.Packing(*shaken_cubic(np.random.default_rng(0), 6)))
+    words = {"variants": "c", "tolerance": 2e-3, "moment": 2}
+    (row,) = compute_rows(packing, Settings.make(**words), observe=VtkFolder(tmp_path, (0, 0, 1)))
+    mesh = pyvista.read(tmp_path / "distribution-c_000000.vtp")
+    share = mesh["weight"] * mesh["mean_length"]
+    assert share.sum() == pytest.approx(row.mean_length, rel=1e-2)
+
+
+def test_the_surface_is_closed_and_looks_outward(computed):
+    mesh = pyvista.read(computed.vtk / "distribution-c_000006.vtp")
+    assert mesh.is_manifold
+    assert mesh.n_open_edges == 0
+    volume = np.einsum(
+        "ti,ti->t",
+        mesh.points[mesh.regular_faces[:, 0]],
+        np.cross(mesh.points[mesh.regular_faces[:, 1]], mesh.points[mesh.regular_faces[:, 2]]),
+    )
+    assert np.all(volume > 0)
+
+
+def test_tensors_are_points_with_nine_components(computed):
+    row = next(row for row in computed.rows if (row["frame"], row["variant"]) == (6, "c"))
+    mesh = pyvista.read(computed.vtk / "tensors-c_000006.vtp")
+    assert mesh["gvs"].reshape(3, 3) == pytest.approx(tensor(row, "gvs"))
+    assert mesh["gc"].reshape(3, 3) == pytest.approx(tensor(row, "gc"))
+
+
+def test_ellipsoids_have_the_principal_values_as_half_axes(computed):
+    row = next(row for row in computed.rows if (row["frame"], row["variant"]) == (6, "c"))
+    mesh = pyvista.read(computed.vtk / "ellipsoids-c_000006.vtp")
+    for kind, name in enumerate(("gvs", "gc")):
+        points = mesh.points[mesh["kind"] == kind]
+        points = points - 0.5 * (points.min(axis=0) + points.max(axis=0))
+        distance = np.linalg.norm(points, axis=1)
+        values = np.linalg.eigvalsh(tensor(row, name))
+        assert distance.max() / distance.min() == pytest.approx(values[2] / values[0], rel=0.01)
+
+
+def test_grains_and_contacts_are_those_of_the_table(computed):
+    for row in computed.rows:
+        if row["variant"] != "c":
+            continue
+        grains = pyvista.read(computed.vtk / f"grains_{row['frame']:06d}.vtp")
+        inside = (grains["in_window"] == 1) & (grains["boundary"] == 0)
+        assert inside.sum() == row["grains"]
+        assert (inside & (grains["rattler"] == 1)).sum() == row["rattlers"]
+        contacts = pyvista.read(computed.vtk / f"contacts_{row['frame']:06d}.vtp")
+        inside = (contacts.cell_data["in_window"] == 1) & (contacts.cell_data["boundary"] == 0)
+        assert inside.sum() == row["contacts"]
+        normal = contacts.cell_data["normal"][inside]
+        assert normal.T @ normal / inside.sum() == pytest.approx(tensor(row, "gc"))
+
+
+def test_pieces_of_lines_are_kept_from_the_cut_off_on(computed):
+    mesh = pyvista.read(computed.vtk / "lines-c_000006.vtp")
+    length, void, kept = (np.asarray(mesh.cell_data[name]) for name in ("length", "void", "kept"))
+    cutoff = mesh.field_data["cutoff"][0]
+    assert np.array_equal(kept == 1, (void == 1) & (length >= cutoff))
+    assert mesh.cell_data["state"].tolist() == (void.astype(int) + kept).tolist()
+    ends = np.asarray(mesh.points).reshape(-1, 2, 3)
+    assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) == pytest.approx(length)
+
+
+def test_files_of_a_cut_off_that_nothing_reaches_have_no_distribution(tmp_path):
+    spheres = shaken_cubic(np.random.default_rng(0), 5)
+    packing = scanfab.Packing(spheres.position, spheres.radius, step=7)
+    settings = Settings.make(variants="c", cutoff=100.0, directions=9, spacing="1rmin")
+    with pytest.warns(scanfab.ScanfabWarning, match="no void segment"):
+        list(compute_rows(packing, settings, observe=VtkFolder(tmp_path, settings.axis)))
+    names = {path.name for path in tmp_path.iterdir()}
+    assert "grains_000000.vtp" in names
+    assert "distribution-c_000000.vtp" not in names
+    mesh = pyvista.read(tmp_path / "lines-c_000000.vtp")
+    assert np.isnan(mesh.field_data["alpha_vs"][0])
+    assert pyvista.get_reader(tmp_path / "grains.pvd").time_values == [7.0]
+
+
+def test_contacts_without_a_force_or_without_any(tmp_path):
+    packing = scanfab.Packing([[0.0, 0, 0], [5, 0, 0]], 1.0, contacts=[])
+    settings = Settings.make(variants="a", directions=3, spacing=0.2, cutoff=0.0)
+    with pytest.warns(scanfab.ScanfabWarning):
+        list(compute_rows(packing, settings, observe=VtkFolder(tmp_path, settings.axis)))
+    mesh = pyvista.read(tmp_path / "contacts_000000.vtp")
+    assert mesh.n_cells == 0
+
+
+def test_a_resumed_collection_keeps_its_frames(tmp_path):
+    path = tmp_path / "grains.pvd"
+    Collection(path).add("a.vtp", 0.5)
+    Collection(path, go_on=True).add("b.vtp", 0.25)
+    assert list(Collection(path, go_on=True).entries.values()) == [0.25, 0.5]
+    Collection(path).add("c.vtp", 1.0)
+    assert list(Collection(path, go_on=True).entries) == ["c.vtp"]
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
+def test_a_frame_without_grains_and_a_name_beyond_ascii(tmp_path):
+    folder = tmp_path / 'grüße<&">'
+    folder.mkdir()
+    for step, rows in enumerate((cubic_rows(), [], cubic_rows())):
+        write(folder / f"dump_{step}.txt", dump_text(rows, step=step))
+    settings = Settings.make(variants="c", directions=9, spacing="0.5rmin", cutoff="0.2rmin")
+    vtk = tmp_path / "vtk"
+    series = scanfab.read_series(folder)
+    assert len(list(compute_rows(series, settings, observe=VtkFolder(vtk, settings.axis)))) == 3
+    empty = pyvista.read(vtk / "grains_000001.vtp")
+    assert empty.n_points == 0
+    assert empty.field_data["grains"][0] == 0
+    assert empty.field_data["source"][0].endswith(r'gr\xfc\xdfe<&">')
+    assert pyvista.get_reader(vtk / "grains.pvd").time_values == [0.0, 1.0, 2.0]
+    assert pyvista.get_reader(vtk / "distribution-c.pvd").time_values == [0.0, 2.0]

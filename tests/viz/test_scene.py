@@ -1,0 +1,78 @@
+"""Scenes: what the sample knows of each grain and contact, and lines in a section."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab.packing.sample import Sample
+from scanfab.packing.window import SphereWindow
+from scanfab.viz.scene import Scene, contact_lines, grains_of, scene_of, section_lines
+from tests.helpers.lattices import simple_cubic
+
+
+@pytest.fixture
+def sample():
+    """Five in a row, the last one is boundary."""
+    position = [[0.0, 0, 0], [2, 0, 0], [4, 0, 0], [9, 0, 0], [6, 0, 0]]
+    packing = scanfab.Packing(position, 1.0, contacts=[[0, 1], [1, 2], [2, 4]], id=[5, 6, 7, 8, 9])
+    return Sample(packing, np.array([False, False, False, False, True]))
+
+
+WINDOW = SphereWindow(np.array([1.0, 0.0, 0.0]), 2.5)
+
+
+def test_grains_are_told_apart(sample):
+    grains = grains_of(sample, WINDOW)
+    assert grains.contacts.tolist() == [1, 2, 2, 0, 1]
+    assert grains.rattler.tolist() == [True, False, False, True, False]
+    assert grains.boundary.tolist() == [False] * 4 + [True]
+    assert grains.in_window.tolist() == [True, True, False, False, False]
+    assert not grains_of(sample, None).in_window.any()
+
+
+def test_contacts_are_lines_between_centres(sample):
+    lines = contact_lines(sample, WINDOW)
+    assert lines.ends[:, :, 0].tolist() == [[0, 2], [2, 4], [4, 6]]
+    assert lines.boundary.tolist() == [False, False, True]
+    assert lines.in_window.tolist() == [True, True, False]
+
+
+def test_contacts_through_a_periodic_face_stay_short():
+    cell = scanfab.Cell([10.0, 10.0, 10.0])
+    packing = scanfab.Packing([[0.5, 5, 5], [9.5, 5, 5]], 0.5, contacts=[[0, 1]], cell=cell)
+    lines = contact_lines(Sample(packing, np.zeros(2, bool)), None)
+    assert np.linalg.norm(lines.ends[:, 1] - lines.ends[:, 0], axis=1) == pytest.approx([1.0])
+
+
+@pytest.mark.parametrize("axis", [(0, 0, 1), (1, 0, 0), (0.6, 0.0, 0.8)])
+def test_a_section_lies_in_one_plane_and_in_the_window(sample, axis):
+    scene = scene_of(sample, WINDOW)
+    lines = section_lines(scene, axis)
+    flat = lines.ends.reshape(-1, 3) - scene.center
+    values = np.linalg.svd(flat, compute_uv=False)
+    assert values[2] < 1e-9 * values[0]
+    assert np.linalg.norm(flat, axis=1).max() < WINDOW.radius + 1e-9
+    assert lines.void.any()
+
+
+def test_a_section_cuts_periodic_images_too():
+    """A crystal looks the same about each of its grains, also one at the corner of the cell."""
+    position, radius = simple_cubic(4)
+    cell = scanfab.Cell([4.0, 4.0, 4.0])
+    packing = scanfab.Packing(position, radius, contacts=[], cell=cell)
+    sample = Sample(packing, np.zeros(len(radius), bool))
+    middle, corner = (
+        section_lines(scene_of(sample, SphereWindow(np.array(place), 1.6)), (0, 0, 1))
+        for place in ([2.5, 2.5, 2.5], [0.5, 3.5, 0.5])
+    )
+    np.testing.assert_allclose(np.sort(corner.length), np.sort(middle.length), atol=1e-9)
+    assert corner.length[corner.void].max() < 1.6
+
+
+def test_a_section_without_window_or_grains_is_no_error(sample):
+    assert section_lines(scene_of(sample, None), (0, 0, 1)).line.ndim == 1
+    nothing = Sample(scanfab.Packing(np.zeros((0, 3)), 1.0, contacts=[]), np.zeros(0, bool))
+    empty = Scene(grains_of(nothing, None), np.zeros(3), None)
+    assert len(section_lines(empty, (0, 0, 1)).length) == 0
