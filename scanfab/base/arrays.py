@@ -8,10 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import PackingError
+from scanfab.base.typing import IntArray
 
 __all__ = ["cast", "grains_named"]
-
-IntArray = npt.NDArray[np.int64]
 
 
 def cast(

@@ -13,12 +13,11 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.directions import direction_rule
 
 __all__ = ["EvenFunction", "fit_even", "mean_length_function", "sphere_points"]
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 HIGHEST_DEGREE = 6
 # how unevenly directions may cover the sphere for a fit: the ratio of largest to smallest

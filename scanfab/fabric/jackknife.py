@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.typing import FloatArray
 from scanfab.fabric.tensor import axial
 from scanfab.fabric.void import void_fabric
 
@@ -25,9 +26,6 @@ __all__ = [
     "variance_without_noise",
     "void_jackknife",
 ]
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 
 # octants

@@ -8,9 +8,10 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.typing import FloatArray
+
 __all__ = ["COMPONENTS", "FabricTensor", "axial"]
 
-FloatArray = npt.NDArray[np.float64]
 
 COMPONENTS = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 

@@ -13,12 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.tensor import FabricTensor, axial
 
 __all__ = ["VoidFabric", "void_fabric"]
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 MOST_FILLED = 0.5
 

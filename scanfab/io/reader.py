@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, Protocol
 
-import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import SettingsError
+from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import ContactList
 
@@ -24,8 +24,6 @@ __all__ = [
     "Snapshot",
 ]
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 FileKind = Literal["grains", "index", "points", "contacts", "cell", "other"]
 """

@@ -11,11 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import SettingsError
+from scanfab.base.typing import BoolArray
 from scanfab.packing.packing import Packing
 
 __all__ = ["BoundaryRule", "enclosing_class", "existing_values", "select_boundary"]
 
-BoolArray = npt.NDArray[np.bool_]
 
 OPERATORS = {
     "=": np.equal,

@@ -9,12 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import PackingError
+from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.lattice import Lattice, reduced_lattice
 
 __all__ = ["Cell"]
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 
 class Cell:

@@ -11,12 +11,11 @@ import numpy.typing as npt
 
 from scanfab.base.arrays import cast, grains_named
 from scanfab.base.errors import PackingError, ScanfabWarning
+from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.cell import Cell
 
 __all__ = ["ContactList", "Contacts", "Spheres", "resolve_contacts", "warn_of_same_centre"]
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 ContactSource = Literal["file", "geometric"]
 
 

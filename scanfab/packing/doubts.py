@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import PackingError
+from scanfab.base.typing import FloatArray
 from scanfab.packing.packing import Packing
 from scanfab.packing.periodicity import fitting_periods
 from scanfab.packing.sample import Sample
 
 __all__ = ["CLUMP_COLUMNS", "cell_doubt", "cell_hint", "doubts_of", "refuse_impossible"]
 
-FloatArray = npt.NDArray[np.float64]
 
 # columns that say which body a sphere is part of, by names in lower case; all but the first few
 # number molecules, too

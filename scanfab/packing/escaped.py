@@ -6,16 +6,13 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial import KDTree
 
+from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.packing.packing import Packing
 
 __all__ = ["Escaped", "escaped_grains"]
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-BoolArray = npt.NDArray[np.bool_]
 
 # Gap between surfaces from which on grains are far away: so many largest radii, and so many times
 # the gap to the nearest neighbour that all but a part of the grains are below. In dense samples, of

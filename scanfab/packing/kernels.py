@@ -1,7 +1,7 @@
 """
 Pairs of overlapping spheres, by cell lists, in time linear in the number of spheres.
 
-The bins are cut out of a *frame*: three vectors, of which some are lattice vectors. A bin beyond
+The bins are cut out of a *basis*: three vectors, of which some are lattice vectors. A bin beyond
 the last one along a lattice vector is the first one, moved by that vector: so each pair is met once
 with each of its images, however thin the cell is.
 """
@@ -14,26 +14,25 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.jit import inner, kernel
+from scanfab.base.typing import FloatArray, IntArray
 
 __all__ = [
-    "Frame",
+    "Basis",
     "Grid",
     "Pairs",
     "contact_geometry",
     "fill_grid",
-    "move_into_frame",
+    "move_into_basis",
     "pairs_between",
     "pairs_within",
     "sort_pairs",
 ]
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 RowArray = npt.NDArray[np.int32]
 ShiftArray = npt.NDArray[np.int16]
 
 
-class Frame(NamedTuple):
+class Basis(NamedTuple):
     """The parallelepiped that is cut into bins."""
 
     inverse: FloatArray
@@ -56,7 +55,7 @@ class Grid(NamedTuple):
     start: IntArray
     """Shape (bins + 1,): where each bin starts."""
     shape: IntArray
-    """Shape (3,): number of bins along each vector of the frame."""
+    """Shape (3,): number of bins along each vector of the basis."""
     reach: IntArray
     """Shape (3,): how many bins away a sphere in contact can be."""
 
@@ -71,24 +70,24 @@ class Pairs(NamedTuple):
     rows: RowArray
     """Shape (M, 2), the smaller row first."""
     image: ShiftArray
-    """Shape (M, 3), in vectors of the frame."""
+    """Shape (M, 3), in vectors of the basis."""
     most: int
 
 
 @kernel
-def move_into_frame(position: FloatArray, frame: Frame, moved: FloatArray, turns: IntArray) -> None:
-    """Move positions into the frame along its lattice vectors."""
-    lattice = frame.lattice
+def move_into_basis(position: FloatArray, basis: Basis, moved: FloatArray, turns: IntArray) -> None:
+    """Move positions into the basis along its lattice vectors."""
+    lattice = basis.lattice
     for i in range(position.shape[0]):
         for k in range(3):
             moved[i, k] = position[i, k]
         for axis in range(3):
-            fraction = -frame.low[axis]
+            fraction = -basis.low[axis]
             for k in range(3):
-                fraction += position[i, k] * frame.inverse[k, axis]
+                fraction += position[i, k] * basis.inverse[k, axis]
             # a rounding error outside is inside
             outside = fraction < -1e-12 or fraction >= 1.0 + 1e-12
-            turn = int(np.floor(fraction)) if frame.repeats[axis] and outside else 0
+            turn = int(np.floor(fraction)) if basis.repeats[axis] and outside else 0
             turns[i, axis] = turn
             if turn != 0:
                 for k in range(3):
@@ -96,9 +95,9 @@ def move_into_frame(position: FloatArray, frame: Frame, moved: FloatArray, turns
 
 
 @inner()
-def _bin(frame: Frame, shape: IntArray, x: float, y: float, z: float, axis: int) -> int:
-    inverse = frame.inverse
-    fraction = x * inverse[0, axis] + y * inverse[1, axis] + z * inverse[2, axis] - frame.low[axis]
+def _bin(basis: Basis, shape: IntArray, x: float, y: float, z: float, axis: int) -> int:
+    inverse = basis.inverse
+    fraction = x * inverse[0, axis] + y * inverse[1, axis] + z * inverse[2, axis] - basis.low[axis]
     # what lies outside belongs to the outermost bins
     place: int = int(min(max(fraction * shape[axis], 0.0), shape[axis] - 1.0))
     return place
@@ -106,7 +105,7 @@ def _bin(frame: Frame, shape: IntArray, x: float, y: float, z: float, axis: int)
 
 @kernel
 def fill_grid(
-    position: FloatArray, radius: FloatArray, rows: RowArray, frame: Frame, grid: Grid
+    position: FloatArray, radius: FloatArray, rows: RowArray, basis: Basis, grid: Grid
 ) -> None:
     """Sort the spheres of some rows into the bins of a grid, whose start is zero."""
     start, shape, spheres = grid.start, grid.shape, grid.spheres
@@ -116,7 +115,7 @@ def fill_grid(
         x, y, z = position[i, 0], position[i, 1], position[i, 2]
         number = 0
         for axis in range(3):
-            number = number * shape[axis] + _bin(frame, shape, x, y, z, axis)
+            number = number * shape[axis] + _bin(basis, shape, x, y, z, axis)
         bins[place] = number
         start[number + 1] += 1
     for number in range(1, start.shape[0]):
@@ -133,14 +132,14 @@ def fill_grid(
 
 
 @inner()
-def _runs(frame: Frame, grid: Grid, place: tuple[int, int, int], half: bool, runs: IntArray) -> int:
+def _runs(basis: Basis, grid: Grid, place: tuple[int, int, int], half: bool, runs: IntArray) -> int:
     """
     Runs of spheres in the bins around a place; how many runs there are.
 
     A run, a row of ``runs``: its first sphere, the one behind its last, and its image. Half of the
     bins suffice where the others see a pair from its other sphere; the place itself is not in it.
     """
-    shape, reach, repeats, start = grid.shape, grid.reach, frame.repeats, grid.start
+    shape, reach, repeats, start = grid.shape, grid.reach, basis.repeats, grid.start
     count = 0
     for x in range(0 if half else -reach[0], reach[0] + 1):
         ix = (place[0] + x) // shape[0]
@@ -169,7 +168,7 @@ def _runs(frame: Frame, grid: Grid, place: tuple[int, int, int], half: bool, run
 
 
 @inner()
-def _room_for_runs(frame: Frame, grid: Grid) -> int:
+def _room_for_runs(basis: Basis, grid: Grid) -> int:
     reach, shape = grid.reach, grid.shape
     pieces = (2 * reach[2] + 1) // shape[2] + 3
     room: int = (2 * reach[0] + 1) * (2 * reach[1] + 1) * pieces
@@ -188,18 +187,18 @@ def _add_pair(pairs: Pairs, place: int, one: int, two: int, ix: int, iy: int, iz
 
 
 @kernel
-def pairs_within(grid: Grid, frame: Frame, scale: float, pairs: Pairs, found: int) -> int:
+def pairs_within(grid: Grid, basis: Basis, scale: float, pairs: Pairs, found: int) -> int:
     """Add the pairs of one grid whose distance is below (r_i + r_j) * scale; how many there are."""
-    shape, start, a, lattice = grid.shape, grid.start, grid.spheres, frame.lattice
+    shape, start, a, lattice = grid.shape, grid.start, grid.spheres, basis.lattice
     row = grid.row
-    runs = np.empty((_room_for_runs(frame, grid), 5), np.int64)
+    runs = np.empty((_room_for_runs(basis, grid), 5), np.int64)
     for number in range(start.shape[0] - 1):
         first, last = start[number], start[number + 1]
         if first == last:
             continue
         column = number // shape[2]
         place = (column // shape[1], column % shape[1], number % shape[2])
-        count = _runs(frame, grid, place, True, runs)
+        count = _runs(basis, grid, place, True, runs)
         for k in range(-1, count):
             # the bin itself first
             ix, iy, iz = (0, 0, 0) if k < 0 else (runs[k, 2], runs[k, 3], runs[k, 4])
@@ -221,20 +220,20 @@ def pairs_within(grid: Grid, frame: Frame, scale: float, pairs: Pairs, found: in
 
 @kernel
 def pairs_between(
-    small: Grid, large: Grid, frame: Frame, scale: float, pairs: Pairs, found: int
+    small: Grid, large: Grid, basis: Basis, scale: float, pairs: Pairs, found: int
 ) -> int:
     """Add the pairs of a sphere of one grid and one of another, whose spheres are larger."""
-    shape, a, b, lattice = large.shape, small.spheres, large.spheres, frame.lattice
-    runs = np.empty((_room_for_runs(frame, large), 5), np.int64)
+    shape, a, b, lattice = large.shape, small.spheres, large.spheres, basis.lattice
+    runs = np.empty((_room_for_runs(basis, large), 5), np.int64)
     for i in range(a.shape[0]):
         if found > pairs.most:
             return found
         place = (
-            _bin(frame, shape, a[i, 0], a[i, 1], a[i, 2], 0),
-            _bin(frame, shape, a[i, 0], a[i, 1], a[i, 2], 1),
-            _bin(frame, shape, a[i, 0], a[i, 1], a[i, 2], 2),
+            _bin(basis, shape, a[i, 0], a[i, 1], a[i, 2], 0),
+            _bin(basis, shape, a[i, 0], a[i, 1], a[i, 2], 1),
+            _bin(basis, shape, a[i, 0], a[i, 1], a[i, 2], 2),
         )
-        count = _runs(frame, large, place, False, runs)
+        count = _runs(basis, large, place, False, runs)
         for k in range(count):
             ix, iy, iz = runs[k, 2], runs[k, 3], runs[k, 4]
             x = a[i, 0] - ix * lattice[0, 0] - iy * lattice[1, 0] - iz * lattice[2, 0]

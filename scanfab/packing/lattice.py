@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-import numpy.typing as npt
+
+from scanfab.base.typing import FloatArray, IntArray
 
 __all__ = ["Lattice", "reduced_lattice"]
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 # a step that makes a vector shorter by less is rounding: reducing must come to an end
 SHORTER = 1.0 - 1e-9

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from scanfab.base.arrays import cast, grains_named
 from scanfab.base.errors import PackingError
 from scanfab.base.lengths import LEAST, MOST, all_within
+from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import ContactList, Contacts, Spheres, resolve_contacts
 
@@ -24,9 +25,6 @@ __all__ = [
     "check_lengths",
     "lies_within",
 ]
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 
 # rows whose temporary array stays in a cache: a new one for all would take longer to come by

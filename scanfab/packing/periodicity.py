@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.typing import FloatArray
 from scanfab.packing.packing import Packing
 
 __all__ = ["fitting_periods"]
 
-FloatArray = npt.NDArray[np.float64]
 
 # grains of a face that tell whether it fits
 MOST_GRAINS = 2000

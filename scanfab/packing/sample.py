@@ -10,17 +10,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
+from scanfab.base.typing import BoolArray, IntArray
 from scanfab.packing.escaped import Escaped, escaped_grains
 from scanfab.packing.packing import Contacts, Packing
 from scanfab.packing.window import SphereWindow, SurfaceBox
 
 __all__ = ["VARIANTS", "Sample", "Variant"]
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-BoolArray = npt.NDArray[np.bool_]
 
 # grains that a message names
 MOST_NAMED = 20

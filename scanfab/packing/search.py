@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, SettingsError
+from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import Contacts, warn_of_same_centre
 from scanfab.packing.kernels import (
-    Frame,
+    Basis,
     Grid,
     Pairs,
     contact_geometry,
     fill_grid,
-    move_into_frame,
+    move_into_basis,
     pairs_between,
     pairs_within,
     sort_pairs,
@@ -25,8 +25,6 @@ from scanfab.packing.packing import Packing
 
 __all__ = ["find_contacts", "overlapping_pairs"]
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 # grains of one grid differ by no more than this factor: dust is not sought in bins of boulders
 CLASS_RATIO = 3.5
@@ -124,17 +122,17 @@ def overlapping_pairs(
     count = len(radius)
     if count == 0:
         return np.zeros((0, 2), np.int64), np.zeros((0, 3), np.int64)
-    frame, vectors = _frame(position, cell)
+    basis, vectors = _basis(position, cell)
     moved, turns = position, np.empty((0, 3), np.int64)
-    if frame.repeats.any():
+    if basis.repeats.any():
         moved, turns = np.empty((count, 3)), np.empty((count, 3), np.int64)
-        move_into_frame(position, frame, moved, turns)
-    grids = list(_grids(moved, radius, scale, frame, vectors))
+        move_into_basis(position, basis, moved, turns)
+    grids = list(_grids(moved, radius, scale, basis, vectors))
     found, room = 0, USUAL_CONTACTS * count
     while True:
         most = MOST_CONTACTS * count
         pairs = Pairs(np.empty((room, 2), np.int32), np.empty((room, 3), np.int16), most)
-        found = _search(grids, frame, scale, pairs)
+        found = _search(grids, basis, scale, pairs)
         if found > most:
             raise PackingError(
                 f"more than {MOST_CONTACTS} contacts a grain by geometry: {count} grains lie on "
@@ -147,14 +145,14 @@ def overlapping_pairs(
     sort_pairs(Pairs(pairs.rows[:found], pairs.image[:found], most), count, rows, image)
     if turns.any():
         image += turns[rows[:, 0]] - turns[rows[:, 1]]
-    return rows, _in_vectors_of(cell, image, frame)
+    return rows, _in_vectors_of(cell, image, basis)
 
 
-def _frame(position: FloatArray, cell: Cell | None) -> tuple[Frame, FloatArray]:
+def _basis(position: FloatArray, cell: Cell | None) -> tuple[Basis, FloatArray]:
     """
     What is cut into bins: the cell by its shortest vectors, closed by the grains' own box.
 
-    The frame's vectors come with it, shape (3, 3).
+    The basis's vectors come with it, shape (3, 3).
     """
     lattice = np.zeros((0, 3)) if cell is None else cell.lattice.vectors
     repeating = len(lattice)
@@ -171,7 +169,7 @@ def _frame(position: FloatArray, cell: Cell | None) -> tuple[Frame, FloatArray]:
     start[repeating:] = low / size
     lattice_rows = np.zeros((3, 3))
     lattice_rows[:repeating] = lattice
-    return Frame(inverse, start, lattice_rows, np.arange(3) < repeating), vectors
+    return Basis(inverse, start, lattice_rows, np.arange(3) < repeating), vectors
 
 
 def _extents(position: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -208,7 +206,7 @@ def _orthogonal_complement(vectors: FloatArray) -> FloatArray:
 
 
 def _grids(
-    position: FloatArray, radius: FloatArray, scale: float, frame: Frame, vectors: FloatArray
+    position: FloatArray, radius: FloatArray, scale: float, basis: Basis, vectors: FloatArray
 ) -> Iterator[Grid]:
     """Grids of grains of like size, the largest grains first."""
     largest, smallest = float(radius.max()), float(radius.min())
@@ -221,14 +219,14 @@ def _grids(
     heights = 1.0 / np.linalg.norm(np.linalg.inv(vectors), axis=0)
     for rows in classes:
         if len(rows):
-            grid = _empty_grid(len(rows), 2 * scale * float(radius[rows].max()), heights, frame)
-            fill_grid(position, radius, rows, frame, grid)
+            grid = _empty_grid(len(rows), 2 * scale * float(radius[rows].max()), heights, basis)
+            fill_grid(position, radius, rows, basis, grid)
             yield grid
 
 
-def _empty_grid(count: int, edge: float, heights: FloatArray, frame: Frame) -> Grid:
+def _empty_grid(count: int, edge: float, heights: FloatArray, basis: Basis) -> Grid:
     """A grid of bins that are no thinner than an edge, about as many as there are grains."""
-    cells = np.where(frame.repeats, edge / heights, 0.0)
+    cells = np.where(basis.repeats, edge / heights, 0.0)
     if np.any(cells > MOST_CELLS):
         raise PackingError(
             f"a grain of radius {0.5 * edge:g} spans {cells.max():g} periodic cells: "
@@ -239,7 +237,7 @@ def _empty_grid(count: int, edge: float, heights: FloatArray, frame: Frame) -> G
         excess = np.cbrt(np.prod(np.floor(shape)) / (2 * count + 8))
         shape = np.maximum(shape / max(excess, 1.01), 1.0)
     bins = shape.astype(np.int64)
-    reach = np.where(frame.repeats, np.ceil(edge * ROOM * bins / heights), 1.0).astype(np.int64)
+    reach = np.where(basis.repeats, np.ceil(edge * ROOM * bins / heights), 1.0).astype(np.int64)
     return Grid(
         np.empty((count, 4)),
         np.empty(count, np.int32),
@@ -249,18 +247,18 @@ def _empty_grid(count: int, edge: float, heights: FloatArray, frame: Frame) -> G
     )
 
 
-def _search(grids: list[Grid], frame: Frame, scale: float, pairs: Pairs) -> int:
+def _search(grids: list[Grid], basis: Basis, scale: float, pairs: Pairs) -> int:
     """All pairs, of grains of like size and of others; how many there are."""
     found = 0
     for place, grid in enumerate(grids):
-        found = pairs_within(grid, frame, scale, pairs, found)
+        found = pairs_within(grid, basis, scale, pairs, found)
         for larger in grids[:place]:
-            found = pairs_between(grid, larger, frame, scale, pairs, found)
+            found = pairs_between(grid, larger, basis, scale, pairs, found)
     return found
 
 
-def _in_vectors_of(cell: Cell | None, image: IntArray, frame: Frame) -> IntArray:
-    """Images in vectors of the cell, from those in vectors of the frame."""
+def _in_vectors_of(cell: Cell | None, image: IntArray, basis: Basis) -> IntArray:
+    """Images in vectors of the cell, from those in vectors of the basis."""
     if cell is None or not cell.is_periodic:
         return image
     combination = cell.lattice.combination

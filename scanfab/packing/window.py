@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import SettingsError
+from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 
@@ -15,9 +15,6 @@ __all__ = ["RV_MEANING", "SphereWindow", "SurfaceBox"]
 
 # for messages: who writes 70 means per cent
 RV_MEANING = "which is a fraction of half the sample's smallest extent, such as 0.7"
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

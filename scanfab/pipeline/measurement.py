@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.typing import FloatArray
 from scanfab.packing.sample import Sample, Variant
 from scanfab.pipeline.plan import CLOSE, Plan
 from scanfab.pipeline.settings import AUTO_RULE, Settings
@@ -19,7 +20,6 @@ from scanfab.scan.scan import CellGrains, ScanSums, Solids, most_lines
 
 __all__ = ["Measurement", "measure"]
 
-FloatArray = npt.NDArray[np.float64]
 
 # Of the scan for the sample's scatter: its noise is known from the replicates, and taken off. Lines
 # at one distance in mean radii make as many segments for each grain of a small sample as of a large

@@ -9,7 +9,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.fabric.contact import axial_error, contact_fabric
 from scanfab.fabric.jackknife import BLOCKS, Jackknife, contact_jackknife, void_jackknife
@@ -22,7 +21,6 @@ from scanfab.table.table import COLUMNS
 
 __all__ = ["FRAME_COLUMNS", "VariantColumns", "no_columns"]
 
-FloatArray = npt.NDArray[np.float64]
 
 # the same for all variants
 FRAME_COLUMNS = (

@@ -13,10 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import SettingsError
+from scanfab.base.typing import FloatArray
 
 __all__ = ["DirectionRule", "design_of", "direction_rule"]
 
-FloatArray = npt.NDArray[np.float64]
 
 # SciPy's Lebedev rules of these degrees have negative weights: they would amplify noise
 NEGATIVE_LEBEDEV = (13, 25, 27)

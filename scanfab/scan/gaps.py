@@ -13,16 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.kernels.bins import BLOCKS, Bins
-from scanfab.scan.lines import drawn_lines, line_frames
-from scanfab.scan.scan import MOST_STEPS, Following, Solids, in_parts, shortest_gap, tally_frames
+from scanfab.scan.lines import drawn_lines, line_triads
+from scanfab.scan.scan import MOST_STEPS, Following, Solids, in_parts, shortest_gap, tally_triads
 
 __all__ = ["Blocks", "GapSums", "scan_gaps"]
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-BoolArray = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +46,7 @@ class Blocks:
         """
         along = np.asarray(axis, dtype=np.float64)
         # about x, y or z the octants are those of the coordinates
-        parting = np.eye(3) if np.count_nonzero(along) == 1 else line_frames(along[None])[0]
+        parting = np.eye(3) if np.count_nonzero(along) == 1 else line_triads(along[None])[0]
         matrix = parting / (4.0 * reach)
         return cls(matrix, 0.5 - matrix @ center)
 
@@ -165,7 +162,7 @@ def scan_gaps(
     cutoffs : sequence of float
         In ascending order, dump's length unit.
     blocks : two Blocks
-        Of the whole sample and of the window, in the frame of ``solids``.
+        Of the whole sample and of the window, in the coordinates of ``solids``.
 
     Raises
     ------
@@ -173,20 +170,20 @@ def scan_gaps(
         If following lines through a periodic medium takes more steps than allowed.
     """
     following = Following(most_steps)
-    frames, offsets = drawn_lines(rule, seed, replicates)
+    triads, offsets = drawn_lines(rule, seed, replicates)
     least = np.maximum(np.array(cutoffs, dtype=np.float64), shortest_gap(solids))
     affine = np.array([one.affine() for one in blocks])
 
-    def some(frames: FloatArray, offsets: FloatArray) -> FloatArray:
-        bins = Bins(affine, least, np.zeros((len(frames), 2, 2, BLOCKS * len(least), 3)))
-        tally_frames(solids, frames, offsets, spacing, least[0], variants, bins, following)
+    def some(triads: FloatArray, offsets: FloatArray) -> FloatArray:
+        bins = Bins(affine, least, np.zeros((len(triads), 2, 2, BLOCKS * len(least), 3)))
+        tally_triads(solids, triads, offsets, spacing, least[0], variants, bins, following)
         return bins.sums
 
-    sums = in_parts(some, frames, offsets, workers)
+    sums = in_parts(some, triads, offsets, workers)
     # variants: whole (a, b) and window (c, d)
     sums = sums.reshape(*offsets.shape[:2], 4, BLOCKS, len(least), 3)
     sums[:, :, [variant not in variants for variant in "abcd"]] = 0.0
     # what reaches a cut-off reaches all below it
     sums = np.flip(np.cumsum(np.flip(sums, axis=4), axis=4), axis=4)
     number, length, square = np.moveaxis(np.swapaxes(sums, 1, 2), -1, 0)
-    return GapSums(frames[:, :, 2], least, number, length, square)
+    return GapSums(triads[:, :, 2], least, number, length, square)

@@ -1,29 +1,27 @@
-"""The grids of scan lines: a frame for each axis, turned and shifted at random in a replicate."""
+"""The grids of scan lines: a triad for each axis, turned and shifted at random in a replicate."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import SettingsError
+from scanfab.base.typing import FloatArray
 from scanfab.scan.directions import DirectionRule
 
-__all__ = ["drawn_lines", "line_frames", "turned_frames"]
-
-FloatArray = npt.NDArray[np.float64]
+__all__ = ["drawn_lines", "line_triads", "turned_triads"]
 
 
-def line_frames(axes: FloatArray) -> FloatArray:
+def line_triads(axes: FloatArray) -> FloatArray:
     """
-    Orthonormal frames (rows u, v, n) whose third row is each axis, shape (D, 3, 3).
+    Orthonormal triads (rows u, v, n) whose third row is each axis, shape (D, 3, 3).
 
     Examples
     --------
     >>> import numpy as np
-    >>> from scanfab.scan.lines import line_frames
-    >>> line_frames(np.array([[0.0, 0.0, 1.0]]))[0]
+    >>> from scanfab.scan.lines import line_triads
+    >>> line_triads(np.array([[0.0, 0.0, 1.0]]))[0]
     array([[1., 0., 0.],
            [0., 1., 0.],
            [0., 0., 1.]])
@@ -37,33 +35,33 @@ def line_frames(axes: FloatArray) -> FloatArray:
 def drawn_lines(
     rule: DirectionRule, seed: int, replicates: Iterable[int]
 ) -> tuple[FloatArray, FloatArray]:
-    """Line frames of all replicates, shape (R, D, 3, 3), and shifts of their grids, (R, D, 2)."""
-    frames = line_frames(rule.axes)
-    drawn = [turned_frames(rule, frames, seed, replicate) for replicate in replicates]
+    """Line triads of all replicates, shape (R, D, 3, 3), and shifts of their grids, (R, D, 2)."""
+    triads = line_triads(rule.axes)
+    drawn = [turned_triads(rule, triads, seed, replicate) for replicate in replicates]
     if not drawn:
         raise SettingsError("replicates: expected at least one")
     turned, offsets = zip(*drawn, strict=True)
     return np.array(turned), np.array(offsets)
 
 
-def turned_frames(
-    rule: DirectionRule, frames: FloatArray, seed: int, replicate: int
+def turned_triads(
+    rule: DirectionRule, triads: FloatArray, seed: int, replicate: int
 ) -> tuple[FloatArray, FloatArray]:
     """
     The lines of one replicate.
 
-    Returns the rule's line frames (shape (D, 3, 3)), turned, and the shifts of the grids in units
+    Returns the rule's line triads (shape (D, 3, 3)), turned, and the shifts of the grids in units
     of the spacing (shape (D, 2)).
     """
     random = np.random.default_rng([seed, replicate])
     rotation = _random_rotation(random)
     offsets = random.random((len(rule), 2))
-    return (frames @ rotation.T if rule.turned else frames), offsets
+    return (triads @ rotation.T if rule.turned else triads), offsets
 
 
 def _random_rotation(random: np.random.Generator) -> FloatArray:
     """A rotation matrix out of all, each as likely: from a random unit quaternion."""
-    # SciPy has this too, but takes as long to import as a small frame to compute
+    # SciPy has this too, but takes as long to import as a small triad to compute
     quaternion = random.normal(size=4)
     x, y, z, w = quaternion / np.linalg.norm(quaternion)
     return np.array(

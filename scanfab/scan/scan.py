@@ -8,10 +8,10 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import SettingsError
 from scanfab.base.jit import Flag
+from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.kernels import sweep
 from scanfab.scan.kernels.axes import scan_axes, scan_cell
@@ -33,12 +33,9 @@ __all__ = [
     "scan_lines",
     "shortest_gap",
     "sums_of",
-    "tally_frames",
+    "tally_triads",
 ]
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-BoolArray = npt.NDArray[np.bool_]
 
 # lines of one axis and replicate: more take minutes, even those that meet nothing
 MAX_LINES = 50_000_000
@@ -258,13 +255,13 @@ def scan_lines(
     1.87
     """
     _check_spacing(solids, spacing)
-    frames, offsets = drawn_lines(rule, seed, replicates)
+    triads, offsets = drawn_lines(rule, seed, replicates)
     following = Following(most_steps)
 
-    def some(frames: FloatArray, offsets: FloatArray) -> FloatArray:
-        return tally_frames(solids, frames, offsets, spacing, cutoff, variants, following=following)
+    def some(triads: FloatArray, offsets: FloatArray) -> FloatArray:
+        return tally_triads(solids, triads, offsets, spacing, cutoff, variants, following=following)
 
-    return sums_of(frames, in_parts(some, frames, offsets, workers), variants)
+    return sums_of(triads, in_parts(some, triads, offsets, workers), variants)
 
 
 def shortest_gap(solids: Solids) -> float:
@@ -275,24 +272,24 @@ def shortest_gap(solids: Solids) -> float:
 
 def in_parts(
     scan: Callable[[FloatArray, FloatArray], FloatArray],
-    frames: FloatArray,
+    triads: FloatArray,
     offsets: FloatArray,
     workers: int,
 ) -> FloatArray:
     """
     Scan along the axes of all replicates, a few in each job of several threads.
 
-    ``scan`` takes the frames and shifts of some axes, (A, 3, 3) and (A, 2), and returns what it
+    ``scan`` takes the triads and shifts of some axes, (A, 3, 3) and (A, 2), and returns what it
     adds up for each, (A, ...); the result has the shape (R, D, ...).
     """
     count = offsets.shape[0] * offsets.shape[1]
-    frames, shifts = frames.reshape(count, 3, 3), offsets.reshape(count, 2)
+    triads, shifts = triads.reshape(count, 3, 3), offsets.reshape(count, 2)
     # so many that no thread waits long for the last one, but not many more
     axes = min(max(count // (JOBS_A_THREAD * workers), 1), MOST_AXES)
     parts = [slice(first, first + axes) for first in range(0, count, axes)]
 
     def one(part: slice) -> FloatArray:
-        return scan(frames[part], shifts[part])
+        return scan(triads[part], shifts[part])
 
     if workers == 1 or len(parts) == 1:
         sums = np.concatenate([one(part) for part in parts])
@@ -302,9 +299,9 @@ def in_parts(
     return sums.reshape(*offsets.shape[:2], *sums.shape[1:])
 
 
-def tally_frames(
+def tally_triads(
     solids: Solids,
-    frames: FloatArray,
+    triads: FloatArray,
     offsets: FloatArray,
     spacing: float,
     cutoff: float,
@@ -313,7 +310,7 @@ def tally_frames(
     following: Following | None = None,
 ) -> FloatArray:
     """
-    Scan along given line frames (D, 3, 3) with given shifts (D, 2).
+    Scan along given line triads (D, 3, 3) with given shifts (D, 2).
 
     Returns the tallies of each axis and set of solids, shape (D, 2, TALLY_SIZE); where there are
     bins, the gaps go there instead. ``following`` counts the steps of this and of other parts.
@@ -325,16 +322,16 @@ def tally_frames(
     """
     first, second = ("a" in variants or "c" in variants), ("b" in variants or "d" in variants)
     whole, window = ("a" in variants or "b" in variants), ("c" in variants or "d" in variants)
-    tallies = np.zeros((len(frames), 2, sweep.TALLY_SIZE))
+    tallies = np.zeros((len(triads), 2, sweep.TALLY_SIZE))
     cutoff = max(cutoff, shortest_gap(solids))
-    bins = no_bins(len(frames)) if bins is None else bins
+    bins = no_bins(len(triads)) if bins is None else bins
     following = Following(MOST_STEPS) if following is None else following
     both: Flag = True if first and second else None
     if solids.medium is not None and whole:
         # without a or c, the solids of b and d are the only ones
         medium = solids.medium if first else _without_removed(solids.medium)
         if len(medium.radius):
-            axes = np.ascontiguousarray(frames[:, 2])
+            axes = np.ascontiguousarray(triads[:, 2])
             by_lists = _few_lines(medium.radius, spacing, 1 + (both is not None))
             scan_cell(
                 medium, axes, offsets, spacing, cutoff, tallies, by_lists, both, bins,
@@ -348,7 +345,7 @@ def tally_frames(
             np.ascontiguousarray(solids.position[solid]),
             solids.radius[solid],
             solids.removed[solid],
-            np.ascontiguousarray(frames),
+            np.ascontiguousarray(triads),
             offsets,
             spacing,
             cutoff,
@@ -378,8 +375,8 @@ def _without_removed(medium: CellGrains) -> CellGrains:
     )
 
 
-def sums_of(frames: FloatArray, tallies: FloatArray, variants: str) -> ScanSums:
-    """The sums of replicates from their line frames and tallies, shape (R, D, 2, TALLY_SIZE)."""
+def sums_of(triads: FloatArray, tallies: FloatArray, variants: str) -> ScanSums:
+    """The sums of replicates from their line triads and tallies, shape (R, D, 2, TALLY_SIZE)."""
     wanted = np.array([variant in variants for variant in "abcd"])[:, None]
     # replicate, set of solids, axis
     entries = np.moveaxis(tallies, (3, 2), (0, 2))
@@ -392,7 +389,7 @@ def sums_of(frames: FloatArray, tallies: FloatArray, variants: str) -> ScanSums:
         return of(sweep.WHOLE + number, sweep.WINDOW + number)
 
     return ScanSums(
-        axes=frames[:, :, 2],
+        axes=triads[:, :, 2],
         length=both(sweep.LENGTH),
         segments=both(sweep.KEPT).astype(np.int64),
         lines=both(sweep.LINES).astype(np.int64),

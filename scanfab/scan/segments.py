@@ -7,13 +7,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
+
+from scanfab.base.typing import BoolArray, FloatArray, IntArray
 
 __all__ = ["Segments", "cut_lines", "grid_points", "sample_segments"]
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-BoolArray = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +45,7 @@ class Segments:
 def cut_lines(
     position: FloatArray,
     radius: FloatArray,
-    frame: FloatArray,
+    triad: FloatArray,
     points: FloatArray,
     window_radius: float = 0.0,
 ) -> Segments:
@@ -63,7 +60,7 @@ def cut_lines(
         Centres of the solids; the window, if any, is centred at the origin.
     radius : ndarray, shape (N,)
         Their radii, dump's length unit.
-    frame : ndarray, shape (3, 3)
+    triad : ndarray, shape (3, 3)
         Orthonormal rows u, v, n; the lines run along n.
     points : ndarray, shape (L, 2)
         Where the lines pierce the plane through the origin, along u and v.
@@ -83,7 +80,7 @@ def cut_lines(
     >>> cut_lines(np.zeros((1, 3)), np.ones(1), np.eye(3), np.zeros((1, 2)), 3.0).length
     array([2., 2., 2.])
     """
-    across, depth = position @ frame[:2].T, position @ frame[2]
+    across, depth = position @ triad[:2].T, position @ triad[2]
     ends, void, line = [np.zeros((0, 2, 3))], [np.zeros(0, bool)], [np.arange(0)]
     for number, point in enumerate(points):
         square = radius**2 - np.sum((across - point) ** 2, axis=1)
@@ -92,7 +89,7 @@ def cut_lines(
         bounds, is_void = _cut(depth[hit] - half, depth[hit] + half, _reach(point, window_radius))
         places = np.empty((*bounds.shape, 3))
         places[..., :2], places[..., 2] = point, bounds
-        ends.append(places @ frame)
+        ends.append(places @ triad)
         void.append(is_void)
         line.append(np.full(len(bounds), number))
     return Segments(np.concatenate(ends), np.concatenate(void), np.concatenate(line))
@@ -139,12 +136,12 @@ def grid_points(reach: float, lines: int) -> FloatArray:
 def sample_segments(
     position: FloatArray,
     radius: FloatArray,
-    frames: FloatArray,
+    triads: FloatArray,
     lines: int,
     window_radius: float = 0.0,
 ) -> Segments:
     """
-    Cut about so many lines, a grid of them for each of several line frames (D, 3, 3).
+    Cut about so many lines, a grid of them for each of several line triads (D, 3, 3).
 
     Parameters as for :func:`cut_lines`.
     """
@@ -153,7 +150,7 @@ def sample_segments(
         reach = float((np.linalg.norm(position, axis=1) + radius).max())
     if reach == 0:
         return Segments.concatenate([])
-    points = grid_points(reach, max(lines // len(frames), 1))
+    points = grid_points(reach, max(lines // len(triads), 1))
     return Segments.concatenate(
-        cut_lines(position, radius, frame, points, window_radius) for frame in frames
+        cut_lines(position, radius, triad, points, window_radius) for triad in triads
     )

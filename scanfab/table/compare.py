@@ -8,9 +8,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import ScanfabNote, ScanfabWarning, SettingsError
+from scanfab.base.typing import FloatArray
 from scanfab.fabric.jackknife import BLOCKS, variance_without_noise
 from scanfab.table.abscissa import strain_column, why_not_strain
 from scanfab.table.comparison import Comparison, DifferenceRow, FrameRow, SummaryRow
@@ -20,7 +20,6 @@ from scanfab.table.selection import check_rows
 
 __all__ = ["compare_tables"]
 
-FloatArray = npt.NDArray[np.float64]
 
 TURNED = (
     "the loading axis is not the axis of the contact fabric, as in simple shear: alpha_vs_axial, "

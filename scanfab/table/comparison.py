@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-import numpy.typing as npt
+from scanfab.base.typing import FloatArray
 
 __all__ = [
     "DIFFERENCE_MEANINGS",
@@ -16,8 +15,6 @@ __all__ = [
     "FrameRow",
     "SummaryRow",
 ]
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

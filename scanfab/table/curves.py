@@ -8,8 +8,8 @@ from pathlib import PurePath
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from scanfab.base.typing import FloatArray
 from scanfab.table.abscissa import STRAINS, strain_column
 from scanfab.table.reading import number_of, total_error
 
@@ -23,7 +23,6 @@ __all__ = [
     "short_names",
 ]
 
-FloatArray = npt.NDArray[np.float64]
 Rows = Sequence[Mapping[str, Any]]
 
 LONGEST_NAME = 32

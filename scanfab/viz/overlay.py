@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
+
+from scanfab.base.typing import FloatArray
 
 __all__ = ["SIZE", "Framing", "add_scale", "add_words"]
 
-FloatArray = npt.NDArray[np.float64]
 
 # of the picture, pixels
 SIZE = (1200, 900)

@@ -9,16 +9,16 @@ from threading import Lock
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import SettingsError
 from scanfab.base.files import check_folder
+from scanfab.base.typing import FloatArray
 from scanfab.fabric.distribution import mean_length_function, sphere_points
 from scanfab.fabric.tensor import COMPONENTS
 from scanfab.packing.sample import VARIANTS
 from scanfab.pipeline.frame import FrameResult
 from scanfab.pipeline.settings import Vector
-from scanfab.scan.lines import line_frames
+from scanfab.scan.lines import line_triads
 from scanfab.scan.segments import Segments, sample_segments
 from scanfab.table.table import Row
 from scanfab.viz import vtk_files as vtk
@@ -26,7 +26,6 @@ from scanfab.viz.scene import contact_lines, grains_of, scene_of
 
 __all__ = ["VtkFolder", "scan_line_sample"]
 
-FloatArray = npt.NDArray[np.float64]
 
 LINES = 120
 TEXT_FIELDS = ("source", "variant", "contacts_from")
@@ -115,7 +114,7 @@ def scan_line_sample(
 ) -> Segments:
     """A few scan lines along the loading axis and across it, in the dump's coordinates."""
     position, radius, reach = result.scanned.spheres_of(VARIANTS[variant])
-    frame = line_frames(np.array([axis]))[0]
+    frame = line_triads(np.array([axis]))[0]
     # along the axis, and along the first direction across it
     frames = np.stack([frame, np.roll(frame, -1, axis=0)])
     found = sample_segments(position, radius, frames, lines, reach)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import SphereWindow
@@ -23,9 +24,6 @@ __all__ = [
     "section_lines",
 ]
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-BoolArray = npt.NDArray[np.bool_]
 
 # between the lines of a section and the plane across the axis, degrees
 LINE_ANGLE = 30.0

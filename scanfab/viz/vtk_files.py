@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.files import whole_file
+from scanfab.base.typing import FloatArray
 from scanfab.scan.segments import Segments
 from scanfab.viz.scene import ContactLines, Grains
 
@@ -26,7 +27,6 @@ __all__ = [
     "window_mesh",
 ]
 
-FloatArray = npt.NDArray[np.float64]
 
 SOLID, DROPPED, KEPT = 0, 1, 2
 

@@ -14,14 +14,13 @@ import numpy.typing as npt
 from scanfab.base.errors import ScanfabError
 from scanfab.base.files import whole_file
 from scanfab.base.logs import quiet_vtk
+from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.viz.figures.style import COLOURS
 from scanfab.viz.overlay import SIZE, Framing, add_scale, add_words
 from scanfab.viz.scene import Grains, Scene
 
 __all__ = ["check_screen", "show_scene"]
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 ADVICE = (
     "install one of them: on Debian or Ubuntu apt-get install libegl1 libgl1 libosmesa6, or "

@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from scanfab.scan.directions import DirectionRule
-from scanfab.scan.lines import line_frames
+from scanfab.scan.lines import line_triads
 from scanfab.scan.scan import Solids, scan_lines
 from tests.benchmarks.packings import PAPER, dense
 from tests.benchmarks.timing import interleaved, table
@@ -154,7 +154,7 @@ class Projected:
     """The spheres along the axis, and the grid over the window."""
 
     def __init__(self, solids: Solids) -> None:
-        u, v, depth = line_frames(AXIS)[0] @ solids.position.T
+        u, v, depth = line_triads(AXIS)[0] @ solids.position.T
         order = np.argsort(depth)
         self.u, self.v, self.depth = u[order], v[order], depth[order]
         self.radius = solids.radius[order]

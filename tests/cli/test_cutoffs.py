@@ -10,7 +10,7 @@ import pytest
 
 from scanfab import Packing, compute, direction_rule, find_contacts
 from scanfab.cli.main import run
-from scanfab.scan.lines import line_frames, turned_frames
+from scanfab.scan.lines import line_triads, turned_triads
 from scanfab.table.table import COLUMNS
 from tests.helpers import naive
 from tests.helpers.interruptions import interrupted_at_row
@@ -81,7 +81,7 @@ def test_second_moment_is_that_of_the_slow_twin():
     options = {"rv_radius": 1.5, "rv_center": (2.5, 2.5, 2.5), "variants": "c"}
     row = compute(packing, directions=rule, spacing=spacing, cutoff=cutoff, moment=2, **options)[0]
     assert row.replicates == 1
-    frames, offsets = turned_frames(rule, line_frames(rule.axes), 0, 0)
+    frames, offsets = turned_triads(rule, line_triads(rule.axes), 0, 0)
     over, under = np.zeros(len(rule)), np.zeros(len(rule))
     for axis in range(len(rule)):
         _, window = naive.void_segments(

@@ -76,9 +76,9 @@ def lengths(intervals):
     return [end - start for start, end in intervals]
 
 
-def grid_lines(position, radius, frame, offset, spacing, window_radius):
-    """The lines of a square grid along the third row of a frame (rows u, v, n): x, y, solids."""
-    u, v, direction = frame
+def grid_lines(position, radius, triad, offset, spacing, window_radius):
+    """The lines of a square grid along the third row of a triad (rows u, v, n): x, y, solids."""
+    u, v, direction = triad
     surfaces = np.linalg.norm(position, axis=1) + radius
     number = ceil(max([window_radius, *surfaces]) / spacing) + 1
     for i, j in product(range(-number, number + 1), repeat=2):
@@ -86,10 +86,10 @@ def grid_lines(position, radius, frame, offset, spacing, window_radius):
         yield x, y, union(chords(position, radius, x * u + y * v, direction))
 
 
-def scan(position, radius, frame, offset, spacing, window_radius):
-    """All gaps on the square grid of lines along the third row of a frame (rows u, v, n)."""
+def scan(position, radius, triad, offset, spacing, window_radius):
+    """All gaps on the square grid of lines along the third row of a triad (rows u, v, n)."""
     whole, whole_lines, window, window_lines, line_length = [], 0, [], 0, 0.0
-    for x, y, solids in grid_lines(position, radius, frame, offset, spacing, window_radius):
+    for x, y, solids in grid_lines(position, radius, triad, offset, spacing, window_radius):
         whole += lengths(gaps_between(solids))
         whole_lines += bool(solids)
         if x * x + y * y < window_radius**2:
@@ -100,11 +100,11 @@ def scan(position, radius, frame, offset, spacing, window_radius):
     return Gaps(whole, whole_lines, window, window_lines, line_length)
 
 
-def void_segments(position, radius, frame, offset, spacing, window_radius):
+def void_segments(position, radius, triad, offset, spacing, window_radius):
     """The void segments on a grid of lines: those of the whole sample, those of the window."""
-    u, v, direction = frame
+    u, v, direction = triad
     whole, window = [], []
-    for x, y, solids in grid_lines(position, radius, frame, offset, spacing, window_radius):
+    for x, y, solids in grid_lines(position, radius, triad, offset, spacing, window_radius):
         half = sqrt(max(window_radius**2 - x * x - y * y, 0.0))
         kinds = [(whole, gaps_between(solids))]
         if half > 0:

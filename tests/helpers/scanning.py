@@ -6,8 +6,8 @@ import numpy as np
 
 from scanfab.fabric.void import void_fabric
 from scanfab.scan.directions import direction_rule
-from scanfab.scan.lines import line_frames
-from scanfab.scan.scan import ScanSums, Solids, scan_lines, sums_of, tally_frames
+from scanfab.scan.lines import line_triads
+from scanfab.scan.scan import ScanSums, Solids, scan_lines, sums_of, tally_triads
 
 Z = np.array([[0.0, 0.0, 1.0]])
 
@@ -32,18 +32,18 @@ def solids_of(spheres, window_radius=0.0, removed=None):
     )
 
 
-def scan_frames(solids, frames, offsets, spacing, cutoff, variants="abcd"):
-    """Scan along given line frames, with given shifts of the lines, as one replicate."""
-    tallies = tally_frames(solids, frames, offsets, spacing, cutoff, variants)
-    return sums_of(frames[None], tallies[None], variants)
+def scan_triads(solids, triads, offsets, spacing, cutoff, variants="abcd"):
+    """Scan along given line triads, with given shifts of the lines, as one replicate."""
+    tallies = tally_triads(solids, triads, offsets, spacing, cutoff, variants)
+    return sums_of(triads[None], tallies[None], variants)
 
 
 def scan_along(solids, axes, spacing, cutoff=0.0, replicates=16, seed=0):
     """Scan along the same axes in every replicate: only the lines are shifted."""
     random = np.random.default_rng(seed)
-    frames = line_frames(np.asarray(axes, dtype=float))
+    triads = line_triads(np.asarray(axes, dtype=float))
     return ScanSums.concatenate(
-        scan_frames(solids, frames, random.random((len(frames), 2)), spacing, cutoff)
+        scan_triads(solids, triads, random.random((len(triads), 2)), spacing, cutoff)
         for _ in range(replicates)
     )
 

@@ -5,7 +5,7 @@ import pytest
 
 from scanfab import Packing, compute, contact_fabric, find_contacts, void_fabric
 from scanfab.scan.directions import direction_rule
-from scanfab.scan.lines import line_frames
+from scanfab.scan.lines import line_triads
 from tests.helpers.lattices import Spheres, poisson_spheres, rotation, shaken_cubic
 from tests.helpers.scanning import fabric, scan_frames, solids_of
 
@@ -43,7 +43,7 @@ def assert_same(one, other, rel=1e-9):
 
 def test_packing_directions_and_offsets_turned_together(spheres):
     """G becomes Q G Qᵀ to rounding, in all variants."""
-    frames = line_frames(RULE.axes)
+    frames = line_triads(RULE.axes)
     before, sums = tensors(spheres, frames)
     for seed in range(5):
         turn = rotation(np.random.default_rng(seed))
@@ -67,7 +67,7 @@ def test_packing_turned_alone():
 
 @pytest.mark.parametrize("unit", [1e-9, 50.0])
 def test_lengths_in_another_unit(spheres, unit):
-    frames = line_frames(RULE.axes)
+    frames = line_triads(RULE.axes)
     before, sums = tensors(spheres, frames)
     after, scaled = tensors(spheres.scaled(unit), frames, unit=unit)
     assert np.array_equal(scaled.segments, sums.segments)
@@ -86,7 +86,7 @@ def test_table_in_another_unit(unit):
 
 
 def test_grains_in_another_order(spheres):
-    frames = line_frames(RULE.axes)
+    frames = line_triads(RULE.axes)
     before, sums = tensors(spheres, frames, "ac")
     order = np.random.default_rng(2).permutation(len(spheres.radius))
     after, shuffled = tensors(Spheres(*(part[order] for part in spheres)), frames, "ac")
@@ -114,7 +114,7 @@ def test_packing_moved():
 def test_packing_mirrored(spheres, axis):
     """Lines mirrored too: G is mirrored, its off-diagonal terms change their signs."""
     mirror = np.diag(np.where(np.arange(3) == axis, -1.0, 1.0))
-    frames = line_frames(RULE.axes)
+    frames = line_triads(RULE.axes)
     before, sums = tensors(spheres, frames)
     after, mirrored = tensors(spheres.turned(mirror), frames @ mirror)
     assert np.array_equal(mirrored.segments, sums.segments)

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scanfab import Cell, Packing, PackingError, find_contacts
-from scanfab.packing.kernels import Frame, Grid, Pairs, fill_grid, pairs_within, sort_pairs
+from scanfab.packing.kernels import Basis, Grid, Pairs, fill_grid, pairs_within, sort_pairs
 from scanfab.packing.search import overlapping_pairs
 from tests.helpers import naive
 from tests.helpers.uncompiled import run_uncompiled
@@ -147,7 +147,7 @@ def test_two_grains_may_touch_through_several_images():
     assert canonical(contacts) == {(0, 1, (0, 0, 0)), (0, 1, (-1, 0, 0))}
 
 
-OPEN = Frame(np.eye(3) / 4, np.zeros(3), np.zeros((3, 3)), np.zeros(3, np.bool_))
+OPEN = Basis(np.eye(3) / 4, np.zeros(3), np.zeros((3, 3)), np.zeros(3, np.bool_))
 
 
 def filled(position, radius, shape):

@@ -5,7 +5,7 @@ import pytest
 
 from scanfab import Cell, Solids, direction_rule, scan_lines
 from scanfab.scan.gaps import Blocks, scan_gaps
-from scanfab.scan.lines import line_frames, turned_frames
+from scanfab.scan.lines import line_triads, turned_triads
 from scanfab.scan.scan import CellGrains
 from tests.helpers import naive
 from tests.helpers.lattices import poisson_spheres
@@ -71,10 +71,10 @@ def test_octants_left_out_add_up_to_seven_times_all(solids):
 
 def test_octant_left_out_is_that_of_the_slow_twin(solids):
     """The second moment too: Σ l² and Σ l of the segments with their middle elsewhere."""
-    frames, offsets = turned_frames(RULE, line_frames(RULE.axes), 0, 0)
+    triads, offsets = turned_triads(RULE, line_triads(RULE.axes), 0, 0)
     gaps = gaps_of(solids, spacing=0.8, replicates=range(1))
     _, window = naive.void_segments(
-        solids.position, solids.radius, frames[2], offsets[2], 0.8, solids.window_radius
+        solids.position, solids.radius, triads[2], offsets[2], 0.8, solids.window_radius
     )
     for place, cutoff in enumerate(CUTOFFS):
         sums = naive.gap_sums(window, cutoff, np.zeros(3))

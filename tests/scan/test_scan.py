@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scanfab import Packing, SettingsError, compute, direction_rule, scan_lines
-from scanfab.scan.lines import line_frames, turned_frames
+from scanfab.scan.lines import line_triads, turned_triads
 from scanfab.scan.scan import MAX_LINES, ScanSums
 from tests.helpers import naive
 from tests.helpers.lattices import Spheres, poisson_spheres, separate_spheres, shaken_cubic
@@ -27,13 +27,13 @@ def raw(sums):
 
 
 def test_scan_equals_the_slow_twin_for_all_variants(solids):
-    """Its lines are those of the replicate's frames and shifts."""
+    """Its lines are those of the replicate's triads and shifts."""
     sums = scan_lines(solids, RULE, spacing=0.6, cutoff=0.3, replicates=[3], seed=5)
-    frames, offsets = turned_frames(RULE, line_frames(RULE.axes), 5, 3)
-    for number, (frame, offset) in enumerate(zip(frames, offsets, strict=True)):
+    triads, offsets = turned_triads(RULE, line_triads(RULE.axes), 5, 3)
+    for number, (triad, offset) in enumerate(zip(triads, offsets, strict=True)):
         keep = ~solids.removed
         tallies = [
-            naive.tally(naive.scan(p, r, frame, offset, 0.6, 3.0), 0.3)
+            naive.tally(naive.scan(p, r, triad, offset, 0.6, 3.0), 0.3)
             for p, r in [
                 (solids.position, solids.radius),
                 (solids.position[keep], solids.radius[keep]),

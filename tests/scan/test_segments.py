@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scanfab.scan.lines import line_frames
+from scanfab.scan.lines import line_triads
 from scanfab.scan.segments import Segments, cut_lines, grid_points, sample_segments
 from tests.helpers import naive
 from tests.helpers.lattices import shaken_cubic
@@ -23,11 +23,11 @@ def spheres():
 @pytest.mark.parametrize("window", [0.0, 1.5])
 def test_void_segments_are_those_of_the_naive_twin(spheres, window):
     position, radius = spheres
-    frame = line_frames(np.array([[0.3, -0.5, np.sqrt(0.66)]]))[0]
+    triad = line_triads(np.array([[0.3, -0.5, np.sqrt(0.66)]]))[0]
     points = grid_points(2.0, 60)
-    found = cut_lines(position, radius, frame, points, window)
+    found = cut_lines(position, radius, triad, points, window)
     for number, point in enumerate(points):
-        chords = naive.chords(position, radius, point @ frame[:2], frame[2])
+        chords = naive.chords(position, radius, point @ triad[:2], triad[2])
         solids = naive.union(chords)
         if window:
             half2 = window**2 - point @ point
@@ -47,10 +47,10 @@ def test_pieces_of_a_line_join_and_alternate(spheres):
 
 
 def test_ends_lie_on_the_line(spheres):
-    frame = line_frames(np.array([[0.0, 0.6, 0.8]]))[0]
-    found = cut_lines(*spheres, frame, np.array([[0.25, -0.5]]), 1.5)
-    assert found.ends @ frame[0] == pytest.approx(np.full(found.ends.shape[:2], 0.25))
-    assert found.ends @ frame[1] == pytest.approx(np.full(found.ends.shape[:2], -0.5))
+    triad = line_triads(np.array([[0.0, 0.6, 0.8]]))[0]
+    found = cut_lines(*spheres, triad, np.array([[0.25, -0.5]]), 1.5)
+    assert found.ends @ triad[0] == pytest.approx(np.full(found.ends.shape[:2], 0.25))
+    assert found.ends @ triad[1] == pytest.approx(np.full(found.ends.shape[:2], -0.5))
 
 
 def test_an_empty_window_is_one_segment():
@@ -66,7 +66,7 @@ def test_lines_that_meet_nothing_have_no_pieces(points):
 
 
 def test_lines_of_several_directions_are_numbered_on(spheres):
-    found = sample_segments(*spheres, line_frames(np.eye(3)), 90, 1.5)
+    found = sample_segments(*spheres, line_triads(np.eye(3)), 90, 1.5)
     numbers = np.unique(found.line)
     assert numbers.tolist() == list(range(len(numbers)))
     assert 60 < len(numbers) < 120

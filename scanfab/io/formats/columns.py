@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
 from scanfab.base.lengths import all_within
+from scanfab.base.typing import FloatArray
 from scanfab.io.reader import GrainTable, ReadOptions
 from scanfab.packing.boundary import CLASS_COLUMNS
 from scanfab.packing.cell import Cell
@@ -26,7 +27,6 @@ __all__ = [
     "whole_numbers",
 ]
 
-FloatArray = npt.NDArray[np.float64]
 Columns = Mapping[str, npt.NDArray[Any]]
 
 # names are compared without regard to case

@@ -5,15 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
+from scanfab.base.typing import FloatArray
 from scanfab.io.formats.join import rows_of_ids
 from scanfab.io.reader import GrainTable
 
 __all__ = ["MOST_ROWS", "are_ids", "are_whole", "refuse_rounded_ids"]
 
-FloatArray = npt.NDArray[np.float64]
 
 # of the rows of a contact file: enough to know a column by its values
 MOST_ROWS = 0.5

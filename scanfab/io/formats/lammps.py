@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
+from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.dump_grains import dump_kind, read_dump_grains
 from scanfab.io.formats.ids import are_ids, are_whole, refuse_rounded_ids
@@ -26,8 +27,6 @@ from scanfab.io.reader import (
 
 __all__ = ["LammpsReader"]
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 # LIGGGHTS writes neither of these items, and its bounds with six digits
 LAMMPS_ITEMS = re.compile(

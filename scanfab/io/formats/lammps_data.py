@@ -6,10 +6,10 @@ import re
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.lengths import MOST
+from scanfab.base.typing import FloatArray
 from scanfab.io.files import check_memory, plain
 from scanfab.io.formats.columns import grain_table
 from scanfab.io.parse.lammps_box import box_vectors
@@ -19,7 +19,6 @@ from scanfab.packing.cell import Cell
 
 __all__ = ["is_data_file", "read_data_grains", "step_of_data"]
 
-FloatArray = npt.NDArray[np.float64]
 
 FIRST_LINE = re.compile(rb"\A(?:\xef\xbb\xbf)?LAMMPS data file[^\n]*")
 STEP = re.compile(rb"timestep = (\d{1,18})\b")

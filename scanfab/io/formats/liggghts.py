@@ -11,9 +11,9 @@ import re
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
+from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.dump_grains import dump_kind, read_dump_grains
 from scanfab.io.formats.ids import MOST_ROWS, are_ids, are_whole, refuse_rounded_ids
@@ -32,8 +32,6 @@ from scanfab.io.reader import (
 
 __all__ = ["LiggghtsReader"]
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 # values of compute pair/gran/local in the order in which they are written, and how many
 PAIR_VALUES = {

@@ -7,10 +7,10 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
 from scanfab.base.lengths import MOST
+from scanfab.base.typing import FloatArray
 from scanfab.io.files import bare_name, plain
 from scanfab.io.formats.columns import grain_table, has_radius, whole_numbers
 from scanfab.io.formats.join import join_ids, join_positions
@@ -29,7 +29,6 @@ from scanfab.packing.packing import ContactList
 
 __all__ = ["VtkReader"]
 
-FloatArray = npt.NDArray[np.float64]
 
 # other kinds of VTK files are grids and indexes of files
 HOLDING_POINTS = ("PolyData", "POLYDATA", "UnstructuredGrid", "UNSTRUCTURED_GRID", "Xdmf")

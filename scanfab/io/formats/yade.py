@@ -9,10 +9,10 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.lengths import MOST
+from scanfab.base.typing import FloatArray
 from scanfab.io.files import check_memory, first_bytes, plain
 from scanfab.io.formats.columns import grain_table
 from scanfab.io.formats.vtk import VtkReader
@@ -31,7 +31,6 @@ from scanfab.packing.cell import Cell
 
 __all__ = ["YadeReader"]
 
-FloatArray = npt.NDArray[np.float64]
 
 # legacy VTK by VTKExporter: VTK itself writes no dot behind the version
 EXPORTER_HEAD = b"# vtk DataFile Version 3.0.\n"

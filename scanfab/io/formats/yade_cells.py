@@ -15,9 +15,9 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError, ScanfabNote, ScanfabWarning
+from scanfab.base.typing import FloatArray
 from scanfab.io.files import COMPRESSED_SUFFIXES, bare_name
 from scanfab.io.formats.yade_save import is_save, read_save, snapshot_of_save
 from scanfab.io.parse.vtk_mesh import read_mesh
@@ -26,7 +26,6 @@ from scanfab.packing.cell import Cell
 
 __all__ = ["cell_beside", "cell_file", "is_cell_file", "refuse_as_numbers"]
 
-FloatArray = npt.NDArray[np.float64]
 
 EXPORTED = re.compile(r"(.*)-spheres-(\d+)\.vtk")
 RECORDED = re.compile(r"(.*)spheres\.(\d+)\.vtu")

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.lengths import MOST
@@ -22,8 +21,6 @@ from scanfab.packing.cell import Cell
 
 __all__ = ["is_binary_save", "is_save", "read_save", "snapshot_of_save"]
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 STEP = re.compile(rb"<iter>\s*(\d{1,18})\s*</iter>")
 TIME = re.compile(rb"<time>\s*([-+.\deE]+)\s*</time>")

@@ -5,15 +5,14 @@ from __future__ import annotations
 import re
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.lengths import MOST
+from scanfab.base.typing import FloatArray
 from scanfab.packing.cell import Cell
 
 __all__ = ["box_of_bounds", "box_vectors", "dump_cell"]
 
-FloatArray = npt.NDArray[np.float64]
 
 # of the lower and the upper face
 BOUNDARY = re.compile("pp|[fsm][fsm]")

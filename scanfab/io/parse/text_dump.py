@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import ReadError, ScanfabWarning
+from scanfab.base.typing import FloatArray
 from scanfab.io.files import check_memory, plain
 from scanfab.io.parse.lammps_box import dump_cell
 from scanfab.io.parse.number_rows import plain_reason
@@ -30,7 +31,6 @@ from scanfab.packing.packing import LazyColumns
 
 __all__ = ["DumpBlock", "index_dump", "read_block", "read_columns", "row_word"]
 
-FloatArray = npt.NDArray[np.float64]
 Columns = dict[str, npt.NDArray[Any]]
 
 # a snapshot's header never comes near this size, whatever the number of columns

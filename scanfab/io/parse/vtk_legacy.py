@@ -13,11 +13,11 @@ import re
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.typing import IntArray
 from scanfab.io.parse.vtk_flaws import FlawError
 
 __all__ = ["check_legacy", "count_words"]
 
-IntArray = npt.NDArray[np.int64]
 
 # bytes of a value in a binary file
 SIZES = {

@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
 from scanfab.base.logs import quiet_vtk
+from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.files import bare_name, check_memory, first_bytes, plain
 from scanfab.io.parse.vtk_flaws import FlawError
 from scanfab.io.parse.vtk_legacy import check_legacy
@@ -26,8 +27,6 @@ from scanfab.io.parse.vtk_xml import check_xml
 
 __all__ = ["Mesh", "form_of", "read_bounds", "read_mesh"]
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 VTK_VERTEX, VTK_POLY_VERTEX, VTK_LINE = 1, 2, 3
 

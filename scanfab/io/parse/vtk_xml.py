@@ -17,14 +17,13 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from scanfab.base.typing import IntArray
 from scanfab.io.parse.vtk_flaws import FlawError
 from scanfab.io.parse.vtk_legacy import count_words
 
 __all__ = ["check_xml"]
 
-IntArray = npt.NDArray[np.int64]
 
 ROOT = re.compile(rb"<VTKFile\b([^<>]*)>")
 # the arrays of a piece stand in sections

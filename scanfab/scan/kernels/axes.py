@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.jit import LANES, ZERO, Flag, inner, kernel
+from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.scan.kernels.bins import Bins, bins_along
 from scanfab.scan.kernels.follow import follow
 from scanfab.scan.kernels.grid import Grid, bounds, open_grid, part_of, strip_of
@@ -26,9 +26,6 @@ from scanfab.scan.kernels.sweep import NOTHING, STEPS, Measured, settle, visit
 
 __all__ = ["scan_axes", "scan_cell"]
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-BoolArray = npt.NDArray[np.bool_]
 
 SMALLEST = 5e-324
 
@@ -156,7 +153,7 @@ def scan_axes(
     position: FloatArray,
     radius: FloatArray,
     removed: BoolArray,
-    frames: FloatArray,
+    triads: FloatArray,
     offsets: FloatArray,
     spacing: float,
     cutoff: float,
@@ -177,7 +174,7 @@ def scan_axes(
         Spheres; the window's centre is the origin.
     removed : shape (N,)
         Spheres that are not solid in the second set of solids.
-    frames : shape (D, 3, 3)
+    triads : shape (D, 3, 3)
         Orthonormal rows u, v, n of each axis: the lines run along n.
     offsets : shape (D, 2)
         Shift of each axis' grid, in units of the spacing.
@@ -198,10 +195,10 @@ def scan_axes(
     # a row of lines has to fit a strip
     most = most_lines(lists) - LANES
     extent = bounds(position, radius)
-    for axis in range(frames.shape[0]):
-        frame = frames[axis]
-        grid = open_grid(extent, frame, offsets[axis], spacing, window_radius, whole is not None)
-        spheres = project(position, radius, removed, frame, grid)
+    for axis in range(triads.shape[0]):
+        triad = triads[axis]
+        grid = open_grid(extent, triad, offsets[axis], spacing, window_radius, whole is not None)
+        spheres = project(position, radius, removed, triad, grid)
         for first in range(0, grid.columns, most):
             scan_strips(
                 lines,
@@ -217,7 +214,7 @@ def scan_axes(
                 None,
                 None,
                 np.inf,
-                bins_along(bins, frame, axis),
+                bins_along(bins, triad, axis),
             )
 
 
@@ -248,7 +245,7 @@ def scan_cell(
         prism, spheres, grid = cell_grid(grains, normals[axis], offsets[axis], spacing)
         tally = tallies[axis]
         measured = measured_in(grains, prism)
-        here = bins_along(bins, prism.frame, axis)
+        here = bins_along(bins, prism.triad, axis)
         for first in range(0, grid.columns, most):
             part = part_of(grid, first, most)
             if left <= tally[0, STEPS]:

@@ -9,9 +9,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.jit import Flag, inner
+from scanfab.base.typing import FloatArray
 from scanfab.scan.kernels.strips import FAR
 from scanfab.scan.kernels.sweep import Measured, whole_gap
 
@@ -31,7 +31,6 @@ __all__ = [
     "room_for_gaps",
 ]
 
-FloatArray = npt.NDArray[np.float64]
 
 BLOCKS = 8
 # what is added up of the gaps of a block and bin
@@ -73,15 +72,15 @@ def no_bins(axes: int) -> Bins:
 
 
 @inner()
-def bins_along(bins: Bins, frame: FloatArray, axis: int) -> Bins:
-    """The bins of an axis, for places u, v, depth in its frame."""
+def bins_along(bins: Bins, triad: FloatArray, axis: int) -> Bins:
+    """The bins of an axis, for places u, v, depth in its triad."""
     to_block = bins.to_block.copy()
     for kind in range(2):
         for i in range(3):
             for j in range(3):
                 to_block[kind, i, j] = 0.0
                 for k in range(3):
-                    to_block[kind, i, j] += bins.to_block[kind, i, k] * frame[j, k]
+                    to_block[kind, i, j] += bins.to_block[kind, i, k] * triad[j, k]
     return Bins(to_block, bins.cutoffs, bins.sums[axis])
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.jit import inner
+from scanfab.base.typing import FloatArray
 from scanfab.scan.kernels.bins import (
     GAP_HIGH,
     GAP_LOW,
@@ -21,7 +21,6 @@ from scanfab.scan.kernels.sweep import CHANNELS, KEPT, LENGTH, STEPS, VOID, WHOL
 
 __all__ = ["follow"]
 
-FloatArray = npt.NDArray[np.float64]
 
 # a line that has met nothing along so many cells and mean free paths, and has passed by so many
 # grains, stays in a channel; in media more dilute than any sample one that has passed by many more
@@ -39,7 +38,7 @@ def entry(
 
     Of those that it leaves behind a depth, the first; FAR if there is none.
     """
-    normal = prism.frame[2]
+    normal = prism.triad[2]
     found = FAR
     over = 0, 1
     if grains.periodic[prism.second]:
@@ -63,7 +62,7 @@ def entry(
 
 
 @inner()
-def way_out(grains: CellGrains, frame: FloatArray, u: float, v: float) -> float:
+def way_out(grains: CellGrains, triad: FloatArray, u: float, v: float) -> float:
     """The depth at which a line leaves the sample through a face that does not repeat, or FAR."""
     last = FAR
     for k in range(3):
@@ -75,8 +74,8 @@ def way_out(grains: CellGrains, frame: FloatArray, u: float, v: float) -> float:
         for g in range(grains.radius.size):
             place = dot(grains.position[g], face)
             low, high = min(low, place - grains.radius[g]), max(high, place + grains.radius[g])
-        here = u * dot(frame[0], face) + v * dot(frame[1], face)
-        rise = dot(frame[2], face)
+        here = u * dot(triad[0], face) + v * dot(triad[1], face)
+        rise = dot(triad[2], face)
         if rise > 0.0:
             last = min(last, (high - here) / rise)
         elif rise < 0.0:
@@ -117,13 +116,13 @@ def next_solid(
     FAR if it stays in a channel. And the steps that this took: one for each grain and cell.
     ``second``: of the grains that are not removed.
     """
-    frame, c = prism.frame, grains.vectors[prism.third]
+    triad, c = prism.triad, grains.vectors[prism.third]
     largest, most = limits
-    rise_c = dot(c, frame[2]) - prism.rise_u * dot(c, frame[0]) - prism.rise_v * dot(c, frame[1])
+    rise_c = dot(c, triad[2]) - prism.rise_u * dot(c, triad[0]) - prism.rise_v * dot(c, triad[1])
     step = 1.0 if rise_c > 0.0 else -1.0
     margin = largest * prism.slope
     place = (after - prism.rise_u * u - prism.rise_v * v) / prism.length - margin
-    last = way_out(grains, frame, u, v) + 2.0 * largest
+    last = way_out(grains, triad, u, v) + 2.0 * largest
     found, steps = FAR, 0.0
     for cells in range(most):
         # spheres that are so far away begin behind what was found, or outside the sample
@@ -134,12 +133,12 @@ def next_solid(
             if second and grains.removed[g]:
                 continue
             x, r = grains.position[g], grains.radius[g]
-            u0, v0, n0 = dot(x, frame[0]), dot(x, frame[1]), dot(x, frame[2])
+            u0, v0, n0 = dot(x, triad[0]), dot(x, triad[1]), dot(x, triad[2])
             height = (n0 - prism.rise_u * u0 - prism.rise_v * v0) / prism.length
             k = np.ceil(place + cells - height) * step
-            u1 = u0 + k * dot(c, frame[0]) - u
-            v1 = v0 + k * dot(c, frame[1]) - v
-            n1 = n0 + k * dot(c, frame[2])
+            u1 = u0 + k * dot(c, triad[0]) - u
+            v1 = v0 + k * dot(c, triad[1]) - v
+            n1 = n0 + k * dot(c, triad[2])
             found = min(found, entry(grains, prism, u1, v1, n1, r, after))
     return found, steps
 

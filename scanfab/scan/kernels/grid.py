@@ -5,15 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.jit import inner
+from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.kernels.strips import Strip
 
 __all__ = ["Grid", "bounds", "cover", "open_grid", "part_of", "sheared_grid", "strip_of"]
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 
 class Grid(NamedTuple):
@@ -104,7 +101,7 @@ def shadow(extent: Bounds, side: FloatArray, low: float, high: float) -> tuple[f
 @inner()
 def open_grid(
     extent: Bounds,
-    frame: FloatArray,
+    triad: FloatArray,
     offset: FloatArray,
     spacing: float,
     window_radius: float,
@@ -114,8 +111,8 @@ def open_grid(
     low_u = low_v = -window_radius
     high_u = high_v = window_radius
     if whole and extent.reach > 0.0:
-        low_u, high_u = shadow(extent, frame[0], low_u, high_u)
-        low_v, high_v = shadow(extent, frame[1], low_v, high_v)
+        low_u, high_u = shadow(extent, triad[0], low_u, high_u)
+        low_v, high_v = shadow(extent, triad[1], low_v, high_v)
     grid = cover(low_u, high_u, low_v, high_v, offset, spacing)
     if not whole:
         for row in range(grid.rows):

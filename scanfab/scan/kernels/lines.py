@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.jit import ZERO, Flag, inner
+from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.kernels.bins import (
     GAP_HIGH,
     GAP_LOW,
@@ -20,9 +20,6 @@ from scanfab.scan.kernels.strips import BOUND, END, FAR, SET, Strip, span
 from scanfab.scan.kernels.sweep import Measured, add, counted, moved
 
 __all__ = ["solve_closed"]
-
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 
 @inner()

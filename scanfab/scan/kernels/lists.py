@@ -12,9 +12,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.jit import LANES, ONE, REORDERED, ZERO, Flag, inner
+from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.kernels.bins import (
     GAP_HIGH,
     GAP_LOW,
@@ -38,8 +38,6 @@ __all__ = [
     "sweep_lists",
 ]
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 # lines swept side by side; their lists lie together, first the first chord of each line
 ABREAST = 64

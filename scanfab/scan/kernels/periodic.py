@@ -13,9 +13,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.jit import ZERO, inner
+from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.scan.kernels.grid import Grid, sheared_grid
 from scanfab.scan.kernels.projection import Spheres, in_order, order_of, range_of, room_for_spheres
 from scanfab.scan.kernels.sweep import Measured
@@ -31,8 +31,6 @@ __all__ = [
     "shifts",
 ]
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 # how far beyond the prism solids are listed at once, in mean radii; longer gaps are followed alone
 BEYOND = 16.0
@@ -52,13 +50,13 @@ class CellGrains(NamedTuple):
 
 class Prism(NamedTuple):
     """
-    The lines' prism in the frame u, v, n, with the edges (base_u, 0) and (skew_u, base_v).
+    The lines' prism in the triad u, v, n, with the edges (base_u, 0) and (skew_u, base_v).
 
     Its length along n is ``length``. A point has the height (n - rise_u * u - rise_v * v) / length,
     which is 0 to 1 in the prism.
     """
 
-    frame: FloatArray
+    triad: FloatArray
     first: int
     """Which of the cell's edges is (base_u, 0), which the other of the face, which leads away."""
     second: int
@@ -102,20 +100,20 @@ def prism_along(normal: FloatArray, vectors: FloatArray, periodic: BoolArray) ->
     if periodic[second] and not periodic[first]:
         first, second = second, first
     a, b, c = vectors[first], vectors[second], vectors[third]
-    frame = np.empty((3, 3))
-    frame[2] = normal
-    frame[0] = a - dot(a, normal) * normal
-    base_u = np.sqrt(dot(frame[0], frame[0]))
-    frame[0] /= base_u
-    frame[1] = cross(normal, frame[0])
-    if dot(b, frame[1]) < 0.0:
-        frame[1] = -frame[1]
-    skew_u, base_v = dot(b, frame[0]), dot(b, frame[1])
+    triad = np.empty((3, 3))
+    triad[2] = normal
+    triad[0] = a - dot(a, normal) * normal
+    base_u = np.sqrt(dot(triad[0], triad[0]))
+    triad[0] /= base_u
+    triad[1] = cross(normal, triad[0])
+    if dot(b, triad[1]) < 0.0:
+        triad[1] = -triad[1]
+    skew_u, base_v = dot(b, triad[0]), dot(b, triad[1])
     rise_u = dot(a, normal) / base_u
     rise_v = (dot(b, normal) - rise_u * skew_u) / base_v
-    length = abs(dot(c, normal) - rise_u * dot(c, frame[0]) - rise_v * dot(c, frame[1]))
+    length = abs(dot(c, normal) - rise_u * dot(c, triad[0]) - rise_v * dot(c, triad[1]))
     slope = np.sqrt(1.0 + rise_u * rise_u + rise_v * rise_v) / length
-    return Prism(frame, first, second, third, base_u, skew_u, base_v, rise_u, rise_v, length, slope)
+    return Prism(triad, first, second, third, base_u, skew_u, base_v, rise_u, rise_v, length, slope)
 
 
 @inner(error_model="numpy")
@@ -139,10 +137,10 @@ def fill_images(
     greatest u along the skew) becomes what bounds the face where an axis is not periodic.
     """
     # no array is handed on in the loop: to count its references would take longer than all else
-    frame, position = prism.frame, grains.position
-    u_x, u_y, u_z = frame[0, 0], frame[0, 1], frame[0, 2]
-    v_x, v_y, v_z = frame[1, 0], frame[1, 1], frame[1, 2]
-    n_x, n_y, n_z = frame[2, 0], frame[2, 1], frame[2, 2]
+    triad, position = prism.triad, grains.position
+    u_x, u_y, u_z = triad[0, 0], triad[0, 1], triad[0, 2]
+    v_x, v_y, v_z = triad[1, 0], triad[1, 1], triad[1, 2]
+    n_x, n_y, n_z = triad[2, 0], triad[2, 1], triad[2, 2]
     layers = grains.periodic[prism.third]
     rows, columns = grains.periodic[prism.second], grains.periodic[prism.first]
     a, b, c = (
@@ -150,8 +148,8 @@ def fill_images(
         grains.vectors[prism.second],
         grains.vectors[prism.third],
     )
-    along_a, along_b = dot(a, frame[2]), dot(b, frame[2])
-    c_u, c_v, c_n = dot(c, frame[0]), dot(c, frame[1]), dot(c, frame[2])
+    along_a, along_b = dot(a, triad[2]), dot(b, triad[2])
+    c_u, c_v, c_n = dot(c, triad[0]), dot(c, triad[1]), dot(c, triad[2])
     step = 1.0 if c_n - prism.rise_u * c_u - prism.rise_v * c_v > 0.0 else -1.0
     skew = prism.skew_u / prism.base_v
     wide = np.sqrt(1.0 + skew * skew)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.jit import ONE, ZERO, inner
+from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.scan.kernels.grid import Grid
 from scanfab.scan.kernels.strips import FAR, Sphere, span
 
@@ -24,9 +24,6 @@ __all__ = [
     "sphere_at",
 ]
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-BoolArray = npt.NDArray[np.bool_]
 
 # a bucket with more indices is sorted by itself, and not with all others
 FEW = 16
@@ -65,13 +62,13 @@ def project(
     position: FloatArray,
     radius: FloatArray,
     removed: BoolArray,
-    frame: FloatArray,
+    triad: FloatArray,
     grid: Grid,
 ) -> Spheres:
-    """The spheres that may meet a line, ordered by depth, in the frame with rows u, v, n."""
-    u_x, u_y, u_z = frame[0, 0], frame[0, 1], frame[0, 2]
-    v_x, v_y, v_z = frame[1, 0], frame[1, 1], frame[1, 2]
-    n_x, n_y, n_z = frame[2, 0], frame[2, 1], frame[2, 2]
+    """The spheres that may meet a line, ordered by depth, in the triad with rows u, v, n."""
+    u_x, u_y, u_z = triad[0, 0], triad[0, 1], triad[0, 2]
+    v_x, v_y, v_z = triad[1, 0], triad[1, 1], triad[1, 2]
+    n_x, n_y, n_z = triad[2, 0], triad[2, 1], triad[2, 2]
     met, depth = np.empty(radius.size, np.int64), np.empty(radius.size)
     count = np.uint64(0)
     low, high = np.inf, -np.inf

@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.jit import REORDERED, Flag, inner
+from scanfab.base.typing import FloatArray, IntArray
 
 __all__ = [
     "BOUND",
@@ -31,8 +31,6 @@ __all__ = [
     "span",
 ]
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 # infinity
 FAR = 1e300

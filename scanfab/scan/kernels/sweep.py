@@ -24,9 +24,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.jit import LANES, REORDERED, Flag, inner
+from scanfab.base.typing import FloatArray
 from scanfab.scan.kernels.strips import (
     BOUND,
     END,
@@ -61,8 +61,6 @@ __all__ = [
     "whole_gap",
 ]
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 Sums = tuple[float, float, float, float, float, float]
 
 # the compiler leaves out what adds it: unlike 0, it changes no number, not even -0

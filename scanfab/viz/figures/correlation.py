@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from scanfab.base.typing import FloatArray
 from scanfab.table.curves import Curve
 from scanfab.viz.figures.groups import Drawn, Group
 from scanfab.viz.figures.style import (
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
 __all__ = ["PAPER_SLOPE", "Fit", "draw_correlation"]
 
-FloatArray = npt.NDArray[np.float64]
 
 PAPER_SLOPE = 0.096
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from scanfab.base.typing import FloatArray
 from scanfab.viz.figures.style import (
     COLOURS,
     COLUMN,
@@ -45,8 +45,6 @@ __all__ = [
     "plot_rose",
 ]
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 RINGS: tuple[dict[str, Any], ...] = (
     {"color": COLOURS["vermilion"], "marker": "^", "ls": "-"},

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import SettingsError
+from scanfab.base.typing import FloatArray
 from scanfab.table.curves import (
     Curve,
     abscissa_label,
@@ -43,7 +43,6 @@ if TYPE_CHECKING:
 
 __all__ = ["SIZES", "TABLE_FIGURES", "Fit", "draw_table", "plot_table"]
 
-FloatArray = npt.NDArray[np.float64]
 
 TABLE_FIGURES = ("evolution", "normalised", "correlation")
 

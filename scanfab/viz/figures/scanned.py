@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import ScanfabWarning, SettingsError
+from scanfab.base.typing import FloatArray
 from scanfab.fabric.contact import contact_fabric
 from scanfab.fabric.distribution import mean_length_function, sphere_points
 from scanfab.io.series import Series
@@ -22,7 +22,7 @@ from scanfab.pipeline.frame import FrameResult
 from scanfab.pipeline.settings import Length, Settings
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.gaps import scan_gaps
-from scanfab.scan.lines import line_frames
+from scanfab.scan.lines import line_triads
 from scanfab.scan.scan import ScanSums, Solids
 from scanfab.scan.segments import sample_segments
 from scanfab.table.abscissa import spelt_strain, strain_column
@@ -51,7 +51,6 @@ __all__ = [
     "scan_frames",
 ]
 
-FloatArray = npt.NDArray[np.float64]
 
 FRAME_FIGURES = {
     "rose": "mean void length and contact normals over θ; rose:30,60,90 chooses φ in degrees",
@@ -363,7 +362,7 @@ def _lengths(result: FrameResult, title: str, variant: str) -> LengthSample:
     _, _, cutoff, smallest = _parts(result)
     position, radius, reach = result.scanned.spheres_of(VARIANTS[variant])
     points, _ = sphere_points()
-    frames = line_frames(points[: len(points) // 2 : 20])
+    frames = line_triads(points[: len(points) // 2 : 20])
     found = sample_segments(position, radius, frames, HISTOGRAM_LINES, reach)
     return LengthSample(title, found.length[found.void] / smallest, cutoff / smallest)
 

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import SettingsError
 from scanfab.base.files import check_folder, whole_file
+from scanfab.base.typing import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -43,7 +43,6 @@ __all__ = [
     "widen",
 ]
 
-FloatArray = npt.NDArray[np.float64]
 
 PLOT_FORMATS = {
     ".png": "pixels, 300 per inch",

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 import numpy as np
-import numpy.typing as npt
 
+from scanfab.base.typing import FloatArray
 from scanfab.fabric.distribution import HIGHEST_DEGREE, sphere_points
 from scanfab.pipeline.frame import FrameResult
 from scanfab.table.reading import number_of, total_error
@@ -17,7 +17,6 @@ from scanfab.viz.figures.scanned import CONCENTRATION, ScannedFrames
 
 __all__ = ["contact_noise", "noise_notes", "void_noise"]
 
-FloatArray = npt.NDArray[np.float64]
 
 # a lobe is a sum of harmonics, each with √5 times the error of the axial anisotropy α: of the
 # sample those of the second degree, five, as it hardly differs in finer ones; of the scan all that

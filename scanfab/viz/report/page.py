@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from scanfab.base.errors import SettingsError
 from scanfab.base.files import check_folder, whole_file
+from scanfab.base.typing import FloatArray
 from scanfab.viz.figures.style import COLOURS
 from scanfab.viz.scene import Scene
 
@@ -28,8 +29,6 @@ __all__ = [
     "view_data",
 ]
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 
 # spheres that a browser turns without effort
 MOST_GRAINS = 4_000

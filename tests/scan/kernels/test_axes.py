@@ -11,7 +11,7 @@ from scanfab.scan.kernels import axes, lists, strips, sweep
 from scanfab.scan.kernels.bins import no_bins
 from scanfab.scan.kernels.grid import cover, strip_of
 from scanfab.scan.kernels.projection import order_of, project, range_of
-from scanfab.scan.lines import line_frames
+from scanfab.scan.lines import line_triads
 from tests.helpers import naive
 from tests.helpers.lattices import ball_points, poisson_spheres, rotation
 from tests.helpers.uncompiled import run_uncompiled
@@ -79,13 +79,13 @@ KINDS = [
 ]
 
 
-def line_words(spheres, removed, frame, offset, spacing):
+def line_words(spheres, removed, triad, offset, spacing):
     """What kernels want to know of spheres and the lines along one axis."""
     return (
         np.ascontiguousarray(spheres[0], dtype=float),
         np.asarray(spheres[1], dtype=float),
         removed,
-        np.ascontiguousarray(frame[None]),
+        np.ascontiguousarray(triad[None]),
         offset[None],
         spacing,
     )
@@ -94,7 +94,7 @@ def line_words(spheres, removed, frame, offset, spacing):
 def fast_tallies(
     spheres,
     removed,
-    frame,
+    triad,
     offset,
     spacing,
     cutoff,
@@ -108,7 +108,7 @@ def fast_tallies(
     """What the kernel tallies with all spheres, and with those that are not removed."""
     tallies = np.zeros((1, 2, sweep.TALLY_SIZE))
     axes.scan_axes(
-        *line_words(spheres, removed, frame, offset, spacing),
+        *line_words(spheres, removed, triad, offset, spacing),
         cutoff,
         window,
         tallies,
@@ -138,15 +138,15 @@ def assert_equal(fast, slow):
         assert getattr(fast, name) == pytest.approx(getattr(slow, name), rel=1e-9, abs=1e-9), name
 
 
-def assert_fast_equals_naive(spheres, removed, frame, offset, spacing, cutoffs, window):
+def assert_fast_equals_naive(spheres, removed, triad, offset, spacing, cutoffs, window):
     position, radius = spheres
     subsets = [
-        naive.scan(position, radius, frame, offset, spacing, window),
-        naive.scan(position[~removed], radius[~removed], frame, offset, spacing, window),
+        naive.scan(position, radius, triad, offset, spacing, window),
+        naive.scan(position[~removed], radius[~removed], triad, offset, spacing, window),
     ]
     for cutoff in cutoffs:
         for by_lists in WAYS:
-            line = removed, frame, offset, spacing, cutoff, window
+            line = removed, triad, offset, spacing, cutoff, window
             fast = fast_tallies(spheres, *line, by_lists=by_lists)
             for one, gaps in zip(fast, subsets, strict=True):
                 assert_equal(one, naive.tally(gaps, cutoff))
@@ -160,11 +160,11 @@ def check_random_packing(kind, random):
     if random.random() < 0.02:
         spacing *= 0.2
     axis = random.integers(0, 3)
-    frame = line_frames(np.eye(3))[axis] if random.random() < 0.2 else rotation(random)
+    triad = line_triads(np.eye(3))[axis] if random.random() < 0.2 else rotation(random)
     assert_fast_equals_naive(
         (position + random.uniform(-0.5, 0.5, 3), radius),
         random.random(len(radius)) < random.choice([0.0, 0.3, 1.0]),
-        frame,
+        triad,
         random.random(2),
         spacing,
         [0.0, random.uniform(0.01, 0.5), random.uniform(0.5, 2.0), 2.0 * window + 1e-3],
@@ -173,9 +173,9 @@ def check_random_packing(kind, random):
 
 
 @njit
-def closed_lines(position, radius, frame, grid, window):
+def closed_lines(position, radius, triad, grid, window):
     """How many lines of one strip the sweep of all spheres leaves to be solved again."""
-    projected = project(position, radius, np.zeros(radius.size, np.bool_), frame, grid)
+    projected = project(position, radius, np.zeros(radius.size, np.bool_), triad, grid)
     pitch = grid.columns + LANES
     strip = strip_of(grid, 0, grid.rows, pitch)
     state, tally = np.empty(strips.STATE_SIZE), np.zeros((2, sweep.TALLY_SIZE))
@@ -190,13 +190,13 @@ def square_grid(reach, offset, spacing):
     return cover(-reach, reach, -reach, reach, offset, spacing)
 
 
-def suspect_lines(spheres, frame, offset, spacing, window):
+def suspect_lines(spheres, triad, offset, spacing, window):
     """How many lines about the packing the sweep leaves to be solved again."""
     position, radius = spheres
     reach = np.linalg.norm(position, axis=1).max() + radius.max() + window
     grid = square_grid(reach, offset, spacing)
     assert grid.rows * (grid.columns + LANES) <= strips.MOST_LINES
-    return closed_lines(position, radius, np.ascontiguousarray(frame), grid, window)
+    return closed_lines(position, radius, np.ascontiguousarray(triad), grid, window)
 
 
 @njit
@@ -227,7 +227,7 @@ def test_sweep_equals_the_slow_twin_for_any_grains(grains, axis, seed, cutoff, w
     assert_fast_equals_naive(
         (0.25 * table[:, :3], 0.25 * table[:, 3]),
         table[:, 4] > 0,
-        line_frames(direction[None])[0],
+        line_triads(direction[None])[0],
         np.random.default_rng(seed).random(2),
         spacing,
         [cutoff * 1.0001 + 1e-7],
@@ -239,9 +239,9 @@ def test_a_chord_that_reaches_back_past_the_last_gap_makes_its_line_suspect():
     """Two grains with a gap, and a third whose middle is behind them but that covers the gap."""
     position = np.array([[0.0, 0, 0], [0, 0, 1.0], [0, 0, 1.05]])
     spheres = position, np.array([0.2, 0.2, 2.0])
-    frame, offset = np.eye(3), np.array([0.3, 0.4])
-    assert suspect_lines(spheres, frame, offset, 0.1, 1.5) > 5
-    assert_fast_equals_naive(spheres, np.zeros(3, bool), frame, offset, 0.05, [0.0, 0.3], 1.5)
+    triad, offset = np.eye(3), np.array([0.3, 0.4])
+    assert suspect_lines(spheres, triad, offset, 0.1, 1.5) > 5
+    assert_fast_equals_naive(spheres, np.zeros(3, bool), triad, offset, 0.05, [0.0, 0.3], 1.5)
 
 
 def test_only_lines_that_need_it_are_suspect():

@@ -6,7 +6,7 @@ import pytest
 from scanfab.scan.gaps import Blocks
 from scanfab.scan.kernels import axes, sweep
 from scanfab.scan.kernels.bins import BLOCKS, Bins
-from scanfab.scan.lines import line_frames
+from scanfab.scan.lines import line_triads
 from tests.helpers import naive
 from tests.helpers.lattices import rotation
 from tests.helpers.uncompiled import run_uncompiled
@@ -16,12 +16,12 @@ RUNS_OF_A_KIND = 60
 REACH = 30.0
 
 
-def fast_sums(spheres, removed, frame, offset, spacing, window, cutoffs, centers, flags=(1, 1, 1)):
+def fast_sums(spheres, removed, triad, offset, spacing, window, cutoffs, centers, flags=(1, 1, 1)):
     """What the kernel adds up: shape (whole or window, set of solids, octant, bin, sum)."""
     blocks = np.array([Blocks.about(center, REACH).affine() for center in centers])
     sums = np.zeros((1, 2, 2, BLOCKS * len(cutoffs), 3))
     axes.scan_axes(
-        *line_words(spheres, removed, frame, offset, spacing),
+        *line_words(spheres, removed, triad, offset, spacing),
         0.0,
         window,
         np.zeros((1, 2, sweep.TALLY_SIZE)),
@@ -32,12 +32,12 @@ def fast_sums(spheres, removed, frame, offset, spacing, window, cutoffs, centers
     return sums.reshape(2, 2, BLOCKS, len(cutoffs), 3)
 
 
-def slow_sums(spheres, removed, frame, offset, spacing, window, cutoffs, centers):
+def slow_sums(spheres, removed, triad, offset, spacing, window, cutoffs, centers):
     """The same from the list of all segments, each in the bin of the largest cut-off it reaches."""
     position, radius = spheres
     sums = np.zeros((2, 2, 8, len(cutoffs), 3))
     for which, solid in enumerate([np.ones(len(radius), bool), ~removed]):
-        grid = position[solid], radius[solid], frame, offset, spacing, window
+        grid = position[solid], radius[solid], triad, offset, spacing, window
         for kind, segments in enumerate(naive.void_segments(*grid)):
             reached = [naive.gap_sums(segments, cutoff, centers[kind]) for cutoff in cutoffs]
             for k, least in enumerate(reached):
@@ -48,11 +48,11 @@ def slow_sums(spheres, removed, frame, offset, spacing, window, cutoffs, centers
 def check_random_packing(kind, random):
     """One packing of a kind, with random window, grid, cut-offs, octants and removed grains."""
     position, radius = kind(random)
-    frame = line_frames(np.eye(3))[0] if random.random() < 0.2 else rotation(random)
+    triad = line_triads(np.eye(3))[0] if random.random() < 0.2 else rotation(random)
     line = (
         (position + random.uniform(-0.5, 0.5, 3), radius),
         random.random(len(radius)) < random.choice([0.0, 0.3, 1.0]),
-        frame,
+        triad,
         random.random(2),
         np.exp(random.uniform(np.log(0.4), np.log(2.5))),
         random.choice([0.0, random.uniform(0.3, 3.0)], p=[0.1, 0.9]),

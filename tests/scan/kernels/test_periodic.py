@@ -66,7 +66,7 @@ def lines_of(medium, normal, offset, spacing):
             u = grid.first_u + column * grid.spacing
             v = grid.first_v + row * grid.spacing
             depth = prism.rise_u * u + prism.rise_v * v
-            feet.append(u * prism.frame[0] + v * prism.frame[1] + depth * prism.frame[2])
+            feet.append(u * prism.triad[0] + v * prism.triad[1] + depth * prism.triad[2])
     measured = prism.length if medium.periodic[prism.third] else 0.0
     return np.array(feet), measured
 
@@ -155,7 +155,7 @@ def test_every_direction_crosses_its_face_steeply():
         normal = direction(random)
         prism = prism_of(normal, np.diag([1.0, 2.0, 3.0]), np.ones(3, bool))
         assert prism.length <= np.sqrt(3) * 3.0 + 1e-9
-        assert prism.frame @ prism.frame.T == pytest.approx(np.eye(3), abs=1e-12)
+        assert prism.triad @ prism.triad.T == pytest.approx(np.eye(3), abs=1e-12)
         assert prism.base_v > 0
 
 
