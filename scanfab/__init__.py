@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from scanfab.pipeline.compute import compute
     from scanfab.pipeline.settings import Settings
     from scanfab.scan.directions import DirectionRule, direction_rule
-    from scanfab.scan.scan import ScanSums, Solids, scan_lines
+    from scanfab.scan.scan import ScanSums, scan_lines
+    from scanfab.scan.solids import Solids
     from scanfab.table.compare import compare_tables
     from scanfab.table.reading import read_rows
     from scanfab.table.table import COLUMNS, Row, Table
@@ -54,7 +55,7 @@ _HOME = {
     "Series": "io.series",
     "Settings": "pipeline.settings",
     "SettingsError": "base.errors",
-    "Solids": "scan.scan",
+    "Solids": "scan.solids",
     "Table": "table.table",
     "UnknownFormatError": "base.errors",
     "VoidFabric": "fabric.void",

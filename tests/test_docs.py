@@ -50,6 +50,27 @@ def test_the_command_line_page_is_fresh() -> None:
     ).page(), "run python docs/make_command_line.py"
 
 
+def test_the_rooms_are_drawn_as_they_are() -> None:
+    architecture = script("make_architecture")
+    page = (DOCS / "architecture.md").read_text(encoding="utf-8")
+    assert page == architecture.page(), "run python docs/make_architecture.py"
+
+
+def test_the_house_stays_small() -> None:
+    """What a reader can hold in mind; see docs/architecture.md."""
+    architecture = script("make_architecture")
+    rooms = architecture.rooms()
+    package = architecture.PACKAGE
+    assert len([path for path in package.iterdir() if path.name != "__pycache__"]) <= 11
+    assert max(map(architecture.floor, rooms)) <= 7
+    assert sum(len(architecture.arrows(room)) for room in rooms) <= 35
+    for folder in [path for path in package.rglob("*") if path.is_dir()]:
+        assert len(list(folder.glob("*.py"))) <= 25, folder
+        assert len(folder.relative_to(package).parts) <= 2 or folder.name == "__pycache__", folder
+    for path in package.rglob("*.py"):
+        assert len(path.read_text(encoding="utf-8").splitlines()) <= 400, path
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_option_is_documented(name: str) -> None:
     text = (DOCS / "command-line.md").read_text(encoding="utf-8")

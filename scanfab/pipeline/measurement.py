@@ -16,7 +16,8 @@ from scanfab.pipeline.settings import AUTO_RULE, Settings
 from scanfab.pipeline.tolerance import scan_to_tolerance
 from scanfab.scan.directions import DirectionRule, design_of, direction_rule
 from scanfab.scan.gaps import Blocks, GapSums, scan_gaps
-from scanfab.scan.scan import CellGrains, ScanSums, Solids, most_lines
+from scanfab.scan.scan import ScanSums
+from scanfab.scan.solids import CellGrains, Solids, most_lines
 
 __all__ = ["Measurement", "measure"]
 

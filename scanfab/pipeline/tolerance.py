@@ -16,14 +16,8 @@ from scanfab.fabric.void import void_fabric
 from scanfab.pipeline.plan import CLOSE, GROWTH_WITH_SPACING, Plan
 from scanfab.pipeline.settings import Settings
 from scanfab.scan.directions import design_of, direction_rule
-from scanfab.scan.scan import (
-    FollowedTooFarError,
-    ScanSums,
-    Solids,
-    is_affordable,
-    most_lines,
-    scan_lines,
-)
+from scanfab.scan.scan import FollowedTooFarError, ScanSums, scan_lines
+from scanfab.scan.solids import Solids, is_affordable, most_lines
 
 __all__ = ["missing_work", "scan_to_tolerance"]
 

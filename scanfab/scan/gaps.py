@@ -17,7 +17,8 @@ from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.kernels.bins import BLOCKS, Bins
 from scanfab.scan.lines import drawn_lines, line_triads
-from scanfab.scan.scan import MOST_STEPS, Following, Solids, in_parts, shortest_gap, tally_triads
+from scanfab.scan.scan import MOST_STEPS, Following, in_parts, tally_triads
+from scanfab.scan.solids import Solids, shortest_gap
 
 __all__ = ["Blocks", "GapSums", "scan_gaps"]
 

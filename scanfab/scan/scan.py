@@ -11,77 +11,32 @@ import numpy as np
 
 from scanfab.base.errors import SettingsError
 from scanfab.base.jit import Flag
-from scanfab.base.typing import BoolArray, FloatArray, IntArray
+from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.kernels import sweep
 from scanfab.scan.kernels.axes import scan_axes, scan_cell
 from scanfab.scan.kernels.bins import Bins, no_bins
-from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.lines import drawn_lines
+from scanfab.scan.solids import CellGrains, Solids, check_spacing, shortest_gap
 
 __all__ = [
-    "MAX_LINES",
     "MOST_STEPS",
-    "CellGrains",
     "FollowedTooFarError",
     "Following",
     "ScanSums",
-    "Solids",
     "in_parts",
-    "is_affordable",
-    "most_lines",
     "scan_lines",
-    "shortest_gap",
     "sums_of",
     "tally_triads",
 ]
 
 
-# lines of one axis and replicate: more take minutes, even those that meet nothing
-MAX_LINES = 50_000_000
 JOBS_A_THREAD, MOST_AXES = 4, 16
 # steps of following lines through a periodic medium: more take minutes
 MOST_STEPS = 1e10
-# Of the smallest radius: what lies between surfaces that coincide but for rounding is no gap.
-SHORTEST = 1e-9
 # of the spacing and for each variant: spheres of such a radius are scanned as fast row by row as
 # over lists of chords; for the more variants the lists serve, the sooner they pay
 FEW_LINES = 0.5
-
-
-@dataclass(frozen=True, eq=False)
-class Solids:
-    """
-    The spheres that lines meet, and the sphere window; lengths in the dump's unit.
-
-    Positions are relative to the window's centre.
-    """
-
-    position: FloatArray
-    """Shape (N, 3)."""
-    radius: FloatArray
-    """Shape (N,)."""
-    removed: BoolArray
-    """Spheres that the variants b and d leave out, shape (N,)."""
-    window_radius: float = 0.0
-    """Radius of the sphere window; 0 for none."""
-    medium: CellGrains | None = None
-    """The grains of a periodic packing, each once, if its whole is scanned, which has no edge."""
-
-    @property
-    def grain_radius(self) -> FloatArray:
-        """
-        Radii of the grains that lines may meet, each once where the whole is periodic.
-
-        In a periodic packing without a window, ``radius`` has next to none.
-        """
-        return self.radius if self.medium is None else self.medium.radius
-
-    @property
-    def cross_section(self) -> float:
-        """Σ π r² of all spheres that lines may meet: they cut so many chords times spacing²."""
-        of_medium = 0.0 if self.medium is None else float(np.sum(self.medium.radius**2))
-        return np.pi * (float(np.sum(self.radius**2)) + of_medium)
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,7 +209,7 @@ def scan_lines(
     >>> round(float(length.sum() / segments.sum()), 2)
     1.87
     """
-    _check_spacing(solids, spacing)
+    check_spacing(solids, spacing)
     triads, offsets = drawn_lines(rule, seed, replicates)
     following = Following(most_steps)
 
@@ -262,12 +217,6 @@ def scan_lines(
         return tally_triads(solids, triads, offsets, spacing, cutoff, variants, following=following)
 
     return sums_of(triads, in_parts(some, triads, offsets, workers), variants)
-
-
-def shortest_gap(solids: Solids) -> float:
-    """Shorter gaps are rounding, dump's length unit."""
-    radius = solids.grain_radius
-    return SHORTEST * float(radius.min()) if len(radius) else 0.0
 
 
 def in_parts(
@@ -399,32 +348,3 @@ def sums_of(triads: FloatArray, tallies: FloatArray, variants: str) -> ScanSums:
         channels=of(sweep.CHANNELS).astype(np.int64),
         steps=entries[sweep.STEPS].sum(axis=(1, 2)).astype(np.int64),
     )
-
-
-def is_affordable(solids: Solids, spacing: float) -> bool:
-    """Whether the lines of one axis and replicate are not too many."""
-    return most_lines(solids, spacing) <= MAX_LINES
-
-
-def most_lines(solids: Solids, spacing: float) -> float:
-    """At most so many lines, also such that meet nothing, has one axis of a replicate."""
-    reach = solids.window_radius
-    if solids.medium is not None:
-        # along an axis that does not repeat, what the grains take
-        edges = np.linalg.norm(solids.medium.vectors[solids.medium.periodic], axis=1)
-        across = solids.medium.position - solids.medium.position.mean(axis=0)
-        extent = float((np.linalg.norm(across, axis=1) + solids.medium.radius).max(initial=0.0))
-        reach = max(reach, float(edges.max(initial=0.0)), extent if len(edges) < 3 else 0.0)
-    if len(solids.position):
-        reach = max(reach, float((np.linalg.norm(solids.position, axis=1) + solids.radius).max()))
-    return (2.0 * reach / spacing + 1.0) ** 2
-
-
-def _check_spacing(solids: Solids, spacing: float) -> None:
-    lines = most_lines(solids, spacing)
-    if lines > MAX_LINES:
-        raise SettingsError(
-            f"spacing: {spacing:g} between lines of one direction and replicate makes "
-            f"{lines:.2g} of them, more than {MAX_LINES:.0e}: choose a wider spacing, or leave out "
-            f"grains that are far away from all others"
-        )

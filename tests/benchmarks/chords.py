@@ -15,7 +15,8 @@ from numba import njit
 
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.lines import line_triads
-from scanfab.scan.scan import Solids, scan_lines
+from scanfab.scan.scan import scan_lines
+from scanfab.scan.solids import Solids
 from tests.benchmarks.packings import PAPER, dense
 from tests.benchmarks.timing import interleaved, table
 

@@ -7,7 +7,8 @@ import time
 import numpy as np
 
 from scanfab.scan.directions import direction_rule
-from scanfab.scan.scan import CellGrains, Solids, scan_lines
+from scanfab.scan.scan import scan_lines
+from scanfab.scan.solids import CellGrains, Solids
 from tests.benchmarks.packings import relaxed_cell
 from tests.benchmarks.timing import interleaved, table
 

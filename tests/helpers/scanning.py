@@ -7,7 +7,8 @@ import numpy as np
 from scanfab.fabric.void import void_fabric
 from scanfab.scan.directions import direction_rule
 from scanfab.scan.lines import line_triads
-from scanfab.scan.scan import ScanSums, Solids, scan_lines, sums_of, tally_triads
+from scanfab.scan.scan import ScanSums, scan_lines, sums_of, tally_triads
+from scanfab.scan.solids import Solids
 
 Z = np.array([[0.0, 0.0, 1.0]])
 

@@ -22,7 +22,7 @@ from scanfab.pipeline import tolerance as adaptive
 from scanfab.pipeline.plan import REPLICATES, make_plan
 from scanfab.pipeline.settings import AUTO_RULE
 from scanfab.scan.directions import DirectionRule
-from scanfab.scan.scan import CellGrains, Solids
+from scanfab.scan.solids import CellGrains, Solids
 from tests.helpers.lattices import shaken_cubic
 from tests.helpers.scanning import solids_of
 

@@ -6,7 +6,7 @@ import pytest
 from scanfab import Cell, Solids, direction_rule, scan_lines
 from scanfab.scan.gaps import Blocks, scan_gaps
 from scanfab.scan.lines import line_triads, turned_triads
-from scanfab.scan.scan import CellGrains
+from scanfab.scan.solids import CellGrains
 from tests.helpers import naive
 from tests.helpers.lattices import poisson_spheres
 from tests.helpers.scanning import ratio, solids_of

@@ -5,7 +5,8 @@ import pytest
 
 from scanfab import Packing, SettingsError, compute, direction_rule, scan_lines
 from scanfab.scan.lines import line_triads, turned_triads
-from scanfab.scan.scan import MAX_LINES, ScanSums
+from scanfab.scan.scan import ScanSums
+from scanfab.scan.solids import MAX_LINES
 from tests.helpers import naive
 from tests.helpers.lattices import Spheres, poisson_spheres, separate_spheres, shaken_cubic
 from tests.helpers.scanning import fabric, solids_of

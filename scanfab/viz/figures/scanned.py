@@ -23,8 +23,9 @@ from scanfab.pipeline.settings import Length, Settings
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.gaps import scan_gaps
 from scanfab.scan.lines import line_triads
-from scanfab.scan.scan import ScanSums, Solids
+from scanfab.scan.scan import ScanSums
 from scanfab.scan.segments import sample_segments
+from scanfab.scan.solids import Solids
 from scanfab.table.abscissa import spelt_strain, strain_column
 from scanfab.table.reading import number_of, total_error
 from scanfab.viz.figures.of_frames import (

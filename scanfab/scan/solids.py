@@ -1,0 +1,97 @@
+"""What lines meet: the spheres, the window that cuts the lines, and how many lines that makes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from scanfab.base.errors import SettingsError
+from scanfab.base.typing import BoolArray, FloatArray
+from scanfab.scan.kernels.periodic import CellGrains
+
+__all__ = [
+    "MAX_LINES",
+    "CellGrains",
+    "Solids",
+    "check_spacing",
+    "is_affordable",
+    "most_lines",
+    "shortest_gap",
+]
+
+# lines of one axis and replicate: more take minutes, even those that meet nothing
+MAX_LINES = 50_000_000
+# Of the smallest radius: what lies between surfaces that coincide but for rounding is no gap.
+SHORTEST = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Solids:
+    """
+    The spheres that lines meet, and the sphere window; lengths in the dump's unit.
+
+    Positions are relative to the window's centre.
+    """
+
+    position: FloatArray
+    """Shape (N, 3)."""
+    radius: FloatArray
+    """Shape (N,)."""
+    removed: BoolArray
+    """Spheres that the variants b and d leave out, shape (N,)."""
+    window_radius: float = 0.0
+    """Radius of the sphere window; 0 for none."""
+    medium: CellGrains | None = None
+    """The grains of a periodic packing, each once, if its whole is scanned, which has no edge."""
+
+    @property
+    def grain_radius(self) -> FloatArray:
+        """
+        Radii of the grains that lines may meet, each once where the whole is periodic.
+
+        In a periodic packing without a window, ``radius`` has next to none.
+        """
+        return self.radius if self.medium is None else self.medium.radius
+
+    @property
+    def cross_section(self) -> float:
+        """Σ π r² of all spheres that lines may meet: they cut so many chords times spacing²."""
+        of_medium = 0.0 if self.medium is None else float(np.sum(self.medium.radius**2))
+        return np.pi * (float(np.sum(self.radius**2)) + of_medium)
+
+
+def shortest_gap(solids: Solids) -> float:
+    """Shorter gaps are rounding, dump's length unit."""
+    radius = solids.grain_radius
+    return SHORTEST * float(radius.min()) if len(radius) else 0.0
+
+
+def is_affordable(solids: Solids, spacing: float) -> bool:
+    """Whether the lines of one axis and replicate are not too many."""
+    return most_lines(solids, spacing) <= MAX_LINES
+
+
+def most_lines(solids: Solids, spacing: float) -> float:
+    """At most so many lines, also such that meet nothing, has one axis of a replicate."""
+    reach = solids.window_radius
+    if solids.medium is not None:
+        # along an axis that does not repeat, what the grains take
+        edges = np.linalg.norm(solids.medium.vectors[solids.medium.periodic], axis=1)
+        across = solids.medium.position - solids.medium.position.mean(axis=0)
+        extent = float((np.linalg.norm(across, axis=1) + solids.medium.radius).max(initial=0.0))
+        reach = max(reach, float(edges.max(initial=0.0)), extent if len(edges) < 3 else 0.0)
+    if len(solids.position):
+        reach = max(reach, float((np.linalg.norm(solids.position, axis=1) + solids.radius).max()))
+    return (2.0 * reach / spacing + 1.0) ** 2
+
+
+def check_spacing(solids: Solids, spacing: float) -> None:
+    """SettingsError if that makes more lines than can be scanned in reasonable time."""
+    lines = most_lines(solids, spacing)
+    if lines > MAX_LINES:
+        raise SettingsError(
+            f"spacing: {spacing:g} between lines of one direction and replicate makes "
+            f"{lines:.2g} of them, more than {MAX_LINES:.0e}: choose a wider spacing, or leave out "
+            f"grains that are far away from all others"
+        )
