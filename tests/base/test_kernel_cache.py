@@ -138,7 +138,7 @@ def test_a_package_that_nobody_can_write_to_is_no_obstacle(dump, tmp_path):
         ROOT / "scanfab", package / "scanfab", ignore=shutil.ignore_patterns("__pycache__")
     )
     # not even root makes a folder where a file is
-    (package / "scanfab" / "kernels" / "__pycache__").write_text("")
+    (package / "scanfab" / "packing" / "__pycache__").write_text("")
     home = tmp_path / "cache"
     assert SAID in words_of(start(dump, home, package=package))
     assert SAID not in words_of(start(dump, home, package=package))

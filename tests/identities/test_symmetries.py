@@ -7,7 +7,7 @@ from scanfab import Packing, compute, contact_fabric, find_contacts, void_fabric
 from scanfab.scan.directions import direction_rule
 from scanfab.scan.lines import line_triads
 from tests.helpers.lattices import Spheres, poisson_spheres, rotation, shaken_cubic
-from tests.helpers.scanning import fabric, scan_frames, solids_of
+from tests.helpers.scanning import fabric, scan_triads, solids_of
 
 WINDOW, SPACING, CUTOFF = 3.0, 0.3, 0.4
 RULE = direction_rule("lebedev:9")
@@ -24,7 +24,7 @@ def tensors(spheres, frames, variants="abcd", unit=1.0):
     removed = np.arange(len(spheres.radius)) % 3 == 0
     offsets = np.random.default_rng(1).random((len(frames), 2))
     solids = solids_of(spheres, WINDOW * unit, removed)
-    sums = scan_frames(solids, frames, offsets, SPACING * unit, CUTOFF * unit, variants)
+    sums = scan_triads(solids, frames, offsets, SPACING * unit, CUTOFF * unit, variants)
     fabrics = [void_fabric(sums.axes, RULE.weights, *sums.kept(name)) for name in variants]
     return np.array([fabric.tensor.matrix for fabric in fabrics]), sums
 
