@@ -85,7 +85,7 @@ class Run:
 
     def _has_gaps(self, done: list[dict[str, Any]]) -> bool:
         """Whether an earlier run has skipped frames between those that it has written."""
-        from scanfab.pipeline.compute import chosen_frames
+        from scanfab.pipeline.frames import chosen_frames
 
         for one in self.series:
             written = {row["frame"] for row in done if row["source"] == one.name}

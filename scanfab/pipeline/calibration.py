@@ -14,14 +14,8 @@ from scanfab.base.errors import PackingError, ScanfabWarning, SettingsError
 from scanfab.io.series import Series
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample
-from scanfab.pipeline.compute import (
-    classify,
-    frames_of,
-    no_such_frames,
-    refuse_unknown_boundary,
-    tell_doubts,
-)
 from scanfab.pipeline.frame import frame_result
+from scanfab.pipeline.frames import Frames
 from scanfab.pipeline.ladders import (
     PAPER_CUTOFF,
     PAPER_SPACING,
@@ -291,29 +285,17 @@ def _samples(
     source: Packing | Series, settings: Settings, frame: int
 ) -> tuple[Sample, int, Sample]:
     """The first frame that has grains, and the wanted one with its number."""
-    if not isinstance(source, Packing | Series):
-        raise SettingsError(f"calibrate: expected a Packing or a Series, found {source!r}")
     wanted = slice(frame, frame + 1 if frame != -1 else None)
-    frames = [one for _, one in frames_of(source)]
-    chosen = range(len(frames))[wanted]
-    if not chosen:
-        raise no_such_frames(source, wanted)
-    number = chosen[0]
-    first: Sample | None = None
-    for place, one in enumerate(frames):
-        sample = classify(one.read(), settings)
-        if first is None and sample.grains.any():
-            first = sample
-            refuse_unknown_boundary(source, first, settings)
-            tell_doubts(one, first, settings)
-        if place >= number and first is not None:
-            break
+    frames = Frames(source, replace(settings, frames=wanted))
+    number, one = frames.one()
+    first = frames.first()
     if first is None:
         raise PackingError("no frame has any grains: there is nothing to calibrate")
-    sample = sample if place == number else classify(frames[number].read(), settings)
-    if not sample.grains.any():
+    frames.tell_doubts(*first[1:])
+    sample = first[2] if first[0] == number else frames.sample(number, one)
+    if sample is None or not sample.grains.any():
         raise PackingError(f"frame {number} has no grains: choose another frame")
-    return first, number, sample
+    return first[2], number, sample
 
 
 def _notes(caught: list[warnings.WarningMessage], row: Row) -> str:

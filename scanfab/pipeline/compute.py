@@ -4,50 +4,25 @@ from __future__ import annotations
 
 import logging
 import time
-import warnings
 from collections.abc import Callable, Container, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import chain, islice
-from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
-from scanfab.base.errors import (
-    PackingError,
-    ReadError,
-    ScanfabWarning,
-    SettingsError,
-    SkippedFrameWarning,
-)
 from scanfab.base.threads import in_order
-from scanfab.io.reader import Carries
 from scanfab.io.series import Series
-from scanfab.packing.boundary import enclosing_class, existing_values, select_boundary
-from scanfab.packing.cell import Cell
-from scanfab.packing.doubts import cell_doubt, doubts_of
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample
-from scanfab.packing.search import find_contacts
 from scanfab.pipeline.frame import FrameResult, frame_result
+from scanfab.pipeline.frames import Frames, Readable
 from scanfab.pipeline.plan import Plan, make_plan
-from scanfab.pipeline.settings import STRAIN_MODES, Settings
-from scanfab.pipeline.strain import StrainFile, axial_length, is_flipped, shear_strain
+from scanfab.pipeline.settings import Settings
+from scanfab.pipeline.strain import Strains
 from scanfab.table.table import Row, Table
 
-__all__ = [
-    "FrameResult",
-    "boundary_hint",
-    "chosen_frames",
-    "classify",
-    "compute",
-    "compute_rows",
-    "frames_of",
-    "no_such_frames",
-    "refuse_unknown_boundary",
-    "tell_doubts",
-]
+__all__ = ["FrameResult", "compute", "compute_rows"]
 
 LOGGER = logging.getLogger("scanfab")
 
@@ -111,96 +86,55 @@ def compute_rows(
     observe : callable, optional
         Called with the :class:`FrameResult` of each frame, by the thread that computed it.
     """
-    if not isinstance(source, Packing | Series):
-        raise SettingsError(f"compute: expected a Packing or a Series, found {source!r}")
-    run = _Run(source, settings, done, observe)
-    jobs = run.jobs()
+    run = _Run(Frames(source, settings), done, observe)
     with _Pool(settings.workers) as pool:
-        for rows in pool.in_order(jobs):
+        for rows in pool.in_order(run.jobs()):
             yield from rows
-    run.finish()
+    if run.plan is None:
+        run.frames.complain_of_no_grains()
 
 
 class _Run:
     """
     One series under way.
 
-    Frames are read one after the other until one has grains, which makes the plan; from there on
-    they do not depend on one another.
+    The first frame that has grains makes the plan; from there on frames do not depend on one
+    another.
     """
 
-    def __init__(
-        self,
-        source: Packing | Series,
-        settings: Settings,
-        done: Container[int],
-        observe: Observer | None,
-    ) -> None:
-        self.source = source
-        self.settings = settings
-        self.name = "" if isinstance(source, Packing) else source.name
+    def __init__(self, frames: Frames, done: Container[int], observe: Observer | None) -> None:
+        self.frames = frames
+        self.settings = frames.settings
         self.done = done
         self.observe = observe
         self.plan: Plan | None = None
-        self.strains = _Strains(settings)
-        self.particles = 0
-        self.found = False
+        self.strains = Strains(frames.settings)
 
     def jobs(self) -> Iterator[Callable[[int], list[Row]]]:
         """For each chosen frame what computes its rows, with a number of threads."""
-        chosen = chosen_frames(self.source, self.settings.frames)
-        for number, frame in frames_of(self.source):
-            due = number in chosen
-            self.found = self.found or due
-            due = due and number not in self.done
-            if self.plan is None:
-                sample = self._read(number, frame.read)
-                if sample is not None:
-                    self._start(frame, sample)
-                    if due:
-                        yield partial(self._rows, number, sample)
-            elif due:
-                yield partial(self._read_rows, number, frame.read)
-            if number >= chosen.stop - 1 and self.plan is not None:
-                break
-
-    def finish(self) -> None:
-        """Complain of frames that do not exist, and of grains that were never met."""
-        if not self.found:
-            raise no_such_frames(self.source, self.settings.frames)
-        if self.plan is None:
-            _complain_of_no_grains(self.name, self.particles, self.settings)
+        first = self.frames.first()
+        if first is not None:
+            self._start(*first[1:])
+        for number, frame in self.frames.due():
+            if number not in self.done:
+                yield partial(self._rows, number, frame)
 
     def _start(self, frame: Readable, sample: Sample) -> None:
-        """Make the plan, if the frame has grains."""
-        self.particles += len(sample.packing)
-        if sample.grains.any():
-            refuse_unknown_boundary(self.source, sample, self.settings)
-            tell_doubts(frame, sample, self.settings)
-            self.plan = make_plan(self.settings, sample)
-            self.strains.start(sample)
+        """Make the plan."""
+        self.frames.tell_doubts(frame, sample)
+        self.plan = make_plan(self.settings, sample)
+        self.strains.start(sample)
 
-    def _read(self, number: int, read: Callable[[], Packing]) -> Sample | None:
-        """The frame; None if it cannot be read and such frames are to be skipped."""
-        try:
-            return classify(read(), self.settings)
-        except (PackingError, ReadError) as error:
-            if self.settings.on_error == "stop":
-                raise
-            warnings.warn(f"frame {number} skipped: {error}", SkippedFrameWarning, stacklevel=2)
-            return None
-
-    def _read_rows(self, number: int, read: Callable[[], Packing], threads: int) -> list[Row]:
-        sample = self._read(number, read)
-        return [] if sample is None else self._rows(number, sample, threads)
-
-    def _rows(self, number: int, sample: Sample, threads: int) -> list[Row]:
+    def _rows(self, number: int, frame: Readable, threads: int) -> list[Row]:
+        sample = self.frames.sample(number, frame)
+        if sample is None:
+            return []
         settings = replace(self.settings, workers=threads)
         strains = self.strains.at(number, sample)
         begun = time.perf_counter()
-        result = frame_result(self.name, number, sample, self.plan, settings, *strains)
+        result = frame_result(self.frames.name, number, sample, self.plan, settings, *strains)
         seconds, grains = time.perf_counter() - begun, int(sample.grains.sum())
-        LOGGER.info("%s: frame %d: %d grains in %.2g s", self.name, number, grains, seconds)
+        LOGGER.info("%s: frame %d: %d grains in %.2g s", self.frames.name, number, grains, seconds)
         if self.observe is not None:
             self.observe(result)
         return result.rows
@@ -226,167 +160,3 @@ class _Pool:
         threads = max(1, self.workers // max(len(first), 1))
         every = (partial(job, threads) for job in chain(first, jobs))
         return in_order(self._pool, every, self.workers)
-
-
-def no_such_frames(source: Packing | Series, frames: slice) -> SettingsError:
-    """The error for a slice that meets no frame."""
-    count = 1 if isinstance(source, Packing) else sum(1 for _ in source)
-    name = "the packing" if isinstance(source, Packing) else source.name
-    has = "1 frame, 0" if count == 1 else f"{count} frames, 0 to {count - 1}"
-    parts = [frames.start, frames.stop, *([] if frames.step is None else [frames.step])]
-    spelt = ":".join("" if part is None else str(part) for part in parts)
-    return SettingsError(f"frames: the series has no frame in {spelt}: {name} has {has}")
-
-
-def _complain_of_no_grains(name: str, particles: int, settings: Settings) -> None:
-    if particles:
-        named = " or ".join(rule.text for rule in settings.boundary)
-        raise SettingsError(
-            f"boundary: {named} selects all particles of every frame: no grain is left"
-        )
-    warnings.warn(f"{name}: no frame has any grains", ScanfabWarning, stacklevel=3)
-
-
-class Readable(Protocol):
-    """A frame of a series, or a packing in its place."""
-
-    @property
-    def carries(self) -> Carries: ...
-
-    @property
-    def cell_is_named(self) -> bool: ...
-
-    def read(self) -> Packing: ...
-
-
-@dataclass(frozen=True)
-class _Given:
-    """A packing made of arrays, whose maker knows its cell."""
-
-    packing: Packing
-    carries: Carries = "cell"
-    cell_is_named: bool = False
-
-    def read(self) -> Packing:
-        return self.packing
-
-
-def frames_of(source: Packing | Series) -> Iterator[tuple[int, Readable]]:
-    """The frames by number; a packing is one."""
-    yield from enumerate([_Given(source)] if isinstance(source, Packing) else source)
-
-
-def refuse_unknown_boundary(source: Packing | Series, first: Sample, settings: Settings) -> None:
-    """
-    SettingsError if no frame has any of the boundary's particles; a warning if one rule fits none.
-
-    Particles may come in later frames, so those are looked through if the ``first`` has none.
-    """
-    missing = [rule for rule in settings.boundary if not rule.select(first.packing).any()]
-    for _, frame in frames_of(source) if missing else ():
-        with suppress(PackingError, ReadError, SettingsError):
-            packing = frame.read()
-            missing = [rule for rule in missing if not rule.select(packing).any()]
-        if not missing:
-            break
-    if not missing:
-        return
-    named = " or ".join(rule.text for rule in missing)
-    values = existing_values(first.packing, missing)
-    message = f"boundary: no particle of any frame has {named}: {values}"
-    if len(missing) == len(settings.boundary):
-        raise SettingsError(message)
-    warnings.warn(message, ScanfabWarning, stacklevel=3)
-
-
-def tell_doubts(frame: Readable, sample: Sample, settings: Settings) -> None:
-    """Warn of what looks wrong in a frame before anything is measured."""
-    doubts = doubts_of(sample, cell_is_named=frame.cell_is_named)
-    doubts.append(cell_doubt(sample, frame.carries))
-    if not settings.boundary:
-        doubts.append(boundary_hint(sample, settings) or "")
-    for doubt in filter(None, doubts):
-        warnings.warn(doubt, ScanfabWarning, stacklevel=3)
-
-
-def chosen_frames(source: Packing | Series, frames: slice) -> range:
-    """The frames to compute, in the order of the source."""
-    bounds = (frames.start, frames.stop, frames.step)
-    if any(bound is not None and bound < 0 for bound in bounds):
-        count = 1 if isinstance(source, Packing) else sum(1 for _ in source)
-        chosen = range(count)[frames]
-        return chosen if chosen.step > 0 else chosen[::-1]
-    # without counting the frames first: a dump may hold very many
-    endless = 2**62
-    return range(endless)[frames]
-
-
-class _Strains:
-    """Strains of the frames of a series, from its first frame that has grains."""
-
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
-        self.file = None if settings.strain in STRAIN_MODES else StrainFile(Path(settings.strain))
-        self.first: float | None = None
-        self.first_cell: Cell | None = None
-        self.cells: dict[int, Cell | None] = {}
-
-    def start(self, sample: Sample) -> None:
-        self.first_cell = sample.packing.cell
-        if self.file is None:
-            self.first = axial_length(sample, self.settings.strain, self.settings.axis)
-
-    def at(self, number: int, sample: Sample) -> tuple[float | None, float | None]:
-        """Axial and shear strain of a frame."""
-        if not sample.grains.any():
-            return self._axial(number, sample), None
-        cell = sample.packing.cell
-        self._warn_of_flips(number, cell)
-        return self._axial(number, sample), shear_strain(cell, self.first_cell)
-
-    def _axial(self, number: int, sample: Sample) -> float | None:
-        if self.file is not None:
-            return self.file.at(number, sample.packing.step)
-        if self.first is None or not sample.grains.any():
-            return None
-        length = axial_length(sample, self.settings.strain, self.settings.axis)
-        return None if length is None or self.first == 0 else 1.0 - length / self.first
-
-    def _warn_of_flips(self, number: int, cell: Cell | None) -> None:
-        """Frames come in any order: each is held against both neighbours that are known."""
-        self.cells[number] = cell
-        step = abs(self.settings.frames.step or 1)
-        for early in (number - step, number):
-            late = early + step
-            if is_flipped(self.cells.get(late), self.cells.get(early)):
-                warnings.warn(
-                    f"the cell seems to be flipped between the frames {early} and {late}: from "
-                    f"there on its vectors are others than in the first frame, and shear_strain is "
-                    f"not the strain since then (LAMMPS: fix deform ... flip no)",
-                    ScanfabWarning,
-                    stacklevel=2,
-                )
-
-
-def classify(packing: Packing, settings: Settings) -> Sample:
-    """Contacts and boundary of a frame."""
-    if packing.contacts is None:
-        packing = find_contacts(packing, settings.contact_tolerance)
-    return Sample(packing, select_boundary(packing, settings.boundary), settings.min_contacts)
-
-
-def boundary_hint(sample: Sample, settings: Settings) -> str | None:
-    """What to tell of boundary particles that are not named, or of a name that fits none."""
-    if settings.boundary:
-        named = " or ".join(rule.text for rule in settings.boundary)
-        if sample.boundary.any():
-            return None
-        values = existing_values(sample.packing, settings.boundary)
-        return f"boundary: no particle has {named}: {values}"
-    expression = enclosing_class(sample.packing)
-    if expression is None:
-        return None
-    return (
-        f"the particles with {expression} enclose the others: if they are a boundary, "
-        f'name them: --boundary "{expression}"'
-    )

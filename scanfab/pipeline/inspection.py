@@ -12,13 +12,7 @@ from scanfab.io.series import Frame, Series
 from scanfab.packing.doubts import cell_doubt, cell_hint, doubts_of, refuse_impossible
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import SphereWindow, SurfaceBox
-from scanfab.pipeline.compute import (
-    boundary_hint,
-    chosen_frames,
-    classify,
-    no_such_frames,
-    refuse_unknown_boundary,
-)
+from scanfab.pipeline.frames import Frames, boundary_hint
 from scanfab.pipeline.plan import rv_of
 from scanfab.pipeline.settings import Settings
 
@@ -94,42 +88,41 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
     ScanfabError
         If a frame cannot be read, or no frame has any of the boundary's particles.
     """
-    chosen = chosen_frames(series, settings.frames)
-    found = False
+    frames, found = Frames(series, settings), False
     window: SphereWindow | None = None
     for number, frame in enumerate(series):
-        if number in chosen:
+        if number in frames.chosen:
             found = True
-            sample, told = _read(frame, settings)
-            window = window or _rv(series, sample, settings)
+            sample, told = _read(frames, frame)
+            window = window or _rv(frames, sample)
             yield _report(series.name, number, frame, sample, told, window)
         elif window is None:
             with suppress(PackingError, ReadError):
-                window = _rv(series, _read(frame, settings)[0], settings)
-        if number >= chosen.stop - 1:
+                window = _rv(frames, _read(frames, frame)[0])
+        if number >= frames.chosen.stop - 1:
             break
     if not found:
-        raise no_such_frames(series, settings.frames)
+        raise frames.no_such_frames()
 
 
-def _read(frame: Frame, settings: Settings) -> tuple[Sample, list[str]]:
+def _read(frames: Frames, frame: Frame) -> tuple[Sample, list[str]]:
     """A frame, and what is doubtful about it."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        sample = classify(frame.read(), settings)
+        sample = frames.read(frame)
     for one in caught:
         if issubclass(one.category, ScanfabNote):
             warnings.warn(one.message, stacklevel=2)
     told = [str(one.message) for one in caught if not issubclass(one.category, ScanfabNote)]
-    return sample, [*told, *_hints(frame, sample, settings)]
+    return sample, [*told, *_hints(frame, sample, frames.settings)]
 
 
-def _rv(series: Series, sample: Sample, settings: Settings) -> SphereWindow | None:
+def _rv(frames: Frames, sample: Sample) -> SphereWindow | None:
     """The RV, and a word on the boundary, from the first frame that has grains."""
     if not sample.grains.any():
         return None
-    refuse_unknown_boundary(series, sample, settings)
-    return rv_of(sample, settings)
+    frames.refuse_unknown_boundary(sample)
+    return rv_of(sample, frames.settings)
 
 
 def _report(

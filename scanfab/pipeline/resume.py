@@ -11,7 +11,7 @@ from typing import Any
 
 from scanfab.base.errors import SettingsError
 from scanfab.io.series import Series
-from scanfab.pipeline.compute import chosen_frames
+from scanfab.pipeline.frames import chosen_frames
 from scanfab.pipeline.manifest import strain_file
 from scanfab.pipeline.repeat import read_manifest
 from scanfab.pipeline.settings import Settings

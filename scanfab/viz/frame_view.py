@@ -12,11 +12,10 @@ from scanfab.base.errors import (
     ReadError,
     ScanfabWarning,
     SettingsError,
-    SkippedFrameWarning,
 )
 from scanfab.io.series import Frame, Series
 from scanfab.packing.sample import Sample
-from scanfab.pipeline.compute import classify, refuse_unknown_boundary, tell_doubts
+from scanfab.pipeline.frames import Frames
 from scanfab.pipeline.plan import Plan, make_plan
 from scanfab.pipeline.settings import STRAIN_MODES, Settings
 from scanfab.pipeline.strain import StrainFile, axial_length, shear_strain
@@ -63,18 +62,19 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
     ScanfabError
         If there is no such frame, or it cannot be read.
     """
+    # of damaged frames only the one asked for counts
+    frames = Frames(series, replace(settings, on_error="skip"))
     number, frame = _frame(series, number)
-    sample = classify(frame.read(), settings)
-    tell_doubts(frame, sample, settings)
-    first = _first(series, settings)
-    if first is not None:
-        refuse_unknown_boundary(series, first, settings)
+    sample = frames.read(frame)
+    frames.tell_doubts(frame, sample)
+    found = frames.first()
+    first = None if found is None else found[2]
     plan = None if first is None else _plan(first, settings)
     scene = scene_of(sample, None if plan is None else plan.window)
     if plan is not None:
         scene = about_window(replace(scene, cutoff=plan.cutoff))
     strains = _strains(number, sample, first, settings)
-    column = _strain_column(series, strains, first, settings)
+    column = _strain_column(frames, strains, first, settings)
     return Look(scene, number, sample, strains, first, plan, column)
 
 
@@ -89,19 +89,6 @@ def _frame(series: Series, number: int) -> tuple[int, Frame]:
         if count == wanted + 1:
             return wanted, frame
     raise ReadError(f"{series.name}: has {count} frames, there is no frame {number}")
-
-
-def _first(series: Series, settings: Settings) -> Sample | None:
-    """The first frame that has grains; those that are damaged are skipped, as by compute."""
-    for number, frame in enumerate(series):
-        try:
-            sample = classify(frame.read(), settings)
-        except (PackingError, ReadError) as error:
-            warnings.warn(f"frame {number} skipped: {error}", SkippedFrameWarning, stacklevel=3)
-            continue
-        if sample.grains.any():
-            return sample
-    return None
 
 
 def _plan(first: Sample, settings: Settings) -> Plan | None:
@@ -123,13 +110,12 @@ def _strains(
 
 
 def _strain_column(
-    series: Series, strains: dict[str, float | None], first: Sample | None, settings: Settings
+    frames: Frames, strains: dict[str, float | None], first: Sample | None, settings: Settings
 ) -> str | None:
     """That of the frame; where no strain has begun, that of the last frame that can be read."""
-    frames = list(enumerate(series)) if is_ambiguous(strains) else []
-    for number, frame in reversed(frames):
+    for number, frame in reversed(list(frames) if is_ambiguous(strains) else []):
         with suppress(PackingError, ReadError):
-            last = classify(frame.read(), settings)
+            last = frames.read(frame)
             return frame_strain_column(_strains(number, last, first, settings))
     return frame_strain_column(strains)
 
