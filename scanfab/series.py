@@ -283,6 +283,25 @@ class Series:
             return []
         return [path for path in dict.fromkeys(one.path for one in snapshots) if path.is_file()]
 
+    def files_through(self, number: int) -> Iterator[tuple[Path, bool]]:
+        """
+        The files of the frames up to one, and whether each is a file of grains.
+
+        All of these frames have been looked for: one file may hold many.
+        """
+        steps, met = [], 0
+        for step, path in self.grains.files.items():
+            steps.append(step)
+            yield path, True
+            met += self._met.get(path, 1)
+            if met > number:
+                break
+        last = max((step for step in steps if step is not None), default=None)
+        for family in self.contacts:
+            for step, path in family.files.items():
+                if step is None or last is None or step <= last:
+                    yield path, False
+
     def files(self) -> Iterator[Path]:
         """Every file that the frames come from."""
         for family in (self.grains, *self.contacts):

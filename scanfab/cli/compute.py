@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -211,12 +212,13 @@ def compute(
         tell_inputs(series, settings.workers)
         announce_compiling()
         run = Run(series, settings, vtk_folder, resume, keep=plot is not None)
-        if resume and result is not None:
-            with usage_errors():
-                asked = run.go_on(result, asked)
-                if plot is not None and run.table is not None:
-                    run.table.check_columns(_columns_drawn(figure))
-        _write_or_say(run, asked, result, excerpt)
+        with nullcontext() if result is None else result.alone():
+            if resume and result is not None:
+                with usage_errors():
+                    asked = run.go_on(result, asked)
+                    if plot is not None and run.table is not None:
+                        run.table.check_columns(_columns_drawn(figure))
+            _write_or_say(run, asked, result, excerpt)
         for path in _manifests(output, manifest_path):
             _write_manifest(path, asked, run, told, settings_file)
         if plot is not None:
@@ -307,6 +309,7 @@ def _write(run: Run, asked: dict[str, Any], result: ResultFile | None, excerpt: 
     if result is not None:
         with result.writer(asked, run.resume) as writer:
             for row in run.rows():
+                result.record(run.new_inputs(row))
                 writer.write(row)
     elif is_readable():
         print_table(list(run.rows()), excerpt)
@@ -329,7 +332,8 @@ def _write_manifest(
 
     # what was told of the rows that an earlier run has finished
     before = run.table.warnings if run.table is not None else []
-    found = manifest(asked, run.series, [*dict.fromkeys([*before, *told.texts])], told.notes)
+    warnings = [*dict.fromkeys([*before, *told.texts])]
+    found = manifest(asked, run.series, warnings, told.notes, run.inputs)
     if settings_file is not None:
         found["settings_file"] = settings_file.asked()
     text = json.dumps(found, indent=1, ensure_ascii=False)

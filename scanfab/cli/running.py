@@ -36,6 +36,9 @@ class Run:
         resume: bool,
         keep: bool,
     ) -> None:
+        from scanfab.finished import InputsOfRows
+        from scanfab.manifest import Inputs
+
         self.series = series
         self.settings = settings
         self.resume = resume
@@ -51,6 +54,9 @@ class Run:
         """The complete FILE."""
         self.done = 0
         """Finished frames."""
+        self.inputs = Inputs()
+        """What the files hold, as far as rows have come."""
+        self._told = InputsOfRows(series, settings, self.inputs)
         self._keep = keep
         self._observers = _vtk_folders(vtk_folder, series, settings, resume)
 
@@ -61,7 +67,7 @@ class Run:
         A part is of the run that was interrupted last, so it counts, whatever FILE holds.
         """
         from scanfab.errors import SettingsError
-        from scanfab.finished import finished_table
+        from scanfab.finished import check_part, finished_table
         from scanfab.manifest import with_frames
 
         if result.path.is_file():
@@ -71,10 +77,12 @@ class Run:
                 self.settings = replace(self.settings, frames=frames)
                 asked = with_frames(asked, frames)
             except SettingsError:
-                if not result.part.exists():
+                if not result.has_part:
                     raise
                 self.table = None
         self.part = result.finished_rows(asked, self.settings.rows_per_frame)
+        of_part = {"settings": asked, "inputs": result.recorded_inputs()}
+        check_part(result.part, of_part, self.part, self.series, self.settings)
         self.found = any(row["alpha_vs"] is not None for row in self.part)
         if self.table is not None:
             self.found = self.found or self.table.has_void_fabric
@@ -96,6 +104,10 @@ class Run:
             if len(due) > len(written):
                 return True
         return False
+
+    def new_inputs(self, row: Row) -> list[dict[str, Any]]:
+        """What files hold that a row comes from, each once."""
+        return self._told.new(row)
 
     def frames(self) -> int:
         """About how many frames there are to be finished, those of earlier runs among them."""
