@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from scanfab.choice import PathLike, choose_grains, expanded, files_of, named_once
+from scanfab.choice import PathLike, choose_grains, expanded, files_of, named_once, series_below
 from scanfab.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.families import (
     SETTINGS_FILE,
@@ -136,6 +136,7 @@ def read_series(
     name = _as_text(os.fspath(given[0]) if len(paths) == len(given) == 1 else _common_folder(paths))
     own = [family for family in families if family.kind == "contacts"]
     _note_passed_over(families, [grains, *own])
+    _note_below(paths, grains)
 
     def series(files: Sequence[Family], contacts_from: ContactsFrom) -> Series:
         checked = tuple(family.check() for family in files)
@@ -234,6 +235,15 @@ def _note_passed_over(families: Sequence[Family], used: Sequence[Family]) -> Non
     for family in families:
         if family.problem is not None:
             warnings.warn(f"passed over: {family.problem}", ScanfabWarning, stacklevel=3)
+
+
+def _note_below(paths: Sequence[Path], grains: Family) -> None:
+    """A folder with a single dump beside folders of them: these may have been meant."""
+    if len(paths) != 1 or not paths[0].is_dir() or len(grains.files) > 1:
+        return
+    below = series_below(paths[0])
+    if below:
+        _note(f"{paths[0]}: {Path(grains.pattern).name} alone is read, but {below}")
 
 
 def _lack(family: Family) -> str:

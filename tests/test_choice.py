@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import warnings
 
@@ -159,7 +160,7 @@ def test_globs_in_quotes_are_expanded(folder, capsys):
 
 def test_a_glob_that_meets_nothing_is_wrong_usage(folder, capsys):
     assert run(["inspect", f"{folder}/grains_*.txt"]) == 2
-    assert "does not exist" in capsys.readouterr().err
+    assert "grains_*.txt' matches nothing: there is no file" in capsys.readouterr().err
 
 
 def test_contacts_beside_that_cannot_be_read_say_how_to_leave_them_alone(folder):
@@ -191,3 +192,15 @@ def test_the_command_line_takes_a_file_of_cells(tmp_path, capsys):
     assert "0.0035473249830325487" in capsys.readouterr().out
     assert run([*words, "--cell", str(tmp_path / "nowhere.csv")]) == 2
     assert "CSV file with those of each frame" in capsys.readouterr().err
+
+
+def test_a_pipe_in_a_folder_is_told_of(folder):
+    os.mkfifo(folder / "dump_200.txt")
+    with pytest.warns(ScanfabNote, match=r"passed over: .*dump_200.txt is a pipe"):
+        assert len(scanfab.read_series(folder).grains.files) == 2
+
+
+def test_a_lone_dump_above_folders_of_dumps_is_told_of(folder):
+    shutil.copy(next(folder.glob("dump_*")), folder.parent / "dump_7.txt")
+    with pytest.warns(ScanfabNote, match=r"dump_7.txt alone is read, but .*: .*dumps"):
+        scanfab.read_series(folder.parent)

@@ -52,6 +52,8 @@ class Run:
         """Rows that stand in FILE.part."""
         self.table: FinishedTable | None = None
         """The complete FILE."""
+        self.is_over = False
+        """Whether all rows have come: the table is being made of them."""
         self.done = 0
         """Finished frames."""
         self.inputs = Inputs()
@@ -116,6 +118,8 @@ class Run:
 
     def standing(self) -> str:
         """How many frames are finished, for the sentence that tells of an interruption."""
+        if self.is_over:
+            return "after the last frame, before the table was complete"
         return f"after {self.done} of {max(self.frames(), self.done)} frames"
 
     def rows(self) -> Iterator[Row]:
@@ -131,6 +135,7 @@ class Run:
                 if number % self.settings.rows_per_frame == 0:
                     self.done += 1
                     advance(new=not self._is_taken_over(row))
+        self.is_over = True
 
     def _is_taken_over(self, row: Row) -> bool:
         """Whether a row stands in the complete FILE."""

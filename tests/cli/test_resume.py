@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import signal
 import sys
@@ -12,7 +13,7 @@ from random import Random
 import pytest
 
 from scanfab.cli.main import run
-from scanfab.writers.rows import CsvWriter, JsonLinesWriter
+from scanfab.writers.rows import CsvWriter, JsonLinesWriter, JsonWriter
 from tests.interruptions import Interrupter, interrupted_at_row, write_series
 
 # about a second of scanning
@@ -377,3 +378,31 @@ def test_frames_behind_a_source_whose_rows_are_over_are_refused(
     command = stopped_run(sources=(first, dumps))
     shutil.copy(dumps / "dump_100.txt", first)
     assert is_refused(command, capsys, "dump_100.txt is new, and rows of the next source")
+
+
+def test_a_part_that_is_a_pipe_is_refused_at_once(compute, tmp_path, capsys):
+    output = tmp_path / "table.csv"
+    os.mkfifo(f"{output}.part")
+    assert compute(output) == 2
+    assert f"{output}.part: is a pipe, expected a file or nothing" in capsys.readouterr().err
+
+
+def test_a_table_that_is_replaced_is_told_of(compute, tmp_path, capsys):
+    output = tmp_path / "table.csv"
+    note = f"{output}: the file that is there will be replaced at the end of this run; --resume"
+    assert compute(output) == 0
+    assert note not in capsys.readouterr().err
+    assert compute(output, "--resume") == 0
+    assert note not in capsys.readouterr().err
+    assert compute(output) == 0
+    assert note in capsys.readouterr().err
+
+
+def test_a_failure_behind_the_last_frame_says_so(compute, tmp_path, capsys, monkeypatch):
+    def full(*_):
+        raise OSError(28, os.strerror(28))
+
+    monkeypatch.setattr(JsonWriter, "close", full)
+    assert compute(tmp_path / "table.json") == 1
+    said = "stopped after the last frame, before the table was complete; the same command with"
+    assert said in capsys.readouterr().err
