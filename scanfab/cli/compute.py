@@ -236,7 +236,7 @@ def _note_replaced(output: Path) -> None:
     from scanfab.errors import ScanfabNote
 
     warnings.warn(
-        f"{output}: the file that is there will be replaced at the end of this run; --resume would "
+        f"{output}: the table that is there will be replaced at the end of this run; --resume would "
         f"go on with it",
         ScanfabNote,
         stacklevel=3,
@@ -326,7 +326,7 @@ def _write(run: Run, asked: dict[str, Any], result: ResultFile | None, excerpt: 
     if result is not None:
         with result.writer(asked, run.resume) as writer:
             for number, row in enumerate(run.rows()):
-                if number == 0 and not run.resume and result.path.is_file():
+                if number == 0 and not run.resume and result.has_table:
                     _note_replaced(result.path)
                 result.record(run.new_inputs(row))
                 writer.write(row)

@@ -77,6 +77,11 @@ class ResultFile:
         """Whether an earlier run has left something in FILE.part."""
         return self.part.exists() and self.part.stat().st_size > 0
 
+    @property
+    def has_table(self) -> bool:
+        """Whether an earlier run has made FILE, with its manifest."""
+        return self.path.is_file() and self.manifest.is_file()
+
     @contextmanager
     def alone(self) -> Iterator[None]:
         """Keep other runs away from FILE.part; a ScanfabError if one writes to it."""

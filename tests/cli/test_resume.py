@@ -389,7 +389,7 @@ def test_a_part_that_is_a_pipe_is_refused_at_once(compute, tmp_path, capsys):
 
 def test_a_table_that_is_replaced_is_told_of(compute, tmp_path, capsys):
     output = tmp_path / "table.csv"
-    note = f"{output}: the file that is there will be replaced at the end of this run; --resume"
+    note = f"{output}: the table that is there will be replaced at the end of this run; --resume"
     assert compute(output) == 0
     assert note not in capsys.readouterr().err
     assert compute(output, "--resume") == 0
