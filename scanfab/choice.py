@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from scanfab.errors import ReadError, ScanfabNote, ScanfabWarning, UnknownFormatError
-from scanfab.families import Family, files_in, own_contacts, sort_into_families
+from scanfab.families import Family, contacts_beside, files_in, sort_into_families
 from scanfab.readers.base import FileKind
 from scanfab.readers.files import first_bytes
 from scanfab.streams import kind_of
@@ -115,16 +115,20 @@ def _several(where: str, families: Sequence[Family]) -> str:
     contacts = [family for family in families if family.kind == "contacts"]
     full = [family for family in families if family.kind in ("grains", "index")]
     bare = [family for family in families if family.kind == "points"]
-    lines, doubtful = [], []
+    lines: list[str] = []
+    doubtful: list[str] = []
     for family in [*full, *bare]:
-        own, unclear = own_contacts(family, [*full, *bare], contacts)
-        doubtful += unclear
+        # by the rule that reads them, once this one is named
+        own, unclear = contacts_beside(family, None)
+        doubtful += [one.pattern for one in unclear]
         notes = ["it has no radius: --radius L"] if family.kind == "points" else []
         if own:
             notes.append(f"contacts: {', '.join(one.pattern for one in own)}")
         lines.append("; ".join([family.pattern, *notes]))
     message = f"{where}: several series of grains: choose one of\n  " + "\n  ".join(lines)
-    names = dict.fromkeys(f"'{family.pattern}'" for family in contacts if family in doubtful)
+    names = dict.fromkeys(
+        f"'{family.pattern}'" for family in contacts if family.pattern in doubtful
+    )
     if names:
         message += "\nand its contacts, --contacts with one of\n  " + "\n  ".join(names)
     return message

@@ -13,8 +13,7 @@ from scanfab.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.families import (
     SETTINGS_FILE,
     Family,
-    families_beside,
-    own_contacts,
+    contacts_beside,
     sort_into_families,
 )
 from scanfab.frame_file import FrameFile
@@ -199,14 +198,11 @@ def _contacts_beside(grains: Family, format: str | None) -> list[Family]:
 
     Told by a note; also where it is not clear whose contacts they are, and they are left alone.
     """
-    if grains.kind == "index":
-        return []
-    beside = families_beside(grains, format)
-    rivals = [family for family in beside if family.kind in ("grains", grains.kind)]
-    contacts = [family for family in beside if family.kind == "contacts" and family.clash is None]
-    own, doubtful = own_contacts(grains, rivals, contacts)
-    if own:
+    own, doubtful = contacts_beside(grains, format)
+    if len(own) == 1:
         _note(f"contacts are read from {_patterns(own)}, beside the grains")
+    elif own:
+        _note(f"files of contacts beside the grains, which are read with them: {_patterns(own)}")
     elif doubtful:
         _note(
             f"{_patterns(doubtful)}: contacts beside the grains, but it is not clear whose they "

@@ -104,6 +104,26 @@ def test_two_lists_beside_are_not_taken(folder):
         assert contacts_of(folder / "dump_9.txt") == [None]
 
 
+def test_of_two_lists_beside_the_nearest_by_name_is_taken(folder):
+    write(folder / "dump_pairs_9.txt", pairs_text(PAIRS[:1], step=9))
+    with pytest.warns(ScanfabNote) as told:
+        assert contacts_of(folder / "dump_9.txt") == [1]
+    texts = [str(one.message) for one in told]
+    assert not any("contacts are read from" in text for text in texts)
+    assert any("dump_pairs_9.txt: of several contact lists" in text for text in texts)
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabNote")
+def test_the_advice_of_several_series_names_the_contacts_that_are_read(tmp_path):
+    """Points without a radius are no rivals of grains, nor are the frames of other steps."""
+    series(tmp_path, "ex_dump", "ex_contacts", 9)
+    write(tmp_path / "ex_points_9.txt", dump_text(step=9, names=NO_RADIUS))
+    write(tmp_path / "other_7.txt", dump_text(step=7))
+    with pytest.raises(ReadError, match=r"ex_dump_9.txt; contacts: .*ex_contacts_9.txt"):
+        scanfab.read_series(tmp_path)
+    assert contacts_of(tmp_path / "ex_dump_9.txt") == [2]
+
+
 @pytest.mark.filterwarnings("ignore::scanfab.errors.ScanfabNote")
 def test_the_advice_of_several_series_keeps_the_contacts(folder):
     series(folder, "p5_dump", "p5_contacts", 9, PAIRS[:1])

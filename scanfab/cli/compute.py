@@ -236,8 +236,8 @@ def _note_replaced(output: Path) -> None:
     from scanfab.errors import ScanfabNote
 
     warnings.warn(
-        f"{output}: the table that is there will be replaced at the end of this run; --resume would "
-        f"go on with it",
+        f"{output}: the table that is there will be replaced at the end of this run; --resume "
+        f"would go on with it",
         ScanfabNote,
         stacklevel=3,
     )
