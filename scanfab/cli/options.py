@@ -102,7 +102,8 @@ class SourceType(click.Path):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Refuse what does not exist."""
-        if not Path(value).exists() and glob.has_magic(value) and not glob.glob(value):
+        is_glob = not Path(value).exists() and glob.has_magic(value)
+        if self.exists and is_glob and not glob.glob(value):
             self.fail(f"{value!r} matches nothing: there is no file or folder of such a name.")
         for one in _expanded(value):
             super().convert(one, param, ctx)
