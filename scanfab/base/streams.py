@@ -8,7 +8,7 @@ from pathlib import Path
 
 from scanfab.base.errors import ReadError
 
-__all__ = ["check_file", "check_file_or_pipe"]
+__all__ = ["check_file", "check_file_or_pipe", "kind_of"]
 
 KINDS = {
     stat.S_IFIFO: "a pipe",
@@ -22,7 +22,7 @@ INHERITED = ("/dev/fd/", "/dev/stdin", "/proc/self/fd/")
 
 def check_file(path: Path) -> None:
     """ReadError if a path that exists is no file."""
-    kind = _kind(path)
+    kind = kind_of(path)
     if kind is not None:
         raise ReadError(
             f"{path}: is {kind}, expected a file: what a program writes is read from standard "
@@ -32,7 +32,7 @@ def check_file(path: Path) -> None:
 
 def check_file_or_pipe(path: Path) -> None:
     """ReadError if a path is neither a file nor a pipe that a shell made: ``<(command)``."""
-    kind = _kind(path)
+    kind = kind_of(path)
     ready = kind in ("a pipe", "a socket") and os.fspath(path).startswith(INHERITED)
     if kind is not None and not ready:
         raise ReadError(
@@ -41,7 +41,8 @@ def check_file_or_pipe(path: Path) -> None:
         )
 
 
-def _kind(path: Path) -> str | None:
+def kind_of(path: Path) -> str | None:
+    """What a path is that is neither a file nor a folder; None if it is one, or nothing."""
     try:
         return KINDS.get(stat.S_IFMT(path.stat().st_mode))
     except OSError:

@@ -23,7 +23,6 @@ from scanfab.cli.options import (
     reading_options,
     sample_options,
     seed_option,
-    usage_errors,
     window_options,
     workers_option,
 )
@@ -132,9 +131,9 @@ def calibrate(
 
     check_plot(plot, None, ())
     with reported_warnings():
-        options, _ = fill_from_file(ctx, (source,), options)
-        reading = reading_arguments(options)
-        with usage_errors():
+        options, settings_file = fill_from_file(ctx, (source,), options)
+        with settings_file.named_errors():
+            reading = reading_arguments(options)
             excerpt = Excerpt.make(StepRow, options.pop("fields"), int(options.pop("digits")))
             settings = Settings.make(**options)
             result = None if output is None else ResultFile(output, StepRow, excerpt)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import sys
+import warnings
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -42,6 +44,11 @@ __all__ = ["OF_THE_LINE", "compute"]
 OF_THE_LINE = (
     "sources", "output", "resume", "manifest_path", "vtk_folder", "plot", "figure", "quiet",
     "verbose", "help",
+)  # fmt: skip
+
+# of directions
+RULES = (
+    "lebedev", "design", "icosahedral", "product", "fibonacci", "equal-angle", "equal-angle-full",
 )  # fmt: skip
 
 
@@ -87,7 +94,7 @@ OF_THE_LINE = (
     metavar="N|RULE",
     shell_complete=completed(
         "auto",
-        *(f"{rule}:" for rule in ("lebedev", "design", "icosahedral", "product", "fibonacci")),
+        *(f"{rule}:" for rule in RULES),
     ),
     help="N axes, rounded up to the next exact rule, or lebedev:DEGREE, design:DEGREE, "
     "icosahedral:DEGREE, product:DEGREE, fibonacci:N, equal-angle:STEP, equal-angle-full:STEP.",
@@ -197,8 +204,8 @@ def compute(
         options, settings_file = fill_from_file(ctx, sources, options)
         if options.get("cutoffs") and (vtk_folder is not None or plot is not None):
             raise click.UsageError("--vtk and --plot are of one cut-off: leave out --cutoffs")
-        reading = reading_arguments(options)
-        with usage_errors():
+        with settings_file.named_errors():
+            reading = reading_arguments(options)
             excerpt = Excerpt.make(Row, options.pop("fields"), int(options.pop("digits")))
             settings = Settings.make(**options)
             result = None if output is None else ResultFile(output, Row, excerpt)
@@ -211,17 +218,29 @@ def compute(
         tell_inputs(series, settings.workers)
         announce_compiling()
         run = Run(series, settings, vtk_folder, resume, keep=plot is not None)
-        if resume and result is not None:
-            with usage_errors():
-                asked = run.go_on(result, asked)
-                if plot is not None and run.table is not None:
-                    run.table.check_columns(_columns_drawn(figure))
-        _write_or_say(run, asked, result, excerpt)
+        with nullcontext() if result is None else result.alone():
+            if resume and result is not None:
+                with usage_errors():
+                    asked = run.go_on(result, asked)
+                    if plot is not None and run.table is not None:
+                        run.table.check_columns(_columns_drawn(figure))
+            _write_or_say(run, asked, result, excerpt)
         for path in _manifests(output, manifest_path):
             _write_manifest(path, asked, run, told, settings_file)
         if plot is not None:
             _draw(plot, figure, run)
     return 0 if run.found and not told.skipped and not run.skipped else 1
+
+
+def _note_replaced(output: Path) -> None:
+    from scanfab.base.errors import ScanfabNote
+
+    warnings.warn(
+        f"{output}: the table that is there will be replaced at the end of this run; --resume "
+        f"would go on with it",
+        ScanfabNote,
+        stacklevel=3,
+    )
 
 
 def _check_figure(plot: Path | None, figure: str | None) -> None:
@@ -278,7 +297,7 @@ def _write_or_say(
         with telling(standing):
             _write(run, asked, result, excerpt)
     except (ScanfabError, OSError):
-        if result is not None and 0 < run.done < run.frames():
+        if result is not None and (run.is_over or 0 < run.done < run.frames()):
             click.echo(f"scanfab: stopped {standing()}", err=True)
         raise
 
@@ -306,7 +325,10 @@ def _write(run: Run, asked: dict[str, Any], result: ResultFile | None, excerpt: 
 
     if result is not None:
         with result.writer(asked, run.resume) as writer:
-            for row in run.rows():
+            for number, row in enumerate(run.rows()):
+                if number == 0 and not run.resume and result.has_table:
+                    _note_replaced(result.path)
+                result.record(run.new_inputs(row))
                 writer.write(row)
     elif is_readable():
         print_table(list(run.rows()), excerpt)
@@ -322,16 +344,16 @@ def _manifests(output: Path | None, asked: Path | None) -> list[Path]:
 
 
 def _write_manifest(
-    path: Path, asked: dict[str, Any], run: Run, told: Told, settings_file: SettingsFile | None
+    path: Path, asked: dict[str, Any], run: Run, told: Told, settings_file: SettingsFile
 ) -> None:
     from scanfab.base.files import whole_file
     from scanfab.pipeline.manifest import manifest
 
     # what was told of the rows that an earlier run has finished
     before = run.table.warnings if run.table is not None else []
-    found = manifest(asked, run.series, [*dict.fromkeys([*before, *told.texts])], told.notes)
-    if settings_file is not None:
-        found["settings_file"] = settings_file.asked()
+    texts = [*dict.fromkeys([*before, *told.texts])]
+    found = manifest(asked, run.series, texts, told.notes, run.inputs)
+    found.update(settings_file.asked())
     text = json.dumps(found, indent=1, ensure_ascii=False)
     with whole_file(path) as part:
         # names of files need be no text; what replaces their letters is how JSON spells them

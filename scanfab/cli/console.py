@@ -106,7 +106,9 @@ def announce_compiling() -> None:
             None
             if quiet
             else click.echo(
-                f"scanfab: compiling what no earlier run has needed, 2 to 20 s; {kept}", err=True
+                f"scanfab: compiling what no earlier run has needed: seconds, or minutes on a "
+                f"busy machine; {kept}",
+                err=True,
             )
         )
     )

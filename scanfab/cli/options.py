@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -101,6 +102,9 @@ class SourceType(click.Path):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Refuse what does not exist."""
+        is_glob = not Path(value).exists() and glob.has_magic(value)
+        if self.exists and is_glob and not glob.glob(value):
+            self.fail(f"{value!r} matches nothing: there is no file or folder of such a name.")
         for one in _expanded(value):
             super().convert(one, param, ctx)
         return value
@@ -261,10 +265,29 @@ output_option = click.option(
     "same, or a readable table on a terminal).",
 )
 
+
+def _complete_fields(
+    ctx: click.Context, parameter: click.Parameter, text: str
+) -> list[CompletionItem]:
+    """The columns of what a command writes, behind those that are named already."""
+    from dataclasses import fields
+
+    from scanfab.pipeline.ladders import StepRow
+    from scanfab.table.comparison import FrameRow, SummaryRow
+    from scanfab.table.table import Row
+
+    of_compare = SummaryRow if ctx.params.get("summary") else FrameRow
+    kind: type = {"calibrate": StepRow, "compare": of_compare}.get(str(ctx.command.name), Row)
+    before, comma, last = text.rpartition(",")
+    names = [one.name for one in fields(kind) if one.name not in before.split(",")]
+    return [CompletionItem(before + comma + name) for name in names if name.startswith(last)]
+
+
 excerpt_options = together(
     click.option(
         "--fields",
         metavar="NAME,NAME,...",
+        shell_complete=_complete_fields,
         help="Which columns to write, in this order (default: all).",
     ),
     click.option(

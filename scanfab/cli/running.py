@@ -36,6 +36,9 @@ class Run:
         resume: bool,
         keep: bool,
     ) -> None:
+        from scanfab.pipeline.manifest import Inputs
+        from scanfab.pipeline.resume import InputsOfRows
+
         self.series = series
         self.settings = settings
         self.resume = resume
@@ -49,8 +52,13 @@ class Run:
         """Rows that stand in FILE.part."""
         self.table: FinishedTable | None = None
         """The complete FILE."""
+        self.is_over = False
+        """Whether all rows have come: the table is being made of them."""
         self.done = 0
         """Finished frames."""
+        self.inputs = Inputs()
+        """What the files hold, as far as rows have come."""
+        self._told = InputsOfRows(series, settings, self.inputs)
         self._keep = keep
         self._observers = _vtk_folders(vtk_folder, series, settings, resume)
 
@@ -62,7 +70,7 @@ class Run:
         """
         from scanfab.base.errors import SettingsError
         from scanfab.pipeline.manifest import with_frames
-        from scanfab.pipeline.resume import finished_table
+        from scanfab.pipeline.resume import check_part, finished_table
 
         if result.path.is_file():
             try:
@@ -71,10 +79,12 @@ class Run:
                 self.settings = replace(self.settings, frames=frames)
                 asked = with_frames(asked, frames)
             except SettingsError:
-                if not result.part.exists():
+                if not result.has_part:
                     raise
                 self.table = None
         self.part = result.finished_rows(asked, self.settings.rows_per_frame)
+        of_part = {"settings": asked, "inputs": result.recorded_inputs()}
+        check_part(result.part, of_part, self.part, self.series, self.settings)
         self.found = any(row["alpha_vs"] is not None for row in self.part)
         if self.table is not None:
             self.found = self.found or self.table.has_void_fabric
@@ -97,6 +107,10 @@ class Run:
                 return True
         return False
 
+    def new_inputs(self, row: Row) -> list[dict[str, Any]]:
+        """What files hold that a row comes from, each once."""
+        return self._told.new(row)
+
     def frames(self) -> int:
         """About how many frames there are to be finished, those of earlier runs among them."""
         frames = self.settings.frames
@@ -104,6 +118,8 @@ class Run:
 
     def standing(self) -> str:
         """How many frames are finished, for the sentence that tells of an interruption."""
+        if self.is_over:
+            return "after the last frame, before the table was complete"
         return f"after {self.done} of {max(self.frames(), self.done)} frames"
 
     def rows(self) -> Iterator[Row]:
@@ -119,6 +135,7 @@ class Run:
                 if number % self.settings.rows_per_frame == 0:
                     self.done += 1
                     advance(new=not self._is_taken_over(row))
+        self.is_over = True
 
     def _is_taken_over(self, row: Row) -> bool:
         """Whether a row stands in the complete FILE."""

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 import warnings
-from dataclasses import dataclass
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -21,21 +23,38 @@ SECTION = "compute"
 class SettingsFile:
     """A settings file, and which of its options a command has taken from it."""
 
-    path: Path
-    options: dict[str, Any]
+    path: Path | None = None
+    """None: there is no file."""
+    options: dict[str, Any] = field(default_factory=dict)
     """As they stand in the file."""
-    used: tuple[str, ...]
+    used: tuple[str, ...] = ()
     """The others are named on the command line, or are none of this command's."""
 
+    @contextmanager
+    def named_errors(self) -> Iterator[None]:
+        """Let errors of options that come from the file name it; all are wrong usage."""
+        from scanfab.base.errors import SettingsError, UnknownFormatError
+
+        try:
+            yield
+        except (SettingsError, UnknownFormatError, click.UsageError) as error:
+            text = error.message if isinstance(error, click.UsageError) else str(error)
+            option = text.partition(":")[0].removeprefix("--").replace(" ", "-")
+            before = f"{self.path}: " if self.path and option in self.used else ""
+            raise click.UsageError(f"{before}{text}") from None
+
     def asked(self) -> dict[str, Any]:
-        """As a manifest lists it."""
+        """As a manifest lists it; nothing without a file."""
+        if self.path is None:
+            return {}
         others = [name for name in self.options if name not in self.used]
-        return {"path": str(self.path), "used": list(self.used), "not_used": others}
+        listed = {"path": str(self.path), "used": list(self.used), "not_used": others}
+        return {"settings_file": listed}
 
 
 def fill_from_file(
     ctx: click.Context, sources: tuple[str, ...], options: dict[str, Any]
-) -> tuple[dict[str, Any], SettingsFile | None]:
+) -> tuple[dict[str, Any], SettingsFile]:
     """
     The options of a command, those that its line does not name from the settings file.
 
@@ -45,7 +64,7 @@ def fill_from_file(
 
     path = _path_beside(sources)
     if path is None:
-        return options, None
+        return options, SettingsFile()
     given = read_settings_file(path)
     filled, used = dict(options), []
     parameters = _by_option(ctx.command)
@@ -135,6 +154,11 @@ def _by_option(command: click.Command) -> dict[str, click.Parameter]:
     }
 
 
+def _key(parameter: click.Parameter) -> str:
+    """As the file has it."""
+    return parameter.opts[0].removeprefix("--")
+
+
 def _explained(text: str, error: ValueError) -> str:
     """What is wrong with a file that is no TOML: most often text without quotes."""
     found = re.search(r"\(at line (\d+), column \d+\)", str(error))
@@ -162,7 +186,7 @@ def _from_toml(ctx: click.Context, path: Path, parameter: click.Parameter, value
         # a truth value would count as the number 1
         if isinstance(one, bool) or not isinstance(one, str | int | float):
             raise click.UsageError(
-                f"{path}: {parameter.name}: expected numbers or text in quotes, one or a list of "
+                f"{path}: {_key(parameter)}: expected numbers or text in quotes, one or a list of "
                 f"them, found {_in_toml(one)}"
             )
     if isinstance(value, list) and not parameter.multiple and parameter.nargs == 1:
@@ -174,4 +198,4 @@ def _from_toml(ctx: click.Context, path: Path, parameter: click.Parameter, value
     try:
         return parameter.type_cast_value(ctx, value)
     except click.BadParameter as error:
-        raise click.UsageError(f"{path}: {parameter.name}: {error.format_message()}") from None
+        raise click.UsageError(f"{path}: {_key(parameter)}: {error.format_message()}") from None

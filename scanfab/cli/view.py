@@ -13,7 +13,6 @@ from scanfab.cli.options import (
     reading_options,
     sample_options,
     sources_argument,
-    usage_errors,
     window_options,
 )
 from scanfab.cli.settings_file import fill_from_file
@@ -76,9 +75,9 @@ def view(
     from scanfab.pipeline.settings import Settings
 
     with reported_warnings():
-        options, _ = fill_from_file(ctx, sources, options)
-        reading = reading_arguments(options)
-        with usage_errors():
+        options, settings_file = fill_from_file(ctx, sources, options)
+        with settings_file.named_errors():
+            reading = reading_arguments(options)
             settings = Settings.make(variants="c", **options)
             if screenshot is not None:
                 if screenshot.suffix.lower() != ".png":

@@ -17,8 +17,10 @@ from scanfab.io.registry import reader_for, reader_named
 __all__ = [
     "SETTINGS_FILE",
     "Family",
+    "contacts_beside",
     "families_beside",
     "files_in",
+    "nearest",
     "own_contacts",
     "sort_into_families",
 ]
@@ -114,6 +116,16 @@ def families_beside(grains: Family, format: str | None) -> list[Family]:
     ]
 
 
+def contacts_beside(grains: Family, format: str | None) -> tuple[list[Family], list[Family]]:
+    """The contact files in the folder of single grain files: their own, and those in doubt."""
+    if grains.kind == "index":
+        return [], []
+    beside = families_beside(grains, format)
+    rivals = [family for family in beside if family.kind in ("grains", grains.kind)]
+    contacts = [family for family in beside if family.kind == "contacts" and family.clash is None]
+    return own_contacts(grains, rivals, contacts)
+
+
 def files_in(folder: Path) -> list[Path]:
     """The files of a folder that may be dumps: not hidden ones, nor what is left behind."""
     return sorted(
@@ -146,6 +158,14 @@ def own_contacts(
         elif kin == closest:
             doubtful.append(family)
     return own, doubtful
+
+
+def nearest(grains: Family, contacts: Sequence[Family]) -> Family | None:
+    """The contact files whose names begin with more of the grains' words than all others do."""
+    ordered = sorted(contacts, key=lambda one: _kinship(grains, one)[0], reverse=True)
+    first, second = ordered[:2]
+    is_nearer = _kinship(grains, first)[0] > _kinship(grains, second)[0]
+    return first if is_nearer else None
 
 
 def _stem(family: Family) -> list[str]:

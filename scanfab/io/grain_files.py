@@ -8,12 +8,13 @@ import warnings
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from scanfab.base.errors import ReadError, ScanfabWarning, UnknownFormatError
-from scanfab.io.families import Family, files_in, own_contacts, sort_into_families
+from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning, UnknownFormatError
+from scanfab.base.streams import kind_of
+from scanfab.io.families import Family, contacts_beside, files_in, sort_into_families
 from scanfab.io.files import first_bytes
 from scanfab.io.reader import FileKind
 
-__all__ = ["PathLike", "choose_grains", "expanded", "files_of", "named_once"]
+__all__ = ["PathLike", "choose_grains", "expanded", "files_of", "named_once", "series_below"]
 
 PathLike = str | os.PathLike[str]
 
@@ -33,7 +34,7 @@ def expanded(source: PathLike) -> list[PathLike]:
         return [source]
     found: list[PathLike] = [*sorted(glob.glob(os.fspath(source)))]
     if not found:
-        raise ReadError(f"{source}: there is no such file, folder or glob")
+        raise ReadError(f"{source}: matches nothing: there is no file or folder of such a name")
     return found
 
 
@@ -67,8 +68,12 @@ def files_of(path: Path) -> list[Path]:
             raise ReadError(f"{path}: there is no such file, folder or glob")
         return [path]
     files = files_in(path)
+    for one in sorted(path.iterdir()):
+        if (kind := kind_of(one)) is not None:
+            text = f"passed over: {one} is {kind}, expected a file"
+            warnings.warn(text, ScanfabNote, stacklevel=3)
     if not files:
-        below = _series_below(path)
+        below = series_below(path)
         if below:
             raise ReadError(f"{path}: holds no dumps itself, but {below}")
         raise ReadError(f"{path}: the folder holds no files")
@@ -110,16 +115,20 @@ def _several(where: str, families: Sequence[Family]) -> str:
     contacts = [family for family in families if family.kind == "contacts"]
     full = [family for family in families if family.kind in ("grains", "index")]
     bare = [family for family in families if family.kind == "points"]
-    lines, doubtful = [], []
+    lines: list[str] = []
+    doubtful: list[str] = []
     for family in [*full, *bare]:
-        own, unclear = own_contacts(family, [*full, *bare], contacts)
-        doubtful += unclear
+        # by the rule that reads them, once this one is named
+        own, unclear = contacts_beside(family, None)
+        doubtful += [one.pattern for one in unclear]
         notes = ["it has no radius: --radius L"] if family.kind == "points" else []
         if own:
             notes.append(f"contacts: {', '.join(one.pattern for one in own)}")
         lines.append("; ".join([family.pattern, *notes]))
     message = f"{where}: several series of grains: choose one of\n  " + "\n  ".join(lines)
-    names = dict.fromkeys(f"'{family.pattern}'" for family in contacts if family in doubtful)
+    names = dict.fromkeys(
+        f"'{family.pattern}'" for family in contacts if family.pattern in doubtful
+    )
     if names:
         message += "\nand its contacts, --contacts with one of\n  " + "\n  ".join(names)
     return message
@@ -142,7 +151,7 @@ def _none(where: str, paths: Sequence[Path], families: Sequence[Family]) -> Read
             f"{table}: this is a fabric table, not a dump: scanfab compare or scanfab report "
             f"take it"
         )
-    below = ", ".join(filter(None, (_series_below(path) for path in paths if path.is_dir())))
+    below = ", ".join(filter(None, (series_below(path) for path in paths if path.is_dir())))
     if below:
         return ReadError(f"{where}: no reader knows its files, but {below}")
     return UnknownFormatError(
@@ -159,7 +168,7 @@ def _is_table(path: Path) -> bool:
     return all(word in data for word in TABLE_WORDS)
 
 
-def _series_below(folder: Path) -> str:
+def series_below(folder: Path) -> str:
     """Which sub-folders hold grains, as the end of a sentence; empty if none does."""
     below = sorted(one for one in folder.iterdir() if one.is_dir() and one.name[0] != ".")
     found = [str(one) for one in below[:MOST_FOLDERS] if _holds_grains(one)]

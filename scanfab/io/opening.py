@@ -12,13 +12,19 @@ from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.io.families import (
     SETTINGS_FILE,
     Family,
-    families_beside,
-    own_contacts,
+    contacts_beside,
     sort_into_families,
 )
 from scanfab.io.formats.yade_cells import is_cell_file, refuse_as_numbers
 from scanfab.io.frame_csv import FrameFile
-from scanfab.io.grain_files import PathLike, choose_grains, expanded, files_of, named_once
+from scanfab.io.grain_files import (
+    PathLike,
+    choose_grains,
+    expanded,
+    files_of,
+    named_once,
+    series_below,
+)
 from scanfab.io.reader import ReadOptions
 from scanfab.io.series import ContactsFrom, Series
 from scanfab.packing.packing import Packing
@@ -136,6 +142,7 @@ def read_series(
     name = _as_text(os.fspath(given[0]) if len(paths) == len(given) == 1 else _common_folder(paths))
     own = [family for family in families if family.kind == "contacts"]
     _note_passed_over(families, [grains, *own])
+    _note_below(paths, grains)
 
     def series(files: Sequence[Family], contacts_from: ContactsFrom) -> Series:
         checked = tuple(family.check() for family in files)
@@ -198,14 +205,11 @@ def _contacts_beside(grains: Family, format: str | None) -> list[Family]:
 
     Told by a note; also where it is not clear whose contacts they are, and they are left alone.
     """
-    if grains.kind == "index":
-        return []
-    beside = families_beside(grains, format)
-    rivals = [family for family in beside if family.kind in ("grains", grains.kind)]
-    contacts = [family for family in beside if family.kind == "contacts" and family.clash is None]
-    own, doubtful = own_contacts(grains, rivals, contacts)
-    if own:
+    own, doubtful = contacts_beside(grains, format)
+    if len(own) == 1:
         _note(f"contacts are read from {_patterns(own)}, beside the grains")
+    elif own:
+        _note(f"files of contacts beside the grains, which are read with them: {_patterns(own)}")
     elif doubtful:
         _note(
             f"{_patterns(doubtful)}: contacts beside the grains, but it is not clear whose they "
@@ -234,6 +238,15 @@ def _note_passed_over(families: Sequence[Family], used: Sequence[Family]) -> Non
     for family in families:
         if family.problem is not None:
             warnings.warn(f"passed over: {family.problem}", ScanfabWarning, stacklevel=3)
+
+
+def _note_below(paths: Sequence[Path], grains: Family) -> None:
+    """A folder with a single dump beside folders of them: these may have been meant."""
+    if len(paths) != 1 or not paths[0].is_dir() or len(grains.files) > 1:
+        return
+    below = series_below(paths[0])
+    if below:
+        _note(f"{paths[0]}: {Path(grains.pattern).name} alone is read, but {below}")
 
 
 def _lack(family: Family) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -11,8 +11,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from scanfab.base.errors import PackingError, ReadError, ScanfabWarning
-from scanfab.io.families import Family
+from scanfab.base.errors import PackingError, ReadError, ScanfabNote, ScanfabWarning
+from scanfab.io.families import Family, nearest
 from scanfab.io.frame_csv import FrameFile
 from scanfab.io.reader import (
     Carries,
@@ -101,12 +101,15 @@ class Frame:
         with _named(self.snapshot.path):
             id = np.arange(len(grains.radius)) if grains.id is None else grains.id
             check_lengths(grains.position, grains.radius, id)
-        joined = [self._joined(reader, snapshot, options, grains) for reader, snapshot in files]
-        lists = sum(part.contacts is not None for part in joined)
+        joined = [
+            (family, self._joined(family, snapshot, options, grains)) for family, snapshot in files
+        ]
+        lists = [family for family, part in joined if part.contacts is not None]
         with_own = self.series.contacts_from == "auto" and grains.contacts is not None
         paths = " and ".join(str(snapshot.path) for _, snapshot in files)
-        if lists + with_own > 1:
-            return self._several_lists(paths)
+        if len(lists) + with_own > 1:
+            others = self._left_out(lists, paths)
+            return [part for family, part in joined if family not in others]
         if not lists and self.series.contacts_from == "path":
             warnings.warn(
                 f"{paths}: lists contacts with walls only: contacts between grains are found by "
@@ -114,13 +117,14 @@ class Frame:
                 ScanfabWarning,
                 stacklevel=4,
             )
-        return joined
+        return [part for _, part in joined]
 
     def _joined(
-        self, reader: Reader, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
+        self, family: Family, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
     ) -> JoinedContacts:
+        assert family.reader is not None
         try:
-            return reader.read_contacts(snapshot, options, grains)
+            return family.reader.read_contacts(snapshot, options, grains)
         except ReadError as error:
             if self.series.contacts_from != "beside":
                 raise
@@ -128,17 +132,27 @@ class Frame:
                 f"{error} (this file lies beside the grains; --contacts geometric leaves it alone)"
             ) from None
 
-    def _several_lists(self, paths: str) -> list[JoinedContacts]:
-        """An error; but of files that lie beside others none is taken."""
+    def _left_out(self, lists: list[Family], paths: str) -> Sequence[Family]:
+        """An error; but of files that lie beside grains all that are not the nearest by name."""
         if self.series.contacts_from != "beside":
             raise ReadError(f"two contact lists for one frame: {paths}: choose with --contacts")
+        taken = nearest(self.series.grains, lists)
+        if taken is not None:
+            others = [family for family in lists if family is not taken]
+            warnings.warn(
+                f"{taken.pattern}: of several contact lists beside the grains this one is taken, "
+                f"whose name is the nearest: --contacts names another",
+                ScanfabNote,
+                stacklevel=5,
+            )
+            return others
         warnings.warn(
             f"two contact lists lie beside {self.snapshot.path}: {paths}: none is taken; choose "
             f"with --contacts",
             ScanfabWarning,
             stacklevel=5,
         )
-        return []
+        return self.series.contacts
 
     @property
     def step(self) -> int | None:
@@ -173,15 +187,14 @@ class Frame:
             )
         return replace(options, cell=found)
 
-    def _contact_files(self) -> list[tuple[Reader, Snapshot]]:
+    def _contact_files(self) -> list[tuple[Family, Snapshot]]:
         """The snapshots of the contact files that belong to this frame."""
         series, found = self.series, []
         for family in series.contacts:
             named = series.contacts_from == "path" and len(series.grains.files) == 1
             contacts = series.contacts_of(self.snapshot, self.name_step, family, named)
             if contacts is not None:
-                assert family.reader is not None
-                found.append((family.reader, contacts))
+                found.append((family, contacts))
         if not found and series.contacts:
             patterns = ", ".join(family.pattern for family in series.contacts)
             message = f"{self.snapshot.path}: no contact file for step {self.step} among {patterns}"
@@ -282,6 +295,25 @@ class Series:
         except ReadError:
             return []
         return [path for path in dict.fromkeys(one.path for one in snapshots) if path.is_file()]
+
+    def files_through(self, number: int) -> Iterator[tuple[Path, bool]]:
+        """
+        The files of the frames up to one, and whether each is a file of grains.
+
+        All of these frames have been looked for: one file may hold many.
+        """
+        steps, met = [], 0
+        for step, path in self.grains.files.items():
+            steps.append(step)
+            yield path, True
+            met += self._met.get(path, 1)
+            if met > number:
+                break
+        last = max((step for step in steps if step is not None), default=None)
+        for family in self.contacts:
+            for step, path in family.files.items():
+                if step is None or last is None or step <= last:
+                    yield path, False
 
     def files(self) -> Iterator[Path]:
         """Every file that the frames come from."""

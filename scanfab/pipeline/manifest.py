@@ -14,7 +14,7 @@ from scanfab.io.series import Series
 from scanfab.pipeline.settings import STRAIN_MODES, Settings
 from scanfab.scan.directions import DirectionRule
 
-__all__ = ["asked_for", "manifest", "strain_file", "with_frames"]
+__all__ = ["Inputs", "asked_for", "manifest", "strain_file", "with_frames"]
 
 PACKAGES = (
     "scanfab", "numpy", "numba", "scipy", "meshio", "pyvista", "click", "rich", "h5py",
@@ -50,11 +50,28 @@ def with_frames(asked: dict[str, Any], frames: slice) -> dict[str, Any]:
     return {**asked, "frames": _plain(frames)}
 
 
+class Inputs:
+    """Size and hash of files, each read once as long as it stays as it is."""
+
+    def __init__(self) -> None:
+        self._known: dict[Path, tuple[tuple[int, int], dict[str, Any]]] = {}
+
+    def entry(self, path: Path) -> dict[str, Any]:
+        """A file as a manifest lists it."""
+        found = path.stat()
+        stamp = (found.st_size, found.st_mtime_ns)
+        if path not in self._known or self._known[path][0] != stamp:
+            entry = {"path": str(path), "size": found.st_size, "sha256": _hash(path)}
+            self._known[path] = stamp, entry
+        return self._known[path][1]
+
+
 def manifest(
     asked: dict[str, Any],
     series: Iterable[Series],
     warnings: Sequence[str] = (),
     notes: Sequence[str] = (),
+    inputs: Inputs | None = None,
 ) -> dict[str, Any]:
     """
     The manifest of a finished result.
@@ -67,7 +84,10 @@ def manifest(
         What was read.
     warnings, notes : sequence of str, optional
         What the user was told.
+    inputs : Inputs, optional
+        Those that have been looked at already.
     """
+    inputs = inputs or Inputs()
     files = {path for one in series for path in one.files()}
     strains = strain_file(asked)
     if strains is not None:
@@ -79,10 +99,7 @@ def manifest(
             "python": platform.python_version(),
             **{name: version(name) for name in PACKAGES},
         },
-        "inputs": [
-            {"path": str(path), "size": path.stat().st_size, "sha256": _hash(path)}
-            for path in sorted(files)
-        ],
+        "inputs": [inputs.entry(path) for path in sorted(files)],
         "warnings": list(warnings),
         "notes": list(notes),
     }

@@ -1,9 +1,9 @@
-"""A complete table that a run goes on with: whether its rows are what a run would give now."""
+"""Rows that a run goes on with: whether they are what it would give now."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from itertools import groupby, pairwise
 from pathlib import Path
@@ -12,14 +12,14 @@ from typing import Any
 from scanfab.base.errors import SettingsError
 from scanfab.io.series import Series
 from scanfab.pipeline.frames import chosen_frames
-from scanfab.pipeline.manifest import strain_file
+from scanfab.pipeline.manifest import Inputs, strain_file
 from scanfab.pipeline.repeat import read_manifest
 from scanfab.pipeline.settings import Settings
 from scanfab.table.reading import read_rows
 from scanfab.table.result_file import differing_settings
 from scanfab.table.table import Row
 
-__all__ = ["FinishedTable", "finished_table"]
+__all__ = ["FinishedTable", "InputsOfRows", "check_part", "finished_table"]
 
 # what may differ: inputs are compared by what they hold, and more frames are the point of it
 FREE = ("frames", "sources")
@@ -126,6 +126,101 @@ def finished_table(
     rows = read_rows(path)
     if rows and not {"source", "frame"} <= set(rows[0]):
         raise _refused(path, "it lacks the columns source and frame, which tell its frames")
+    found = _by_frame(path, rows, series, settings)
+    _check_inputs(path, manifest, series, found)
+    frames = slice(*(manifest["settings"].get("frames") or (None,)))
+    told = [str(one) for one in manifest.get("warnings", [])]
+    return FinishedTable(path, found, frames, told, frozenset(rows[0] if rows else ()))
+
+
+def check_part(
+    part: Path,
+    manifest: Mapping[str, Any],
+    rows: Sequence[Mapping[str, Any]],
+    series: Sequence[Series],
+    settings: Settings,
+) -> None:
+    """
+    Refuse the part of an interrupted run whose inputs are not what they were.
+
+    Parameters
+    ----------
+    part : Path
+        For messages.
+    manifest : mapping
+        Settings and inputs of its rows.
+    rows : sequence of mapping
+        Of frames that have all of theirs.
+    series : sequence of Series
+        What is read now.
+    settings : Settings
+        Of the computation.
+
+    Raises
+    ------
+    SettingsError
+        If other inputs made them, or if their frames are not among those chosen now.
+    """
+    if not rows:
+        return
+    found = _by_frame(part, rows, series, settings)
+    names = [one.name for one in series]
+    over = names[: names.index(rows[-1]["source"])]
+    _check_inputs(part, manifest, series, found, over)
+    for one in series:
+        chosen = chosen_frames(one, settings.frames)  # may have no end
+        other = [frame for frame in found[one.name] if frame not in chosen]
+        if other:
+            raise _refused(part, f"it holds frame {min(other)}, which is not chosen now")
+
+
+class InputsOfRows:
+    """What the files of rows hold, each told once, before the first row that is of it."""
+
+    def __init__(self, series: Sequence[Series], settings: Settings, inputs: Inputs) -> None:
+        self._series = {one.name: one for one in series}
+        self._inputs = inputs
+        self._before: tuple[str, int] | None = None
+        strains = strain_file({"strain": settings.strain})
+        self._tables = [] if strains is None else [strains]
+        self._told: set[Path] = set()
+
+    def new(self, row: Row) -> list[dict[str, Any]]:
+        """What has not been told yet of the frames up to that of a row."""
+        if self._before == (row.source, row.frame):
+            return []
+        self._before = row.source, row.frame
+        found = [file for file in self._files(row) if file not in self._told]
+        self._told.update(found)
+        return [self._inputs.entry(file) for file in dict.fromkeys(found)]
+
+    def _files(self, row: Row) -> Iterator[Path]:
+        yield from self._tables
+        for name, one in self._series.items():
+            if one.cells is not None:
+                yield one.cells.path
+            if name == row.source:
+                yield from self._through(one, row.frame)
+                return
+            # a series that is over; if nothing of it has been told, an earlier run has done that
+            yield from one.files()
+
+    def _through(self, series: Series, frame: int) -> Iterator[Path]:
+        for file, is_grains in series.files_through(frame):
+            if file in self._told:
+                continue
+            yield file
+            if is_grains:
+                yield from series.beside(file)
+
+
+def _by_frame(
+    path: Path,
+    rows: Sequence[Mapping[str, Any]],
+    series: Sequence[Series],
+    settings: Settings,
+) -> dict[str, dict[int, list[Row]]]:
+    """Rows by source and frame, of frames that have all of theirs."""
     found: dict[str, dict[int, list[Row]]] = {one.name: {} for one in series}
     for (source, frame), group in groupby(rows, key=lambda row: (row["source"], row["frame"])):
         if source not in found:
@@ -133,10 +228,7 @@ def finished_table(
         own = [_row(row) for row in group]
         if len(own) == settings.rows_per_frame:
             found[source][frame] = own
-    _check_inputs(path, manifest, series, found)
-    frames = slice(*(manifest["settings"].get("frames") or (None,)))
-    told = [str(one) for one in manifest.get("warnings", [])]
-    return FinishedTable(path, found, frames, told, frozenset(rows[0] if rows else ()))
+    return found
 
 
 def _row(values: Mapping[str, Any]) -> Row:
@@ -157,8 +249,13 @@ def _check_inputs(
     manifest: Mapping[str, Any],
     series: Sequence[Series],
     rows: Mapping[str, Mapping[int, list[Row]]],
+    over: Collection[str] = (),
 ) -> None:
-    """Refuse a table whose inputs are not what they were, but for frames behind the last one."""
+    """
+    Refuse rows whose inputs are not what they were, but for frames behind the last one.
+
+    Behind the frames of a series that is ``over`` stand those of the next: nothing may have come.
+    """
     before = {str(one.get("path")): one for one in manifest.get("inputs", [])}
     strains = strain_file(manifest["settings"])
     numbers = [strains, *(one.cells.path for one in series if one.cells is not None)]
@@ -167,7 +264,7 @@ def _check_inputs(
     for gone in before.keys() - {str(file) for file in read}:
         raise _refused(path, f"{gone} is not among the files that are read now")
     for one in series:
-        _check_frames(path, before, one, rows[one.name])
+        _check_frames(path, before, one, rows[one.name], one.name in over)
     every = [row for frames in rows.values() for some in frames.values() for row in some]
     for file in tables:
         # a longer one may name the strains of frames that had none
@@ -177,7 +274,11 @@ def _check_inputs(
 
 
 def _check_frames(
-    path: Path, before: Mapping[str, Any], series: Series, rows: Mapping[int, list[Row]]
+    path: Path,
+    before: Mapping[str, Any],
+    series: Series,
+    rows: Mapping[int, list[Row]],
+    is_over: bool,
 ) -> None:
     """Refuse what has changed of the files of a series, and what lies beside them."""
     grains = series.grains.files
@@ -187,11 +288,13 @@ def _check_frames(
         known, is_last = before.get(str(file)), step is None or step == last
         if known is None and steps and (step is None or last is None or step <= last):
             raise _refused(path, f"{file} is new, and not behind the last frame")
+        if known is None and is_over:
+            raise _refused(path, f"{file} is new, and rows of the next source are there already")
         if known is None:
             continue
         beside = series.beside(file) if grains.get(step) == file else []
         changed = [one for one in beside if not _is_same(one, before.get(str(one)))]
-        if not _is_same(file, known, may_grow=is_last):
+        if not _is_same(file, known, may_grow=is_last and not is_over):
             changed.append(file)
         if changed and not _was_skipped(series, step, rows):
             what = "has changed since" if str(changed[0]) in before else "is new, beside the grains"

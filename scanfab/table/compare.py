@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -113,6 +114,29 @@ def _tell_of_strains(rows: Sequence[Mapping[str, Any]], strain_max: float | None
             ScanfabWarning if strain_max > 1 else ScanfabNote,
             stacklevel=3,
         )
+    else:
+        _tell_of_few_frames(rows, strain_max)
+
+
+def _tell_of_few_frames(rows: Sequence[Mapping[str, Any]], strain_max: float) -> None:
+    """Say where a largest strain leaves too few frames for a line, and which one would not."""
+    column = strain_column(rows) or "strain"
+    for source, own in groupby(sorted(rows, key=_source), key=_source):
+        of_frames = {row["frame"]: number_of(row, column) for row in own}
+        strains = sorted(strain for strain in of_frames.values() if strain is not None)
+        beyond = [strain for strain in strains if strain > strain_max]
+        left = len(strains) - len(beyond)
+        if left < FEWEST_FRAMES and beyond:
+            warnings.warn(
+                f"strain-max: {strain_max:g} leaves {left} of {len(strains)} frames of {source}, "
+                f"and a line needs {FEWEST_FRAMES}: the nearest strain above is {beyond[0]:.10g}",
+                ScanfabWarning,
+                stacklevel=4,
+            )
+
+
+def _source(row: Mapping[str, Any]) -> str:
+    return str(row["source"])
 
 
 def _with_strain(

@@ -3,9 +3,10 @@ A result file that is complete or untouched, and that an interrupted computation
 
 Rows go to FILE.part, which becomes FILE at the end. FILE.part is CSV, TSV or JSON lines as FILE is;
 for other formats, and where not all columns or digits are wanted, it is JSON lines, and converted
-at the end. What was asked for stands beside it in FILE.manifest.json.part, so that nobody goes on
-with other settings. No finished row is ever lost: a part that a new run does not go on with is kept
-under another name.
+at the end. What was asked for stands beside it in FILE.manifest.json.part, and what the files of
+the frames held, so that nobody goes on with other settings or other files: JSON lines, as entries
+come with the frames. No finished row is ever lost: a part that a new run does not go on with is
+kept under another name, and one that another run writes to is left alone.
 """
 
 from __future__ import annotations
@@ -13,15 +14,18 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import sys
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
 from scanfab.base.ending import undone_at_end
-from scanfab.base.errors import ScanfabNote, SettingsError
+from scanfab.base.errors import ReadError, ScanfabNote, SettingsError
 from scanfab.base.files import check_folder, named_errors, whole_file
+from scanfab.base.lock import locked
+from scanfab.base.streams import kind_of
 from scanfab.table.writing import ALL, Excerpt, RowWriter, check_suffix, row_writer
 
 __all__ = ["ResultFile", "differing_settings"]
@@ -57,9 +61,39 @@ class ResultFile:
         self.suffix = path.suffix.lower()
         self.part = path.with_name(path.name + ".part")
         self.manifest = path.with_name(path.name + ".manifest.json")
-        self._asked = path.with_name(self.manifest.name + ".part")
+        self._record = path.with_name(self.manifest.name + ".part")
+        self._lock: IO[bytes] | None = None
+        for one in (self.part, self._record):
+            if (found := kind_of(one)) is not None:
+                raise SettingsError(
+                    f"{one}: is {found}, expected a file or nothing, as rows are kept there until "
+                    f"{path.name} is complete: remove it, or name another -o FILE"
+                )
         as_it_is = self.suffix in LINE_FORMATS and excerpt.is_all
         self._part_suffix = self.suffix if as_it_is else ".jsonl"
+
+    @property
+    def has_part(self) -> bool:
+        """Whether an earlier run has left something in FILE.part."""
+        return self.part.exists() and self.part.stat().st_size > 0
+
+    @property
+    def has_table(self) -> bool:
+        """Whether an earlier run has made FILE, with its manifest."""
+        return self.path.is_file() and self.manifest.is_file()
+
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Keep other runs away from FILE.part; a ScanfabError if one writes to it."""
+        if self._lock is not None:
+            yield
+            return
+        with locked(self.part) as self._lock, undone_at_end(self._remove_empty_part):
+            try:
+                yield
+            finally:
+                self._remove_empty_part()
+                self._lock = None
 
     def finished_rows(self, asked: dict[str, Any], rows_per_frame: int) -> list[dict[str, Any]]:
         """
@@ -76,10 +110,12 @@ class ResultFile:
         ------
         SettingsError
             If FILE.part was made with other settings.
+        ReadError
+            If what stands beside it is damaged.
         """
-        if not self.part.exists():
+        if not self.has_part:
             return []
-        before = json.loads(self._asked.read_text("utf-8")) if self._asked.exists() else {}
+        before, _ = self._recorded()
         differing = differing_settings(before, asked)
         if differing:
             raise SettingsError(
@@ -93,29 +129,40 @@ class ResultFile:
             stream.truncate(sum(map(len, kept)))
         return self._rows()
 
+    def recorded_inputs(self) -> list[dict[str, Any]]:
+        """What the files of the frames in FILE.part held."""
+        return self._recorded()[1]
+
     @contextmanager
     def writer(self, asked: dict[str, Any], resume: bool = False) -> Iterator[RowWriter]:
         """Write rows to FILE.part, behind those that are there if resumed; then make FILE of it."""
-        going_on = resume and self.part.exists() and self.part.stat().st_size > 0
-        if not going_on:
-            # before its settings are overwritten: rows of other settings must not look like these
-            self._put_part_aside()
-        self._write_asked(asked)
-        try:
-            with undone_at_end(self._remove_empty_part), self._open_part(going_on) as stream:
+        with self.alone():
+            going_on = resume and self.has_part
+            inputs = self.recorded_inputs() if going_on else []
+            if not going_on:
+                # before its settings are overwritten: rows of others must not look like these
+                self._put_part_aside()
+            self._begin_record(asked, inputs)
+            with self._open_part() as stream:
                 yield row_writer(
                     self._part_suffix, stream, self.kind, not going_on, self._excerpt_of_part
                 )
-        except BaseException:
-            self._remove_empty_part()
-            raise
-        # what stands there is of the table that was FILE before
-        self.manifest.unlink(missing_ok=True)
-        if self._part_suffix == self.suffix:
-            os.replace(self.part, self.path)
-        else:
-            self._convert()
-        self._asked.unlink(missing_ok=True)
+            # what stands there is of the table that was FILE before
+            self.manifest.unlink(missing_ok=True)
+            if self._part_suffix == self.suffix:
+                self._let_go()
+                os.replace(self.part, self.path)
+            else:
+                self._convert()
+            self._record.unlink(missing_ok=True)
+
+    def record(self, inputs: Sequence[Mapping[str, Any]]) -> None:
+        """Keep what files held, before rows come that are of them."""
+        if not inputs:
+            return
+        lines = "".join(json.dumps(one) + "\n" for one in inputs)
+        with named_errors(self._record), open(self._record, "a", encoding="utf-8") as stream:
+            stream.write(lines)
 
     @property
     def _excerpt_of_part(self) -> Excerpt:
@@ -128,46 +175,78 @@ class ResultFile:
         return header, [line for line in lines if line.endswith(b"\n")]
 
     def _put_part_aside(self) -> None:
-        """Keep FILE.part under another name if it holds rows, so that ``--resume`` can find it."""
-        if not self.part.exists():
-            return
+        """Keep what FILE.part holds under another name, so that ``--resume`` can find it."""
         header, lines = self._lines_of_part()
-        if len(lines) <= header:
-            self.part.unlink()
-            return
+        if len(lines) > header:
+            self._copy_aside(len(lines) - header)
+        # not moved: it is this very file that other runs find locked
+        os.truncate(self.part, 0)
+
+    def _copy_aside(self, rows: int) -> None:
         other, number = self, 0
         while other.path.exists() or other.part.exists():
             number += 1
             name = f"{self.path.stem}.{number}{self.path.suffix}"
             other = ResultFile(self.path.with_name(name), self.kind, self.excerpt)
         hint = ""
-        if self._asked.exists():
-            shutil.copyfile(self._asked, other._asked)
+        if self._record.exists():
+            shutil.copyfile(self._record, other._record)
             hint = f"; what made it goes on with it by -o {other.path} --resume"
-        os.rename(self.part, other.part)
+        with whole_file(other.part) as copy:
+            shutil.copyfile(self.part, copy)
         warnings.warn(
-            f"{self.part}: {len(lines) - header} finished rows of an earlier run are kept as "
-            f"{other.part}{hint}",
+            f"{self.part}: {rows} finished rows of an earlier run are kept as {other.part}{hint}",
             ScanfabNote,
-            stacklevel=4,
+            stacklevel=5,
         )
 
     @contextmanager
-    def _open_part(self, going_on: bool) -> Iterator[IO[str]]:
-        mode = "a" if going_on else "w"
-        with named_errors(self.part), open(self.part, mode, newline="", encoding="utf-8") as stream:
+    def _open_part(self) -> Iterator[IO[str]]:
+        with named_errors(self.part), open(self.part, "a", newline="", encoding="utf-8") as stream:
             yield stream
+
+    def _let_go(self) -> None:
+        """Windows moves and removes no file that is open."""
+        if sys.platform == "win32" and self._lock is not None:
+            self._lock.close()
 
     def _remove_empty_part(self) -> None:
         """Without a row there is nothing to go on with."""
-        if self.part.exists() and not self.part.stat().st_size:
+        if self._holds_part() and not self.part.stat().st_size:
+            self._let_go()
             self.part.unlink()
-            self._asked.unlink()
+            self._record.unlink(missing_ok=True)
 
-    def _write_asked(self, asked: dict[str, Any]) -> None:
+    def _holds_part(self) -> bool:
+        """Whether FILE.part is still ours: once it has become FILE, the next run may have one."""
+        if self._lock is None or self._lock.closed or not self.part.exists():
+            return False
+        return os.path.samestat(os.fstat(self._lock.fileno()), self.part.stat())
+
+    def _begin_record(self, asked: dict[str, Any], inputs: list[dict[str, Any]]) -> None:
         """Whole or not at all, as the process may be killed here too."""
-        with whole_file(self._asked) as part:
-            part.write_text(json.dumps(asked, indent=1), "utf-8")
+        with whole_file(self._record) as part:
+            lines = [json.dumps(one) + "\n" for one in ({"settings": asked}, *inputs)]
+            part.write_text("".join(lines), "utf-8")
+
+    def _recorded(self) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+        """Settings and inputs of the rows in FILE.part."""
+        if not self._record.exists():
+            return {}, []
+        try:
+            lines = self._record.read_text("utf-8").splitlines(keepends=True)
+            # an entry that was not written to its end is of a frame that has no rows
+            first, *inputs = [json.loads(one) for one in lines if one.endswith("\n")]
+            settings = first["settings"]
+            if not all(isinstance(one, dict) for one in (settings, *inputs)):
+                raise TypeError
+        except (ValueError, TypeError, KeyError, IndexError, RecursionError):
+            raise ReadError(
+                f"{self._record}: expected what an interrupted run has kept there of its settings "
+                f"and inputs, found something else: leave out --resume to start afresh; then "
+                f"{self.part.name} is kept under another name"
+            ) from None
+        return settings, inputs
 
     def _rows(self) -> list[dict[str, Any]]:
         from scanfab.table.reading import read_rows
@@ -181,6 +260,7 @@ class ResultFile:
             for row in self._rows():
                 writer.write(self.kind(**row))
             writer.close()
+        self._let_go()
         self.part.unlink()
 
 

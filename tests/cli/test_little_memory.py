@@ -19,10 +19,19 @@ resource = pytest.importorskip("resource", reason="limits of a process are POSIX
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the size is read from /proc")
-@pytest.mark.parametrize("words", [["compute"], ["inspect"], ["calibrate"]])
-def test_a_limit_that_nothing_can_be_done_with_is_told_at_once(tmp_path, words):
+@pytest.mark.parametrize(
+    ("words", "megabytes"),
+    [
+        (["compute"], 400),
+        (["compute", "--workers", "4"], 1200),
+        (["inspect"], 400),
+        (["calibrate"], 400),
+        (["view", "--screenshot", "picture.png"], 1500),
+    ],
+)
+def test_a_limit_that_nothing_can_be_done_with_is_told_at_once(tmp_path, words, megabytes):
     dump = write(tmp_path / "dump", dump_text(cubic_rows()))
-    most = 400 << 20
+    most = megabytes << 20
     answer = subprocess.run(
         [*PROGRAM, *words, str(dump)],
         capture_output=True,

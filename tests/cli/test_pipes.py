@@ -113,6 +113,13 @@ def test_commands_and_options_are_completed():
         ("compare --figure", "ev", {"plain,evolution"}),
         ("calibrate --variants", "c", {"plain,cd", "plain,c"}),
         ("compute --directions", "le", {"plain,lebedev:"}),
+        ("compute --directions", "equal-angle:", {"plain,equal-angle:"}),
+        (
+            "compute --fields",
+            "frame,alpha_c_axial_s",
+            {"plain,frame,alpha_c_axial_se", "plain,frame,alpha_c_axial_sample_se"},
+        ),
+        ("compare --summary --fields", "slope_o", {"plain,slope_origin"}),
         ("view --axis", "", {"plain,x", "plain,y", "plain,z"}),
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import signal
 import sys
@@ -12,7 +13,7 @@ from random import Random
 import pytest
 
 from scanfab.cli.main import run
-from scanfab.table.writing import CsvWriter, JsonLinesWriter
+from scanfab.table.writing import CsvWriter, JsonLinesWriter, JsonWriter
 from tests.helpers.interruptions import Interrupter, interrupted_at_row, write_series
 
 # about a second of scanning
@@ -246,3 +247,162 @@ def test_an_error_says_how_to_go_on_too(short_series, tmp_path, capsys):
     broken.write_text(good)
     assert run([*words, str(output), "--resume"]) == run([*words, str(whole)]) == 0
     assert output.read_bytes() == whole.read_bytes()
+
+
+def test_a_second_run_into_the_same_file_is_refused(compute, tmp_path, capsys, monkeypatch):
+    """However it begins; and the first goes on undisturbed."""
+    output, whole, codes = tmp_path / "table.csv", tmp_path / "whole.csv", []
+    write_row = CsvWriter.write
+
+    def second_run_meanwhile(self, row):
+        write_row(self, row)
+        if not codes:
+            codes.append(None)
+            codes[:] = [compute(output, *more) for more in (["--resume"], ["--rv", "0.4"], [])]
+
+    assert compute(whole) == 0
+    monkeypatch.setattr(CsvWriter, "write", second_run_meanwhile)
+    assert compute(output) == 0
+    assert codes == [1, 1, 1]
+    told = capsys.readouterr().err
+    assert f"error: {output}.part: another run is writing to it: wait until that one has" in told
+    assert output.read_bytes() == whole.read_bytes()
+    assert {path.name for path in tmp_path.glob("table*")} == {
+        "table.csv",
+        "table.csv.manifest.json",
+    }
+
+
+def test_where_there_are_no_locks_runs_go_on(compute, tmp_path, monkeypatch):
+    fcntl = pytest.importorskip("fcntl")
+
+    def none(*_):
+        raise OSError(95, "Operation not supported")
+
+    monkeypatch.setattr(fcntl, "flock", none)
+    assert compute(tmp_path / "table.csv") == 0
+
+
+@pytest.mark.parametrize("text", ["{", "[1]", "", '{"settings": 3}', '{"settings": {}}\n7\n', "ü"])
+def test_a_damaged_record_is_refused_and_the_rows_are_kept(
+    compute, stopped, tmp_path, capsys, text
+):
+    output = stopped()
+    part = Path(f"{output}.part").read_bytes()
+    Path(f"{output}.manifest.json.part").write_bytes(text.encode("latin-1") + b"\n")
+    assert compute(output, "--resume") == 1
+    told = capsys.readouterr().err
+    assert f"error: {output}.manifest.json.part: expected what an interrupted run" in told
+    assert Path(f"{output}.part").read_bytes() == part
+    assert compute(output) == 0
+    assert (tmp_path / "table.1.csv.part").read_bytes() == part
+
+
+@pytest.fixture
+def dumps(short_series, tmp_path):
+    """A copy of the series, whose files may change."""
+    return shutil.copytree(short_series, tmp_path / "dumps")
+
+
+@pytest.fixture
+def stopped_run(dumps, tmp_path, monkeypatch):
+    """Stops a run after two frames of four; the words of its command."""
+
+    def stop(*words: str, sources: tuple[Path, ...] = ()) -> list[str]:
+        output = str(tmp_path / "table.csv")
+        command = ["compute", *map(str, sources or (dumps,)), *FAST, *words, "-o", output]
+        with interrupted_at_row(monkeypatch, 6):
+            assert run(command) == 130
+        _wait_for_frames_under_way()
+        return [*command, "--resume"]
+
+    return stop
+
+
+def is_refused(command: list[str], capsys, said: str) -> bool:
+    """Whether going on is wrong usage, for this reason."""
+    code = run(command)
+    told = capsys.readouterr().err
+    return code == 2 and "table.csv.part: --resume cannot go on with it: " in told and said in told
+
+
+def test_a_part_of_other_dumps_is_refused(stopped_run, dumps, capsys):
+    command = stopped_run()
+    for path in dumps.iterdir():
+        path.write_text(path.read_text().replace(" 0.5", " 0.49", 1))
+    assert is_refused(command, capsys, "dump_0.txt has changed since")
+
+
+def test_a_part_with_a_new_frame_between_is_refused(stopped_run, dumps, capsys):
+    command = stopped_run()
+    shutil.copy(dumps / "dump_100.txt", dumps / "dump_50.txt")
+    assert is_refused(command, capsys, "dump_50.txt is new, and not behind the last frame")
+
+
+def test_dumps_behind_the_rows_of_a_part_may_change(stopped_run, dumps, tmp_path):
+    command = stopped_run()
+    last = dumps / "dump_300.txt"
+    last.write_text(last.read_text().replace(" 0.5", " 0.49", 1))
+    shutil.copy(last, dumps / "dump_400.txt")
+    assert run(command) == 0
+    whole = tmp_path / "whole.csv"
+    assert run([*command[:-2], str(whole)]) == 0
+    assert (tmp_path / "table.csv").read_bytes() == whole.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("option", "header", "row"),
+    [("--strain", "step,strain", "0.1"), ("--cell", "step,lx,ly,lz", "4,4,4")],
+)
+def test_a_part_of_other_numbers_is_refused(stopped_run, tmp_path, capsys, option, header, row):
+    numbers = tmp_path / "numbers.csv"
+    numbers.write_text("\n".join([header, *(f"{step},{row}" for step in (0, 100, 200, 300))]))
+    command = stopped_run(option, str(numbers))
+    numbers.write_text(numbers.read_text().replace(f"100,{row}", f"100,{row}1"))
+    assert is_refused(command, capsys, f"{numbers} has changed since")
+
+
+def test_frames_that_a_part_has_and_nobody_chooses_now_are_refused(stopped_run, dumps, capsys):
+    command = stopped_run("--frames=-3:")
+    for step in (400, 500):
+        shutil.copy(dumps / "dump_300.txt", dumps / f"dump_{step}.txt")
+    assert is_refused(command, capsys, "it holds frame 1, which is not chosen now")
+
+
+def test_frames_behind_a_source_whose_rows_are_over_are_refused(
+    stopped_run, dumps, tmp_path, capsys
+):
+    first = tmp_path / "first"
+    first.mkdir()
+    shutil.copy(dumps / "dump_0.txt", first)
+    command = stopped_run(sources=(first, dumps))
+    shutil.copy(dumps / "dump_100.txt", first)
+    assert is_refused(command, capsys, "dump_100.txt is new, and rows of the next source")
+
+
+def test_a_part_that_is_a_pipe_is_refused_at_once(compute, tmp_path, capsys):
+    output = tmp_path / "table.csv"
+    os.mkfifo(f"{output}.part")
+    assert compute(output) == 2
+    assert f"{output}.part: is a pipe, expected a file or nothing" in capsys.readouterr().err
+
+
+def test_a_table_that_is_replaced_is_told_of(compute, tmp_path, capsys):
+    output = tmp_path / "table.csv"
+    note = f"{output}: the table that is there will be replaced at the end of this run; --resume"
+    assert compute(output) == 0
+    assert note not in capsys.readouterr().err
+    assert compute(output, "--resume") == 0
+    assert note not in capsys.readouterr().err
+    assert compute(output) == 0
+    assert note in capsys.readouterr().err
+
+
+def test_a_failure_behind_the_last_frame_says_so(compute, tmp_path, capsys, monkeypatch):
+    def full(*_):
+        raise OSError(28, os.strerror(28))
+
+    monkeypatch.setattr(JsonWriter, "close", full)
+    assert compute(tmp_path / "table.json") == 1
+    said = "stopped after the last frame, before the table was complete; the same command with"
+    assert said in capsys.readouterr().err

@@ -72,8 +72,10 @@ def test_a_resumed_run_draws_all_frames_and_keeps_their_files(series, tmp_path):
     lines = (whole / "t.csv").read_text().splitlines(keepends=True)
     (part / "t.csv").unlink()
     (part / "t.csv.part").write_text("".join(lines[:5]))
-    settings = json.loads((whole / "t.csv.manifest.json").read_text())["settings"]
-    (part / "t.csv.manifest.json.part").write_text(json.dumps(settings))
+    manifest = json.loads((whole / "t.csv.manifest.json").read_text())
+    record = [{"settings": manifest["settings"]}, *manifest["inputs"]]
+    lines = "".join(json.dumps(one) + "\n" for one in record)
+    (part / "t.csv.manifest.json.part").write_text(lines)
     assert run([*words(part), "--resume"]) == 0
     assert (part / "t.csv").read_bytes() == (whole / "t.csv").read_bytes()
     assert (part / "t.svg").read_bytes() == (whole / "t.svg").read_bytes()

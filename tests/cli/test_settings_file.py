@@ -143,8 +143,8 @@ def test_the_manifest_lists_what_came_from_the_file(series, tmp_path):
         ("[compute\n", "Expected"),
         ("compute = 3\n", "expected a section [compute]"),
         ('[compute]\nseed = "many"\n', "seed: "),
-        ("[compute]\nrv-center = [1, 2]\n", "rv_center: "),
-        ("[compute]\nrv-center = [[1, 2], 2, 3]\n", "rv_center: expected numbers or text in quo"),
+        ("[compute]\nrv-center = [1, 2]\n", "rv-center: "),
+        ("[compute]\nrv-center = [[1, 2], 2, 3]\n", "rv-center: expected numbers or text in quo"),
         ("[compute]\nrv-center = [{x = 1}, 2, 3]\n", "found a table"),
         ("[compute]\nrv-center = [true, 2, 3]\n", "one or a list of them, found true"),
         ("[compute]\nrv = false\n", "rv: expected numbers or text in quotes"),
@@ -161,7 +161,9 @@ def test_a_broken_file_is_named(series, capsys, text, message):
 def test_a_value_that_cannot_be_used_is_wrong_usage(series, capsys):
     write(series / "scanfab.toml", '[compute]\nvariants = "x"\n')
     assert run(["compute", str(series)]) == 2
-    assert "variants: expected letters out of abcd" in capsys.readouterr().err
+    assert (
+        f"{series}/scanfab.toml: variants: expected letters out of abcd" in capsys.readouterr().err
+    )
 
 
 def test_different_files_of_several_sources_are_refused(tmp_path, capsys):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import warnings
 
@@ -103,7 +104,27 @@ def test_two_lists_beside_are_not_taken(folder):
         assert contacts_of(folder / "dump_9.txt") == [None]
 
 
-@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabNote")
+def test_of_two_lists_beside_the_nearest_by_name_is_taken(folder):
+    write(folder / "dump_pairs_9.txt", pairs_text(PAIRS[:1], step=9))
+    with pytest.warns(ScanfabNote) as told:
+        assert contacts_of(folder / "dump_9.txt") == [1]
+    texts = [str(one.message) for one in told]
+    assert not any("contacts are read from" in text for text in texts)
+    assert any("dump_pairs_9.txt: of several contact lists" in text for text in texts)
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.ScanfabNote")
+def test_the_advice_of_several_series_names_the_contacts_that_are_read(tmp_path):
+    """Points without a radius are no rivals of grains, nor are the frames of other steps."""
+    series(tmp_path, "ex_dump", "ex_contacts", 9)
+    write(tmp_path / "ex_points_9.txt", dump_text(step=9, names=NO_RADIUS))
+    write(tmp_path / "other_7.txt", dump_text(step=7))
+    with pytest.raises(ReadError, match=r"ex_dump_9.txt; contacts: .*ex_contacts_9.txt"):
+        scanfab.read_series(tmp_path)
+    assert contacts_of(tmp_path / "ex_dump_9.txt") == [2]
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.ScanfabNote")
 def test_the_advice_of_several_series_keeps_the_contacts(folder):
     series(folder, "p5_dump", "p5_contacts", 9, PAIRS[:1])
     with pytest.raises(ReadError, match="several series of grains") as told:
@@ -160,7 +181,7 @@ def test_globs_in_quotes_are_expanded(folder, capsys):
 
 def test_a_glob_that_meets_nothing_is_wrong_usage(folder, capsys):
     assert run(["inspect", f"{folder}/grains_*.txt"]) == 2
-    assert "does not exist" in capsys.readouterr().err
+    assert "grains_*.txt' matches nothing: there is no file" in capsys.readouterr().err
 
 
 def test_contacts_beside_that_cannot_be_read_say_how_to_leave_them_alone(folder):
@@ -192,3 +213,15 @@ def test_the_command_line_takes_a_file_of_cells(tmp_path, capsys):
     assert "0.0035473249830325487" in capsys.readouterr().out
     assert run([*words, "--cell", str(tmp_path / "nowhere.csv")]) == 2
     assert "CSV file with those of each frame" in capsys.readouterr().err
+
+
+def test_a_pipe_in_a_folder_is_told_of(folder):
+    os.mkfifo(folder / "dump_200.txt")
+    with pytest.warns(ScanfabNote, match=r"passed over: .*dump_200.txt is a pipe"):
+        assert len(scanfab.read_series(folder).grains.files) == 2
+
+
+def test_a_lone_dump_above_folders_of_dumps_is_told_of(folder):
+    shutil.copy(next(folder.glob("dump_*")), folder.parent / "dump_7.txt")
+    with pytest.warns(ScanfabNote, match=r"dump_7.txt alone is read, but .*: .*dumps"):
+        scanfab.read_series(folder.parent)

@@ -138,9 +138,14 @@ def test_named_contacts_are_required_for_the_frame_that_is_read_only():
     assert len(packing.contacts) == 368
 
 
-@pytest.mark.parametrize("contacts", ["nowhere.txt", "nowhere_*.txt"])
-def test_named_contacts_must_exist(folder, contacts):
-    with pytest.raises(ReadError, match="there is no such file, folder or glob"):
+MISSING = "there is no such file, folder or glob"
+
+
+@pytest.mark.parametrize(
+    ("contacts", "said"), [("nowhere.txt", MISSING), ("nowhere_*.txt", "matches nothing")]
+)
+def test_named_contacts_must_exist(folder, contacts, said):
+    with pytest.raises(ReadError, match=said):
         scanfab.read_series(folder, contacts=folder / contacts)
 
 
@@ -203,9 +208,11 @@ def test_points_without_a_radius_are_passed_over_beside_grains(folder):
         assert len(frames_of(folder)) == 3
 
 
-@pytest.mark.parametrize("name", ["nothing", "dump_*.txt"])
-def test_a_source_must_exist(tmp_path, name):
-    with pytest.raises(ReadError, match="there is no such file, folder or glob"):
+@pytest.mark.parametrize(
+    ("name", "said"), [("nothing", MISSING), ("dump_*.txt", "matches nothing")]
+)
+def test_a_source_must_exist(tmp_path, name, said):
+    with pytest.raises(ReadError, match=said):
         scanfab.read_series(tmp_path / name)
 
 

@@ -163,6 +163,12 @@ def test_a_largest_strain_that_leaves_out_all_frames_is_a_warning():
         assert summary_of(curve(), strain_max=-1).frames == 0
 
 
+def test_a_largest_strain_that_leaves_too_few_frames_names_the_next_strain():
+    message = "strain-max: 0.01 leaves 2 of 5 frames of .*, and a line needs 3: .* above is 0.02$"
+    with pytest.warns(ScanfabWarning, match=message):
+        assert summary_of(curve(), strain_max=0.01).slope is None
+
+
 def test_a_largest_strain_that_is_no_number_is_refused():
     with pytest.raises(SettingsError, match="strain-max: expected a number, found nan"):
         summary_of(curve(), strain_max=math.nan)

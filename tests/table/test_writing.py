@@ -179,7 +179,7 @@ def test_rows_of_other_settings_are_gone_before_the_new_settings_stand(tmp_path,
     def killed(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("scanfab.table.result_file.os.replace", killed)
+    monkeypatch.setattr(ResultFile, "_begin_record", killed)
     interrupt(result, {"seed": 1}, [a_row()])
     assert result.finished_rows({"seed": 1}, 1) == []
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import scanfab
 from scanfab.base.errors import ReadError, ScanfabWarning
 from scanfab.io.parse import text_dump as dump
 from scanfab.io.parse.text_dump import index_dump, read_block, row_word
@@ -357,3 +358,9 @@ def test_a_file_that_is_cut_while_it_is_indexed_is_an_error(tmp_path, monkeypatc
     monkeypatch.setattr(dump, "_snapshot", cut)
     with pytest.raises(ReadError, match="expected a whole number after ITEM: TIMESTEP"):
         index_dump(path)
+
+
+def test_a_step_of_thousands_of_digits_is_told_as_such(tmp_path):
+    path = write(tmp_path / "dump_1.liggghts", dump_text().replace("\n0\n", f"\n{'9' * 5000}\n", 1))
+    with pytest.raises(ReadError, match="expected a whole number after ITEM: TIMESTEP"):
+        scanfab.read(path)
