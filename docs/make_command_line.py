@@ -6,11 +6,12 @@ from pathlib import Path
 
 import click
 
+from scanfab.base.column import Column, columns_of_fields
 from scanfab.cli.group import COMMANDS, cli
-from scanfab.pipeline.inspection import REPORT_MEANINGS
-from scanfab.pipeline.ladders import STEP_MEANINGS
-from scanfab.table.comparison import DIFFERENCE_MEANINGS, FRAME_MEANINGS, SUMMARY_MEANINGS
-from scanfab.table.table import MEANINGS
+from scanfab.pipeline.inspection import FrameReport
+from scanfab.pipeline.ladders import StepRow
+from scanfab.table.columns import OWN_COLUMNS
+from scanfab.table.comparison import DifferenceRow, FrameRow, SummaryRow
 
 PAGE = Path(__file__).parent / "command-line.md"
 
@@ -44,12 +45,12 @@ series that has grains.
 """
 
 TABLES = {
-    "scanfab compute": MEANINGS,
-    "scanfab compare": FRAME_MEANINGS,
-    "scanfab compare --summary": SUMMARY_MEANINGS,
-    "scanfab compare --differences": DIFFERENCE_MEANINGS,
-    "scanfab calibrate": STEP_MEANINGS,
-    "scanfab inspect --json": REPORT_MEANINGS,
+    "scanfab compute": OWN_COLUMNS,
+    "scanfab compare": columns_of_fields(FrameRow),
+    "scanfab compare --summary": columns_of_fields(SummaryRow),
+    "scanfab compare --differences": columns_of_fields(DifferenceRow),
+    "scanfab calibrate": columns_of_fields(StepRow),
+    "scanfab inspect --json": columns_of_fields(FrameReport),
 }
 
 
@@ -67,15 +68,16 @@ def help_of(name: str) -> str:
 def page() -> str:
     """The whole page."""
     helps = [f"## scanfab {name}\n\n```text\n{help_of(name)}\n```\n" for name in COMMANDS]
-    columns = "## Columns\n\nA value that does not exist is an empty cell, in JSON null.\n"
-    tables = [table(command, meanings) for command, meanings in TABLES.items()]
+    columns = "## Columns\n\nA value that does not exist is an empty cell, in JSON null. "
+    columns += "The unit `length` is that of the dump's lengths, `time` that of its times.\n"
+    tables = [table(command, columns) for command, columns in TABLES.items()]
     return "\n".join([INTRODUCTION, *helps, columns, *tables])
 
 
-def table(command: str, meanings: dict[str, str]) -> str:
+def table(command: str, columns: tuple[Column, ...]) -> str:
     """What the columns of a command's table hold."""
-    rows = "\n".join(f"| `{name}` | {meaning} |" for name, meaning in meanings.items())
-    return f"### {command}\n\n| column | what it holds |\n|---|---|\n{rows}\n"
+    rows = "\n".join(f"| `{one.name}` | {one.unit} | {one.meaning} |" for one in columns)
+    return f"### {command}\n\n| column | unit | what it holds |\n|---|---|---|\n{rows}\n"
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
+    from scanfab.base.column import Column
     from scanfab.base.errors import (
         PackingError,
         ReadError,
@@ -31,15 +32,18 @@ if TYPE_CHECKING:
     from scanfab.scan.directions import DirectionRule, direction_rule
     from scanfab.scan.scan import ScanSums, scan_lines
     from scanfab.scan.solids import Solids
+    from scanfab.table.columns import COLUMNS
     from scanfab.table.compare import compare_tables
     from scanfab.table.reading import read_rows
-    from scanfab.table.table import COLUMNS, Row, Table
+    from scanfab.table.row import Row
+    from scanfab.table.table import Table
 
 # numpy, numba and the readers are loaded by the first name that needs them
 _HOME = {
-    "COLUMNS": "table.table",
+    "COLUMNS": "table.columns",
     "Calibration": "pipeline.calibration",
     "Cell": "packing.cell",
+    "Column": "base.column",
     "ContactList": "packing.packing",
     "Contacts": "packing.packing",
     "DirectionRule": "scan.directions",
@@ -47,7 +51,7 @@ _HOME = {
     "Packing": "packing.packing",
     "PackingError": "base.errors",
     "ReadError": "base.errors",
-    "Row": "table.table",
+    "Row": "table.row",
     "ScanSums": "scan.scan",
     "ScanfabError": "base.errors",
     "ScanfabNote": "base.errors",
@@ -76,6 +80,7 @@ __all__ = [
     "COLUMNS",
     "Calibration",
     "Cell",
+    "Column",
     "ContactList",
     "Contacts",
     "DirectionRule",

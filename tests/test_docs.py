@@ -10,7 +10,6 @@ import pkgutil
 import re
 import shutil
 import warnings
-from dataclasses import fields
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -23,7 +22,8 @@ from scanfab.cli.group import COMMANDS, cli
 from scanfab.io.registry import installed_readers
 from scanfab.pipeline import inspection, ladders
 from scanfab.scan.directions import RULES
-from scanfab.table import comparison, table
+from scanfab.table import comparison
+from scanfab.table.columns import columns_of
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -82,18 +82,24 @@ def test_every_option_is_documented(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("meanings", "row"),
+    "kind",
     [
-        (table.MEANINGS, table.Row),
-        (comparison.FRAME_MEANINGS, comparison.FrameRow),
-        (comparison.SUMMARY_MEANINGS, comparison.SummaryRow),
-        (comparison.DIFFERENCE_MEANINGS, comparison.DifferenceRow),
-        (ladders.STEP_MEANINGS, ladders.StepRow),
-        (inspection.REPORT_MEANINGS, inspection.FrameReport),
+        scanfab.Row,
+        comparison.FrameRow,
+        comparison.SummaryRow,
+        comparison.DifferenceRow,
+        ladders.StepRow,
+        inspection.FrameReport,
     ],
 )
-def test_every_column_has_a_meaning(meanings: dict[str, str], row: type) -> None:
-    assert tuple(meanings) == tuple(field.name for field in fields(row))
+def test_every_column_has_a_meaning_and_a_kind_and_stands_on_the_page(kind: type) -> None:
+    text = (DOCS / "command-line.md").read_text(encoding="utf-8")
+    columns = columns_of(kind)
+    assert len({column.name for column in columns}) == len(columns)
+    for column in columns:
+        assert column.kind in (int, float, str, list)
+        assert f"| `{column.name}` | {column.unit} | {column.meaning} |" in text
+        assert column.meaning
 
 
 def test_every_reader_has_a_page() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from scanfab.cli.tables import GAP, Column, print_columns, spelt, width_of
@@ -77,7 +76,7 @@ def _curves(comparison: Comparison, longest: int) -> Titled:
 def _frames(rows: Sequence[FrameRow]) -> Titled:
     from scanfab.table.abscissa import strain_column
 
-    sheared = strain_column([asdict(row) for row in rows]) == "shear_strain"
+    sheared = strain_column(rows) == "shear_strain"
     return [
         ("frame", [str(row.frame) for row in rows]),
         (

@@ -6,7 +6,6 @@ import sys
 import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict
 from typing import Any
 
 import click
@@ -118,7 +117,7 @@ def print_table(rows: Iterable[Row], excerpt: Excerpt) -> None:
     """A readable table on standard output: the columns that were asked for, or those that fit."""
     from scanfab.table.reading import total_error
 
-    values = [asdict(row) for row in rows]
+    values = [dict(row) for row in rows]
     for row in values:
         row["total"] = total_error(row, "alpha_vs_axial")
     # three digits say enough on a terminal, unless others were asked for

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -130,7 +130,7 @@ class Run:
             for number, row in enumerate(self._rows(), start=1):
                 self.found = self.found or row.alpha_vs is not None
                 if self._keep:
-                    self.kept.append(asdict(row))
+                    self.kept.append(dict(row))
                 yield row
                 if number % self.settings.rows_per_frame == 0:
                     self.done += 1

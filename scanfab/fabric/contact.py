@@ -10,9 +10,25 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.fabric.tensor import FabricTensor
+from scanfab.base.column import Column
+from scanfab.fabric.tensor import FabricTensor, tensor_columns
 
-__all__ = ["axial_error", "contact_fabric"]
+__all__ = ["CONTACT_COLUMNS", "axial_error", "contact_fabric"]
+
+CONTACT_COLUMNS = (
+    *tensor_columns("gc", "contact fabric"),
+    Column("alpha_c", float, "", "largest minus smallest principal value of the contact fabric"),
+    Column(
+        "alpha_c_axial", float, "", "signed anisotropy of the contact fabric along the loading axis"
+    ),
+    Column(
+        "alpha_c_axial_se",
+        float,
+        "",
+        "its standard error if contacts were independent; too large by about half in relaxed dense "
+        "packings",
+    ),
+)
 
 
 def contact_fabric(normals: npt.ArrayLike) -> FabricTensor | None:

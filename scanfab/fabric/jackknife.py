@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.column import Column
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.tensor import axial
 from scanfab.fabric.void import void_fabric
@@ -22,14 +23,23 @@ __all__ = [
     "BLOCKS",
     "Jackknife",
     "contact_jackknife",
+    "half_columns",
+    "half_values",
     "jackknife_error",
+    "sample_column",
+    "scatter_values",
     "variance_without_noise",
     "void_jackknife",
+    "without_columns",
 ]
 
 
 # octants
 BLOCKS = 8
+ORDER = (
+    " (-x, -y, -z; x counts fastest; for an oblique loading axis the octants are turned so that "
+    "one of their axes lies along it)"
+)
 
 
 class Jackknife(NamedTuple):
@@ -161,3 +171,56 @@ def variance_without_noise(values: FloatArray) -> float:
     # of one replicate: the sample's scatter, and R times the noise that the mean has
     of_single = float(_variance(values).mean())
     return float((count * of_mean - of_single) / (count - 1))
+
+
+def sample_column(name: str) -> Column:
+    """The column of an anisotropy's standard error from the sample."""
+    meaning = f"the sample's own scatter of {name}, by a jackknife over eight octants"
+    return Column(f"{name}_sample_se", float, "", meaning)
+
+
+def without_columns(name: str, what: str) -> tuple[Column, ...]:
+    """The columns of an anisotropy without each block's segments or contacts."""
+    return tuple(
+        Column(
+            f"{name}_without_{block}",
+            float,
+            "",
+            f"{name} without the {what} of octant {block}" + (ORDER if block == 1 else ""),
+        )
+        for block in range(1, BLOCKS + 1)
+    )
+
+
+def scatter_values(
+    name: str, value: float | None, scatter: Jackknife | None
+) -> dict[str, float | None]:
+    """The values of the columns that :func:`sample_column` and :func:`without_columns` declare."""
+    without = [
+        None if value is None or scatter is None else value + float(scatter.shift[block])
+        for block in range(BLOCKS)
+    ]
+    return {
+        f"{name}_sample_se": None if scatter is None else scatter.error,
+        **{f"{name}_without_{block}": one for block, one in enumerate(without, start=1)},
+    }
+
+
+def half_columns(name: str) -> tuple[Column, ...]:
+    """The columns of what the scan's noise makes of an anisotropy without each block."""
+    return tuple(
+        Column(
+            f"{name}_half_{block}",
+            float,
+            "",
+            f"{name}_without_{block} is the mean of two replicates: half their difference, which "
+            f"tells compare the scan's noise in a slope",
+        )
+        for block in range(1, BLOCKS + 1)
+    )
+
+
+def half_values(name: str, scatter: Jackknife | None) -> dict[str, float | None]:
+    """The values of these columns."""
+    halves = [None] * BLOCKS if scatter is None else scatter.half.tolist()
+    return {f"{name}_half_{block}": half for block, half in enumerate(halves, start=1)}

@@ -8,9 +8,19 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.column import Column
 from scanfab.base.typing import FloatArray
 
-__all__ = ["COMPONENTS", "FabricTensor", "axial"]
+__all__ = [
+    "COAXIALITY",
+    "COMPONENTS",
+    "FabricTensor",
+    "axial",
+    "axis_columns",
+    "axis_values",
+    "tensor_columns",
+    "tensor_values",
+]
 
 
 COMPONENTS = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
@@ -102,3 +112,47 @@ class FabricTensor:
     def components(self) -> dict[str, float]:
         """The six components by name, ``xx`` to ``yz``."""
         return {name: float(self.matrix[place]) for name, place in COMPONENTS.items()}
+
+
+COAXIALITY = Column(
+    "coaxiality_deg",
+    float,
+    "degrees",
+    "angle between the major axes of void and contact fabric, 0 to 90",
+)
+
+
+def tensor_columns(prefix: str, what: str) -> tuple[Column, ...]:
+    """
+    The columns of a tensor's six components.
+
+    Examples
+    --------
+    >>> from scanfab.fabric.tensor import tensor_columns
+    >>> [one.name for one in tensor_columns("gc", "contact fabric")]
+    ['gc_xx', 'gc_yy', 'gc_zz', 'gc_xy', 'gc_xz', 'gc_yz']
+    """
+    return tuple(
+        Column(f"{prefix}_{name}", float, "", f"{name} of the {what} tensor, whose trace is 1")
+        for name in COMPONENTS
+    )
+
+
+def tensor_values(prefix: str, tensor: FabricTensor | None) -> dict[str, float | None]:
+    """The values of these columns."""
+    found = tensor.components() if tensor else dict.fromkeys(COMPONENTS)
+    return {f"{prefix}_{name}": value for name, value in found.items()}
+
+
+def axis_columns(prefix: str, what: str) -> tuple[Column, ...]:
+    """The columns of a tensor's major axis."""
+    meaning = f"direction of the {what}'s largest principal value, a unit vector"
+    return tuple(
+        Column(f"{prefix}_axis_{name}", float, "", f"{name} of the {meaning}") for name in "xyz"
+    )
+
+
+def axis_values(prefix: str, tensor: FabricTensor | None) -> dict[str, float | None]:
+    """The values of these columns."""
+    axis = [None] * 3 if tensor is None else tensor.major_axis.tolist()
+    return {f"{prefix}_axis_{name}": one for name, one in zip("xyz", axis, strict=True)}

@@ -13,13 +13,29 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.column import LENGTH, Column
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.fabric.tensor import FabricTensor, axial
+from scanfab.fabric.tensor import FabricTensor, axial, tensor_columns
 
-__all__ = ["VoidFabric", "void_fabric"]
+__all__ = ["VOID_COLUMNS", "VoidFabric", "void_fabric"]
 
 
 MOST_FILLED = 0.5
+
+VOID_COLUMNS = (
+    Column("mean_length", float, LENGTH, "mean length of the kept segments, Σ w·sum / Σ w·count"),
+    *tensor_columns("gvs", "void fabric"),
+    Column("alpha_vs", float, "", "largest minus smallest principal value of the void fabric"),
+    Column(
+        "alpha_vs_axial", float, "", "signed anisotropy of the void fabric along the loading axis"
+    ),
+    Column(
+        "alpha_vs_axial_se",
+        float,
+        "",
+        "its standard error from the scan, by the scatter of the replicates",
+    ),
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,7 +14,8 @@ from scanfab.pipeline.measurement import Measurement, measure
 from scanfab.pipeline.plan import Plan
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.variant_columns import VariantColumns, no_columns
-from scanfab.table.table import Row
+from scanfab.table.columns import complete_row
+from scanfab.table.row import Row
 
 __all__ = ["FrameResult", "frame_result"]
 
@@ -58,7 +59,7 @@ def frame_result(
     }
     if plan is None or not sample.grains.any():
         empty = [
-            Row(**frame, variant=variant, **no_columns())
+            complete_row({**no_columns(), **frame, "variant": variant})
             for variant in settings.variants
             for _ in settings.cutoffs or (settings.cutoff,)
         ]
@@ -72,7 +73,7 @@ def frame_result(
     for variant in settings.variants:
         for place in range(len(plan.cutoffs)):
             row = VariantColumns(measurement, VARIANTS[variant], place, settings)
-            rows.append(Row(**frame, variant=variant, **row.columns()))
+            rows.append(complete_row({**frame, "variant": variant, **row.columns()}))
             for text in row.doubts():
                 doubts.setdefault(text, []).append(variant)
     for text, variants in doubts.items():

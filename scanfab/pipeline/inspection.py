@@ -6,7 +6,9 @@ import warnings
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import Annotated
 
+from scanfab.base.column import LENGTH
 from scanfab.base.errors import PackingError, ReadError, ScanfabNote
 from scanfab.io.series import Frame, Series
 from scanfab.packing.doubts import cell_doubt, cell_hint, doubts_of, refuse_impossible
@@ -15,61 +17,50 @@ from scanfab.packing.window import SphereWindow, SurfaceBox
 from scanfab.pipeline.frames import Frames, boundary_hint
 from scanfab.pipeline.plan import rv_of
 from scanfab.pipeline.settings import Settings
+from scanfab.table.row import Record
 
-__all__ = ["REPORT_MEANINGS", "FrameReport", "inspect_series"]
+__all__ = ["FrameReport", "inspect_series"]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class FrameReport:
+class FrameReport(Record):
     """One frame as the reader sees it; lengths in the dump's unit."""
 
-    source: str
-    frame: int
-    step: int | None
-    time: float | None
-    format: str
-    grains: int
-    boundary: int
-    radius_min: float | None
-    radius_max: float | None
-    contacts: int
-    contacts_from: str
-    rattlers: int
-    coordination: float | None
-    cell: list[list[float]] | None
-    periodic: list[bool] | None
-    columns: list[str]
-    warnings: list[str]
-    low: list[float] | None
-    high: list[float] | None
-    rv_center: list[float] | None
-    rv_radius: float | None
-
-
-REPORT_MEANINGS: dict[str, str] = {
-    "source": "the series as given",
-    "frame": "index in the series, from 0",
-    "step": "of the dump",
-    "time": "of the dump",
-    "format": "the reader",
-    "grains": "without boundary particles",
-    "boundary": "number of boundary particles",
-    "radius_min": "smallest radius of a grain",
-    "radius_max": "largest radius of a grain",
-    "contacts": "all that are listed or found by geometry, with boundary particles too",
-    "contacts_from": "file or geometric",
-    "rattlers": "grains with too few contacts",
-    "coordination": "mean number of contacts of a grain",
-    "cell": "the lattice vectors, by rows",
-    "periodic": "whether the sample repeats along each of them",
-    "columns": "what the dump says of each particle; what is not standard by its own name",
-    "warnings": "what is doubtful",
-    "low": "corner of the box of the grains' surfaces, x y z; grains that flew away left out",
-    "high": "the opposite corner",
-    "rv_center": "centre of the RV, which is that of the series' first frame that has grains",
-    "rv_radius": "its radius",
-}
-"""What each entry holds; lengths are in the dump's unit."""
+    source: Annotated[str, "the series as given"]
+    frame: Annotated[int, "index in the series, from 0"]
+    step: Annotated[int | None, "of the dump"]
+    time: Annotated[float | None, "of the dump", "time"]
+    format: Annotated[str, "the reader"]
+    grains: Annotated[int, "without boundary particles"]
+    boundary: Annotated[int, "number of boundary particles"]
+    radius_min: Annotated[float | None, "smallest radius of a grain", LENGTH]
+    radius_max: Annotated[float | None, "largest radius of a grain", LENGTH]
+    contacts: Annotated[
+        int,
+        "all that are listed or found by geometry, with boundary particles too",
+    ]
+    contacts_from: Annotated[str, "file or geometric"]
+    rattlers: Annotated[int, "grains with too few contacts"]
+    coordination: Annotated[float | None, "mean number of contacts of a grain"]
+    cell: Annotated[list[list[float]] | None, "the lattice vectors, by rows", LENGTH]
+    periodic: Annotated[list[bool] | None, "whether the sample repeats along each of them"]
+    columns: Annotated[
+        list[str],
+        "what the dump says of each particle; what is not standard by its own name",
+    ]
+    warnings: Annotated[list[str], "what is doubtful"]
+    low: Annotated[
+        list[float] | None,
+        "corner of the box of the grains' surfaces, x y z; grains that flew away left out",
+        LENGTH,
+    ]
+    high: Annotated[list[float] | None, "the opposite corner", LENGTH]
+    rv_center: Annotated[
+        list[float] | None,
+        "centre of the RV, which is that of the series' first frame that has grains",
+        LENGTH,
+    ]
+    rv_radius: Annotated[float | None, "its radius", LENGTH]
 
 
 def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:

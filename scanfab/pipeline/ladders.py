@@ -6,11 +6,14 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
+from typing import Annotated
+
+from scanfab.base.column import LENGTH
+from scanfab.table.row import Record
 
 __all__ = [
     "PAPER_CUTOFF",
     "PAPER_SPACING",
-    "STEP_MEANINGS",
     "StepRow",
     "first_steady",
     "judged",
@@ -29,59 +32,53 @@ CHANCE, FREEDOM = 0.05, 30
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class StepRow:
+class StepRow(Record):
     """One step of a ladder for one variant; lengths in the dump's unit."""
 
-    source: str
-    frame: int
-    ladder: str
-    value: float
-    variant: str
-    rule: str
-    degree: int | None
-    rule_bias: float
-    directions: int | None
-    replicates: int | None
-    spacing: float | None
-    cutoff: float | None
-    rv_radius: float | None
-    segments: int | None
-    seconds: float
-    mean_length: float | None
-    alpha_vs_axial: float | None
-    alpha_vs_axial_se: float | None
-    alpha_vs_axial_sample_se: float | None
-    steady: int | None
-    note: str
-
-
-STEP_MEANINGS: dict[str, str] = {
-    "source": "the series as given",
-    "frame": "index in the series, from 0",
-    "ladder": "what is changed: spacing, directions, cutoff, rv; or recommended",
-    "value": "spacing or cut-off in r_min, number of directions, RV radius as a fraction of half "
-    "the smallest extent",
-    "variant": "as in the fabric table",
-    "rule": "the direction rule",
-    "degree": "polynomials to this degree it integrates exactly; empty for none",
-    "rule_bias": "alpha_vs that the rule gives an isotropic sample",
-    "directions": "axes of the rule, in each replicate",
-    "replicates": "number of replicates",
-    "spacing": "distance between neighbouring lines of one direction, all replicates together",
-    "cutoff": "shortest void segment kept",
-    "rv_radius": "radius of the RV; empty for the whole sample",
-    "segments": "void segments kept",
-    "seconds": "time of the step, all variants (and all cut-offs) together",
-    "mean_length": "mean length of the kept segments",
-    "alpha_vs_axial": "signed anisotropy of the void fabric along the loading axis",
-    "alpha_vs_axial_se": "its standard error from the scan",
-    "alpha_vs_axial_sample_se": "the sample's own scatter, by a jackknife over eight octants",
-    "steady": "1 if this step and all later ones of the ladder differ by no more than chance makes "
-    "of their standard errors (of the scan; for rv also of the sample, as the smaller RV is a part "
-    "of the larger), else 0; empty for a cut-off, on which alpha_vs depends by definition",
-    "note": "what makes the step doubtful",
-}
-"""What each column of a calibration holds; lengths are in the dump's unit."""
+    source: Annotated[str, "the series as given"]
+    frame: Annotated[int, "index in the series, from 0"]
+    ladder: Annotated[str, "what is changed: spacing, directions, cutoff, rv; or recommended"]
+    value: Annotated[
+        float,
+        "spacing or cut-off in r_min, number of directions, RV radius as a fraction of "
+        "half the smallest extent",
+    ]
+    variant: Annotated[str, "as in the fabric table"]
+    rule: Annotated[str, "the direction rule"]
+    degree: Annotated[
+        int | None,
+        "polynomials to this degree it integrates exactly; empty for none",
+    ]
+    rule_bias: Annotated[float, "alpha_vs that the rule gives an isotropic sample"]
+    directions: Annotated[int | None, "axes of the rule, in each replicate"]
+    replicates: Annotated[int | None, "number of replicates"]
+    spacing: Annotated[
+        float | None,
+        "distance between neighbouring lines of one direction, all replicates together",
+        LENGTH,
+    ]
+    cutoff: Annotated[float | None, "shortest void segment kept", LENGTH]
+    rv_radius: Annotated[float | None, "radius of the RV; empty for the whole sample", LENGTH]
+    segments: Annotated[int | None, "void segments kept"]
+    seconds: Annotated[float, "time of the step, all variants (and all cut-offs) together", "s"]
+    mean_length: Annotated[float | None, "mean length of the kept segments", LENGTH]
+    alpha_vs_axial: Annotated[
+        float | None,
+        "signed anisotropy of the void fabric along the loading axis",
+    ]
+    alpha_vs_axial_se: Annotated[float | None, "its standard error from the scan"]
+    alpha_vs_axial_sample_se: Annotated[
+        float | None,
+        "the sample's own scatter, by a jackknife over eight octants",
+    ]
+    steady: Annotated[
+        int | None,
+        "1 if this step and all later ones of the ladder differ by no more than chance "
+        "makes of their standard errors (of the scan; for rv also of the sample, as the "
+        "smaller RV is a part of the larger), else 0; empty for a cut-off, on which "
+        "alpha_vs depends by definition",
+    ]
+    note: Annotated[str, "what makes the step doubtful"]
 
 
 def judged(rows: Iterator[StepRow]) -> list[StepRow]:

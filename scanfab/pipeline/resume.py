@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from itertools import groupby, pairwise
 from pathlib import Path
 from typing import Any
@@ -15,9 +15,10 @@ from scanfab.pipeline.frames import chosen_frames
 from scanfab.pipeline.manifest import Inputs, strain_file
 from scanfab.pipeline.repeat import read_manifest
 from scanfab.pipeline.settings import Settings
+from scanfab.table.columns import complete_row, table_columns
 from scanfab.table.reading import read_rows
 from scanfab.table.result_file import differing_settings
-from scanfab.table.table import Row
+from scanfab.table.row import Row
 
 __all__ = ["FinishedTable", "InputsOfRows", "check_part", "finished_table"]
 
@@ -233,8 +234,7 @@ def _by_frame(
 
 def _row(values: Mapping[str, Any]) -> Row:
     """A row as it was written; columns that were not are empty, and are not written again."""
-    every: dict[str, Any] = {one.name: values.get(one.name) for one in fields(Row)}
-    return Row(**every)
+    return complete_row({column.name: values.get(column.name) for column in table_columns()})
 
 
 def _refused(path: Path, reason: str) -> SettingsError:

@@ -3,29 +3,32 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.fabric.contact import axial_error, contact_fabric
-from scanfab.fabric.jackknife import BLOCKS, Jackknife, contact_jackknife, void_jackknife
-from scanfab.fabric.tensor import COMPONENTS, FabricTensor
+from scanfab.fabric.jackknife import (
+    BLOCKS,
+    Jackknife,
+    contact_jackknife,
+    half_values,
+    scatter_values,
+    void_jackknife,
+)
+from scanfab.fabric.registry import Measured, installed_fabrics
+from scanfab.fabric.tensor import axis_values, tensor_values
 from scanfab.fabric.void import VoidFabric, void_fabric
 from scanfab.packing.sample import Variant
 from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.settings import Settings
-from scanfab.table.table import COLUMNS
+from scanfab.table.columns import table_columns
 
-__all__ = ["FRAME_COLUMNS", "VariantColumns", "no_columns"]
-
-
-# the same for all variants
-FRAME_COLUMNS = (
-    "source", "frame", "step", "time", "strain", "variant", "contacts_from", "shear_strain",
-)  # fmt: skip
+__all__ = ["VariantColumns", "no_columns"]
 
 
 # in smallest radii: a cut-off that nobody means
@@ -47,7 +50,13 @@ class VariantColumns:
 
     def columns(self) -> dict[str, Any]:
         """All that depend on the variant."""
-        return {**self._sample(), **self._scan(), **self._void(), **self._contact()}
+        return {
+            **self._sample(),
+            **self._scan(),
+            **self._void(),
+            **self._contact(),
+            **self._others(),
+        }
 
     @cached_property
     def fabric(self) -> VoidFabric | None:
@@ -114,13 +123,13 @@ class VariantColumns:
         scatter = self._void_scatter() if fabric else None
         return {
             "mean_length": fabric.mean_length if fabric else None,
-            **_tensor_columns("gvs", fabric.tensor if fabric else None),
+            **tensor_values("gvs", fabric.tensor if fabric else None),
             "alpha_vs": fabric.tensor.alpha if fabric else None,
             "alpha_vs_axial": value,
             "alpha_vs_axial_se": fabric.axial_error(axis) if fabric else None,
-            **_scatter_columns("alpha_vs_axial", value, scatter),
-            **_half_columns(scatter),
-            **_axis_columns("gvs", fabric.tensor if fabric else None),
+            **scatter_values("alpha_vs_axial", value, scatter),
+            **half_values("alpha_vs_axial", scatter),
+            **axis_values("gvs", fabric.tensor if fabric else None),
         }
 
     def _void_scatter(self) -> Jackknife | None:
@@ -134,16 +143,30 @@ class VariantColumns:
             self.settings.axis,
         )
 
+    @cached_property
+    def _chosen(self) -> BoolArray:
+        """The contacts that enter the contact fabric."""
+        return self.sample.fabric_contacts(self.variant, self.plan.window)
+
+    # np.compress is several times as fast as to index with a mask
+
+    @cached_property
+    def _normals(self) -> FloatArray:
+        """Of these contacts, shape (M, 3)."""
+        return np.compress(self._chosen, self.sample.contacts.normal, axis=0)
+
+    @cached_property
+    def _points(self) -> FloatArray:
+        """Of these contacts, shape (M, 3), dump's length unit."""
+        return np.compress(self._chosen, self.sample.contacts.point, axis=0)
+
     def _contact(self) -> dict[str, Any]:
-        chosen = self.sample.fabric_contacts(self.variant, self.plan.window)
-        contacts, axis = self.sample.contacts, self.settings.axis
-        # several times as fast as to index with a mask
-        normals = np.compress(chosen, contacts.normal, axis=0)
+        normals, axis = self._normals, self.settings.axis
         tensor = contact_fabric(normals)
         value = tensor.axial(axis) if tensor else None
         scatter: Jackknife | None = None
         if tensor:
-            points = np.compress(chosen, contacts.point, axis=0)
+            points = self._points
             if self.variant.in_window:
                 window = self.plan.window
                 assert window is not None
@@ -152,16 +175,33 @@ class VariantColumns:
             scatter = contact_jackknife(normals, places, axis)
         return {
             "contacts": len(normals),
-            **_tensor_columns("gc", tensor),
+            **tensor_values("gc", tensor),
             "alpha_c": tensor.alpha if tensor else None,
             "alpha_c_axial": value,
             "alpha_c_axial_se": axial_error(normals, axis),
-            **_scatter_columns("alpha_c_axial", value, scatter),
-            **_axis_columns("gc", tensor),
+            **scatter_values("alpha_c_axial", value, scatter),
+            **axis_values("gc", tensor),
             "coaxiality_deg": (
                 self.fabric.tensor.angle_to(tensor) if self.fabric and tensor else None
             ),
         }
+
+    def _others(self) -> dict[str, Any]:
+        """The columns of the fabrics of other packages."""
+        fabrics = installed_fabrics().values()
+        if not fabrics:
+            return {}
+        length, segments = self.measurement.kept(self.variant.name, self.place)
+        measured = Measured(
+            np.asarray(self.settings.axis),
+            self.sums.axes,
+            self.plan.rule.weights,
+            length,
+            segments,
+            self._normals,
+            self._points,
+        )
+        return {name: one for each in fabrics for name, one in each.values(measured).items()}
 
     def _too_long(self, cutoff: float) -> str:
         """Of a cut-off that no segment reaches; a large number may be one in another unit."""
@@ -193,40 +233,7 @@ class VariantColumns:
             )
 
 
-def _tensor_columns(prefix: str, tensor: FabricTensor | None) -> dict[str, float | None]:
-    values: Iterable[tuple[str, float | None]] = (
-        tensor.components().items() if tensor else ((name, None) for name in COMPONENTS)
-    )
-    return {f"{prefix}_{name}": value for name, value in values}
-
-
-def _axis_columns(prefix: str, tensor: FabricTensor | None) -> dict[str, float | None]:
-    """Direction of the largest principal value."""
-    axis = [None] * 3 if tensor is None else tensor.major_axis.tolist()
-    return {f"{prefix}_axis_{name}": one for name, one in zip("xyz", axis, strict=True)}
-
-
-def _scatter_columns(
-    name: str, value: float | None, scatter: Jackknife | None
-) -> dict[str, float | None]:
-    """The sample's standard error, and the values without each block."""
-    without = [
-        None if value is None or scatter is None else value + float(scatter.shift[block])
-        for block in range(BLOCKS)
-    ]
-    return {
-        f"{name}_sample_se": None if scatter is None else scatter.error,
-        **{f"{name}_without_{block + 1}": one for block, one in enumerate(without)},
-    }
-
-
-def _half_columns(scatter: Jackknife | None) -> dict[str, float | None]:
-    """Half the differences between the replicates that the values without each block come from."""
-    halves = [None] * BLOCKS if scatter is None else scatter.half.tolist()
-    return {f"alpha_vs_axial_half_{block + 1}": half for block, half in enumerate(halves)}
-
-
 def no_columns() -> dict[str, Any]:
     """The columns of a frame without grains."""
-    empty = {name: None for name in COLUMNS if name not in FRAME_COLUMNS}
+    empty = {column.name: None for column in table_columns()}
     return {**empty, "grains": 0, "rattlers": 0, "contacts": 0}

@@ -48,9 +48,8 @@ def compare_tables(
     Returns
     -------
     Comparison
-        Rows for frames, for sources and variants, and for pairs of variants; what they hold is in
-        ``FRAME_MEANINGS``, ``SUMMARY_MEANINGS`` and ``DIFFERENCE_MEANINGS`` of
-        ``scanfab.table.comparison``; and the points of each fit.
+        Rows for frames, for sources and variants, and for pairs of variants (what they hold is
+        said by ``columns_of`` of ``scanfab.table.columns``), and the points of each fit.
 
     Raises
     ------

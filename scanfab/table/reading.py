@@ -13,10 +13,12 @@ from typing import Any
 
 from scanfab.base.errors import ReadError
 from scanfab.base.streams import check_file_or_pipe
+from scanfab.table.columns import OWN_COLUMNS
 
 __all__ = ["is_number", "number_of", "numbers_of", "read_rows", "total_error"]
 
-TEXT_COLUMNS = ("source", "variant", "contacts_from")
+# words that may look like numbers: a source may be called 2024
+TEXT_COLUMNS = {column.name for column in OWN_COLUMNS if column.kind is str}
 
 
 def read_rows(path: Path | str) -> list[dict[str, Any]]:

@@ -42,7 +42,7 @@ class ResultFile:
     path : Path
         Its suffix is the format.
     kind : type
-        The dataclass of the rows.
+        The class of the rows.
     excerpt : Excerpt, optional
         Which columns of them are written, and with how many digits.
 

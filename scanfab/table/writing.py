@@ -5,13 +5,14 @@ from __future__ import annotations
 import csv
 import json
 from contextlib import AbstractContextManager
-from dataclasses import asdict, dataclass, fields
-from difflib import get_close_matches
+from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any, Protocol, get_type_hints
+from typing import IO, Any, Protocol
 
+from scanfab.base.column import no_column
 from scanfab.base.errors import SettingsError
 from scanfab.base.files import named_errors
+from scanfab.table.columns import columns_of
 
 __all__ = ["FILE_FORMATS", "Excerpt", "RowWriter", "check_suffix", "row_writer"]
 
@@ -58,10 +59,10 @@ class Excerpt:
         if fields_text is None:
             return cls(digits=digits)
         names = tuple(name.strip() for name in fields_text.split(","))
-        known = [field.name for field in fields(kind)]
+        known = [column.name for column in columns_of(kind)]
         for name in names:
             if name not in known:
-                raise SettingsError(f"fields: {_no_column(name, known)}")
+                raise SettingsError(f"fields: {no_column(name, known)}")
             if names.count(name) > 1:
                 raise SettingsError(f"fields: the column {name} is named more than once")
         return cls(names, digits)
@@ -73,7 +74,7 @@ class Excerpt:
 
     def of(self, row: Any) -> dict[str, Any]:
         """The columns of a row that are written, by name."""
-        values = asdict(row)
+        values = dict(row)
         if self.fields:
             values = {name: values[name] for name in self.fields}
         if self.digits == ALL_DIGITS:
@@ -92,14 +93,8 @@ class Excerpt:
 ALL = Excerpt()
 
 
-def _no_column(name: str, known: list[str]) -> str:
-    near = get_close_matches(name, known, n=1)
-    hint = f"did you mean {near[0]}?" if near else f"the columns are {', '.join(known)}"
-    return f"there is no column {name!r}: {hint}"
-
-
 class RowWriter(Protocol):
-    """Writes rows, which are dataclasses of one kind, to a stream."""
+    """Writes rows, which are of one kind, to a stream."""
 
     def write(self, row: Any) -> None:
         """Write one row."""
@@ -200,9 +195,10 @@ class ParquetWriter:
         pyarrow = _pyarrow()
         from pyarrow import parquet
 
-        hints = get_type_hints(self.kind)
-        names = self.excerpt.fields or [field.name for field in fields(self.kind)]
-        schema = pyarrow.schema([(name, _arrow_type(pyarrow, hints[name])) for name in names])
+        kinds = {int: pyarrow.int64(), float: pyarrow.float64(), str: pyarrow.string()}
+        columns = {column.name: kinds[column.kind] for column in columns_of(self.kind)}
+        names = self.excerpt.fields or columns
+        schema = pyarrow.schema([(name, columns[name]) for name in names])
         parquet.write_table(pyarrow.Table.from_pylist(self._rows, schema=schema), self.stream)
 
 
@@ -219,7 +215,7 @@ def row_writer(
     stream : file object
         For text, for ``.parquet`` for bytes.
     kind : type
-        The dataclass of the rows.
+        The class of the rows.
     header : bool, optional
         Whether CSV and TSV start with the names of the columns.
     excerpt : Excerpt, optional
@@ -264,10 +260,3 @@ def _pyarrow() -> Any:
             "Parquet files need the package pyarrow: pip install 'scanfab[parquet]'"
         ) from None
     return pyarrow
-
-
-def _arrow_type(pyarrow: Any, hint: Any) -> Any:
-    """int64, double or string for ``int``, ``float | None`` and the like."""
-    kinds = {int: pyarrow.int64(), float: pyarrow.float64(), str: pyarrow.string()}
-    options = getattr(hint, "__args__", (hint,))
-    return next(kinds[option] for option in options if option in kinds)

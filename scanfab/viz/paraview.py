@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from threading import Lock
 from typing import Any
@@ -150,7 +150,7 @@ def _tensors(row: Row) -> dict[str, FloatArray]:
 def _fields(rows: list[Row]) -> dict[str, Any]:
     """The rows' values by column, one for each row; NaN where there is none."""
     columns: dict[str, Any] = {}
-    for name in asdict(rows[0]):
+    for name in rows[0]:
         values = [getattr(row, name) for row in rows]
         if name in TEXT_FIELDS:
             # VTK's texts are ASCII

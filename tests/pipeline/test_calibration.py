@@ -17,12 +17,12 @@ from scanfab import (
     find_contacts,
 )
 from scanfab.pipeline.ladders import (
-    STEP_MEANINGS,
     StepRow,
     first_steady,
     judged,
     sentence_of_recommended,
 )
+from scanfab.table.columns import columns_of
 from tests.helpers.lattices import shaken_cubic
 
 QUICK = {"tolerance": 2e-3, "variants": "cd", "rv": 0.6, "workers": 1}
@@ -99,7 +99,9 @@ def test_whole_sample_has_no_ladder_of_rvs(packing):
 
 def step(value, alpha, error, **more):
     words = {"value": value, "variant": "c", "alpha_vs_axial": alpha, "alpha_vs_axial_se": error}
-    return StepRow(**{**dict.fromkeys(STEP_MEANINGS), "note": "", **words, **more})
+    return StepRow(
+        **{**{column.name: None for column in columns_of(StepRow)}, "note": "", **words, **more}
+    )
 
 
 def test_steady_is_what_differs_from_later_steps_by_no_more_than_chance():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import dataclasses
 import io
 
 import numpy as np
@@ -56,7 +55,7 @@ def series_of(folder, frames):
 
 
 def without(row, *names):
-    return {key: value for key, value in dataclasses.asdict(row).items() if key not in names}
+    return {key: value for key, value in row.items() if key not in names}
 
 
 SHRINKING = [heap(squeeze=factor) for factor in (1.0, 0.95, 0.9, 0.85)]

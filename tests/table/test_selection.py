@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import fields
 
 import pytest
 
 from scanfab.base.errors import ScanfabWarning, SettingsError
 from scanfab.pipeline.inspection import FrameReport
 from scanfab.pipeline.ladders import StepRow
+from scanfab.table.columns import columns_of
 from scanfab.table.comparison import DifferenceRow, FrameRow, SummaryRow
 from scanfab.table.reading import number_of
 from scanfab.table.selection import choose_rows
@@ -147,7 +147,7 @@ def test_a_column_that_some_rows_lack_is_named_with_the_row():
     ],
 )
 def test_other_tables_are_called_by_their_name(row, command):
-    rows = [{field.name: None for field in fields(row)}]
+    rows = [{column.name: None for column in columns_of(row)}]
     with pytest.raises(SettingsError, match=f"^t.csv: this is a table of scanfab {command}: "):
         choose_rows([("t.csv", rows)])
 

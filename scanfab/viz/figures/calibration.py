@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -86,7 +85,7 @@ def _missing(rows: Sequence[Any]) -> str:
 def _totals(rows: Sequence[Any]) -> npt.NDArray[np.float64]:
     """Total errors of the steps that have a void fabric; NaN where they are not known."""
     known = [row for row in rows if row.alpha_vs_axial is not None]
-    totals = [total_error(asdict(row), "alpha_vs_axial") for row in known]
+    totals = [total_error(row, "alpha_vs_axial") for row in known]
     return np.array([np.nan if one is None else one for one in totals], np.float64)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -377,7 +377,7 @@ def _over_cutoffs(settings: Settings) -> Settings:
 def _cutoffs(result: FrameResult, title: str, variant: str) -> CutoffCurve:
     """The rows of one frame and many cut-offs as a curve."""
     _, _, chosen, smallest = _parts(result)
-    rows = [asdict(row) for row in result.rows if row.variant == variant]
+    rows = [dict(row) for row in result.rows if row.variant == variant]
 
     def column(values: Iterable[float | None]) -> FloatArray:
         return np.array([np.nan if one is None else one for one in values], np.float64)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict
 
 import numpy as np
 
@@ -56,7 +55,7 @@ def _note(what: str, error: float, deviation: FloatArray) -> str:
 
 def void_noise(result: FrameResult) -> float | None:
     """Standard error of a lobe of the mean void length, per cent of the mean."""
-    row = asdict(result.rows[0])
+    row = result.rows[0]
     scan, sample = (number_of(row, f"alpha_vs_axial_{part}") for part in ("se", "sample_se"))
     if sample is None:
         return None
@@ -66,7 +65,7 @@ def void_noise(result: FrameResult) -> float | None:
 
 def contact_noise(result: FrameResult) -> float | None:
     """Standard error of the smoothed density of contact normals, per cent of the mean."""
-    row = asdict(result.rows[0])
+    row = result.rows[0]
     alone, error = number_of(row, "alpha_c_axial_se"), total_error(row, "alpha_c_axial")
     if not alone or error is None:
         return None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import asdict
 
 import numpy as np
 import pytest
@@ -74,7 +73,7 @@ def test_figures_have_the_moment_of_the_table(series, caught, tmp_path):
     found = {}
     for frame in (0, 6):
         (row,) = scanfab.compute(series, **words, variants="c", frames=str(frame))
-        found[frame] = asdict(row)
+        found[frame] = dict(row)
     settings = Settings.make(**words)
     plot_frames(tmp_path / "x.png", series, settings, list(found.values()), "cutoffs")
     for curve, row in zip(caught["cutoffs"], found.values(), strict=True):

@@ -11,14 +11,12 @@ from scanfab.fabric.contact import axial_error
 from scanfab.fabric.distribution import fit_even, sphere_points
 from scanfab.viz.figures.of_frames import Projection
 from scanfab.viz.figures.scanned import _smoothed_density
-from scanfab.viz.report import frame_noise
 from scanfab.viz.report.frame_noise import contact_noise, noise_notes, void_noise
 from tests.viz.figures.test_scanned import disk
 
 
 def result_of(monkeypatch, number=0, **columns):
     """A frame of which nothing but some columns of its row is known."""
-    monkeypatch.setattr(frame_noise, "asdict", lambda row: row)
     return SimpleNamespace(rows=[columns], number=number)
 
 

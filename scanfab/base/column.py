@@ -1,0 +1,105 @@
+"""A column of a table: its name, the kind of its values, their unit and what they mean."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from difflib import get_close_matches
+from functools import cache
+from typing import Any, get_args, get_origin, get_type_hints
+
+from scanfab.base.errors import ScanfabError
+
+__all__ = ["LENGTH", "Column", "NoColumnError", "columns_of_fields", "no_column"]
+
+# the unit of all lengths: that of the dump, as nothing is converted
+LENGTH = "length"
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """
+    A column of a table, declared beside the code that computes it.
+
+    The header and the order of CSV files, the schema of Parquet files, the rows of empty frames
+    and docs/command-line.md all follow from such declarations.
+
+    Parameters
+    ----------
+    name : str
+        As scripts know it.
+    kind : type
+        ``int``, ``float`` or ``str``; a value that does not exist is None in any column. ``list``
+        where rows are written as JSON alone.
+    unit : str
+        ``"length"`` is that of the dump, ``"time"`` likewise; empty for names, numbers of things
+        and what is dimensionless.
+    meaning : str
+        What the column holds, for the documentation.
+
+    Examples
+    --------
+    >>> from scanfab import Column
+    >>> Column("void_ratio", float, "", "volume of the voids over volume of the solids").kind
+    <class 'float'>
+    """
+
+    name: str
+    kind: type
+    unit: str
+    meaning: str
+
+
+class NoColumnError(ScanfabError, KeyError, AttributeError):
+    """A column that does not exist, asked for by key or as an attribute; names the nearest."""
+
+    # a KeyError would put its message between quotes
+    __str__ = Exception.__str__
+
+
+def no_column(name: object, known: Iterable[str]) -> str:
+    """
+    What to tell somebody who names a column that does not exist.
+
+    Examples
+    --------
+    >>> from scanfab.base.column import no_column
+    >>> no_column("alpha_v", ["frame", "alpha_vs"])
+    "there is no column 'alpha_v': did you mean alpha_vs?"
+    """
+    names = list(known)
+    near = get_close_matches(str(name), names, n=1)
+    hint = f"did you mean {near[0]}?" if near else f"the columns are {', '.join(names)}"
+    return f"there is no column {name!r}: {hint}"
+
+
+@cache
+def columns_of_fields(kind: type) -> tuple[Column, ...]:
+    """
+    The columns of a dataclass whose fields are annotated with meaning and, where it has one, unit.
+
+    ``radius: Annotated[float, "of the smallest grain", LENGTH]`` is such a field.
+
+    Examples
+    --------
+    >>> from scanfab.base.column import columns_of_fields
+    >>> from scanfab.table.comparison import SummaryRow
+    >>> columns_of_fields(SummaryRow)[2].meaning
+    'number of frames that enter the fits'
+    """
+    hints = get_type_hints(kind, include_extras=True)
+    return tuple(_column(one.name, hints[one.name]) for one in fields(kind))
+
+
+def _column(name: str, hint: Any) -> Column:
+    meaning, *unit = hint.__metadata__
+    return Column(name, _kind(hint.__origin__), "".join(unit), meaning)
+
+
+def _kind(hint: Any) -> type:
+    """``float`` of ``float | None``, ``list`` of ``list[str]`` and the like."""
+    options = [one for one in get_args(hint) if one is not type(None)]
+    if get_origin(hint) is list:
+        return list
+    kind: type = _kind(options[0]) if options else hint
+    return kind

@@ -1,0 +1,27 @@
+"""The columns of a table that say how a sample was scanned, and what the lines met."""
+
+from __future__ import annotations
+
+from scanfab.base.column import LENGTH, Column
+
+__all__ = ["SCAN_COLUMNS"]
+
+SCAN_COLUMNS = (
+    Column(
+        "solid_fraction",
+        float,
+        "",
+        "of this variant's solids in the RV or periodic cell; else empty",
+    ),
+    Column("directions", int, "", "axes of the direction rule, in each replicate"),
+    Column("replicates", int, "", "number of replicates"),
+    Column("lines", int, "", "scan lines that meet the window (for the whole: any solid)"),
+    Column("segments", int, "", "void segments kept"),
+    Column(
+        "spacing",
+        float,
+        LENGTH,
+        "distance between neighbouring lines of one direction, all replicates together",
+    ),
+    Column("cutoff", float, LENGTH, "shortest void segment kept"),
+)

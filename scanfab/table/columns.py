@@ -1,0 +1,98 @@
+"""The columns of the fabric table, in the order that scripts rely on; new ones come behind."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import is_dataclass
+from typing import Any
+
+from scanfab.base.column import Column, columns_of_fields, no_column
+from scanfab.fabric.contact import CONTACT_COLUMNS
+from scanfab.fabric.jackknife import half_columns, sample_column, without_columns
+from scanfab.fabric.registry import installed_fabrics
+from scanfab.fabric.tensor import COAXIALITY, axis_columns
+from scanfab.fabric.void import VOID_COLUMNS
+from scanfab.packing.columns import SAMPLE_COLUMNS
+from scanfab.scan.columns import SCAN_COLUMNS
+from scanfab.table.row import Row
+
+__all__ = ["COLUMNS", "OWN_COLUMNS", "columns_of", "complete_row", "table_columns"]
+
+FRAME_COLUMNS = (
+    Column("source", str, "", "the series as given: folder, file, or the files' common folder"),
+    Column("frame", int, "", "index in the series, from 0"),
+    Column("step", int, "", "of the dump"),
+    Column("time", float, "time", "of the dump"),
+    Column(
+        "strain",
+        float,
+        "",
+        "axial strain 1 - L/L0 along the loading axis, positive in compression",
+    ),
+    Column("variant", str, "", "a whole sample, b without rattlers, c RV, d RV without rattlers"),
+)
+SHEAR_STRAIN = Column(
+    "shear_strain",
+    float,
+    "",
+    "of a cell that repeats along all its vectors, since the first frame: √(2/3 e:e) of the "
+    "logarithmic strain's deviator e; else empty",
+)
+
+OWN_COLUMNS = (
+    *FRAME_COLUMNS,
+    *SAMPLE_COLUMNS,
+    *SCAN_COLUMNS,
+    *VOID_COLUMNS,
+    *CONTACT_COLUMNS,
+    sample_column("alpha_vs_axial"),
+    sample_column("alpha_c_axial"),
+    *without_columns("alpha_vs_axial", "segments"),
+    *without_columns("alpha_c_axial", "contacts"),
+    *axis_columns("gvs", "void fabric"),
+    *axis_columns("gc", "contact fabric"),
+    COAXIALITY,
+    SHEAR_STRAIN,
+    *half_columns("alpha_vs_axial"),
+)
+"""Those of every fabric table."""
+
+COLUMNS: tuple[str, ...] = tuple(one.name for one in OWN_COLUMNS)
+"""Their names."""
+
+
+def table_columns() -> tuple[Column, ...]:
+    """The columns of the tables that are computed here: behind the own, those of other fabrics."""
+    more = (column for fabric in installed_fabrics().values() for column in fabric.columns)
+    return (*OWN_COLUMNS, *more)
+
+
+def columns_of(kind: type) -> tuple[Column, ...]:
+    """The columns of a kind of rows: the fabric table's, or the fields of a dataclass."""
+    return columns_of_fields(kind) if is_dataclass(kind) else table_columns()
+
+
+def complete_row(values: Mapping[str, Any]) -> Row:
+    """
+    A row that has all columns, in their order.
+
+    Raises
+    ------
+    TypeError
+        If a value is of no column, or a column has no value: the code that computes them has to
+        be mended.
+
+    Examples
+    --------
+    >>> from scanfab.table.columns import COLUMNS, complete_row
+    >>> complete_row({**dict.fromkeys(COLUMNS), "frame": 3}).frame
+    3
+    """
+    names = [one.name for one in table_columns()]
+    for name in values:
+        if name not in names:
+            raise TypeError(no_column(name, names))
+    missing = [name for name in names if name not in values]
+    if missing:
+        raise TypeError(f"a row needs a value for each column, None for none: {', '.join(missing)}")
+    return Row(**{name: values[name] for name in names})
