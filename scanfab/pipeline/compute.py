@@ -5,14 +5,14 @@ from __future__ import annotations
 import logging
 import time
 import warnings
-from collections.abc import Callable, Container, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain, islice
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 from scanfab.base.errors import (
     PackingError,
@@ -21,19 +21,20 @@ from scanfab.base.errors import (
     SettingsError,
     SkippedFrameWarning,
 )
+from scanfab.base.option import options_of, takes_options
 from scanfab.base.threads import in_order
 from scanfab.io.reader import Carries
 from scanfab.io.series import Series
 from scanfab.packing.boundary import enclosing_class, existing_values, select_boundary
-from scanfab.packing.cell import Cell
 from scanfab.packing.doubts import cell_doubt, doubts_of
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample
 from scanfab.packing.search import find_contacts
 from scanfab.pipeline.frame import FrameResult, frame_result
 from scanfab.pipeline.plan import Plan, make_plan
-from scanfab.pipeline.settings import STRAIN_MODES, Settings
-from scanfab.pipeline.strain import StrainFile, axial_length, is_flipped, shear_strain
+from scanfab.pipeline.settings import MAX_CHORDS, Settings
+from scanfab.pipeline.strain import Strains
+from scanfab.scan.directions import DirectionRule
 from scanfab.table.table import Row, Table
 
 __all__ = [
@@ -54,7 +55,31 @@ LOGGER = logging.getLogger("scanfab")
 Observer = Callable[[FrameResult], None]
 
 
-def compute(source: Packing | Series, **options: Any) -> Table:
+@takes_options(options_of(Settings))
+def compute(
+    source: Packing | Series,
+    *,
+    variants: str = "abcd",
+    rv: float = 0.7,
+    rv_radius: float | None = None,
+    rv_center: Sequence[float] | None = None,
+    boundary: str | Sequence[str] = (),
+    cutoff: str | float = "1rmin",
+    cutoffs: str | float | Iterable[str | float] | None = None,
+    moment: int = 1,
+    spacing: str | float = "auto",
+    directions: str | int | DirectionRule = "auto",
+    tolerance: float = 1e-4,
+    max_chords: float = MAX_CHORDS,
+    min_contacts: int = 2,
+    contact_tolerance: float = 0.0,
+    axis: str | Sequence[float] = "z",
+    strain: str | Path = "auto",
+    frames: str | int | slice | None = None,
+    seed: int = 0,
+    workers: int | None = None,
+    on_error: str = "stop",
+) -> Table:
     """
     The fabric table of a packing or of a series.
 
@@ -66,9 +91,7 @@ def compute(source: Packing | Series, **options: Any) -> Table:
     ----------
     source : Packing or Series
         One frame, or what :func:`scanfab.read_series` returns: one frame in memory at a time.
-    **options
-        See :meth:`scanfab.Settings.make`: ``variants``, ``rv``, ``boundary``, ``cutoff``,
-        ``spacing``, ``directions``, ``tolerance``, ...
+    {options}
 
     Returns
     -------
@@ -79,6 +102,8 @@ def compute(source: Packing | Series, **options: Any) -> Table:
     ------
     ScanfabError
         If a frame cannot be read, or the settings do not fit the packing.
+    TypeError
+        If there is no such option; names the nearest that there is.
 
     Examples
     --------
@@ -89,7 +114,9 @@ def compute(source: Packing | Series, **options: Any) -> Table:
     >>> bool(table["alpha_c"][0] < 1e-12)
     True
     """
-    return Table(compute_rows(source, Settings.make(**options)))
+    given = locals()
+    settings = Settings(**{option.name: given[option.name] for option in options_of(Settings)})
+    return Table(compute_rows(source, settings))
 
 
 def compute_rows(
@@ -142,7 +169,7 @@ class _Run:
         self.done = done
         self.observe = observe
         self.plan: Plan | None = None
-        self.strains = _Strains(settings)
+        self.strains = Strains(settings)
         self.particles = 0
         self.found = False
 
@@ -319,53 +346,6 @@ def chosen_frames(source: Packing | Series, frames: slice) -> range:
     # without counting the frames first: a dump may hold very many
     endless = 2**62
     return range(endless)[frames]
-
-
-class _Strains:
-    """Strains of the frames of a series, from its first frame that has grains."""
-
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
-        self.file = None if settings.strain in STRAIN_MODES else StrainFile(Path(settings.strain))
-        self.first: float | None = None
-        self.first_cell: Cell | None = None
-        self.cells: dict[int, Cell | None] = {}
-
-    def start(self, sample: Sample) -> None:
-        self.first_cell = sample.packing.cell
-        if self.file is None:
-            self.first = axial_length(sample, self.settings.strain, self.settings.axis)
-
-    def at(self, number: int, sample: Sample) -> tuple[float | None, float | None]:
-        """Axial and shear strain of a frame."""
-        if not sample.grains.any():
-            return self._axial(number, sample), None
-        cell = sample.packing.cell
-        self._warn_of_flips(number, cell)
-        return self._axial(number, sample), shear_strain(cell, self.first_cell)
-
-    def _axial(self, number: int, sample: Sample) -> float | None:
-        if self.file is not None:
-            return self.file.at(number, sample.packing.step)
-        if self.first is None or not sample.grains.any():
-            return None
-        length = axial_length(sample, self.settings.strain, self.settings.axis)
-        return None if length is None or self.first == 0 else 1.0 - length / self.first
-
-    def _warn_of_flips(self, number: int, cell: Cell | None) -> None:
-        """Frames come in any order: each is held against both neighbours that are known."""
-        self.cells[number] = cell
-        step = abs(self.settings.frames.step or 1)
-        for early in (number - step, number):
-            late = early + step
-            if is_flipped(self.cells.get(late), self.cells.get(early)):
-                warnings.warn(
-                    f"the cell seems to be flipped between the frames {early} and {late}: from "
-                    f"there on its vectors are others than in the first frame, and shear_strain is "
-                    f"not the strain since then (LAMMPS: fix deform ... flip no)",
-                    ScanfabWarning,
-                    stacklevel=2,
-                )
 
 
 def classify(packing: Packing, settings: Settings) -> Sample:

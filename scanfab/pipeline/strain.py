@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
 
-from scanfab.base.errors import SettingsError
+from scanfab.base.errors import ScanfabWarning, SettingsError
 from scanfab.io.frame_csv import FrameFile
 from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
+from scanfab.pipeline.settings import STRAIN_MODES, Settings, Vector
 
-__all__ = ["StrainFile", "axial_length", "is_flipped", "shear_strain"]
-
-Vector = tuple[float, float, float]
+__all__ = ["StrainFile", "Strains", "axial_length", "is_flipped", "shear_strain"]
 
 # programs that flip their cells do so when it leans by half a length or a little later
 MOST_TILT = 0.61
@@ -145,3 +145,51 @@ class StrainFile:
         """The strain of a frame; None if the file does not name it."""
         found = self._file.at(frame, step)
         return None if found is None else found[0]
+
+
+class Strains:
+    """Strains of the frames of a series, from its first frame that has grains."""
+
+    def __init__(self, settings: Settings) -> None:
+        self.settings = settings
+        self.file = None if settings.strain in STRAIN_MODES else StrainFile(Path(settings.strain))
+        self.first: float | None = None
+        self.first_cell: Cell | None = None
+        self.cells: dict[int, Cell | None] = {}
+
+    def start(self, sample: Sample) -> None:
+        """Take the lengths of the first frame that has grains."""
+        self.first_cell = sample.packing.cell
+        if self.file is None:
+            self.first = axial_length(sample, self.settings.strain, self.settings.axis)
+
+    def at(self, number: int, sample: Sample) -> tuple[float | None, float | None]:
+        """Axial and shear strain of a frame."""
+        if not sample.grains.any():
+            return self._axial(number, sample), None
+        cell = sample.packing.cell
+        self._warn_of_flips(number, cell)
+        return self._axial(number, sample), shear_strain(cell, self.first_cell)
+
+    def _axial(self, number: int, sample: Sample) -> float | None:
+        if self.file is not None:
+            return self.file.at(number, sample.packing.step)
+        if self.first is None or not sample.grains.any():
+            return None
+        length = axial_length(sample, self.settings.strain, self.settings.axis)
+        return None if length is None or self.first == 0 else 1.0 - length / self.first
+
+    def _warn_of_flips(self, number: int, cell: Cell | None) -> None:
+        """Frames come in any order: each is held against both neighbours that are known."""
+        self.cells[number] = cell
+        step = abs(self.settings.frames.step or 1)
+        for early in (number - step, number):
+            late = early + step
+            if is_flipped(self.cells.get(late), self.cells.get(early)):
+                warnings.warn(
+                    f"the cell seems to be flipped between the frames {early} and {late}: from "
+                    f"there on its vectors are others than in the first frame, and shear_strain is "
+                    f"not the strain since then (LAMMPS: fix deform ... flip no)",
+                    ScanfabWarning,
+                    stacklevel=2,
+                )
