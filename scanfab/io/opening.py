@@ -19,13 +19,14 @@ from scanfab.io.families import (
 from scanfab.io.formats.yade_cells import is_cell_file, refuse_as_numbers
 from scanfab.io.frame_csv import FrameFile
 from scanfab.io.grain_files import PathLike, choose_grains, expanded, files_of, named_once
+from scanfab.io.options import READING_OPTIONS
 from scanfab.io.reader import ReadOptions
 from scanfab.io.series import ContactsFrom, Series
 from scanfab.packing.packing import Packing
 
 __all__ = ["READING", "SETTINGS_FILE", "open_sources", "read", "read_series"]
 
-READING = ("format", "columns", "contact_columns", "radius", "cell", "periodic", "contacts")
+READING = tuple(one.name for one in READING_OPTIONS)
 """The options of :func:`read_series`, by which commands and manifests know them too."""
 
 
