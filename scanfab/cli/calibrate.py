@@ -12,19 +12,14 @@ import click
 from click.core import ParameterSource
 
 from scanfab.cli.options import (
+    EXCERPT,
+    READING,
+    SAMPLE,
+    WINDOW,
+    GroupedOption,
     SourceType,
-    axis_option,
     check_plot,
-    completed,
-    cutoff_option,
-    excerpt_options,
-    output_option,
-    plot_option,
-    reading_options,
-    sample_options,
-    seed_option,
-    window_options,
-    workers_option,
+    options,
 )
 from scanfab.cli.settings_file import fill_from_file
 from scanfab.cli.sources import SourceCommand, open_series, reading_arguments
@@ -54,53 +49,26 @@ TITLES = {
 
 @click.command(cls=SourceCommand)
 @click.argument("source", metavar="SOURCE", type=SourceType())
-@reading_options
-@sample_options
+@options(*READING, *SAMPLE)
 @click.option(
-    "--frame", default=-1, metavar="K", help="Which frame, as in the fabric table (default: last)."
+    "--frame",
+    cls=GroupedOption,
+    group="reading",
+    default=-1,
+    metavar="K",
+    help="Which frame, as in the fabric table (default: last).",
 )
-@click.option(
-    "--variants",
-    default="cd",
-    show_default=True,
-    shell_complete=completed("cd", "c", "d", "abcd"),
-    help="Which variants to compute.",
-)
-@window_options
-@cutoff_option
-@click.option(
-    "--spacing",
-    default="auto",
-    metavar="L",
-    help="Of the ladder of directions (default: 0.25rmin).",
-)
-@click.option(
-    "--directions",
-    default="auto",
-    metavar="N|RULE",
-    help="Of the ladder of spacings (default: icosahedral:9).",
-)
-@click.option(
-    "--tolerance",
-    default=1e-4,
-    show_default=True,
-    metavar="X",
+@options("variants", default="cd")
+@options(*WINDOW, "cutoff")
+@options("spacing", help="Of the ladder of directions (default: 0.25rmin).")
+@options("directions", help="Of the ladder of spacings (default: icosahedral:9).")
+@options(
+    "tolerance",
     help="Standard error of the scan for the ladders of cut-offs and RVs, and the least to ask of "
     "the recommended settings.",
 )
-@click.option(
-    "--max-chords",
-    default=1e10,
-    show_default=True,
-    metavar="N",
-    help="Steps that would cut more chords from grains than this are left out.",
-)
-@axis_option
-@seed_option
-@workers_option
-@output_option
-@excerpt_options
-@plot_option
+@options("max_chords", help="Steps that would cut more chords from grains than this are left out.")
+@options("axis", "seed", "workers", "output", *EXCERPT, "plot")
 @talk_options
 @click.pass_context
 def calibrate(
@@ -110,7 +78,7 @@ def calibrate(
     output: Path | None,
     plot: Path | None,
     frame: int,
-    **options: Any,
+    **chosen: Any,
 ) -> int:
     """
     Show how the void fabric of one frame changes with spacing, directions, cut-off and RV.
@@ -131,11 +99,11 @@ def calibrate(
 
     check_plot(plot, None, ())
     with reported_warnings():
-        options, settings_file = fill_from_file(ctx, (source,), options)
+        chosen, settings_file = fill_from_file(ctx, (source,), chosen)
         with settings_file.named_errors():
-            reading = reading_arguments(options)
-            excerpt = Excerpt.make(StepRow, options.pop("fields"), int(options.pop("digits")))
-            settings = Settings.make(**options)
+            reading = reading_arguments(chosen)
+            excerpt = Excerpt.make(StepRow, chosen.pop("fields"), int(chosen.pop("digits")))
+            settings = Settings(**chosen)
             result = None if output is None else ResultFile(output, StepRow, excerpt)
         announce_compiling()
         series = open_series((source,), reading)

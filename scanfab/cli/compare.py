@@ -9,15 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from scanfab.cli.options import (
-    check_plot,
-    choosing_options,
-    completed,
-    excerpt_options,
-    output_option,
-    plot_option,
-    usage_errors,
-)
+from scanfab.cli.options import EXCERPT, OF_SEVERAL, check_plot, options, usage_errors
 from scanfab.cli.talk import talk_options
 
 if TYPE_CHECKING:
@@ -38,18 +30,11 @@ __all__ = ["compare"]
 @click.option(
     "--differences", is_flag=True, help="One row per frame and pair of variants: how far apart."
 )
-@click.option(
-    "--strain-max", type=float, metavar="X", help="Leave frames beyond this strain out of the fits."
-)
-@choosing_options
-@output_option
-@excerpt_options
-@plot_option
-@click.option(
-    "--figure",
-    metavar="NAME",
-    shell_complete=completed("evolution", "normalised", "correlation"),
-    help="Which figure: evolution, normalised or correlation (default: all on one page).",
+@options("strain_max")
+@options("cutoff", **OF_SEVERAL)
+@options("labels", "output", *EXCERPT, "plot")
+@options(
+    "figure", help="Which figure: evolution, normalised or correlation (default: all on one page)."
 )
 @talk_options
 def compare(

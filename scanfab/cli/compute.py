@@ -11,27 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from scanfab.cli.options import (
-    axis_option,
-    check_plot,
-    completed,
-    cutoff_option,
-    excerpt_options,
-    frames_option,
-    output_option,
-    plot_option,
-    reading_options,
-    sample_options,
-    seed_option,
-    sources_argument,
-    usage_errors,
-    window_options,
-    workers_option,
-)
+from scanfab.cli.options import check_plot, options, sources_argument, usage_errors
 from scanfab.cli.running import Run
 from scanfab.cli.settings_file import SettingsFile, fill_from_file
 from scanfab.cli.sources import SourceCommand, open_series, reading_arguments
 from scanfab.cli.talk import talk_options, tell_inputs
+from scanfab.pipeline.options import OPTIONS, OUTPUT_OPTIONS
 
 if TYPE_CHECKING:
     from scanfab.cli.console import Told
@@ -40,10 +25,11 @@ if TYPE_CHECKING:
 
 __all__ = ["OF_THE_LINE", "compute"]
 
-# what a settings file says nothing of: where results go
+# in the order of the help
+ORDER = ("output", "sample", "reading", "window", "scan", "fabric")
+# what a settings file says nothing of: what is read, where results go, and what is told
 OF_THE_LINE = (
-    "sources", "output", "resume", "manifest_path", "vtk_folder", "plot", "figure", "quiet",
-    "verbose", "help",
+    "sources", "quiet", "verbose", "help", *(one.name for one in OUTPUT_OPTIONS if not one.meaning)
 )  # fmt: skip
 
 # of directions
@@ -54,118 +40,7 @@ RULES = (
 
 @click.command(cls=SourceCommand)
 @sources_argument
-@reading_options
-@sample_options
-@frames_option
-@click.option(
-    "--variants",
-    default="abcd",
-    show_default=True,
-    shell_complete=completed("abcd", "ab", "cd", "ac", *"abcd"),
-    help="Which variants to compute.",
-)
-@window_options
-@cutoff_option
-@click.option(
-    "--cutoffs",
-    metavar="FROM:TO:STEP|L,L,...",
-    help="Several cut-offs, a row for each, from one pass over the void segments.",
-)
-@click.option(
-    "--moment",
-    default=1,
-    show_default=True,
-    metavar="1|2",
-    shell_complete=completed("1", "2"),
-    help="Mean length of the void segments (1), or mean of the squares over the mean (2).",
-)
-@click.option(
-    "--spacing",
-    default="auto",
-    show_default=True,
-    metavar="L",
-    shell_complete=completed("auto"),
-    help="Distance between neighbouring lines, likewise; auto meets --tolerance.",
-)
-@click.option(
-    "--directions",
-    default="auto",
-    show_default=True,
-    metavar="N|RULE",
-    shell_complete=completed(
-        "auto",
-        *(f"{rule}:" for rule in RULES),
-    ),
-    help="N axes, rounded up to the next exact rule, or lebedev:DEGREE, design:DEGREE, "
-    "icosahedral:DEGREE, product:DEGREE, fibonacci:N, equal-angle:STEP, equal-angle-full:STEP.",
-)
-@click.option(
-    "--tolerance",
-    default=1e-4,
-    show_default=True,
-    metavar="X",
-    help="Target standard error of alpha_vs_axial, for every variant, when something is auto.",
-)
-@click.option(
-    "--max-chords",
-    default=1e10,
-    show_default=True,
-    metavar="N",
-    help="An auto scan stops before it cuts more chords from grains than this, in each frame: by "
-    "default after one or two minutes of one processor (lines count like chords).",
-)
-@axis_option
-@click.option(
-    "--strain",
-    default="auto",
-    show_default=True,
-    metavar="auto|cell|boundary|grains|FILE.csv",
-    shell_complete=completed("auto", "cell", "boundary", "grains", files=True),
-    help="Where the axial strain comes from.",
-)
-@seed_option
-@workers_option
-@click.option(
-    "--on-error",
-    default="stop",
-    show_default=True,
-    metavar="stop|skip",
-    shell_complete=completed("stop", "skip"),
-    help="What a frame that cannot be read does.",
-)
-@output_option
-@excerpt_options
-@click.option(
-    "--resume",
-    is_flag=True,
-    help="Go on with FILE.part of an interrupted run, or add what is missing to a complete FILE.",
-)
-@click.option(
-    "--manifest",
-    "manifest_path",
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help="Settings, seed, versions, inputs with size and hash, as JSON (with -o FILE also "
-    "FILE.manifest.json without asking).",
-)
-@click.option(
-    "--vtk",
-    "vtk_folder",
-    type=click.Path(file_okay=False, path_type=Path),
-    metavar="DIR",
-    help="Write files for ParaView of each frame that is computed now.",
-)
-@plot_option
-@click.option(
-    "--figure",
-    metavar="NAME",
-    shell_complete=completed(
-        "evolution", "normalised", "correlation", "rose", "projection", "histogram", "cutoffs"
-    ),
-    help="Which figure: of the table evolution, normalised or correlation (default: all on one "
-    "page); of the first and last frame rose (or rose:30,60,90 for these polar angles), "
-    "projection, histogram or cutoffs.",
-)
+@options(*(one.name for group in ORDER for one in OPTIONS.values() if one.group == group))
 @talk_options
 @click.pass_context
 def compute(
@@ -178,13 +53,18 @@ def compute(
     vtk_folder: Path | None,
     plot: Path | None,
     figure: str | None,
-    **options: Any,
+    **chosen: Any,
 ) -> int:
     """
     Compute the fabric table: one row per frame and variant.
 
     SOURCE is a folder with a series of dumps, files of one series, or - for standard input; what is
     named twice counts once.
+
+    \b
+    A folder:       scanfab compute dumps/ --boundary type=2 -o fabric.csv
+    Several files:  scanfab compute dumps/*.vtk --variants cd --tolerance 1e-3
+    A pipe:         zcat dump.gz | scanfab compute - --format liggghts
 
     Variants: a whole sample; b whole sample, rattlers removed; c representative volume (RV); d RV,
     rattlers removed. Lengths are in the dump's own units.
@@ -201,13 +81,13 @@ def compute(
         raise click.UsageError("--resume goes with -o FILE")
     _check_figure(plot, figure)
     with reported_warnings() as told:
-        options, settings_file = fill_from_file(ctx, sources, options)
-        if options.get("cutoffs") and (vtk_folder is not None or plot is not None):
+        chosen, settings_file = fill_from_file(ctx, sources, chosen)
+        if chosen.get("cutoffs") and (vtk_folder is not None or plot is not None):
             raise click.UsageError("--vtk and --plot are of one cut-off: leave out --cutoffs")
         with settings_file.named_errors():
-            reading = reading_arguments(options)
-            excerpt = Excerpt.make(Row, options.pop("fields"), int(options.pop("digits")))
-            settings = Settings.make(**options)
+            reading = reading_arguments(chosen)
+            excerpt = Excerpt.make(Row, chosen.pop("fields"), int(chosen.pop("digits")))
+            settings = Settings(**chosen)
             result = None if output is None else ResultFile(output, Row, excerpt)
             if manifest_path is not None:
                 check_folder(manifest_path)

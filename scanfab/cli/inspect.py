@@ -8,13 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from scanfab.cli.options import (
-    frames_option,
-    reading_options,
-    sample_options,
-    sources_argument,
-    window_options,
-)
+from scanfab.cli.options import READING, SAMPLE, WINDOW, options, sources_argument
 from scanfab.cli.settings_file import fill_from_file
 from scanfab.cli.sources import SourceCommand, open_series, reading_arguments
 from scanfab.cli.tables import spelt
@@ -28,14 +22,11 @@ __all__ = ["inspect"]
 
 @click.command(cls=SourceCommand)
 @sources_argument
-@reading_options
-@sample_options
-@frames_option
-@window_options
+@options(*READING, "frames", *SAMPLE, *WINDOW)
 @click.option("--json", "as_json", is_flag=True, help="One JSON object a line and frame.")
 @talk_options
 @click.pass_context
-def inspect(ctx: click.Context, /, sources: tuple[str, ...], as_json: bool, **options: Any) -> int:
+def inspect(ctx: click.Context, /, sources: tuple[str, ...], as_json: bool, **chosen: Any) -> int:
     """
     Show what the reader sees in each frame: grains, radii, contacts, rattlers, cell, columns,
     extents, and where the RV would be.
@@ -47,10 +38,10 @@ def inspect(ctx: click.Context, /, sources: tuple[str, ...], as_json: bool, **op
     from scanfab.pipeline.settings import Settings
 
     with reported_warnings():
-        options, settings_file = fill_from_file(ctx, sources, options)
+        chosen, settings_file = fill_from_file(ctx, sources, chosen)
         with settings_file.named_errors():
-            reading = reading_arguments(options)
-            settings = Settings.make(**options)
+            reading = reading_arguments(chosen)
+            settings = Settings(**chosen)
         announce_compiling()
         every = open_series(sources, reading)
         tell_inputs(every, settings.workers)

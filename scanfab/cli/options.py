@@ -1,58 +1,90 @@
-"""Options that several commands share, and how a wrong value is told."""
+"""Options of commands, made of their declarations, and how a wrong value is told."""
 
 from __future__ import annotations
 
 import glob
+import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
 
+from scanfab.base.option import GROUPS, Option
+from scanfab.pipeline.options import COMPARING_OPTIONS, OPTIONS
+
 __all__ = [
     "AS_CSV",
+    "EXCERPT",
+    "OF_SEVERAL",
+    "READING",
+    "SAMPLE",
+    "WINDOW",
+    "GroupedOption",
     "SourceType",
-    "axis_option",
+    "as_options",
     "check_plot",
-    "choosing_options",
-    "completed",
-    "cutoff_option",
-    "excerpt_options",
-    "frames_option",
-    "output_option",
-    "plot_option",
-    "reading_options",
-    "sample_options",
-    "seed_option",
+    "click_option",
+    "options",
     "sources_argument",
     "usage_errors",
-    "window_options",
-    "workers_option",
+    "write_groups",
 ]
 
 Command = Callable[..., Any]
 Completion = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
 
+READING = ("format", "columns", "contact_columns", "radius", "cell", "periodic", "contacts")
+SAMPLE = ("boundary", "min_contacts", "contact_tolerance")
+WINDOW = ("rv", "rv_radius", "rv_center")
+EXCERPT = ("fields", "digits")
+# the cut-off of commands that take tables
+OF_SEVERAL = {
+    "type": float,
+    "default": None,
+    "metavar": "C",
+    "help": "Take the rows of this cut-off from tables of several; in the tables' unit.",
+}
+
+DECLARED = {**OPTIONS, **{one.name: one for one in COMPARING_OPTIONS}}
+NAMES = "|".join(DECLARED)
+TITLES = {"": "What most need", **{group: group.capitalize() for group in GROUPS}}
+
+# letters for an option and what it takes; what is longer has a line of its own
+COLUMN = 22
 # of the context: -o - asks for CSV on standard output, on a terminal too
 AS_CSV = "scanfab.as_csv"
 
 
-def completed(
-    *choices: str, files: bool = False, more: Callable[[], Iterable[str]] = tuple
-) -> Completion:
+def as_options(text: str) -> str:
     """
-    What a shell offers for an option: these words, those of a function, or files.
+    A text of the library, which speaks of its arguments, in the words of the command line.
 
-    The option takes other words too, or complains of them in words of its own.
+    Examples
+    --------
+    >>> from scanfab.cli.options import as_options
+    >>> as_options('choose another `rv_center`, or name the `cell=(LX, LY, LZ)`')
+    'choose another --rv-center, or name the --cell LX LY LZ'
     """
+    return re.sub(rf"`({NAMES})(?:=([^`]*))?`", _as_option, text)
 
-    def complete(ctx: click.Context, parameter: click.Parameter, text: str) -> list[CompletionItem]:
-        found = [CompletionItem(word) for word in (*choices, *more()) if word.startswith(text)]
-        return [*found, CompletionItem(text, type="file")] if files else found
 
-    return complete
+def _as_option(found: re.Match[str]) -> str:
+    name, value = found.groups()
+    return DECLARED[name].flag + ("" if value is None else f" {_as_word(value)}")
+
+
+def _as_word(value: str) -> str:
+    """A value in Python as words of a command line: (1, 2) is 1 2, and {"x": "px"} is x=px."""
+    if value.startswith("("):
+        return value.strip("()").replace(",", "")
+    if value.startswith("{"):
+        return value.strip("{}").replace('"', "").replace(": ", "=").replace(", ", ",")
+    # what a shell takes as it is needs no quotes
+    return re.sub(r'^"([\w.:/+-]*)"$', r"\1", value)
 
 
 @contextmanager
@@ -63,24 +95,123 @@ def usage_errors(before: str = "") -> Iterator[None]:
     try:
         yield
     except (SettingsError, UnknownFormatError) as error:
-        raise click.UsageError(f"{before}{error}") from None
+        # the argument whose value is wrong stands in front
+        text = re.sub(rf"^({NAMES}): ", lambda name: f"{DECLARED[name[1]].flag}: ", str(error))
+        raise click.UsageError(f"{before}{as_options(text)}") from None
 
 
-def together(*options: Callable[[Command], Command]) -> Callable[[Command], Command]:
-    """Several options as one decorator, in the order of the help."""
+def completed(option: Option) -> Completion:
+    """
+    What a shell offers for an option: some words, and files.
+
+    The option takes other words too, or complains of them in words of its own.
+    """
+
+    def complete(ctx: click.Context, parameter: click.Parameter, text: str) -> list[CompletionItem]:
+        found = [CompletionItem(word) for word in option.choices() if word.startswith(text)]
+        return [*found, CompletionItem(text, type="file")] if option.files else found
+
+    return complete
+
+
+class GroupedOption(click.Option):
+    """An option that stands in a group of the help, or among the few that most need."""
+
+    def __init__(self, *args: Any, group: str = "output", **attributes: Any) -> None:
+        super().__init__(*args, **attributes)
+        self.group = group
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        """As click has it, with numbers as they are written: 1e10 and 0, not 10000000000.0."""
+        record = super().get_help_record(ctx)
+        if record is None or not isinstance(self.default, float):
+            return record
+        short = f"{self.default:g}".replace("e+", "e")
+        return record[0], record[1].replace(f"[default: {self.default}]", f"[default: {short}]")
+
+
+def write_groups(
+    command: click.Command, ctx: click.Context, formatter: click.HelpFormatter
+) -> None:
+    """The options of a command in their groups, those first that most need."""
+    found: dict[str, list[tuple[str, str]]] = {group: [] for group in TITLES}
+    for parameter in command.get_params(ctx):
+        record = parameter.get_help_record(ctx) if isinstance(parameter, click.Option) else None
+        if record is not None:
+            # all groups in one column
+            name = record[0].ljust(COLUMN)
+            found[getattr(parameter, "group", "output")].append((name, record[1]))
+    for group, records in found.items():
+        if records:
+            with formatter.section(TITLES[group]):
+                formatter.write_dl(records, col_max=COLUMN)
+
+
+def _output(ctx: click.Context, parameter: click.Parameter, path: Path | None) -> Path | None:
+    """The file; ``-`` is standard output, which gets CSV wherever it goes."""
+    if path == Path("-"):
+        ctx.meta[AS_CSV] = True
+        return None
+    return path
+
+
+def _complete_fields(
+    ctx: click.Context, parameter: click.Parameter, text: str
+) -> list[CompletionItem]:
+    """The columns of what a command writes, behind those that are named already."""
+    from scanfab.pipeline.ladders import StepRow
+    from scanfab.table.columns import columns_of
+    from scanfab.table.comparison import FrameRow, SummaryRow
+    from scanfab.table.row import Row
+
+    of_compare = SummaryRow if ctx.params.get("summary") else FrameRow
+    kind: type = {"calibrate": StepRow, "compare": of_compare}.get(str(ctx.command.name), Row)
+    before, comma, last = text.rpartition(",")
+    names = [one.name for one in columns_of(kind) if one.name not in before.split(",")]
+    return [CompletionItem(before + comma + name) for name in names if name.startswith(last)]
+
+
+a_file = partial(click.Path, dir_okay=False, path_type=Path)
+# what only the command line knows of an option
+MORE: dict[str, dict[str, Any]] = {
+    "fields": {"shell_complete": _complete_fields},
+    "output": {"type": a_file(allow_dash=True), "callback": _output},
+    "vtk_folder": {"type": click.Path(file_okay=False, path_type=Path)},
+}
+
+
+def click_option(option: Option, **changes: Any) -> Callable[[Command], Command]:
+    """An option of a command, as it is declared but for some changes."""
+    attributes: dict[str, Any] = {
+        "cls": GroupedOption,
+        "group": "" if option.first else option.group,
+        "type": a_file() if option.kind is Path else option.kind,
+        "default": option.default,
+        "metavar": option.metavar,
+        "multiple": option.several,
+        "nargs": option.words,
+        "help": option.help,
+        "shell_complete": completed(option),
+    }
+    if option.kind is bool:
+        attributes |= {"is_flag": True, "metavar": None}
+    attributes |= {**MORE.get(option.name, {}), **changes}
+    attributes["help"] = as_options(attributes["help"])
+    default = attributes["default"]
+    shown = default is not None and default is not False and default != ()
+    shown = shown and "(default: " not in attributes["help"]
+    return click.option(option.flag, option.name, show_default=shown, **attributes)
+
+
+def options(*names: str, **changes: Any) -> Callable[[Command], Command]:
+    """Declared options of a command, in this order."""
 
     def add(command: Command) -> Command:
-        for option in reversed(options):
-            command = option(command)
+        for name in reversed(names):
+            command = click_option(DECLARED[name], **changes)(command)
         return command
 
     return add
-
-
-def _reader_names() -> Iterable[str]:
-    from scanfab.io.registry import installed_readers
-
-    return installed_readers()
 
 
 def _expanded(source: str) -> list[Any]:
@@ -117,194 +248,6 @@ def _expand(ctx: click.Context, param: click.Parameter, sources: tuple[str, ...]
 
 sources_argument = click.argument(
     "sources", metavar="SOURCE...", nargs=-1, required=True, type=SourceType(), callback=_expand
-)
-
-reading_options = together(
-    click.option(
-        "--format",
-        metavar="NAME",
-        shell_complete=completed(more=_reader_names),
-        help="Reader to use (default: by content).",
-    ),
-    click.option(
-        "--columns",
-        metavar="NAMES",
-        help='Names of columns that are not the usual ones: "radius=c_rad,x=px".',
-    ),
-    click.option(
-        "--contact-columns",
-        metavar="KEYWORDS",
-        help='Columns of a dump local: LIGGGHTS keywords "pos id force", '
-        'or LAMMPS names "id1=NAME,id2=NAME".',
-    ),
-    click.option(
-        "--radius",
-        type=click.FloatRange(min=0, min_open=True),
-        metavar="L",
-        help="Radius for dumps without one.",
-    ),
-    click.option(
-        "--cell",
-        metavar="LX LY LZ [XY XZ YZ]|FILE.csv",
-        help="The cell, for formats that do not carry it (periodic in xyz unless --periodic); "
-        "FILE.csv has one for each step or frame: step lx ly lz, and xy xz yz if tilted.",
-    ),
-    click.option("--periodic", metavar="xyz", help="Periodic directions (default: the dump's)."),
-    click.option(
-        "--contacts",
-        default="auto",
-        metavar="PATH|file|geometric",
-        shell_complete=completed("file", "geometric", files=True),
-        help="Contacts: a file, folder or glob matched by step; from the dump's own contact files; "
-        "or by geometry (default: file if there is one, else geometric).",
-    ),
-)
-
-sample_options = together(
-    click.option(
-        "--contact-tolerance",
-        default=0.0,
-        show_default=True,
-        metavar="X",
-        help="Relative: contact if distance < (r1 + r2)(1 + X).",
-    ),
-    click.option(
-        "--boundary",
-        multiple=True,
-        metavar="EXPR",
-        help='Which particles are boundary: "type=2", "mask=3,4", "id>=13723"; repeated: or.',
-    ),
-    click.option(
-        "--min-contacts",
-        default=2,
-        show_default=True,
-        metavar="N",
-        help="A grain with fewer contacts is a rattler.",
-    ),
-)
-
-frames_option = click.option(
-    "--frames", metavar="A:B:C", help="Which frames, as a Python slice (default: all)."
-)
-
-window_options = together(
-    click.option(
-        "--rv",
-        default=0.7,
-        show_default=True,
-        metavar="FRACTION",
-        help="Radius of the sphere RV, as a fraction of half the smallest extent of the grains.",
-    ),
-    click.option("--rv-radius", type=float, metavar="L", help="The same in the dump's units."),
-    click.option(
-        "--rv-center",
-        nargs=3,
-        type=float,
-        metavar="X Y Z",
-        help="Centre of the RV (default: middle).",
-    ),
-)
-
-cutoff_option = click.option(
-    "--cutoff",
-    default="1rmin",
-    show_default=True,
-    metavar="L",
-    help="Shortest void segment kept: in the dump's units, or with rmin, rmean, rmax.",
-)
-
-choosing_options = together(
-    click.option(
-        "--cutoff",
-        type=float,
-        metavar="C",
-        help="Take the rows of this cut-off from tables of several; in the tables' unit.",
-    ),
-    click.option(
-        "--label",
-        "labels",
-        multiple=True,
-        metavar="NAME",
-        help="Name of a table in place of its source, once a table, in their order.",
-    ),
-)
-
-axis_option = click.option(
-    "--axis",
-    default="z",
-    show_default=True,
-    metavar="x|y|z|X,Y,Z",
-    shell_complete=completed("x", "y", "z"),
-    help="Loading axis.",
-)
-
-seed_option = click.option(
-    "--seed", default=0, show_default=True, metavar="N", help="Of the random numbers."
-)
-
-workers_option = click.option(
-    "--workers", type=int, metavar="N", help="Parallel workers (default: all cores)."
-)
-
-
-def _output(ctx: click.Context, parameter: click.Parameter, path: Path | None) -> Path | None:
-    """The file; ``-`` is standard output, which gets CSV wherever it goes."""
-    if path == Path("-"):
-        ctx.meta[AS_CSV] = True
-        return None
-    return path
-
-
-output_option = click.option(
-    "-o",
-    "output",
-    type=click.Path(dir_okay=False, path_type=Path, allow_dash=True),
-    callback=_output,
-    metavar="FILE",
-    help="Result file: .csv .tsv .json .jsonl .parquet; - is CSV on standard output (default: the "
-    "same, or a readable table on a terminal).",
-)
-
-
-def _complete_fields(
-    ctx: click.Context, parameter: click.Parameter, text: str
-) -> list[CompletionItem]:
-    """The columns of what a command writes, behind those that are named already."""
-    from dataclasses import fields
-
-    from scanfab.pipeline.ladders import StepRow
-    from scanfab.table.comparison import FrameRow, SummaryRow
-    from scanfab.table.table import Row
-
-    of_compare = SummaryRow if ctx.params.get("summary") else FrameRow
-    kind: type = {"calibrate": StepRow, "compare": of_compare}.get(str(ctx.command.name), Row)
-    before, comma, last = text.rpartition(",")
-    names = [one.name for one in fields(kind) if one.name not in before.split(",")]
-    return [CompletionItem(before + comma + name) for name in names if name.startswith(last)]
-
-
-excerpt_options = together(
-    click.option(
-        "--fields",
-        metavar="NAME,NAME,...",
-        shell_complete=_complete_fields,
-        help="Which columns to write, in this order (default: all).",
-    ),
-    click.option(
-        "--digits",
-        default=17,
-        show_default=True,
-        metavar="N",
-        help="Significant digits of written numbers; 17: as short as reads back the same.",
-    ),
-)
-
-
-plot_option = click.option(
-    "--plot",
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help="Draw to a file: .png .svg .pdf.",
 )
 
 

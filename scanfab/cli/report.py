@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from scanfab.cli.options import choosing_options, usage_errors
+from scanfab.cli.options import OF_SEVERAL, options, usage_errors
 from scanfab.cli.talk import talk_options, working
 
 __all__ = ["report"]
@@ -32,7 +32,8 @@ __all__ = ["report"]
 @click.option(
     "--author", metavar="TEXT", help="Author (default: your full name, if this computer knows it)."
 )
-@choosing_options
+@options("cutoff", **OF_SEVERAL)
+@options("labels")
 @talk_options
 def report(
     tables: tuple[Path, ...],

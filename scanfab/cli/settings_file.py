@@ -33,15 +33,15 @@ class SettingsFile:
     @contextmanager
     def named_errors(self) -> Iterator[None]:
         """Let errors of options that come from the file name it; all are wrong usage."""
-        from scanfab.base.errors import SettingsError, UnknownFormatError
+        from scanfab.cli.options import usage_errors
 
         try:
-            yield
-        except (SettingsError, UnknownFormatError, click.UsageError) as error:
-            text = error.message if isinstance(error, click.UsageError) else str(error)
-            option = text.partition(":")[0].removeprefix("--").replace(" ", "-")
+            with usage_errors():
+                yield
+        except click.UsageError as error:
+            option = error.message.partition(":")[0].removeprefix("--").replace(" ", "-")
             before = f"{self.path}: " if self.path and option in self.used else ""
-            raise click.UsageError(f"{before}{text}") from None
+            raise click.UsageError(f"{before}{error.message}") from None
 
     def asked(self) -> dict[str, Any]:
         """As a manifest lists it; nothing without a file."""

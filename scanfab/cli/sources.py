@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from scanfab.cli.options import usage_errors
+from scanfab.cli.options import usage_errors, write_groups
+from scanfab.io.options import READING_OPTIONS
 
 if TYPE_CHECKING:
     from scanfab.io.series import Series
@@ -18,7 +18,11 @@ __all__ = ["SourceCommand", "open_series", "reading_arguments"]
 
 
 class SourceCommand(click.Command):
-    """A command with sources, whose --cell takes three or six numbers, or a file."""
+    """A command with sources: help in groups, and --cell takes three or six numbers, or a file."""
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The options in their groups."""
+        write_groups(self, ctx, formatter)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Join the numbers behind --cell into one word, as click knows no variable count."""
@@ -36,12 +40,8 @@ class SourceCommand(click.Command):
 
 def reading_arguments(options: dict[str, Any]) -> dict[str, Any]:
     """Take the reading options out of a command's, as arguments of ``read_series``."""
-    from scanfab.io.opening import READING
-
-    taken = {name: options.pop(name) for name in READING}
-    taken["columns"] = _column_names(taken["columns"])
-    taken["cell"] = _cell(taken["cell"])
-    _check_periodic(taken["periodic"])
+    with usage_errors():
+        taken = {one.name: one.parse(one.name, options.pop(one.name)) for one in READING_OPTIONS}
     if taken["format"] is not None:
         _check_format(taken["format"])
     return taken
@@ -73,41 +73,6 @@ def _leading_numbers(words: list[str]) -> int:
     while count < len(words) and re.fullmatch(r"[-+]?[\d.]+([eE][-+]?\d+)?", words[count]):
         count += 1
     return 6 if count >= 6 else min(count, 3)
-
-
-def _cell(text: str | None) -> tuple[float, ...] | str | None:
-    """Numbers, or the name of a file that has those of each frame."""
-    if text is None or Path(text).is_file():
-        return text
-    try:
-        numbers = tuple(float(word) for word in text.split())
-    except ValueError:
-        numbers = ()
-    if len(numbers) not in (3, 6) or min(numbers[:3]) <= 0:
-        raise click.UsageError(
-            f"--cell: expected three lengths LX LY LZ above 0, or six numbers with XY XZ YZ, or a "
-            f"CSV file with those of each frame, found {text!r}"
-        )
-    return numbers
-
-
-def _column_names(text: str | None) -> dict[str, str] | None:
-    if text is None:
-        return None
-    names = {}
-    for part in text.split(","):
-        standard, equals, own = part.partition("=")
-        if not (equals and standard.strip() and own.strip()):
-            raise click.UsageError(
-                f'--columns: expected NAME=COLUMN such as "radius=c_rad,x=px", found {part!r}'
-            )
-        names[standard.strip()] = own.strip()
-    return names
-
-
-def _check_periodic(letters: str | None) -> None:
-    if letters is not None and not re.fullmatch("[xyz]{0,3}", letters):
-        raise click.UsageError(f"--periodic: expected letters out of xyz, found {letters!r}")
 
 
 def _check_format(name: str) -> None:

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from scanfab.cli.options import (
-    axis_option,
-    cutoff_option,
-    reading_options,
-    sample_options,
+    READING,
+    SAMPLE,
+    WINDOW,
+    GroupedOption,
+    options,
     sources_argument,
-    window_options,
 )
 from scanfab.cli.settings_file import fill_from_file
 from scanfab.cli.sources import SourceCommand, open_series, reading_arguments
@@ -31,18 +31,17 @@ LONGEST_SOURCE = 60
 
 @click.command(cls=SourceCommand)
 @sources_argument
-@reading_options
-@sample_options
+@options(*READING)
 @click.option(
     "--frame",
+    cls=GroupedOption,
+    group="reading",
     default=0,
     show_default=True,
     metavar="K",
     help="Which frame; negative: from the end.",
 )
-@window_options
-@cutoff_option
-@axis_option
+@options(*SAMPLE, *WINDOW, "cutoff", "axis")
 @click.option(
     "--cut", is_flag=True, help="Leave out the grains in front, and show scan lines in the section."
 )
@@ -61,7 +60,7 @@ def view(
     frame: int,
     cut: bool,
     screenshot: Path | None,
-    **options: Any,
+    **chosen: Any,
 ) -> int:
     """
     Show a frame in 3D: grains, rattlers, and the representative volume (RV).
@@ -75,10 +74,10 @@ def view(
     from scanfab.pipeline.settings import Settings
 
     with reported_warnings():
-        options, settings_file = fill_from_file(ctx, sources, options)
+        chosen, settings_file = fill_from_file(ctx, sources, chosen)
         with settings_file.named_errors():
-            reading = reading_arguments(options)
-            settings = Settings.make(variants="c", **options)
+            reading = reading_arguments(chosen)
+            settings = Settings(variants="c", **chosen)
             if screenshot is not None:
                 if screenshot.suffix.lower() != ".png":
                     raise SettingsError(f"{screenshot}: screenshots are PNG files: name one .png")

@@ -25,13 +25,14 @@ from scanfab.io.grain_files import (
     named_once,
     series_below,
 )
+from scanfab.io.options import READING_OPTIONS
 from scanfab.io.reader import ReadOptions
 from scanfab.io.series import ContactsFrom, Series
 from scanfab.packing.packing import Packing
 
 __all__ = ["READING", "SETTINGS_FILE", "open_sources", "read", "read_series"]
 
-READING = ("format", "columns", "contact_columns", "radius", "cell", "periodic", "contacts")
+READING = tuple(one.name for one in READING_OPTIONS)
 """The options of :func:`read_series`, by which commands and manifests know them too."""
 
 

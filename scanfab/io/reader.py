@@ -9,8 +9,8 @@ from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy.typing as npt
 
-from scanfab.base.errors import SettingsError
 from scanfab.base.typing import FloatArray, IntArray
+from scanfab.io.options import parse_cell, parse_periodic, parse_radius
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import ContactList
 
@@ -55,16 +55,9 @@ class ReadOptions:
 
     def __post_init__(self) -> None:
         """Raise SettingsError if a value cannot be used."""
-        cell, periodic = self.cell, self.periodic
-        if cell is not None and (len(cell) not in (3, 6) or not min(cell[:3]) > 0):
-            raise SettingsError(
-                f"cell: expected three lengths LX LY LZ above 0, or six numbers with XY XZ YZ, "
-                f"found {tuple(cell)}"
-            )
-        if periodic is not None and not set(periodic) <= set("xyz"):
-            raise SettingsError(f"periodic: expected letters out of xyz, found {periodic!r}")
-        if self.radius is not None and not 0 < self.radius < float("inf"):
-            raise SettingsError(f"radius: expected a length above 0, found {self.radius}")
+        parse_cell("cell", self.cell)
+        parse_periodic("periodic", self.periodic)
+        parse_radius("radius", self.radius)
 
 
 @dataclass(frozen=True)

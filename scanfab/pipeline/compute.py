@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable, Container, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from itertools import chain, islice
-from typing import Any
+from pathlib import Path
 
+from scanfab.base.option import options_of, takes_options
 from scanfab.base.threads import in_order
 from scanfab.io.series import Series
 from scanfab.packing.packing import Packing
@@ -18,8 +19,9 @@ from scanfab.packing.sample import Sample
 from scanfab.pipeline.frame import FrameResult, frame_result
 from scanfab.pipeline.frames import Frames, Readable
 from scanfab.pipeline.plan import Plan, make_plan
-from scanfab.pipeline.settings import Settings
+from scanfab.pipeline.settings import MAX_CHORDS, Settings
 from scanfab.pipeline.strain import Strains
+from scanfab.scan.directions import DirectionRule
 from scanfab.table.table import Row, Table
 
 __all__ = ["FrameResult", "compute", "compute_rows"]
@@ -29,7 +31,31 @@ LOGGER = logging.getLogger("scanfab")
 Observer = Callable[[FrameResult], None]
 
 
-def compute(source: Packing | Series, **options: Any) -> Table:
+@takes_options(options_of(Settings))
+def compute(
+    source: Packing | Series,
+    *,
+    variants: str = "abcd",
+    rv: float = 0.7,
+    rv_radius: float | None = None,
+    rv_center: Sequence[float] | None = None,
+    boundary: str | Sequence[str] = (),
+    cutoff: str | float = "1rmin",
+    cutoffs: str | float | Iterable[str | float] | None = None,
+    moment: int = 1,
+    spacing: str | float = "auto",
+    directions: str | int | DirectionRule = "auto",
+    tolerance: float = 1e-4,
+    max_chords: float = MAX_CHORDS,
+    min_contacts: int = 2,
+    contact_tolerance: float = 0.0,
+    axis: str | Sequence[float] = "z",
+    strain: str | Path = "auto",
+    frames: str | int | slice | None = None,
+    seed: int = 0,
+    workers: int | None = None,
+    on_error: str = "stop",
+) -> Table:
     """
     The fabric table of a packing or of a series.
 
@@ -41,9 +67,7 @@ def compute(source: Packing | Series, **options: Any) -> Table:
     ----------
     source : Packing or Series
         One frame, or what :func:`scanfab.read_series` returns: one frame in memory at a time.
-    **options
-        See :meth:`scanfab.Settings.make`: ``variants``, ``rv``, ``boundary``, ``cutoff``,
-        ``spacing``, ``directions``, ``tolerance``, ...
+    {options}
 
     Returns
     -------
@@ -54,6 +78,8 @@ def compute(source: Packing | Series, **options: Any) -> Table:
     ------
     ScanfabError
         If a frame cannot be read, or the settings do not fit the packing.
+    TypeError
+        If there is no such option; names the nearest that there is.
 
     Examples
     --------
@@ -64,7 +90,9 @@ def compute(source: Packing | Series, **options: Any) -> Table:
     >>> bool(table["alpha_c"][0] < 1e-12)
     True
     """
-    return Table(compute_rows(source, Settings.make(**options)))
+    given = locals()
+    settings = Settings(**{option.name: given[option.name] for option in options_of(Settings)})
+    return Table(compute_rows(source, settings))
 
 
 def compute_rows(

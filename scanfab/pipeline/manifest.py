@@ -10,6 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from scanfab.base.option import options_of
 from scanfab.io.series import Series
 from scanfab.pipeline.settings import STRAIN_MODES, Settings
 from scanfab.scan.directions import DirectionRule
@@ -38,9 +39,7 @@ def asked_for(
         Of the computation.
     """
     chosen = {
-        name: _plain(getattr(settings, name))
-        for name in Settings.__dataclass_fields__
-        if name != "workers"
+        one.name: _plain(getattr(settings, one.name)) for one in options_of(Settings) if one.meaning
     }
     return {"scanfab": version("scanfab"), "sources": list(sources), **_plain(reading), **chosen}
 

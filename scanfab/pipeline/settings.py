@@ -1,371 +1,295 @@
-"""Settings of a computation: frozen, and checked once, before any frame is read."""
+"""Settings of a computation: each option declared once, checked when they are made, frozen."""
 
 from __future__ import annotations
 
 import math
-import os
-import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
-from pathlib import Path
-from typing import Literal
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
-from scanfab.base.errors import SettingsError
-from scanfab.packing.boundary import BoundaryRule
-from scanfab.scan.directions import DirectionRule, direction_rule
+from scanfab.base.option import (
+    number,
+    one_of,
+    option,
+    optional,
+    options_of,
+    refuse_unknown,
+    whole,
+)
+from scanfab.pipeline.values import (
+    AXES,
+    STRAIN_MODES,
+    Axis,
+    Length,
+    Vector,
+    parse_axis,
+    parse_boundary,
+    parse_cutoff,
+    parse_cutoffs,
+    parse_directions,
+    parse_frames,
+    parse_spacing,
+    parse_strain,
+    parse_variants,
+    parse_vector,
+    parse_workers,
+)
 
-__all__ = [
-    "AUTO_RULE",
-    "AXES",
-    "MAX_CHORDS",
-    "Length",
-    "Settings",
-    "parse_axis",
-    "parse_frames",
-    "parse_length",
-]
+if TYPE_CHECKING:
+    from scanfab.packing.boundary import BoundaryRule
+    from scanfab.scan.directions import DirectionRule
 
-Vector = tuple[float, float, float]
+__all__ = ["AUTO_RULE", "AXES", "MAX_CHORDS", "STRAIN_MODES", "Length", "Settings", "Vector"]
 
-AXES: dict[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 # equal weights and few axes: the random turns of the replicates do the rest
 AUTO_RULE = "icosahedral:9"
-MOST_CUTOFFS = 1000
 # of an auto scan of one frame: one to two minutes of one processor, some hundred times what dense
 # packings need for the default tolerance
 MAX_CHORDS = 1e10
-STRAIN_MODES = ("auto", "cell", "boundary", "grains")
+RULE_NAMES = (
+    "lebedev", "design", "icosahedral", "product", "fibonacci", "equal-angle", "equal-angle-full",
+)  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Length:
-    """A length in the dump's unit, or relative to a radius of the series' first frame."""
-
-    value: float
-    unit: Literal["", "rmin", "rmean", "rmax"] = ""
-
-    def resolve(self, radii: dict[str, float]) -> float:
-        """The length in the dump's unit."""
-        return self.value * (radii[self.unit] if self.unit else 1.0)
-
-
-def parse_length(name: str, text: str | float | Length) -> Length:
-    """
-    A length as users write it: ``0.5``, ``1rmin``, ``0.2rmean``.
-
-    Examples
-    --------
-    >>> from scanfab.pipeline.settings import parse_length
-    >>> parse_length("cutoff", "0.5rmin")
-    Length(value=0.5, unit='rmin')
-    """
-    if isinstance(text, Length):
-        return text
-    match = re.fullmatch(r"\s*([^a-df-z\s]+)\s*(rmin|rmean|rmax)?\s*", str(text))
-    try:
-        value = float(match[1]) if match else math.nan
-    except ValueError:
-        value = math.nan
-    if match is None or not math.isfinite(value):
-        raise SettingsError(
-            f"{name}: expected a length such as 0.0005 or 1rmin (rmin, rmean, rmax), "
-            f"found {str(text)!r}"
-        )
-    return Length(value, match[2] or "")  # type: ignore[arg-type]
-
-
-def parse_lengths(name: str, text: str | float | Iterable[str | float]) -> tuple[Length, ...]:
-    """
-    Lengths as ``FROM:TO:STEP``, both ends included, as ``L,L,...``, or one by one.
-
-    Examples
-    --------
-    >>> from scanfab.pipeline.settings import parse_lengths
-    >>> [length.value for length in parse_lengths("cutoffs", "0:1rmin:0.5rmin")]
-    [0.0, 0.5, 1.0]
-    """
-    if not isinstance(text, str):
-        parts = text if isinstance(text, Iterable) else [text]
-        return tuple(parse_length(name, part) for part in parts)
-    if ":" not in text:
-        return tuple(parse_length(name, part) for part in text.split(","))
-    lengths = [parse_length(name, part) for part in text.split(":")]
-    units = {length.unit for length in lengths if length.value != 0}
-    if len(lengths) != 3 or len(units) > 1 or lengths[2].value <= 0:
-        raise SettingsError(
-            f"{name}: expected FROM:TO:STEP of one unit such as 0:3rmin:0.1rmin, found {text!r}"
-        )
-    first, last, step = (length.value for length in lengths)
-    count = math.floor((last - first) / step + 1e-9) + 1
-    if not 1 <= count <= MOST_CUTOFFS:
-        raise SettingsError(
-            f"{name}: expected 1 to {MOST_CUTOFFS} of them, found {count}: {text!r}"
-        )
-    # not by adding steps, whose rounding would show
-    return tuple(Length(round(first + k * step, 12), *units) for k in range(count))
-
-
-def _number(name: str, value: object) -> float:
-    try:
-        return float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        raise SettingsError(f"{name}: expected a number, found {value!r}") from None
-
-
-def _whole(name: str, value: object) -> int:
-    number = _number(name, value)
-    if not number.is_integer():
-        raise SettingsError(f"{name}: expected a whole number, found {value!r}")
-    return int(number)
-
-
-def _vector(name: str, values: Sequence[float]) -> Vector:
-    numbers = tuple(_number(name, value) for value in values) if hasattr(values, "__len__") else ()
-    if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
-        raise SettingsError(f"{name}: expected three finite numbers, found {values!r}")
-    return numbers
-
-
-def _rule(directions: str | int | DirectionRule) -> DirectionRule | None:
-    if directions == "auto":
-        return None
-    rule = directions if isinstance(directions, DirectionRule) else direction_rule(str(directions))
-    if rule.is_flat:
-        raise SettingsError(
-            f"directions: the {len(rule)} axes of {rule.name} lie in one plane, across which they "
-            f"say nothing: take more of them"
-        )
-    return rule
-
-
-def parse_axis(text: str | Vector) -> Vector:
-    """A unit vector from ``x``, ``y``, ``z`` or three numbers."""
-    if isinstance(text, str) and text in AXES:
-        return AXES[text]
-    try:
-        x, y, z = (float(part) for part in (text.split(",") if isinstance(text, str) else text))
-    except (TypeError, ValueError):
-        x = y = z = math.nan
-    length = math.hypot(x, y, z)
-    if not (math.isfinite(length) and length > 0):
-        raise SettingsError(f"axis: expected x, y, z or three numbers X,Y,Z, found {text!r}")
-    return (x / length, y / length, z / length)
-
-
-def parse_frames(text: str | int | slice | None) -> slice:
-    """A slice from ``A:B:C`` or a single number."""
-    if text is None:
-        return slice(None)
-    if isinstance(text, slice):
-        return text
-    try:
-        numbers = [int(part) if part.strip() else None for part in str(text).split(":")]
-    except ValueError:
-        numbers = []
-    if not 1 <= len(numbers) <= 3 or numbers == [None] or numbers[2:] == [0]:
-        raise SettingsError(f"frames: expected a slice such as 0:10:2, :5 or -1:, found {text!r}")
-    if len(numbers) > 1:
-        return slice(*numbers)
-    number = numbers[0]
-    assert number is not None
-    return slice(number, number + 1 if number != -1 else None)
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class Settings:
     """
     What to compute, and how.
 
-    The fields are the options of ``scanfab compute``; lengths are in the dump's unit. :meth:`make`
-    takes them as the command line does, as text.
+    Settings are made of the options of :func:`scanfab.compute`, written as there; the attributes
+    are what they mean, with lengths in the dump's unit.
+
+    Raises
+    ------
+    SettingsError
+        If a value cannot be used.
+    TypeError
+        If there is no such option.
+
+    Examples
+    --------
+    >>> from scanfab import Settings
+    >>> Settings(cutoff="0.5rmin").cutoff
+    Length(value=0.5, unit='rmin')
     """
 
-    variants: str = "abcd"
-    rv: float = 0.7
-    rv_radius: float | None = None
-    rv_center: Vector | None = None
-    boundary: tuple[BoundaryRule, ...] = ()
-    cutoff: Length = Length(1.0, "rmin")
-    cutoffs: tuple[Length, ...] = ()
+    variants: str = option(
+        default="abcd",
+        parse=parse_variants,
+        group="sample",
+        help="Which variants to compute: letters out of abcd.",
+        meaning="a whole sample, b whole without rattlers, c RV, d RV without rattlers",
+        metavar="LETTERS",
+        choices=lambda: ("abcd", "ab", "cd", "ac", *"abcd"),
+        first=True,
+    )
+    rv: float = option(
+        default=0.7,
+        parse=number("a fraction above 0", lambda value: 0 < value < math.inf),
+        group="window",
+        help="Radius of the sphere RV, as a fraction of half the smallest extent of the grains.",
+        meaning="radius of the RV over half the smallest extent of the grains",
+        takes="float",
+        kind=float,
+        metavar="FRACTION",
+        first=True,
+    )
+    rv_radius: float | None = option(
+        parse=optional(number("a length above 0", lambda value: 0 < value < math.inf)),
+        group="window",
+        help="Radius of the RV in the dump's units, instead of `rv`.",
+        meaning="radius of the RV instead, dump's unit",
+        takes="float",
+        kind=float,
+        metavar="L",
+    )
+    rv_center: Vector | None = option(
+        parse=optional(parse_vector),
+        group="window",
+        help="Centre of the RV (default: middle).",
+        meaning="centre of the RV, dump's unit; not given: the middle of the sample",
+        takes="three floats",
+        kind=float,
+        metavar="X Y Z",
+        words=3,
+    )
+    boundary: tuple[BoundaryRule, ...] = option(
+        default=(),
+        parse=parse_boundary,
+        group="sample",
+        help='Which particles are boundary: "type=2", "mask=3,4", "id>=13723"; several: or.',
+        meaning="particles that are boundary, not grains",
+        takes="str or sequence of str",
+        metavar="EXPR",
+        several=True,
+        first=True,
+    )
+    cutoff: Length = option(
+        default="1rmin",
+        parse=parse_cutoff,
+        group="scan",
+        help="Shortest void segment kept: in the dump's units, or with rmin, rmean, rmax.",
+        meaning="shortest void segment that counts (rmin: smallest grain radius)",
+        takes="str or float",
+        metavar="L",
+    )
+    cutoffs: tuple[Length, ...] = option(
+        parse=parse_cutoffs,
+        group="scan",
+        help="Several cut-offs, a row for each, from one pass over the void segments; `cutoff` is "
+        "then the one at which the scan meets the tolerance.",
+        meaning="several such lengths instead, a row of the table for each",
+        takes="str or sequence of str or float",
+        metavar="FROM:TO:STEP|L,L,...",
+    )
     """Several instead of the one, each with its rows."""
-    moment: int = 1
-    spacing: Length | None = None
+    moment: int = option(
+        default=1,
+        parse=whole("1 or 2", lambda moment: moment in (1, 2)),
+        group="fabric",
+        help="Mean length of the void segments (1), or mean of the squares over the mean (2).",
+        meaning="1: mean length of the void segments; 2: mean of their squares over that",
+        takes="int",
+        kind=int,
+        metavar="1|2",
+        choices=lambda: ("1", "2"),
+    )
+    spacing: Length | None = option(
+        default="auto",
+        parse=parse_spacing,
+        group="scan",
+        help="Distance between neighbouring lines, as `cutoff`; auto meets `tolerance`.",
+        meaning="distance between neighbouring scan lines; auto: as the tolerance needs",
+        takes="str or float",
+        metavar="L",
+        choices=lambda: ("auto",),
+    )
     """None for ``auto``."""
-    directions: DirectionRule | None = None
+    directions: DirectionRule | None = option(
+        default="auto",
+        parse=parse_directions,
+        group="scan",
+        help="N axes, rounded up to the next exact rule, or lebedev:DEGREE, design:DEGREE, "
+        "icosahedral:DEGREE, product:DEGREE, fibonacci:N, equal-angle:STEP, equal-angle-full:STEP.",
+        meaning="rule of the scan directions; auto: as the tolerance needs",
+        takes="str, int or DirectionRule",
+        metavar="N|RULE",
+        choices=lambda: ("auto", *(f"{rule}:" for rule in RULE_NAMES)),
+    )
     """None for ``auto``."""
-    tolerance: float = 1e-4
-    max_chords: float = MAX_CHORDS
-    min_contacts: int = 2
-    contact_tolerance: float = 0.0
-    axis: Vector = AXES["z"]
-    strain: str = "auto"
-    frames: slice = field(default_factory=lambda: slice(None))
-    seed: int = 0
-    workers: int = 1
-    on_error: str = "stop"
+    tolerance: float = option(
+        default=1e-4,
+        parse=number("a number above 0, from 1e-15 to 1e15", lambda value: 1e-15 <= value <= 1e15),
+        group="scan",
+        help="Target standard error of alpha_vs_axial, for every variant, when something is auto.",
+        meaning="wanted standard error of the scan, where spacing or directions are auto",
+        takes="float",
+        kind=float,
+        metavar="X",
+        first=True,
+    )
+    max_chords: float = option(
+        default=MAX_CHORDS,
+        parse=number("a number of at least 1", lambda value: value >= 1),
+        group="scan",
+        help="An auto scan stops before it cuts more chords from grains than this, in each frame: "
+        "by default after one or two minutes of one processor (lines count like chords).",
+        meaning="an auto scan stops before it cuts more chords from grains in a frame",
+        takes="float",
+        kind=float,
+        metavar="N",
+    )
+    min_contacts: int = option(
+        default=2,
+        parse=whole("0 or more", lambda count: count >= 0),
+        group="sample",
+        help="A grain with fewer contacts is a rattler.",
+        meaning="a grain with fewer contacts is a rattler",
+        takes="int",
+        kind=int,
+        metavar="N",
+    )
+    contact_tolerance: float = option(
+        default=0.0,
+        parse=number("0 or more", lambda value: 0 <= value < math.inf),
+        group="sample",
+        help="Of contacts by geometry, relative: contact if distance < (r1 + r2)(1 + X).",
+        meaning="relative tolerance of contacts by geometry",
+        takes="float",
+        kind=float,
+        metavar="X",
+    )
+    axis: Axis = option(
+        default="z",
+        parse=lambda name, value: parse_axis(value, name),
+        group="fabric",
+        help="Loading axis, along which the anisotropies are signed.",
+        meaning="loading axis, along which the anisotropies are signed",
+        takes="str or three floats",
+        metavar="x|y|z|X,Y,Z",
+        choices=lambda: AXES,
+    )
+    strain: str = option(
+        default="auto",
+        parse=parse_strain,
+        group="sample",
+        help="Where the axial strain comes from: auto is the cell if periodic, else the boundary.",
+        meaning="where the axial strain comes from: cell, boundary, grains or a file",
+        takes="str or path",
+        metavar="auto|cell|boundary|grains|FILE.csv",
+        choices=lambda: STRAIN_MODES,
+        files=True,
+    )
+    frames: slice = option(
+        parse=lambda name, value: parse_frames(value, name),
+        group="reading",
+        help="Which frames, as a Python slice (default: all).",
+        meaning="which frames, as a Python slice",
+        takes="str, int or slice",
+        metavar="A:B:C",
+        first=True,
+    )
+    seed: int = option(
+        default=0,
+        parse=whole("0 or more", lambda seed: seed >= 0),
+        group="scan",
+        help="Seed of the random numbers.",
+        meaning="of the random numbers; the same seed repeats the same numbers",
+        takes="int",
+        kind=int,
+        metavar="N",
+    )
+    workers: int = option(
+        parse=parse_workers,
+        group="scan",
+        help="Parallel workers (default: all cores).",
+        takes="int",
+        kind=int,
+        metavar="N",
+        first=True,
+    )
+    on_error: str = option(
+        default="stop",
+        parse=one_of("stop", "skip"),
+        group="reading",
+        help="What a frame that cannot be read does.",
+        meaning="what a frame that cannot be read does: stop, or skip it",
+        metavar="stop|skip",
+        choices=lambda: ("stop", "skip"),
+    )
+
+    def __init__(self, **options: Any) -> None:
+        """Check what users write, and keep what it means."""
+        holder: type = type(self)
+        declared = options_of(holder)
+        refuse_unknown("Settings", options, [one.name for one in declared])
+        for one in declared:
+            value = one.parse(one.name, options.get(one.name, one.default))
+            object.__setattr__(self, one.name, value)
 
     @classmethod
-    def make(
-        cls,
-        *,
-        variants: str = "abcd",
-        rv: float = 0.7,
-        rv_radius: float | None = None,
-        rv_center: Vector | None = None,
-        boundary: str | tuple[str, ...] | list[str] = (),
-        cutoff: str | float = "1rmin",
-        cutoffs: str | float | Iterable[str | float] | None = None,
-        moment: int = 1,
-        spacing: str | float = "auto",
-        directions: str | int | DirectionRule = "auto",
-        tolerance: float = 1e-4,
-        max_chords: float = MAX_CHORDS,
-        min_contacts: int = 2,
-        contact_tolerance: float = 0.0,
-        axis: str | Vector = "z",
-        strain: str | Path = "auto",
-        frames: str | int | slice | None = None,
-        seed: int = 0,
-        workers: int | None = None,
-        on_error: str = "stop",
-    ) -> Settings:
-        """
-        Settings from what users write.
-
-        Parameters
-        ----------
-        variants : str
-            Which of a, b, c, d.
-        rv : float
-            Radius of the sphere RV as a fraction of half the smallest extent of the grains.
-        rv_radius, rv_center : float, three floats, optional
-            The same in the dump's length unit.
-        boundary : str or sequence of str
-            Which particles are boundary: ``type=2``, ``mask=3,4``, ``id>=13723``; joined by or.
-        cutoff, spacing : str or float
-            A length in the dump's unit, or with the suffix ``rmin``, ``rmean`` or ``rmax``; spacing
-            also ``auto``.
-        cutoffs : str or sequence of str or float, optional
-            Several cut-offs in one pass: ``FROM:TO:STEP``, ``L,L,...``, or one by one; ``cutoff``
-            is then the one at which the scan meets the tolerance.
-        moment : int
-            1: ℓ is the mean length of the kept segments; 2: the mean of the squares over the mean.
-        directions : str, int or DirectionRule
-            ``auto``, a number of axes, or a rule, see :func:`scanfab.direction_rule`.
-        tolerance : float
-            Target standard error of ``alpha_vs_axial`` where spacing or directions are ``auto``.
-        max_chords : float
-            An ``auto`` scan stops before it cuts more chords from grains, in each frame.
-        min_contacts : int
-            A grain with fewer contacts is a rattler.
-        contact_tolerance : float
-            Relative tolerance of contacts by geometry.
-        axis : str or three floats
-            Loading axis: x, y, z or a vector.
-        strain : str or path
-            ``auto``, ``cell``, ``boundary``, ``grains`` or a CSV file.
-        frames : str, int or slice, optional
-            Which frames.
-        seed, workers : int
-            Seed of the random numbers; threads (all cores by default).
-        on_error : str
-            What a frame that cannot be read does: ``stop`` or ``skip``.
-
-        Raises
-        ------
-        SettingsError
-            If a value cannot be used.
-        """
-        if not isinstance(variants, str):
-            raise SettingsError(f"variants: expected letters out of abcd, found {variants!r}")
-        if not isinstance(boundary, str | tuple | list):
-            raise SettingsError(f"boundary: expected rules such as type=2, found {boundary!r}")
-        return cls(
-            variants="".join(v for v in "abcd" if v in variants),
-            rv=_number("rv", rv),
-            rv_radius=None if rv_radius is None else _number("rv-radius", rv_radius),
-            rv_center=None if rv_center is None else _vector("rv-center", rv_center),
-            boundary=tuple(
-                BoundaryRule.parse(rule)
-                for rule in ([boundary] if isinstance(boundary, str) else boundary)
-            ),
-            cutoff=parse_length("cutoff", cutoff),
-            cutoffs=() if cutoffs is None else parse_lengths("cutoffs", cutoffs),
-            moment=_whole("moment", moment),
-            spacing=None if spacing == "auto" else parse_length("spacing", spacing),
-            directions=_rule(directions),
-            tolerance=_number("tolerance", tolerance),
-            max_chords=_number("max-chords", max_chords),
-            min_contacts=_whole("min-contacts", min_contacts),
-            contact_tolerance=_number("contact-tolerance", contact_tolerance),
-            axis=parse_axis(axis),
-            strain=str(strain),
-            frames=parse_frames(frames),
-            seed=_whole("seed", seed),
-            workers=(os.cpu_count() or 1) if workers is None else _whole("workers", workers),
-            on_error=on_error,
-        )._checked(variants)
-
-    def _checked(self, variants: str) -> Settings:
-        checks = [
-            (
-                bool(variants) and set(variants) <= set("abcd"),
-                f"variants: expected letters out of abcd, found {variants!r}",
-            ),
-            (
-                self.rv > 0 and math.isfinite(self.rv),
-                f"rv: expected a fraction above 0, found {self.rv:g}",
-            ),
-            (
-                self.rv_radius is None or (self.rv_radius > 0 and math.isfinite(self.rv_radius)),
-                f"rv-radius: expected a length above 0, found {self.rv_radius}",
-            ),
-            (self.cutoff.value >= 0, f"cutoff: expected 0 or more, found {self.cutoff.value:g}"),
-            (
-                all(one.value >= 0 for one in self.cutoffs),
-                "cutoffs: expected lengths of 0 or more",
-            ),
-            (self.moment in (1, 2), f"moment: expected 1 or 2, found {self.moment}"),
-            (
-                self.spacing is None or self.spacing.value > 0,
-                f"spacing: expected a length above 0, found {self.spacing and self.spacing.value}",
-            ),
-            (
-                self.tolerance > 0 and math.isfinite(self.tolerance),
-                f"tolerance: expected a number above 0, found {self.tolerance:g}",
-            ),
-            (
-                1e-15 <= self.tolerance <= 1e15,
-                f"tolerance: expected a number from 1e-15 to 1e15, found {self.tolerance:g}",
-            ),
-            (
-                self.max_chords >= 1,
-                f"max-chords: expected a number of at least 1, found {self.max_chords:g}",
-            ),
-            (
-                self.min_contacts >= 0,
-                f"min-contacts: expected 0 or more, found {self.min_contacts}",
-            ),
-            (
-                self.contact_tolerance >= 0 and math.isfinite(self.contact_tolerance),
-                f"contact-tolerance: expected 0 or more, found {self.contact_tolerance:g}",
-            ),
-            (
-                self.strain in STRAIN_MODES or Path(self.strain).is_file(),
-                f"strain: expected auto, cell, boundary, grains or a CSV file that exists, "
-                f"found {self.strain!r}",
-            ),
-            (
-                self.on_error in ("stop", "skip"),
-                f"on-error: expected stop or skip, found {self.on_error!r}",
-            ),
-            (self.seed >= 0, f"seed: expected 0 or more, found {self.seed}"),
-            (self.workers >= 1, f"workers: expected 1 or more, found {self.workers}"),
-        ]
-        for holds, message in checks:
-            if not holds:
-                raise SettingsError(message)
-        return self
+    def make(cls, **options: Any) -> Settings:
+        """The same as the class itself."""
+        return cls(**options)
 
     @property
     def lists_gaps(self) -> bool:

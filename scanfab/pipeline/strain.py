@@ -11,11 +11,9 @@ from scanfab.base.errors import ScanfabWarning, SettingsError
 from scanfab.io.frame_csv import FrameFile
 from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
-from scanfab.pipeline.settings import STRAIN_MODES, Settings
+from scanfab.pipeline.settings import STRAIN_MODES, Settings, Vector
 
 __all__ = ["StrainFile", "Strains", "axial_length", "is_flipped", "shear_strain"]
-
-Vector = tuple[float, float, float]
 
 # programs that flip their cells do so when it leans by half a length or a little later
 MOST_TILT = 0.61
@@ -160,7 +158,7 @@ class Strains:
         self.cells: dict[int, Cell | None] = {}
 
     def start(self, sample: Sample) -> None:
-        """Take the lengths and the cell of the first frame that has grains."""
+        """Take the lengths of the first frame that has grains."""
         self.first_cell = sample.packing.cell
         if self.file is None:
             self.first = axial_length(sample, self.settings.strain, self.settings.axis)

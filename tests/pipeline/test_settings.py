@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 
 import numpy as np
 import pytest
 
+import scanfab
 from scanfab.base.errors import SettingsError
-from scanfab.pipeline.settings import Length, Settings, parse_axis, parse_frames, parse_length
+from scanfab.base.option import options_of
+from scanfab.pipeline.settings import Settings
+from scanfab.pipeline.values import Length, parse_axis, parse_frames, parse_length
 from scanfab.scan.directions import direction_rule
 from tests.helpers.dumps import write
 
@@ -175,9 +179,7 @@ def test_boundary_is_one_expression_or_several():
     ],
 )
 def test_a_value_that_cannot_be_used_is_an_error_with_its_name(option, value):
-    with pytest.raises(
-        SettingsError, match=f"{option.replace('_', '-')}: expected|{option}: |direction"
-    ):
+    with pytest.raises(SettingsError, match=f"^{option}: (expected|no rule|at least)"):
         Settings.make(**{option: value})
 
 
@@ -267,7 +269,7 @@ def test_there_are_two_moments(moment):
 
 @pytest.mark.parametrize("chords", [0, -1, "many", float("nan")])
 def test_a_budget_of_chords_is_a_number_of_at_least_one(chords):
-    with pytest.raises(SettingsError, match=r"^max-chords: expected"):
+    with pytest.raises(SettingsError, match=r"^max_chords: expected"):
         Settings.make(max_chords=chords)
 
 
@@ -309,7 +311,7 @@ def test_three_directions_across_one_another_will_do():
     ],
 )
 def test_what_has_the_wrong_type_is_refused_by_name(name, value):
-    with pytest.raises(SettingsError, match=f"^{name.replace('_', '-')}: expected"):
+    with pytest.raises(SettingsError, match=f"^{name}: expected"):
         Settings.make(**{name: value})
 
 
@@ -320,3 +322,63 @@ def test_numbers_do_where_the_command_line_has_text():
         Settings.make(cutoffs=[0.5, "1rmin"]).cutoffs == Settings.make(cutoffs="0.5,1rmin").cutoffs
     )
     assert Settings.make(cutoffs=0.5).cutoffs == Settings.make(cutoffs="0.5").cutoffs
+
+
+def test_the_signature_of_compute_has_every_option_and_its_default():
+    signature = inspect.signature(scanfab.compute).parameters
+    options = {name: one.default for name, one in signature.items() if name != "source"}
+    assert options == {one.name: one.default for one in options_of(Settings)}
+    kinds = {one.kind for name, one in signature.items() if name != "source"}
+    assert kinds == {inspect.Parameter.KEYWORD_ONLY}
+
+
+def test_the_help_of_compute_says_what_every_option_means():
+    text = inspect.getdoc(scanfab.compute)
+    for one in options_of(Settings):
+        assert f"\n{one.name} : {one.takes}, optional\n    {one.help[:20]}" in text
+
+
+def test_compute_hands_every_option_to_the_settings(monkeypatch):
+    """Each in its own place."""
+    taken = {}
+
+    def rows(source, settings):
+        taken.update(vars(settings))
+        return iter(())
+
+    monkeypatch.setattr("scanfab.pipeline.compute.compute_rows", rows)
+    given = {
+        "variants": "cd", "rv": 0.6, "rv_radius": 2.0, "rv_center": (1.0, 2.0, 3.0),
+        "boundary": ("type=2",), "cutoff": "2rmin", "cutoffs": "1,2", "moment": 2,
+        "spacing": "1rmean", "directions": direction_rule("9"), "tolerance": 1e-3,
+        "max_chords": 1e5, "min_contacts": 3, "contact_tolerance": 1e-4, "axis": "x",
+        "strain": "cell",
+        "frames": "1:2", "seed": 5, "workers": 3, "on_error": "skip",
+    }  # fmt: skip
+    scanfab.compute(None, **given)
+    assert taken == vars(Settings(**given))
+    usual = vars(Settings(workers=1))
+    assert [name for name in taken if taken[name] == usual[name]] == []
+
+
+def test_a_wrong_name_is_named_with_the_nearest():
+    with pytest.raises(TypeError, match=r"^compute has no option 'varaints': did"):
+        scanfab.compute(scanfab.Packing([[0, 0, 0]], 1.0), varaints="cd")
+    with pytest.raises(
+        TypeError, match=r"^Settings has no option 'tolerence': did you mean 'toler"
+    ):
+        Settings(tolerence=1e-3)
+
+
+def test_there_are_no_unchecked_settings():
+    with pytest.raises(SettingsError, match=r"^rv: expected a fraction above 0, found -1$"):
+        Settings(rv=-1)
+    with pytest.raises(SettingsError, match=r"^cutoff: expected"):
+        dataclasses.replace(Settings(), cutoff=Length(-1.0))
+
+
+def test_settings_made_of_settings_are_the_same():
+    """Also the axis, which would lose its last digit if it were divided by its length again."""
+    settings = Settings(axis="1,2,3", cutoffs="1,2rmin", boundary="type=2", directions=9)
+    again = dataclasses.replace(settings, seed=1)
+    assert dataclasses.replace(again, seed=0) == settings

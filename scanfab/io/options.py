@@ -1,0 +1,130 @@
+"""What users say of a source that it does not say itself: the options of ``read_series``."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from scanfab.base.option import Option, number, optional, unusable
+
+__all__ = ["READING_OPTIONS", "parse_cell", "parse_columns", "parse_periodic", "parse_radius"]
+
+
+def _reader_names() -> Iterable[str]:
+    from scanfab.io.registry import installed_readers
+
+    return installed_readers()
+
+
+def parse_columns(name: str, value: Any) -> dict[str, str] | None:
+    """Standard names to a file's own, from a mapping or from ``NAME=COLUMN,NAME=COLUMN``."""
+    if value is None or isinstance(value, Mapping):
+        return None if value is None else dict(value)
+    names = {}
+    for part in str(value).split(","):
+        standard, equals, own = part.partition("=")
+        if not (equals and standard.strip() and own.strip()):
+            raise unusable(name, 'NAME=COLUMN such as "radius=c_rad,x=px"', part)
+        names[standard.strip()] = own.strip()
+    return names
+
+
+def parse_cell(name: str, value: Any) -> tuple[float, ...] | str | PathLike[str] | None:
+    """Three or six numbers, or the name of a file that has those of each frame."""
+    if value is None or (isinstance(value, str | PathLike) and Path(value).is_file()):
+        return value
+    try:
+        numbers = tuple(map(float, value.split() if isinstance(value, str) else value))
+    except (TypeError, ValueError):
+        numbers = ()
+    if len(numbers) not in (3, 6) or not min(numbers[:3]) > 0:
+        raise unusable(
+            name,
+            "three lengths LX LY LZ above 0, or six numbers with XY XZ YZ, or a CSV file with "
+            "those of each frame",
+            value,
+        )
+    return numbers
+
+
+def parse_periodic(name: str, value: Any) -> str | None:
+    """Letters out of xyz."""
+    if value is not None and not (
+        isinstance(value, str) and len(value) <= 3 and set(value) <= set("xyz")
+    ):
+        raise unusable(name, "letters out of xyz", value)
+    return value
+
+
+parse_radius = optional(number("a length above 0", lambda value: 0 < value < math.inf))
+
+READING_OPTIONS = (
+    Option(
+        name="format",
+        group="reading",
+        help="Reader to use (default: by content).",
+        meaning="reader of the dumps; not given: found by their content",
+        metavar="NAME",
+        choices=_reader_names,
+    ),
+    Option(
+        name="columns",
+        parse=parse_columns,
+        group="reading",
+        help='Names of columns that are not the usual ones: "radius=c_rad,x=px".',
+        meaning="names of columns that are not the usual ones",
+        takes="dict",
+        metavar="NAMES",
+    ),
+    Option(
+        name="contact_columns",
+        group="reading",
+        help='Columns of a dump local: LIGGGHTS keywords "pos id force", or LAMMPS names '
+        '"id1=NAME,id2=NAME".',
+        meaning="what the columns of the contact files are",
+        metavar="KEYWORDS",
+    ),
+    Option(
+        name="radius",
+        parse=parse_radius,
+        group="reading",
+        help="Radius for dumps without one.",
+        meaning="radius of grains whose dump has none, dump's unit",
+        takes="float",
+        kind=float,
+        metavar="L",
+    ),
+    Option(
+        name="cell",
+        parse=parse_cell,
+        group="reading",
+        help="The cell, for formats that do not carry it (periodic in xyz unless `periodic`); "
+        "FILE.csv has one for each step or frame: step lx ly lz, and xy xz yz if tilted.",
+        meaning="the periodic cell, where the dump carries none, dump's unit",
+        takes="tuple of float or path",
+        metavar="LX LY LZ [XY XZ YZ]|FILE.csv",
+    ),
+    Option(
+        name="periodic",
+        parse=parse_periodic,
+        group="reading",
+        help="Periodic directions (default: the dump's).",
+        meaning="directions in which the sample repeats; not given: the dump's",
+        metavar="xyz",
+    ),
+    Option(
+        name="contacts",
+        default="auto",
+        group="reading",
+        help="Contacts: a file, folder or glob matched by step; from the dump's own contact files; "
+        "or by geometry (default: file if there is one, else geometric).",
+        meaning="where the contacts come from: contact files, or the geometry of the grains",
+        takes="str or path",
+        metavar="PATH|file|geometric",
+        choices=lambda: ("file", "geometric"),
+        files=True,
+    ),
+)

@@ -1,0 +1,107 @@
+"""Every option of compute: those of reading, of the settings, and of what is written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from scanfab.base.option import Option, options_of
+from scanfab.io.options import READING_OPTIONS
+from scanfab.pipeline.settings import Settings
+
+__all__ = ["COMPARING_OPTIONS", "MEANINGS", "OPTIONS", "OUTPUT_OPTIONS"]
+
+OUTPUT_OPTIONS = (
+    Option(
+        name="output",
+        group="output",
+        help="Result file: .csv .tsv .json .jsonl .parquet; - is CSV on standard output (default: "
+        "the same, or a readable table on a terminal).",
+        kind=Path,
+        metavar="FILE",
+        spelling="-o",
+        first=True,
+    ),
+    Option(
+        name="fields",
+        group="output",
+        help="Which columns to write, in this order (default: all).",
+        meaning="columns of the table, where not all are written",
+        metavar="NAME,NAME,...",
+    ),
+    Option(
+        name="digits",
+        default=17,
+        group="output",
+        help="Significant digits of written numbers; 17: as short as reads back the same.",
+        meaning="significant digits of the numbers of the table",
+        kind=int,
+        metavar="N",
+    ),
+    Option(
+        name="resume",
+        default=False,
+        group="output",
+        help="Go on with FILE.part of an interrupted run, or add what is missing to a complete "
+        "FILE.",
+        kind=bool,
+    ),
+    Option(
+        name="manifest_path",
+        group="output",
+        help="Settings, seed, versions, inputs with size and hash, as JSON (with `output=FILE` "
+        "also FILE.manifest.json without asking).",
+        kind=Path,
+        metavar="FILE",
+        spelling="--manifest",
+    ),
+    Option(
+        name="vtk_folder",
+        group="output",
+        help="Write files for ParaView of each frame that is computed now.",
+        kind=Path,
+        metavar="DIR",
+        spelling="--vtk",
+    ),
+    Option(
+        name="plot",
+        group="output",
+        help="Draw to a file: .png .svg .pdf.",
+        kind=Path,
+        metavar="FILE",
+    ),
+    Option(
+        name="figure",
+        group="output",
+        help="Which figure: of the table evolution, normalised or correlation (default: all on "
+        "one page); of the first and last frame rose (or rose:30,60,90 for these polar angles), "
+        "projection, histogram or cutoffs.",
+        metavar="NAME",
+        choices=lambda: (
+            "evolution", "normalised", "correlation", "rose", "projection", "histogram", "cutoffs",
+        ),
+    ),
+)  # fmt: skip
+
+COMPARING_OPTIONS = (
+    Option(
+        name="strain_max",
+        group="fabric",
+        help="Leave frames beyond this strain out of the fits.",
+        kind=float,
+        metavar="X",
+    ),
+    Option(
+        name="labels",
+        group="reading",
+        help="Name of a table in place of its source, once a table, in their order.",
+        metavar="NAME",
+        spelling="--label",
+        several=True,
+    ),
+)
+
+OPTIONS = {one.name: one for one in (*READING_OPTIONS, *options_of(Settings), *OUTPUT_OPTIONS)}
+"""The options of compute by name."""
+
+MEANINGS = {name: one.meaning for name, one in OPTIONS.items() if one.meaning}
+"""What each option means that decides a result, in the words of the report."""
