@@ -8,6 +8,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
+    from scanfab.base.convex import sphere
     from scanfab.base.errors import (
         PackingError,
         ReadError,
@@ -69,6 +70,7 @@ _HOME = {
     "read_rows": "table.reading",
     "read_series": "io.opening",
     "scan_lines": "scan.scan",
+    "sphere": "base.convex",
     "void_fabric": "fabric.void",
 }
 
@@ -105,6 +107,7 @@ __all__ = [
     "read_rows",
     "read_series",
     "scan_lines",
+    "sphere",
     "void_fabric",
 ]
 

@@ -11,7 +11,7 @@ from scanfab.base.errors import PackingError, ReadError, ScanfabNote
 from scanfab.io.series import Frame, Series
 from scanfab.packing.doubts import cell_doubt, cell_hint, doubts_of, refuse_impossible
 from scanfab.packing.sample import VARIANTS, Sample
-from scanfab.packing.window import SphereWindow, SurfaceBox
+from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.compute import (
     boundary_hint,
     chosen_frames,
@@ -96,7 +96,7 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
     """
     chosen = chosen_frames(series, settings.frames)
     found = False
-    window: SphereWindow | None = None
+    window: Window | None = None
     for number, frame in enumerate(series):
         if number in chosen:
             found = True
@@ -124,7 +124,7 @@ def _read(frame: Frame, settings: Settings) -> tuple[Sample, list[str]]:
     return sample, [*told, *_hints(frame, sample, settings)]
 
 
-def _rv(series: Series, sample: Sample, settings: Settings) -> SphereWindow | None:
+def _rv(series: Series, sample: Sample, settings: Settings) -> Window | None:
     """The RV, and a word on the boundary, from the first frame that has grains."""
     if not sample.grains.any():
         return None
@@ -138,7 +138,7 @@ def _report(
     frame: Frame,
     sample: Sample,
     told: list[str],
-    window: SphereWindow | None,
+    window: Window | None,
 ) -> FrameReport:
     packing, grains = sample.packing, sample.grains
     radius = packing.radius[grains]
