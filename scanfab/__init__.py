@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from scanfab.base.column import Column
+    from scanfab.base.convex import sphere
     from scanfab.base.errors import (
         PackingError,
         ReadError,
@@ -73,6 +74,7 @@ _HOME = {
     "read_rows": "table.reading",
     "read_series": "io.opening",
     "scan_lines": "scan.scan",
+    "sphere": "base.convex",
     "void_fabric": "fabric.void",
 }
 
@@ -110,6 +112,7 @@ __all__ = [
     "read_rows",
     "read_series",
     "scan_lines",
+    "sphere",
     "void_fabric",
 ]
 

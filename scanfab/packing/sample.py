@@ -14,7 +14,7 @@ import numpy as np
 from scanfab.base.typing import BoolArray, IntArray
 from scanfab.packing.escaped import Escaped, escaped_grains
 from scanfab.packing.packing import Contacts, Packing
-from scanfab.packing.window import SphereWindow, SurfaceBox
+from scanfab.packing.window import SurfaceBox, Window
 
 __all__ = ["VARIANTS", "Sample", "Variant"]
 
@@ -129,28 +129,28 @@ class Sample:
         """Grains that the variant leaves out, shape (N,)."""
         return self.rattlers if variant.without_rattlers else np.zeros(len(self.packing), bool)
 
-    def counted(self, variant: Variant, window: SphereWindow | None) -> BoolArray:
+    def counted(self, variant: Variant, window: Window | None) -> BoolArray:
         """Grains whose centre lies in the variant's window, rattlers included, shape (N,)."""
         if not variant.in_window:
             return self.grains
         assert window is not None
         return self.grains & window.contains(self.packing.position, self.packing)
 
-    def solids(self, variant: Variant, window: SphereWindow | None) -> BoolArray:
+    def solids(self, variant: Variant, window: Window | None) -> BoolArray:
         """Grains of which the variant's lines may meet a part, shape (N,)."""
         left = self.grains & ~self.removed(variant)
         if not variant.in_window:
             return left
         assert window is not None
         position, radius = self.packing.position, self.packing.radius
-        return left & (window.distance(position, self.packing) < window.radius + radius)
+        return left & window.may_meet(position, radius, self.packing)
 
     def contacts_without(self, left_out: BoolArray) -> BoolArray:
         """Contacts of which neither particle is left out, shape (M,)."""
         one, two = self.contacts.pairs.T
         return np.asarray(~(left_out[one] | left_out[two]))
 
-    def fabric_contacts(self, variant: Variant, window: SphereWindow | None) -> BoolArray:
+    def fabric_contacts(self, variant: Variant, window: Window | None) -> BoolArray:
         """Which grain-grain contacts enter the variant's contact fabric, shape (M,)."""
         contacts = self.contacts
         chosen = self.contacts_without(self.boundary | self.removed(variant))
@@ -159,7 +159,7 @@ class Sample:
             chosen &= window.contains(contacts.point, self.packing)
         return np.asarray(chosen)
 
-    def coordination(self, variant: Variant, window: SphereWindow | None) -> float | None:
+    def coordination(self, variant: Variant, window: Window | None) -> float | None:
         """
         Mean number of contacts of the variant's grains, boundary's included.
 

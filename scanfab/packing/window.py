@@ -1,4 +1,4 @@
-"""The sphere RV (representative volume): what lies in it, of lines, grains and contacts."""
+"""The RV (representative volume), the window of c and d: which grains and contacts lie in it."""
 
 from __future__ import annotations
 
@@ -6,37 +6,42 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
 from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 
-__all__ = ["RV_MEANING", "SphereWindow", "SurfaceBox"]
+__all__ = ["RV_MEANING", "SurfaceBox", "Window"]
 
 # for messages: who writes 70 means per cent
 RV_MEANING = "which is a fraction of half the sample's smallest extent, such as 0.7"
 
 
 @dataclass(frozen=True, eq=False)
-class SphereWindow:
-    """A sphere RV, fixed for a series; lengths in the dump's unit."""
+class Window:
+    """An RV, fixed for a series: a region about a centre; lengths in the dump's unit."""
 
     center: FloatArray
     """Shape (3,)."""
-    radius: float
+    shape: Convex
+    """The region, as if its centre were the origin."""
+
+    @property
+    def radius(self) -> float:
+        """Of the ball about the centre that holds the window; of a sphere its own."""
+        return self.shape.reach
 
     def contains(self, points: FloatArray, packing: Packing) -> BoolArray:
         """Which points (shape (N, 3)) lie in the window, through periodic faces too."""
-        return np.asarray(self.distance(points, packing) < self.radius)
+        return self.shape.contains(self.branches(points, packing))
 
-    def distance(self, points: FloatArray, packing: Packing) -> FloatArray:
-        """Distance of points from the centre, nearest image, shape (N,)."""
-        branches = self.branches(points, packing)
-        distance: FloatArray = np.sqrt(np.einsum("ij,ij->i", branches, branches))
-        return distance
+    def may_meet(self, points: FloatArray, radius: FloatArray, packing: Packing) -> BoolArray:
+        """Which spheres may reach into it, likewise: see :meth:`Convex.may_meet`."""
+        return self.shape.may_meet(self.branches(points, packing), radius)
 
     def __str__(self) -> str:
-        return f"RV (radius {self.radius:g} about {np.round(self.center, 9).tolist()})"
+        return f"RV ({self.shape} about {np.round(self.center, 9).tolist()})"
 
     def check_fits(self, packing: Packing) -> None:
         """
@@ -99,13 +104,14 @@ class SurfaceBox:
             middle = np.where(self.cell.periodic, self.cell.center, middle)
         return middle
 
-    def room_around(self, window: SphereWindow) -> float:
+    def room_around(self, window: Window) -> float:
         """
-        The smallest distance from a window to a face.
+        The smallest distance from a window's box to a face.
 
         Negative if it reaches beyond; infinite if all directions are periodic, as there is no face.
         """
-        nearest = np.minimum(window.center - self.low, self.high - window.center)
+        below, above = window.center - self.low, self.high - window.center
+        nearest = np.minimum(below + window.shape.low, above - window.shape.high)
         if self.cell is not None:
             nearest = np.where(self.cell.periodic, np.inf, nearest)
-        return float(nearest.min()) - window.radius
+        return float(nearest.min())

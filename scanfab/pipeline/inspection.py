@@ -13,7 +13,7 @@ from scanfab.base.errors import PackingError, ReadError, ScanfabNote
 from scanfab.io.series import Frame, Series
 from scanfab.packing.doubts import cell_doubt, cell_hint, doubts_of, refuse_impossible
 from scanfab.packing.sample import VARIANTS, Sample
-from scanfab.packing.window import SphereWindow, SurfaceBox
+from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.frames import Frames, boundary_hint
 from scanfab.pipeline.plan import rv_of
 from scanfab.pipeline.settings import Settings
@@ -80,7 +80,7 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
         If a frame cannot be read, or no frame has any of the boundary's particles.
     """
     frames, found = Frames(series, settings), False
-    window: SphereWindow | None = None
+    window: Window | None = None
     for number, frame in enumerate(series):
         if number in frames.chosen:
             found = True
@@ -108,7 +108,7 @@ def _read(frames: Frames, frame: Frame) -> tuple[Sample, list[str]]:
     return sample, [*told, *_hints(frame, sample, frames.settings)]
 
 
-def _rv(frames: Frames, sample: Sample) -> SphereWindow | None:
+def _rv(frames: Frames, sample: Sample) -> Window | None:
     """The RV, and a word on the boundary, from the first frame that has grains."""
     if not sample.grains.any():
         return None
@@ -122,7 +122,7 @@ def _report(
     frame: Frame,
     sample: Sample,
     told: list[str],
-    window: SphereWindow | None,
+    window: Window | None,
 ) -> FrameReport:
     packing, grains = sample.packing, sample.grains
     radius = packing.radius[grains]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.convex import Convex, sphere
 from scanfab.base.typing import FloatArray
 from scanfab.packing.sample import Sample, Variant
 from scanfab.pipeline.plan import CLOSE, Plan
@@ -49,7 +50,7 @@ class Measurement:
     gaps: GapSums | None
     """All gaps of the same lines, where more than one cut-off or moment is asked for."""
     blocked: GapSums
-    """Gaps of fewer lines, by the octant of their middle."""
+    """Gaps of fewer lines, by the block of their middle."""
     block_rule: DirectionRule
     """The directions of these lines."""
     blocks: tuple[Blocks, Blocks]
@@ -65,23 +66,23 @@ class Measurement:
             return self.sums.kept(variant)
         return self.gaps.kept(variant, place, self.moment)
 
-    def spheres_of(self, variant: Variant) -> tuple[FloatArray, FloatArray, float]:
+    def spheres_of(self, variant: Variant) -> tuple[FloatArray, FloatArray, Convex | None]:
         """
         What a few lines of a variant meet, to be looked at.
 
-        Positions (N, 3) and radii (N,) of its solids, and the radius of the sphere about the origin
-        that its lines are clipped to, 0 for none. Of a periodic whole that is a part.
+        Positions (N, 3) and radii (N,) of its solids, and what its lines are clipped to, if
+        anything. Of a periodic whole that is a sphere, a part of it.
         """
         solids, medium = self.solids, self.solids.medium
         position, radius, removed = solids.position, solids.radius, solids.removed
-        reach = solids.window_radius if variant.in_window else 0.0
+        window = solids.window if variant.in_window else None
         cell = self.sample.packing.cell
         if medium is not None and cell is not None and not variant.in_window:
-            reach = 0.5 * float(np.linalg.norm(medium.vectors, axis=1).max())
-            position, row = cell.images_near_origin(medium.position, medium.radius + reach)
+            window = sphere(0.5 * float(np.linalg.norm(medium.vectors, axis=1).max()))
+            position, row = cell.images_near_origin(medium.position, medium.radius + window.reach)
             radius, removed = medium.radius[row], medium.removed[row]
         solid = ~removed if variant.without_rattlers else np.ones(len(radius), bool)
-        return position[solid], radius[solid], reach
+        return position[solid], radius[solid], window
 
 
 def measure(
@@ -130,7 +131,8 @@ def _solids(sample: Sample, plan: Plan, settings: Settings) -> tuple[Solids, Flo
     removed = sample.rattlers[sample.grains]
     origin = position.mean(axis=0) if window is None else window.center
     position = position - origin
-    reach = 0.0 if window is None else window.radius
+    shape = None if window is None else window.shape
+    reach = 0.0 if shape is None else shape.reach
     if packing.cell is not None and packing.is_periodic:
         medium: CellGrains | None = None
         if settings.needs_whole:
@@ -138,11 +140,11 @@ def _solids(sample: Sample, plan: Plan, settings: Settings) -> tuple[Solids, Flo
             position = np.ascontiguousarray(position)
             medium = CellGrains(position, radius, removed, vectors, periodic)
         images, row = packing.cell.images_near_origin(position, radius + reach)
-        return Solids(images, radius[row], removed[row], reach, medium), origin
-    if not settings.needs_whole:
-        near = np.linalg.norm(position, axis=1) < reach + radius
+        return Solids(images, radius[row], removed[row], shape, medium), origin
+    if shape is not None and not settings.needs_whole:
+        near = shape.may_meet(position, radius)
         position, radius, removed = position[near], radius[near], removed[near]
-    return Solids(position, radius, removed, reach), origin
+    return Solids(position, radius, removed, shape), origin
 
 
 def _blocks(sample: Sample, plan: Plan, settings: Settings) -> tuple[Blocks, Blocks]:
@@ -171,7 +173,7 @@ def _block_rule(solids: Solids) -> DirectionRule:
 def _block_spacing(solids: Solids, rule: DirectionRule, sums: ScanSums, plan: Plan) -> float:
     """As close as is of use, but no closer than the sample's scatter is worth."""
     if not len(solids.grain_radius):
-        return solids.window_radius
+        return solids.reach
     spacing = CLOSE * float(solids.grain_radius.mean())
     axes = BLOCK_REPLICATES * len(rule)
     steps = float(sums.steps.mean()) / len(plan.rule) * (plan.spacing / spacing) ** 2

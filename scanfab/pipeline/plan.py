@@ -8,10 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scanfab.base.convex import sphere
 from scanfab.base.errors import ScanfabWarning, SettingsError
 from scanfab.packing.doubts import refuse_impossible
 from scanfab.packing.sample import Sample
-from scanfab.packing.window import RV_MEANING, SphereWindow, SurfaceBox
+from scanfab.packing.window import RV_MEANING, SurfaceBox, Window
 from scanfab.pipeline.settings import AUTO_RULE, Settings
 from scanfab.scan.directions import DirectionRule, direction_rule
 
@@ -38,7 +39,7 @@ CLOSE = 0.3
 class Plan:
     """Lengths (dump's unit) and rule that hold for all frames of a series."""
 
-    window: SphereWindow | None
+    window: Window | None
     cutoff: float
     """Of the scan that is to meet the tolerance."""
     cutoffs: tuple[float, ...]
@@ -108,7 +109,7 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     return Plan(window, cutoff, cutoffs, rule, asked * math.sqrt(replicates), replicates, auto)
 
 
-def rv_of(sample: Sample, settings: Settings) -> SphereWindow:
+def rv_of(sample: Sample, settings: Settings) -> Window:
     """
     The RV that settings make of the first frame that has grains.
 
@@ -128,15 +129,14 @@ def rv_of(sample: Sample, settings: Settings) -> SphereWindow:
             f"rv: a radius of {radius:g} is nothing beside that of the smallest grain "
             f"({smallest:g}): choose a larger --rv or --rv-radius"
         )
-    return SphereWindow(center, radius)
+    return Window(center, sphere(radius))
 
 
-def _check_window(window: SphereWindow, sample: Sample, box: SurfaceBox, largest: float) -> None:
+def _check_window(window: Window, sample: Sample, box: SurfaceBox, largest: float) -> None:
     """Refuse an RV without grains or larger than the sample; warn of one at its surface."""
     packing, grains = sample.packing, sample.grains
-    distance = window.distance(packing.position[grains], packing)
     room = box.room_around(window)
-    if not np.any(distance < window.radius + packing.radius[grains]):
+    if not window.may_meet(packing.position[grains], packing.radius[grains], packing).any():
         raise SettingsError(
             f"the {window} holds no grain: choose another --rv-center or a larger --rv-radius"
         )

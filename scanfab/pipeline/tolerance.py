@@ -212,8 +212,8 @@ def _within_budget(plan: Plan, solids: Solids, settings: Settings) -> Plan:
 
 def _width(solids: Solids) -> float:
     """Of the window, or of the sample (the cell) where there is none."""
-    if solids.window_radius > 0:
-        return 2.0 * solids.window_radius
+    if solids.window is not None:
+        return 2.0 * solids.reach
     if solids.medium is not None:
         return float(np.linalg.norm(solids.medium.vectors, axis=1).max())
     low = (solids.position - solids.radius[:, None]).min(axis=0)
@@ -252,8 +252,8 @@ def _kept_grains(solids: Solids, variant: str) -> float:
         return 1.0
     removed = solids.removed if solids.medium is None else solids.medium.removed
     if variant == "d":
-        inside = np.linalg.norm(solids.position, axis=1) < solids.window_radius
-        removed = solids.removed[inside]
+        assert solids.window is not None
+        removed = solids.removed[solids.window.contains(solids.position)]
     return 1.0 - float(removed.mean()) if len(removed) else 1.0
 
 

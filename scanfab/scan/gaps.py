@@ -1,5 +1,5 @@
 """
-The gap scan: all void segments, by the octant of their middle and by cut-off.
+The gap scan: all void segments, by the block of their middle and by cut-off.
 
 Slower than :mod:`scanfab.scan.scan`, about twice where lines are far apart, and for what that
 cannot tell: the sample's own scatter, every cut-off in one pass, and higher moments of the lengths.
@@ -7,6 +7,7 @@ cannot tell: the sample's own scatter, every cut-off in one pass, and higher mom
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -15,7 +16,7 @@ import numpy.typing as npt
 
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.scan.directions import DirectionRule
-from scanfab.scan.kernels.bins import BLOCKS, Bins
+from scanfab.scan.kernels.bins import Bins
 from scanfab.scan.lines import drawn_lines, line_triads
 from scanfab.scan.scan import MOST_STEPS, Following, in_parts, tally_triads
 from scanfab.scan.solids import Solids, shortest_gap
@@ -26,16 +27,21 @@ __all__ = ["Blocks", "GapSums", "scan_gaps"]
 @dataclass(frozen=True, eq=False)
 class Blocks:
     """
-    Eight blocks of space: octants about a centre, or those of a periodic cell.
+    Blocks of space, such as the octants about a centre, or those of a periodic cell.
 
-    A place x lies in the upper half of the axis i if the fractional part of (M x + t)_i is at least
-    one half; block numbers from 0 count x fastest.
+    Of the axis i, a place x lies in the part ⌊p_i f⌋, where f is the fractional part of
+    (M x + t)_i; block numbers from 0 count the first axis fastest.
     """
 
     matrix: FloatArray
     """M, shape (3, 3), per length unit."""
     shift: FloatArray
     """t, shape (3,), dimensionless."""
+    parts: tuple[int, int, int] = (2, 2, 2)
+    """p: how many blocks there are along each axis."""
+
+    def __len__(self) -> int:
+        return math.prod(self.parts)
 
     @classmethod
     def about(cls, center: FloatArray, reach: float, axis: npt.ArrayLike = (0, 0, 1)) -> Blocks:
@@ -87,10 +93,13 @@ class Blocks:
         array([0, 5])
         """
         numbers = np.zeros(len(places), dtype=np.int64)
-        for axis in range(3):
-            along = places @ self.matrix[axis] + self.shift[axis]
+        before = 1
+        for matrix, shift, parts in zip(self.matrix, self.shift, self.parts, strict=True):
+            along = places @ matrix + shift
             along -= np.floor(along)
-            numbers |= (along >= 0.5).astype(np.int64) << axis
+            # rounding makes a whole period of what is just below 0
+            numbers += before * np.minimum((along * parts).astype(np.int64), parts - 1)
+            before *= parts
         return numbers
 
     def affine(self) -> FloatArray:
@@ -134,7 +143,7 @@ class GapSums:
         without : int, optional
             A block to leave out.
         """
-        blocks = np.arange(BLOCKS) != without
+        blocks = np.arange(self.number.shape[3]) != without
         which = "abcd".index(variant)
         over, under = (self.length, self.number) if moment == 1 else (self.square, self.length)
         return over[:, which, ..., cutoff] @ blocks, under[:, which, ..., cutoff] @ blocks
@@ -163,7 +172,8 @@ def scan_gaps(
     cutoffs : sequence of float
         In ascending order, dump's length unit.
     blocks : two Blocks
-        Of the whole sample and of the window, in the coordinates of ``solids``.
+        Of the whole sample and of the window, in the coordinates of ``solids``; if one has fewer,
+        nothing is in its last ones.
 
     Raises
     ------
@@ -174,15 +184,17 @@ def scan_gaps(
     triads, offsets = drawn_lines(rule, seed, replicates)
     least = np.maximum(np.array(cutoffs, dtype=np.float64), shortest_gap(solids))
     affine = np.array([one.affine() for one in blocks])
+    parts = np.array([one.parts for one in blocks], dtype=np.float64)
+    count = max(len(one) for one in blocks)
 
     def some(triads: FloatArray, offsets: FloatArray) -> FloatArray:
-        bins = Bins(affine, least, np.zeros((len(triads), 2, 2, BLOCKS * len(least), 3)))
+        bins = Bins(affine, parts, least, np.zeros((len(triads), 2, 2, count * len(least), 3)))
         tally_triads(solids, triads, offsets, spacing, least[0], variants, bins, following)
         return bins.sums
 
     sums = in_parts(some, triads, offsets, workers)
     # variants: whole (a, b) and window (c, d)
-    sums = sums.reshape(*offsets.shape[:2], 4, BLOCKS, len(least), 3)
+    sums = sums.reshape(*offsets.shape[:2], 4, count, len(least), 3)
     sums[:, :, [variant not in variants for variant in "abcd"]] = 0.0
     # what reaches a cut-off reaches all below it
     sums = np.flip(np.cumsum(np.flip(sums, axis=4), axis=4), axis=4)

@@ -17,7 +17,7 @@ from scanfab.scan.kernels import sweep
 from scanfab.scan.kernels.axes import scan_axes, scan_cell
 from scanfab.scan.kernels.bins import Bins, no_bins
 from scanfab.scan.lines import drawn_lines
-from scanfab.scan.solids import CellGrains, Solids, check_spacing, shortest_gap
+from scanfab.scan.solids import CellGrains, Solids, check_spacing, clip_of, shortest_gap
 
 __all__ = [
     "MOST_STEPS",
@@ -202,8 +202,8 @@ def scan_lines(
     (4/3) (R³ - r³) / (R² + r²), here 1.87:
 
     >>> import numpy as np
-    >>> from scanfab import Solids, direction_rule, scan_lines
-    >>> solids = Solids(np.zeros((1, 3)), np.ones(1), np.zeros(1, bool), window_radius=2.0)
+    >>> from scanfab import Solids, direction_rule, scan_lines, sphere
+    >>> solids = Solids(np.zeros((1, 3)), np.ones(1), np.zeros(1, bool), window=sphere(2.0))
     >>> sums = scan_lines(solids, direction_rule("lebedev:5"), spacing=0.05, cutoff=0.0)
     >>> length, segments = sums.kept("c")
     >>> round(float(length.sum() / segments.sum()), 2)
@@ -283,8 +283,8 @@ def tally_triads(
             axes = np.ascontiguousarray(triads[:, 2])
             by_lists = _few_lines(medium.radius, spacing, 1 + (both is not None))
             scan_cell(
-                medium, axes, offsets, spacing, cutoff, tallies, by_lists, both, bins,
-                following.left,
+                medium, axes, offsets, spacing, cutoff, clip_of(None), tallies,
+                by_lists, both, bins, following.left,
             )  # fmt: skip
             following.add(float(tallies[:, 0, sweep.STEPS].sum()))
         whole = False
@@ -298,7 +298,7 @@ def tally_triads(
             offsets,
             spacing,
             cutoff,
-            solids.window_radius,
+            clip_of(solids.window),
             tallies,
             _few_lines(solids.radius[solid], spacing, (1 + (both is not None)) * (whole + window)),
             both,

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
+from scanfab.base.convex import Convex
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
+from scanfab.scan.kernels.strips import spans
+from scanfab.scan.solids import clip_of
 
 __all__ = ["Segments", "cut_lines", "grid_points", "sample_segments"]
 
@@ -47,7 +49,7 @@ def cut_lines(
     radius: FloatArray,
     triad: FloatArray,
     points: FloatArray,
-    window_radius: float = 0.0,
+    window: Convex | None = None,
 ) -> Segments:
     """
     Cut parallel lines into solid and void segments.
@@ -57,15 +59,15 @@ def cut_lines(
     Parameters
     ----------
     position : ndarray, shape (N, 3)
-        Centres of the solids; the window, if any, is centred at the origin.
+        Centres of the solids; the window, if any, is lies about the origin.
     radius : ndarray, shape (N,)
         Their radii, dump's length unit.
     triad : ndarray, shape (3, 3)
         Orthonormal rows u, v, n; the lines run along n.
     points : ndarray, shape (L, 2)
         Where the lines pierce the plane through the origin, along u and v.
-    window_radius : float, optional
-        Clip the lines to a sphere, whose surface bounds the first and last segment; 0: only what
+    window : Convex, optional
+        Clip the lines to it: its surface bounds the first and last segment. Without one only what
         lies between the first and the last solid of a line counts.
 
     Returns
@@ -76,17 +78,22 @@ def cut_lines(
     Examples
     --------
     >>> import numpy as np
+    >>> from scanfab import sphere
     >>> from scanfab.scan.segments import cut_lines
-    >>> cut_lines(np.zeros((1, 3)), np.ones(1), np.eye(3), np.zeros((1, 2)), 3.0).length
+    >>> cut_lines(np.zeros((1, 3)), np.ones(1), np.eye(3), np.zeros((1, 2)), sphere(3.0)).length
     array([2., 2., 2.])
     """
     across, depth = position @ triad[:2].T, position @ triad[2]
     ends, void, line = [np.zeros((0, 2, 3))], [np.zeros(0, bool)], [np.arange(0)]
+    clips = np.empty_like(points)
+    if window is not None:
+        spans(clip_of(window), np.ascontiguousarray(triad), np.ascontiguousarray(points), clips)
     for number, point in enumerate(points):
         square = radius**2 - np.sum((across - point) ** 2, axis=1)
         hit = square > 0
         half = np.sqrt(square[hit])
-        bounds, is_void = _cut(depth[hit] - half, depth[hit] + half, _reach(point, window_radius))
+        clip = None if window is None else clips[number]
+        bounds, is_void = _cut(depth[hit] - half, depth[hit] + half, clip)
         places = np.empty((*bounds.shape, 3))
         places[..., :2], places[..., 2] = point, bounds
         ends.append(places @ triad)
@@ -95,20 +102,19 @@ def cut_lines(
     return Segments(np.concatenate(ends), np.concatenate(void), np.concatenate(line))
 
 
-def _reach(point: FloatArray, window_radius: float) -> float | None:
-    """Half the length of a line in the window; None without a window."""
-    if window_radius == 0:
-        return None
-    return math.sqrt(max(window_radius**2 - float(point @ point), 0.0))
+def _cut(
+    start: FloatArray, stop: FloatArray, clip: FloatArray | None
+) -> tuple[FloatArray, BoolArray]:
+    """
+    Solid and void pieces of one line, (K, 2) bounds and (K,) flags, from its chords.
 
-
-def _cut(start: FloatArray, stop: FloatArray, reach: float | None) -> tuple[FloatArray, BoolArray]:
-    """Solid and void pieces of one line, (K, 2) bounds and (K,) flags, from its chords."""
-    if reach is not None:
+    ``clip`` is where it enters and leaves a window, NaN if it misses it.
+    """
+    if clip is not None:
         # what lies outside the window is solid
-        start = np.concatenate([[-np.inf, reach], start])
-        stop = np.concatenate([[-reach, np.inf], stop])
-    if len(start) == 0:
+        start = np.concatenate([[-np.inf, clip[1]], start])
+        stop = np.concatenate([[clip[0], np.inf], stop])
+    if len(start) == 0 or (clip is not None and np.isnan(clip[0])):
         return np.zeros((0, 2)), np.zeros(0, bool)
     order = np.argsort(start)
     start, stop = start[order], np.maximum.accumulate(stop[order])
@@ -116,8 +122,8 @@ def _cut(start: FloatArray, stop: FloatArray, reach: float | None) -> tuple[Floa
     # solid runs alternate with gaps
     bounds = np.concatenate([start[:1], np.column_stack([stop[gap], start[gap + 1]]).ravel()])
     bounds = np.concatenate([bounds, stop[-1:]])
-    if reach is not None:
-        bounds = np.clip(bounds, -reach, reach)
+    if clip is not None:
+        bounds = np.clip(bounds, *clip)
     pieces = np.column_stack([bounds[:-1], bounds[1:]])
     is_void = np.arange(len(pieces)) % 2 == 1
     some = pieces[:, 1] > pieces[:, 0]
@@ -138,19 +144,19 @@ def sample_segments(
     radius: FloatArray,
     triads: FloatArray,
     lines: int,
-    window_radius: float = 0.0,
+    window: Convex | None = None,
 ) -> Segments:
     """
     Cut about so many lines, a grid of them for each of several line triads (D, 3, 3).
 
     Parameters as for :func:`cut_lines`.
     """
-    reach = window_radius
-    if reach == 0 and len(position):
+    reach = 0.0 if window is None else window.reach
+    if window is None and len(position):
         reach = float((np.linalg.norm(position, axis=1) + radius).max())
     if reach == 0:
         return Segments.concatenate([])
     points = grid_points(reach, max(lines // len(triads), 1))
     return Segments.concatenate(
-        cut_lines(position, radius, triad, points, window_radius) for triad in triads
+        cut_lines(position, radius, triad, points, window) for triad in triads
     )

@@ -6,15 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
 from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.scan.kernels.periodic import CellGrains
+from scanfab.scan.kernels.windows import Clip
 
 __all__ = [
     "MAX_LINES",
     "CellGrains",
     "Solids",
     "check_spacing",
+    "clip_of",
     "is_affordable",
     "most_lines",
     "shortest_gap",
@@ -29,9 +32,9 @@ SHORTEST = 1e-9
 @dataclass(frozen=True, eq=False)
 class Solids:
     """
-    The spheres that lines meet, and the sphere window; lengths in the dump's unit.
+    The spheres that lines meet, and the window; lengths in the dump's unit.
 
-    Positions are relative to the window's centre.
+    Positions are relative to the window's origin, the centre of a sphere.
     """
 
     position: FloatArray
@@ -40,10 +43,15 @@ class Solids:
     """Shape (N,)."""
     removed: BoolArray
     """Spheres that the variants b and d leave out, shape (N,)."""
-    window_radius: float = 0.0
-    """Radius of the sphere window; 0 for none."""
+    window: Convex | None = None
+    """What the lines of c and d are clipped to; None if these are not scanned."""
     medium: CellGrains | None = None
     """The grains of a periodic packing, each once, if its whole is scanned, which has no edge."""
+
+    @property
+    def reach(self) -> float:
+        """Radius of the ball about the origin that holds the window; 0 without one."""
+        return 0.0 if self.window is None else self.window.reach
 
     @property
     def grain_radius(self) -> FloatArray:
@@ -61,6 +69,14 @@ class Solids:
         return np.pi * (float(np.sum(self.radius**2)) + of_medium)
 
 
+def clip_of(window: Convex | None) -> Clip:
+    """The numbers of a window; without one, no line meets it."""
+    if window is None:
+        return Clip(np.zeros((0, 4)), 1.0, np.zeros((3, 3)), -1.0, 0.0)
+    isotropic, deviator, level = window.quadric
+    return Clip(window.planes, isotropic, deviator, level, window.reach)
+
+
 def shortest_gap(solids: Solids) -> float:
     """Shorter gaps are rounding, dump's length unit."""
     radius = solids.grain_radius
@@ -74,7 +90,7 @@ def is_affordable(solids: Solids, spacing: float) -> bool:
 
 def most_lines(solids: Solids, spacing: float) -> float:
     """At most so many lines, also such that meet nothing, has one axis of a replicate."""
-    reach = solids.window_radius
+    reach = solids.reach
     if solids.medium is not None:
         # along an axis that does not repeat, what the grains take
         edges = np.linalg.norm(solids.medium.vectors[solids.medium.periodic], axis=1)

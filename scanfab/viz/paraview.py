@@ -113,11 +113,11 @@ def scan_line_sample(
     result: FrameResult, variant: str, axis: Vector, lines: int = LINES
 ) -> Segments:
     """A few scan lines along the loading axis and across it, in the dump's coordinates."""
-    position, radius, reach = result.scanned.spheres_of(VARIANTS[variant])
+    position, radius, window = result.scanned.spheres_of(VARIANTS[variant])
     frame = line_triads(np.array([axis]))[0]
     # along the axis, and along the first direction across it
     frames = np.stack([frame, np.roll(frame, -1, axis=0)])
-    found = sample_segments(position, radius, frames, lines, reach)
+    found = sample_segments(position, radius, frames, lines, window)
     center = scene_of(result.sample, result.scanned.plan.window).center
     return replace(found, ends=found.ends + center)
 
@@ -130,8 +130,8 @@ def _time(result: FrameResult) -> float:
 
 
 def _reach(result: FrameResult) -> float:
-    position, _, reach = result.scanned.spheres_of(VARIANTS[result.rows[-1].variant])
-    return reach or float(np.linalg.norm(position, axis=1).max())
+    position, _, window = result.scanned.spheres_of(VARIANTS[result.rows[-1].variant])
+    return window.reach if window else float(np.linalg.norm(position, axis=1).max())
 
 
 def _tensors(row: Row) -> dict[str, FloatArray]:

@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.convex import sphere
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
-from scanfab.packing.window import SphereWindow
+from scanfab.packing.window import Window
 from scanfab.scan.segments import Segments, cut_lines
 
 __all__ = [
@@ -76,7 +77,7 @@ class Scene:
     """Of a periodic frame."""
 
 
-def scene_of(sample: Sample, window: SphereWindow | None) -> Scene:
+def scene_of(sample: Sample, window: Window | None) -> Scene:
     """The grains of a frame and its RV."""
     chosen = sample.grains if sample.grains.any() else np.ones(len(sample.packing), bool)
     center = np.zeros(3) if window is None else window.center
@@ -136,11 +137,12 @@ def section_lines(scene: Scene, axis: npt.ArrayLike) -> Segments:
     spacing = max(2.5 * float(radius.mean()), reach / 40) if len(radius) else reach
     steps = np.arange(-reach + 0.5 * spacing, reach, spacing) if spacing > 0 else np.zeros(0)
     points = np.column_stack([steps, np.zeros_like(steps)])
-    found = cut_lines(position, radius, frame, points, scene.window_radius or 0.0)
+    window = None if scene.window_radius is None else sphere(scene.window_radius)
+    found = cut_lines(position, radius, frame, points, window)
     return replace(found, ends=found.ends + scene.center)
 
 
-def grains_of(sample: Sample, window: SphereWindow | None) -> Grains:
+def grains_of(sample: Sample, window: Window | None) -> Grains:
     """The particles of a frame, with what the sample knows of them."""
     packing = sample.packing
     return Grains(
@@ -154,7 +156,7 @@ def grains_of(sample: Sample, window: SphereWindow | None) -> Grains:
     )
 
 
-def contact_lines(sample: Sample, window: SphereWindow | None) -> ContactLines:
+def contact_lines(sample: Sample, window: Window | None) -> ContactLines:
     """The contacts of a frame as lines between centres."""
     packing, contacts = sample.packing, sample.contacts
     first, second = packing.position[contacts.pairs].transpose(1, 0, 2)
@@ -169,7 +171,7 @@ def contact_lines(sample: Sample, window: SphereWindow | None) -> ContactLines:
     )
 
 
-def _inside(points: FloatArray, sample: Sample, window: SphereWindow | None) -> BoolArray:
+def _inside(points: FloatArray, sample: Sample, window: Window | None) -> BoolArray:
     if window is None or len(points) == 0:
         return np.zeros(len(points), bool)
     return window.contains(points, sample.packing)

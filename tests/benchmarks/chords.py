@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numba import njit
 
+from scanfab.base.convex import sphere
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.lines import line_triads
 from scanfab.scan.scan import scan_lines
@@ -37,7 +38,7 @@ def rv_solids() -> Solids:
     window = 0.7 * 0.5 * extent.min()
     near = np.linalg.norm(position, axis=1) < window + radius
     removed = np.random.default_rng(1).random(near.sum()) < 0.1
-    return Solids(position[near], radius[near], removed, float(window))
+    return Solids(position[near], radius[near], removed, sphere(float(window)))
 
 
 def sweep(solids, variants="c", directions=1, workers=1):
@@ -159,8 +160,8 @@ class Projected:
         order = np.argsort(depth)
         self.u, self.v, self.depth = u[order], v[order], depth[order]
         self.radius = solids.radius[order]
-        self.lines = int(2 * solids.window_radius / SPACING)
-        self.grid = (-0.5 * self.lines * SPACING, SPACING, self.lines, solids.window_radius)
+        self.lines = int(2 * solids.reach / SPACING)
+        self.grid = (-0.5 * self.lines * SPACING, SPACING, self.lines, solids.reach)
 
     def floor(self, part: slice = slice(None)):
         return floor(self.u[part], self.v[part], self.radius[part], *self.grid)
@@ -259,7 +260,7 @@ def _chords(solids, projected, count, folder, repeats):
 def _variants(solids, repeats):
     position, radius = dense(PAPER)
     removed = np.random.default_rng(1).random(PAPER) < 0.1
-    whole = Solids(position, radius, removed, solids.window_radius)
+    whole = Solids(position, radius, removed, solids.window)
     seconds = interleaved(
         {variants: lambda v=variants: sweep(whole, v) for variants in ("a", "abcd")},
         repeats,

@@ -6,6 +6,7 @@ import time
 
 import numpy as np
 
+from scanfab.base.convex import sphere
 from scanfab.scan.directions import direction_rule
 from scanfab.scan.scan import scan_lines
 from scanfab.scan.solids import CellGrains, Solids
@@ -29,10 +30,11 @@ def samples(variants: str) -> dict[str, Solids]:
     removed = np.random.default_rng(1).random(radius.size) < 0.1
     medium = CellGrains(position, radius, removed, np.diag([edge] * 3), np.ones(3, bool))
     reach = RV * edge if "c" in variants else 0.0
+    window = sphere(reach) if reach else None
     near = np.linalg.norm(position, axis=1) < reach + radius
     return {
-        "open": Solids(position, radius, removed, reach),
-        "periodic": Solids(position[near], radius[near], removed[near], reach, medium),
+        "open": Solids(position, radius, removed, window),
+        "periodic": Solids(position[near], radius[near], removed[near], window, medium),
     }
 
 

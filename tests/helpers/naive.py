@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from scanfab.base.convex import Convex
+
 
 class Gaps(NamedTuple):
     """The void segments on all lines of one grid, in the whole sample and in the window."""
@@ -76,44 +78,87 @@ def lengths(intervals):
     return [end - start for start, end in intervals]
 
 
-def grid_lines(position, radius, triad, offset, spacing, window_radius):
+def grid_lines(position, radius, triad, offset, spacing, window):
     """The lines of a square grid along the third row of a triad (rows u, v, n): x, y, solids."""
     u, v, direction = triad
     surfaces = np.linalg.norm(position, axis=1) + radius
-    number = ceil(max([window_radius, *surfaces]) / spacing) + 1
+    reach = window.reach if isinstance(window, Convex) else window
+    number = ceil(max([reach, *surfaces]) / spacing) + 1
     for i, j in product(range(-number, number + 1), repeat=2):
         x, y = (i + offset[0]) * spacing, (j + offset[1]) * spacing
         yield x, y, union(chords(position, radius, x * u + y * v, direction))
 
 
-def scan(position, radius, triad, offset, spacing, window_radius):
+def within(window, foot, direction):
+    """
+    Where a line enters and leaves a window, a sphere of this radius or a region as data.
+
+    The line is foot + t * direction; what it enters behind where it leaves, it misses.
+    """
+    if not isinstance(window, Convex):
+        half2 = window**2 - foot @ foot
+        return (-sqrt(half2), sqrt(half2)) if half2 > 0 else (0.0, 0.0)
+
+    def rise(t):
+        place, (isotropic, deviator, level) = foot + t * direction, window.quadric
+        return place @ (isotropic * np.eye(3) + deviator) @ place - level
+
+    # the parabola through three of its points
+    one, half_slope = 0.5 * (rise(1) + rise(-1)) - rise(0), 0.25 * (rise(1) - rise(-1))
+    if abs(one) < 1e-12:
+        low, high = (-np.inf, np.inf) if rise(0) < 0 else (0.0, 0.0)
+    else:
+        root = sqrt(max(half_slope**2 - one * rise(0), 0.0))
+        low, high = (-half_slope - root) / one, (-half_slope + root) / one
+    for *normal, distance in window.planes:
+        steepness, rest = direction @ normal, distance - foot @ normal
+        if abs(steepness) < 1e-12:
+            high = high if rest > 0 else low
+        elif steepness > 0:
+            high = min(high, rest / steepness)
+        else:
+            low = max(low, rest / steepness)
+    return low, high
+
+
+def scan(position, radius, triad, offset, spacing, clip):
     """All gaps on the square grid of lines along the third row of a triad (rows u, v, n)."""
     whole, whole_lines, window, window_lines, line_length = [], 0, [], 0, 0.0
-    for x, y, solids in grid_lines(position, radius, triad, offset, spacing, window_radius):
+    for x, y, solids in grid_lines(position, radius, triad, offset, spacing, clip):
         whole += lengths(gaps_between(solids))
         whole_lines += bool(solids)
-        if x * x + y * y < window_radius**2:
-            half = sqrt(window_radius**2 - x * x - y * y)
-            window += lengths(gaps_within(solids, -half, half))
+        low, high = within(clip, x * triad[0] + y * triad[1], triad[2])
+        if low < high:
+            window += lengths(gaps_within(solids, low, high))
             window_lines += 1
-            line_length += 2 * half
+            line_length += high - low
     return Gaps(whole, whole_lines, window, window_lines, line_length)
 
 
-def void_segments(position, radius, triad, offset, spacing, window_radius):
+def void_segments(position, radius, triad, offset, spacing, clip):
     """The void segments on a grid of lines: those of the whole sample, those of the window."""
     u, v, direction = triad
     whole, window = [], []
-    for x, y, solids in grid_lines(position, radius, triad, offset, spacing, window_radius):
-        half = sqrt(max(window_radius**2 - x * x - y * y, 0.0))
+    for x, y, solids in grid_lines(position, radius, triad, offset, spacing, clip):
+        low, high = within(clip, x * u + y * v, direction)
         kinds = [(whole, gaps_between(solids))]
-        if half > 0:
-            kinds.append((window, gaps_within(solids, -half, half)))
+        if low < high:
+            kinds.append((window, gaps_within(solids, low, high)))
         for found, gaps in kinds:
             for start, end in gaps:
                 middle = x * u + y * v + 0.5 * (start + end) * direction
                 found.append(Segment(end - start, middle))
     return whole, window
+
+
+def block(place, blocks):
+    """The block of a place, from its definition."""
+    number, before = 0, 1
+    for axis, parts in enumerate(blocks.parts):
+        along = (blocks.matrix[axis] @ place + blocks.shift[axis]) % 1.0
+        number += before * min(int(along * parts), parts - 1)
+        before *= parts
+    return number
 
 
 def octant(place, center):

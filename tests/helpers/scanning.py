@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from scanfab.base.convex import Convex, sphere
 from scanfab.fabric.void import void_fabric
 from scanfab.scan.directions import direction_rule
 from scanfab.scan.lines import line_triads
@@ -25,12 +26,12 @@ class Estimate(NamedTuple):
         return np.all(off < 4 * self.error) and np.all(off < within * np.abs(expected))
 
 
-def solids_of(spheres, window_radius=0.0, removed=None):
-    """Spheres about the window's centre, as a scan takes them."""
+def solids_of(spheres, window=0.0, removed=None):
+    """Spheres about a window, as a scan takes them: a region, or the radius of a sphere, or 0."""
     none = np.zeros(len(spheres.radius), bool)
-    return Solids(
-        spheres.position, spheres.radius, none if removed is None else removed, window_radius
-    )
+    if not isinstance(window, Convex):
+        window = sphere(window) if window else None
+    return Solids(spheres.position, spheres.radius, none if removed is None else removed, window)
 
 
 def scan_triads(solids, triads, offsets, spacing, cutoff, variants="abcd"):

@@ -189,7 +189,7 @@ def test_lines_in_a_dilute_medium_meet_a_grain_at_last():
         )
         nothing = np.zeros((0, 3)), np.zeros(0), np.zeros(0, bool)
         sums = scan_lines(
-            Solids(*nothing, 0.0, medium),
+            Solids(*nothing, None, medium),
             direction_rule("lebedev:5"),
             spacing=0.1,
             cutoff=0.0,
@@ -208,7 +208,7 @@ def test_grains_that_are_removed_do_not_shorten_the_search():
     random = np.random.default_rng(1)
     removed = np.arange(30) > 0
     medium = CellGrains(random.random((30, 3)), np.full(30, 0.03), removed, *UNIT_CELL)
-    solids = Solids(np.zeros((0, 3)), np.zeros(0), np.zeros(0, bool), 0.0, medium)
+    solids = Solids(np.zeros((0, 3)), np.zeros(0), np.zeros(0, bool), None, medium)
     lines = {"spacing": 0.1, "cutoff": 0.0, "replicates": range(3)}
     alone, beside = (
         scan_lines(solids, direction_rule("lebedev:5"), variants=names, **lines)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from scanfab import Cell, Packing, contact_fabric, find_contacts
+from scanfab import Cell, Packing, contact_fabric, find_contacts, sphere
 from scanfab.packing.sample import VARIANTS, Sample
-from scanfab.packing.window import SphereWindow
+from scanfab.packing.window import Window
 from tests.helpers.lattices import shaken_cubic
 
 A, B, C, D = (VARIANTS[name] for name in "abcd")
@@ -87,7 +87,7 @@ def test_coordination_counts_contacts_with_boundary_and_walls():
 
 def test_coordination_in_the_window_is_of_the_grains_whose_centre_lies_in_it():
     """The contacts of those grains count wherever they are."""
-    window = SphereWindow(np.array([0.0, 0, 0]), 2.5)
+    window = Window(np.array([0.0, 0, 0]), sphere(2.5))
     sample = row_of_grains()
     assert rows(sample.counted(C, window)) == [0, 1]
     assert sample.coordination(C, window) == pytest.approx((1 + 2) / 2)
@@ -96,14 +96,14 @@ def test_coordination_in_the_window_is_of_the_grains_whose_centre_lies_in_it():
 
 
 def test_coordination_of_no_grain_is_none():
-    window = SphereWindow(np.array([50.0, 0, 0]), 1.0)
+    window = Window(np.array([50.0, 0, 0]), sphere(1.0))
     assert row_of_grains().coordination(C, window) is None
     assert row_of_grains(2).coordination(B, None) is None
 
 
 def test_counted_grains_are_no_boundary_but_may_be_rattlers():
     sample = row_of_grains(boundary=[1])
-    window = SphereWindow(np.array([0.0, 0, 0]), 4.5)
+    window = Window(np.array([0.0, 0, 0]), sphere(4.5))
     assert rows(sample.counted(A, None)) == rows(sample.counted(B, None)) == [0, 2, 3, 4, 5]
     assert rows(sample.counted(C, window)) == rows(sample.counted(D, window)) == [0, 2]
 
@@ -120,7 +120,7 @@ def test_contacts_of_removed_grains_do_not_enter_the_contact_fabric():
 @pytest.mark.parametrize(("reach", "contacts"), [(0.99, 0), (1.01, 1), (2.99, 1), (3.01, 2)])
 def test_contacts_of_the_window_are_those_whose_point_lies_in_it(reach, contacts):
     """Points at 1, 3, 5, ...; centres at 0, 2, 4, ..."""
-    window = SphereWindow(np.array([0.0, 0, 0]), reach)
+    window = Window(np.array([0.0, 0, 0]), sphere(reach))
     assert row_of_grains().fabric_contacts(C, window).sum() == contacts
     assert row_of_grains().fabric_contacts(D, window).sum() == max(contacts - 1, 0)
 
@@ -130,7 +130,7 @@ def test_contact_point_of_unequal_grains_is_the_middle_of_the_overlap():
     packing = Packing([[0, 0, 0], [2.4, 0, 0]], [2.0, 0.5], contacts=[[1, 0]])
     sample = Sample(packing, np.zeros(2, bool))
     for reach, contacts in [(1.949, 0), (1.951, 1)]:
-        assert sample.fabric_contacts(C, SphereWindow(np.zeros(3), reach)).sum() == contacts
+        assert sample.fabric_contacts(C, Window(np.zeros(3), sphere(reach))).sum() == contacts
 
 
 def test_contact_point_through_a_face_lies_in_the_window_on_either_side():
@@ -138,14 +138,14 @@ def test_contact_point_through_a_face_lies_in_the_window_on_either_side():
     sample = Sample(packing, np.zeros(2, bool))
     assert len(packing.contacts) == 1
     for x in (0.2, 9.7):
-        assert sample.fabric_contacts(C, SphereWindow(np.array([x, 5, 5]), 0.4)).sum() == 1
-    assert sample.fabric_contacts(C, SphereWindow(np.array([1.0, 5, 5]), 0.4)).sum() == 0
+        assert sample.fabric_contacts(C, Window(np.array([x, 5, 5]), sphere(0.4))).sum() == 1
+    assert sample.fabric_contacts(C, Window(np.array([1.0, 5, 5]), sphere(0.4))).sum() == 0
 
 
 def test_window_that_holds_everything_gives_what_the_whole_gives():
     packing = find_contacts(Packing(*shaken_cubic(np.random.default_rng(0), 5)))
     sample = Sample(packing, packing.position[:, 2] < 0.8)
-    window = SphereWindow(np.array([2.5, 2.5, 2.5]), 50.0)
+    window = Window(np.array([2.5, 2.5, 2.5]), sphere(50.0))
     assert sample.rattlers.any()
     for whole, inside in [(A, C), (B, D)]:
         normals = packing.contacts.normal[sample.fabric_contacts(whole, None)]

@@ -1,10 +1,10 @@
-"""The sphere RV: what lies in it, its default place and size, and periodic faces."""
+"""The RV: what lies in it, its default place and size, and periodic faces."""
 
 import numpy as np
 import pytest
 
-from scanfab import Cell, Packing, SettingsError, compute
-from scanfab.packing.window import SphereWindow, SurfaceBox
+from scanfab import Cell, Packing, SettingsError, compute, sphere
+from scanfab.packing.window import SurfaceBox, Window
 from tests.helpers.lattices import shaken_cubic
 
 CELL = Cell([10.0, 8.0, 6.0], origin=(-1.0, 2.0, 3.0))
@@ -18,23 +18,24 @@ def four_grains(**options):
 
 
 def test_points_in_the_window_are_nearer_than_its_radius():
-    window = SphereWindow(np.array([1.0, 0.0, 0.0]), 2.0)
+    window = Window(np.array([1.0, 0.0, 0.0]), sphere(2.0))
     points = np.array([[1.0, 0, 0], [2.9, 0, 0], [3.1, 0, 0], [-0.9, 0, 0], [1, 1.5, 1.5]])
     assert window.contains(points, four_grains()).tolist() == [True, True, False, True, False]
 
 
 def test_distance_is_to_the_nearest_image():
     packing = Packing([[0, 3, 4]], 1.0, cell=CELL)
-    window = SphereWindow(np.array([-0.5, 2.5, 3.5]), 1.0)
+    window = Window(np.array([-0.5, 2.5, 3.5]), sphere(1.0))
     points = np.array([[8.9, 2.5, 3.5], [-0.5, 9.8, 3.5], [-0.5, 2.5, 8.9], [4.5, 6.5, 6.5]])
     expected = [0.6, 0.7, 0.6, np.sqrt(25 + 16 + 9)]
-    assert window.distance(points, packing) == pytest.approx(expected)
+    distance = np.linalg.norm(window.branches(points, packing), axis=1)
+    assert distance == pytest.approx(expected)
     assert window.contains(points, packing).tolist() == [True, True, True, False]
 
 
 def test_faces_that_do_not_repeat_are_not_looked_through():
     packing = Packing([[0, 3, 4]], 1.0, cell=Cell([10.0, 8, 6], periodic=(True, False, False)))
-    window = SphereWindow(np.array([0.5, 0.5, 0.5]), 1.0)
+    window = Window(np.array([0.5, 0.5, 0.5]), sphere(1.0))
     points = np.array([[9.9, 0.5, 0.5], [0.5, 7.9, 0.5], [0.5, 0.5, 5.9]])
     assert window.contains(points, packing).tolist() == [True, False, False]
 
@@ -78,7 +79,7 @@ def test_only_periodic_vectors_of_a_cell_give_center_and_extent():
 )
 def test_window_must_not_meet_its_own_image(center, radius, fits):
     packing = Packing([[0, 3, 4]], 1.0, cell=CELL)
-    window = SphereWindow(np.array(center), radius)
+    window = Window(np.array(center), sphere(radius))
     if fits:
         window.check_fits(packing)
     else:
@@ -88,8 +89,8 @@ def test_window_must_not_meet_its_own_image(center, radius, fits):
 
 def test_window_may_reach_beyond_faces_that_do_not_repeat():
     packing = Packing([[0, 3, 4]], 1.0, cell=Cell([10.0, 8, 6], periodic=(True, False, False)))
-    SphereWindow(np.array([5.0, 0.0, 0.0]), 4.9).check_fits(packing)
-    SphereWindow(np.array([5.0, 0.0, 0.0]), 4.9).check_fits(four_grains())
+    Window(np.array([5.0, 0.0, 0.0]), sphere(4.9)).check_fits(packing)
+    Window(np.array([5.0, 0.0, 0.0]), sphere(4.9)).check_fits(four_grains())
 
 
 def test_window_wider_than_the_cell_stops_the_computation():
@@ -99,8 +100,8 @@ def test_window_wider_than_the_cell_stops_the_computation():
 
 
 def test_room_around_the_window_is_to_the_nearest_surface_that_is_no_periodic_face():
-    window = SphereWindow(np.array([4.0, 4.0, 4.0]), 3.0)
-    beyond = SphereWindow(np.array([4.0, 4.0, 4.0]), 6.0)
+    window = Window(np.array([4.0, 4.0, 4.0]), sphere(3.0))
+    beyond = Window(np.array([4.0, 4.0, 4.0]), sphere(6.0))
     # along y the surfaces lie at -1 and 8.25, along x and z farther away
     assert SurfaceBox.of(four_grains(), ALL).room_around(window) == pytest.approx(8.25 - 7)
     assert SurfaceBox.of(four_grains(), ALL).room_around(beyond) == pytest.approx(8.25 - 10)

@@ -241,7 +241,7 @@ def test_whether_following_takes_too_many_steps_does_not_depend_on_threads(nearl
     medium = CellGrains(
         nearly_empty.position, nearly_empty.radius, none, vectors, np.ones(3, dtype=bool)
     )
-    solids = Solids(np.zeros((0, 3)), np.zeros(0), none[:0], 0.0, medium)
+    solids = Solids(np.zeros((0, 3)), np.zeros(0), none[:0], None, medium)
     lines = {"spacing": 0.5, "cutoff": 0.0, "variants": "a", "replicates": range(2)}
     rule = direction_rule("lebedev:5")
     steps = int(scan_lines(solids, rule, **lines).steps.sum())

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scanfab import Cell, Solids, direction_rule, scan_lines
+from scanfab import Cell, Solids, direction_rule, scan_lines, sphere
 from scanfab.scan.gaps import Blocks, scan_gaps
 from scanfab.scan.lines import line_triads, turned_triads
 from scanfab.scan.solids import CellGrains
@@ -53,7 +53,7 @@ def test_all_octants_of_a_periodic_packing_are_the_scan_of_the_same_lines(period
     removed = random.random(30) < 0.2
     medium = CellGrains(position, radius, removed, cell.vectors, np.array(periodic))
     images, row = cell.images_near_origin(position, radius + 1.5)
-    solids = Solids(images, radius[row], removed[row], 1.5, medium)
+    solids = Solids(images, radius[row], removed[row], sphere(1.5), medium)
     gaps = gaps_of(solids, cutoffs=[0.1, 0.4])
     for place, cutoff in enumerate((0.1, 0.4)):
         sums = scan_lines(solids, RULE, spacing=0.3, cutoff=cutoff, replicates=range(3))
@@ -74,7 +74,7 @@ def test_octant_left_out_is_that_of_the_slow_twin(solids):
     triads, offsets = turned_triads(RULE, line_triads(RULE.axes), 0, 0)
     gaps = gaps_of(solids, spacing=0.8, replicates=range(1))
     _, window = naive.void_segments(
-        solids.position, solids.radius, triads[2], offsets[2], 0.8, solids.window_radius
+        solids.position, solids.radius, triads[2], offsets[2], 0.8, solids.reach
     )
     for place, cutoff in enumerate(CUTOFFS):
         sums = naive.gap_sums(window, cutoff, np.zeros(3))

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import scanfab
+from scanfab.base.convex import sphere
 from scanfab.packing.sample import Sample
-from scanfab.packing.window import SphereWindow
+from scanfab.packing.window import Window
 from scanfab.viz.scene import Scene, contact_lines, grains_of, scene_of, section_lines
 from tests.helpers.lattices import simple_cubic
 
@@ -20,7 +21,7 @@ def sample():
     return Sample(packing, np.array([False, False, False, False, True]))
 
 
-WINDOW = SphereWindow(np.array([1.0, 0.0, 0.0]), 2.5)
+WINDOW = Window(np.array([1.0, 0.0, 0.0]), sphere(2.5))
 
 
 def test_grains_are_told_apart(sample):
@@ -64,7 +65,7 @@ def test_a_section_cuts_periodic_images_too():
     packing = scanfab.Packing(position, radius, contacts=[], cell=cell)
     sample = Sample(packing, np.zeros(len(radius), bool))
     middle, corner = (
-        section_lines(scene_of(sample, SphereWindow(np.array(place), 1.6)), (0, 0, 1))
+        section_lines(scene_of(sample, Window(np.array(place), sphere(1.6))), (0, 0, 1))
         for place in ([2.5, 2.5, 2.5], [0.5, 3.5, 0.5])
     )
     np.testing.assert_allclose(np.sort(corner.length), np.sort(middle.length), atol=1e-9)

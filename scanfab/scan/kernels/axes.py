@@ -21,8 +21,15 @@ from scanfab.scan.kernels.lists import (
 )
 from scanfab.scan.kernels.periodic import CellGrains, Prism, cell_grid, measured_in
 from scanfab.scan.kernels.projection import Spheres, project, sort_into_strips, sphere_at
-from scanfab.scan.kernels.strips import MOST_LINES, STATE_SIZE, Strip, begin, measure_from
+from scanfab.scan.kernels.strips import (
+    MOST_LINES,
+    STATE_SIZE,
+    Strip,
+    begin,
+    measure_from,
+)
 from scanfab.scan.kernels.sweep import NOTHING, STEPS, Measured, settle, visit
+from scanfab.scan.kernels.windows import Clip, Section, section_along
 
 __all__ = ["scan_axes", "scan_cell"]
 
@@ -36,7 +43,7 @@ def visit_all(
     strip: Strip,
     spheres: Spheres,
     chosen: IntArray,
-    window_radius: float,
+    reach_of_window: float,
     least: float,
     tally: FloatArray,
     second: Flag,
@@ -49,7 +56,7 @@ def visit_all(
         sphere = sphere_at(spheres, k)
         kept = np.nan if spheres.removed[k] else NOTHING
         if whole is not None and window is not None:
-            reach = window_radius + sphere.radius
+            reach = reach_of_window + sphere.radius
             if sphere.u * sphere.u + sphere.v * sphere.v > reach * reach:
                 # its lines miss the window
                 visit(lines, strip, sphere, kept, least, tally, second, whole, None, measured)
@@ -93,7 +100,7 @@ def scan_strips(
     lines: FloatArray,
     spheres: Spheres,
     grid: Grid,
-    window_radius: float,
+    section: Section,
     cutoff: float,
     tally: FloatArray,
     lists: Lists,
@@ -114,14 +121,14 @@ def scan_strips(
     for number in range(start.size - 1):
         strip = strip_of(grid, number, rows, pitch)
         met = chosen[start[number] : start[number + 1]]
-        begin(lines, strip, window_radius, second, whole)
+        begin(lines, strip, section, second, whole)
         if medium is not None:
             measure_from(lines, strip, medium[1].rise_u, medium[1].rise_v)
         flags = second, whole, window, measured
         if by_lists:
             visit_listed(lines, lists, strip, spheres, met, least, tally, bins, *flags)
         else:
-            visit_all(lines, strip, spheres, met, window_radius, least, tally, *flags)
+            visit_all(lines, strip, spheres, met, section.reach, least, tally, *flags)
         for which in range(1 if second is None else 2):
             if in_bins:
                 closed = bin_last_gaps(lines, strip, which, bins, whole, window, measured)
@@ -157,7 +164,7 @@ def scan_axes(
     offsets: FloatArray,
     spacing: float,
     cutoff: float,
-    window_radius: float,
+    clip: Clip,
     tallies: FloatArray,
     by_lists: bool,
     second: Flag,
@@ -178,8 +185,8 @@ def scan_axes(
         Orthonormal rows u, v, n of each axis: the lines run along n.
     offsets : shape (D, 2)
         Shift of each axis' grid, in units of the spacing.
-    window_radius : float
-        Radius of the sphere window; 0 for none.
+    clip : Clip
+        The window.
     tallies : shape (D, 2, TALLY_SIZE)
         Zeros; the results for each axis and set of solids.
     by_lists : bool
@@ -197,14 +204,15 @@ def scan_axes(
     extent = bounds(position, radius)
     for axis in range(triads.shape[0]):
         triad = triads[axis]
-        grid = open_grid(extent, triad, offsets[axis], spacing, window_radius, whole is not None)
+        grid = open_grid(extent, triad, offsets[axis], spacing, clip.reach, whole is not None)
         spheres = project(position, radius, removed, triad, grid)
+        section = section_along(clip, triad)
         for first in range(0, grid.columns, most):
             scan_strips(
                 lines,
                 spheres,
                 part_of(grid, first, most),
-                window_radius,
+                section,
                 cutoff,
                 tallies[axis],
                 lists,
@@ -225,6 +233,7 @@ def scan_cell(
     offsets: FloatArray,
     spacing: float,
     cutoff: float,
+    clip: Clip,
     tallies: FloatArray,
     by_lists: bool,
     second: Flag,
@@ -234,7 +243,8 @@ def scan_cell(
     """
     Scan a periodic medium along several directions: the whole of it, that has no edge.
 
-    ``normals`` has shape (D, 3), the rest is as in :func:`scan_axes`. When following lines has
+    ``normals`` has shape (D, 3), ``clip`` is that of no window, the rest is as in
+    :func:`scan_axes`. When following lines has
     taken ``most_steps``, all directions together, the scan ends and its tallies are worth nothing.
     """
     left = most_steps
@@ -245,6 +255,7 @@ def scan_cell(
         prism, spheres, grid = cell_grid(grains, normals[axis], offsets[axis], spacing)
         tally = tallies[axis]
         measured = measured_in(grains, prism)
+        section = section_along(clip, prism.triad)
         here = bins_along(bins, prism.triad, axis)
         for first in range(0, grid.columns, most):
             part = part_of(grid, first, most)
@@ -254,12 +265,12 @@ def scan_cell(
             if grains.periodic[prism.third]:
                 medium = grains, prism
                 scan_strips(
-                    lines, spheres, part, 0.0, cutoff, tally, lists, second, True, None, measured,
-                    medium, left, here,
+                    lines, spheres, part, section, cutoff, tally, lists, second, True, None,
+                    measured, medium, left, here,
                 )  # fmt: skip
             else:
                 scan_strips(
-                    lines, spheres, part, 0.0, cutoff, tally, lists, second, True, None, None,
+                    lines, spheres, part, section, cutoff, tally, lists, second, True, None, None,
                     None, np.inf, here,
                 )  # fmt: skip
         left -= tally[0, STEPS]

@@ -1,5 +1,5 @@
 """
-Void segments one by one: by the octant of their middle and by cut-off, with their squares.
+Void segments one by one: by the block of their middle and by cut-off, with their squares.
 
 What sums for one cut-off cannot tell.
 """
@@ -13,34 +13,28 @@ import numpy as np
 from scanfab.base.jit import Flag, inner
 from scanfab.base.typing import FloatArray
 from scanfab.scan.kernels.strips import FAR
-from scanfab.scan.kernels.sweep import Measured, whole_gap
+from scanfab.scan.kernels.sweep import Measured
 
 __all__ = [
-    "BLOCKS",
-    "GAP_HIGH",
-    "GAP_LOW",
     "LENGTH",
-    "LINE_BOUND",
-    "LINE_U",
     "NUMBER",
     "SQUARE",
     "Bins",
     "add_gaps",
     "bins_along",
+    "list_gap",
     "no_bins",
     "room_for_gaps",
 ]
 
 
-BLOCKS = 8
 # what is added up of the gaps of a block and bin
 NUMBER, LENGTH, SQUARE = range(3)
 # whose gaps they are
 OF_WHOLE, OF_WINDOW = 0, 1
-# of a list of gaps its rows: the line's place along u, its bound, where the gap starts and ends;
-# its length in the whole and, behind that, in the window; likewise its bin
-LINE_U, LINE_BOUND, GAP_LOW, GAP_HIGH = range(4)
-COUNTED, PLACE = 4, 6
+# of a list of gaps its rows: the line's place along u; where the gap starts in the whole and,
+# behind that, in the window; likewise where it ends, its length if it counts, its bin
+LINE_U, GAP_LOW, GAP_HIGH, COUNTED, PLACE = 0, 1, 3, 5, 7
 
 
 class Bins(NamedTuple):
@@ -48,10 +42,12 @@ class Bins(NamedTuple):
 
     to_block: FloatArray
     """
-    Affine maps of places to three coordinates, of whose periods of 1 the halves are blocks.
+    Affine maps of places to three coordinates, of whose periods of 1 equal parts are blocks.
 
     For the whole and the window, shape (2, 3, 4).
     """
+    parts: FloatArray
+    """How many parts of each, whole numbers, shape (2, 3)."""
     cutoffs: FloatArray
     """
     In ascending order, shape (C,); a gap goes to the bin of the largest that it reaches.
@@ -60,7 +56,7 @@ class Bins(NamedTuple):
     """
     sums: FloatArray
     """
-    Number, length, squared length, shape (D, 2, 2, BLOCKS * C, 3).
+    Number, length, squared length, shape (D, 2, 2, B * C, 3) with B blocks.
 
     For each axis, whole or window, and set of solids; without D those of one axis.
     """
@@ -68,7 +64,7 @@ class Bins(NamedTuple):
 
 def no_bins(axes: int) -> Bins:
     """For so many axes, none: a kernel that takes these is compiled once, with bins or without."""
-    return Bins(np.zeros((2, 3, 4)), np.zeros(0), np.zeros((axes, 2, 2, 0, 3)))
+    return Bins(np.zeros((2, 3, 4)), np.ones((2, 3)), np.zeros(0), np.zeros((axes, 2, 2, 0, 3)))
 
 
 @inner()
@@ -81,13 +77,49 @@ def bins_along(bins: Bins, triad: FloatArray, axis: int) -> Bins:
                 to_block[kind, i, j] = 0.0
                 for k in range(3):
                     to_block[kind, i, j] += bins.to_block[kind, i, k] * triad[j, k]
-    return Bins(to_block, bins.cutoffs, bins.sums[axis])
+    return Bins(to_block, bins.parts, bins.cutoffs, bins.sums[axis])
 
 
 @inner()
 def room_for_gaps(count: int) -> FloatArray:
-    """So many gaps, to be listed: the first four rows; the others are for :func:`add_gaps`."""
-    return np.empty((8, count))
+    """So many gaps, for :func:`list_gap` and :func:`add_gaps`."""
+    return np.empty((9, count))
+
+
+@inner(forceinline=True)
+def list_gap(
+    gaps: FloatArray,
+    k: int | np.uint64,
+    u: float,
+    low: float,
+    high: float,
+    enters: float,
+    leaves: float,
+    whole: Flag,
+    window: Flag,
+    measured: Measured | None,
+) -> None:
+    """List a gap as number k, as it is and clipped to the window; NaN where it does not count."""
+    gaps[LINE_U, k] = u
+    if whole is not None:
+        gaps[GAP_LOW + OF_WHOLE, k] = low
+        if measured is not None:
+            begins = (low - enters >= 0.0) & (low - enters < measured.length)
+            gaps[GAP_HIGH + OF_WHOLE, k] = high if begins else np.nan
+        else:
+            gaps[GAP_HIGH + OF_WHOLE, k] = high
+    if window is not None:
+        gaps[GAP_LOW + OF_WINDOW, k] = low if low > enters else enters
+        gaps[GAP_HIGH + OF_WINDOW, k] = high if high < leaves else leaves
+
+
+@inner(inline="always")
+def part_of_period(x: float, parts: float) -> float:
+    """In which of so many equal parts of its period of 1 a coordinate lies, from 0."""
+    part = np.floor((x - np.floor(x)) * parts)
+    # rounding makes a whole period of what is just below 0; and NaN, of a line that misses the
+    # window, must have some place, too
+    return part if part < parts - 1.0 else parts - 1.0
 
 
 @inner(error_model="numpy")
@@ -97,7 +129,6 @@ def find_bins(
     count: np.uint64,
     kind: int,
     v: float,
-    measured: Measured | None,
 ) -> None:
     """Of gaps on a row of lines, the lengths, 0 where they do not count, and the bins."""
     cutoffs, to_block = bins.cutoffs, bins.to_block[kind]
@@ -106,23 +137,21 @@ def find_bins(
     x_v = to_block[0, 1] * v + to_block[0, 3]
     y_v = to_block[1, 1] * v + to_block[1, 3]
     z_v = to_block[2, 1] * v + to_block[2, 3]
+    in_x, in_y, in_z = bins.parts[kind, 0], bins.parts[kind, 1], bins.parts[kind, 2]
+    lows, highs = gaps[GAP_LOW + kind], gaps[GAP_HIGH + kind]
     lengths, places = gaps[COUNTED + kind], gaps[PLACE + kind]
     for k in range(count):
-        u, bound = gaps[LINE_U, k], gaps[LINE_BOUND, k]
-        low, high = gaps[GAP_LOW, k], gaps[GAP_HIGH, k]
-        # NaN where the line misses the window
-        reach = bound if kind == OF_WINDOW else FAR
-        low = low if low > -reach else -reach
-        high = high if high < reach else reach
-        length = whole_gap(low, high, 0.0, bound, measured)[2]
+        u, low, high = gaps[LINE_U, k], lows[k], highs[k]
+        length = high - low
         middle = 0.5 * (low + high)
         x = x_v + x_u * u + x_n * middle
         y = y_v + y_u * u + y_n * middle
         z = z_v + z_u * u + z_n * middle
-        block = 1.0 if x - np.floor(x) >= 0.5 else 0.0
-        block += 2.0 if y - np.floor(y) >= 0.5 else 0.0
-        block += 4.0 if z - np.floor(z) >= 0.5 else 0.0
-        lengths[k] = length if (length > 0.0) & (length >= cutoffs[0]) else 0.0
+        block = part_of_period(x, in_x)
+        block += in_x * part_of_period(y, in_y)
+        block += in_x * in_y * part_of_period(z, in_z)
+        is_kept = (length > 0.0) & (length >= cutoffs[0]) & (length < 0.5 * FAR)
+        lengths[k] = length if is_kept else 0.0
         places[k] = block * cutoffs.size
     for number in range(1, cutoffs.size):
         for k in range(count):
@@ -139,12 +168,11 @@ def add_gaps(
     v: float,
     whole: Flag,
     window: Flag,
-    measured: Measured | None,
 ) -> None:
     """Add the first gaps of a list, all on one row of lines, where they count; or take them off."""
     kinds = np.uint64(OF_WINDOW if whole is None else OF_WHOLE), np.uint64(1 + (window is not None))
     for kind in range(kinds[0], kinds[1]):
-        find_bins(bins, gaps, count, kind, v, measured)
+        find_bins(bins, gaps, count, kind, v)
     sums, of = bins.sums, np.uint64(which)
     for k in range(count):
         # both in turns, as a gap has to wait for the one before it if they share a bin

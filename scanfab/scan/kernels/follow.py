@@ -4,19 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from scanfab.base.jit import inner
+from scanfab.base.jit import ZERO, inner
 from scanfab.base.typing import FloatArray
 from scanfab.scan.kernels.bins import (
-    GAP_HIGH,
-    GAP_LOW,
-    LINE_BOUND,
-    LINE_U,
     Bins,
     add_gaps,
+    list_gap,
     room_for_gaps,
 )
 from scanfab.scan.kernels.periodic import CellGrains, Prism, cross, dot, shifts
-from scanfab.scan.kernels.strips import BOUND, END, FAR, SET, Strip
+from scanfab.scan.kernels.strips import END, ENTRY, FAR, SET, Strip
 from scanfab.scan.kernels.sweep import CHANNELS, KEPT, LENGTH, STEPS, VOID, WHOLE
 
 __all__ = ["follow"]
@@ -169,14 +166,14 @@ def follow(
         for column in range(strip.columns):
             u = strip.first_u + column * strip.spacing
             place = np.uint64(row * strip.pitch + column)
-            bound = lines[place + BOUND]
+            enters = lines[place + ENTRY]
             end = lines[place + SET * np.uint64(which) + END]
             is_empty = end == -FAR
-            if not is_empty and not bound <= end < bound + prism.length:
+            if not is_empty and not enters <= end < enters + prism.length:
                 continue
             if tally[0, STEPS] >= most_steps:
                 return
-            after = bound if is_empty else end
+            after = enters if is_empty else end
             start, steps = next_solid(grains, prism, which == 1, limits, u, v, after)
             tally[0, STEPS] += steps
             if start < FAR:
@@ -185,14 +182,13 @@ def follow(
                     tally[which, WHOLE + VOID] += gap
                     if bins.cutoffs.size > 0:
                         one = room_for_gaps(1)
-                        one[LINE_U, 0], one[LINE_BOUND, 0] = u, bound
-                        one[GAP_LOW, 0], one[GAP_HIGH, 0] = end, start
-                        add_gaps(bins, one, np.uint64(1), 1.0, which, v, True, None, None)
+                        list_gap(one, ZERO, u, end, start, enters, enters, True, None, None)
+                        add_gaps(bins, one, np.uint64(1), 1.0, which, v, True, None)
                     elif gap >= least:
                         tally[which, WHOLE + LENGTH] += gap
                         tally[which, WHOLE + KEPT] += 1.0
             elif endless:
                 tally[which, CHANNELS] += 1.0
                 tally[which, WHOLE + VOID] += (
-                    prism.length if is_empty else bound + prism.length - end
+                    prism.length if is_empty else enters + prism.length - end
                 )

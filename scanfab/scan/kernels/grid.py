@@ -104,12 +104,17 @@ def open_grid(
     triad: FloatArray,
     offset: FloatArray,
     spacing: float,
-    window_radius: float,
+    reach: float,
     whole: bool,
 ) -> Grid:
-    """The lines that meet the sphere window or, of the whole, any sphere."""
-    low_u = low_v = -window_radius
-    high_u = high_v = window_radius
+    """
+    The lines that meet the window or, of the whole, any sphere.
+
+    ``reach`` is the radius of the ball that holds the window; lines that meet the ball alone are
+    there, too.
+    """
+    low_u = low_v = -reach
+    high_u = high_v = reach
     if whole and extent.reach > 0.0:
         low_u, high_u = shadow(extent, triad[0], low_u, high_u)
         low_v, high_v = shadow(extent, triad[1], low_v, high_v)
@@ -118,7 +123,7 @@ def open_grid(
         for row in range(grid.rows):
             v = grid.first_v + row * spacing
             # one more on either side, against rounding
-            half = np.sqrt(max(window_radius * window_radius - v * v, 0.0)) + spacing
+            half = np.sqrt(max(reach * reach - v * v, 0.0)) + spacing
             limit_row(grid, row, -half, half)
     return grid
 

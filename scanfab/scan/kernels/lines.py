@@ -6,17 +6,9 @@ import numpy as np
 
 from scanfab.base.jit import ZERO, Flag, inner
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.scan.kernels.bins import (
-    GAP_HIGH,
-    GAP_LOW,
-    LINE_BOUND,
-    LINE_U,
-    Bins,
-    add_gaps,
-    room_for_gaps,
-)
+from scanfab.scan.kernels.bins import Bins, add_gaps, list_gap, room_for_gaps
 from scanfab.scan.kernels.projection import Spheres, number_from, sort_by, sphere_at
-from scanfab.scan.kernels.strips import BOUND, END, FAR, SET, Strip, span
+from scanfab.scan.kernels.strips import END, ENTRY, EXIT, FAR, SET, Strip, span
 from scanfab.scan.kernels.sweep import Measured, add, counted, moved
 
 __all__ = ["solve_closed"]
@@ -122,13 +114,13 @@ def chords_of(
 def gaps_of(
     chords: FloatArray,
     order: IntArray,
-    bound: float,
+    enters: float,
     whole: Flag,
     measured: Measured | None,
-    gaps: FloatArray,
+    ends: FloatArray,
 ) -> tuple[int, float]:
     """
-    The gaps that the sweep settles on one line, in the first places of ``gaps``.
+    The gaps that the sweep settles on one line: in ``ends``, (2, M), where they start and stop.
 
     Their number, the void behind the last solid included, and where that ends. Chords ordered by
     their middles: as the sweep does it, and nothing more once the line is closed. Chords ordered by
@@ -136,31 +128,32 @@ def gaps_of(
     """
     end, low, high = -FAR, -FAR, -FAR
     if whole is None:
-        end = -bound
+        end = enters
     count = 0
     for k in order:
         start, stop = chords[0, k], chords[1, k]
-        if measured is not None and start - bound >= measured.known:
+        if measured is not None and start - enters >= measured.known:
             continue
         if start > end:
-            gaps[GAP_LOW, count], gaps[GAP_HIGH, count] = low, high
+            ends[0, count], ends[1, count] = low, high
             count += 1
         end, low, high = moved(start, stop, end, low, high)
     if end < FAR:
-        gaps[GAP_LOW, count], gaps[GAP_HIGH, count] = low, high
-        gaps[GAP_LOW, count + 1], gaps[GAP_HIGH, count + 1] = end, FAR
+        ends[0, count], ends[1, count] = low, high
+        ends[0, count + 1], ends[1, count + 1] = end, FAR
         count += 2
     return count, end
 
 
 @inner()
 def tally_line(
-    gaps: FloatArray,
+    ends: FloatArray,
     count: int,
     sign: float,
     u: float,
     v: float,
-    bound: float,
+    enters: float,
+    leaves: float,
     least: float,
     tally: FloatArray,
     which: int,
@@ -171,13 +164,17 @@ def tally_line(
 ) -> None:
     """Tally the gaps of one line, or take them back, with a sign of -1."""
     if bins.cutoffs.size > 0:
+        gaps = room_for_gaps(count)
         for k in range(count):
-            gaps[LINE_U, k], gaps[LINE_BOUND, k] = u, bound
-        add_gaps(bins, gaps, np.uint64(count), sign, which, v, whole, window, measured)
+            low, high = ends[0, k], ends[1, k]
+            list_gap(gaps, k, u, low, high, enters, leaves, whole, window, measured)
+        add_gaps(bins, gaps, np.uint64(count), sign, which, v, whole, window)
     else:
         for k in range(count):
-            low, high = gaps[GAP_LOW, k], gaps[GAP_HIGH, k]
-            a, b, c, d, e, f = counted(True, low, high, least, bound, whole, window, measured)
+            low, high = ends[0, k], ends[1, k]
+            a, b, c, d, e, f = counted(
+                True, low, high, least, enters, leaves, whole, window, measured
+            )
             add(tally, which, (sign * a, sign * b, sign * c, sign * d, sign * e, sign * f))
 
 
@@ -208,20 +205,21 @@ def solve_closed(
                 places[line] = row * strip.pitch + column
                 line += 1
     first, chords = chords_of(spheres, chosen, which, strip, number, closed)
-    gaps = room_for_gaps(chords.size // 2 + 2)
+    ends = np.empty((2, chords.size // 2 + 2))
     for line in range(closed):
         row, column = places[line] // strip.pitch, places[line] % strip.pitch
         u = strip.first_u + column * strip.spacing
         v = strip.first_v + row * strip.spacing
         place = np.uint64(places[line])
-        bound = lines[place + BOUND]
+        enters, leaves = lines[place + ENTRY], lines[place + EXIT]
         order = np.empty(first[line + 1] - first[line], np.int64)
         number_from(first[line], order)
         end = 0.0
         for sign in (-1.0, 1.0):
-            count, end = gaps_of(chords, order, bound, whole, measured, gaps)
+            count, end = gaps_of(chords, order, enters, whole, measured, ends)
             tally_line(
-                gaps, count, sign, u, v, bound, least, tally, which, whole, window, measured, bins
-            )
+                ends, count, sign, u, v, enters, leaves, least, tally, which, whole, window,
+                measured, bins,
+            )  # fmt: skip
             sort_by(chords[0], order)
         lines[place + SET * np.uint64(which) + END] = end

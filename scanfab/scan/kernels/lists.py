@@ -16,16 +16,23 @@ import numpy as np
 from scanfab.base.jit import LANES, ONE, REORDERED, ZERO, Flag, inner
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.kernels.bins import (
-    GAP_HIGH,
-    GAP_LOW,
-    LINE_BOUND,
-    LINE_U,
     Bins,
     add_gaps,
+    list_gap,
     room_for_gaps,
 )
 from scanfab.scan.kernels.projection import Spheres, sphere_at
-from scanfab.scan.kernels.strips import BOUND, END, FAR, GAP_END, GAP_START, SET, Strip, span
+from scanfab.scan.kernels.strips import (
+    END,
+    ENTRY,
+    EXIT,
+    FAR,
+    GAP_END,
+    GAP_START,
+    SET,
+    Strip,
+    span,
+)
 from scanfab.scan.kernels.sweep import CHORDS, Measured, add, both, meet, moved
 
 __all__ = [
@@ -149,16 +156,18 @@ def sweep_abreast(
         half_chord = np.sqrt(abs(reach2))
         half_chord = half_chord if np.int64(k) < lists.stop[i] else np.nan
         start, stop = depth - half_chord, depth + half_chord
-        bound = lines[i + BOUND]
+        enters, leaves = lines[i + ENTRY], lines[i + EXIT]
         if measured is not None:
-            stop = stop if start - bound < measured.known else np.nan
-            start = start if start - bound < measured.known else np.nan
-        found = meet(lines, i, start, stop, least, bound, whole, window, measured)
+            stop = stop if start - enters < measured.known else np.nan
+            start = start if start - enters < measured.known else np.nan
+        found = meet(lines, i, start, stop, least, enters, leaves, whole, window, measured)
         sums = both(sums, found)
         if second is not None:
             start = start if reach2 > 0.0 else np.nan
             stop = stop if reach2 > 0.0 else np.nan
-            found = meet(lines, i + SET, start, stop, least, bound, whole, window, measured)
+            found = meet(
+                lines, i + SET, start, stop, least, enters, leaves, whole, window, measured
+            )
             sums2 = both(sums2, found)
     add(tally, 0, sums)
     if second is not None:
@@ -231,25 +240,23 @@ def bin_lists(
             u = strip.first_u + column * strip.spacing
             line = row * strip.pitch + column
             i, i2 = np.uint64(line), np.uint64(line) + SET
-            bound = lines[i + BOUND]
+            enters, leaves = lines[i + ENTRY], lines[i + EXIT]
             end, low, high = lines[i + END], lines[i + GAP_START], lines[i + GAP_END]
             end2, low2, high2 = lines[i2 + END], lines[i2 + GAP_START], lines[i2 + GAP_END]
             for place in range(first_place(line), stops[i], NEXT):
                 depth, reach2 = chords[np.uint64(place)], chords[np.uint64(place + ABREAST)]
                 half_chord = np.sqrt(abs(reach2))
                 start, stop = depth - half_chord, depth + half_chord
-                if measured is not None and not start - bound < measured.known:
+                if measured is not None and not start - enters < measured.known:
                     continue
                 # listed anyhow, as chords are
-                gaps[LINE_U, count], gaps[LINE_BOUND, count] = u, bound
-                gaps[GAP_LOW, count], gaps[GAP_HIGH, count] = low, high
+                list_gap(gaps, count, u, low, high, enters, leaves, whole, window, measured)
                 count += np.uint64((start > end) & (high - low >= least))
                 end, low, high = moved(start, stop, end, low, high)
                 if second is not None:
                     start = start if reach2 > 0.0 else np.nan
                     stop = stop if reach2 > 0.0 else np.nan
-                    gaps2[LINE_U, count2], gaps2[LINE_BOUND, count2] = u, bound
-                    gaps2[GAP_LOW, count2], gaps2[GAP_HIGH, count2] = low2, high2
+                    list_gap(gaps2, count2, u, low2, high2, enters, leaves, whole, window, measured)
                     count2 += np.uint64((start > end2) & (high2 - low2 >= least))
                     end2, low2, high2 = moved(start, stop, end2, low2, high2)
             lines[i + END], lines[i + GAP_START], lines[i + GAP_END] = end, low, high
@@ -257,8 +264,8 @@ def bin_lists(
                 lines[i2 + END], lines[i2 + GAP_START], lines[i2 + GAP_END] = end2, low2, high2
             stops[i] = first_place(line)
             if count >= ALMOST or count2 >= ALMOST or column == strip.columns - 1:
-                add_gaps(bins, gaps, count, 1.0, ZERO, v, whole, window, measured)
-                add_gaps(bins, gaps2, count2, 1.0, ONE, v, whole, window, measured)
+                add_gaps(bins, gaps, count, 1.0, ZERO, v, whole, window)
+                add_gaps(bins, gaps2, count2, 1.0, ONE, v, whole, window)
                 count = count2 = np.uint64(0)
 
 
@@ -288,12 +295,15 @@ def bin_last_gaps(
             if lines[k + END] == FAR:
                 closed += 1.0
                 continue
+            u, enters, leaves = (
+                strip.first_u + column * strip.spacing,
+                lines[i + ENTRY],
+                lines[i + EXIT],
+            )
             last = lines[k + GAP_START], lines[k + GAP_END]
             for low, high in (last, (lines[k + END], FAR)):
-                gaps[LINE_U, count] = strip.first_u + column * strip.spacing
-                gaps[LINE_BOUND, count] = lines[i + BOUND]
-                gaps[GAP_LOW, count], gaps[GAP_HIGH, count] = low, high
+                list_gap(gaps, count, u, low, high, enters, leaves, whole, window, measured)
                 # behind the last solid there is void in the window alone
-                count += (high - low > 0.0) & ((high < FAR) | (low < lines[i + BOUND]))
-        add_gaps(bins, gaps, np.uint64(count), 1.0, which, v, whole, window, measured)
+                count += (high - low > 0.0) & ((high < FAR) | (low < leaves))
+        add_gaps(bins, gaps, np.uint64(count), 1.0, which, v, whole, window)
     return closed

@@ -2,7 +2,8 @@
 Strips of scan lines: where the lines are, which of them a sphere reaches, and their state.
 
 The state is three numbers a line for each set of solids, the running end of the solid and the two
-ends of the last gap, and one more; what they are for, :mod:`scanfab.scan.kernels.sweep` says.
+ends of the last gap, and two more that both sets share, where the line enters and leaves the
+window; what they are for, :mod:`scanfab.scan.kernels.sweep` says.
 """
 
 from __future__ import annotations
@@ -11,12 +12,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.base.jit import REORDERED, Flag, inner
+from scanfab.base.jit import LANES, Flag, inner, kernel
 from scanfab.base.typing import FloatArray, IntArray
+from scanfab.scan.kernels.windows import Clip, Section, section_along
 
 __all__ = [
-    "BOUND",
     "END",
+    "ENTRY",
+    "EXIT",
     "FAR",
     "GAP_END",
     "GAP_START",
@@ -29,6 +32,7 @@ __all__ = [
     "columns_of_row",
     "measure_from",
     "span",
+    "spans",
 ]
 
 
@@ -39,11 +43,11 @@ FAR = 1e300
 MOST_LINES = 24_576
 PLANE = np.uint64(MOST_LINES + 24)
 # first places of the planes: running end, last gap; the same for the second set of solids; and
-# half the line's length in the window, or where its measured length begins
+# where the line enters the window, or where its measured length begins, and where it leaves it
 END, GAP_START, GAP_END = np.uint64(0), PLANE, np.uint64(2) * PLANE
 SET = np.uint64(3) * PLANE
-BOUND = np.uint64(6) * PLANE
-STATE_SIZE = int(7 * PLANE)
+ENTRY, EXIT = np.uint64(6) * PLANE, np.uint64(7) * PLANE
+STATE_SIZE = int(8 * PLANE)
 # a sphere that is no more lines wide is visited as a square: to find where its chords begin and end
 # in each row would take longer than the corners
 NARROW = 12
@@ -76,19 +80,24 @@ class Sphere(NamedTuple):
     radius: float
 
 
-@inner(fastmath=REORDERED, error_model="numpy")
-def begin(lines: FloatArray, strip: Strip, radius: float, second: Flag, whole: Flag) -> None:
-    """Lines that have met nothing yet, in a window of this radius."""
+@inner(fastmath={"contract"}, error_model="numpy")
+def begin(lines: FloatArray, strip: Strip, section: Section, second: Flag, whole: Flag) -> None:
+    """Lines that have met nothing yet, and where they enter and leave the window."""
+    a, rise_u = section.a, section.rise_u
     for row in range(strip.rows):
         v = strip.first_v + row * strip.spacing
-        half2 = radius * radius - v * v
+        rest, aslant = section.level - section.c * v * v, 2.0 * section.b * v
+        aside = section.rise_v * v
         at = np.uint64(row * strip.pitch)
         for j in range(np.uint64(strip.pitch)):
             i = at + j
             u = strip.first_u + strip.spacing * np.int32(j)
-            half = np.sqrt(half2 - u * u)
-            end = -FAR if whole is not None else -half
-            lines[i + BOUND] = half
+            half = np.sqrt(rest - (aslant + a * u) * u)
+            middle = aside + rise_u * u
+            enters = middle - half
+            end = -FAR if whole is not None else enters
+            lines[i + ENTRY] = enters
+            lines[i + EXIT] = middle + half
             lines[i + END] = end
             lines[i + GAP_START] = -FAR
             lines[i + GAP_END] = -FAR
@@ -96,8 +105,37 @@ def begin(lines: FloatArray, strip: Strip, radius: float, second: Flag, whole: F
                 lines[i + SET + END] = end
                 lines[i + SET + GAP_START] = -FAR
                 lines[i + SET + GAP_END] = -FAR
+        if section.planes.shape[0] > 0:
+            cut_row(lines, strip, section.planes, row, whole)
         no_lines(lines, at, np.uint64(0), np.uint64(strip.low[row]))
         no_lines(lines, at, np.uint64(strip.high[row]), np.uint64(strip.pitch))
+
+
+@inner(error_model="numpy")
+def cut_row(lines: FloatArray, strip: Strip, planes: FloatArray, row: int, whole: Flag) -> None:
+    """Let the lines of a row enter and leave the window between its planes, too."""
+    v = strip.first_v + row * strip.spacing
+    at = np.uint64(row * strip.pitch)
+    for k in range(planes.shape[0]):
+        n_u, n_n = planes[k, 0], planes[k, 2]
+        rest = planes[k, 3] - planes[k, 1] * v
+        for j in range(np.uint64(strip.pitch)):
+            i = at + j
+            # infinite along a plane; NaN, a line that misses the quadric, stays NaN
+            cut = (rest - n_u * (strip.first_u + strip.spacing * np.int32(j))) / abs(n_n)
+            if n_n < 0.0:
+                enters = lines[i + ENTRY]
+                lines[i + ENTRY] = -cut if -cut > enters else enters
+            else:
+                leaves = lines[i + EXIT]
+                lines[i + EXIT] = cut if cut < leaves else leaves
+    for j in range(np.uint64(strip.pitch)):
+        i = at + j
+        missed = not lines[i + ENTRY] < lines[i + EXIT]
+        lines[i + ENTRY] = np.nan if missed else lines[i + ENTRY]
+        lines[i + EXIT] = np.nan if missed else lines[i + EXIT]
+        if whole is None:
+            lines[i + END] = lines[i + SET + END] = lines[i + ENTRY]
 
 
 @inner()
@@ -105,7 +143,8 @@ def no_lines(lines: FloatArray, row: np.uint64, first: np.uint64, last: np.uint6
     """Mark places of a row where no lines are: nothing is ever greater or less than NaN."""
     for column in range(first, last):
         k = row + column
-        lines[k + BOUND] = lines[k + END] = lines[k + SET + END] = np.nan
+        lines[k + ENTRY] = lines[k + EXIT] = np.nan
+        lines[k + END] = lines[k + SET + END] = np.nan
 
 
 @inner()
@@ -116,7 +155,23 @@ def measure_from(lines: FloatArray, strip: Strip, rise_u: float, rise_v: float) 
         for column in range(strip.low[row], strip.high[row]):
             u = strip.first_u + column * strip.spacing
             place = np.uint64(row * strip.pitch + column)
-            lines[place + BOUND] = rise_u * u + rise_v * v
+            lines[place + ENTRY] = rise_u * u + rise_v * v
+
+
+@kernel
+def spans(clip: Clip, triad: FloatArray, points: FloatArray, ends: FloatArray) -> None:
+    """
+    Where a few lines enter and leave a window, to be looked at; NaN where they miss it.
+
+    They run along the third row of a triad through ``points`` along the other two, shape (L, 2);
+    ``ends`` has the same shape.
+    """
+    section, lines = section_along(clip, triad), np.empty(STATE_SIZE)
+    every = np.zeros(1, np.int64), np.ones(1, np.int64)
+    for k in range(points.shape[0]):
+        strip = Strip(1.0, 1.0, points[k, 0], points[k, 1], 1, 1, 1 + LANES, every[0], every[1])
+        begin(lines, strip, section, None, None)
+        ends[k, 0], ends[k, 1] = lines[ENTRY], lines[EXIT]
 
 
 @inner(inline="always")

@@ -13,7 +13,8 @@ choice the compiler makes a loop with nothing else in it:
 
 ``whole``     gaps as they are, between the first and the last solid of the line
 ``measured``  with ``whole``: only gaps that start in the line's measured length
-``window``    gaps clipped to the sphere window; lines that miss it carry NaN
+``window``    gaps clipped to the window, from where the line enters it to where it leaves it;
+              lines that miss it carry NaN
 ``second``    all this again for a second set of solids, from which some spheres are removed
 
 A gap that reaches FAR never counts in the whole.
@@ -28,8 +29,9 @@ import numpy as np
 from scanfab.base.jit import LANES, REORDERED, Flag, inner
 from scanfab.base.typing import FloatArray
 from scanfab.scan.kernels.strips import (
-    BOUND,
     END,
+    ENTRY,
+    EXIT,
     FAR,
     GAP_END,
     GAP_START,
@@ -83,16 +85,20 @@ class Measured(NamedTuple):
 
 @inner(forceinline=True, error_model="numpy")
 def whole_gap(
-    low: float, high: float, least: float, bound: float, measured: Measured | None
+    low: float, high: float, least: float, enters: float, measured: Measured | None
 ) -> tuple[float, float, float]:
-    """Length and number of a gap if it counts in the whole, and its length if it is too short."""
+    """
+    Length and number of a gap if it counts in the whole, and its length if it is too short.
+
+    ``enters`` is where the line's measured length begins.
+    """
     gap = high - low
     if measured is None:
         gap = gap if gap < 0.5 * FAR else 0.0
     else:
         # NaN: a place behind the last line
-        gap = gap if low - bound >= 0.0 else 0.0
-        gap = gap if low - bound < measured.length else 0.0
+        gap = gap if low - enters >= 0.0 else 0.0
+        gap = gap if low - enters < measured.length else 0.0
         gap = gap if gap < 0.5 * FAR else 0.0
     kept = gap >= least
     return gap if kept else 0.0, 1.0 if kept else 0.0, gap
@@ -100,13 +106,13 @@ def whole_gap(
 
 @inner(forceinline=True, error_model="numpy")
 def window_gap(
-    low: float, high: float, least: float, half: float, whole: Flag
+    low: float, high: float, least: float, enters: float, leaves: float, whole: Flag
 ) -> tuple[float, float, float]:
     """Length and number of a gap's part in the window if it is kept, and its length anyhow."""
-    high = high if high < half else half
+    high = high if high < leaves else leaves
     if whole is not None:
         # else no line begins before the window
-        low = low if low > -half else -half
+        low = low if low > enters else enters
     gap = high - low
     kept = gap >= least
     return gap if kept else 0.0, 1.0 if kept else 0.0, gap if gap > 0.0 else 0.0
@@ -118,7 +124,8 @@ def counted(
     low: float,
     high: float,
     least: float,
-    bound: float,
+    enters: float,
+    leaves: float,
     whole: Flag,
     window: Flag,
     measured: Measured | None,
@@ -129,11 +136,11 @@ def counted(
     # no gap is longer
     least = least if settles else 2.0 * FAR
     if whole is not None:
-        length, kept, gap = whole_gap(low, high, least, bound, measured)
+        length, kept, gap = whole_gap(low, high, least, enters, measured)
         if measured is not None:
             void = gap if settles else 0.0
     if window is not None:
-        inside, inside_kept, gap = window_gap(low, high, least, bound, whole)
+        inside, inside_kept, gap = window_gap(low, high, least, enters, leaves, whole)
         inside_void = gap if settles else 0.0
     return length, kept, void, inside, inside_kept, inside_void
 
@@ -160,7 +167,8 @@ def meet(
     start: float,
     stop: float,
     least: float,
-    bound: float,
+    enters: float,
+    leaves: float,
     whole: Flag,
     window: Flag,
     measured: Measured | None,
@@ -171,7 +179,7 @@ def meet(
     A chord of NaN settles none, and leaves the line as it is.
     """
     end, low, high = lines[i + END], lines[i + GAP_START], lines[i + GAP_END]
-    sums = counted(start > end, low, high, least, bound, whole, window, measured)
+    sums = counted(start > end, low, high, least, enters, leaves, whole, window, measured)
     end, low, high = moved(start, stop, end, low, high)
     lines[i + END], lines[i + GAP_START], lines[i + GAP_END] = end, low, high
     return sums
@@ -232,15 +240,17 @@ def visit(
             half_chord = np.sqrt(reach2 - du * du)
             start = sphere.depth - half_chord
             stop = sphere.depth + half_chord
-            bound = lines[i + BOUND]
+            enters, leaves = lines[i + ENTRY], lines[i + EXIT]
             if measured is not None:
-                stop = stop if start - bound < measured.known else np.nan
-                start = start if start - bound < measured.known else np.nan
-            found = meet(lines, i, start, stop, least, bound, whole, window, measured)
+                stop = stop if start - enters < measured.known else np.nan
+                start = start if start - enters < measured.known else np.nan
+            found = meet(lines, i, start, stop, least, enters, leaves, whole, window, measured)
             sums = both(sums, found)
             if second is not None:
                 start, stop = start + kept, stop + kept
-                found = meet(lines, i + SET, start, stop, least, bound, whole, window, measured)
+                found = meet(
+                    lines, i + SET, start, stop, least, enters, leaves, whole, window, measured
+                )
                 sums2 = both(sums2, found)
     tally[0, CHORDS] += chords
     add(tally, 0, sums)
@@ -276,27 +286,27 @@ def settle(
     Returns the number of closed lines, of which nothing is tallied here but that they are there.
     """
     a = b = c = d = e = f = 0.0
-    met = half_length = closed = 0.0
+    met = length = closed = 0.0
     crossing = np.int64(0)
     state = SET * np.uint64(which)
     for i in range(np.uint64(strip.rows * strip.pitch)):
         k = i + state
         end, low, high = lines[k + END], lines[k + GAP_START], lines[k + GAP_END]
-        bound = lines[i + BOUND]
+        enters, leaves = lines[i + ENTRY], lines[i + EXIT]
         closed += 1.0 if end == FAR else 0.0
-        sums = counted(end < FAR, low, high, least, bound, whole, window, measured)
+        sums = counted(end < FAR, low, high, least, enters, leaves, whole, window, measured)
         a, b, c = a + sums[0], b + sums[1], c + sums[2]
         d, e, f = d + sums[3], e + sums[4], f + sums[5]
         if window is not None:
-            start = end if end < FAR else bound
-            behind = window_gap(start, FAR, least, bound, whole)
+            start = end if end < FAR else leaves
+            behind = window_gap(start, FAR, least, enters, leaves, whole)
             d, e, f = d + behind[0], e + behind[1], f + behind[2]
-            crossing += np.int64(bound > 0.0)
-            half_length += bound if bound > 0.0 else 0.0
+            crossing += np.int64(leaves > enters)
+            length += leaves - enters if leaves > enters else 0.0
         if whole is not None:
             met += 1.0 if end > -FAR else 0.0
             if measured is not None:
-                crossing += np.int64(bound < FAR)
+                crossing += np.int64(enters < FAR)
     add(tally, which, (a, b, c, d, e, f))
     if whole is not None:
         tally[which, WHOLE + LINES] += met
@@ -304,5 +314,5 @@ def settle(
         tally[which, WHOLE + LINE_LENGTH] += crossing * measured.length
     if window is not None:
         tally[which, WINDOW + LINES] += crossing
-        tally[which, WINDOW + LINE_LENGTH] += 2.0 * half_length
+        tally[which, WINDOW + LINE_LENGTH] += length
     return closed

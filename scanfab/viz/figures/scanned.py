@@ -361,10 +361,10 @@ def _smoothed_density(normals: FloatArray, directions: FloatArray) -> FloatArray
 
 def _lengths(result: FrameResult, title: str, variant: str) -> LengthSample:
     _, _, cutoff, smallest = _parts(result)
-    position, radius, reach = result.scanned.spheres_of(VARIANTS[variant])
+    position, radius, window = result.scanned.spheres_of(VARIANTS[variant])
     points, _ = sphere_points()
     frames = line_triads(points[: len(points) // 2 : 20])
-    found = sample_segments(position, radius, frames, HISTOGRAM_LINES, reach)
+    found = sample_segments(position, radius, frames, HISTOGRAM_LINES, window)
     return LengthSample(title, found.length[found.void] / smallest, cutoff / smallest)
 
 

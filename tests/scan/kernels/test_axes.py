@@ -6,15 +6,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
+from scanfab.base.convex import Convex, sphere
 from scanfab.base.jit import LANES
 from scanfab.scan.kernels import axes, lists, strips, sweep
 from scanfab.scan.kernels.bins import no_bins
 from scanfab.scan.kernels.grid import cover, strip_of
 from scanfab.scan.kernels.projection import order_of, project, range_of
+from scanfab.scan.kernels.windows import section_along
 from scanfab.scan.lines import line_triads
+from scanfab.scan.solids import clip_of
 from tests.helpers import naive
 from tests.helpers.lattices import ball_points, poisson_spheres, rotation
 from tests.helpers.uncompiled import run_uncompiled
+from tests.helpers.windows import random_window
 
 RUNS_OF_A_KIND = 300
 # row by row, and over lists of chords
@@ -91,6 +95,13 @@ def line_words(spheres, removed, triad, offset, spacing):
     )
 
 
+def region(window):
+    """A window as a scan takes it, from a region, the radius of a sphere, or 0 for none."""
+    if isinstance(window, Convex):
+        return window
+    return sphere(window) if window else None
+
+
 def fast_tallies(
     spheres,
     removed,
@@ -110,7 +121,7 @@ def fast_tallies(
     axes.scan_axes(
         *line_words(spheres, removed, triad, offset, spacing),
         cutoff,
-        window,
+        clip_of(region(window)),
         tallies,
         by_lists,
         second or None,
@@ -155,7 +166,7 @@ def assert_fast_equals_naive(spheres, removed, triad, offset, spacing, cutoffs, 
 def check_random_packing(kind, random):
     """One packing of a kind, with a random window, grid, cut-offs and removed grains."""
     position, radius = kind(random)
-    window = random.choice([0.0, 1.0, random.uniform(0.3, 3.0)], p=[0.1, 0.3, 0.6])
+    window = random_window(random)
     spacing = np.exp(random.uniform(np.log(0.4), np.log(2.5)))
     if random.random() < 0.02:
         spacing *= 0.2
@@ -167,21 +178,28 @@ def check_random_packing(kind, random):
         triad,
         random.random(2),
         spacing,
-        [0.0, random.uniform(0.01, 0.5), random.uniform(0.5, 2.0), 2.0 * window + 1e-3],
+        [
+            0.0,
+            random.uniform(0.01, 0.5),
+            random.uniform(0.5, 2.0),
+            2.0 * (region(window).reach if window else 0.0) + 1e-3,
+        ],
         window,
     )
 
 
 @njit
-def closed_lines(position, radius, triad, grid, window):
+def closed_lines(position, radius, triad, grid, clip):
     """How many lines of one strip the sweep of all spheres leaves to be solved again."""
     projected = project(position, radius, np.zeros(radius.size, np.bool_), triad, grid)
     pitch = grid.columns + LANES
     strip = strip_of(grid, 0, grid.rows, pitch)
     state, tally = np.empty(strips.STATE_SIZE), np.zeros((2, sweep.TALLY_SIZE))
     every = np.arange(projected.u.size)
-    strips.begin(state, strip, window, None, True)
-    axes.visit_all(state, strip, projected, every, window, 1e-300, tally, None, True, True, None)
+    section = section_along(clip, triad)
+    strips.begin(state, strip, section, None, True)
+    reach = section.reach
+    axes.visit_all(state, strip, projected, every, reach, 1e-300, tally, None, True, True, None)
     return sweep.settle(state, strip, 0, 1e-300, tally, True, True, None)
 
 
@@ -196,7 +214,8 @@ def suspect_lines(spheres, triad, offset, spacing, window):
     reach = np.linalg.norm(position, axis=1).max() + radius.max() + window
     grid = square_grid(reach, offset, spacing)
     assert grid.rows * (grid.columns + LANES) <= strips.MOST_LINES
-    return closed_lines(position, radius, np.ascontiguousarray(triad), grid, window)
+    triad = np.ascontiguousarray(triad)
+    return closed_lines(position, radius, triad, grid, clip_of(sphere(window)))
 
 
 @njit

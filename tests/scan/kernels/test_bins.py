@@ -5,12 +5,14 @@ import pytest
 
 from scanfab.scan.gaps import Blocks
 from scanfab.scan.kernels import axes, sweep
-from scanfab.scan.kernels.bins import BLOCKS, Bins
+from scanfab.scan.kernels.bins import Bins
 from scanfab.scan.lines import line_triads
+from scanfab.scan.solids import clip_of
 from tests.helpers import naive
 from tests.helpers.lattices import rotation
 from tests.helpers.uncompiled import run_uncompiled
-from tests.scan.kernels.test_axes import KINDS, line_words, overlapping
+from tests.helpers.windows import random_window
+from tests.scan.kernels.test_axes import KINDS, line_words, overlapping, region
 
 RUNS_OF_A_KIND = 60
 REACH = 30.0
@@ -19,17 +21,17 @@ REACH = 30.0
 def fast_sums(spheres, removed, triad, offset, spacing, window, cutoffs, centers, flags=(1, 1, 1)):
     """What the kernel adds up: shape (whole or window, set of solids, octant, bin, sum)."""
     blocks = np.array([Blocks.about(center, REACH).affine() for center in centers])
-    sums = np.zeros((1, 2, 2, BLOCKS * len(cutoffs), 3))
+    sums = np.zeros((1, 2, 2, 8 * len(cutoffs), 3))
     axes.scan_axes(
         *line_words(spheres, removed, triad, offset, spacing),
         0.0,
-        window,
+        clip_of(region(window)),
         np.zeros((1, 2, sweep.TALLY_SIZE)),
         True,
         *(True if flag else None for flag in flags),
-        Bins(blocks, np.array(cutoffs), sums),
+        Bins(blocks, np.full((2, 3), 2.0), np.array(cutoffs), sums),
     )
-    return sums.reshape(2, 2, BLOCKS, len(cutoffs), 3)
+    return sums.reshape(2, 2, 8, len(cutoffs), 3)
 
 
 def slow_sums(spheres, removed, triad, offset, spacing, window, cutoffs, centers):
@@ -55,7 +57,7 @@ def check_random_packing(kind, random):
         triad,
         random.random(2),
         np.exp(random.uniform(np.log(0.4), np.log(2.5))),
-        random.choice([0.0, random.uniform(0.3, 3.0)], p=[0.1, 0.9]),
+        random_window(random),
         np.sort(random.uniform(0.003, 2.0, random.integers(1, 5))),
         random.uniform(-1.0, 1.0, (2, 3)),
     )

@@ -7,6 +7,7 @@ from numba import njit
 from scanfab.scan.kernels import axes, periodic, sweep
 from scanfab.scan.kernels.bins import no_bins
 from scanfab.scan.kernels.periodic import CellGrains
+from scanfab.scan.solids import clip_of
 from tests.helpers import naive
 from tests.helpers.uncompiled import run_uncompiled
 from tests.scan.kernels.test_axes import WAYS
@@ -75,7 +76,7 @@ def tallies_of(
     medium, normal, offset, spacing, cutoff, second=True, by_lists=False, most_steps=np.inf
 ):
     tallies = np.zeros((1, 2, sweep.TALLY_SIZE))
-    lines = normal[None], offset[None], spacing, cutoff
+    lines = normal[None], offset[None], spacing, cutoff, clip_of(None)
     axes.scan_cell(medium, *lines, tallies, by_lists, second or None, no_bins(1), most_steps)
     return tallies[0]
 

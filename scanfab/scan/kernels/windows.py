@@ -1,0 +1,98 @@
+"""Where the lines along an axis enter and leave a window, as numbers."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from scanfab.base.jit import inner
+from scanfab.base.typing import FloatArray
+
+__all__ = ["Clip", "Section", "section_along"]
+
+# Of the quadric's own size: along a line for which it changes less than that by rounding alone, it
+# does not change at all. Such a line, one along a cylinder's axis, leaves it far beyond the planes.
+FLAT, LEAST = 1e-15, 1e-300
+
+
+class Clip(NamedTuple):
+    """What lines are clipped to: the data of a :class:`scanfab.base.convex.Convex`."""
+
+    planes: FloatArray
+    """Shape (P, 4)."""
+    isotropic: float
+    deviator: FloatArray
+    level: float
+    reach: float
+
+
+class Section(NamedTuple):
+    """
+    A window as the lines along one axis meet it.
+
+    Those through (u, v) are inside at depths within √(level - a u² - 2 b u v - c v²) of
+    rise_u u + rise_v v, and on the inner side of all planes.
+    """
+
+    planes: FloatArray
+    """Unit vectors along u, v, n and distances from the origin, shape (P, 4)."""
+    level: float
+    a: float
+    b: float
+    c: float
+    rise_u: float
+    rise_v: float
+    reach: float
+
+
+@inner()
+def form(matrix: FloatArray, one: FloatArray, two: FloatArray) -> float:
+    """The bilinear form of a matrix."""
+    total = 0.0
+    for i in range(3):
+        for j in range(3):
+            total += one[i] * matrix[i, j] * two[j]
+    return total
+
+
+@inner()
+def section_along(clip: Clip, triad: FloatArray) -> Section:
+    """
+    The section for the lines along the third row of a triad (rows u, v, n).
+
+    On a line the quadric x·(m I + D) x = L is a quadratic equation in the depth t. With q the
+    matrix in the triad,
+
+        t = -(q_un u + q_vn v) / q_nn ± √(L / q_nn - a u² - 2 b u v - c v²),
+
+    where a = q_uu / q_nn - (q_un / q_nn)², and b, c likewise. m I is the same in every triad.
+    """
+    u, v, n = triad[0], triad[1], triad[2]
+    m, deviator = clip.isotropic, clip.deviator
+    largest = 0.0
+    for i in range(3):
+        for j in range(3):
+            largest = max(largest, abs(deviator[i, j]))
+    along, lean_u, lean_v = m + form(deviator, n, n), form(deviator, u, n), form(deviator, v, n)
+    flat = FLAT * (m + largest) + LEAST
+    if along < flat:
+        along, lean_u, lean_v = flat, 0.0, 0.0
+    lean_u, lean_v = lean_u / along, lean_v / along
+    planes = np.empty_like(clip.planes)
+    for k in range(planes.shape[0]):
+        for i in range(3):
+            planes[k, i] = 0.0
+            for j in range(3):
+                planes[k, i] += triad[i, j] * clip.planes[k, j]
+        planes[k, 3] = clip.planes[k, 3]
+    return Section(
+        planes,
+        clip.level / along,
+        (m + form(deviator, u, u)) / along - lean_u * lean_u,
+        form(deviator, u, v) / along - lean_u * lean_v,
+        (m + form(deviator, v, v)) / along - lean_v * lean_v,
+        -lean_u,
+        -lean_v,
+        clip.reach,
+    )

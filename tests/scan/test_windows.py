@@ -1,0 +1,141 @@
+"""Windows as data: regions made up from half-spaces and a quadric, of which no code knows."""
+
+import numpy as np
+import pytest
+from numba import njit
+
+from scanfab import direction_rule, scan_lines, sphere
+from scanfab.scan.gaps import Blocks, scan_gaps
+from scanfab.scan.kernels.strips import spans
+from scanfab.scan.kernels.windows import section_along
+from scanfab.scan.lines import line_triads
+from scanfab.scan.solids import clip_of
+from tests.helpers import naive
+from tests.helpers.lattices import Spheres, poisson_spheres, rotation
+from tests.helpers.scanning import mean_lengths, scan_along, solids_of
+from tests.helpers.windows import box, cut_ball, cylinder, ellipsoid, random_window
+
+NOTHING = Spheres(np.zeros((0, 3)), np.zeros(0))
+TURN = rotation(np.random.default_rng(4))
+HALF = np.array([0.8, 1.1, 1.5])
+RULE = direction_rule("lebedev:5")
+# with volume and surface
+WINDOWS = {
+    "sphere": (sphere(1.2), 4 / 3 * np.pi * 1.2**3, 4 * np.pi * 1.2**2),
+    "box": (box(HALF, TURN), 8 * HALF.prod(), 8 * (0.8 * 1.1 + 1.1 * 1.5 + 1.5 * 0.8)),
+    "cylinder": (cylinder(TURN[0], 0.7, 1.3), np.pi * 0.49 * 2.6, 2 * np.pi * (0.49 + 0.7 * 2.6)),
+    "half a ball": (cut_ball(1.3, TURN[1], 0.0), 2 / 3 * np.pi * 1.3**3, 3 * np.pi * 1.3**2),
+}
+
+
+@pytest.mark.parametrize("name", WINDOWS)
+def test_lines_measure_the_volume_along_every_axis_and_the_surface_over_all(name):
+    """Σ length * spacing² = V; and by Cauchy's formula the mean shadow is a quarter of S."""
+    window, volume, surface = WINDOWS[name]
+    rule = direction_rule("lebedev:41")
+    sums = scan_lines(
+        solids_of(NOTHING, window), rule, spacing=0.02, cutoff=0.0, variants="c", replicates=[0]
+    )
+    assert sums.line_length[0, 2] * 0.02**2 == pytest.approx(volume, rel=2e-3)
+    assert sums.length[0, 2] == pytest.approx(sums.line_length[0, 2])
+    assert rule.weights @ sums.lines[0, 2] * 0.02**2 == pytest.approx(surface / 4, rel=2e-3)
+
+
+def test_lines_through_an_empty_box_are_as_long_as_its_edges():
+    sums = scan_along(solids_of(NOTHING, box(HALF)), np.eye(3), 0.05)
+    assert mean_lengths(sums, "c").value == pytest.approx(2 * HALF)
+
+
+def test_lines_along_a_cylinder_are_as_long_as_it_is():
+    for axis in np.concatenate([TURN, direction_rule("lebedev:11").axes]):
+        sums = scan_along(solids_of(NOTHING, cylinder(axis, 0.7, 1.3)), [axis], 0.05)
+        assert mean_lengths(sums, "c").value == pytest.approx(2.6)
+        assert sums.lines[:, 2].mean() * 0.05**2 == pytest.approx(np.pi * 0.49, rel=0.02)
+
+
+def test_lines_along_an_axis_of_an_ellipsoid_have_two_thirds_of_it_on_average():
+    sums = scan_along(solids_of(NOTHING, ellipsoid(HALF, TURN)), TURN, 0.01)
+    assert mean_lengths(sums, "c").value == pytest.approx(4 / 3 * HALF, rel=1e-3)
+
+
+@njit
+def quadric_along(clip, triad):
+    section = section_along(clip, triad)
+    return section.level, section.a, section.b, section.c, section.rise_u, section.rise_v
+
+
+def test_a_sphere_has_the_same_numbers_along_all_axes():
+    """To the last bit: its quadric has no part that turns with the axes."""
+    for triad in line_triads(direction_rule("lebedev:11").axes):
+        section = quadric_along(clip_of(sphere(1.7)), triad)
+        assert section == (1.7 * 1.7, 1.0, 0.0, 1.0, 0.0, 0.0)
+
+
+def test_spans_are_those_of_the_naive_twin():
+    random = np.random.default_rng(6)
+    for _ in range(300):
+        window = random_window(random)
+        if not isinstance(window, float):
+            triad, points = rotation(random), random.uniform(-2.0, 2.0, (40, 2))
+            ends = np.empty((40, 2))
+            spans(clip_of(window), triad, points, ends)
+            for place, (enters, leaves) in zip(points @ triad[:2], ends, strict=True):
+                low, high = naive.within(window, place, triad[2])
+                expected = (low, high) if low < high else (np.nan, np.nan)
+                assert (enters, leaves) == pytest.approx(expected, nan_ok=True, abs=1e-7)
+
+
+def packed(window):
+    random = np.random.default_rng(2)
+    spheres = poisson_spheres(random, 0.4, 2.5)
+    return solids_of(spheres, window, random.random(len(spheres.radius)) < 0.2)
+
+
+@pytest.mark.parametrize("parts", [(2, 2, 2), (3, 1, 4), (1, 1, 1), (5, 3, 7)])
+@pytest.mark.parametrize("window", [sphere(2.0), box(HALF, TURN)], ids=["sphere", "box"])
+def test_all_blocks_of_any_number_together_are_the_scan_of_the_same_lines(window, parts):
+    solids, cutoffs = packed(window), [0.0, 0.3]
+    # about a quarter of a period across, so that there are places in every block
+    cells = Blocks(np.eye(3) / 4.3, np.full(3, 0.1), parts)
+    words = {"spacing": 0.1, "replicates": range(2)}
+    gaps = scan_gaps(solids, RULE, cutoffs=cutoffs, blocks=(cells, cells), **words)
+    assert gaps.number.shape[3] == len(cells) == np.prod(parts)
+    assert np.all(gaps.number.sum(axis=(0, 1, 2, 4)) > 0)
+    for place, cutoff in enumerate(cutoffs):
+        sums = scan_lines(solids, RULE, cutoff=cutoff, **words)
+        for variant in "abcd":
+            length, number = gaps.kept(variant, place)
+            assert np.array_equal(number, sums.kept(variant)[1])
+            np.testing.assert_allclose(length, sums.kept(variant)[0], rtol=1e-10)
+            without = [gaps.kept(variant, place, without=k)[1] for k in range(len(cells))]
+            assert np.array_equal(sum(without), (len(cells) - 1) * number)
+
+
+def test_blocks_are_those_of_the_naive_twin():
+    random = np.random.default_rng(8)
+    places = random.uniform(-5, 5, (300, 3))
+    for parts in [(3, 1, 4), (2, 2, 2), (6, 5, 1)]:
+        blocks = Blocks(rotation(random) / 3.0, random.random(3), parts)
+        assert blocks.of(places).tolist() == [naive.block(place, blocks) for place in places]
+
+
+def test_a_place_just_below_a_period_lies_in_the_last_block():
+    blocks = Blocks(np.eye(3), np.zeros(3), (3, 1, 4))
+    assert blocks.of(np.full((1, 3), -1e-20)).tolist() == [11]
+
+
+def test_whole_and_window_may_have_blocks_of_their_own():
+    solids = packed(sphere(2.0))
+    blocks = Blocks(np.eye(3) / 9, np.full(3, 0.5), (3, 1, 1)), Blocks.about(np.zeros(3), 3.0)
+    gaps = scan_gaps(solids, RULE, spacing=0.1, cutoffs=[0.0], blocks=blocks, replicates=[0])
+    found = gaps.number.sum(axis=(0, 2, 4)) > 0
+    assert found[0].tolist() == [True] * 3 + [False] * 5
+    assert found[2].all()
+
+
+def test_nothing_is_tallied_of_lines_that_miss_a_region_inside_its_ball():
+    """A thin plate: most lines across its ball pass it by."""
+    plate = box(np.array([1.0, 1.0, 0.01]))
+    sums = scan_along(solids_of(NOTHING, plate), [[1.0, 0.0, 0.0]], 0.004)
+    assert sums.lines[:, 2].mean() * 0.004**2 == pytest.approx(2.0 * 0.02, rel=0.01)
+    assert sums.line_length[:, 2] == pytest.approx(2.0 * sums.lines[:, 2])
