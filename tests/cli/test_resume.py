@@ -12,7 +12,8 @@ from random import Random
 import pytest
 
 from scanfab.cli.main import run
-from scanfab.table.writing import CsvWriter, JsonLinesWriter
+from scanfab.table.formats.json_rows import LinesWriter
+from scanfab.table.formats.text import TextWriter
 from tests.helpers.interruptions import Interrupter, interrupted_at_row, write_series
 
 # about a second of scanning
@@ -65,7 +66,7 @@ def stopped(compute, monkeypatch, tmp_path):
 
     def stop(name: str = "table.csv") -> Path:
         output = tmp_path / name
-        writer = CsvWriter if name.endswith(("csv", "tsv")) else JsonLinesWriter
+        writer = TextWriter if name.endswith(("csv", "tsv")) else LinesWriter
         with interrupted_at_row(monkeypatch, 6, writer) as rows:
             assert compute(output) == 130
         _wait_for_frames_under_way()
