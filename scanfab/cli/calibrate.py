@@ -190,6 +190,7 @@ def _show(found: Calibration, command: str, tables: bool) -> None:
 
 def _write_rows(found: Calibration, command: str, excerpt: Excerpt) -> None:
     """The steps on one stream, and what was found on the other."""
+    from scanfab.pipeline.ladders import StepRow
     from scanfab.table.columns import columns_of
     from scanfab.table.writing import row_writer
 
