@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from scanfab.table.compare import compare_tables
     from scanfab.table.reading import read_rows
     from scanfab.table.row import Row
-    from scanfab.table.table import Table
+    from scanfab.table.table import Table, load
 
 # numpy, numba and the readers are loaded by the first name that needs them
 _HOME = {
@@ -70,6 +70,7 @@ _HOME = {
     "contact_fabric": "fabric.contact",
     "direction_rule": "scan.directions",
     "find_contacts": "packing.search",
+    "load": "table.table",
     "read": "io.opening",
     "read_rows": "table.reading",
     "read_series": "io.opening",
@@ -108,6 +109,7 @@ __all__ = [
     "contact_fabric",
     "direction_rule",
     "find_contacts",
+    "load",
     "read",
     "read_rows",
     "read_series",

@@ -157,9 +157,11 @@ def _show(found: Calibration, command: str, tables: bool) -> None:
 
 def _write_rows(found: Calibration, command: str, excerpt: Excerpt) -> None:
     """The steps on one stream, and what was found on the other."""
-    from scanfab.table.writing import CsvWriter
+    from scanfab.pipeline.ladders import StepRow
+    from scanfab.table.columns import columns_of
+    from scanfab.table.writing import row_writer
 
-    writer = CsvWriter(sys.stdout, excerpt=excerpt)
+    writer = row_writer(".csv", sys.stdout, columns_of(StepRow), excerpt=excerpt)
     for row in found.rows:
         writer.write(row)
     for sentence in (*found.findings, command):

@@ -61,9 +61,10 @@ def compare(
     from scanfab.cli.comparison_tables import print_comparison
     from scanfab.cli.console import is_readable, reported_warnings
     from scanfab.table.compare import compare_tables
+    from scanfab.table.formats.registry import format_of
     from scanfab.table.reading import read_rows
     from scanfab.table.selection import choose_rows
-    from scanfab.table.writing import Excerpt, check_suffix
+    from scanfab.table.writing import Excerpt
     from scanfab.viz.figures.fitted import TABLE_FIGURES, plot_rows
 
     check_plot(plot, figure, TABLE_FIGURES)
@@ -73,7 +74,7 @@ def compare(
         raise click.UsageError(f"--label: expected one a table: {len(tables)}, found {len(labels)}")
     if output is not None:
         with usage_errors():
-            check_suffix(output)
+            format_of(output)
     with reported_warnings():
         read = [(table, read_rows(table)) for table in tables]
         rows = [row for one in choose_rows(read, cutoff, labels) for row in one]
@@ -100,9 +101,10 @@ def compare(
 
 
 def _write_csv(rows: Sequence[Any], excerpt: Excerpt) -> None:
-    from scanfab.table.writing import CsvWriter
+    from scanfab.table.columns import columns_of
+    from scanfab.table.writing import row_writer
 
-    writer = CsvWriter(sys.stdout, excerpt=excerpt)
+    writer = row_writer(".csv", sys.stdout, columns_of(type(rows[0])), excerpt=excerpt)
     for row in rows:
         writer.write(row)
 

@@ -201,7 +201,8 @@ def _standing(run: Run, result: ResultFile | None, printed: bool) -> str:
 def _write(run: Run, asked: dict[str, Any], result: ResultFile | None, excerpt: Excerpt) -> None:
     """Write the rows as they come."""
     from scanfab.cli.console import is_readable, print_table
-    from scanfab.table.writing import CsvWriter
+    from scanfab.table.columns import table_columns
+    from scanfab.table.writing import row_writer
 
     if result is not None:
         with result.writer(asked, run.resume) as writer:
@@ -213,7 +214,7 @@ def _write(run: Run, asked: dict[str, Any], result: ResultFile | None, excerpt: 
     elif is_readable():
         print_table(list(run.rows()), excerpt)
     else:
-        printer = CsvWriter(sys.stdout, excerpt=excerpt)
+        printer = row_writer(".csv", sys.stdout, table_columns(), excerpt=excerpt)
         for row in run.rows():
             printer.write(row)
 

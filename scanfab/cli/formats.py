@@ -12,7 +12,7 @@ def formats() -> None:
     """List every reader and writer, its extensions, and the package it comes from."""
     from scanfab.cli.console import reported_warnings
     from scanfab.io.registry import installed_readers
-    from scanfab.table.writing import FILE_FORMATS
+    from scanfab.table.formats.registry import known_formats
     from scanfab.viz.figures.style import PLOT_FORMATS
 
     with reported_warnings():
@@ -21,8 +21,8 @@ def formats() -> None:
             for name, one in installed_readers().items()
         ]
     lines += [
-        ("writer", suffix.lstrip("."), suffix, "scanfab", description)
-        for suffix, description in FILE_FORMATS.items()
+        ("writer", suffix.lstrip("."), suffix, type(one).__module__.split(".")[0], one.description)
+        for suffix, one in known_formats().items()
     ]
     lines += [
         ("figure", suffix.lstrip("."), suffix, "scanfab", description)

@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
+import numpy as np
+
 from scanfab.base.typing import FloatArray
+from scanfab.table.preview import with_error
 from scanfab.table.row import Record
 
 __all__ = [
@@ -108,3 +111,34 @@ class Comparison:
     points: tuple[FloatArray, ...]
     """For each row of the summary, contact and void anisotropy of the frames in its fits, shape
     (frames, 2)."""
+
+    @property
+    def slope(self) -> FloatArray:
+        """Slope of each row of the summary, dimensionless; NaN where there is none."""
+        return self._numbers("slope")
+
+    @property
+    def slope_se(self) -> FloatArray:
+        """Its standard error from the sample's octants."""
+        return self._numbers("slope_se")
+
+    @property
+    def r2(self) -> FloatArray:
+        """R² of each fit."""
+        return self._numbers("r2")
+
+    @property
+    def peak(self) -> FloatArray:
+        """The void anisotropy that is largest in size, for each row of the summary."""
+        return self._numbers("peak")
+
+    def _numbers(self, name: str) -> FloatArray:
+        return np.array([np.nan if row[name] is None else row[name] for row in self.summary], float)
+
+    def __repr__(self) -> str:
+        lines = [
+            f"{one.source}, variant {one.variant}: slope {with_error(one.slope, one.slope_se)}, "
+            f"{one.frames} frames"
+            for one in self.summary
+        ]
+        return "\n".join([f"Comparison of {len(self.frames)} rows", *lines])

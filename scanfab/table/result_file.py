@@ -1,7 +1,8 @@
 """
 A result file that is complete or untouched, and that an interrupted computation can go on with.
 
-Rows go to FILE.part, which becomes FILE at the end. FILE.part is CSV, TSV or JSON lines as FILE is;
+Rows go to FILE.part, which becomes FILE at the end. FILE.part is of the
+format of FILE where that has a line for each row (CSV, TSV, JSON lines);
 for other formats, and where not all columns or digits are wanted, it is JSON lines, and converted
 at the end. What was asked for stands beside it in FILE.manifest.json.part, and what the files of
 the frames held, so that nobody goes on with other settings or other files: JSON lines, as entries
@@ -26,11 +27,12 @@ from scanfab.base.errors import ReadError, ScanfabNote, SettingsError
 from scanfab.base.files import check_folder, named_errors, whole_file
 from scanfab.base.lock import locked
 from scanfab.base.streams import kind_of
-from scanfab.table.writing import ALL, Excerpt, RowWriter, check_suffix, row_writer
+from scanfab.table.columns import columns_of
+from scanfab.table.formats.registry import RowWriter, format_of
+from scanfab.table.reading import read_rows
+from scanfab.table.writing import ALL, Excerpt, row_writer, write_rows
 
 __all__ = ["ResultFile", "differing_settings"]
-
-LINE_FORMATS = (".csv", ".tsv", ".jsonl")
 
 
 class ResultFile:
@@ -53,7 +55,7 @@ class ResultFile:
     """
 
     def __init__(self, path: Path, kind: type, excerpt: Excerpt = ALL) -> None:
-        check_suffix(path)
+        table_format = format_of(path)
         check_folder(path)
         self.path = path
         self.kind = kind
@@ -69,7 +71,7 @@ class ResultFile:
                     f"{one}: is {found}, expected a file or nothing, as rows are kept there until "
                     f"{path.name} is complete: remove it, or name another -o FILE"
                 )
-        as_it_is = self.suffix in LINE_FORMATS and excerpt.is_all
+        as_it_is = table_format.appends and excerpt.is_all
         self._part_suffix = self.suffix if as_it_is else ".jsonl"
 
     @property
@@ -144,9 +146,9 @@ class ResultFile:
                 self._put_part_aside()
             self._begin_record(asked, inputs)
             with self._open_part() as stream:
-                yield row_writer(
-                    self._part_suffix, stream, self.kind, not going_on, self._excerpt_of_part
-                )
+                columns = columns_of(self.kind)
+                excerpt = self.excerpt if self._part_suffix == self.suffix else ALL
+                yield row_writer(self._part_suffix, stream, columns, not going_on, excerpt)
             # what stands there is of the table that was FILE before
             self.manifest.unlink(missing_ok=True)
             if self._part_suffix == self.suffix:
@@ -163,10 +165,6 @@ class ResultFile:
         lines = "".join(json.dumps(one) + "\n" for one in inputs)
         with named_errors(self._record), open(self._record, "a", encoding="utf-8") as stream:
             stream.write(lines)
-
-    @property
-    def _excerpt_of_part(self) -> Excerpt:
-        return self.excerpt if self._part_suffix == self.suffix else ALL
 
     def _lines_of_part(self) -> tuple[int, list[bytes]]:
         """How many lines come before the first row, and all whole lines."""
@@ -249,17 +247,11 @@ class ResultFile:
         return settings, inputs
 
     def _rows(self) -> list[dict[str, Any]]:
-        from scanfab.table.reading import read_rows
-
         return read_rows(self.part) if self.part.stat().st_size else []
 
     def _convert(self) -> None:
         """Write FILE from the JSON lines of FILE.part."""
-        with whole_file(self.path) as final, _open_for(self.suffix, final) as stream:
-            writer = row_writer(self.suffix, stream, self.kind, excerpt=self.excerpt)
-            for row in self._rows():
-                writer.write(self.kind(**row))
-            writer.close()
+        write_rows(self.path, self._rows(), columns_of(self.kind), self.excerpt)
         self._let_go()
         self.part.unlink()
 
@@ -276,9 +268,3 @@ def differing_settings(
         for name in names
         if before.get(name) != now.get(name)
     )
-
-
-def _open_for(suffix: str, path: Path) -> IO[Any]:
-    if suffix == ".parquet":
-        return open(path, "wb")
-    return open(path, "w", newline="", encoding="utf-8")

@@ -1,34 +1,107 @@
-"""The fabric table: one row for each frame and variant."""
+"""A table of rows: computed, read back from a file, or compared."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, overload
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import is_dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.table.columns import COLUMNS
+from scanfab.base.column import Column, NoColumnError, no_column
+from scanfab.base.errors import SettingsError
+from scanfab.base.typing import FloatArray
+from scanfab.fabric.tensor import COMPONENTS
+from scanfab.table.columns import COLUMNS, columns_of, table_columns
+from scanfab.table.plots import Plots
+from scanfab.table.preview import as_html, as_text
+from scanfab.table.reading import read_rows
 from scanfab.table.row import Row
 
-__all__ = ["COLUMNS", "Row", "Table"]
+if TYPE_CHECKING:
+    import pandas
+    import polars
+
+    from scanfab.table.comparison import Comparison
+
+__all__ = ["COLUMNS", "Row", "Table", "load"]
+
+
+def load(path: Path | str) -> Table:
+    """
+    Read a table that was saved, by :meth:`Table.save` or by ``scanfab compute -o``.
+
+    Parameters
+    ----------
+    path : path
+        CSV, TSV, JSON, JSON lines, Parquet, or a format of another package; told apart by content.
+
+    Returns
+    -------
+    Table
+        With the columns that the file has; a missing value is None.
+
+    Raises
+    ------
+    ReadError
+        If the file cannot be read as a table; names the line of a text file.
+
+    Examples
+    --------
+    >>> import scanfab
+    >>> table = scanfab.load("sample_data/yade_triaxial/engine.csv")
+    >>> table[0].contacts
+    2076
+    """
+    return Table(read_rows(path))
 
 
 class Table(Sequence[Row]):
     """
-    The rows of a computation.
+    Rows with named columns: ``table[0]`` is a row, ``table["alpha_vs"]`` a column as an array.
 
-    ``table["alpha_vs"]`` is a column as an array (missing numbers are NaN), ``table[0]`` a row.
+    Parameters
+    ----------
+    rows : iterable of mapping
+        Values by column; missing values are None.
+
+    Examples
+    --------
+    >>> from scanfab import Table
+    >>> table = Table([dict(frame=0, variant="c", alpha_vs=0.01), dict(frame=1, variant="c")])
+    >>> table[0].alpha_vs
+    0.01
+    >>> table["alpha_vs"]
+    array([0.01,  nan])
+    >>> len(table.select(frame=1)), len(table[:1])
+    (1, 1)
     """
 
-    def __init__(self, rows: Iterable[Row]) -> None:
-        self.rows = tuple(rows)
+    columns: tuple[Column, ...]
+    """What each column is called and holds."""
+
+    def __init__(self, rows: Iterable[Mapping[str, Any]] = ()) -> None:
+        given = list(rows)
+        self.columns = _columns(given)
+        names = [column.name for column in self.columns]
+        self.rows = tuple(
+            row if isinstance(row, Row) and len(row) == len(names) else _filled(row, names)
+            for row in given
+        )
 
     def __len__(self) -> int:
         return len(self.rows)
 
     def __iter__(self) -> Iterator[Row]:
         return iter(self.rows)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Table) and self.rows == other.rows
+
+    def __hash__(self) -> int:
+        return hash(self.rows)
 
     @overload
     def __getitem__(self, key: int) -> Row: ...
@@ -37,21 +110,201 @@ class Table(Sequence[Row]):
     @overload
     def __getitem__(self, key: str) -> npt.NDArray[Any]: ...
     def __getitem__(self, key: int | slice | str) -> Row | Table | npt.NDArray[Any]:
-        if isinstance(key, str):
-            if key not in COLUMNS:
-                raise KeyError(f"no column {key!r}; the columns are {', '.join(COLUMNS)}")
-            values = [getattr(row, key) for row in self.rows]
-            text = any(isinstance(value, str) for value in values)
-            return np.array(values if text else [np.nan if v is None else v for v in values])
-        return Table(self.rows[key]) if isinstance(key, slice) else self.rows[key]
+        if isinstance(key, slice):
+            return Table(self.rows[key])
+        if not isinstance(key, str):
+            return self.rows[key]
+        self._check(key)
+        values = [row[key] for row in self.rows]
+        text = any(isinstance(value, str) for value in values)
+        return np.array(values if text else [np.nan if v is None else v for v in values])
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the columns."""
+        return tuple(column.name for column in self.columns)
+
+    @property
+    def plot(self) -> Plots:
+        """The figures that are installed: ``table.plot.evolution(ax=ax)`` draws one on its Axes."""
+        return Plots(self)
 
     def select(self, **wanted: Any) -> Table:
-        """The rows whose columns have the given values, for instance ``variant="a"``."""
+        """
+        The rows whose columns have the given values.
+
+        Parameters
+        ----------
+        **wanted
+            For instance ``variant="a"``.
+
+        Returns
+        -------
+        Table
+
+        Raises
+        ------
+        ScanfabError
+            If there is no such column; names the nearest.
+
+        Examples
+        --------
+        >>> import scanfab
+        >>> table = scanfab.load("sample_data/yade_triaxial/engine.csv")
+        >>> [row.contacts for row in table.select(frame=0)]
+        [2076]
+        """
+        for name in wanted:
+            self._check(name)
         return Table(
-            row
-            for row in self.rows
-            if all(getattr(row, name) == value for name, value in wanted.items())
+            row for row in self.rows if all(row[name] == value for name, value in wanted.items())
         )
 
+    def tensor(self, name: str) -> FloatArray:
+        """
+        A fabric tensor of all rows.
+
+        Parameters
+        ----------
+        name : str
+            ``"gvs"`` for the void fabric, ``"gc"`` for the contact fabric.
+
+        Returns
+        -------
+        ndarray, shape (rows, 3, 3)
+            Dimensionless, trace 1; NaN where a row has none.
+
+        Raises
+        ------
+        ScanfabError
+            If the table has no such columns.
+
+        Examples
+        --------
+        >>> from scanfab import Table
+        >>> row = dict(gc_xx=0.3, gc_yy=0.3, gc_zz=0.4, gc_xy=0.0, gc_xz=0.0, gc_yz=0.1)
+        >>> Table([row]).tensor("gc")[0, 2, 1]
+        np.float64(0.1)
+        """
+        found = np.empty((len(self), 3, 3))
+        for component, (i, j) in COMPONENTS.items():
+            found[:, i, j] = found[:, j, i] = self[f"{name}_{component}"]
+        return found
+
+    def compare(self, *, strain_max: float | None = None) -> Comparison:
+        """
+        Void against contact fabric, and variants side by side: :func:`scanfab.compare_tables`.
+
+        Parameters
+        ----------
+        strain_max : float, optional
+            Leave frames beyond this strain, a fraction, out of the fits.
+
+        Returns
+        -------
+        Comparison
+            ``.slope`` and its error for each source and variant, and all rows.
+
+        Raises
+        ------
+        SettingsError
+            If the table lacks a column, or has several rows of one frame and variant.
+        """
+        from scanfab.table.compare import compare_tables
+
+        return compare_tables(self, strain_max=strain_max)
+
+    def save(self, path: Path | str, *, fields: str | None = None, digits: int = 17) -> None:
+        """
+        Write the table; of a computed one the bytes are those of ``scanfab compute -o``.
+
+        Parameters
+        ----------
+        path : path
+            ``.csv``, ``.tsv``, ``.json``, ``.jsonl``, ``.parquet``, or a format of another
+            package. A file that is there is replaced, all at once.
+        fields : str, optional
+            Names of columns, separated by commas, in the order in which to write them.
+        digits : int, optional
+            Significant digits of floats; with 17 they read back the same.
+
+        Raises
+        ------
+        SettingsError
+            If the suffix, a column or the folder does not exist.
+
+        Examples
+        --------
+        >>> import scanfab, tempfile
+        >>> table = scanfab.Table([dict(frame=0, alpha_vs=0.01)])
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     table.save(f"{folder}/table.csv")
+        ...     scanfab.load(f"{folder}/table.csv") == table
+        True
+        """
+        from scanfab.table.writing import Excerpt, write_rows
+
+        write_rows(Path(path), self, self.columns, Excerpt.make(self.columns, fields, digits))
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """
+        The table as a data frame of pandas; missing numbers are NaN.
+
+        Raises
+        ------
+        SettingsError
+            If pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise SettingsError("to_pandas needs the package pandas: pip install pandas") from None
+        return pandas.DataFrame({name: self[name] for name in self.names})
+
+    def to_polars(self) -> polars.DataFrame:
+        """
+        The table as a data frame of polars; missing values are null.
+
+        Examples
+        --------
+        >>> from scanfab import Table
+        >>> Table([dict(frame=0, alpha_vs=0.01), dict(frame=1)]).to_polars()["alpha_vs"].to_list()
+        [0.01, None]
+        """
+        import polars
+
+        kinds = {int: polars.Int64, float: polars.Float64, str: polars.String}
+        schema = {column.name: kinds.get(column.kind, polars.Object) for column in self.columns}
+        return polars.DataFrame([dict(row) for row in self], schema=schema, strict=False)
+
     def __repr__(self) -> str:
-        return f"Table({len(self)} rows)"
+        return as_text(self.rows, self.names)
+
+    def _repr_html_(self) -> str:
+        return as_html(self.rows, self.names)
+
+    def _check(self, name: str) -> None:
+        if name not in self.names:
+            raise NoColumnError(no_column(name, self.names))
+
+
+def _columns(rows: Sequence[Mapping[str, Any]]) -> tuple[Column, ...]:
+    """The columns of rows, as they are declared where they are known."""
+    if not rows:
+        return table_columns()
+    if is_dataclass(rows[0]):
+        return columns_of(type(rows[0]))
+    known = {column.name: column for column in table_columns()}
+    names = dict.fromkeys(name for row in rows for name in row)
+    return tuple(known.get(name) or _found(name, rows) for name in names)
+
+
+def _found(name: str, rows: Sequence[Mapping[str, Any]]) -> Column:
+    """A column that is not the fabric table's, by its values."""
+    kinds = {type(row[name]) for row in rows if row.get(name) is not None}
+    kind = next((kind for kind in (str, float, int) if kind in kinds), float)
+    return Column(name, kind, "", "")
+
+
+def _filled(row: Mapping[str, Any], names: Sequence[str]) -> Row:
+    return Row(**{name: row.get(name) for name in names})

@@ -17,9 +17,10 @@ import tempfile
 from pathlib import Path
 from random import Random
 
-from scanfab.table.writing import FILE_FORMATS
+from scanfab.table.formats.registry import OWN_FORMATS
 from tests.helpers.interruptions import Interrupter, write_series
 
+SUFFIXES = [one.suffix for one in OWN_FORMATS]
 OPTIONS = ("--tolerance", "6e-4")
 
 
@@ -29,9 +30,9 @@ def main(runs: int = 100, seed: int = 0) -> int:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         tool = Interrupter(write_series(folder / "series"), OPTIONS, Random(seed))
-        expected = {suffix: tool.whole(folder / f"whole{suffix}") for suffix in FILE_FORMATS}
+        expected = {suffix: tool.whole(folder / f"whole{suffix}") for suffix in SUFFIXES}
         for run in range(runs):
-            suffix = list(FILE_FORMATS)[run % len(FILE_FORMATS)]
+            suffix = SUFFIXES[run % len(SUFFIXES)]
             data, seconds = expected[suffix]
             place = folder / f"run{run}"
             place.mkdir()

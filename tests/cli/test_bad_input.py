@@ -21,7 +21,7 @@ import pytest
 
 from scanfab.cli.main import run
 from scanfab.io import registry
-from scanfab.table.writing import CsvWriter
+from scanfab.table.formats.text import TextWriter
 from tests.helpers.dumps import (
     PAIRS,
     cubic_rows,
@@ -500,14 +500,14 @@ def test_a_folder_that_does_not_exist_is_wrong_usage(tmp_path, compute):
 def test_a_full_disk_leaves_the_old_result(tmp_path, compute, monkeypatch):
     file, output = grains(tmp_path), tmp_path / "table.csv"
     output.write_text("precious")
-    write_row = CsvWriter.write
+    write_row = TextWriter.write
 
     def full(writer, row):
         if row.variant == "c":
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         write_row(writer, row)
 
-    monkeypatch.setattr(CsvWriter, "write", full)
+    monkeypatch.setattr(TextWriter, "write", full)
     answer = compute(file, "-o", output)
     assert (answer.code, answer.out) == (1, "")
     assert "scanfab: error: " in answer.err

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from scanfab.cli.main import run
+from scanfab.table.formats.registry import OWN_FORMATS
 from scanfab.table.reading import read_rows
-from scanfab.table.writing import FILE_FORMATS
 from tests.helpers.dumps import write
 from tests.helpers.tables import curve
 
@@ -62,7 +62,7 @@ def test_the_largest_strain_is_that_of_the_fit(tmp_path, compare):
 
 
 @pytest.mark.parametrize("words", [[], ["--summary"], ["--differences"]])
-@pytest.mark.parametrize("suffix", FILE_FORMATS)
+@pytest.mark.parametrize("suffix", [one.suffix for one in OWN_FORMATS])
 def test_every_format_holds_the_same(tmp_path, capsys, suffix, words):
     given, output = table(tmp_path, [*curve(), *curve(variant="d")]), tmp_path / f"out{suffix}"
     assert run(["compare", given, *words]) == 0
@@ -72,7 +72,7 @@ def test_every_format_holds_the_same(tmp_path, capsys, suffix, words):
     assert read_rows(output) == read_rows(printed)
 
 
-@pytest.mark.parametrize("suffix", FILE_FORMATS)
+@pytest.mark.parametrize("suffix", [one.suffix for one in OWN_FORMATS])
 def test_the_tables_of_compute_are_read_in_every_format(tmp_path, compare, suffix):
     sample = "sample_data/yade_triaxial/triaxial-spheres-00000000.vtk.gz"
     root, output = Path(__file__).parents[2], tmp_path / f"table{suffix}"

@@ -10,9 +10,9 @@ from scanfab import Column
 from scanfab.fabric import registry
 from scanfab.table import columns
 from scanfab.table.columns import COLUMNS, complete_row
+from scanfab.table.formats.registry import OWN_FORMATS
 from scanfab.table.reading import read_rows
 from scanfab.table.result_file import ResultFile
-from scanfab.table.writing import FILE_FORMATS
 from tests.helpers.lattices import simple_cubic
 
 
@@ -53,7 +53,7 @@ def test_its_columns_are_computed_and_stand_behind_the_own_ones():
 
 
 @pytest.mark.usefixtures("cubic")
-@pytest.mark.parametrize("suffix", FILE_FORMATS)
+@pytest.mark.parametrize("suffix", [one.suffix for one in OWN_FORMATS])
 def test_its_columns_are_written_and_read_back(tmp_path, suffix):
     path = tmp_path / f"t{suffix}"
     values = dict.fromkeys(COLUMNS) | {"frame": 0, "c_fourth": 0.5, "vs_longest": None}

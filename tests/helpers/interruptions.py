@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from scanfab.table.writing import CsvWriter
+from scanfab.table.formats.text import TextWriter
 from tests.helpers.dumps import cubic_rows, dump_text, write
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
@@ -26,7 +26,7 @@ FRAMES = 30
 
 @contextmanager
 def interrupted_at_row(
-    monkeypatch: pytest.MonkeyPatch, number: int, writer: type = CsvWriter
+    monkeypatch: pytest.MonkeyPatch, number: int, writer: type = TextWriter
 ) -> Iterator[list[Any]]:
     """Rows of a writer are listed, and the number-th is interrupted before it is written."""
     rows: list[Any] = []

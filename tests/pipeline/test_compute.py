@@ -14,8 +14,8 @@ from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 from scanfab.pipeline.compute import compute_rows
 from scanfab.pipeline.settings import Settings
+from scanfab.table.formats.text import TextWriter
 from scanfab.table.table import COLUMNS
-from scanfab.table.writing import CsvWriter
 from tests.helpers.dumps import dump_text, pairs_text, write, yade_spheres
 
 SCAN = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin"}
@@ -114,7 +114,7 @@ def test_rows_come_as_soon_as_their_frame_is_done(shrinking):
 
 def test_every_number_of_a_row_reads_back_the_same(whole_table):
     stream = io.StringIO(newline="")
-    writer = CsvWriter(stream)
+    writer = TextWriter(stream)
     for row in whole_table:
         writer.write(row)
     text = stream.getvalue()

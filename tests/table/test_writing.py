@@ -13,11 +13,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scanfab.base.errors import SettingsError
+from scanfab.table.formats.registry import OWN_FORMATS, format_of
+from scanfab.table.formats.text import TextWriter
 from scanfab.table.reading import read_rows
 from scanfab.table.result_file import ResultFile
 from scanfab.table.table import COLUMNS, Row
-from scanfab.table.writing import FILE_FORMATS, CsvWriter, Excerpt, check_suffix
+from scanfab.table.writing import Excerpt
 from tests.table.test_table import a_row
+
+SUFFIXES = [one.suffix for one in OWN_FORMATS]
 
 
 def result_in(folder):
@@ -34,7 +38,7 @@ def interrupt(result, asked, rows):
 
 def written(*rows):
     stream = io.StringIO(newline="")
-    writer = CsvWriter(stream)
+    writer = TextWriter(stream)
     for row in rows:
         writer.write(row)
     return stream.getvalue()
@@ -87,7 +91,7 @@ def test_the_header_comes_once_with_the_first_row():
 def test_each_row_is_written_at_once(tmp_path):
     path = tmp_path / "t.csv"
     with open(path, "w", newline="") as stream:
-        writer = CsvWriter(stream)
+        writer = TextWriter(stream)
         for count in (2, 3):
             writer.write(a_row())
             assert len(path.read_text().splitlines()) == count
@@ -123,17 +127,17 @@ def test_an_error_leaves_the_old_result_and_keeps_the_part(tmp_path):
 @pytest.mark.parametrize("name", ["t.docx", "t", "t.csv.gz", ".csv"])
 def test_other_endings_are_refused_before_anything_is_written(tmp_path, name):
     with pytest.raises(SettingsError, match=r"results can be written as .csv"):
-        check_suffix(tmp_path / name)
+        format_of(tmp_path / name)
     with pytest.raises(SettingsError, match=r"results can be written as .csv"):
         ResultFile(tmp_path / name, Row)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_the_ending_may_be_in_capitals(tmp_path):
-    check_suffix(tmp_path / "T.CSV")
+    format_of(tmp_path / "T.CSV")
 
 
-@pytest.mark.parametrize("ending", FILE_FORMATS)
+@pytest.mark.parametrize("ending", SUFFIXES)
 def test_every_format_reads_back_the_same(tmp_path, ending):
     rows = [a_row(frame=0, alpha_vs=1 / 3, grains=7), a_row(frame=1, strain=-1e-300, step=10**12)]
     result = ResultFile(tmp_path / f"t{ending}", Row)
@@ -144,7 +148,7 @@ def test_every_format_reads_back_the_same(tmp_path, ending):
     assert list(tmp_path.iterdir()) == [result.path]
 
 
-@pytest.mark.parametrize("ending", FILE_FORMATS)
+@pytest.mark.parametrize("ending", SUFFIXES)
 def test_finished_frames_are_kept_and_a_half_one_is_cut_off(tmp_path, ending):
     result = ResultFile(tmp_path / f"t{ending}", Row)
     rows = [a_row(frame=k // 2, variant="ab"[k % 2], alpha_vs=0.1 * k) for k in range(6)]
@@ -205,7 +209,7 @@ def test_rounded_numbers_stay_as_they_are_when_they_are_rounded_again(value, dig
     assert digits < 17 or once == value
 
 
-@pytest.mark.parametrize("suffix", FILE_FORMATS)
+@pytest.mark.parametrize("suffix", SUFFIXES)
 def test_columns_come_in_the_order_in_which_they_are_named(tmp_path, suffix):
     path = tmp_path / f"t{suffix}"
     excerpt = Excerpt.make(Row, "alpha_vs, frame,variant", 2)

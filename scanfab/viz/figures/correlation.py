@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-__all__ = ["PAPER_SLOPE", "Fit", "draw_correlation"]
+__all__ = ["PAPER_SLOPE", "Fit", "draw_correlation", "draw_group"]
 
 
 PAPER_SLOPE = 0.096
@@ -57,18 +57,34 @@ def draw_correlation(
     panels = part.subplots(len(groups), 2, squeeze=False, width_ratios=(3, 2))
     lines: list[str] = []
     for group, (axes, margin) in zip(groups, panels, strict=True):
-        legend = _Legend()
-        fitted = [] if turned else [fits[one.place] for one in group.drawn]
-        lines += ["fitted lines"] * any(fit is not None for fit in fitted)
-        for one in group.drawn:
-            _points(axes, one, None if turned else fits[one.place], legend, turned)
-        lines += ["the paper's slope"] * _paper(axes, fitted, legend)
-        _errors(group, legend, turned)
-        _label(axes, turned)
-        legend.draw(margin, "intensities" if turned else f"slope of {VOID} on {CONTACT}, axial")
+        lines += draw_group(axes, margin, group, fits, turned)
     what = "intensity" if turned else "anisotropy along the loading axis"
     drawn = f"with {' and '.join(dict.fromkeys(lines))}" if lines else "without a line"
     return [axes for axes, _ in panels], f"Void against contact {what}, {drawn}"
+
+
+def draw_group(
+    axes: Axes, margin: Axes | None, group: Group, fits: Sequence[Fit | None], turned: bool
+) -> list[str]:
+    """
+    The points and lines of one panel, and which kinds of lines there are.
+
+    The legend stands in the margin, or in the panel itself where there is none.
+    """
+    legend = _Legend()
+    fitted = [] if turned else [fits[one.place] for one in group.drawn]
+    for one in group.drawn:
+        _points(axes, one, None if turned else fits[one.place], legend, turned)
+    lines = ["fitted lines"] * any(fit is not None for fit in fitted)
+    lines += ["the paper's slope"] * _paper(axes, fitted, legend)
+    _errors(group, legend, turned)
+    _label(axes, turned)
+    title = "intensities" if turned else f"slope of {VOID} on {CONTACT}, axial"
+    if margin is None:
+        axes.legend(legend.handles, legend.labels, title=title)
+    else:
+        legend.draw(margin, title)
+    return lines
 
 
 class _Legend:

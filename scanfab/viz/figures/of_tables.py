@@ -41,7 +41,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-__all__ = ["SIZES", "TABLE_FIGURES", "Fit", "draw_table", "plot_table"]
+__all__ = [
+    "SIZES",
+    "TABLE_FIGURES",
+    "Fit",
+    "Quantity",
+    "draw_panel",
+    "draw_table",
+    "plot_table",
+    "quantities_of",
+    "set_abscissa",
+]
 
 
 TABLE_FIGURES = ("evolution", "normalised", "correlation")
@@ -54,7 +64,7 @@ MOST_MARKERS = 25
 
 
 @dataclass(frozen=True)
-class _Quantity:
+class Quantity:
     """What a column of panels shows: names of a curve's arrays, and the factor of the axis."""
 
     label: str
@@ -69,22 +79,22 @@ class _Quantity:
 
 
 AXIAL = (
-    _Quantity(VOID_UNIT + VOID_AXIAL, 1e3, "void", "void_total", "void_scan", "voids"),
-    _Quantity(CONTACT_UNIT + CONTACT_AXIAL, 1e2, "contact", "contact_total", words="contacts"),
+    Quantity(VOID_UNIT + VOID_AXIAL, 1e3, "void", "void_total", "void_scan", "voids"),
+    Quantity(CONTACT_UNIT + CONTACT_AXIAL, 1e2, "contact", "contact_total", words="contacts"),
 )
 # where the principal axes are not the loading axis
 TURNED = (
-    _Quantity(VOID_UNIT + VOID_INTENSITY, 1e3, "void_intensity"),
-    _Quantity(CONTACT_UNIT + CONTACT_INTENSITY, 1e2, "contact_intensity"),
-    _Quantity("coaxiality, degrees", 1.0, "angle"),
+    Quantity(VOID_UNIT + VOID_INTENSITY, 1e3, "void_intensity"),
+    Quantity(CONTACT_UNIT + CONTACT_INTENSITY, 1e2, "contact_intensity"),
+    Quantity("coaxiality, degrees", 1.0, "angle"),
 )
 NORMALISED = (
-    _Quantity(f"{VOID_AXIAL} / largest", 1.0, "void", "void_total", words="voids"),
-    _Quantity(f"{CONTACT_AXIAL} / largest", 1.0, "contact", "contact_total", words="contacts"),
+    Quantity(f"{VOID_AXIAL} / largest", 1.0, "void", "void_total", words="voids"),
+    Quantity(f"{CONTACT_AXIAL} / largest", 1.0, "contact", "contact_total", words="contacts"),
 )
 NORMALISED_TURNED = (
-    _Quantity(f"{VOID_INTENSITY} / largest", 1.0, "void_intensity"),
-    _Quantity(f"{CONTACT_INTENSITY} / largest", 1.0, "contact_intensity"),
+    Quantity(f"{VOID_INTENSITY} / largest", 1.0, "void_intensity"),
+    Quantity(f"{CONTACT_INTENSITY} / largest", 1.0, "contact_intensity"),
 )
 
 
@@ -174,14 +184,14 @@ class _Page:
             self._letter(panels, [group.title for group in self.groups])
             return caption
         share = name == "normalised"
-        quantities = (AXIAL, TURNED, NORMALISED, NORMALISED_TURNED)[2 * share + self.turned]
+        quantities = quantities_of(share, self.turned)
         shape = len(self.groups), len(quantities)
         columns = part.subplots(*shape, squeeze=False, sharex=True, sharey="col")
         for group, panels in zip(self.groups, columns, strict=True):
             for axes, quantity in zip(panels, quantities, strict=True):
-                _draw(axes, group.drawn, quantity, share)
+                draw_panel(axes, group.drawn, quantity, share)
         for axes in columns[-1]:
-            self._abscissa(axes)
+            set_abscissa(axes, self.abscissa, self.groups)
         titles = [
             group.title if place == 0 else ""
             for group in self.groups
@@ -191,7 +201,7 @@ class _Page:
         self._legend(part, _note(self.groups, quantities, share))
         return self._caption(quantities, share)
 
-    def _caption(self, quantities: Sequence[_Quantity], share: bool) -> str:
+    def _caption(self, quantities: Sequence[Quantity], share: bool) -> str:
         """What is drawn of a figure with an abscissa."""
         what = "Void and contact anisotropy along the loading axis"
         if self.turned:
@@ -207,18 +217,6 @@ class _Page:
         ]
         errors = f"with total standard errors of {' and '.join(banded)}"
         return f"{what}, over {self.over}{divided}; {errors if banded else 'without total errors'}"
-
-    def _abscissa(self, axes: Axes) -> None:
-        from matplotlib.ticker import MaxNLocator
-
-        axes.set_xlabel(self.abscissa)
-        places = np.concatenate([one.curve.x for group in self.groups for one in group.drawn])
-        known = np.unique(places[np.isfinite(places)])
-        if len(known) == 1:
-            # one frame alone has no scale
-            axes.set_xlim(known[0] - 1, known[0] + 1)
-        if self.abscissa == "frame":
-            axes.xaxis.set_major_locator(MaxNLocator(integer=True))
 
     def _letter(self, panels: Sequence[Axes], titles: Sequence[str]) -> None:
         letter(panels, titles, self.lettered)
@@ -242,7 +240,26 @@ class _Page:
         )
 
 
-def _draw(axes: Axes, drawn: Sequence[Drawn], quantity: _Quantity, share: bool) -> None:
+def quantities_of(share: bool, turned: bool) -> tuple[Quantity, ...]:
+    """What a figure shows, a panel each: voids first, then contacts."""
+    return (AXIAL, TURNED, NORMALISED, NORMALISED_TURNED)[2 * share + turned]
+
+
+def set_abscissa(axes: Axes, label: str, groups: Sequence[Group]) -> None:
+    """Label and scale of what the curves are drawn over."""
+    from matplotlib.ticker import MaxNLocator
+
+    axes.set_xlabel(label)
+    places = np.concatenate([one.curve.x for group in groups for one in group.drawn])
+    known = np.unique(places[np.isfinite(places)])
+    if len(known) == 1:
+        # one frame alone has no scale
+        axes.set_xlim(known[0] - 1, known[0] + 1)
+    if label == "frame":
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+
+
+def draw_panel(axes: Axes, drawn: Sequence[Drawn], quantity: Quantity, share: bool) -> None:
     """One panel: values, their total errors as bands, the scan's part as bars."""
     for one in drawn:
         values = getattr(one.curve, quantity.values)
@@ -272,7 +289,7 @@ def _bars(axes: Axes, one: Drawn, values: FloatArray, error: FloatArray) -> None
         )
 
 
-def _note(groups: Sequence[Group], quantities: Sequence[_Quantity], share: bool) -> str:
+def _note(groups: Sequence[Group], quantities: Sequence[Quantity], share: bool) -> str:
     """What bands and bars are."""
     curves = [one.curve for group in groups for one in group.drawn]
     if not any(quantity.total for quantity in quantities):
