@@ -114,14 +114,14 @@ def _several(where: str, families: Sequence[Family]) -> str:
     for family in [*full, *bare]:
         own, unclear = own_contacts(family, [*full, *bare], contacts)
         doubtful += unclear
-        notes = ["it has no radius: --radius L"] if family.kind == "points" else []
+        notes = ["it has no radius: `radius=L`"] if family.kind == "points" else []
         if own:
             notes.append(f"contacts: {', '.join(one.pattern for one in own)}")
         lines.append("; ".join([family.pattern, *notes]))
     message = f"{where}: several series of grains: choose one of\n  " + "\n  ".join(lines)
     names = dict.fromkeys(f"'{family.pattern}'" for family in contacts if family in doubtful)
     if names:
-        message += "\nand its contacts, --contacts with one of\n  " + "\n  ".join(names)
+        message += "\nand its contacts, `contacts` with one of\n  " + "\n  ".join(names)
     return message
 
 

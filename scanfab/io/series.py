@@ -77,7 +77,8 @@ class Frame:
             listed.append(own)
         if self.series.contacts_from == "grains" and not listed:
             raise ReadError(
-                f"{self.snapshot.path}: --contacts file was asked for, but there is no contact file"
+                f'{self.snapshot.path}: `contacts="file"` was asked for, but there is no '
+                "contact file"
             )
         with _named(self.snapshot.path):
             return Packing(
@@ -110,7 +111,7 @@ class Frame:
         if not lists and self.series.contacts_from == "path":
             warnings.warn(
                 f"{paths}: lists contacts with walls only: contacts between grains are found by "
-                f"geometry, unless --contacts names their file",
+                f"geometry, unless `contacts` names their file",
                 ScanfabWarning,
                 stacklevel=4,
             )
@@ -125,16 +126,17 @@ class Frame:
             if self.series.contacts_from != "beside":
                 raise
             raise ReadError(
-                f"{error} (this file lies beside the grains; --contacts geometric leaves it alone)"
+                f"{error} (this file lies beside the grains; "
+                '`contacts="geometric"` leaves it alone)'
             ) from None
 
     def _several_lists(self, paths: str) -> list[JoinedContacts]:
         """An error; but of files that lie beside others none is taken."""
         if self.series.contacts_from != "beside":
-            raise ReadError(f"two contact lists for one frame: {paths}: choose with --contacts")
+            raise ReadError(f"two contact lists for one frame: {paths}: choose with `contacts`")
         warnings.warn(
             f"two contact lists lie beside {self.snapshot.path}: {paths}: none is taken; choose "
-            f"with --contacts",
+            f"with `contacts`",
             ScanfabWarning,
             stacklevel=5,
         )

@@ -277,8 +277,7 @@ class Settings:
 
     def __init__(self, **options: Any) -> None:
         """Check what users write, and keep what it means."""
-        holder: type = type(self)
-        declared = options_of(holder)
+        declared = options_of(type(self))
         refuse_unknown("Settings", options, [one.name for one in declared])
         for one in declared:
             value = one.parse(one.name, options.get(one.name, one.default))

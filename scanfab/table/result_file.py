@@ -84,7 +84,7 @@ class ResultFile:
         if differing:
             raise SettingsError(
                 f"{self.part}: was made with other settings ({', '.join(differing)}): repeat "
-                f"them, or leave out --resume to start afresh; then it is kept under another name"
+                f"them, or leave out `resume` to start afresh; then it is kept under another name"
             )
         header, complete = self._lines_of_part()
         frames = max(len(complete) - header, 0) // rows_per_frame
@@ -143,7 +143,7 @@ class ResultFile:
         hint = ""
         if self._asked.exists():
             shutil.copyfile(self._asked, other._asked)
-            hint = f"; what made it goes on with it by -o {other.path} --resume"
+            hint = f"; what made it goes on with it by `output={other.path}` `resume`"
         os.rename(self.part, other.part)
         warnings.warn(
             f"{self.part}: {len(lines) - header} finished rows of an earlier run are kept as "
