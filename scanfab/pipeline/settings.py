@@ -29,6 +29,7 @@ from scanfab.pipeline.values import (
     parse_frames,
     parse_spacing,
     parse_strain,
+    parse_tolerance,
     parse_variants,
     parse_vector,
     parse_workers,
@@ -176,7 +177,7 @@ class Settings:
     """None for ``auto``."""
     tolerance: float = option(
         default=1e-4,
-        parse=number("a number above 0, from 1e-15 to 1e15", lambda value: 1e-15 <= value <= 1e15),
+        parse=parse_tolerance,
         group="scan",
         help="Target standard error of alpha_vs_axial, for every variant, when something is auto.",
         meaning="wanted standard error of the scan, where spacing or directions are auto",
