@@ -101,9 +101,13 @@ def option(**declaration: Any) -> Any:
     return field(default=declared.default, metadata={"option": declared})
 
 
-@cache
 def options_of(holder: type) -> tuple[Option, ...]:
     """The options that the fields of a dataclass declare."""
+    return _options_of(holder)
+
+
+@cache
+def _options_of(holder: type) -> tuple[Option, ...]:
     return tuple(replace(one.metadata["option"], name=one.name) for one in fields(holder))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,6 +26,7 @@ from scanfab.cli.settings_file import fill_from_file
 from scanfab.cli.sources import SourceCommand, open_series, reading_arguments
 from scanfab.cli.tables import Column, print_columns, spelt
 from scanfab.cli.talk import talk_options, tell_inputs, working
+from scanfab.pipeline.options import as_options
 
 if TYPE_CHECKING:
     from scanfab.pipeline.calibration import Calibration
@@ -113,6 +115,8 @@ def calibrate(
         tell_inputs(series, settings.workers)
         with working():
             found = calibrate_series(series[0], settings, frame=frame)
+        rows = tuple(replace(row, note=as_options(row.note)) for row in found.rows)
+        found = replace(found, rows=rows)
         command = _command_line(ctx, source, found.options)
         if result is not None:
             with result.writer({}) as writer:

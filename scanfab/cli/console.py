@@ -14,6 +14,7 @@ from scanfab.base.errors import ScanfabNote, ScanfabWarning, SkippedFrameWarning
 from scanfab.cli.options import AS_CSV
 from scanfab.cli.tables import Column, print_columns, spelt
 from scanfab.cli.talk import Level, level
+from scanfab.pipeline.options import as_options
 from scanfab.table.table import Row
 from scanfab.table.writing import Excerpt
 
@@ -61,6 +62,7 @@ class Told:
 
     def hear(self, category: type[Warning], text: str) -> None:
         """Tell a warning or note of scanfab, if it is new."""
+        text = as_options(text)
         self.skipped += issubclass(category, SkippedFrameWarning)
         known, kind = (
             (self.notes, "note") if issubclass(category, ScanfabNote) else (self.texts, "warning")

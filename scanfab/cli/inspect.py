@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -13,6 +13,7 @@ from scanfab.cli.settings_file import fill_from_file
 from scanfab.cli.sources import SourceCommand, open_series, reading_arguments
 from scanfab.cli.tables import spelt
 from scanfab.cli.talk import talk_options, tell_inputs, working
+from scanfab.pipeline.options import as_options
 
 if TYPE_CHECKING:
     from scanfab.pipeline.inspection import FrameReport
@@ -50,7 +51,9 @@ def inspect(ctx: click.Context, /, sources: tuple[str, ...], as_json: bool, **ch
             return sum(len(range(one.frames_expected())[settings.frames]) for one in every)
 
         with working(frames, prints=True) as advance:
-            for report in (one for series in every for one in inspect_series(series, settings)):
+            for found in (one for series in every for one in inspect_series(series, settings)):
+                told = [as_options(text) for text in found.warnings]
+                report = replace(found, warnings=told)
                 if as_json:
                     click.echo(json.dumps(asdict(report), ensure_ascii=False))
                 else:

@@ -127,4 +127,6 @@ def _describe(error: Exception) -> str:
     if isinstance(error, OSError) and error.errno and error.strerror == os.strerror(error.errno):
         # whatever writes to files names them
         return f"{error.filename or 'standard output'}: {error.strerror}"
-    return str(error) or type(error).__name__
+    from scanfab.pipeline.options import as_options
+
+    return as_options(str(error)) or type(error).__name__

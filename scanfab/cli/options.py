@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import glob
-import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -14,7 +13,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from scanfab.base.option import GROUPS, Option
-from scanfab.pipeline.options import COMPARING_OPTIONS, OPTIONS
+from scanfab.pipeline.options import DECLARED, as_options
 
 __all__ = [
     "AS_CSV",
@@ -25,7 +24,6 @@ __all__ = [
     "WINDOW",
     "GroupedOption",
     "SourceType",
-    "as_options",
     "check_plot",
     "click_option",
     "options",
@@ -49,42 +47,12 @@ OF_SEVERAL = {
     "help": "Take the rows of this cut-off from tables of several; in the tables' unit.",
 }
 
-DECLARED = {**OPTIONS, **{one.name: one for one in COMPARING_OPTIONS}}
-NAMES = "|".join(DECLARED)
 TITLES = {"": "What most need", **{group: group.capitalize() for group in GROUPS}}
 
 # letters for an option and what it takes; what is longer has a line of its own
 COLUMN = 22
 # of the context: -o - asks for CSV on standard output, on a terminal too
 AS_CSV = "scanfab.as_csv"
-
-
-def as_options(text: str) -> str:
-    """
-    A text of the library, which speaks of its arguments, in the words of the command line.
-
-    Examples
-    --------
-    >>> from scanfab.cli.options import as_options
-    >>> as_options('choose another `rv_center`, or name the `cell=(LX, LY, LZ)`')
-    'choose another --rv-center, or name the --cell LX LY LZ'
-    """
-    return re.sub(rf"`({NAMES})(?:=([^`]*))?`", _as_option, text)
-
-
-def _as_option(found: re.Match[str]) -> str:
-    name, value = found.groups()
-    return DECLARED[name].flag + ("" if value is None else f" {_as_word(value)}")
-
-
-def _as_word(value: str) -> str:
-    """A value in Python as words of a command line: (1, 2) is 1 2, and {"x": "px"} is x=px."""
-    if value.startswith("("):
-        return value.strip("()").replace(",", "")
-    if value.startswith("{"):
-        return value.strip("{}").replace('"', "").replace(": ", "=").replace(", ", ",")
-    # what a shell takes as it is needs no quotes
-    return re.sub(r'^"([\w.:/+-]*)"$', r"\1", value)
 
 
 @contextmanager
@@ -95,9 +63,7 @@ def usage_errors(before: str = "") -> Iterator[None]:
     try:
         yield
     except (SettingsError, UnknownFormatError) as error:
-        # the argument whose value is wrong stands in front
-        text = re.sub(rf"^({NAMES}): ", lambda name: f"{DECLARED[name[1]].flag}: ", str(error))
-        raise click.UsageError(f"{before}{as_options(text)}") from None
+        raise click.UsageError(f"{before}{as_options(str(error))}") from None
 
 
 def completed(option: Option) -> Completion:

@@ -121,7 +121,7 @@ def _several(where: str, families: Sequence[Family]) -> str:
         # by the rule that reads them, once this one is named
         own, unclear = contacts_beside(family, None)
         doubtful += [one.pattern for one in unclear]
-        notes = ["it has no radius: --radius L"] if family.kind == "points" else []
+        notes = ["it has no radius: `radius=L`"] if family.kind == "points" else []
         if own:
             notes.append(f"contacts: {', '.join(one.pattern for one in own)}")
         lines.append("; ".join([family.pattern, *notes]))
@@ -130,7 +130,7 @@ def _several(where: str, families: Sequence[Family]) -> str:
         f"'{family.pattern}'" for family in contacts if family.pattern in doubtful
     )
     if names:
-        message += "\nand its contacts, --contacts with one of\n  " + "\n  ".join(names)
+        message += "\nand its contacts, `contacts` with one of\n  " + "\n  ".join(names)
     return message
 
 

@@ -159,7 +159,9 @@ def read_series(
         beside = False
     if contacts == "file" and not own:
         if not getattr(grains.reader, "lists_contacts", False):
-            raise ReadError(f"{name}: --contacts file was asked for, but there is no contact file")
+            raise ReadError(
+                f'{name}: `contacts="file"` was asked for, but there is no contact file'
+            )
         return series((), "grains")
     return series(own, "path" if contacts == "file" else "beside" if beside else "auto")
 
@@ -191,7 +193,7 @@ def open_sources(sources: Sequence[PathLike], **options: Any) -> list[Series]:
 
 
 def _cell_file(path: PathLike) -> FrameFile:
-    """The cells of --cell FILE.csv."""
+    """The cells of a CSV file."""
     if is_cell_file(Path(path)):
         raise refuse_as_numbers(Path(path))
     try:
@@ -214,7 +216,7 @@ def _contacts_beside(grains: Family, format: str | None) -> list[Family]:
     elif doubtful:
         _note(
             f"{_patterns(doubtful)}: contacts beside the grains, but it is not clear whose they "
-            f"are: name them with --contacts, or they are left alone"
+            f"are: name them with `contacts`, or they are left alone"
         )
     return own
 
@@ -251,11 +253,11 @@ def _note_below(paths: Sequence[Path], grains: Family) -> None:
 
 
 def _lack(family: Family) -> str:
-    return " (no radius: --radius)" if family.kind == "points" else ""
+    return " (no radius: `radius`)" if family.kind == "points" else ""
 
 
 def _named_contacts(contacts: PathLike, format: str | None) -> list[Family]:
-    """Contact files from --contacts PATH: a file, a folder or a glob."""
+    """Contact files from a file, a folder or a glob."""
     files = [file for one in expanded(contacts) for file in files_of(Path(one))]
     families = sort_into_families(files, format)
     found = [family for family in families if family.kind == "contacts"]

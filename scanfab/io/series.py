@@ -77,7 +77,8 @@ class Frame:
             listed.append(own)
         if self.series.contacts_from == "grains" and not listed:
             raise ReadError(
-                f"{self.snapshot.path}: --contacts file was asked for, but there is no contact file"
+                f'{self.snapshot.path}: `contacts="file"` was asked for, but there is no '
+                "contact file"
             )
         with _named(self.snapshot.path):
             return Packing(
@@ -113,7 +114,7 @@ class Frame:
         if not lists and self.series.contacts_from == "path":
             warnings.warn(
                 f"{paths}: lists contacts with walls only: contacts between grains are found by "
-                f"geometry, unless --contacts names their file",
+                f"geometry, unless `contacts` names their file",
                 ScanfabWarning,
                 stacklevel=4,
             )
@@ -129,26 +130,27 @@ class Frame:
             if self.series.contacts_from != "beside":
                 raise
             raise ReadError(
-                f"{error} (this file lies beside the grains; --contacts geometric leaves it alone)"
+                f"{error} (this file lies beside the grains; "
+                '`contacts="geometric"` leaves it alone)'
             ) from None
 
     def _left_out(self, lists: list[Family], paths: str) -> Sequence[Family]:
         """An error; but of files that lie beside grains all that are not the nearest by name."""
         if self.series.contacts_from != "beside":
-            raise ReadError(f"two contact lists for one frame: {paths}: choose with --contacts")
+            raise ReadError(f"two contact lists for one frame: {paths}: choose with `contacts`")
         taken = nearest(self.series.grains, lists)
         if taken is not None:
             others = [family for family in lists if family is not taken]
             warnings.warn(
                 f"{taken.pattern}: of several contact lists beside the grains this one is taken, "
-                f"whose name is the nearest: --contacts names another",
+                f"whose name is the nearest: `contacts` names another",
                 ScanfabNote,
                 stacklevel=5,
             )
             return others
         warnings.warn(
             f"two contact lists lie beside {self.snapshot.path}: {paths}: none is taken; choose "
-            f"with --contacts",
+            f"with `contacts`",
             ScanfabWarning,
             stacklevel=5,
         )

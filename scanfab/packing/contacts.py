@@ -151,7 +151,7 @@ def _refuse_ambiguous(pairs: IntArray, branch: FloatArray, spheres: Spheres) -> 
             raise PackingError(
                 f"the grains {one} and {two} touch through more than one image, and the contact "
                 f"list does not say through which: the cell is too thin for this format; find the "
-                f"contacts by geometry (--contacts geometric)"
+                f'contacts by geometry (`contacts="geometric"`)'
             )
 
 
@@ -163,7 +163,7 @@ def _refuse_itself(pairs: IntArray, image: IntArray, spheres: Spheres) -> None:
     if spheres.cell is not None and spheres.cell.is_periodic:
         advice = (
             "; if it touches its own image, the list does not say which one: find the contacts by "
-            "geometry (--contacts geometric)"
+            'geometry (`contacts="geometric"`)'
         )
     raise PackingError(
         f"{grains_named(spheres.id[pairs[:, 0]], itself)}: in contact with itself{advice}"
@@ -182,7 +182,7 @@ def _refuse_long(pairs: IntArray, length: FloatArray, spheres: Spheres) -> None:
     advice = (
         "is this the contact list of another step?"
         if spheres.cell is not None and spheres.cell.is_periodic
-        else "if the sample is periodic, name its cell (--cell and --periodic); "
+        else "if the sample is periodic, name its cell (`cell` and `periodic`); "
         "otherwise the contact list belongs to another step"
     )
     raise PackingError(

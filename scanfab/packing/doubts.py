@@ -28,8 +28,8 @@ SOLIDS = 20.0
 EMPTY = 0.2
 # what formats without a cell lack, and what makes up for it
 CELL_LACKS = {
-    "nothing": ("this format carries no cell", "--cell LX LY LZ"),
-    "box": ("this format has a box, but does not say whether it repeats", "--periodic xyz"),
+    "nothing": ("this format carries no cell", "`cell=(LX, LY, LZ)`"),
+    "box": ("this format has a box, but does not say whether it repeats", '`periodic="xyz"`'),
 }
 
 
@@ -208,7 +208,7 @@ def _empty_period(packing: Packing) -> str:
             return (
                 f"the grains fill {1.0 - gap:.0%} of the cell's period along {'xyz'[axis]} "
                 f"({cell.heights[axis]:.4g}), the rest of it is empty: is the sample periodic "
-                f"there, and with this period (--periodic, --cell)?"
+                f"there, and with this period (`periodic`, `cell`)?"
             )
     return ""
 
@@ -231,7 +231,7 @@ def _no_contacts(sample: Sample) -> str:
     return (
         f"no contact at all by geometry: the centres of nearest neighbours are "
         f"{_nearest(sample.packing):.6g} diameters apart (median): right for a gas, else check the "
-        f"units of radius and position, or use --contact-tolerance 1e-4"
+        f"units of radius and position, or use `contact_tolerance=1e-4`"
     )
 
 

@@ -86,7 +86,7 @@ class Sample:
             f"others"
         )
         ids = ",".join(str(one) for one in packing.id[rows[:MOST_NAMED]])
-        cure = f'--boundary "id={ids}{",..." if len(rows) > MOST_NAMED else ""}"'
+        cure = f'`boundary="id={ids}{",..." if len(rows) > MOST_NAMED else ""}"`'
         if not self.escaped.are_many:
             return (
                 f"{found}, so the sample's extents, RV and octants leave out what has flown away; "

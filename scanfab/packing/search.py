@@ -76,7 +76,7 @@ def find_contacts(packing: Packing, tolerance: float = 0.0) -> Packing:
            [1, 2]])
     """
     if not (np.isfinite(tolerance) and tolerance >= 0):
-        raise SettingsError(f"contact tolerance: expected a number >= 0, found {tolerance}")
+        raise SettingsError(f"contact_tolerance: expected a number >= 0, found {tolerance}")
     pairs, image = overlapping_pairs(
         packing.position, packing.radius, 1.0 + tolerance, packing.cell
     )

@@ -58,7 +58,7 @@ class Window:
         if self.radius > 0.5 * shortest:
             raise SettingsError(
                 f"the {self} is wider than the cell's shortest period ({shortest:g}): "
-                f"choose a smaller --rv, {RV_MEANING}"
+                f"choose a smaller `rv`, {RV_MEANING}"
             )
 
     def branches(self, points: FloatArray, packing: Packing) -> FloatArray:

@@ -209,7 +209,7 @@ class _Calibrator:
         chords = area / plan.spacing**2 * plan.replicates * len(plan.rule)
         if ladder in ("spacing", "directions") and chords > self.settings.max_chords:
             raise SettingsError(
-                f"it would cut {chords:.2g} chords from the grains, more than --max-chords "
+                f"it would cut {chords:.2g} chords from the grains, more than `max_chords` "
                 f"{self.settings.max_chords:g}"
             )
 

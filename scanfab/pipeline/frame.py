@@ -99,7 +99,7 @@ def _warn_of_large_errors(rows: list[Row], plan: Plan, settings: Settings) -> No
             f"frame {worst.frame}, variant {worst.variant}, cut-off {worst.cutoff:g}: "
             f"alpha_vs_axial_se is {reached}, above the tolerance {tolerance}, which "
             f"holds for the mean length at the cut-off {plan.cutoff:g}: choose a smaller "
-            f"--tolerance",
+            f"`tolerance`",
             ScanfabWarning,
             stacklevel=3,
         )

@@ -235,5 +235,5 @@ def boundary_hint(sample: Sample, settings: Settings) -> str | None:
         return None
     return (
         f"the particles with {expression} enclose the others: if they are a boundary, "
-        f'name them: --boundary "{expression}"'
+        f'name them: `boundary="{expression}"`'
     )

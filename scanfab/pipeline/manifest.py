@@ -39,7 +39,9 @@ def asked_for(
         Of the computation.
     """
     chosen = {
-        one.name: _plain(getattr(settings, one.name)) for one in options_of(Settings) if one.meaning
+        one.name: _plain(getattr(settings, one.name))
+        for one in options_of(type(settings))
+        if one.meaning
     }
     return {"scanfab": version("scanfab"), "sources": list(sources), **_plain(reading), **chosen}
 

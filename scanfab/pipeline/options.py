@@ -1,14 +1,15 @@
-"""Every option of compute: those of reading, of the settings, and of what is written."""
+"""Every option that is declared, and the words of the command line for them."""
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 from scanfab.base.option import Option, options_of
 from scanfab.io.options import READING_OPTIONS
 from scanfab.pipeline.settings import Settings
 
-__all__ = ["COMPARING_OPTIONS", "MEANINGS", "OPTIONS", "OUTPUT_OPTIONS"]
+__all__ = ["DECLARED", "MEANINGS", "OPTIONS", "OUTPUT_OPTIONS", "as_options"]
 
 OUTPUT_OPTIONS = (
     Option(
@@ -105,3 +106,37 @@ OPTIONS = {one.name: one for one in (*READING_OPTIONS, *options_of(Settings), *O
 
 MEANINGS = {name: one.meaning for name, one in OPTIONS.items() if one.meaning}
 """What each option means that decides a result, in the words of the report."""
+
+DECLARED = {**OPTIONS, **{one.name: one for one in COMPARING_OPTIONS}}
+"""Those of ``compare`` too."""
+NAMES = "|".join(DECLARED)
+
+
+def as_options(text: str) -> str:
+    """
+    A text of the library, which speaks of its arguments, in the words of the command line.
+
+    Examples
+    --------
+    >>> from scanfab.pipeline.options import as_options
+    >>> as_options('choose another `rv_center`, or name the `cell=(LX, LY, LZ)`')
+    'choose another --rv-center, or name the --cell LX LY LZ'
+    """
+    # the argument whose value is wrong stands in front of a message
+    named = re.sub(rf"^({NAMES}): ", r"`\1`: ", text)
+    return re.sub(rf"`({NAMES})(?:=([^`]*))?`", _as_option, named)
+
+
+def _as_option(found: re.Match[str]) -> str:
+    name, value = found.groups()
+    return DECLARED[name].flag + ("" if value is None else f" {_as_word(value)}")
+
+
+def _as_word(value: str) -> str:
+    """A value in Python as words of a command line: (1, 2) is 1 2, and {"x": "px"} is x=px."""
+    if value.startswith("("):
+        return value.strip("()").replace(",", "")
+    if value.startswith("{"):
+        return value.strip("{}").replace('"', "").replace(": ", "=").replace(", ", ",")
+    # what a shell takes as it is needs no quotes
+    return re.sub(r'^"([\w.:/+-]*)"$', r"\1", value)

@@ -127,7 +127,7 @@ def rv_of(sample: Sample, settings: Settings) -> Window:
     if radius < CLOSEST * smallest:
         raise SettingsError(
             f"rv: a radius of {radius:g} is nothing beside that of the smallest grain "
-            f"({smallest:g}): choose a larger --rv or --rv-radius"
+            f"({smallest:g}): choose a larger `rv` or `rv_radius`"
         )
     return Window(center, sphere(radius))
 
@@ -138,19 +138,19 @@ def _check_window(window: Window, sample: Sample, box: SurfaceBox, largest: floa
     room = box.room_around(window)
     if not window.may_meet(packing.position[grains], packing.radius[grains], packing).any():
         raise SettingsError(
-            f"the {window} holds no grain: choose another --rv-center or a larger --rv-radius"
+            f"the {window} holds no grain: choose another `rv_center` or a larger `rv_radius`"
         )
     if room < -2 * largest:
         raise SettingsError(
             f"the {window} reaches {-room:g} beyond the sample, that is more than two of its "
-            f"largest radii ({largest:g}): choose another --rv-center or a smaller --rv, "
+            f"largest radii ({largest:g}): choose another `rv_center` or a smaller `rv`, "
             f"{RV_MEANING}"
         )
     if room < largest:
         warnings.warn(
             f"the {window} comes within one of the largest radii ({largest:g}) of the sample's "
             f"surface: it cuts the outermost layer of grains, which a boundary arranges: choose a "
-            f"smaller --rv, or use more grains",
+            f"smaller `rv`, or use more grains",
             ScanfabWarning,
             stacklevel=3,
         )

@@ -55,8 +55,8 @@ class FinishedTable:
         lacking = [name for name in needed if name not in self.columns]
         if any(self.rows.values()) and lacking:
             raise SettingsError(
-                f"{self.path}: its rows lack {', '.join(lacking)} (--fields), which the figure "
-                f"needs: leave out --plot, or --resume to compute all frames again"
+                f"{self.path}: its rows lack {', '.join(lacking)} (`fields`), which the figure "
+                f"needs: leave out `plot`, or `resume` to compute all frames again"
             )
 
     def with_frames(self, series: Sequence[Series], chosen: slice) -> slice:
@@ -80,8 +80,8 @@ class FinishedTable:
         if len(steps) > 1:
             raise SettingsError(
                 f"frames: {self.path} holds frames {min(known)} to {last}, which with those "
-                f"chosen now make no slice A:B:C: choose --frames so that they do, or another -o "
-                f"FILE"
+                f"chosen now make no slice A:B:C: choose `frames` so that they do, or another "
+                f"`output=FILE`"
             )
         endless = chosen.stop is None
         step = steps.pop()
@@ -239,8 +239,8 @@ def _row(values: Mapping[str, Any]) -> Row:
 
 def _refused(path: Path, reason: str) -> SettingsError:
     return SettingsError(
-        f"{path}: --resume cannot go on with it: {reason}: name another -o FILE, or leave out "
-        f"--resume to compute all frames again"
+        f"{path}: `resume` cannot go on with it: {reason}: name another `output=FILE`, or leave "
+        f"out `resume` to compute all frames again"
     )
 
 

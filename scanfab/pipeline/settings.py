@@ -29,6 +29,7 @@ from scanfab.pipeline.values import (
     parse_frames,
     parse_spacing,
     parse_strain,
+    parse_tolerance,
     parse_variants,
     parse_vector,
     parse_workers,
@@ -178,7 +179,7 @@ class Settings:
     """None for ``auto``."""
     tolerance: float = option(
         default=1e-4,
-        parse=number("a number above 0, from 1e-15 to 1e15", lambda value: 1e-15 <= value <= 1e15),
+        parse=parse_tolerance,
         group="scan",
         help="Target standard error of alpha_vs_axial, for every variant, when something is auto.",
         meaning="wanted standard error of the scan, where spacing or directions are auto",
@@ -279,8 +280,7 @@ class Settings:
 
     def __init__(self, **options: Any) -> None:
         """Check what users write, and keep what it means."""
-        holder: type = type(self)
-        declared = options_of(holder)
+        declared = options_of(type(self))
         refuse_unknown("Settings", options, [one.name for one in declared])
         for one in declared:
             value = one.parse(one.name, options.get(one.name, one.default))

@@ -63,7 +63,7 @@ def axial_length(sample: Sample, mode: str, axis: Vector) -> float | None:
     if not chosen.any():
         raise SettingsError(
             f"strain: {mode} was asked for, but the frame has none"
-            + (": name them with --boundary" if mode == "boundary" else "")
+            + (": name them with `boundary`" if mode == "boundary" else "")
         )
     return float(np.ptp(sample.packing.position[chosen] @ np.array(axis)))
 

@@ -198,14 +198,14 @@ def _within_budget(plan: Plan, solids: Solids, settings: Settings) -> Plan:
         wider = plan.spacing * math.sqrt(chords / settings.max_chords)
         if wider > _width(solids):
             raise SettingsError(
-                f"max-chords: {settings.max_chords:g} leave less than one line for each of "
+                f"max_chords: {settings.max_chords:g} leave less than one line for each of "
                 f"{plan.replicates} replicates of {len(plan.rule)} directions: allow more, or take "
-                f"fewer --directions"
+                f"fewer `directions`"
             )
         return replace(plan, spacing=wider)
     raise SettingsError(
         f"spacing: {plan.replicates} replicates of {len(plan.rule)} directions would cut "
-        f"{chords:.2g} chords from the grains, more than --max-chords {settings.max_chords:g}: "
+        f"{chords:.2g} chords from the grains, more than `max_chords` {settings.max_chords:g}: "
         f"choose a wider spacing"
     )
 
@@ -306,12 +306,12 @@ def _warn_of_missed_tolerance(
         why = (
             f"; {sums.steps.sum() / sums.work.sum():.0%} of the work was to follow long void "
             f"segments through the images of the cell: is it too large, or periodic where the "
-            f"sample is not (--cell, --periodic)?"
+            f"sample is not (`cell`, `periodic`)?"
         )
     warnings.warn(
         f"{where}: the scan stopped after {spent:.2g} chords before the tolerance "
         f"{settings.tolerance:g} was met: alpha_vs_axial_se is what it reached; {more}"
-        f"{factor:.4g} times as many lines would be needed (--max-chords, --tolerance){why}",
+        f"{factor:.4g} times as many lines would be needed (`max_chords`, `tolerance`){why}",
         ScanfabWarning,
         stacklevel=3,
     )
@@ -330,7 +330,7 @@ def _warn_of_dropped_variants(
         said = f"alpha_vs_axial_se is {reached}, above the tolerance {tolerance}"
         warnings.warn(
             f"{where}, variant {name}: {said if fabric else 'there is no void fabric yet'}: it "
-            f"keeps few grains, or would need far more lines than the others (--variants {name} "
+            f'keeps few grains, or would need far more lines than the others (`variants="{name}"` '
             f"scans it alone)",
             ScanfabWarning,
             stacklevel=3,

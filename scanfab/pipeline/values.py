@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from scanfab.base.errors import SettingsError
-from scanfab.base.option import unusable, whole
+from scanfab.base.option import number, unusable, whole
 
 if TYPE_CHECKING:
     # their modules need numpy, for which the help of a command does not wait
@@ -34,6 +34,7 @@ __all__ = [
     "parse_lengths",
     "parse_spacing",
     "parse_strain",
+    "parse_tolerance",
     "parse_variants",
     "parse_vector",
     "parse_workers",
@@ -153,9 +154,9 @@ def parse_frames(text: str | int | slice | None, name: str = "frames") -> slice:
         raise unusable(name, "a slice such as 0:10:2, :5 or -1:", text)
     if len(numbers) > 1:
         return slice(*numbers)
-    number = numbers[0]
-    assert number is not None
-    return slice(number, number + 1 if number != -1 else None)
+    first = numbers[0]
+    assert first is not None
+    return slice(first, first + 1 if first != -1 else None)
 
 
 def parse_variants(name: str, letters: object) -> str:
@@ -228,6 +229,14 @@ def parse_directions(name: str, value: Any) -> DirectionRule | None:
             f"say nothing: take more of them"
         )
     return rule
+
+
+def parse_tolerance(name: str, value: Any) -> float:
+    """A number above 0 that a scan can be held to."""
+    found = number("a number above 0", lambda error: 0 < error < math.inf)(name, value)
+    if not 1e-15 <= found <= 1e15:
+        raise unusable(name, "a number from 1e-15 to 1e15", value)
+    return float(found)
 
 
 def parse_strain(name: str, value: Any) -> str:

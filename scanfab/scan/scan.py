@@ -142,9 +142,9 @@ class Following:
             raise FollowedTooFarError(
                 f"void segments that leave the cell are long: following them through its images "
                 f"takes more than {self.most:.2g} steps. Much of the cell is empty, or a variant "
-                f"keeps few grains: check the cell's size (--cell) and its periodic axes "
-                f"(--periodic), choose a wider --spacing or other --variants, or allow more "
-                f"(--max-chords)"
+                f"keeps few grains: check the cell's size (`cell`) and its periodic axes "
+                f"(`periodic`), choose a wider `spacing` or other `variants`, or allow more "
+                f"(`max_chords`)"
             )
 
 

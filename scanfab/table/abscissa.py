@@ -100,9 +100,9 @@ def why_not_strain(rows: Rows) -> str | None:
         return None
     shear = strain_column(rows) == "shear_strain"
     instead, cure = (
-        ("shear_strain", "--strain of compute takes another length")
+        ("shear_strain", "`strain` of compute takes another length")
         if shear
-        else ("the frame's number", "--strain of compute says what length it is taken from")
+        else ("the frame's number", "`strain` of compute says what length it is taken from")
     )
     return f"{instead} stands in for the axial strain, as {'; '.join(lacking)}: {cure}"
 

@@ -25,7 +25,7 @@ __all__ = ["compare_tables"]
 TURNED = (
     "the loading axis is not the axis of the contact fabric, as in simple shear: alpha_vs_axial, "
     "alpha_c_axial, and with them slope and peak, miss most of the fabric; figures draw alpha_vs, "
-    "alpha_c and the angle between their axes instead; or compute with --axis along the major axis"
+    "alpha_c and the angle between their axes instead; or compute with `axis` along the major axis"
 )
 # with fewer points a line says nothing
 FEWEST_FRAMES = 3
@@ -95,20 +95,20 @@ def _tell_of_strains(rows: Sequence[Mapping[str, Any]], strain_max: float | None
     if strain_max is None:
         return
     if not math.isfinite(strain_max):
-        raise SettingsError(f"strain-max: expected a number, found {strain_max}")
+        raise SettingsError(f"strain_max: expected a number, found {strain_max}")
     strains = numbers_of(rows, strain_column(rows) or "strain")
     if not strains:
-        warnings.warn("strain-max: no frame has a strain, so none is fitted", ScanfabWarning, 3)
+        warnings.warn("strain_max: no frame has a strain, so none is fitted", ScanfabWarning, 3)
     elif min(strains) > strain_max:
         warnings.warn(
-            f"strain-max: {strain_max:g} leaves out all frames, so none is fitted: their strains "
+            f"strain_max: {strain_max:g} leaves out all frames, so none is fitted: their strains "
             f"lie between {min(strains):.3g} and {max(strains):.3g} (positive in compression)",
             ScanfabWarning,
             stacklevel=3,
         )
     elif max(strains) <= strain_max:
         warnings.warn(
-            f"strain-max: {strain_max:g} leaves out no frame: strains are fractions (5 % is 0.05), "
+            f"strain_max: {strain_max:g} leaves out no frame: strains are fractions (5 % is 0.05), "
             f"and lie between {min(strains):.3g} and {max(strains):.3g}",
             ScanfabWarning if strain_max > 1 else ScanfabNote,
             stacklevel=3,
@@ -161,8 +161,8 @@ def _grouped(
             twice = next(frame for frame in frames if frames.count(frame) > 1)
             raise SettingsError(
                 f"{source}, variant {variant}: several rows for frame {twice}: choose the rows of "
-                f"one cut-off with --cutoff; two runs of one sample are told apart by "
-                f"--label NAME, once for each table"
+                f"one cut-off with `cutoff`; two runs of one sample are told apart by "
+                f"`labels=NAME`, once for each table"
             )
     return groups
 

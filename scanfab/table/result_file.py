@@ -122,7 +122,7 @@ class ResultFile:
         if differing:
             raise SettingsError(
                 f"{self.part}: was made with other settings ({', '.join(differing)}): repeat "
-                f"them, or leave out --resume to start afresh; then it is kept under another name"
+                f"them, or leave out `resume` to start afresh; then it is kept under another name"
             )
         header, complete = self._lines_of_part()
         frames = max(len(complete) - header, 0) // rows_per_frame
@@ -189,7 +189,7 @@ class ResultFile:
         hint = ""
         if self._record.exists():
             shutil.copyfile(self._record, other._record)
-            hint = f"; what made it goes on with it by -o {other.path} --resume"
+            hint = f"; what made it goes on with it by `output={other.path}` `resume`"
         with whole_file(other.part) as copy:
             shutil.copyfile(self.part, copy)
         warnings.warn(

@@ -410,7 +410,7 @@ def test_an_rv_at_the_surface_is_a_warning(tmp_path, compute):
 def test_a_boundary_on_a_missing_column_names_those_that_exist(tmp_path, refusal):
     message = refusal(grains(tmp_path), "--boundary", "mask=3")
     assert message == (
-        "boundary: there is no column 'mask'; the columns are id, radius, x, y, z, type"
+        "--boundary: there is no column 'mask'; the columns are id, radius, x, y, z, type"
     )
 
 
@@ -424,7 +424,7 @@ def test_a_boundary_that_is_everything(tmp_path, compute):
     for answer in (printed, written):
         assert answer.code == 1
         assert answer.err == (
-            "scanfab: error: boundary: type=1 selects all particles of every frame: "
+            "scanfab: error: --boundary: type=1 selects all particles of every frame: "
             "no grain is left\n"
         )
     assert [row["alpha_vs"] for row in printed.rows] == [""] * 4

@@ -90,7 +90,7 @@ def test_of_two_series_each_has_the_contacts_of_its_own_prefix(folder):
 
 def test_contacts_that_may_be_another_s_are_not_taken(folder):
     write(folder / "cloud_9.txt", dump_text(step=9))
-    with pytest.warns(ScanfabNote, match=r"contacts_\*?9?.txt.*not clear whose.*--contacts"):
+    with pytest.warns(ScanfabNote, match=r"contacts_\*?9?.txt.*not clear whose.*`contacts`"):
         assert contacts_of(folder / "dump_9.txt") == [None]
 
 
@@ -138,13 +138,13 @@ def test_the_advice_of_several_series_keeps_the_contacts(folder):
 def test_a_series_without_radius_is_among_those_to_choose_from(folder):
     write(folder / "cloud_9.txt", dump_text(step=9))
     write(folder / "tracers_9.txt", dump_text(step=9, names=NO_RADIUS))
-    with pytest.raises(ReadError, match=r"tracers_9.txt; it has no radius: --radius L"):
+    with pytest.raises(ReadError, match=r"tracers_9.txt; it has no radius: `radius=L`"):
         scanfab.read_series(folder)
 
 
 def test_a_column_that_may_be_the_radius_is_suggested(tmp_path):
     path = write(tmp_path / "dump_9.txt", dump_text(names=NO_RADIUS))
-    with pytest.raises(ReadError, match=r"--columns radius=c_rad \(if that is one\)"):
+    with pytest.raises(ReadError, match=r'`columns=."radius": "c_rad".` \(if that is one\)'):
         scanfab.read(path)
     assert len(scanfab.read(path, columns={"radius": "c_rad"})) == 3
 
@@ -186,7 +186,7 @@ def test_a_glob_that_meets_nothing_is_wrong_usage(folder, capsys):
 
 def test_contacts_beside_that_cannot_be_read_say_how_to_leave_them_alone(folder):
     write(folder / "contacts_9.txt", pairs_text([(1, 77)], step=9))
-    message = r"contacts_9.txt: cannot tell.*--contacts geometric leaves it alone"
+    message = r'contacts_9.txt: cannot tell.*`contacts="geometric"` leaves it alone'
     with pytest.raises(ReadError, match=message), pytest.warns(ScanfabNote):
         scanfab.read(folder / "dump_9.txt")
 

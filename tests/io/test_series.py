@@ -104,7 +104,7 @@ def test_contacts_by_geometry_need_no_file(folder):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert frames_of(folder)[0].contacts is None
-    with pytest.raises(ReadError, match="--contacts file was asked for, but there is no contact"):
+    with pytest.raises(ReadError, match='`contacts="file"` was asked for, but there is no contact'):
         scanfab.read_series(folder, contacts="file")
 
 
@@ -158,7 +158,7 @@ def test_two_contact_lists_for_a_frame_are_an_error_that_names_both(folder):
     for step in STEPS:
         write(folder / f"again_{step}.txt", pairs_text(step=step))
     with pytest.raises(
-        ReadError, match=r"two contact lists for one frame: .*again_9.*pairs_9.*--con"
+        ReadError, match=r"two contact lists for one frame: .*again_9.*pairs_9.*`con"
     ):
         frames_of(folder)
 
@@ -204,7 +204,7 @@ def test_points_without_a_radius_are_used_if_there_is_nothing_else(tmp_path):
 
 def test_points_without_a_radius_are_passed_over_beside_grains(folder):
     write(folder / "tracers_9.txt", dump_text(names="id type x y z mass"))
-    with pytest.warns(ScanfabNote, match="passed over.*tracers_9.*no radius: --radius"):
+    with pytest.warns(ScanfabNote, match="passed over.*tracers_9.*no radius: `radius`"):
         assert len(frames_of(folder)) == 3
 
 

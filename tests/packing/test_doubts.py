@@ -120,7 +120,7 @@ def test_contacts_that_rounding_has_opened_ask_for_a_tolerance():
     grid = np.stack(np.meshgrid(*3 * [np.arange(5.0)]), axis=-1).reshape(-1, 3)
     (doubt,) = doubts_of(sample_of(Packing(grid, 0.5 - 1e-6)))
     assert "no contact at all" in doubt
-    assert "--contact-tolerance 1e-4" in doubt
+    assert "`contact_tolerance=1e-4`" in doubt
 
 
 @pytest.mark.parametrize("factor", [0.5, 0.9])
@@ -157,7 +157,7 @@ def test_a_period_that_is_half_empty_is_named_if_it_is_the_user_s():
 def test_a_format_without_a_cell_is_told_where_it_is_asked_for(loose, carries):
     sample = sample_of(loose)
     assert cell_doubt(sample, carries) == ""
-    cure = {"nothing": "--cell LX LY LZ", "box": "--periodic xyz"}[carries]
+    cure = {"nothing": "`cell=(LX, LY, LZ)`", "box": '`periodic="xyz"`'}[carries]
     assert f"{cure} if the sample is periodic" in cell_hint(sample, carries)
     assert cell_hint(sample, "cell") == ""
 

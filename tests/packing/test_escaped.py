@@ -77,7 +77,7 @@ def test_more_than_a_few_stay_but_not_without_a_word(number, far):
     assert np.array_equal(sample_of(packing).gathered, np.ones(729 + number, bool))
     told = sample_of(packing).doubt_of_escaped()
     assert "too many to be left out, so they widen" in told
-    assert '--boundary "id=7' in told
+    assert '`boundary="id=7' in told
 
 
 @pytest.mark.parametrize("solid_fraction", [1e-6, 1e-3, 0.03])

@@ -178,7 +178,7 @@ def test_a_contact_may_be_open_by_half_the_smaller_grain(radius):
 
 
 def test_a_long_contact_without_a_cell_asks_for_one():
-    with pytest.raises(PackingError, match=r"10 and 30.*\(--cell and --periodic\).*another step"):
+    with pytest.raises(PackingError, match=r"10 and 30.*\(`cell` and `periodic`\).*another step"):
         Packing(ROW, 1.0, id=[10, 20, 30], contacts=[[0, 1], [0, 2]])
 
 

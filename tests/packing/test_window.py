@@ -95,7 +95,7 @@ def test_window_may_reach_beyond_faces_that_do_not_repeat():
 
 def test_window_wider_than_the_cell_stops_the_computation():
     packing = Packing(*shaken_cubic(np.random.default_rng(0), 4), cell=Cell([4.0, 4, 4]))
-    with pytest.raises(SettingsError, match="choose a smaller --rv"):
+    with pytest.raises(SettingsError, match="choose a smaller `rv`"):
         compute(packing, variants="c", rv=1.1)
 
 

@@ -381,7 +381,7 @@ def test_a_class_that_encloses_the_rest_is_a_warning():
     rows = [(*row[:2], *(np.array(row[2:5]) - 4), row[5]) for row in heap(125)]
     rows = [(id, 1, *rest) for id, _, *rest in rows]
     rows += [(1000 + k, 3, *place, 0.5) for k, place in enumerate(shell)]
-    with pytest.warns(ScanfabWarning, match=r'type=3 enclose the others.*--boundary "type=3') as e:
+    with pytest.warns(ScanfabWarning, match=r'type=3 enclose the others.*`boundary="type=3"`') as e:
         scanfab.compute(packing_of(rows), variants="a", **SCAN)
     assert len(e) == 1
     table = scanfab.compute(packing_of(rows), variants="a", boundary="type=3", **SCAN)

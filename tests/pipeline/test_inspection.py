@@ -75,7 +75,7 @@ def test_a_box_that_may_be_periodic_is_told():
     (report,) = inspect_series(series, Settings.make())
     (text,) = report.warnings
     assert "does not say whether it repeats" in text
-    assert "--periodic xyz" in text
+    assert '`periodic="xyz"`' in text
 
 
 def test_a_sheet_of_discs_is_told_in_full():

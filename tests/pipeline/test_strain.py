@@ -71,7 +71,7 @@ def test_a_cell_that_cannot_be_measured_is_an_error(cell, axis, message):
 
 
 def test_a_boundary_that_is_not_named_is_an_error_that_asks_for_it():
-    with pytest.raises(SettingsError, match=r"boundary was asked for.*name them with --boundary"):
+    with pytest.raises(SettingsError, match=r"boundary was asked for.*name them with `boundary`"):
         axial_length(sample(boundary=[False] * 4), "boundary", AXES["z"])
 
 

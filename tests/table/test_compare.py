@@ -38,7 +38,8 @@ def test_groups_are_source_and_variant():
 def test_several_rows_of_a_frame_are_refused():
     """Those of several cut-offs would make one curve of many."""
     with pytest.raises(
-        SettingsError, match=r"one, variant c: several rows for frame 0: .*--cutoff; .*--label NAME"
+        SettingsError,
+        match=r"one, variant c: several rows for frame 0.*`cutoff`; .*`labels=NAME`",
     ):
         compare_tables([*curve("one", "d"), *curve("one", "c"), *curve("one", "c", 2.0)])
 
@@ -140,7 +141,7 @@ def test_frames_beyond_the_largest_strain_are_out_of_the_fit_alone():
 def test_frames_without_a_strain_are_out_of_a_fit_up_to_a_strain():
     rows = [{**row, "strain": None} for row in curve()]
     assert summary_of(rows).frames == 5
-    with pytest.warns(ScanfabWarning, match="strain-max: no frame has a strain"):
+    with pytest.warns(ScanfabWarning, match="strain_max: no frame has a strain"):
         assert summary_of(rows, strain_max=1.0).frames == 0
 
 
@@ -158,7 +159,7 @@ def test_a_largest_strain_that_leaves_out_frames_says_nothing():
 
 
 def test_a_largest_strain_that_leaves_out_all_frames_is_a_warning():
-    message = "strain-max: -1 leaves out all frames, so none is fitted: .* between 0 and 0.04"
+    message = "strain_max: -1 leaves out all frames, so none is fitted: .* between 0 and 0.04"
     with pytest.warns(ScanfabWarning, match=message):
         assert summary_of(curve(), strain_max=-1).frames == 0
 
@@ -170,7 +171,7 @@ def test_a_largest_strain_that_leaves_too_few_frames_names_the_next_strain():
 
 
 def test_a_largest_strain_that_is_no_number_is_refused():
-    with pytest.raises(SettingsError, match="strain-max: expected a number, found nan"):
+    with pytest.raises(SettingsError, match="strain_max: expected a number, found nan"):
         summary_of(curve(), strain_max=math.nan)
 
 

@@ -133,7 +133,7 @@ def grain_table(
 
 
 def user_cell(path: Path, cell: Cell | None, options: ReadOptions) -> Cell | None:
-    """The dump's cell with the user's --cell and --periodic on top."""
+    """The dump's cell with the user's cell and periodic on top."""
     periodic: tuple[bool, bool, bool] | None = None
     if options.periodic is not None:
         periodic = (
@@ -150,8 +150,8 @@ def user_cell(path: Path, cell: Cell | None, options: ReadOptions) -> Cell | Non
         return cell
     if cell is None:
         raise ReadError(
-            f"{path}: --periodic {options.periodic} was asked for, but the dump names no cell: "
-            f"give it with --cell LX LY LZ"
+            f'{path}: `periodic="{options.periodic}"` was asked for, but the dump names no cell: '
+            f"give it with `cell=(LX, LY, LZ)`"
         )
     return Cell(cell.vectors, periodic, cell.origin)
 
@@ -197,7 +197,8 @@ def _position(
             return np.asarray(cell.origin + position @ cell.vectors)
     raise ReadError(
         f"{path}{where}: no coordinates: expected the columns x y z (or xu yu zu, xs ys zs), "
-        f"found {', '.join(rest) or 'none'}; name them with --columns x=...,y=...,z=..."
+        f"found {', '.join(rest) or 'none'}; name them with "
+        f'`columns={{"x": ..., "y": ..., "z": ...}}`'
     )
 
 
@@ -225,7 +226,7 @@ def _radius(
     if options.radius is not None:
         if "radius" in named or has_radius(list(rest)):
             raise ReadError(
-                f"{path}{where}: --radius is for dumps without radii, but this one has them: "
+                f"{path}{where}: `radius` is for dumps without radii, but this one has them: "
                 f"leave it out"
             )
         return np.full(count, options.radius)
@@ -240,9 +241,9 @@ def _radius(
     like = next((name for name in rest if LIKE_A_RADIUS.search(name)), "...")
     raise ReadError(
         f"{path}{where}: no radius: expected a column radius (or diameter), found "
-        f"{', '.join(rest) or 'none'}; name it with --columns radius={like}"
+        f'{", ".join(rest) or "none"}; name it with `columns={{"radius": "{like}"}}`'
         f"{'' if like == '...' else ' (if that is one)'}, or give one radius for all grains with "
-        f"--radius"
+        f"`radius`"
     )
 
 

@@ -145,7 +145,7 @@ def _refuse_images(path: Path, grains: GrainTable, rows: IntArray, ends: FloatAr
     if image.sum() > 0.5 * len(one):
         raise ReadError(
             f"{path}: {image.sum()} contacts end at periodic images of grains, but the sample has "
-            f"no cell: name it with --cell LX LY LZ (and --periodic)"
+            f"no cell: name it with `cell=(LX, LY, LZ)` (and `periodic`)"
         )
 
 
@@ -188,7 +188,7 @@ def _join(
         raise ReadError(
             f"{path}: contact {contact + 1} {describe(contact, end)}, which is not in the grain "
             f"file ({np.count_nonzero(wrong)} of {len(rows)} contacts): do both files belong to "
-            f"the same step? A periodic sample also needs its cell (--cell)"
+            f"the same step? A periodic sample also needs its cell (`cell`)"
         )
     both = ~unknown.any(axis=1)
     with_wall = rows[~both].max(axis=1)

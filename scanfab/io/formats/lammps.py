@@ -36,7 +36,7 @@ LAMMPS_ITEMS = re.compile(
     re.MULTILINE,
 )
 
-# names of --contact-columns: ids, force on the first grain, its tangential part if apart from it
+# names of contact_columns: ids, force on the first grain, its tangential part if apart from it
 IDS = ("id1", "id2")
 FORCE = ("fx", "fy", "fz")
 TANGENTIAL = ("tx", "ty", "tz")
@@ -93,7 +93,7 @@ class LammpsReader:
         """
         Pairs of ``compute property/local`` that touch, with the force of ``compute pair/local``.
 
-        Which column is what follows from ``--contact-columns``; without it the ids are found by
+        Which column is what follows from ``contact_columns``; without it the ids are found by
         their values, if there is no doubt, and no force is read.
         """
         path = snapshot.path
@@ -123,14 +123,14 @@ def _named_places(path: Path, text: str | None, block: DumpBlock) -> dict[str, i
     known = ({*IDS}, {*IDS, *FORCE}, {*IDS, *FORCE, *TANGENTIAL})
     if set(named) not in known or not all(named.values()):
         raise ReadError(
-            f"{path}: --contact-columns: expected id1=NAME,id2=NAME, and fx, fy, fz (with tx, ty, "
+            f"{path}: `contact_columns`: expected id1=NAME,id2=NAME, and fx, fy, fz (with tx, ty, "
             f"tz) for the force on the first grain, found {text!r}; "
             f"the columns are {', '.join(block.names)}"
         )
     for own in named.values():
         if own not in block.names:
             raise ReadError(
-                f"{path}: --contact-columns: there is no column {own!r}; "
+                f"{path}: `contact_columns`: there is no column {own!r}; "
                 f"the columns are {', '.join(block.names)}"
             )
     return {key: block.names.index(own) for key, own in named.items()}
@@ -142,8 +142,8 @@ def _ids(path: Path, block: DumpBlock, places: dict[str, int], grains: GrainTabl
     if columns is None:
         raise ReadError(
             f"{path}: cannot tell which columns are the two ids of a contact: the ids may belong "
-            f"to another step; or name them with --contact-columns "
-            f'"id1=NAME,id2=NAME"; the columns are {", ".join(block.names)}'
+            f"to another step; or name them with "
+            f'`contact_columns="id1=NAME,id2=NAME"`; the columns are {", ".join(block.names)}'
         )
     listed = block.values[:, columns]
     if not (are_whole(listed) and np.all(np.abs(listed) < 2.0**53)):

@@ -114,7 +114,7 @@ class LiggghtsReader:
         """
         Pairs of ``pair/gran/local``, or grains of ``wall/gran/local``.
 
-        Which column is what follows from ``--contact-columns``, the keywords of the compute, or
+        Which column is what follows from ``contact_columns``, the keywords of the compute, or
         from the values: two columns of ids of the grain file, then the periodic flag 0 or 1.
         """
         path = snapshot.path
@@ -138,8 +138,8 @@ class LiggghtsReader:
             raise ReadError(
                 f"{path}: cannot tell which columns are the two ids of a contact: the ids may "
                 f"belong to another step; or name the keywords of the compute with "
-                f'--contact-columns "pos id force ..."; a dump of LAMMPS is read with '
-                f"--format lammps"
+                f'`contact_columns="pos id force ..."`; a dump of LAMMPS is read with '
+                f'`format="lammps"`'
             )
         listed = block.values[:, place : place + 2]
         if not (are_whole(listed) and np.all(np.abs(listed) < 2.0**53)):
@@ -172,7 +172,7 @@ def _given_places(
     unknown = asked - set(sizes)
     if unknown or "id" not in asked:
         raise ReadError(
-            f"{path}: --contact-columns: expected keywords of compute pair/gran/local, id among "
+            f"{path}: `contact_columns`: expected keywords of compute pair/gran/local, id among "
             f"them ({', '.join(sizes)}), found {keywords!r}"
         )
     places, place = {}, 0
@@ -182,7 +182,7 @@ def _given_places(
             place += size
     if place != block.values.shape[1]:
         raise ReadError(
-            f"{path}: --contact-columns {keywords!r} makes {place} columns, the file has "
+            f"{path}: `contact_columns={keywords!r}` makes {place} columns, the file has "
             f"{block.values.shape[1]}"
         )
     return places["id"], places.get("force")

@@ -166,7 +166,7 @@ def _refuse_lost_lines(path: Path) -> None:
         raise ReadError(
             f"{path}: {values} values for {lines} contacts: YADE's VTKRecorder loses the contacts "
             f"that cross a periodic cell; export them with export.VTKExporter.exportInteractions, "
-            f"or find them by geometry (--contacts geometric)"
+            f'or find them by geometry (`contacts="geometric"`)'
         )
 
 

@@ -120,7 +120,7 @@ def refuse_as_numbers(path: Path) -> ReadError:
     cure = (
         "lay it beside its spheres, under YADE's own name"
         if np.any(np.triu(vectors, 1))
-        else f"for this frame alone use --cell {' '.join(f'{one:.9g}' for one in numbers)}"
+        else f"for this frame alone use `cell=({', '.join(f'{one:.9g}' for one in numbers)})`"
     )
     return ReadError(
         f"{path}: is the cell of one frame in a VTK file, expected a CSV file with those of all "
@@ -139,7 +139,7 @@ def _tell_of_doubt(path: Path) -> None:
         warnings.warn(
             f"{folder / base}-periCell-*: {len(cells)} cells beside {len(spheres)} files of "
             f"spheres: YADE numbers the cells by the files of interactions, so it cannot be told "
-            f"which cell belongs to which frame: name the cells with --cell FILE.csv",
+            f'which cell belongs to which frame: name the cells with `cell="FILE.csv"`',
             ScanfabWarning,
             stacklevel=3,
         )
@@ -189,5 +189,5 @@ def _refuse_outside(path: Path, file: Path, cell: Cell, position: FloatArray) ->
         raise ReadError(
             f"{path}: {np.count_nonzero(outside)} grains lie outside the cell of {file}, into "
             f"which YADE wraps them: it is the cell of another state; name the right one with "
-            f"--cell LX LY LZ or --cell FILE.csv"
+            f'`cell=(LX, LY, LZ)` or `cell="FILE.csv"`'
         )

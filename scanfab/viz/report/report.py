@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.base.errors import ScanfabError, ScanfabNote, ScanfabWarning, SettingsError
+from scanfab.pipeline.options import as_options
 from scanfab.pipeline.repeat import repeat_command
 from scanfab.table.compare import compare_tables
 from scanfab.table.comparison import Comparison
@@ -148,7 +149,7 @@ def _section(one: Input, heard: _Heard) -> Section:
             with _listening(heard):
                 shown = show_frames(one)
         except (ScanfabError, OSError) as error:
-            no_view = f"The view is left out: {error}."
+            no_view = f"The view is left out: {as_options(str(error))}."
     return Section(
         title=str(one.path),
         command=repeat_command(asked, one.path.name, _overridden(one.manifest)),
@@ -181,9 +182,9 @@ class _listening(warnings.catch_warnings):  # noqa: N801
     def __exit__(self, *details: Any) -> None:
         for one in self.caught or []:
             if issubclass(one.category, ScanfabWarning):
-                self.heard.warnings.append(str(one.message))
+                self.heard.warnings.append(as_options(str(one.message)))
             elif issubclass(one.category, ScanfabNote):
-                self.heard.notes.append(str(one.message))
+                self.heard.notes.append(as_options(str(one.message)))
         super().__exit__(*details)
         for one in self.caught or [] if self.tell else []:
             warnings.warn(one.message, one.category, stacklevel=3)

@@ -72,7 +72,7 @@ def test_users_may_name_one_coordinate_only():
 
 
 def test_missing_coordinates_are_an_error_that_lists_what_there_is():
-    with pytest.raises(ReadError, match=r"no coordinates.*found x, y, radius.*--columns x="):
+    with pytest.raises(ReadError, match=r'no coordinates.*found x, y, radius.*`columns=."x": '):
         table({"x": POSITION[:, 0], "y": POSITION[:, 1], "radius": RADIUS})
 
 
@@ -113,12 +113,12 @@ def test_users_may_give_one_radius_for_all():
 @pytest.mark.parametrize("name", ["radius", "Diameter", "size"])
 def test_one_radius_for_all_does_not_replace_those_of_the_dump(name):
     named = {"radius": name} if name == "size" else {}
-    with pytest.raises(ReadError, match="--radius is for dumps without radii"):
+    with pytest.raises(ReadError, match="`radius` is for dumps without radii"):
         table({"position": POSITION, name: RADIUS}, columns=named, radius=0.5)
 
 
 def test_no_radius_is_an_error_that_names_both_ways_out():
-    with pytest.raises(ReadError, match=r"step 5: no radius.*type.*--columns radius=.*--radius"):
+    with pytest.raises(ReadError, match=r"step 5: no radius.*type.*`columns=.*`radius`"):
         table({"position": POSITION, "type": RADIUS})
 
 
@@ -194,7 +194,7 @@ def test_periodic_letters_say_which_axes_repeat(letters, periodic):
 
 
 def test_periodic_without_a_cell_is_an_error_that_asks_for_it():
-    with pytest.raises(ReadError, match=r"--periodic xy .* names no cell: give it with --cell"):
+    with pytest.raises(ReadError, match=r'`periodic="xy"` .* names no cell: give it with `cell'):
         user_cell(PATH, None, ReadOptions(periodic="xy"))
 
 

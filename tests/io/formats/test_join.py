@@ -110,7 +110,7 @@ def test_rounding_at_a_face_does_not_part_an_end_from_its_grain(error):
 
 
 def test_without_a_cell_the_image_of_a_grain_is_no_wall():
-    with pytest.raises(ReadError, match=r"1 contacts end at periodic images of grains.*--cell"):
+    with pytest.raises(ReadError, match=r"1 contacts end at periodic images of grains.*`cell="):
         by_places([[POSITION[3], [7.6, 0, 0]]])
 
 

@@ -121,9 +121,7 @@ def test_packed_dumps_are_read_like_plain_ones(tmp_path, name, pack):
 
 
 def test_no_radius_is_refused_with_advice():
-    with pytest.raises(
-        ReadError, match=r"noradius.txt, step 30000: no radius.*--columns.*--radius"
-    ):
+    with pytest.raises(ReadError, match=r"noradius.txt, step 30000: no radius.*`columns.*`radius`"):
         scanfab.read(FLOOR / "noradius.txt")
 
 
@@ -314,7 +312,7 @@ def test_contacts_by_id_need_ids_in_the_grain_file(tmp_path):
 
 def test_columns_that_could_be_either_are_asked_for(tmp_path):
     local = local_text([(1, 2, 0, 2, 3, 0), (2, 3, 0, 1, 2, 0)])
-    with pytest.raises(ReadError, match=r"cannot tell which columns.*--contact-columns"):
+    with pytest.raises(ReadError, match=r"cannot tell which columns.*`contact_columns="):
         series_of(tmp_path, ROWS, local=local)
 
 
@@ -340,7 +338,7 @@ def test_history_may_have_any_number_of_values(tmp_path):
 def test_keywords_that_cannot_be_right_are_refused(tmp_path, keywords, message):
     grains = write(tmp_path / "dump_0.txt", dump_text())
     local = write(tmp_path / "pairs_0.txt", pairs_text())
-    with pytest.raises(ReadError, match=f"--contact-columns.*{message}"):
+    with pytest.raises(ReadError, match=f"`contact_columns.*{message}"):
         scanfab.read(grains, contacts=local, contact_columns=keywords)
 
 
@@ -455,5 +453,5 @@ def test_the_pieces_of_a_vtm_file_are_read_by_themselves():
 
 
 def test_a_contact_across_a_face_without_a_cell_asks_for_it():
-    with pytest.raises(scanfab.PackingError, match="name its cell \\(--cell and --periodic\\)"):
+    with pytest.raises(scanfab.PackingError, match="name its cell \\(`cell` and `periodic`\\)"):
         scanfab.read(FLOOR / "grains_30000.vtk", contacts=FLOOR / VTK_CONTACTS[0])

@@ -92,7 +92,7 @@ def test_a_radius_has_many_names(tmp_path, writer, name):
 def test_points_without_a_radius_are_points(tmp_path):
     path = polydata(tmp_path / "a.vtp", mass=RADIUS)
     assert VtkReader().kind(path) == "points"
-    with pytest.raises(ReadError, match=r"no radius.*found mass.*--columns radius=.*--radius"):
+    with pytest.raises(ReadError, match=r"no radius.*found mass.*`columns=.*`radius`"):
         scanfab.read(path)
 
 

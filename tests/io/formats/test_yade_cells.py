@@ -10,6 +10,7 @@ import pytest
 
 import scanfab
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
+from scanfab.pipeline.options import as_options
 from tests.helpers.truth import SAMPLE_DATA, csv_rows
 
 STRAINED = SAMPLE_DATA / "yade_strained"
@@ -74,7 +75,7 @@ def test_the_cell_of_another_frame_is_refused(tmp_path):
     """One file of spheres and one cell, whose number fits, but it is that of the last frame."""
     for name in ("lone-spheres-00000000.vtk.gz", "lone-periCell-00000000.vtk.gz"):
         shutil.copy(STRAINED / name, tmp_path)
-    with pytest.raises(ReadError, match=r"grains lie outside the cell of .*--cell FILE.csv"):
+    with pytest.raises(ReadError, match=r"grains lie outside the cell of .*`cell=.FILE.csv"):
         scanfab.read(tmp_path / "lone-spheres-00000000.vtk.gz")
 
 
@@ -125,7 +126,7 @@ def test_a_cell_of_yade_as_the_file_of_cells_is_an_error_with_its_numbers(file):
     """It is that of one frame; the numbers are those that a user may name instead."""
     with pytest.raises(ReadError, match="is the cell of one frame in a VTK file") as told:
         frames("rec_spheres.27500*", cell=STRAINED / file)
-    numbers = tuple(map(float, str(told.value).partition("--cell ")[2].split()))
+    numbers = tuple(map(float, as_options(str(told.value)).partition("--cell ")[2].split()))
     assert len(numbers) == 6 if np.any(vectors()[1][np.tril_indices(3, -1)]) else 3
     (packing,) = frames("rec_spheres.27500*", cell=numbers)
     np.testing.assert_allclose(packing.cell.vectors, vectors()[1], rtol=0, atol=1e-7)
@@ -138,7 +139,7 @@ def test_a_turned_cell_of_yade_has_no_such_numbers(tmp_path):
     path.write_text(text.replace("\n0.0286394 0 0\n", "\n0.0286394 0.001 0\n"))
     with pytest.raises(ReadError, match="lay it beside its spheres") as told:
         frames("rec_spheres.27500*", cell=path)
-    assert "--cell" not in str(told.value)
+    assert "`cell" not in str(told.value)
 
 
 @pytest.mark.parametrize(

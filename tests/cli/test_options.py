@@ -1,0 +1,110 @@
+"""Options of commands, made of their declarations."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+import pytest
+
+from scanfab.base.option import GROUPS, option, options_of, takes_options, whole
+from scanfab.cli import options as cli_options
+from scanfab.cli.compute import compute
+from scanfab.cli.sources import SourceCommand
+from scanfab.pipeline.manifest import asked_for
+from scanfab.pipeline.options import OPTIONS
+from scanfab.pipeline.settings import Settings
+
+DOCS = Path(__file__).parents[2] / "docs"
+TITLES = ["What most need", *(group.capitalize() for group in GROUPS)]
+
+
+def help_of(command, width=80):
+    context = click.Context(command, info_name="compute", terminal_width=width)
+    return command.get_help(context)
+
+
+def test_every_option_of_compute_is_declared_and_stands_in_a_group():
+    names = {one.name for one in compute.params if isinstance(one, click.Option)}
+    assert names - {"quiet", "verbose"} == set(OPTIONS)
+    text = help_of(compute)
+    assert re.findall(r"^([A-Z][\w ]+):$", text, re.M) == TITLES
+    for one in OPTIONS.values():
+        assert len(re.findall(rf"^  {one.flag}(?![\w-])", text, re.M)) == 1
+
+
+def test_the_few_that_most_need_come_first():
+    most = help_of(compute).split("\nReading:")[0].split("What most need:")[1]
+    flags = re.findall(r"^  (-[\w-]+)", most, re.M)
+    assert flags == [
+        "-o", "--variants", "--boundary", "--frames", "--rv", "--tolerance", "--workers",
+    ]  # fmt: skip
+
+
+def test_there_is_an_example_for_a_folder_several_files_and_a_pipe():
+    text = help_of(compute)
+    for one in ("A folder:", "Several files:", "A pipe:"):
+        assert re.search(rf"^  {one} +.*scanfab compute", text, re.M)
+
+
+def test_the_help_fits_80_columns():
+    assert max(map(len, help_of(compute).splitlines())) <= 80
+
+
+def test_defaults_are_spelt_as_short_as_they_are_written():
+    text = " ".join(help_of(compute).split())
+    for default in ("0.7", "0.0001", "1e10", "0", "1rmin", "abcd", "17"):
+        assert f"[default: {default}]" in text
+
+
+@dataclass(frozen=True, init=False)
+class Wider(Settings):
+    """Settings with one option more, declared as the others are."""
+
+    stray_light: int = option(
+        default=7,
+        parse=whole("a number below 9", lambda number: number < 9),
+        group="fabric",
+        help="How much of it, as `rv`.",
+        meaning="light that strays",
+        takes="int",
+        kind=int,
+        metavar="N",
+    )
+
+
+def test_a_made_up_option_takes_one_declaration(monkeypatch):
+    """Help, command line, settings, their checks, manifest, and docstring have it."""
+    declared = options_of(Wider)[-1]
+    monkeypatch.setitem(cli_options.DECLARED, "stray_light", declared)
+
+    @click.command(cls=SourceCommand)
+    @cli_options.options("stray_light", "rv")
+    def command(**chosen: object) -> Settings:
+        return Wider(**chosen)
+
+    fabric = help_of(command).split("\nFabric:\n")[1]
+    assert fabric.startswith("  --stray-light N         How much of it, as --rv.  [default: 7]\n")
+    made = command.main(["--stray-light", "5"], standalone_mode=False)
+    assert (made.stray_light, made.rv, Wider().stray_light) == (5, 0.7, 7)
+    refused = pytest.raises(click.UsageError, match=r"stray_light: expected a number below 9, fou")
+    with refused, cli_options.usage_errors():
+        Wider(stray_light=12)
+    assert asked_for([], {}, made)["stray_light"] == 5
+
+    @takes_options(options_of(Wider))
+    def function() -> None:
+        """{options}"""
+
+    assert function.__doc__.endswith("stray_light : int, optional\n    How much of it, as `rv`.")
+
+
+def test_the_page_of_the_command_line_shows_what_the_help_has():
+    """So that a declared option is on the page without another word."""
+    spec = importlib.util.spec_from_file_location("page", DOCS / "make_command_line.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert help_of(compute, 100).split("\n\n", 1)[1] in module.page()
