@@ -40,8 +40,11 @@ class SettingsFile:
                 yield
         except click.UsageError as error:
             option = error.message.partition(":")[0].removeprefix("--").replace(" ", "-")
-            before = f"{self.path}: " if self.path and option in self.used else ""
-            raise click.UsageError(f"{before}{error.message}") from None
+            if self.path is None or option not in self.used:
+                raise
+            # the file has the option without the dashes
+            text = error.message.removeprefix("--")
+            raise click.UsageError(f"{self.path}: {text}") from None
 
     def asked(self) -> dict[str, Any]:
         """As a manifest lists it; nothing without a file."""

@@ -60,7 +60,7 @@ def test_of_several_boundaries_the_one_that_fits_nothing_is_named(tmp_path):
 def test_a_format_without_a_cell_is_always_told(tmp_path):
     """By a note: most samples are open, and nothing is wrong with them."""
     yade_spheres(tmp_path / "a-spheres-0.vtk", [[0, 0, 0], [5, 0, 0]], [1, 1])
-    message = "this format carries no cell; --cell LX LY LZ if the sample is periodic"
+    message = r"this format carries no cell; `cell=\(LX, LY, LZ\)` if the sample is periodic"
     with pytest.warns(ScanfabNote, match=message):
         (report,) = inspect_series(scanfab.read_series(tmp_path), Settings.make())
     assert report.warnings == []

@@ -163,7 +163,7 @@ def test_scan_stops_before_it_cuts_more_chords_than_allowed(packing):
     """Of 216 grains in a window; a chord is where a line meets a grain."""
     cut = []
     for most in (1e5, 1e6):
-        with pytest.warns(ScanfabWarning, match="1e-06 was met.*--max-chords"):
+        with pytest.warns(ScanfabWarning, match="1e-06 was met.*`max_chords`"):
             row = compute(packing, tolerance=1e-6, variants="a", max_chords=most)[0]
         chords = np.pi * np.sum(packing.radius**2) / row.spacing**2 * row.directions
         cut.append(chords)
@@ -184,7 +184,7 @@ def test_periodic_whole_takes_about_as_many_lines_as_the_open_one(packing, repea
 
 @pytest.mark.parametrize("variants", ["a", "abcd"])
 def test_budget_holds_for_periodic_packings_too(repeated, variants):
-    with pytest.warns(ScanfabWarning, match="1e-06 was met.*--max-chords"):
+    with pytest.warns(ScanfabWarning, match="1e-06 was met.*`max_chords`"):
         row = compute(repeated, tolerance=1e-6, variants=variants, max_chords=1e6)[0]
     chords = np.pi * np.sum(repeated.radius**2) / row.spacing**2 * row.directions
     assert 0.1e6 < chords <= 1.1e6
@@ -224,7 +224,7 @@ def test_following_lines_through_an_empty_cell_counts_in_the_budget(
 
 @pytest.mark.filterwarnings("ignore::scanfab.ScanfabWarning")
 def test_scan_that_stops_on_an_empty_cell_says_why(nearly_empty):
-    with pytest.warns(ScanfabWarning, match="of the work was to follow long void.*--periodic"):
+    with pytest.warns(ScanfabWarning, match="of the work was to follow long void.*`periodic"):
         compute(nearly_empty, tolerance=1e-5, variants="a", max_chords=3e7)
 
 

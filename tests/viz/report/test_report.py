@@ -152,8 +152,11 @@ def test_without_a_manifest_it_says_so(table):
     [
         ({"sources": ["gone"]}, "The view is left out: the source gone is not there any more."),
         ({"sources": ["-"]}, "The view is left out: the frames came by standard input"),
-        ({"boundary": [{"text": "mask"}]}, "The view is left out: boundary: expected COLUMN=VALUE"),
-        ({"rv": 0.0}, "The view is left out: rv: expected a fraction above 0"),
+        (
+            {"boundary": [{"text": "mask"}]},
+            "The view is left out: --boundary: expected COLUMN=VALUE",
+        ),
+        ({"rv": 0.0}, "The view is left out: --rv: expected a fraction above 0"),
     ],
 )
 def test_a_source_that_cannot_be_read_again_is_told(copied, changes, message):
