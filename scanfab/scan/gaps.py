@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.jit import Flag
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.kernels.bins import Bins
@@ -185,10 +186,12 @@ def scan_gaps(
     least = np.maximum(np.array(cutoffs, dtype=np.float64), shortest_gap(solids))
     affine = np.array([one.affine() for one in blocks])
     parts = np.array([one.parts for one in blocks], dtype=np.float64)
+    halves: Flag = True if np.all(parts == 2.0) else None
     count = max(len(one) for one in blocks)
 
     def some(triads: FloatArray, offsets: FloatArray) -> FloatArray:
-        bins = Bins(affine, parts, least, np.zeros((len(triads), 2, 2, count * len(least), 3)))
+        room = np.zeros((len(triads), 2, 2, count * len(least), 3))
+        bins = Bins(affine, parts, halves, least, room)
         tally_triads(solids, triads, offsets, spacing, least[0], variants, bins, following)
         return bins.sums
 

@@ -1,16 +1,29 @@
 """The sample's own scatter in the table: contacts without each octant, and what it is empty for."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from scanfab import Cell, Packing, ScanfabWarning, Settings, compute, find_contacts
+from scanfab import (
+    Cell,
+    Packing,
+    ScanfabWarning,
+    Settings,
+    Solids,
+    compute,
+    find_contacts,
+    scan_lines,
+)
 from scanfab.packing.sample import VARIANTS, Sample
+from scanfab.packing.window import Window
+from scanfab.pipeline.measurement import measure
 from scanfab.pipeline.plan import make_plan
 from scanfab.scan.gaps import Blocks
 from tests.helpers import naive
-from tests.helpers.lattices import shaken_cubic
+from tests.helpers.lattices import rotation, shaken_cubic
+from tests.helpers.windows import box
 
 LINES = {"directions": "lebedev:5", "spacing": 0.15}
 
@@ -134,3 +147,23 @@ def test_frame_without_a_void_fabric_has_no_columns_of_octants():
         )[0]
     assert row.alpha_vs_axial_sample_se is None
     assert set(without(row, "alpha_vs_axial").tolist()) == {None}
+
+
+def test_a_window_made_up_of_half_spaces_is_measured_like_any_other(packing):
+    """All that a next window needs is its data: frame, solids, scan and blocks take it as it is."""
+    sample, settings = Sample(packing, np.zeros(len(packing), bool)), Settings.make(**LINES)
+    plan = make_plan(settings, sample)
+    window = Window(plan.window.center, box([1.0, 1.5, 2.0], rotation(np.random.default_rng(1))))
+    found = measure(sample, replace(plan, window=window, auto=""), settings)
+    position = packing.position - window.center
+    removed = sample.rattlers
+    solids = Solids(position, packing.radius, removed, window.shape)
+    lines = {"spacing": plan.spacing, "cutoff": plan.cutoff, "replicates": range(plan.replicates)}
+    expected = scan_lines(solids, plan.rule, **lines)
+    for variant in "abcd":
+        assert np.array_equal(found.sums.kept(variant)[1], expected.kept(variant)[1])
+        assert found.kept(variant)[0] == pytest.approx(expected.kept(variant)[0])
+        assert found.blocked.number[:, "abcd".index(variant)].sum(axis=(0, 1, 3)).all()
+    along, across = found.sums.line_length[:, 2].mean(), plan.spacing**2
+    assert along * across == pytest.approx(8 * 1.0 * 1.5 * 2.0, rel=0.01)
+    assert sample.counted(VARIANTS["c"], window).sum() == window.shape.contains(position).sum()

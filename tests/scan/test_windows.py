@@ -131,6 +131,10 @@ def test_whole_and_window_may_have_blocks_of_their_own():
     found = gaps.number.sum(axis=(0, 2, 4)) > 0
     assert found[0].tolist() == [True] * 3 + [False] * 5
     assert found[2].all()
+    octants = scan_gaps(
+        solids, RULE, spacing=0.1, cutoffs=[0.0], blocks=(blocks[1], blocks[1]), replicates=[0]
+    )
+    assert np.array_equal(gaps.number[:, 2:], octants.number[:, 2:])
 
 
 def test_nothing_is_tallied_of_lines_that_miss_a_region_inside_its_ball():

@@ -18,7 +18,9 @@ RUNS_OF_A_KIND = 60
 REACH = 30.0
 
 
-def fast_sums(spheres, removed, triad, offset, spacing, window, cutoffs, centers, flags=(1, 1, 1)):
+def fast_sums(
+    spheres, removed, triad, offset, spacing, window, cutoffs, centers, flags=(1, 1, 1), halves=True
+):
     """What the kernel adds up: shape (whole or window, set of solids, octant, bin, sum)."""
     blocks = np.array([Blocks.about(center, REACH).affine() for center in centers])
     sums = np.zeros((1, 2, 2, 8 * len(cutoffs), 3))
@@ -29,7 +31,7 @@ def fast_sums(spheres, removed, triad, offset, spacing, window, cutoffs, centers
         np.zeros((1, 2, sweep.TALLY_SIZE)),
         True,
         *(True if flag else None for flag in flags),
-        Bins(blocks, np.full((2, 3), 2.0), np.array(cutoffs), sums),
+        Bins(blocks, np.full((2, 3), 2.0), halves or None, np.array(cutoffs), sums),
     )
     return sums.reshape(2, 2, 8, len(cutoffs), 3)
 
@@ -61,9 +63,12 @@ def check_random_packing(kind, random):
         np.sort(random.uniform(0.003, 2.0, random.integers(1, 5))),
         random.uniform(-1.0, 1.0, (2, 3)),
     )
-    fast, slow = fast_sums(*line), slow_sums(*line)
-    assert np.array_equal(fast[..., 0], np.round(slow[..., 0]))
-    np.testing.assert_allclose(fast, slow, rtol=1e-9, atol=1e-9)
+    slow = slow_sums(*line)
+    # as octants, and as blocks of any number
+    for halves in (True, False):
+        fast = fast_sums(*line, halves=halves)
+        assert np.array_equal(fast[..., 0], np.round(slow[..., 0]))
+        np.testing.assert_allclose(fast, slow, rtol=1e-9, atol=1e-9)
     return slow[..., 0].sum(axis=3)
 
 
