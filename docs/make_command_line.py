@@ -8,10 +8,10 @@ import click
 
 from scanfab.base.column import Column, columns_of_fields
 from scanfab.cli.group import COMMANDS, cli
+from scanfab.pipeline.calibration_ladders import StepRow
 from scanfab.pipeline.inspection import FrameReport
-from scanfab.pipeline.ladders import StepRow
 from scanfab.table.columns import OWN_COLUMNS
-from scanfab.table.comparison import DifferenceRow, FrameRow, SummaryRow
+from scanfab.table.comparison_rows import DifferenceRow, FrameRow, SummaryRow
 
 PAGE = Path(__file__).parent / "command-line.md"
 

@@ -20,9 +20,9 @@ import pytest
 import scanfab
 from scanfab.cli.group import COMMANDS, cli
 from scanfab.io.registry import installed_readers
-from scanfab.pipeline import inspection, ladders
+from scanfab.pipeline import calibration_ladders, inspection
 from scanfab.scan.directions import RULES
-from scanfab.table import comparison
+from scanfab.table import comparison_rows
 from scanfab.table.columns import columns_of
 
 ROOT = Path(__file__).parents[1]
@@ -85,10 +85,10 @@ def test_every_option_is_documented(name: str) -> None:
     "kind",
     [
         scanfab.Row,
-        comparison.FrameRow,
-        comparison.SummaryRow,
-        comparison.DifferenceRow,
-        ladders.StepRow,
+        comparison_rows.FrameRow,
+        comparison_rows.SummaryRow,
+        comparison_rows.DifferenceRow,
+        calibration_ladders.StepRow,
         inspection.FrameReport,
     ],
 )

@@ -83,7 +83,7 @@ def columns_of_fields(kind: type) -> tuple[Column, ...]:
     Examples
     --------
     >>> from scanfab.base.column import columns_of_fields
-    >>> from scanfab.table.comparison import SummaryRow
+    >>> from scanfab.table.comparison_rows import SummaryRow
     >>> columns_of_fields(SummaryRow)[2].meaning
     'number of frames that enter the fits'
     """

@@ -1,14 +1,23 @@
-"""What other packages offer under an entry point."""
+"""What packages offer under an entry point."""
 
 from __future__ import annotations
 
 import warnings
-from importlib.metadata import entry_points
-from typing import Any
+from collections.abc import Callable, Iterable
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any, NamedTuple
 
 from scanfab.base.errors import ScanfabError, ScanfabWarning
 
-__all__ = ["load_plugins"]
+__all__ = ["Offer", "load_offers", "load_plugins"]
+
+
+class Offer(NamedTuple):
+    """An object that a package offers."""
+
+    plugin: Any
+    package: str
+    """The name of the package."""
 
 
 def load_plugins(group: str, what: str) -> dict[str, Any]:
@@ -29,16 +38,19 @@ def load_plugins(group: str, what: str) -> dict[str, Any]:
     ScanfabError
         If two packages use one name.
     """
-    found: dict[str, tuple[str, Any]] = {}
-    for point in sorted(entry_points(group=group), key=lambda point: (point.name, point.value)):
+    offers = load_offers(entry_points(group=group), what)
+    return {name: offer.plugin for name, offer in offers.items()}
+
+
+def load_offers(
+    points: Iterable[EntryPoint], what: str, make: Callable[[Any], Any] = lambda plugin: plugin
+) -> dict[str, Offer]:
+    """As :func:`load_plugins`, with the package of each; ``make`` turns into one what is loaded."""
+    found: dict[str, Offer] = {}
+    for point in sorted(points, key=lambda point: (point.name, point.value)):
         package = point.dist.name if point.dist is not None else "unknown package"
-        if point.name in found:
-            raise ScanfabError(
-                f"two packages offer a {what} called {point.name!r}: {found[point.name][0]} and "
-                f"{package}; remove one of them"
-            )
         try:
-            found[point.name] = package, point.load()
+            plugin = make(point.load())
         except (Exception, SystemExit) as error:  # a foreign package may fail in any way
             warnings.warn(
                 f"the {what} {point.name!r} of {package} cannot be loaded: "
@@ -46,4 +58,11 @@ def load_plugins(group: str, what: str) -> dict[str, Any]:
                 ScanfabWarning,
                 stacklevel=2,
             )
-    return {name: offered for name, (_, offered) in found.items()}
+            continue
+        if point.name in found:
+            raise ScanfabError(
+                f"two packages offer a {what} called {point.name!r}: "
+                f"{found[point.name].package} and {package}; remove one of them"
+            )
+        found[point.name] = Offer(plugin, package)
+    return found

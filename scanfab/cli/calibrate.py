@@ -30,7 +30,7 @@ from scanfab.pipeline.options import as_options
 
 if TYPE_CHECKING:
     from scanfab.pipeline.calibration import Calibration
-    from scanfab.pipeline.ladders import StepRow
+    from scanfab.pipeline.calibration_ladders import StepRow
     from scanfab.table.writing import Excerpt
 
 __all__ = ["calibrate"]
@@ -93,7 +93,7 @@ def calibrate(
     """
     from scanfab.cli.console import announce_compiling, is_readable, reported_warnings
     from scanfab.pipeline.calibration import calibrate as calibrate_series
-    from scanfab.pipeline.ladders import StepRow
+    from scanfab.pipeline.calibration_ladders import StepRow
     from scanfab.pipeline.settings import Settings
     from scanfab.table.result_file import ResultFile
     from scanfab.table.writing import Excerpt
@@ -161,7 +161,7 @@ def _show(found: Calibration, command: str, tables: bool) -> None:
 
 def _write_rows(found: Calibration, command: str, excerpt: Excerpt) -> None:
     """The steps on one stream, and what was found on the other."""
-    from scanfab.pipeline.ladders import StepRow
+    from scanfab.pipeline.calibration_ladders import StepRow
     from scanfab.table.columns import columns_of
     from scanfab.table.writing import row_writer
 

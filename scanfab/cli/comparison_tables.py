@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from scanfab.cli.tables import GAP, Column, print_columns, spelt, width_of
 
 if TYPE_CHECKING:
-    from scanfab.table.comparison import Comparison, FrameRow, SummaryRow
+    from scanfab.table.comparison_rows import Comparison, FrameRow, SummaryRow
 
 __all__ = ["print_comparison"]
 

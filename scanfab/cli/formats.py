@@ -17,7 +17,7 @@ def formats() -> None:
 
     with reported_warnings():
         lines = [
-            ("reader", name, " ".join(one.reader.extensions), one.package, one.reader.description)
+            ("reader", name, " ".join(one.plugin.extensions), one.package, one.plugin.description)
             for name, one in installed_readers().items()
         ]
     lines += [

@@ -125,9 +125,9 @@ def _complete_fields(
     ctx: click.Context, parameter: click.Parameter, text: str
 ) -> list[CompletionItem]:
     """The columns of what a command writes, behind those that are named already."""
-    from scanfab.pipeline.ladders import StepRow
+    from scanfab.pipeline.calibration_ladders import StepRow
     from scanfab.table.columns import columns_of
-    from scanfab.table.comparison import FrameRow, SummaryRow
+    from scanfab.table.comparison_rows import FrameRow, SummaryRow
     from scanfab.table.row import Row
 
     of_compare = SummaryRow if ctx.params.get("summary") else FrameRow

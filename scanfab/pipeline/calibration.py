@@ -14,9 +14,7 @@ from scanfab.base.errors import PackingError, ScanfabWarning, SettingsError
 from scanfab.io.series import Series
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample
-from scanfab.pipeline.frame import frame_result
-from scanfab.pipeline.frames import Frames
-from scanfab.pipeline.ladders import (
+from scanfab.pipeline.calibration_ladders import (
     PAPER_CUTOFF,
     PAPER_SPACING,
     StepRow,
@@ -26,6 +24,8 @@ from scanfab.pipeline.ladders import (
     sentence,
     sentence_of_recommended,
 )
+from scanfab.pipeline.frame import frame_result
+from scanfab.pipeline.frames import Frames
 from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.plan import Plan, make_plan
 from scanfab.pipeline.settings import AUTO_RULE, Length, Settings
@@ -99,12 +99,12 @@ def calibrate(
     >>> import numpy as np
     >>> from scanfab import Packing, Settings, calibrate
     >>> grid = np.stack(np.meshgrid(*3 * [np.arange(6.0)]), axis=-1).reshape(-1, 3)
-    >>> settings = Settings.make(variants="c", tolerance=0.01, rv=0.6, contact_tolerance=1e-4)
+    >>> settings = Settings(variants="c", tolerance=0.01, rv=0.6, contact_tolerance=1e-4)
     >>> found = calibrate(Packing(grid, 0.5), settings)
     >>> sorted({row.ladder for row in found.rows})
     ['cutoff', 'directions', 'recommended', 'rv', 'spacing']
     """
-    settings = settings or Settings.make(variants="cd")
+    settings = settings or Settings(variants="cd")
     if settings.lists_gaps:
         raise SettingsError("calibrate: cutoffs and moment have no meaning for its ladders")
     return _Calibrator(source, settings, frame).all()

@@ -79,10 +79,10 @@ def repeat_command(
     >>> from scanfab.pipeline.manifest import asked_for
     >>> from scanfab.pipeline.repeat import repeat_command
     >>> from scanfab.pipeline.settings import Settings
-    >>> repeat_command(asked_for(["dumps"], {}, Settings.make(boundary="type=2", seed=3)))
+    >>> repeat_command(asked_for(["dumps"], {}, Settings(boundary="type=2", seed=3)))
     'scanfab compute dumps --boundary type=2 --seed 3'
     """
-    usual = spelt_settings(asked_for((), {"contacts": "auto"}, Settings.make()))
+    usual = spelt_settings(asked_for((), {"contacts": "auto"}, Settings()))
     words = ["scanfab", "compute", *map(str, asked["sources"])]
     for name, value in spelt_settings(asked).items():
         option = f"--{name.replace('_', '-')}"
@@ -124,7 +124,7 @@ def restored_settings(asked: Mapping[str, Any]) -> Settings:
     known = Settings.__dataclass_fields__
     spelt = {name: value for name, value in spelt_settings(asked).items() if name in known}
     try:
-        return Settings.make(**spelt)
+        return Settings(**spelt)
     except (AttributeError, TypeError, ValueError) as error:
         raise SettingsError(f"the settings of the manifest cannot be used: {error}") from None
 

@@ -286,11 +286,6 @@ class Settings:
             value = one.parse(one.name, options.get(one.name, one.default))
             object.__setattr__(self, one.name, value)
 
-    @classmethod
-    def make(cls, **options: Any) -> Settings:
-        """The same as the class itself."""
-        return cls(**options)
-
     @property
     def lists_gaps(self) -> bool:
         """Whether sums for one cut-off do not suffice."""

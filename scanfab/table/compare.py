@@ -14,7 +14,7 @@ from scanfab.base.errors import ScanfabNote, ScanfabWarning, SettingsError
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.jackknife import BLOCKS, variance_without_noise
 from scanfab.table.abscissa import strain_column, why_not_strain
-from scanfab.table.comparison import Comparison, DifferenceRow, FrameRow, SummaryRow
+from scanfab.table.comparison_rows import Comparison, DifferenceRow, FrameRow, SummaryRow
 from scanfab.table.curves import is_turned
 from scanfab.table.reading import number_of, numbers_of, total_error
 from scanfab.table.selection import check_rows

@@ -173,7 +173,7 @@ class ResultFile:
         return header, [line for line in lines if line.endswith(b"\n")]
 
     def _put_part_aside(self) -> None:
-        """Keep what FILE.part holds under another name, so that ``--resume`` can find it."""
+        """Keep what FILE.part holds under another name, so that a resumed run can find it."""
         header, lines = self._lines_of_part()
         if len(lines) > header:
             self._copy_aside(len(lines) - header)
@@ -241,7 +241,7 @@ class ResultFile:
         except (ValueError, TypeError, KeyError, IndexError, RecursionError):
             raise ReadError(
                 f"{self._record}: expected what an interrupted run has kept there of its settings "
-                f"and inputs, found something else: leave out --resume to start afresh; then "
+                f"and inputs, found something else: leave out `resume` to start afresh; then "
                 f"{self.part.name} is kept under another name"
             ) from None
         return settings, inputs

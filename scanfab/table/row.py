@@ -20,7 +20,7 @@ class Record(Mapping[str, Any]):
 
     Examples
     --------
-    >>> from scanfab.table.comparison import DifferenceRow
+    >>> from scanfab.table.comparison_rows import DifferenceRow
     >>> row = DifferenceRow(source="s", frame=0, strain=None, variants="a-b", difference=0.1,
     ...                     difference_se=None)
     >>> row["difference"] == row.difference == dict(row)["difference"]

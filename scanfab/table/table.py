@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import pandas
     import polars
 
-    from scanfab.table.comparison import Comparison
+    from scanfab.table.comparison_rows import Comparison
 
 __all__ = ["COLUMNS", "Row", "Table", "load"]
 

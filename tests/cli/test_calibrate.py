@@ -11,7 +11,7 @@ import pytest
 
 from scanfab.cli.main import run
 from scanfab.pipeline.calibration import Calibration
-from scanfab.pipeline.ladders import StepRow
+from scanfab.pipeline.calibration_ladders import StepRow
 from scanfab.table.columns import columns_of
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.truth import TRIAXIAL

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab.base.errors import ReadError, ScanfabWarning, UnknownFormatError
+from scanfab.base.errors import ReadError, ScanfabError, ScanfabWarning, UnknownFormatError
 from scanfab.io import registry
 from scanfab.io.reader import GrainTable, JoinedContacts, Snapshot
 from scanfab.io.registry import load_readers, reader_for, reader_named
@@ -76,9 +76,9 @@ def test_the_built_in_readers_are_installed_like_any_other():
     installed = registry.installed_readers()
     assert {"liggghts", "vtk", "yade"} <= set(installed)
     for name, one in installed.items():
-        assert one.reader.name == name
-        assert one.reader.description
-        assert all(ending.startswith(".") for ending in one.reader.extensions)
+        assert one.plugin.name == name
+        assert one.plugin.description
+        assert all(ending.startswith(".") for ending in one.plugin.extensions)
     assert installed["yade"].package == "scanfab"
 
 
@@ -103,7 +103,7 @@ def test_two_packages_with_one_name_are_an_error_that_names_both():
         Point("numbers", lambda: NumbersReader, "one"),
         Point("numbers", lambda: NumbersReader, "two"),
     ]
-    with pytest.raises(UnknownFormatError, match="'numbers': one and two; remove one of them"):
+    with pytest.raises(ScanfabError, match="'numbers': one and two; remove one of them"):
         load_readers(points)
 
 

@@ -32,7 +32,7 @@ def escaped_of(packing: Packing) -> list[int]:
 
 
 def window_of(packing: Packing):
-    return make_plan(Settings.make(), sample_of(packing)).window
+    return make_plan(Settings(), sample_of(packing)).window
 
 
 def test_a_grain_far_away_moves_neither_the_rv_nor_the_result_in_it():

@@ -16,7 +16,7 @@ from scanfab import (
     compute,
     find_contacts,
 )
-from scanfab.pipeline.ladders import (
+from scanfab.pipeline.calibration_ladders import (
     StepRow,
     first_steady,
     judged,
@@ -35,7 +35,7 @@ def packing():
 
 @pytest.fixture(scope="module")
 def found(packing):
-    return calibrate(packing, Settings.make(**QUICK))
+    return calibrate(packing, Settings(**QUICK))
 
 
 def ladder(found, name, variant="c"):
@@ -92,7 +92,7 @@ def test_a_recommendation_that_misses_what_was_wanted_says_so(error, missed):
 
 
 def test_whole_sample_has_no_ladder_of_rvs(packing):
-    found = calibrate(packing, Settings.make(**{**QUICK, "variants": "a", "tolerance": 0.02}))
+    found = calibrate(packing, Settings(**{**QUICK, "variants": "a", "tolerance": 0.02}))
     assert {row.ladder for row in found.rows} == {"spacing", "directions", "cutoff", "recommended"}
     assert {row.rv_radius for row in found.rows} == {None}
 
@@ -173,17 +173,17 @@ def test_no_grain_is_refused():
 @pytest.mark.parametrize("frame", [1, 7, -2])
 def test_a_frame_that_is_not_there_is_refused(packing, frame):
     with pytest.raises(SettingsError, match=f"frames: the series has no frame in {frame}:"):
-        calibrate(packing, Settings.make(**QUICK), frame=frame)
+        calibrate(packing, Settings(**QUICK), frame=frame)
 
 
 def test_cutoffs_and_moments_are_refused(packing):
     with pytest.raises(SettingsError, match="cutoffs and moment have no meaning"):
-        calibrate(packing, Settings.make(moment=2))
+        calibrate(packing, Settings(moment=2))
 
 
 def test_steps_beyond_the_budget_are_left_out_with_a_word(packing):
     chords = np.pi * np.sum(packing.radius**2) * 16 / (0.2 * packing.radius.min()) ** 2
-    settings = Settings.make(**{**QUICK, "tolerance": 0.02, "max_chords": 1.05 * chords})
+    settings = Settings(**{**QUICK, "tolerance": 0.02, "max_chords": 1.05 * chords})
     with pytest.warns(ScanfabWarning) as told:
         few = calibrate(packing, settings)
     assert [row.value for row in ladder(few, "spacing")] == [4, 2, 1, 0.5, 0.2]
@@ -253,7 +253,7 @@ def test_what_looks_wrong_in_the_frame_is_told_here_too(packing):
     bodies = np.repeat(np.arange(count), 2)[:count] + 1
     flown = find_contacts(Packing(position, radius, columns={"clump": bodies}))
     with pytest.warns(ScanfabWarning) as told:
-        calibrate(flown, Settings.make(**{**QUICK, "tolerance": 0.02}))
+        calibrate(flown, Settings(**{**QUICK, "tolerance": 0.02}))
     texts = [str(one.message) for one in told]
     assert any("away from all others" in text for text in texts)
     assert any("clumps are not read as bodies" in text for text in texts)

@@ -108,7 +108,7 @@ def test_another_seed_is_another_scan():
 
 
 def test_rows_come_as_soon_as_their_frame_is_done(shrinking):
-    rows = compute_rows(shrinking, Settings.make(**SCAN))
+    rows = compute_rows(shrinking, Settings(**SCAN))
     assert [next(rows).frame for _ in range(5)] == [0, 0, 0, 0, 1]
 
 

@@ -17,7 +17,7 @@ from tests.helpers.truth import FLOOR, SAMPLE_DATA
 
 def reports(folder, texts, **options):
     write(folder / "dump.txt", "".join(texts))
-    return list(inspect_series(scanfab.read_series(folder), Settings.make(**options)))
+    return list(inspect_series(scanfab.read_series(folder), Settings(**options)))
 
 
 def test_grains_contacts_and_rattlers_are_counted(tmp_path):
@@ -62,17 +62,17 @@ def test_a_format_without_a_cell_is_always_told(tmp_path):
     yade_spheres(tmp_path / "a-spheres-0.vtk", [[0, 0, 0], [5, 0, 0]], [1, 1])
     message = r"this format carries no cell; `cell=\(LX, LY, LZ\)` if the sample is periodic"
     with pytest.warns(ScanfabNote, match=message):
-        (report,) = inspect_series(scanfab.read_series(tmp_path), Settings.make())
+        (report,) = inspect_series(scanfab.read_series(tmp_path), Settings())
     assert report.warnings == []
     with_cell = scanfab.read_series(tmp_path, cell=(9.0, 9.0, 9.0))
     with warnings.catch_warnings():
         warnings.simplefilter("error", ScanfabNote)
-        assert next(inspect_series(with_cell, Settings.make())).warnings == []
+        assert next(inspect_series(with_cell, Settings())).warnings == []
 
 
 def test_a_box_that_may_be_periodic_is_told():
     series = scanfab.read_series(FLOOR / "grains_30000.vtk", contacts="geometric")
-    (report,) = inspect_series(series, Settings.make())
+    (report,) = inspect_series(series, Settings())
     (text,) = report.warnings
     assert "does not say whether it repeats" in text
     assert '`periodic="xyz"`' in text
@@ -80,7 +80,7 @@ def test_a_box_that_may_be_periodic_is_told():
 
 def test_a_sheet_of_discs_is_told_in_full():
     sheet = SAMPLE_DATA / "lammps_discs" / "sheet.3000.lammpstrj"
-    (report,) = inspect_series(scanfab.read_series(sheet), Settings.make())
+    (report,) = inspect_series(scanfab.read_series(sheet), Settings())
     assert [text.partition(",")[0].partition("(")[0].strip() for text in report.warnings] == [
         "all 300 centres lie in one plane",
         "300 grains touch themselves",

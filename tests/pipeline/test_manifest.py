@@ -30,7 +30,7 @@ def series(tmp_path):
 
 
 def test_inputs_have_their_size_and_hash(series):
-    asked = asked_for([str(series)], {}, Settings.make())
+    asked = asked_for([str(series)], {}, Settings())
     inputs = manifest(asked, [scanfab.read_series(series)])["inputs"]
     assert [Path(one["path"]).name for one in inputs] == [
         "dump_0.txt", "dump_1.txt", "pairs_0.txt", "pairs_1.txt",
@@ -42,7 +42,7 @@ def test_inputs_have_their_size_and_hash(series):
 
 
 def test_versions_are_those_that_run(series):
-    asked = asked_for([str(series)], {}, Settings.make())
+    asked = asked_for([str(series)], {}, Settings())
     versions = manifest(asked, [])["versions"]
     assert versions["scanfab"] == version("scanfab")
     assert versions["numba"] == version("numba")
@@ -50,7 +50,7 @@ def test_versions_are_those_that_run(series):
 
 
 def test_all_settings_but_the_workers_are_named():
-    asked = asked_for(["dumps"], {"radius": 0.1}, Settings.make(seed=7, workers=3, rv=0.6))
+    asked = asked_for(["dumps"], {"radius": 0.1}, Settings(seed=7, workers=3, rv=0.6))
     assert (asked["seed"], asked["rv"], asked["radius"]) == (7, 0.6, 0.1)
     assert asked["sources"] == ["dumps"]
     assert set(Settings.__dataclass_fields__) - set(asked) == {"workers"}

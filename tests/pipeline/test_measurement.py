@@ -44,7 +44,7 @@ def without(row, name):
 
 def test_contacts_are_left_out_by_the_octant_of_their_point(packing, table):
     sample = Sample(packing, np.zeros(len(packing), bool))
-    plan = make_plan(Settings.make(**LINES), sample)
+    plan = make_plan(Settings(**LINES), sample)
     low, high = packing.position.min(axis=0), packing.position.max(axis=0)
     for row in table:
         variant = VARIANTS[row.variant]
@@ -109,7 +109,7 @@ def test_octants_about_an_oblique_axis_are_parted_along_it(packing):
     axis = np.array([0.6, 0.0, 0.8])
     row = compute(packing, **LINES, variants="c", axis=tuple(axis))[0]
     sample = Sample(packing, np.zeros(len(packing), bool))
-    plan = make_plan(Settings.make(**LINES), sample)
+    plan = make_plan(Settings(**LINES), sample)
     chosen = sample.fabric_contacts(VARIANTS["c"], plan.window)
     normals = packing.contacts.normal[chosen]
     side = (packing.contacts.point[chosen] - plan.window.center) @ axis >= 0
@@ -151,7 +151,7 @@ def test_frame_without_a_void_fabric_has_no_columns_of_octants():
 
 def test_a_window_made_up_of_half_spaces_is_measured_like_any_other(packing):
     """All that a next window needs is its data: frame, solids, scan and blocks take it as it is."""
-    sample, settings = Sample(packing, np.zeros(len(packing), bool)), Settings.make(**LINES)
+    sample, settings = Sample(packing, np.zeros(len(packing), bool)), Settings(**LINES)
     plan = make_plan(settings, sample)
     window = Window(plan.window.center, box([1.0, 1.5, 2.0], rotation(np.random.default_rng(1))))
     found = measure(sample, replace(plan, window=window, auto=""), settings)

@@ -40,7 +40,7 @@ def packing():
 
 
 def plan_of(packing, boundary=None, **options):
-    return make_plan(Settings.make(**options), sample_of(packing, boundary))
+    return make_plan(Settings(**options), sample_of(packing, boundary))
 
 
 def test_lengths_relative_to_radii_are_those_of_the_grains_without_the_boundary():

@@ -61,12 +61,12 @@ def test_the_command_asks_for_the_same(command, monkeypatch, tmp_path):
 
 
 def test_what_is_usual_is_not_repeated():
-    asked = asked_for(["dumps"], {"contacts": "auto"}, Settings.make())
+    asked = asked_for(["dumps"], {"contacts": "auto"}, Settings())
     assert repeat_command(json.loads(json.dumps(asked))) == "scanfab compute dumps"
 
 
 def test_settings_come_back():
-    settings = Settings.make(
+    settings = Settings(
         boundary=["type=2", "id>=9"], cutoff="0.3rmax", frames="1:9:2", axis="x", workers=1
     )
     asked = json.loads(json.dumps(asked_for(["d"], {}, settings)))
@@ -81,7 +81,7 @@ def test_the_source_is_opened_as_it_was(monkeypatch):
     monkeypatch.chdir(ROOT)
     reading = {"contacts": "geometric", "columns": None, "format": "yade"}
     with pytest.warns(match="passed over"):
-        series = reopen(json.loads(json.dumps(asked_for([SAMPLE], reading, Settings.make()))))
+        series = reopen(json.loads(json.dumps(asked_for([SAMPLE], reading, Settings()))))
     assert series.name == SAMPLE
     assert series.contacts_from == "geometric"
 
@@ -91,7 +91,7 @@ def test_the_source_is_opened_as_it_was(monkeypatch):
 )
 def test_sources_that_are_gone_are_an_error(source, message):
     with pytest.raises(ReadError, match=message):
-        reopen(asked_for([source], {}, Settings.make()))
+        reopen(asked_for([source], {}, Settings()))
 
 
 @pytest.mark.parametrize("text", ["{", "[]", "{}", '{"settings": 3}', '{"settings": {}}', "\udcff"])

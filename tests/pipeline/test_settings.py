@@ -97,7 +97,7 @@ def test_other_frames_are_errors(text):
 
 
 def test_the_defaults_are_those_of_the_command_line():
-    settings = Settings.make()
+    settings = Settings()
     assert settings.variants == "abcd"
     assert settings.rv == 0.7
     assert settings.cutoff == Length(1.0, "rmin")
@@ -113,8 +113,8 @@ def test_the_defaults_are_those_of_the_command_line():
 
 
 def test_variants_are_always_in_the_same_order():
-    assert Settings.make(variants="dca").variants == "acd"
-    assert Settings.make(variants="aab").variants == "ab"
+    assert Settings(variants="dca").variants == "acd"
+    assert Settings(variants="aab").variants == "ab"
 
 
 @pytest.mark.parametrize(
@@ -122,20 +122,20 @@ def test_variants_are_always_in_the_same_order():
     [("ab", False, True), ("cd", True, False), ("ad", True, True)],
 )
 def test_variants_say_what_is_needed(variants, window, whole):
-    settings = Settings.make(variants=variants)
+    settings = Settings(variants=variants)
     assert (settings.needs_window, settings.needs_whole) == (window, whole)
 
 
 def test_directions_are_a_number_a_rule_or_auto():
-    assert len(Settings.make(directions=25).directions) >= 25
-    assert Settings.make(directions="fibonacci:40").directions.name.startswith("fibonacci")
+    assert len(Settings(directions=25).directions) >= 25
+    assert Settings(directions="fibonacci:40").directions.name.startswith("fibonacci")
     rule = direction_rule("lebedev:7")
-    assert Settings.make(directions=rule).directions is rule
+    assert Settings(directions=rule).directions is rule
 
 
 def test_boundary_is_one_expression_or_several():
-    assert [rule.text for rule in Settings.make(boundary="type=2").boundary] == ["type=2"]
-    assert len(Settings.make(boundary=["type=2", "id>5"]).boundary) == 2
+    assert [rule.text for rule in Settings(boundary="type=2").boundary] == ["type=2"]
+    assert len(Settings(boundary=["type=2", "id>5"]).boundary) == 2
 
 
 @pytest.mark.parametrize(
@@ -180,7 +180,7 @@ def test_boundary_is_one_expression_or_several():
 )
 def test_a_value_that_cannot_be_used_is_an_error_with_its_name(option, value):
     with pytest.raises(SettingsError, match=f"^{option}: (expected|no rule|at least)"):
-        Settings.make(**{option: value})
+        Settings(**{option: value})
 
 
 @pytest.mark.parametrize(
@@ -195,24 +195,24 @@ def test_a_value_that_cannot_be_used_is_an_error_with_its_name(option, value):
 )
 def test_a_value_of_the_wrong_kind_is_an_error_of_the_settings(option, value):
     with pytest.raises(SettingsError):
-        Settings.make(**{option: value})
+        Settings(**{option: value})
 
 
 def test_a_strain_file_must_exist(tmp_path):
     path = write(tmp_path / "strain.csv", "step,strain\n0,0\n")
-    assert Settings.make(strain=path).strain == str(path)
+    assert Settings(strain=path).strain == str(path)
     with pytest.raises(SettingsError, match="a CSV file that exists"):
-        Settings.make(strain=tmp_path)
+        Settings(strain=tmp_path)
 
 
 def test_an_option_that_does_not_exist_is_an_error():
     with pytest.raises(TypeError, match="windows"):
-        Settings.make(windows=3)
+        Settings(windows=3)
 
 
 def test_settings_cannot_be_changed():
     with pytest.raises(dataclasses.FrozenInstanceError):
-        Settings.make().rv = 0.5
+        Settings().rv = 0.5
 
 
 @pytest.mark.parametrize(
@@ -226,13 +226,13 @@ def test_settings_cannot_be_changed():
     ],
 )
 def test_cutoffs_are_a_range_of_lengths_with_both_ends(text, values, unit):
-    cutoffs = Settings.make(cutoffs=text).cutoffs
+    cutoffs = Settings(cutoffs=text).cutoffs
     assert [one.value for one in cutoffs] == values
     assert {one.unit for one in cutoffs if one.value} <= {unit}
 
 
 def test_cutoffs_may_be_listed_in_different_units():
-    cutoffs = Settings.make(cutoffs="0.001,1rmin, 2rmean").cutoffs
+    cutoffs = Settings(cutoffs="0.001,1rmin, 2rmean").cutoffs
     assert [(one.value, one.unit) for one in cutoffs] == [(0.001, ""), (1, "rmin"), (2, "rmean")]
 
 
@@ -258,44 +258,44 @@ def test_cutoffs_may_be_listed_in_different_units():
 )
 def test_cutoffs_that_mean_nothing_are_refused_by_name(text):
     with pytest.raises(SettingsError, match=r"^cutoffs: "):
-        Settings.make(cutoffs=text)
+        Settings(cutoffs=text)
 
 
 @pytest.mark.parametrize("moment", [0, 3, 1.5, "x"])
 def test_there_are_two_moments(moment):
     with pytest.raises(SettingsError, match=r"^moment: expected"):
-        Settings.make(moment=moment)
+        Settings(moment=moment)
 
 
 @pytest.mark.parametrize("chords", [0, -1, "many", float("nan")])
 def test_a_budget_of_chords_is_a_number_of_at_least_one(chords):
     with pytest.raises(SettingsError, match=r"^max_chords: expected"):
-        Settings.make(max_chords=chords)
+        Settings(max_chords=chords)
 
 
 @pytest.mark.parametrize("tolerance", [0, -1e-4, float("inf"), float("nan")])
 def test_a_tolerance_that_no_scan_meets_is_refused(tolerance):
     with pytest.raises(SettingsError, match=r"^tolerance: expected a number above 0"):
-        Settings.make(tolerance=tolerance)
+        Settings(tolerance=tolerance)
 
 
 def test_rows_of_a_frame_are_those_of_all_variants_and_cutoffs():
-    assert Settings.make().rows_per_frame == 4
-    assert Settings.make(variants="c", cutoffs="0:3rmin:0.1rmin").rows_per_frame == 31
-    assert not Settings.make().lists_gaps
-    assert Settings.make(moment=2).lists_gaps
+    assert Settings().rows_per_frame == 4
+    assert Settings(variants="c", cutoffs="0:3rmin:0.1rmin").rows_per_frame == 31
+    assert not Settings().lists_gaps
+    assert Settings(moment=2).lists_gaps
 
 
 @pytest.mark.parametrize("rule", ["fibonacci:1", "fibonacci:2", "equal-angle-full:90"])
 def test_directions_in_one_plane_are_refused(rule):
     with pytest.raises(SettingsError, match=f"directions: the . axes of {rule} lie in one plane"):
-        Settings.make(directions=rule)
+        Settings(directions=rule)
     with pytest.raises(SettingsError, match="lie in one plane"):
-        Settings.make(directions=direction_rule(rule))
+        Settings(directions=direction_rule(rule))
 
 
 def test_three_directions_across_one_another_will_do():
-    assert len(Settings.make(directions=1).directions) == 3
+    assert len(Settings(directions=1).directions) == 3
 
 
 @pytest.mark.parametrize(
@@ -312,16 +312,14 @@ def test_three_directions_across_one_another_will_do():
 )
 def test_what_has_the_wrong_type_is_refused_by_name(name, value):
     with pytest.raises(SettingsError, match=f"^{name}: expected"):
-        Settings.make(**{name: value})
+        Settings(**{name: value})
 
 
 def test_numbers_do_where_the_command_line_has_text():
-    assert Settings.make(frames=2).frames == Settings.make(frames="2").frames
-    assert Settings.make(frames=-1).frames == Settings.make(frames="-1").frames
-    assert (
-        Settings.make(cutoffs=[0.5, "1rmin"]).cutoffs == Settings.make(cutoffs="0.5,1rmin").cutoffs
-    )
-    assert Settings.make(cutoffs=0.5).cutoffs == Settings.make(cutoffs="0.5").cutoffs
+    assert Settings(frames=2).frames == Settings(frames="2").frames
+    assert Settings(frames=-1).frames == Settings(frames="-1").frames
+    assert Settings(cutoffs=[0.5, "1rmin"]).cutoffs == Settings(cutoffs="0.5,1rmin").cutoffs
+    assert Settings(cutoffs=0.5).cutoffs == Settings(cutoffs="0.5").cutoffs
 
 
 def test_the_signature_of_compute_has_every_option_and_its_default():

@@ -57,7 +57,7 @@ def test_rounds_of_an_auto_scan_never_draw_the_same_lines_again(packing):
     """Together they are the scan of as many replicates, numbered from 0."""
     centred = Packing(packing.position - 3.0, packing.radius)
     solids = solids_of(centred, 2.0)
-    settings = Settings.make(
+    settings = Settings(
         variants="c", tolerance=2e-5, workers=1, cutoff=0.4, directions="icosahedral:9"
     )
     plan = make_plan(settings, Sample(find_contacts(centred), np.zeros(len(packing), bool)))
@@ -86,7 +86,7 @@ def test_a_scan_of_a_given_spacing_does_not_stop_at_an_error_that_is_small_by_ch
     centred = find_contacts(Packing(packing.position - 3.0, packing.radius))
     solids = solids_of(centred, 2.0)
     for seed in range(6):
-        settings = Settings.make(
+        settings = Settings(
             variants="c", tolerance=1e-3, spacing=0.15, cutoff=0.4, seed=seed, workers=1
         )
         plan = make_plan(settings, Sample(centred, np.zeros(len(packing), bool)))
@@ -314,7 +314,7 @@ def test_variant_of_few_grains_is_scanned_if_it_is_asked_for_alone(loose):
 
 def test_budget_of_chords_is_minutes_by_default():
     """100 to 200 million chords a second and processor."""
-    assert Settings.make().max_chords == 1e10
+    assert Settings().max_chords == 1e10
 
 
 def test_scan_tells_how_far_it_is_and_how_long_the_rest_takes(packing, caplog):
@@ -327,6 +327,6 @@ def test_scan_tells_how_far_it_is_and_how_long_the_rest_takes(packing, caplog):
 
 
 def test_default_settings_ask_for_the_tolerance():
-    assert Settings.make().tolerance == 1e-4
-    assert Settings.make().spacing is None
-    assert Settings.make().directions is None
+    assert Settings().tolerance == 1e-4
+    assert Settings().spacing is None
+    assert Settings().directions is None

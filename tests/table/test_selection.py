@@ -8,10 +8,10 @@ import warnings
 import pytest
 
 from scanfab.base.errors import ScanfabWarning, SettingsError
+from scanfab.pipeline.calibration_ladders import StepRow
 from scanfab.pipeline.inspection import FrameReport
-from scanfab.pipeline.ladders import StepRow
 from scanfab.table.columns import columns_of
-from scanfab.table.comparison import DifferenceRow, FrameRow, SummaryRow
+from scanfab.table.comparison_rows import DifferenceRow, FrameRow, SummaryRow
 from scanfab.table.reading import number_of
 from scanfab.table.selection import choose_rows
 from tests.helpers.tables import curve

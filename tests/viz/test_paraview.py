@@ -85,7 +85,7 @@ def test_the_surface_gives_back_the_tensor(computed, variant):
 def test_the_surface_has_the_moment_of_the_table(tmp_path):
     packing = scanfab.find_contacts(scanfab.Packing(*shaken_cubic(np.random.default_rng(0), 6)))
     words = {"variants": "c", "tolerance": 2e-3, "moment": 2}
-    (row,) = compute_rows(packing, Settings.make(**words), observe=VtkFolder(tmp_path, (0, 0, 1)))
+    (row,) = compute_rows(packing, Settings(**words), observe=VtkFolder(tmp_path, (0, 0, 1)))
     mesh = pyvista.read(tmp_path / "distribution-c_000000.vtp")
     share = mesh["weight"] * mesh["mean_length"]
     assert share.sum() == pytest.approx(row.mean_length, rel=1e-2)
@@ -149,7 +149,7 @@ def test_pieces_of_lines_are_kept_from_the_cut_off_on(computed):
 def test_files_of_a_cut_off_that_nothing_reaches_have_no_distribution(tmp_path):
     spheres = shaken_cubic(np.random.default_rng(0), 5)
     packing = scanfab.Packing(spheres.position, spheres.radius, step=7)
-    settings = Settings.make(variants="c", cutoff=100.0, directions=9, spacing="1rmin")
+    settings = Settings(variants="c", cutoff=100.0, directions=9, spacing="1rmin")
     with pytest.warns(scanfab.ScanfabWarning, match="no void segment"):
         list(compute_rows(packing, settings, observe=VtkFolder(tmp_path, settings.axis)))
     names = {path.name for path in tmp_path.iterdir()}
@@ -162,7 +162,7 @@ def test_files_of_a_cut_off_that_nothing_reaches_have_no_distribution(tmp_path):
 
 def test_contacts_without_a_force_or_without_any(tmp_path):
     packing = scanfab.Packing([[0.0, 0, 0], [5, 0, 0]], 1.0, contacts=[])
-    settings = Settings.make(variants="a", directions=3, spacing=0.2, cutoff=0.0)
+    settings = Settings(variants="a", directions=3, spacing=0.2, cutoff=0.0)
     with pytest.warns(scanfab.ScanfabWarning):
         list(compute_rows(packing, settings, observe=VtkFolder(tmp_path, settings.axis)))
     mesh = pyvista.read(tmp_path / "contacts_000000.vtp")
@@ -184,7 +184,7 @@ def test_a_frame_without_grains_and_a_name_beyond_ascii(tmp_path):
     folder.mkdir()
     for step, rows in enumerate((cubic_rows(), [], cubic_rows())):
         write(folder / f"dump_{step}.txt", dump_text(rows, step=step))
-    settings = Settings.make(variants="c", directions=9, spacing="0.5rmin", cutoff="0.2rmin")
+    settings = Settings(variants="c", directions=9, spacing="0.5rmin", cutoff="0.2rmin")
     vtk = tmp_path / "vtk"
     series = scanfab.read_series(folder)
     assert len(list(compute_rows(series, settings, observe=VtkFolder(vtk, settings.axis)))) == 3

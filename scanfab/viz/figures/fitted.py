@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.table.compare import compare_tables
-from scanfab.table.comparison import Comparison, SummaryRow
+from scanfab.table.comparison_rows import Comparison, SummaryRow
 from scanfab.viz.figures.of_tables import TABLE_FIGURES, Fit, plot_table
 
 __all__ = ["TABLE_FIGURES", "fits_of", "plot_rows"]

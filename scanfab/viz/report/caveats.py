@@ -144,9 +144,9 @@ def _what_helps(doubts: Sequence[_Doubt]) -> str:
     lines = any(one.scan > 0.5 * one.sample for one in doubts)
     grains = any(one.sample > 0.5 * one.scan for one in doubts)
     if lines and not grains:
-        return "More lines would help: a smaller --tolerance or --spacing."
+        return "More lines would help: a smaller `tolerance` or `spacing`."
     if lines:
-        return "It takes more grains, and more lines: a smaller --tolerance or --spacing."
+        return "It takes more grains, and more lines: a smaller `tolerance` or `spacing`."
     return "Only more grains would help; more lines cannot."
 
 

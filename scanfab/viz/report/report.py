@@ -13,7 +13,7 @@ from scanfab.base.errors import ScanfabError, ScanfabNote, ScanfabWarning, Setti
 from scanfab.pipeline.options import as_options
 from scanfab.pipeline.repeat import repeat_command
 from scanfab.table.compare import compare_tables
-from scanfab.table.comparison import Comparison
+from scanfab.table.comparison_rows import Comparison
 from scanfab.viz.figures.fitted import fits_of
 from scanfab.viz.report.caveats import caveats_of
 from scanfab.viz.report.frames import data_url, show_frames
@@ -93,7 +93,7 @@ def make_report(
         summary=[overview(one.path, one.rows) for one in inputs],
         results=results_tables(comparison.summary, rows),
         pictures=[*pictures, *_frame_pictures(sections)],
-        warnings=list(dict.fromkeys([*heard.warnings, *caveats_of(rows, asked)])),
+        warnings=list(dict.fromkeys([*heard.warnings, *map(as_options, caveats_of(rows, asked))])),
         notes=list(dict.fromkeys(heard.notes)),
         sections=sections,
         frames=frame_table(rows),

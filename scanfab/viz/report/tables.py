@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.table.abscissa import STRAINS, spelt_strain, strain_column
-from scanfab.table.comparison import SummaryRow
+from scanfab.table.comparison_rows import SummaryRow
 from scanfab.table.curves import is_turned
 from scanfab.table.reading import number_of, numbers_of, total_error
 from scanfab.viz.report.page import Part

@@ -19,7 +19,7 @@ from tests.conftest import ROOT, SAMPLE
 from tests.viz.figures.test_of_tables import BYTES
 
 pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.base.errors.ScanfabNote")
-SETTINGS = Settings.make(boundary="mask=3", tolerance=5e-4)
+SETTINGS = Settings(boundary="mask=3", tolerance=5e-4)
 
 
 @pytest.fixture
@@ -74,7 +74,7 @@ def test_figures_have_the_moment_of_the_table(series, caught, tmp_path):
     for frame in (0, 6):
         (row,) = scanfab.compute(series, **words, variants="c", frames=str(frame))
         found[frame] = dict(row)
-    settings = Settings.make(**words)
+    settings = Settings(**words)
     plot_frames(tmp_path / "x.png", series, settings, list(found.values()), "cutoffs")
     for curve, row in zip(caught["cutoffs"], found.values(), strict=True):
         (place,) = np.flatnonzero(curve.cutoff == 1.0)
@@ -167,7 +167,7 @@ def test_the_strain_of_a_title_is_that_of_the_table(series, computed, caught, tm
     """The file that it came from may have lost a frame since, or say something else."""
     strains = tmp_path / "strain.csv"
     strains.write_text("frame,strain\n0,0.5\n")
-    settings = Settings.make(boundary="mask=3", tolerance=5e-4, strain=str(strains))
+    settings = Settings(boundary="mask=3", tolerance=5e-4, strain=str(strains))
     rows = [{**row, "strain": 0.01 * row["frame"]} for row in computed.rows]
     plot_frames(tmp_path / "x.png", series, settings, rows, "histogram")
     assert [one.title for one in caught["histogram"]] == [
@@ -191,7 +191,7 @@ def test_cut_offs_have_the_total_error_and_the_scan_s_part(series, computed, cau
 
 def test_the_band_of_cut_offs_does_not_vanish_in_a_rough_scan(series, computed, caught, tmp_path):
     """Nor is it told that errors grow with the cut-off, which is what the figure shows."""
-    settings = Settings.make(boundary="mask=3", tolerance=1e-3)
+    settings = Settings(boundary="mask=3", tolerance=1e-3)
     with warnings.catch_warnings():
         warnings.simplefilter("error", scanfab.ScanfabWarning)
         plot_frames(tmp_path / "x.png", series, settings, computed.rows, "cutoffs")
@@ -200,7 +200,7 @@ def test_the_band_of_cut_offs_does_not_vanish_in_a_rough_scan(series, computed, 
 
 
 def test_the_cut_off_of_the_table_is_one_of_the_curve(series, computed, caught, tmp_path):
-    settings = Settings.make(boundary="mask=3", tolerance=2e-3, cutoff="0.8rmin")
+    settings = Settings(boundary="mask=3", tolerance=2e-3, cutoff="0.8rmin")
     plot_frames(tmp_path / "x.png", series, settings, computed.rows, "cutoffs")
     assert all(one.chosen in one.cutoff for one in caught["cutoffs"])
 
@@ -280,7 +280,7 @@ def test_panels_are_lettered(series, computed, tmp_path, monkeypatch, name):
 
 def test_one_frame_and_other_variants(series, computed, tmp_path, caught):
     rows = [row for row in computed.rows if row["frame"] == 3]
-    settings = Settings.make(boundary="mask=3", tolerance=1e-3, variants="b")
+    settings = Settings(boundary="mask=3", tolerance=1e-3, variants="b")
     plot_frames(tmp_path / "x.png", series, settings, rows, "histogram")
     assert len(caught["histogram"]) == 1
 
