@@ -10,10 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.convex import Convex, sphere
+from scanfab.base.note import Note
 from scanfab.base.typing import FloatArray
 from scanfab.packing.sample import Sample, Variant
 from scanfab.pipeline.plan import CLOSE, Plan
-from scanfab.pipeline.settings import AUTO_RULE, Settings
+from scanfab.pipeline.settings import AUTO_RULE
 from scanfab.pipeline.tolerance import scan_to_tolerance
 from scanfab.scan.directions import DirectionRule, design_of, direction_rule
 from scanfab.scan.gaps import Blocks, GapSums, scan_gaps
@@ -55,8 +56,8 @@ class Measurement:
     """The directions of these lines."""
     blocks: tuple[Blocks, Blocks]
     """Octants of the whole sample and of the window, of places in the dump's coordinates."""
-    moment: int
-    """1: ℓ is the mean length; 2: the mean of squares over the mean."""
+    notes: tuple[Note, ...] = ()
+    """What the scan did not reach."""
 
     def kept(
         self, variant: str, place: int = 0
@@ -64,7 +65,7 @@ class Measurement:
         """As :meth:`GapSums.kept`, at one of the plan's cut-offs, with the moment of the table."""
         if self.gaps is None:
             return self.sums.kept(variant)
-        return self.gaps.kept(variant, place, self.moment)
+        return self.gaps.kept(variant, place, self.plan.moment)
 
     def spheres_of(self, variant: Variant) -> tuple[FloatArray, FloatArray, Convex | None]:
         """
@@ -85,26 +86,24 @@ class Measurement:
         return position[solid], radius[solid], window
 
 
-def measure(
-    sample: Sample, plan: Plan, settings: Settings, where: str = "the frame"
-) -> Measurement:
-    """Scan one frame that has grains; ``where`` names it in messages."""
+def measure(sample: Sample, plan: Plan, where: str = "the frame") -> Measurement:
+    """Scan one frame that has grains; ``where`` names it where progress is told."""
     if plan.window is not None:
         plan.window.check_fits(sample.packing)
-    solids, origin = _solids(sample, plan, settings)
-    sums, plan = scan_to_tolerance(solids, plan, settings, where)
-    blocks = _blocks(sample, plan, settings)
+    solids, origin = _solids(sample, plan)
+    sums, plan, notes = scan_to_tolerance(solids, plan, where)
+    blocks = _blocks(sample, plan)
     lines: dict[str, Any] = {
         "cutoffs": plan.cutoffs,
         "blocks": tuple(Blocks(one.matrix, one.shift + one.matrix @ origin) for one in blocks),
-        "variants": settings.variants,
-        "seed": settings.seed,
-        "workers": settings.workers,
+        "variants": plan.variants,
+        "seed": plan.seed,
+        "workers": plan.workers,
         # what these scans take is known from the one before them
         "most_steps": math.inf,
     }
     gaps: GapSums | None = None
-    if settings.lists_gaps:
+    if plan.lists_gaps:
         every = range(sums.replicates)
         gaps = scan_gaps(solids, plan.rule, spacing=plan.spacing, replicates=every, **lines)
     block_rule = _block_rule(solids)
@@ -115,12 +114,10 @@ def measure(
         replicates=range(BLOCK_REPLICATES),
         **lines,
     )
-    return Measurement(
-        sample, plan, solids, sums, gaps, blocked, block_rule, blocks, settings.moment
-    )
+    return Measurement(sample, plan, solids, sums, gaps, blocked, block_rule, blocks, tuple(notes))
 
 
-def _solids(sample: Sample, plan: Plan, settings: Settings) -> tuple[Solids, FloatArray]:
+def _solids(sample: Sample, plan: Plan) -> tuple[Solids, FloatArray]:
     """
     The spheres that the lines may meet: all grains, or those that reach into the RV.
 
@@ -135,32 +132,32 @@ def _solids(sample: Sample, plan: Plan, settings: Settings) -> tuple[Solids, Flo
     reach = 0.0 if shape is None else shape.reach
     if packing.cell is not None and packing.is_periodic:
         medium: CellGrains | None = None
-        if settings.needs_whole:
+        if plan.needs_whole:
             vectors, periodic = packing.cell.short_vectors, np.array(packing.cell.periodic)
             position = np.ascontiguousarray(position)
             medium = CellGrains(position, radius, removed, vectors, periodic)
         images, row = packing.cell.images_near_origin(position, radius + reach)
         return Solids(images, radius[row], removed[row], shape, medium), origin
-    if shape is not None and not settings.needs_whole:
+    if shape is not None and not plan.needs_whole:
         near = shape.may_meet(position, radius)
         position, radius, removed = position[near], radius[near], removed[near]
     return Solids(position, radius, removed, shape), origin
 
 
-def _blocks(sample: Sample, plan: Plan, settings: Settings) -> tuple[Blocks, Blocks]:
+def _blocks(sample: Sample, plan: Plan) -> tuple[Blocks, Blocks]:
     """The octants about the middle of the sample (of the cell), and about the window's centre."""
     packing = sample.packing
     position = packing.position[sample.gathered]
     low, high = position.min(axis=0), position.max(axis=0)
     radius = float(packing.radius.max())
     reach = float(np.linalg.norm(high - low)) + radius
-    whole = Blocks.about(0.5 * (low + high), reach, settings.axis)
+    whole = Blocks.about(0.5 * (low + high), reach, plan.axis)
     if packing.cell is not None and packing.is_periodic:
         cell = packing.cell
         whole = Blocks.of_periods(cell.vectors, cell.origin, np.array(cell.periodic), position)
     if plan.window is None:
         return whole, whole
-    return whole, Blocks.about(plan.window.center, plan.window.radius + radius, settings.axis)
+    return whole, Blocks.about(plan.window.center, plan.window.radius + radius, plan.axis)
 
 
 def _block_rule(solids: Solids) -> DirectionRule:

@@ -324,7 +324,8 @@ def test_numbers_do_where_the_command_line_has_text():
 
 def test_the_signature_of_compute_has_every_option_and_its_default():
     signature = inspect.signature(scanfab.compute).parameters
-    options = {name: one.default for name, one in signature.items() if name != "source"}
+    others = ("source", "executor")
+    options = {name: one.default for name, one in signature.items() if name not in others}
     assert options == {one.name: one.default for one in options_of(Settings)}
     kinds = {one.kind for name, one in signature.items() if name != "source"}
     assert kinds == {inspect.Parameter.KEYWORD_ONLY}
@@ -340,7 +341,7 @@ def test_compute_hands_every_option_to_the_settings(monkeypatch):
     """Each in its own place."""
     taken = {}
 
-    def rows(source, settings):
+    def rows(source, settings, executor):
         taken.update(vars(settings))
         return iter(())
 
