@@ -7,9 +7,11 @@ import math
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 from scanfab.base.errors import PackingError, SettingsError
 from scanfab.base.note import Note, tell
+from scanfab.base.option import options_of, refuse_unknown
 from scanfab.io.series import Series
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample
@@ -63,7 +65,7 @@ class Calibration:
 
 
 def calibrate(
-    source: Packing | Series, settings: Settings | None = None, *, frame: int = -1
+    source: Packing | Series, *, frame: int = -1, variants: str = "cd", **options: Any
 ) -> Calibration:
     """
     How the void fabric of one frame changes with the settings of the scan.
@@ -73,12 +75,14 @@ def calibrate(
     source : Packing or Series
         Lengths relative to radii and the RV come from the first frame of the series that has
         grains, as for :func:`scanfab.compute`.
-    settings : Settings, optional
-        ``directions`` are those of the ladder of spacings, ``spacing`` that of the ladder of
-        directions; the cut-offs and RVs are scanned to the ``tolerance``. Variants c and d by
-        default.
     frame : int, optional
         Which frame, the last by default.
+    variants : str, optional
+        Letters out of abcd.
+    **options
+        Those of :func:`scanfab.compute`: ``directions`` are those of the ladder of spacings,
+        ``spacing`` that of the ladder of directions; the cut-offs and RVs are scanned to the
+        ``tolerance``.
 
     Returns
     -------
@@ -92,18 +96,21 @@ def calibrate(
     ------
     SettingsError
         If there is no such frame, or no step has a void fabric.
+    TypeError
+        If there is no such option; names the nearest that there is.
 
     Examples
     --------
     >>> import numpy as np
-    >>> from scanfab import Packing, Settings, calibrate
+    >>> from scanfab import Packing, calibrate
     >>> grid = np.stack(np.meshgrid(*3 * [np.arange(6.0)]), axis=-1).reshape(-1, 3)
-    >>> settings = Settings(variants="c", tolerance=0.01, rv=0.6, contact_tolerance=1e-4)
-    >>> found = calibrate(Packing(grid, 0.5), settings)
+    >>> options = {"tolerance": 0.01, "rv": 0.6, "contact_tolerance": 1e-4}
+    >>> found = calibrate(Packing(grid, 0.5), variants="c", **options)
     >>> sorted({row.ladder for row in found.rows})
     ['cutoff', 'directions', 'recommended', 'rv', 'spacing']
     """
-    settings = settings or Settings(variants="cd")
+    refuse_unknown("calibrate", options, [one.name for one in options_of(Settings)])
+    settings = Settings(variants=variants, **options)
     if settings.lists_gaps:
         raise SettingsError("calibrate: cutoffs and moment have no meaning for its ladders")
     return _Calibrator(source, settings, frame).all()
