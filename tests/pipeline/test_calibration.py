@@ -181,7 +181,7 @@ def test_cutoffs_and_moments_are_refused(packing):
 
 
 def test_an_option_that_does_not_exist_is_named_with_the_nearest(packing):
-    with pytest.raises(TypeError, match="calibrate has no option 'tolerence': .*'tolerance'"):
+    with pytest.raises(TypeError, match=r"calibrate has no option 'tolerence': .*'tolerance'"):
         calibrate(packing, tolerence=0.02)
 
 
