@@ -21,6 +21,7 @@ from scanfab.io.series import Series
 from scanfab.packing.boundary import enclosing_class, existing_values, select_boundary
 from scanfab.packing.doubts import cell_doubt, doubts_of
 from scanfab.packing.packing import Packing
+from scanfab.packing.rattlers import installed_rules
 from scanfab.packing.sample import Sample
 from scanfab.packing.search import find_contacts
 from scanfab.pipeline.settings import Settings
@@ -65,7 +66,8 @@ class Frames:
     source : Packing or Series
         One frame, or many.
     settings : Settings
-        ``frames``, ``on_error``, ``boundary``, ``min_contacts`` and ``contact_tolerance`` count.
+        ``frames``, ``on_error``, ``boundary``, ``min_contacts``, ``rattlers`` and
+        ``contact_tolerance`` count.
 
     Raises
     ------
@@ -174,7 +176,9 @@ class Frames:
         packing, settings = frame.read(), self.settings
         if packing.contacts is None:
             packing = find_contacts(packing, settings.contact_tolerance)
-        return Sample(packing, select_boundary(packing, settings.boundary), settings.min_contacts)
+        boundary = select_boundary(packing, settings.boundary)
+        rule = installed_rules()[settings.rattlers]
+        return Sample(packing, boundary, settings.min_contacts, rule)
 
     def refuse_unknown_boundary(self, first: Sample) -> None:
         """
