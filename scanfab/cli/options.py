@@ -36,7 +36,7 @@ Command = Callable[..., Any]
 Completion = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
 
 READING = ("format", "columns", "contact_columns", "radius", "cell", "periodic", "contacts")
-SAMPLE = ("boundary", "min_contacts", "contact_tolerance")
+SAMPLE = ("boundary", "min_contacts", "rattlers", "contact_tolerance")
 WINDOW = ("rv", "rv_radius", "rv_center")
 EXCERPT = ("fields", "digits")
 # the cut-off of commands that take tables

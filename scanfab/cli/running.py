@@ -69,7 +69,7 @@ class Run:
         A part is of the run that was interrupted last, so it counts, whatever FILE holds.
         """
         from scanfab.base.errors import SettingsError
-        from scanfab.pipeline.manifest import with_frames
+        from scanfab.pipeline.manifest import default_settings, with_frames
         from scanfab.pipeline.resume import check_part, finished_table
 
         if result.path.is_file():
@@ -82,7 +82,8 @@ class Run:
                 if not result.has_part:
                     raise
                 self.table = None
-        self.part = result.finished_rows(asked, self.settings.rows_per_frame)
+        rows_per_frame = self.settings.rows_per_frame
+        self.part = result.finished_rows(asked, rows_per_frame, default_settings())
         of_part = {"settings": asked, "inputs": result.recorded_inputs()}
         check_part(result.part, of_part, self.part, self.series, self.settings)
         self.found = any(row["alpha_vs"] is not None for row in self.part)

@@ -15,7 +15,7 @@ from scanfab.io.series import Series
 from scanfab.pipeline.settings import STRAIN_MODES, Settings
 from scanfab.scan.directions import DirectionRule
 
-__all__ = ["Inputs", "asked_for", "manifest", "strain_file", "with_frames"]
+__all__ = ["Inputs", "asked_for", "default_settings", "manifest", "strain_file", "with_frames"]
 
 PACKAGES = (
     "scanfab", "numpy", "numba", "scipy", "meshio", "pyvista", "click", "rich", "h5py",
@@ -38,12 +38,21 @@ def asked_for(
     settings : Settings
         Of the computation.
     """
-    chosen = {
+    named = {"scanfab": version("scanfab"), "sources": list(sources)}
+    return {**named, **_plain(reading), **_chosen(settings)}
+
+
+def default_settings() -> dict[str, Any]:
+    """What an older manifest means that says nothing of a setting: there was no choice."""
+    return _chosen(Settings())
+
+
+def _chosen(settings: Settings) -> dict[str, Any]:
+    return {
         one.name: _plain(getattr(settings, one.name))
         for one in options_of(type(settings))
         if one.meaning
     }
-    return {"scanfab": version("scanfab"), "sources": list(sources), **_plain(reading), **chosen}
 
 
 def with_frames(asked: dict[str, Any], frames: slice) -> dict[str, Any]:

@@ -97,7 +97,9 @@ class ResultFile:
                 self._remove_empty_part()
                 self._lock = None
 
-    def finished_rows(self, asked: dict[str, Any], rows_per_frame: int) -> list[dict[str, Any]]:
+    def finished_rows(
+        self, asked: dict[str, Any], rows_per_frame: int, usual: Mapping[str, Any] | None = None
+    ) -> list[dict[str, Any]]:
         """
         The rows of the finished frames in FILE.part, which is cut behind them; none without it.
 
@@ -107,6 +109,8 @@ class ResultFile:
             What is asked for now.
         rows_per_frame : int
             A frame with fewer rows is not finished.
+        usual : mapping, optional
+            Settings that hold where FILE.part says nothing of them, as they are newer than it.
 
         Raises
         ------
@@ -118,7 +122,7 @@ class ResultFile:
         if not self.has_part:
             return []
         before, _ = self._recorded()
-        differing = differing_settings(before, asked)
+        differing = differing_settings({**(usual or {}), **before}, asked)
         if differing:
             raise SettingsError(
                 f"{self.part}: was made with other settings ({', '.join(differing)}): repeat "
