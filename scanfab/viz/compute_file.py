@@ -95,10 +95,10 @@ def compute_file(
     Examples
     --------
     >>> import scanfab, tempfile
-    >>> dumps = "sample_data/liggghts_periodic/dump_*.txt.gz"
+    >>> series = scanfab.read_series("sample_data/liggghts_periodic")
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     table = scanfab.compute_file(
-    ...         dumps, f"{folder}/fabric.csv", vtk=f"{folder}/vtk", variants="a", tolerance=0.01
+    ...         series, f"{folder}/fabric.csv", frames=":2", variants="a", tolerance=0.01
     ...     )
     >>> [row.step for row in table]
     [30000, 60000]
