@@ -142,7 +142,7 @@ a_file = partial(click.Path, dir_okay=False, path_type=Path)
 MORE: dict[str, dict[str, Any]] = {
     "fields": {"shell_complete": _complete_fields},
     "output": {"type": a_file(allow_dash=True), "callback": _output},
-    "vtk_folder": {"type": click.Path(file_okay=False, path_type=Path)},
+    "vtk": {"type": click.Path(file_okay=False, path_type=Path)},
 }
 
 

@@ -38,11 +38,11 @@ def asked_by(command, monkeypatch, tmp_path):
             (tmp_path / word).parent.mkdir(exist_ok=True, parents=True)
     monkeypatch.setattr("scanfab.cli.compute.open_series", lambda *_: [])
 
-    def remember(sources, reading, settings):
-        found.update(asked_for(sources, reading, settings))
+    def remember(*given):
+        found.update(asked_for(*given))
         raise ReadError("enough")
 
-    monkeypatch.setattr("scanfab.pipeline.manifest.asked_for", remember)
+    monkeypatch.setattr("scanfab.pipeline.job.asked_for", remember)
     # sources need not exist for this
     monkeypatch.setattr(compute.params[0].type, "exists", False)
     with pytest.raises(ReadError, match="enough"):
