@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,11 +14,15 @@ from scanfab.base.errors import SettingsError
 from scanfab.base.jit import Flag
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.directions import DirectionRule
+from scanfab.scan.edges import CLIP, ENDS, START, edge_of
 from scanfab.scan.kernels import sweep
 from scanfab.scan.kernels.axes import scan_axes, scan_cell
-from scanfab.scan.kernels.bins import Bins, no_bins
+from scanfab.scan.kernels.bins import OF_WHOLE, OF_WINDOW, Bins, no_bins
+from scanfab.scan.kernels.cells import Cells
+from scanfab.scan.kernels.edges import CLIPPED
+from scanfab.scan.kernels.strips import Edge
 from scanfab.scan.lines import drawn_lines
-from scanfab.scan.solids import CellGrains, Solids, check_spacing, clip_of, shortest_gap
+from scanfab.scan.solids import CellGrains, Inner, Solids, check_spacing, clip_of, shortest_gap
 
 __all__ = [
     "MOST_STEPS",
@@ -52,8 +57,13 @@ class ScanSums:
     """Unit vectors, shape (R, D, 3)."""
     length: FloatArray
     """Sum of the lengths of the kept segments, shape (R, 4, D)."""
-    segments: IntArray
-    """Number of the kept segments, shape (R, 4, D)."""
+    segments: FloatArray | IntArray
+    """
+    Number of the kept segments, shape (R, 4, D).
+
+    By the rules ``start`` and ``ends`` half the number of their ends in the window; then ``length``
+    is weighted, too, so that the ratio of the two is the mean length.
+    """
     lines: IntArray
     """Lines that meet the window (for the whole: any solid), shape (R, 4, D)."""
     void: FloatArray
@@ -79,6 +89,13 @@ class ScanSums:
     chord.
     """
 
+    left_out: FloatArray
+    """
+    Number of segments that leave the sample, and so are not counted, shape (R, 4, D).
+
+    By the rule ``start``, each by half the number of its ends in the window; else 0.
+    """
+
     @property
     def work(self) -> IntArray:
         """What takes time beside the lines themselves: chords and steps, shape (R,)."""
@@ -89,7 +106,7 @@ class ScanSums:
         """Number of replicates R."""
         return len(self.axes)
 
-    def kept(self, variant: str) -> tuple[FloatArray, IntArray]:
+    def kept(self, variant: str) -> tuple[FloatArray, FloatArray | IntArray]:
         """Lengths and numbers of one variant's kept segments, shapes (R, D)."""
         which = "abcd".index(variant)
         return self.length[:, which], self.segments[:, which]
@@ -216,7 +233,7 @@ def scan_lines(
     def some(triads: FloatArray, offsets: FloatArray) -> FloatArray:
         return tally_triads(solids, triads, offsets, spacing, cutoff, variants, following=following)
 
-    return sums_of(triads, in_parts(some, triads, offsets, workers), variants)
+    return sums_of(triads, in_parts(some, triads, offsets, workers), variants, solids.edge)
 
 
 def in_parts(
@@ -276,6 +293,7 @@ def tally_triads(
     bins = no_bins(len(triads)) if bins is None else bins
     following = Following(MOST_STEPS) if following is None else following
     both: Flag = True if first and second else None
+    lines = _Lines(solids, triads, offsets, spacing, cutoff, first, both)
     if solids.medium is not None and whole:
         # without a or c, the solids of b and d are the only ones
         medium = solids.medium if first else _without_removed(solids.medium)
@@ -288,28 +306,98 @@ def tally_triads(
             )  # fmt: skip
             following.add(float(tallies[:, 0, sweep.STEPS].sum()))
         whole = False
-    if whole or window:
-        solid = slice(None) if first else ~solids.removed
-        scan_axes(
-            np.ascontiguousarray(solids.position[solid]),
-            solids.radius[solid],
-            solids.removed[solid],
-            np.ascontiguousarray(triads),
-            offsets,
-            spacing,
-            cutoff,
-            clip_of(solids.window),
-            tallies,
-            _few_lines(solids.radius[solid], spacing, (1 + (both is not None)) * (whole + window)),
-            both,
-            True if whole else None,
-            True if window else None,
-            bins,
-        )
+    if solids.edge == CLIP:
+        if whole or window:
+            lines.scan(True if whole else None, CLIPPED if window else None, tallies, bins)
+    else:
+        if whole:
+            lines.scan_whole(tallies, bins)
+        if window:
+            lines.scan_window(tallies, bins, following)
     if first:
         return tallies
     bins.sums[:] = bins.sums[:, :, ::-1].copy()
     return tallies[:, ::-1]
+
+
+class _Lines(NamedTuple):
+    """The lines of some axes through the listed solids."""
+
+    solids: Solids
+    triads: FloatArray
+    offsets: FloatArray
+    spacing: float
+    cutoff: float
+    first: bool
+    """Whether the first set of solids has all of them; else it is that of b and d."""
+    both: Flag
+
+    def scan(
+        self,
+        whole: Flag,
+        window: Edge | None,
+        tallies: FloatArray,
+        bins: Bins,
+        *,
+        inner: Inner | None = None,
+        cells: Cells | None = None,
+        most_steps: float = np.inf,
+    ) -> None:
+        """One pass of the sweep; ``inner`` takes the place of the window."""
+        solids = self.solids
+        position, radius, removed = solids.position, solids.radius, solids.removed
+        shape = solids.window
+        if inner is not None:
+            position, shape = position - inner.center, inner.shape
+        solid = slice(None) if self.first else ~removed
+        if whole is None and window is not None and solids.edge != CLIP and shape is not None:
+            near = shape.may_meet(position, radius + window.margin)
+            solid = near if self.first else near & ~removed
+        passes = (1 + (self.both is not None)) * ((whole is not None) + (window is not None))
+        scan_axes(
+            np.ascontiguousarray(position[solid]),
+            radius[solid],
+            removed[solid],
+            np.ascontiguousarray(self.triads),
+            self.offsets,
+            self.spacing,
+            self.cutoff,
+            clip_of(shape),
+            tallies,
+            _few_lines(radius[solid], self.spacing, passes),
+            self.both,
+            whole,
+            window,
+            bins,
+            cells,
+            not self.first,
+            most_steps,
+        )
+
+    def scan_whole(self, tallies: FloatArray, bins: Bins) -> None:
+        """The whole of an open sample: up to its outermost solids, or in a window of its own."""
+        if self.solids.edge != ENDS:
+            self.scan(True, None, tallies, bins)
+            return
+        inner = self.solids.inner
+        if inner is None:
+            return
+        found, room = np.zeros_like(tallies), bins.of_whole(inner.center)
+        self.scan(None, edge_of(ENDS, 0.0), found, room, inner=inner)
+        tallies[..., sweep.WHOLE : sweep.WINDOW] += found[..., sweep.WINDOW : sweep.CHORDS]
+        tallies[..., sweep.CHORDS] += found[..., sweep.CHORDS]
+        bins.sums[:, OF_WHOLE] += room.sums[:, OF_WINDOW]
+
+    def scan_window(self, tallies: FloatArray, bins: Bins, following: Following) -> None:
+        """The window, by a rule that knows what is cut."""
+        solids = self.solids
+        cells = solids.cells if solids.edge == START and len(solids.grain_radius) else None
+        edge = edge_of(solids.edge, solids.margin)
+        if solids.edge == START and cells is None:
+            return
+        before = float(tallies[:, 0, sweep.STEPS].sum())
+        self.scan(None, edge, tallies, bins, cells=cells, most_steps=following.left)
+        following.add(float(tallies[:, 0, sweep.STEPS].sum()) - before)
 
 
 def _few_lines(radius: FloatArray, spacing: float, variants: int) -> bool:
@@ -324,7 +412,7 @@ def _without_removed(medium: CellGrains) -> CellGrains:
     )
 
 
-def sums_of(triads: FloatArray, tallies: FloatArray, variants: str) -> ScanSums:
+def sums_of(triads: FloatArray, tallies: FloatArray, variants: str, edge: str = CLIP) -> ScanSums:
     """The sums of replicates from their line triads and tallies, shape (R, D, 2, TALLY_SIZE)."""
     wanted = np.array([variant in variants for variant in "abcd"])[:, None]
     # replicate, set of solids, axis
@@ -337,14 +425,17 @@ def sums_of(triads: FloatArray, tallies: FloatArray, variants: str) -> ScanSums:
     def both(number: int) -> FloatArray:
         return of(sweep.WHOLE + number, sweep.WINDOW + number)
 
+    segments = both(sweep.KEPT)
+    left = np.concatenate([0.0 * entries[0], entries[sweep.LEFT]], axis=1)
     return ScanSums(
         axes=triads[:, :, 2],
         length=both(sweep.LENGTH),
-        segments=both(sweep.KEPT).astype(np.int64),
+        segments=segments.astype(np.int64) if edge == CLIP else segments,
         lines=both(sweep.LINES).astype(np.int64),
         void=both(sweep.VOID),
         line_length=both(sweep.LINE_LENGTH),
         chords=entries[sweep.CHORDS].sum(axis=(1, 2)).astype(np.int64),
         channels=of(sweep.CHANNELS).astype(np.int64),
         steps=entries[sweep.STEPS].sum(axis=(1, 2)).astype(np.int64),
+        left_out=np.where(wanted, left, 0.0),
     )

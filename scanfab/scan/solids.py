@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
 from scanfab.base.typing import BoolArray, FloatArray
+from scanfab.scan.edges import CLIP, cells_of
+from scanfab.scan.kernels.cells import Cells
 from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.kernels.windows import Clip
 
 __all__ = [
     "MAX_LINES",
     "CellGrains",
+    "Inner",
     "Solids",
     "check_spacing",
     "clip_of",
@@ -27,6 +32,16 @@ __all__ = [
 MAX_LINES = 50_000_000
 # Of the smallest radius: what lies between surfaces that coincide but for rounding is no gap.
 SHORTEST = 1e-9
+# of the mean radius: the wider, the more chords are swept, and the fewer segments followed alone
+MARGIN = 3.0
+
+
+class Inner(NamedTuple):
+    """A window of its own for the whole."""
+
+    shape: Convex
+    center: FloatArray
+    """In the coordinates of the solids, shape (3,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +62,29 @@ class Solids:
     """What the lines of c and d are clipped to; None if these are not scanned."""
     medium: CellGrains | None = None
     """The grains of a periodic packing, each once, if its whole is scanned, which has no edge."""
+    edge: str = CLIP
+    """What counts at the window's surface, see :mod:`scanfab.scan.edges`."""
+    around: CellGrains | None = None
+    """
+    For the rule ``start`` all grains, each once, with the vectors by which they repeat, if any.
+
+    ``position`` then has all that lie within the margin of the window.
+    """
+    inner: Inner | None = None
+    """For the rule ``ends`` the window of an open whole, in which all grains are known."""
+
+    @cached_property
+    def cells(self) -> Cells:
+        """The grains around the window, sorted into cells."""
+        assert self.around is not None
+        return cells_of(self.around)
+
+    @property
+    def margin(self) -> float:
+        """How far beyond the window solids are listed, for the rule ``start``."""
+        if self.around is None or not len(self.around.radius):
+            return 0.0
+        return MARGIN * float(self.around.radius.mean())
 
     @property
     def reach(self) -> float:

@@ -37,7 +37,7 @@ def solids_of(spheres, window=0.0, removed=None):
 def scan_triads(solids, triads, offsets, spacing, cutoff, variants="abcd"):
     """Scan along given line triads, with given shifts of the lines, as one replicate."""
     tallies = tally_triads(solids, triads, offsets, spacing, cutoff, variants)
-    return sums_of(triads[None], tallies[None], variants)
+    return sums_of(triads[None], tallies[None], variants, solids.edge)
 
 
 def scan_along(solids, axes, spacing, cutoff=0.0, replicates=16, seed=0):

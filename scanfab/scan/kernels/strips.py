@@ -21,11 +21,13 @@ __all__ = [
     "ENTRY",
     "EXIT",
     "FAR",
+    "FIRST",
     "GAP_END",
     "GAP_START",
     "MOST_LINES",
     "SET",
     "STATE_SIZE",
+    "Edge",
     "Sphere",
     "Strip",
     "begin",
@@ -47,10 +49,27 @@ PLANE = np.uint64(MOST_LINES + 24)
 END, GAP_START, GAP_END = np.uint64(0), PLANE, np.uint64(2) * PLANE
 SET = np.uint64(3) * PLANE
 ENTRY, EXIT = np.uint64(6) * PLANE, np.uint64(7) * PLANE
-STATE_SIZE = int(8 * PLANE)
+# Of lines that are followed beyond the window: where their first gap ends, if it begins further
+# before the window than solids are listed. The second set's plane is SET behind, and those between
+# are never touched.
+FIRST = np.uint64(8) * PLANE
+STATE_SIZE = int(12 * PLANE)
 # a sphere that is no more lines wide is visited as a square: to find where its chords begin and end
 # in each row would take longer than the corners
 NARROW = 12
+
+
+class Edge(NamedTuple):
+    """
+    A rule of what counts at the window's surface, see :mod:`scanfab.scan.kernels.edges`.
+
+    For each of them kernels are compiled with nothing else in them.
+    """
+
+    ends: Flag
+    start: Flag
+    margin: float
+    """Of ``start``: how far beyond the window solids are listed; else 0."""
 
 
 class Strip(NamedTuple):
@@ -81,8 +100,18 @@ class Sphere(NamedTuple):
 
 
 @inner(fastmath={"contract"}, error_model="numpy")
-def begin(lines: FloatArray, strip: Strip, section: Section, second: Flag, whole: Flag) -> None:
+def begin(
+    lines: FloatArray,
+    strip: Strip,
+    section: Section,
+    second: Flag,
+    whole: Flag,
+    window: Edge | None,
+) -> None:
     """Lines that have met nothing yet, and where they enter and leave the window."""
+    before = 0.0
+    if window is not None:
+        before = window.margin
     a, rise_u = section.a, section.rise_u
     for row in range(strip.rows):
         v = strip.first_v + row * strip.spacing
@@ -95,7 +124,7 @@ def begin(lines: FloatArray, strip: Strip, section: Section, second: Flag, whole
             half = np.sqrt(rest - (aslant + a * u) * u)
             middle = aside + rise_u * u
             enters = middle - half
-            end = -FAR if whole is not None else enters
+            end = -FAR if whole is not None else enters - before
             lines[i + ENTRY] = enters
             lines[i + EXIT] = middle + half
             lines[i + END] = end
@@ -105,14 +134,20 @@ def begin(lines: FloatArray, strip: Strip, section: Section, second: Flag, whole
                 lines[i + SET + END] = end
                 lines[i + SET + GAP_START] = -FAR
                 lines[i + SET + GAP_END] = -FAR
+            if window is not None and window.start is not None:
+                lines[i + FIRST] = -FAR
+                if second is not None:
+                    lines[i + SET + FIRST] = -FAR
         if section.planes.shape[0] > 0:
-            cut_row(lines, strip, section.planes, row, whole)
+            cut_row(lines, strip, section.planes, row, whole, before)
         no_lines(lines, at, np.uint64(0), np.uint64(strip.low[row]))
         no_lines(lines, at, np.uint64(strip.high[row]), np.uint64(strip.pitch))
 
 
 @inner(error_model="numpy")
-def cut_row(lines: FloatArray, strip: Strip, planes: FloatArray, row: int, whole: Flag) -> None:
+def cut_row(
+    lines: FloatArray, strip: Strip, planes: FloatArray, row: int, whole: Flag, before: float
+) -> None:
     """Let the lines of a row enter and leave the window between its planes, too."""
     v = strip.first_v + row * strip.spacing
     at = np.uint64(row * strip.pitch)
@@ -135,7 +170,7 @@ def cut_row(lines: FloatArray, strip: Strip, planes: FloatArray, row: int, whole
         lines[i + ENTRY] = np.nan if missed else lines[i + ENTRY]
         lines[i + EXIT] = np.nan if missed else lines[i + EXIT]
         if whole is None:
-            lines[i + END] = lines[i + SET + END] = lines[i + ENTRY]
+            lines[i + END] = lines[i + SET + END] = lines[i + ENTRY] - before
 
 
 @inner()
@@ -170,7 +205,7 @@ def spans(clip: Clip, triad: FloatArray, points: FloatArray, ends: FloatArray) -
     every = np.zeros(1, np.int64), np.ones(1, np.int64)
     for k in range(points.shape[0]):
         strip = Strip(1.0, 1.0, points[k, 0], points[k, 1], 1, 1, 1 + LANES, every[0], every[1])
-        begin(lines, strip, section, None, None)
+        begin(lines, strip, section, None, None, None)
         ends[k, 0], ends[k, 1] = lines[ENTRY], lines[EXIT]
 
 
