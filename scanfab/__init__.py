@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from scanfab.table.reading import read_rows
     from scanfab.table.row import Row
     from scanfab.table.table import Table, load
+    from scanfab.viz.scanned_frames import ScannedFrames, scan_frames
 
 # numpy, numba and the readers are loaded by the first name that needs them
 _HOME = {
@@ -57,6 +58,7 @@ _HOME = {
     "ScanfabError": "base.errors",
     "ScanfabNote": "base.errors",
     "ScanfabWarning": "base.errors",
+    "ScannedFrames": "viz.scanned_frames",
     "Series": "io.series",
     "Settings": "pipeline.settings",
     "SettingsError": "base.errors",
@@ -74,6 +76,7 @@ _HOME = {
     "read": "io.opening",
     "read_rows": "table.reading",
     "read_series": "io.opening",
+    "scan_frames": "viz.scanned_frames",
     "scan_lines": "scan.scan",
     "sphere": "base.convex",
     "void_fabric": "fabric.void",
@@ -96,6 +99,7 @@ __all__ = [
     "ScanfabError",
     "ScanfabNote",
     "ScanfabWarning",
+    "ScannedFrames",
     "Series",
     "Settings",
     "SettingsError",
@@ -113,6 +117,7 @@ __all__ = [
     "read",
     "read_rows",
     "read_series",
+    "scan_frames",
     "scan_lines",
     "sphere",
     "void_fabric",

@@ -97,9 +97,9 @@ def calibrate(
     from scanfab.pipeline.settings import Settings
     from scanfab.table.result_file import ResultFile
     from scanfab.table.writing import Excerpt
-    from scanfab.viz.figures.calibration import plot_calibration
+    from scanfab.viz.figures.page import make_figures, save_figures
 
-    check_plot(plot, None, ())
+    check_plot(plot, None)
     with reported_warnings():
         chosen, settings_file = fill_from_file(ctx, (source,), chosen)
         with settings_file.named_errors():
@@ -123,7 +123,7 @@ def calibrate(
                 for row in found.rows:
                     writer.write(row)
         if plot is not None:
-            plot_calibration(found.rows, plot)
+            save_figures(plot, make_figures(found.rows, "calibration"))
         if result is not None or is_readable():
             _show(found, command, result is None)
         else:

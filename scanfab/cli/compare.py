@@ -65,9 +65,9 @@ def compare(
     from scanfab.table.reading import read_rows
     from scanfab.table.selection import choose_rows
     from scanfab.table.writing import Excerpt
-    from scanfab.viz.figures.fitted import TABLE_FIGURES, plot_rows
+    from scanfab.viz.figures.page import make_figures, save_figures
 
-    check_plot(plot, figure, TABLE_FIGURES)
+    check_plot(plot, figure, "table")
     if summary and differences:
         raise click.UsageError("--summary and --differences are two tables: ask for one of them")
     if labels and len(labels) != len(tables):
@@ -96,7 +96,7 @@ def compare(
         else:
             _write_csv(chosen, excerpt)
         if plot is not None:
-            plot_rows(plot, rows, figure, comparison)
+            save_figures(plot, make_figures(rows, "table", figure, comparison=comparison))
     return 0 if any(row.alpha_vs_axial is not None for row in comparison.frames) else 1
 
 
