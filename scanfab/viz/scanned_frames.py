@@ -68,7 +68,7 @@ def scan_frames(
     >>> from matplotlib.figure import Figure
     >>> import scanfab
     >>> grid = np.stack(np.meshgrid(*3 * [np.arange(6.0)]), axis=-1).reshape(-1, 3)
-    >>> packing = scanfab.Packing(grid, 0.4)
+    >>> packing = scanfab.find_contacts(scanfab.Packing(grid, 0.5), tolerance=1e-4)
     >>> frames = scanfab.scan_frames(packing, variants="c", tolerance=0.02)
     >>> frames.plot
     Plots(rose, projection, histogram, cutoffs)
@@ -147,6 +147,13 @@ class ScannedFrames:
     ------
     SettingsError
         If no frame has a void fabric of that variant.
+
+    Examples
+    --------
+    >>> import scanfab
+    >>> frames = scanfab.scan_frames(scanfab.Packing([[0.0, 0.0, 0.0]], 0.5), variants="a")
+    >>> frames
+    ScannedFrames(variant a, frame 0)
     """
 
     def __init__(
@@ -232,4 +239,5 @@ class ScannedFrames:
 
     def __repr__(self) -> str:
         first, last = self._ends
-        return f"ScannedFrames({self.name}, frames {first} and {last})"
+        numbers = f"frame {first}" if first == last else f"frames {first} and {last}"
+        return f"ScannedFrames({self.name}, {numbers})"

@@ -76,7 +76,8 @@ class Rose(FrameFigure):
     >>> from matplotlib.figure import Figure
     >>> import scanfab
     >>> grid = np.stack(np.meshgrid(*3 * [np.arange(6.0)]), axis=-1).reshape(-1, 3)
-    >>> frames = scanfab.scan_frames(scanfab.Packing(grid, 0.4), variants="c", tolerance=0.02)
+    >>> packing = scanfab.find_contacts(scanfab.Packing(grid, 0.5), tolerance=1e-4)
+    >>> frames = scanfab.scan_frames(packing, variants="c", tolerance=0.02)
     >>> ax = Figure().subplots(subplot_kw={"projection": "polar"})
     >>> frames.plot.rose(ax=ax, angles=(90, 45)) is ax
     True

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import inspect
 import json
+import re
 from importlib.metadata import EntryPoint
 
 import pytest
+from click import Context
 from matplotlib.figure import Figure
 
 from scanfab.base import plugins
 from scanfab.base.errors import ScanfabWarning, SettingsError
+from scanfab.cli.group import cli
 from scanfab.cli.main import run
 from scanfab.pipeline.settings import Settings
 from scanfab.table.plots import figures_of, installed_figures
@@ -64,6 +67,18 @@ def test_the_figures_of_the_package_stand_first_and_in_their_order(made_up):
     assert tuple(installed_figures()) == (*OWN, "heights", "made_up")
     assert [*figures_of("table")] == [*OWN[:3], "made_up"]
     assert [*figures_of("frames")] == [*OWN[3:7], "heights"]
+
+
+@pytest.mark.parametrize(
+    ("command", "kinds"), [("compute", ("table", "frames")), ("compare", ("table",))]
+)
+def test_the_help_names_the_figures_that_there_are(command, kinds):
+    """It is written by hand, as to look for figures takes longer than to print it."""
+    (option,) = (
+        one for one in cli.get_command(Context(cli), command).params if one.name == "figure"
+    )
+    named = [name for name in OWN if re.search(rf"\b{name}\b", option.help)]
+    assert named == [name for kind in kinds for name in figures_of(kind)]
 
 
 @pytest.mark.usefixtures("made_up")
