@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from scanfab.table.reading import read_rows
     from scanfab.table.row import Row
     from scanfab.table.table import Table, load
+    from scanfab.viz.compute_file import compute_file
+    from scanfab.viz.report.report import Report, make_report
     from scanfab.viz.scanned_frames import ScannedFrames, scan_frames
 
 # numpy, numba and the readers are loaded by the first name that needs them
@@ -53,6 +55,7 @@ _HOME = {
     "Packing": "packing.packing",
     "PackingError": "base.errors",
     "ReadError": "base.errors",
+    "Report": "viz.report.report",
     "Row": "table.row",
     "ScanSums": "scan.scan",
     "ScanfabError": "base.errors",
@@ -69,10 +72,12 @@ _HOME = {
     "calibrate": "pipeline.calibration",
     "compare_tables": "table.compare",
     "compute": "pipeline.compute",
+    "compute_file": "viz.compute_file",
     "contact_fabric": "fabric.contact",
     "direction_rule": "scan.directions",
     "find_contacts": "packing.search",
     "load": "table.table",
+    "make_report": "viz.report.report",
     "read": "io.opening",
     "read_rows": "table.reading",
     "read_series": "io.opening",
@@ -94,6 +99,7 @@ __all__ = [
     "Packing",
     "PackingError",
     "ReadError",
+    "Report",
     "Row",
     "ScanSums",
     "ScanfabError",
@@ -110,10 +116,12 @@ __all__ = [
     "calibrate",
     "compare_tables",
     "compute",
+    "compute_file",
     "contact_fabric",
     "direction_rule",
     "find_contacts",
     "load",
+    "make_report",
     "read",
     "read_rows",
     "read_series",

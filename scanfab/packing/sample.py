@@ -11,12 +11,17 @@ from functools import cached_property
 
 import numpy as np
 
+from scanfab.base.arrays import cast
+from scanfab.base.note import Note
 from scanfab.base.typing import BoolArray, IntArray
+from scanfab.packing.boundary import BoundaryRule, select_boundary
 from scanfab.packing.escaped import Escaped, escaped_grains
 from scanfab.packing.packing import Contacts, Packing
+from scanfab.packing.rattlers import RattlerRule, Touching, count, installed_rules
+from scanfab.packing.search import find_contacts
 from scanfab.packing.window import SurfaceBox, Window
 
-__all__ = ["VARIANTS", "Sample", "Variant"]
+__all__ = ["VARIANTS", "Sample", "SampleRule", "Variant"]
 
 
 # grains that a message names
@@ -51,6 +56,8 @@ class Sample:
     """Shape (N,)."""
     min_contacts: int = 2
     """A grain with fewer contacts is a rattler."""
+    rattler_rule: RattlerRule = count
+    """Tells them by their contacts."""
 
     @property
     def contacts(self) -> Contacts:
@@ -73,11 +80,12 @@ class Sample:
         """Grains that the sample's extents are those of: none that have escaped, shape (N,)."""
         return self.grains if self.escaped.are_many else self.grains & ~self.escaped.grains
 
-    def doubt_of_escaped(self) -> str | None:
-        """What to tell of grains that have escaped; None without any."""
+    def doubts_of_escaped(self) -> list[Note]:
+        """What to tell of grains that have escaped, if there are any."""
         rows = np.flatnonzero(self.escaped.grains)
-        if not len(rows):
-            return None
+        return [Note("escaped", self._escaped(rows))] if len(rows) else []
+
+    def _escaped(self, rows: IntArray) -> str:
         first, packing = rows[0], self.packing
         place = ", ".join(f"{x:g}" for x in packing.position[first])
         others = f" and {len(rows) - 1} more" if len(rows) > 1 else ""
@@ -105,25 +113,25 @@ class Sample:
 
     @cached_property
     def rattlers(self) -> BoolArray:
-        """
-        Grains with fewer than ``min_contacts`` contacts, shape (N,).
+        """Grains that are rattlers by the rule, shape (N,)."""
+        told = self.rattler_rule(self._touching)
+        found: BoolArray = cast("rattlers", told, np.bool_, (len(self.packing),))
+        return self.grains & found
 
-        One pass, no repetition; contacts with boundary particles and walls count.
-        """
-        return self.grains & (self.contact_numbers < self.min_contacts)
+    @property
+    def _touching(self) -> Touching:
+        return Touching(self.contacts, self.contact_numbers, self.grains, self.min_contacts)
 
     @cached_property
     def contact_numbers(self) -> IntArray:
         """Number of contacts of each particle, those with walls included, shape (N,)."""
-        return self._numbers_of(self.contacts.pairs)
+        ends = np.bincount(self.contacts.pairs.ravel(), minlength=len(self.packing))
+        return ends + self.packing.wall_contacts
 
     @cached_property
     def contact_numbers_without_rattlers(self) -> IntArray:
         """The same without contacts that a rattler has part in."""
-        return self._numbers_of(self.contacts.pairs[self.contacts_without(self.rattlers)])
-
-    def _numbers_of(self, pairs: IntArray) -> IntArray:
-        return np.bincount(pairs.ravel(), minlength=len(self.packing)) + self.packing.wall_contacts
+        return self._touching.numbers_without(~self.contacts_without(self.rattlers))
 
     def removed(self, variant: Variant) -> BoolArray:
         """Grains that the variant leaves out, shape (N,)."""
@@ -174,3 +182,31 @@ class Sample:
             else self.contact_numbers
         )
         return float(numbers[counted].mean())
+
+
+@dataclass(frozen=True)
+class SampleRule:
+    """How particles are told apart, and contacts found: the same for all frames of a series."""
+
+    boundary: tuple[BoundaryRule, ...] = ()
+    """Particles that fit one of them are boundary."""
+    min_contacts: int = 2
+    """A grain with fewer contacts is a rattler."""
+    rattlers: str = "count"
+    """By which of the installed rules."""
+    contact_tolerance: float = 0.0
+    """Of contacts by geometry, where no file lists them; relative to the sum of the radii."""
+
+    def sample(self, packing: Packing) -> Sample:
+        """
+        The packing told apart.
+
+        Raises
+        ------
+        SettingsError
+            If the packing lacks a column that a rule for the boundary names.
+        """
+        if packing.contacts is None:
+            packing = find_contacts(packing, self.contact_tolerance)
+        boundary = select_boundary(packing, self.boundary)
+        return Sample(packing, boundary, self.min_contacts, installed_rules()[self.rattlers])

@@ -11,10 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.convex import Convex, sphere
+from scanfab.base.note import Note
 from scanfab.base.typing import FloatArray
 from scanfab.packing.sample import Sample, Variant
 from scanfab.pipeline.plan import CLOSE, Plan
-from scanfab.pipeline.settings import AUTO_RULE, Settings
+from scanfab.pipeline.settings import AUTO_RULE
 from scanfab.pipeline.tolerance import scan_to_tolerance
 from scanfab.scan.directions import DirectionRule, design_of, direction_rule
 from scanfab.scan.gaps import Blocks, GapSums, scan_gaps
@@ -59,8 +60,8 @@ class Measurement:
     """The directions of these lines."""
     blocks: tuple[Blocks, Blocks]
     """Octants of the whole sample and of the window, of places in the dump's coordinates."""
-    moment: int
-    """1: ℓ is the mean length; 2: the mean of squares over the mean."""
+    notes: tuple[Note, ...] = ()
+    """What the scan did not reach."""
 
     def kept(
         self, variant: str, place: int = 0
@@ -68,7 +69,7 @@ class Measurement:
         """As :meth:`GapSums.kept`, at one of the plan's cut-offs, with the moment of the table."""
         if self.gaps is None:
             return self.sums.kept(variant)
-        return self.gaps.kept(variant, place, self.moment)
+        return self.gaps.kept(variant, place, self.plan.moment)
 
     def spheres_of(self, variant: Variant) -> tuple[FloatArray, FloatArray, Convex | None]:
         """
@@ -88,39 +89,33 @@ class Measurement:
         solid = ~removed if variant.without_rattlers else np.ones(len(radius), bool)
         return position[solid], radius[solid], window
 
-    def at_cutoffs(self, cutoffs: Iterable[float], settings: Settings) -> Measurement:
-        """
-        The same lines evaluated with other cut-offs, in the dump's unit.
-
-        The ``settings`` are those of :func:`measure`.
-        """
-        plan = replace(self.plan, cutoffs=tuple(sorted(cutoffs)))
+    def at_cutoffs(self, cutoffs: Iterable[float]) -> Measurement:
+        """The same lines evaluated with other cut-offs, in the dump's unit."""
+        plan = replace(self.plan, cutoffs=tuple(sorted(cutoffs)), lists_gaps=True)
         placed, sums = _about(self.origin, self.blocks), self.sums
-        gaps = _every_gap(self.solids, placed, sums, plan, settings)
-        blocked = _blocked_gaps(self.solids, placed, self.block_rule, sums, plan, settings)
+        gaps = _every_gap(self.solids, placed, sums, plan)
+        blocked = _blocked_gaps(self.solids, placed, self.block_rule, sums, plan)
         return replace(self, plan=plan, gaps=gaps, blocked=blocked)
 
 
-def measure(
-    sample: Sample, plan: Plan, settings: Settings, where: str = "the frame"
-) -> Measurement:
-    """Scan one frame that has grains; ``where`` names it in messages."""
+def measure(sample: Sample, plan: Plan, where: str = "the frame") -> Measurement:
+    """Scan one frame that has grains; ``where`` names it where progress is told."""
     if plan.window is not None:
         plan.window.check_fits(sample.packing)
-    solids, origin = _solids(sample, plan, settings)
-    sums, plan = scan_to_tolerance(solids, plan, settings, where)
-    blocks = _blocks(sample, plan, settings)
+    solids, origin = _solids(sample, plan)
+    sums, plan, notes = scan_to_tolerance(solids, plan, where)
+    blocks = _blocks(sample, plan)
     placed = _about(origin, blocks)
-    gaps = _every_gap(solids, placed, sums, plan, settings) if settings.lists_gaps else None
+    gaps = _every_gap(solids, placed, sums, plan) if plan.lists_gaps else None
     block_rule = _block_rule(solids)
-    blocked = _blocked_gaps(solids, placed, block_rule, sums, plan, settings)
+    blocked = _blocked_gaps(solids, placed, block_rule, sums, plan)
     return Measurement(
-        sample, plan, solids, origin, sums, gaps, blocked, block_rule, blocks, settings.moment
+        sample, plan, solids, origin, sums, gaps, blocked, block_rule, blocks, tuple(notes)
     )
 
 
 def _every_gap(
-    solids: Solids, blocks: tuple[Blocks, Blocks], sums: ScanSums, plan: Plan, settings: Settings
+    solids: Solids, blocks: tuple[Blocks, Blocks], sums: ScanSums, plan: Plan
 ) -> GapSums:
     """All gaps of the lines that the sums are of, at the plan's cut-offs."""
     return scan_gaps(
@@ -128,17 +123,12 @@ def _every_gap(
         plan.rule,
         spacing=plan.spacing,
         replicates=range(sums.replicates),
-        **_lines(blocks, plan, settings),
+        **_lines(blocks, plan),
     )
 
 
 def _blocked_gaps(
-    solids: Solids,
-    blocks: tuple[Blocks, Blocks],
-    rule: DirectionRule,
-    sums: ScanSums,
-    plan: Plan,
-    settings: Settings,
+    solids: Solids, blocks: tuple[Blocks, Blocks], rule: DirectionRule, sums: ScanSums, plan: Plan
 ) -> GapSums:
     """Gaps of fewer lines, for the sample's scatter."""
     return scan_gaps(
@@ -146,18 +136,18 @@ def _blocked_gaps(
         rule,
         spacing=_block_spacing(solids, rule, sums, plan),
         replicates=range(BLOCK_REPLICATES),
-        **_lines(blocks, plan, settings),
+        **_lines(blocks, plan),
     )
 
 
-def _lines(blocks: tuple[Blocks, Blocks], plan: Plan, settings: Settings) -> dict[str, Any]:
+def _lines(blocks: tuple[Blocks, Blocks], plan: Plan) -> dict[str, Any]:
     """What both lists of gaps are made with."""
     return {
         "cutoffs": plan.cutoffs,
         "blocks": blocks,
-        "variants": settings.variants,
-        "seed": settings.seed,
-        "workers": settings.workers,
+        "variants": plan.variants,
+        "seed": plan.seed,
+        "workers": plan.workers,
         # what these scans take is known from the one before them
         "most_steps": math.inf,
     }
@@ -169,7 +159,7 @@ def _about(origin: FloatArray, blocks: tuple[Blocks, Blocks]) -> tuple[Blocks, B
     return whole, window
 
 
-def _solids(sample: Sample, plan: Plan, settings: Settings) -> tuple[Solids, FloatArray]:
+def _solids(sample: Sample, plan: Plan) -> tuple[Solids, FloatArray]:
     """
     The spheres that the lines may meet: all grains, or those that reach into the RV.
 
@@ -184,32 +174,32 @@ def _solids(sample: Sample, plan: Plan, settings: Settings) -> tuple[Solids, Flo
     reach = 0.0 if shape is None else shape.reach
     if packing.cell is not None and packing.is_periodic:
         medium: CellGrains | None = None
-        if settings.needs_whole:
+        if plan.needs_whole:
             vectors, periodic = packing.cell.short_vectors, np.array(packing.cell.periodic)
             position = np.ascontiguousarray(position)
             medium = CellGrains(position, radius, removed, vectors, periodic)
         images, row = packing.cell.images_near_origin(position, radius + reach)
         return Solids(images, radius[row], removed[row], shape, medium), origin
-    if shape is not None and not settings.needs_whole:
+    if shape is not None and not plan.needs_whole:
         near = shape.may_meet(position, radius)
         position, radius, removed = position[near], radius[near], removed[near]
     return Solids(position, radius, removed, shape), origin
 
 
-def _blocks(sample: Sample, plan: Plan, settings: Settings) -> tuple[Blocks, Blocks]:
+def _blocks(sample: Sample, plan: Plan) -> tuple[Blocks, Blocks]:
     """The octants about the middle of the sample (of the cell), and about the window's centre."""
     packing = sample.packing
     position = packing.position[sample.gathered]
     low, high = position.min(axis=0), position.max(axis=0)
     radius = float(packing.radius.max())
     reach = float(np.linalg.norm(high - low)) + radius
-    whole = Blocks.about(0.5 * (low + high), reach, settings.axis)
+    whole = Blocks.about(0.5 * (low + high), reach, plan.axis)
     if packing.cell is not None and packing.is_periodic:
         cell = packing.cell
         whole = Blocks.of_periods(cell.vectors, cell.origin, np.array(cell.periodic), position)
     if plan.window is None:
         return whole, whole
-    return whole, Blocks.about(plan.window.center, plan.window.radius + radius, settings.axis)
+    return whole, Blocks.about(plan.window.center, plan.window.radius + radius, plan.axis)
 
 
 def _block_rule(solids: Solids) -> DirectionRule:

@@ -9,7 +9,7 @@ from typing import Any
 
 from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
-from scanfab.base.option import refuse_unknown
+from scanfab.base.option import options_of, refuse_unknown
 from scanfab.base.typing import FloatArray
 from scanfab.io.series import Series
 from scanfab.packing.packing import Packing
@@ -76,7 +76,7 @@ def scan_frames(
     >>> frames.plot.histogram(ax=ax).get_ylabel()
     'probability density'
     """
-    refuse_unknown("scan_frames", options, [*Settings.__dataclass_fields__])
+    refuse_unknown("scan_frames", options, [one.name for one in options_of(Settings)])
     rows = None if table is None else list(table)
     if rows is not None and len({row["source"] for row in rows}) > 1:
         name = Frames(source, Settings()).name
@@ -210,10 +210,17 @@ class ScannedFrames:
         column = strain_column(self.rows or rows)
         drawn = {row["frame"] for row in rows if row["alpha_vs_axial"] is not None}
         return [
-            ScannedFrame(one, self._title(rows_of[one.number], column), self.variant)
+            ScannedFrame(
+                self._with_all_threads(one), self._title(rows_of[one.number], column), self.variant
+            )
             for one in sorted(results, key=lambda result: result.number)
             if one.number in drawn
         ]
+
+    def _with_all_threads(self, result: FrameResult) -> FrameResult:
+        """A frame whose further scans have the threads that both frames have shared."""
+        plan = replace(result.scanned.plan, workers=self.settings.workers)
+        return replace(result, measurement=replace(result.scanned, plan=plan))
 
     @cached_property
     def _ends(self) -> tuple[int, int]:

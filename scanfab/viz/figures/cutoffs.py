@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Page
     from matplotlib.figure import SubFigure
 
-    from scanfab.pipeline.settings import Settings
     from scanfab.viz.scanned_frames import ScannedFrame
 
 __all__ = ["CutoffCurve", "Cutoffs", "draw_curves"]
@@ -76,8 +75,7 @@ class Cutoffs(FrameFigure):
     @cached_property
     def curves(self) -> list[CutoffCurve]:
         """What is drawn of each frame."""
-        settings = self.data.settings
-        return [_curve_of(one, settings) for one in self.chosen(self.data.with_lines_of_table)]
+        return [_curve_of(one) for one in self.chosen(self.data.with_lines_of_table)]
 
     @property
     def size(self) -> tuple[float, float]:
@@ -130,7 +128,7 @@ def _note(curves: Sequence[CutoffCurve]) -> str:
     return f"bands: one total standard error, scan and sample{without}\nbars: the scan's part"
 
 
-def _curve_of(frame: ScannedFrame, settings: Settings) -> CutoffCurve:
+def _curve_of(frame: ScannedFrame) -> CutoffCurve:
     """The lines of the table at other cut-offs, and at its own."""
     # compiled kernels, which those who draw something else do without
     from scanfab.packing.sample import VARIANTS
@@ -138,9 +136,9 @@ def _curve_of(frame: ScannedFrame, settings: Settings) -> CutoffCurve:
 
     smallest, chosen = frame.smallest, frame.measurement.plan.cutoff
     lengths = {*(cutoff * smallest for cutoff in CUTOFFS), chosen}
-    measured = frame.measurement.at_cutoffs(lengths, settings)
+    measured = frame.measurement.at_cutoffs(lengths)
     rows = [
-        VariantColumns(measured, VARIANTS[frame.variant], place, settings).columns()
+        VariantColumns(measured, VARIANTS[frame.variant], place).columns()
         for place in range(len(lengths))
     ]
 

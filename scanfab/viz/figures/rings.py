@@ -12,7 +12,6 @@ from scanfab.base.typing import FloatArray
 from scanfab.fabric.contact import contact_fabric
 
 if TYPE_CHECKING:
-    from scanfab.pipeline.settings import Settings
     from scanfab.viz.scanned_frames import ScannedFrame
 
 __all__ = ["Ring", "Rings", "contact_ring", "rings_of"]
@@ -50,10 +49,10 @@ class Rings:
     contacts: Sequence[Ring]
 
 
-def rings_of(frame: ScannedFrame, angles: Sequence[float], settings: Settings) -> Rings:
+def rings_of(frame: ScannedFrame, angles: Sequence[float]) -> Rings:
     rings = {phi: _azimuths(phi) for phi in angles}
     axes = np.concatenate([_vectors(theta, phi) for phi, theta in rings.items()])
-    value, error = _mean_lengths(frame, axes, settings)
+    value, error = _mean_lengths(frame, axes)
     place, voids = 0, []
     for phi, theta in rings.items():
         here = slice(place, place + len(theta))
@@ -84,31 +83,29 @@ def _vectors(theta: FloatArray, phi: float) -> FloatArray:
     )
 
 
-def _mean_lengths(
-    frame: ScannedFrame, axes: FloatArray, settings: Settings
-) -> tuple[FloatArray, FloatArray]:
+def _mean_lengths(frame: ScannedFrame, axes: FloatArray) -> tuple[FloatArray, FloatArray]:
     """ℓ of each axis over the mean of all directions, and its standard error, shape (D,)."""
     # compiled kernels, which those who draw something else do without
     from scanfab.scan.directions import DirectionRule
     from scanfab.scan.gaps import scan_gaps
 
-    measured, variant = frame.measurement, frame.variant
+    measured, variant, plan = frame.measurement, frame.variant, frame.measurement.plan
     # as many lines as give the wanted number of segments
     found = measured.sums.kept(variant)[1].mean()
-    spacing = measured.plan.spacing * np.sqrt(found * REPLICATES / SEGMENTS)
+    spacing = plan.spacing * np.sqrt(found * REPLICATES / SEGMENTS)
     rose = scan_gaps(
         measured.solids,
         DirectionRule("rose", axes, np.full(len(axes), 1 / len(axes)), None, turned=False),
         spacing=float(spacing),
-        cutoffs=[measured.plan.cutoff],
+        cutoffs=[plan.cutoff],
         blocks=measured.blocks,
         variants=variant,
         replicates=range(REPLICATES),
-        seed=settings.seed,
-        workers=settings.workers,
-        most_steps=settings.max_chords,
+        seed=plan.seed,
+        workers=plan.workers,
+        most_steps=plan.max_chords,
     )
-    sums_of, numbers = rose.kept(variant, 0, settings.moment)
+    sums_of, numbers = rose.kept(variant, 0, plan.moment)
     length, segments = measured.kept(variant)
     mean = length.sum() / segments.sum()
     with np.errstate(invalid="ignore", divide="ignore"):

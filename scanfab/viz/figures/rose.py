@@ -113,9 +113,7 @@ class Rose(FrameFigure):
     @cached_property
     def rings(self) -> list[Rings]:
         """What is drawn of each frame."""
-        settings = self.data.settings
-        frames = self.chosen(self.data.frames)
-        return [rings_of(one, self.angles, settings) for one in frames]
+        return [rings_of(one, self.angles) for one in self.chosen(self.data.frames)]
 
     @property
     def size(self) -> tuple[float, float]:
