@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from scanfab.table.table import Table, load
     from scanfab.viz.compute_file import compute_file
     from scanfab.viz.report.report import Report, make_report
+    from scanfab.viz.scanned_frames import ScannedFrames, scan_frames
 
 # numpy, numba and the readers are loaded by the first name that needs them
 _HOME = {
@@ -60,6 +61,7 @@ _HOME = {
     "ScanfabError": "base.errors",
     "ScanfabNote": "base.errors",
     "ScanfabWarning": "base.errors",
+    "ScannedFrames": "viz.scanned_frames",
     "Series": "io.series",
     "Settings": "pipeline.settings",
     "SettingsError": "base.errors",
@@ -79,6 +81,7 @@ _HOME = {
     "read": "io.opening",
     "read_rows": "table.reading",
     "read_series": "io.opening",
+    "scan_frames": "viz.scanned_frames",
     "scan_lines": "scan.scan",
     "sphere": "base.convex",
     "void_fabric": "fabric.void",
@@ -102,6 +105,7 @@ __all__ = [
     "ScanfabError",
     "ScanfabNote",
     "ScanfabWarning",
+    "ScannedFrames",
     "Series",
     "Settings",
     "SettingsError",
@@ -121,6 +125,7 @@ __all__ = [
     "read",
     "read_rows",
     "read_series",
+    "scan_frames",
     "scan_lines",
     "sphere",
     "void_fabric",

@@ -32,6 +32,7 @@ from scanfab.pipeline.plan import Plan, make_plan
 from scanfab.pipeline.settings import AUTO_RULE, Length, Settings
 from scanfab.pipeline.tolerance import TOLERANCE_MISSED, missing_work
 from scanfab.scan.directions import direction_rule
+from scanfab.table.plots import Plots
 from scanfab.table.table import Row
 
 __all__ = ["Calibration", "calibrate"]
@@ -62,6 +63,11 @@ class Calibration:
     """One sentence for each ladder, and one for the recommended settings."""
     options: dict[str, str]
     """The recommended settings by the names of their options."""
+
+    @property
+    def plot(self) -> Plots:
+        """Its figure: ``found.plot.calibration(ax=ax, ladder="cutoff")``."""
+        return Plots(self.rows, "calibration")
 
 
 def calibrate(
