@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
 
@@ -17,7 +17,7 @@ from scanfab.base.errors import (
     SkippedFrameWarning,
 )
 from scanfab.io.reader import Carries
-from scanfab.io.series import Series
+from scanfab.io.series import ENDLESS, Series
 from scanfab.packing.boundary import enclosing_class, existing_values, select_boundary
 from scanfab.packing.doubts import cell_doubt, doubts_of
 from scanfab.packing.packing import Packing
@@ -25,7 +25,7 @@ from scanfab.packing.sample import Sample
 from scanfab.packing.search import find_contacts
 from scanfab.pipeline.settings import Settings
 
-__all__ = ["Frames", "Readable", "boundary_hint", "chosen_frames"]
+__all__ = ["Frames", "Readable", "boundary_hint", "chosen_frames", "of_whole"]
 
 
 class Readable(Protocol):
@@ -76,8 +76,7 @@ class Frames:
     def __init__(self, source: Packing | Series, settings: Settings) -> None:
         if not isinstance(source, Packing | Series):
             raise SettingsError(f"expected a Packing or a Series, found {source!r}")
-        self.source = source
-        self.settings = settings
+        self.source, self.settings = of_whole(source, settings)
         self.name = "" if isinstance(source, Packing) else source.name
         self.particles = 0
         """Of the frames that were read on the way to the first that has grains."""
@@ -212,14 +211,22 @@ class Frames:
 
 def chosen_frames(source: Packing | Series, frames: slice) -> range:
     """The frames to compute, in the order of the source."""
-    bounds = (frames.start, frames.stop, frames.step)
-    if any(bound is not None and bound < 0 for bound in bounds):
-        count = 1 if isinstance(source, Packing) else sum(1 for _ in source)
-        chosen = range(count)[frames]
-        return chosen if chosen.step > 0 else chosen[::-1]
-    # without counting the frames first: a dump may hold very many
-    endless = 2**62
-    return range(endless)[frames]
+    chosen = range(1)[frames] if isinstance(source, Packing) else source.numbers_of(frames)
+    return chosen if chosen.step > 0 else chosen[::-1]
+
+
+def of_whole(source: Packing | Series, settings: Settings) -> tuple[Packing | Series, Settings]:
+    """
+    The whole of a series of which some frames are given, and settings that choose these.
+
+    Which frames are asked for decides neither RV, rmin nor L0, whichever way it is said.
+    """
+    if isinstance(source, Packing) or source.is_whole:
+        return source, settings
+    chosen = chosen_frames(source, settings.frames)
+    stop = None if chosen.stop >= ENDLESS else chosen.stop
+    step = None if chosen.step == 1 else chosen.step
+    return source.whole, replace(settings, frames=slice(chosen.start, stop, step))
 
 
 def boundary_hint(sample: Sample, settings: Settings) -> str | None:

@@ -218,7 +218,7 @@ def _results(
     results: list[FrameResult] = []
     for number in sorted({min(numbers), max(numbers)}):
         one = replace(settings, frames=slice(number, number + 1))
-        for _ in compute_rows(series, one, observe=results.append):
+        for _ in compute_rows(series.whole, one, observe=results.append):
             pass
     return results
 
