@@ -46,6 +46,9 @@ class Convex:
     size: str
     """How messages tell its size, for instance ``radius 2``."""
 
+    def __repr__(self) -> str:
+        return f"Convex: {self.size} about the origin"
+
     def __str__(self) -> str:
         return self.size
 

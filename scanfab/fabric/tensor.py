@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.column import Column
+from scanfab.base.spelling import spelt_place
 from scanfab.base.typing import FloatArray
 
 __all__ = [
@@ -71,6 +72,13 @@ class FabricTensor:
 
     matrix: FloatArray
     """Shape (3, 3), trace 1."""
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{value:.4g}" for value in self.principal_values)
+        return (
+            f"FabricTensor: alpha {self.alpha:.3g}, principal values {values}, major axis "
+            f"{spelt_place(np.round(self.major_axis, 4))}"
+        )
 
     @cached_property
     def _eigen(self) -> tuple[FloatArray, FloatArray]:

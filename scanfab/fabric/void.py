@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.column import LENGTH, Column
+from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.tensor import FabricTensor, axial, tensor_columns
 
@@ -56,6 +57,13 @@ class VoidFabric:
     """ℓ of each replicate and axis, shape (R, D), dump's length unit."""
     filled: float
     """Fraction of a replicate's axes without any kept segment, given the mean of the others."""
+
+    def __repr__(self) -> str:
+        count, axes = self.mean_lengths.shape
+        return (
+            f"VoidFabric: mean length {self.mean_length:.4g} (dump's unit), "
+            f"{counted(count, 'replicate')} of {counted(axes, 'axis', 'axes')}\n  {self.tensor!r}"
+        )
 
     def axial_error(self, axis: npt.ArrayLike) -> float | None:
         """

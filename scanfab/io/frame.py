@@ -42,6 +42,11 @@ class Frame:
     problem: ReadError | None = None
     """Why not even the frames of the file can be told."""
 
+    def __repr__(self) -> str:
+        what = [self.snapshot.path.name, *([] if self.step is None else [f"step {self.step}"])]
+        what += [] if self.problem is None else ["damaged"]
+        return f"Frame {self.number} of {self.series.name}: {', '.join(what)}"
+
     @property
     def reader(self) -> Reader:
         """The reader of the grain file."""

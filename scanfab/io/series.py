@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Literal, SupportsIndex, overload
 
 from scanfab.base.errors import NoFrameError, ReadError, SettingsError
+from scanfab.base.spelling import counted
 from scanfab.io.families import Family
 from scanfab.io.frame import Frame
 from scanfab.io.frame_csv import FrameFile
@@ -59,6 +60,24 @@ class Series:
         default_factory=dict, init=False, repr=False, compare=False
     )
     """The frames of the grain files that were looked into, and how these files were then."""
+
+    def __repr__(self) -> str:
+        grains, every = self.grains, all(path in self._met for path in self.grains.files.values())
+        number = (
+            counted(self.frames_expected(), "frame")
+            if every
+            else f"{counted(len(grains.files), 'file')} (frames not counted)"
+        )
+        if not self.is_whole:
+            stop = "" if self.numbers.stop >= ENDLESS else self.numbers.stop
+            step = "" if self.numbers.step == 1 else f":{self.numbers.step}"
+            number = f"frames {self.numbers.start}:{stop}{step}"
+        name = "" if grains.reader is None else f" ({grains.reader.name})"
+        contacts = ", ".join(Path(one.pattern).name for one in self.contacts)
+        return (
+            f"Series {self.name}: {number} of {Path(grains.pattern).name}{name}"
+            f"{f', contacts of {contacts}' if contacts else ''}"
+        )
 
     def __iter__(self) -> Iterator[Frame]:
         return islice(self._every(), self.numbers.start, self.numbers.stop, self.numbers.step)

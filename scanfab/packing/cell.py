@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import PackingError
+from scanfab.base.spelling import spelt_place
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.lattice import Lattice, reduced_lattice
 
@@ -68,10 +69,17 @@ class Cell:
             raise PackingError(f"the cell's vectors span no volume: {self.vectors.tolist()}")
 
     def __repr__(self) -> str:
-        return (
-            f"Cell({self.vectors.tolist()}, periodic={self.periodic}, "
-            f"origin={self.origin.tolist()})"
-        )
+        edges = np.diag(self.vectors)
+        if np.array_equal(self.vectors, np.diag(edges)):
+            shape = " x ".join(f"{edge:.4g}" for edge in edges)
+        else:
+            shape = ", ".join(spelt_place(vector) for vector in self.vectors)
+        along = [name for name, repeats in zip("xyz", self.periodic, strict=True) if repeats]
+        if len(along) == 3 or not along:
+            repeats = "periodic" if along else "not periodic"
+        else:
+            repeats = f"periodic along {' and '.join(along)}"
+        return f"Cell: {shape} from {spelt_place(self.origin)}, {repeats}"
 
     @property
     def is_periodic(self) -> bool:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from scanfab.base.arrays import cast, grains_named
 from scanfab.base.errors import PackingError, ScanfabWarning
+from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.cell import Cell
 
@@ -33,6 +34,12 @@ class ContactList(NamedTuple):
     """Force on the second grain, shape (M, 3), dump's force unit."""
     source: ContactSource = "file"
     """Where the list comes from."""
+
+    def __repr__(self) -> str:
+        named = {"images": self.image, "forces": self.force}
+        has = [f"with {name}" for name, values in named.items() if values is not None]
+        number = counted(len(np.asarray(self.pairs)), "contact")
+        return f"ContactList: {', '.join([f'{number} from {self.source}', *has])}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +67,15 @@ class Contacts:
 
     def __len__(self) -> int:
         return len(self.pairs)
+
+    def __repr__(self) -> str:
+        return f"Contacts: {self.in_words()}"
+
+    def in_words(self) -> str:
+        """How many there are, and where they come from."""
+        whence = "from file" if self.source == "file" else "by geometry"
+        forces = "" if self.force is None else " with forces"
+        return f"{counted(len(self), 'contact')} {whence}{forces}"
 
 
 class Spheres(NamedTuple):

@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
+from scanfab.base.spelling import counted
 from scanfab.base.typing import BoolArray, IntArray
 from scanfab.packing.escaped import Escaped, escaped_grains
 from scanfab.packing.packing import Contacts, Packing
@@ -51,6 +52,14 @@ class Sample:
     """Shape (N,)."""
     min_contacts: int = 2
     """A grain with fewer contacts is a rattler."""
+
+    def __repr__(self) -> str:
+        what = f"Sample: {counted(int(self.grains.sum()), 'grain')}"
+        if self.packing.contacts is not None:
+            rattlers = counted(int(self.rattlers.sum()), "rattler")
+            what += f", {rattlers} (fewer than {counted(self.min_contacts, 'contact')})"
+        boundary = int(self.boundary.sum())
+        return what + (f"; {counted(boundary, 'boundary particle')}" if boundary else "")
 
     @property
     def contacts(self) -> Contacts:

@@ -8,6 +8,7 @@ import numpy as np
 
 from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
+from scanfab.base.spelling import spelt_place
 from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
@@ -39,6 +40,9 @@ class Window:
     def may_meet(self, points: FloatArray, radius: FloatArray, packing: Packing) -> BoolArray:
         """Which spheres may reach into it, likewise: see :meth:`Convex.may_meet`."""
         return self.shape.may_meet(self.branches(points, packing), radius)
+
+    def __repr__(self) -> str:
+        return f"Window: {self.shape} about {spelt_place(self.center)} (dump's unit)"
 
     def __str__(self) -> str:
         return f"RV ({self.shape} about {np.round(self.center, 9).tolist()})"

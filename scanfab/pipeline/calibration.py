@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from scanfab.base.errors import PackingError, ScanfabWarning, SettingsError
+from scanfab.base.spelling import counted
 from scanfab.io.series import Series
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample
@@ -61,6 +62,12 @@ class Calibration:
     """One sentence for each ladder, and one for the recommended settings."""
     options: dict[str, str]
     """The recommended settings by the names of their options."""
+
+    def __repr__(self) -> str:
+        steps = counted(len(self.rows), "step of a variant", "steps of variants")
+        options = ", ".join(f"{name}={value!r}" for name, value in self.options.items())
+        lines = [*self.findings, f"recommended: {options}"]
+        return "\n  ".join([f"Calibration: {steps}", *lines])
 
 
 def calibrate(

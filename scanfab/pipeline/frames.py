@@ -24,6 +24,7 @@ from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample
 from scanfab.packing.search import find_contacts
 from scanfab.pipeline.settings import Settings
+from scanfab.pipeline.values import as_written
 
 __all__ = ["Frames", "Readable", "boundary_hint", "chosen_frames", "of_whole"]
 
@@ -204,9 +205,9 @@ class Frames:
         count = sum(1 for _ in self)
         name, frames = self.name or "the packing", self.settings.frames
         has = "1 frame, 0" if count == 1 else f"{count} frames, 0 to {count - 1}"
-        parts = [frames.start, frames.stop, *([] if frames.step is None else [frames.step])]
-        spelt = ":".join("" if part is None else str(part) for part in parts)
-        return SettingsError(f"frames: the series has no frame in {spelt}: {name} has {has}")
+        return SettingsError(
+            f"frames: the series has no frame in {as_written(frames)}: {name} has {has}"
+        )
 
 
 def chosen_frames(source: Packing | Series, frames: slice) -> range:

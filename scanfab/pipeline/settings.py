@@ -21,6 +21,7 @@ from scanfab.pipeline.values import (
     Axis,
     Length,
     Vector,
+    as_written,
     parse_axis,
     parse_boundary,
     parse_cutoff,
@@ -285,6 +286,15 @@ class Settings:
         for one in declared:
             value = one.parse(one.name, options.get(one.name, one.default))
             object.__setattr__(self, one.name, value)
+
+    def __repr__(self) -> str:
+        usual = Settings()
+        chosen = [
+            f"{one.name}={as_written(getattr(self, one.name))!r}"
+            for one in options_of(type(self))
+            if getattr(self, one.name) != getattr(usual, one.name)
+        ]
+        return f"Settings({', '.join(chosen)})"
 
     @property
     def lists_gaps(self) -> bool:

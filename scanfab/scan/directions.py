@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import SettingsError
+from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray
 
 __all__ = ["DirectionRule", "design_of", "direction_rule"]
@@ -47,6 +48,11 @@ class DirectionRule:
 
     def __len__(self) -> int:
         return len(self.axes)
+
+    def __repr__(self) -> str:
+        degree = "of no degree" if self.degree is None else f"exact to degree {self.degree}"
+        bias = f", bias {self.bias:.2g}" if self.bias > 1e-9 else ""
+        return f"DirectionRule {self.name}: {counted(len(self), 'axis', 'axes')}, {degree}{bias}"
 
     @cached_property
     def isotropic_tensor(self) -> FloatArray:

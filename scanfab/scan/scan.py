@@ -11,6 +11,7 @@ import numpy as np
 
 from scanfab.base.errors import SettingsError
 from scanfab.base.jit import Flag
+from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.kernels import sweep
@@ -78,6 +79,13 @@ class ScanSums:
     A line makes one for each grain of each cell that it crosses; a step costs about as much as a
     chord.
     """
+
+    def __repr__(self) -> str:
+        sums = zip("abcd", self.segments.sum((0, 2)), self.lines.sum((0, 2)), strict=True)
+        told = [f"{name} {kept} on {counted(lines, 'line')}" for name, kept, lines in sums if lines]
+        axes = counted(self.axes.shape[1], "axis", "axes")
+        head = f"ScanSums: {counted(self.replicates, 'replicate')} of {axes}"
+        return f"{head}; segments kept: {', '.join(told) or 'none'}"
 
     @property
     def work(self) -> IntArray:

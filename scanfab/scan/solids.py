@@ -8,6 +8,7 @@ import numpy as np
 
 from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
+from scanfab.base.spelling import counted
 from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.kernels.windows import Clip
@@ -47,6 +48,15 @@ class Solids:
     """What the lines of c and d are clipped to; None if these are not scanned."""
     medium: CellGrains | None = None
     """The grains of a periodic packing, each once, if its whole is scanned, which has no edge."""
+
+    def __repr__(self) -> str:
+        removed = int(np.sum(self.removed))
+        what = [counted(len(self.radius), "sphere")]
+        what += [f"{removed} of them void in b and d"] if removed else []
+        if self.medium is not None:
+            what.append(f"a periodic whole of {counted(len(self.medium.radius), 'grain')}")
+        what.append("no window" if self.window is None else f"window of {self.window}")
+        return f"Solids: {', '.join(what)}"
 
     @property
     def reach(self) -> float:

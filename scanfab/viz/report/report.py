@@ -38,6 +38,10 @@ class Report:
     has_void_fabric: bool
     """Whether any row of the tables has one."""
 
+    def __repr__(self) -> str:
+        fabric = "with" if self.has_void_fabric else "without any"
+        return f"Report: an HTML page of {len(self.page) / 1e6:.2g} MB, {fabric} void fabric"
+
 
 @dataclass
 class _Heard:
