@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
-from typing import Literal, SupportsIndex, overload
+from typing import Any, Literal, SupportsIndex, overload
 
 from scanfab.base.errors import NoFrameError, ReadError, SettingsError
 from scanfab.base.spelling import counted
@@ -60,6 +60,10 @@ class Series:
         default_factory=dict, init=False, repr=False, compare=False
     )
     """The frames of the grain files that were looked into, and how these files were then."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        # another process that computes a frame need not know where all others are
+        return {**self.__dict__, "_met": {}}
 
     def __repr__(self) -> str:
         grains, every = self.grains, all(path in self._met for path in self.grains.files.values())

@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
+from scanfab.base.errors import PackingError
 from scanfab.base.spelling import counted
 from scanfab.base.typing import BoolArray, IntArray
 from scanfab.packing.escaped import Escaped, escaped_grains
@@ -53,6 +54,15 @@ class Sample:
     min_contacts: int = 2
     """A grain with fewer contacts is a rattler."""
 
+    def __post_init__(self) -> None:
+        """PackingError if the boundary is no truth value for each particle."""
+        boundary = np.asarray(self.boundary)
+        if boundary.shape != (len(self.packing),) or boundary.dtype != np.bool_:
+            raise PackingError(
+                f"boundary: expected a truth value for each of {len(self.packing)} particles, such "
+                f'as packing.columns["type"] == 2, found {boundary.dtype} of shape {boundary.shape}'
+            )
+
     def __repr__(self) -> str:
         what = f"Sample: {counted(int(self.grains.sum()), 'grain')}"
         if self.packing.contacts is not None:
@@ -63,8 +73,11 @@ class Sample:
 
     @property
     def contacts(self) -> Contacts:
-        """The contacts of the packing, which must be known."""
-        assert self.packing.contacts is not None
+        """The contacts of the packing; PackingError if they are not known."""
+        if self.packing.contacts is None:
+            raise PackingError(
+                "the contacts of the packing are not known: find_contacts(packing) finds them"
+            )
         return self.packing.contacts
 
     @property

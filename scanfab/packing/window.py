@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scanfab.base.arrays import cast
 from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
 from scanfab.base.spelling import spelt_place
@@ -40,6 +41,10 @@ class Window:
     def may_meet(self, points: FloatArray, radius: FloatArray, packing: Packing) -> BoolArray:
         """Which spheres may reach into it, likewise: see :meth:`Convex.may_meet`."""
         return self.shape.may_meet(self.branches(points, packing), radius)
+
+    def __post_init__(self) -> None:
+        """PackingError if the centre is no point."""
+        object.__setattr__(self, "center", cast("center", self.center, np.float64, (3,)))
 
     def __repr__(self) -> str:
         return f"Window: {self.shape} about {spelt_place(self.center)} (dump's unit)"

@@ -14,11 +14,12 @@ from scanfab.base.typing import FloatArray
 from scanfab.packing.sample import Sample, Variant
 from scanfab.pipeline.plan import CLOSE, Plan
 from scanfab.pipeline.settings import AUTO_RULE, Settings
+from scanfab.pipeline.solids import solids_of
 from scanfab.pipeline.tolerance import scan_to_tolerance
 from scanfab.scan.directions import DirectionRule, design_of, direction_rule
 from scanfab.scan.gaps import Blocks, GapSums, scan_gaps
 from scanfab.scan.scan import ScanSums
-from scanfab.scan.solids import CellGrains, Solids, most_lines
+from scanfab.scan.solids import Solids, most_lines
 
 __all__ = ["Measurement", "measure"]
 
@@ -89,11 +90,10 @@ def measure(
     sample: Sample, plan: Plan, settings: Settings, where: str = "the frame"
 ) -> Measurement:
     """Scan one frame that has grains; ``where`` names it in messages."""
-    if plan.window is not None:
-        plan.window.check_fits(sample.packing)
-    solids, origin = _solids(sample, plan, settings)
+    solids = solids_of(sample, plan.window, variants=settings.variants)
     sums, plan = scan_to_tolerance(solids, plan, settings, where)
     blocks = _blocks(sample, plan, settings)
+    origin = solids.origin
     lines: dict[str, Any] = {
         "cutoffs": plan.cutoffs,
         "blocks": tuple(Blocks(one.matrix, one.shift + one.matrix @ origin) for one in blocks),
@@ -118,33 +118,6 @@ def measure(
     return Measurement(
         sample, plan, solids, sums, gaps, blocked, block_rule, blocks, settings.moment
     )
-
-
-def _solids(sample: Sample, plan: Plan, settings: Settings) -> tuple[Solids, FloatArray]:
-    """
-    The spheres that the lines may meet: all grains, or those that reach into the RV.
-
-    And the origin of their positions in the dump's coordinates.
-    """
-    packing, window = sample.packing, plan.window
-    position, radius = packing.position[sample.grains], packing.radius[sample.grains]
-    removed = sample.rattlers[sample.grains]
-    origin = position.mean(axis=0) if window is None else window.center
-    position = position - origin
-    shape = None if window is None else window.shape
-    reach = 0.0 if shape is None else shape.reach
-    if packing.cell is not None and packing.is_periodic:
-        medium: CellGrains | None = None
-        if settings.needs_whole:
-            vectors, periodic = packing.cell.short_vectors, np.array(packing.cell.periodic)
-            position = np.ascontiguousarray(position)
-            medium = CellGrains(position, radius, removed, vectors, periodic)
-        images, row = packing.cell.images_near_origin(position, radius + reach)
-        return Solids(images, radius[row], removed[row], shape, medium), origin
-    if shape is not None and not settings.needs_whole:
-        near = shape.may_meet(position, radius)
-        position, radius, removed = position[near], radius[near], removed[near]
-    return Solids(position, radius, removed, shape), origin
 
 
 def _blocks(sample: Sample, plan: Plan, settings: Settings) -> tuple[Blocks, Blocks]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from scanfab.base.convex import Convex
-from scanfab.base.errors import SettingsError
+from scanfab.base.errors import PackingError, SettingsError
 from scanfab.base.spelling import counted
 from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.scan.kernels.periodic import CellGrains
@@ -48,6 +50,23 @@ class Solids:
     """What the lines of c and d are clipped to; None if these are not scanned."""
     medium: CellGrains | None = None
     """The grains of a periodic packing, each once, if its whole is scanned, which has no edge."""
+    origin: FloatArray = field(default_factory=lambda: np.zeros(3))
+    """Where the origin of these positions lies in the dump's coordinates, shape (3,)."""
+
+    def __post_init__(self) -> None:
+        """Cast without a copy; PackingError if the shapes do not fit."""
+        count = np.size(self.radius)
+        kinds: dict[str, tuple[type, tuple[int, ...]]] = {
+            "position": (np.float64, (count, 3)),
+            "radius": (np.float64, (count,)),
+            "removed": (np.bool_, (count,)),
+            "origin": (np.float64, (3,)),
+        }
+        for name, (kind, shape) in kinds.items():
+            array: npt.NDArray[Any] = np.asarray(getattr(self, name), kind)
+            if array.shape != shape:
+                raise PackingError(f"solids: {name}: expected shape {shape}, found {array.shape}")
+            object.__setattr__(self, name, array)
 
     def __repr__(self) -> str:
         removed = int(np.sum(self.removed))
