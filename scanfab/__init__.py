@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     from scanfab.packing.window import Window
     from scanfab.pipeline.calibration import Calibration, calibrate
     from scanfab.pipeline.compute import compute
-    from scanfab.pipeline.frames import Frames
     from scanfab.pipeline.settings import Settings
     from scanfab.pipeline.solids import solids_of
     from scanfab.scan.directions import DirectionRule, direction_rule
@@ -59,7 +58,6 @@ _HOME = {
     "DirectionRule": "scan.directions",
     "FabricTensor": "fabric.tensor",
     "Frame": "io.frame",
-    "Frames": "pipeline.frames",
     "NoFrameError": "base.errors",
     "Packing": "packing.packing",
     "PackingError": "base.errors",
@@ -106,7 +104,6 @@ __all__ = [
     "DirectionRule",
     "FabricTensor",
     "Frame",
-    "Frames",
     "NoFrameError",
     "Packing",
     "PackingError",

@@ -31,16 +31,36 @@ __all__ = ["Frame"]
 
 @dataclass(frozen=True)
 class Frame:
-    """One frame of a series, not read yet."""
+    """
+    One frame of a series, not read yet.
+
+    Attributes
+    ----------
+    series : Series
+        The series, or the part of it, that the frame is of.
+    snapshot : Snapshot
+        Where the frame lies in its file.
+    name_step : int or None
+        The step in the file's name.
+    number : int
+        In the series, from 0.
+    problem : ReadError or None
+        Why not even the frames of the file can be told.
+
+    Examples
+    --------
+    >>> import scanfab
+    >>> series = scanfab.read_series("sample_data/liggghts_periodic/dump_*.txt.gz")
+    >>> frame = series[0]
+    >>> frame.number, frame.step, len(frame.read())
+    (0, 30000, 800)
+    """
 
     series: Series
     snapshot: Snapshot
     name_step: int | None
-    """The step in the file's name."""
     number: int = 0
-    """In the series, from 0."""
     problem: ReadError | None = None
-    """Why not even the frames of the file can be told."""
 
     def __repr__(self) -> str:
         what = [self.snapshot.path.name, *([] if self.step is None else [f"step {self.step}"])]
@@ -55,7 +75,12 @@ class Frame:
 
     def read(self) -> Packing:
         """
-        The frame's packing; its contacts are None if no file lists them.
+        The frame's packing.
+
+        Returns
+        -------
+        Packing
+            Its contacts are None if no file lists them: :func:`scanfab.find_contacts` finds them.
 
         Raises
         ------

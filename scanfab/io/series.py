@@ -40,18 +40,41 @@ class Series:
     Iterating gives :class:`Frame` objects; ``frame.read()`` gives the packing. ``series[-1]`` is a
     frame, ``series[2:5]`` the same series with fewer frames: they keep their numbers, and RV,
     ``rmin`` and the initial length stay those of the whole.
+
+    Attributes
+    ----------
+    name : str
+        As the user named it.
+    grains : Family
+        The files of grains, by step.
+    contacts : tuple of Family
+        The files of contacts, likewise.
+    contacts_from : str
+        Where contacts come from.
+    options : ReadOptions
+        What the user tells of the dump.
+    cells : FrameFile or None
+        The cell of each frame, in the place of one for all in the options.
+    numbers : range
+        Which frames of the whole series these are; there may be fewer.
+
+    Examples
+    --------
+    >>> import scanfab
+    >>> series = scanfab.read_series("sample_data/yade_triaxial/triaxial-spheres-*.vtk.gz")
+    >>> len(series), series[-1].number, [frame.number for frame in series[2:5]]
+    (7, 6, [2, 3, 4])
+    >>> [frame.number for frame in series[2:5][1:]]
+    [3, 4]
     """
 
     name: str
-    """As the user named it."""
     grains: Family
     contacts: tuple[Family, ...] = ()
     contacts_from: ContactsFrom = "auto"
     options: ReadOptions = field(default_factory=ReadOptions)
     cells: FrameFile | None = None
-    """The cell of each frame, in the place of one for all in the options."""
     numbers: range = range(ENDLESS)
-    """Which frames of the whole series these are; there may be fewer."""
     # a file that holds the contacts of many frames is indexed once
     _contact_snapshots: dict[Path, list[Snapshot]] = field(
         default_factory=dict, init=False, repr=False, compare=False
@@ -189,6 +212,10 @@ class Series:
         About how many frames there are, without looking for them.
 
         Files that nobody has looked into yet count as many as the last one that was, at first one.
+
+        Returns
+        -------
+        int
         """
         met = [len(snapshots) for _, snapshots in self._met.values()]
         every = sum(met) + (len(self.grains.files) - len(met)) * (met[-1] if met else 1)
@@ -198,10 +225,25 @@ class Series:
         self, grains: Snapshot, name_step: int | None, family: Family, named: bool
     ) -> Snapshot | None:
         """
-        The contacts of a grain snapshot in a family of contact files; None if there are none.
+        The contacts of a grain snapshot in a family of contact files.
 
-        Steps inside the files decide; where a file has none, the number in its name does. A single
-        contact file that the user named for a single grain file needs no number.
+        Steps inside the files decide; where a file has none, the number in its name does.
+
+        Parameters
+        ----------
+        grains : Snapshot
+            Of the grains.
+        name_step : int or None
+            The step in the name of their file.
+        family : Family
+            The contact files.
+        named : bool
+            Whether a single contact file was named for a single grain file: it needs no number.
+
+        Returns
+        -------
+        Snapshot or None
+            None if there are none.
         """
         step = name_step if grains.step is None else grains.step
         path = family.files.get(name_step, family.files.get(step))
@@ -220,7 +262,18 @@ class Series:
         return next((one for one in snapshots if one.step == grains.step), None)
 
     def beside(self, path: Path) -> list[Path]:
-        """What is read with a file of grains: its cell, or the dumps that an index names."""
+        """
+        What is read with a file of grains: its cell, or the dumps that an index names.
+
+        Parameters
+        ----------
+        path : Path
+            A file of grains.
+
+        Returns
+        -------
+        list of Path
+        """
         listed = self._listed(path) if self.grains.kind == "index" else []
         ask = getattr(self.grains.reader, "beside", None)
         named = self.cells is not None or self.options.cell is not None
@@ -239,9 +292,21 @@ class Series:
 
     def files_through(self, number: int) -> Iterator[tuple[Path, bool]]:
         """
-        The files of the frames up to one, and whether each is a file of grains.
+        The files of the frames up to one.
 
         All of these frames have been looked for: one file may hold many.
+
+        Parameters
+        ----------
+        number : int
+            The last frame, in the whole series.
+
+        Yields
+        ------
+        path : Path
+            Each file.
+        is_grains : bool
+            Whether it holds grains.
         """
         steps, met = [], 0
         for step, path in self.grains.files.items():
@@ -257,7 +322,13 @@ class Series:
                     yield path, False
 
     def files(self) -> Iterator[Path]:
-        """Every file that the frames come from."""
+        """
+        Every file that the frames come from.
+
+        Yields
+        ------
+        Path
+        """
         for family in (self.grains, *self.contacts):
             yield from family.files.values()
         for path in self.grains.files.values():

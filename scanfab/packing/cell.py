@@ -99,7 +99,19 @@ class Cell:
         return center
 
     def fractional(self, position: npt.ArrayLike) -> FloatArray:
-        """Coordinates along the lattice vectors, 0 to 1 inside the cell; dimensionless."""
+        """
+        Coordinates along the lattice vectors, 0 to 1 inside the cell.
+
+        Parameters
+        ----------
+        position : array_like, shape (N, 3)
+            Dump's length unit.
+
+        Returns
+        -------
+        ndarray, shape (N, 3)
+            Dimensionless.
+        """
         fractions: FloatArray = (np.asarray(position, dtype=np.float64) - self.origin) @ (
             np.linalg.inv(self.vectors)
         )
@@ -130,7 +142,18 @@ class Cell:
         return wrapped, (turns + on_face).astype(np.int64)
 
     def wrap(self, position: npt.ArrayLike) -> FloatArray:
-        """Positions moved into the cell along its periodic vectors, shape (N, 3)."""
+        """
+        Positions moved into the cell along its periodic vectors.
+
+        Parameters
+        ----------
+        position : array_like, shape (N, 3)
+            Dump's length unit.
+
+        Returns
+        -------
+        ndarray, shape (N, 3)
+        """
         return self.place(position)[0]
 
     @cached_property

@@ -205,6 +205,10 @@ class Packing:
             are taken as they are.
         wall_contacts : array_like of int, shape (N,), optional
             Those of this packing by default.
+
+        Returns
+        -------
+        Packing
         """
         other = copy.copy(self)
         if wall_contacts is not None:

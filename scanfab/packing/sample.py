@@ -46,13 +46,38 @@ VARIANTS = {
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """A packing whose particles are told apart: boundary, grains, rattlers."""
+    """
+    A packing whose particles are told apart: boundary, grains, rattlers.
+
+    Parameters
+    ----------
+    packing : Packing
+        Its contacts tell the rattlers.
+    boundary : ndarray of bool, shape (N,)
+        Particles that are boundary, not grains.
+    min_contacts : int, optional
+        A grain with fewer contacts is a rattler.
+
+    Raises
+    ------
+    PackingError
+        If the boundary is no truth value for each particle.
+
+    Examples
+    --------
+    >>> from scanfab import Packing, Sample
+    >>> row = [[0, 0, 0], [2, 0, 0], [4, 0, 0]]
+    >>> packing = Packing(row, 1.0, contacts=[[0, 1], [1, 2]], columns={"type": [1, 1, 2]})
+    >>> sample = Sample(packing, packing.columns["type"] == 2)
+    >>> sample
+    Sample: 2 grains, 1 rattler (fewer than 2 contacts); 1 boundary particle
+    >>> sample.rattlers
+    array([ True, False, False])
+    """
 
     packing: Packing
     boundary: BoolArray
-    """Shape (N,)."""
     min_contacts: int = 2
-    """A grain with fewer contacts is a rattler."""
 
     def __post_init__(self) -> None:
         """PackingError if the boundary is no truth value for each particle."""
@@ -96,7 +121,14 @@ class Sample:
         return self.grains if self.escaped.are_many else self.grains & ~self.escaped.grains
 
     def doubt_of_escaped(self) -> str | None:
-        """What to tell of grains that have escaped; None without any."""
+        """
+        What to tell of grains that have escaped.
+
+        Returns
+        -------
+        str or None
+            None without any.
+        """
         rows = np.flatnonzero(self.escaped.grains)
         if not len(rows):
             return None
@@ -148,18 +180,55 @@ class Sample:
         return np.bincount(pairs.ravel(), minlength=len(self.packing)) + self.packing.wall_contacts
 
     def removed(self, variant: Variant) -> BoolArray:
-        """Grains that the variant leaves out, shape (N,)."""
+        """
+        Grains that the variant leaves out.
+
+        Parameters
+        ----------
+        variant : Variant
+            One of ``VARIANTS``.
+
+        Returns
+        -------
+        ndarray of bool, shape (N,)
+        """
         return self.rattlers if variant.without_rattlers else np.zeros(len(self.packing), bool)
 
     def counted(self, variant: Variant, window: Window | None) -> BoolArray:
-        """Grains whose centre lies in the variant's window, rattlers included, shape (N,)."""
+        """
+        Grains whose centre lies in the variant's window, rattlers included.
+
+        Parameters
+        ----------
+        variant : Variant
+            One of ``VARIANTS``.
+        window : Window or None
+            Of c and d.
+
+        Returns
+        -------
+        ndarray of bool, shape (N,)
+        """
         if not variant.in_window:
             return self.grains
         assert window is not None
         return self.grains & window.contains(self.packing.position, self.packing)
 
     def solids(self, variant: Variant, window: Window | None) -> BoolArray:
-        """Grains of which the variant's lines may meet a part, shape (N,)."""
+        """
+        Grains of which the variant's lines may meet a part.
+
+        Parameters
+        ----------
+        variant : Variant
+            One of ``VARIANTS``.
+        window : Window or None
+            Of c and d.
+
+        Returns
+        -------
+        ndarray of bool, shape (N,)
+        """
         left = self.grains & ~self.removed(variant)
         if not variant.in_window:
             return left
@@ -168,12 +237,36 @@ class Sample:
         return left & window.may_meet(position, radius, self.packing)
 
     def contacts_without(self, left_out: BoolArray) -> BoolArray:
-        """Contacts of which neither particle is left out, shape (M,)."""
+        """
+        Contacts of which neither particle is left out.
+
+        Parameters
+        ----------
+        left_out : ndarray of bool, shape (N,)
+            Particles.
+
+        Returns
+        -------
+        ndarray of bool, shape (M,)
+        """
         one, two = self.contacts.pairs.T
         return np.asarray(~(left_out[one] | left_out[two]))
 
     def fabric_contacts(self, variant: Variant, window: Window | None) -> BoolArray:
-        """Which grain-grain contacts enter the variant's contact fabric, shape (M,)."""
+        """
+        Which grain-grain contacts enter the variant's contact fabric.
+
+        Parameters
+        ----------
+        variant : Variant
+            One of ``VARIANTS``.
+        window : Window or None
+            Of c and d.
+
+        Returns
+        -------
+        ndarray of bool, shape (M,)
+        """
         contacts = self.contacts
         chosen = self.contacts_without(self.boundary | self.removed(variant))
         if variant.in_window:
@@ -185,7 +278,19 @@ class Sample:
         """
         Mean number of contacts of the variant's grains, boundary's included.
 
-        Contacts with removed grains are left out. None if there is no grain.
+        Contacts with removed grains are left out.
+
+        Parameters
+        ----------
+        variant : Variant
+            One of ``VARIANTS``.
+        window : Window or None
+            Of c and d.
+
+        Returns
+        -------
+        float or None
+            None if there is no grain.
         """
         counted = self.counted(variant, window) & ~self.removed(variant)
         if not counted.any():

@@ -54,14 +54,36 @@ ROUNDS = 5
 
 @dataclass(frozen=True)
 class Calibration:
-    """What :func:`calibrate` finds."""
+    """
+    What :func:`calibrate` finds.
+
+    ``Table(found.rows)`` shows all steps.
+
+    Attributes
+    ----------
+    rows : tuple of StepRow
+        All steps of all ladders, then the recommended settings.
+    findings : tuple of str
+        One sentence for each ladder, and one for the recommended settings.
+    options : dict
+        The recommended settings by the names of their options.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab import Packing, Settings, Table, calibrate
+    >>> grid = np.stack(np.meshgrid(*3 * [np.arange(6.0)]), axis=-1).reshape(-1, 3)
+    >>> settings = Settings(variants="c", tolerance=0.01, rv=0.6, contact_tolerance=1e-4)
+    >>> found = calibrate(Packing(grid, 0.5), settings)
+    >>> sorted(found.options)
+    ['directions', 'spacing']
+    >>> len(Table(found.rows)) == len(found.rows)
+    True
+    """
 
     rows: tuple[StepRow, ...]
-    """All steps of all ladders, then the recommended settings."""
     findings: tuple[str, ...]
-    """One sentence for each ladder, and one for the recommended settings."""
     options: dict[str, str]
-    """The recommended settings by the names of their options."""
 
     def __repr__(self) -> str:
         steps = counted(len(self.rows), "step of a variant", "steps of variants")

@@ -60,6 +60,11 @@ class Settings:
     Settings are made of the options of :func:`scanfab.compute`, written as there; the attributes
     are what they mean, with lengths in the dump's unit.
 
+    Parameters
+    ----------
+    **options
+        Those of :func:`scanfab.compute`.
+
     Raises
     ------
     SettingsError

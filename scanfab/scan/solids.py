@@ -38,20 +38,40 @@ class Solids:
     The spheres that lines meet, and the window; lengths in the dump's unit.
 
     Positions are relative to the window's origin, the centre of a sphere.
+
+    Parameters
+    ----------
+    position : array_like, shape (N, 3)
+        Centres, from the window's origin.
+    radius : array_like, shape (N,)
+        Radii.
+    removed : array_like of bool, shape (N,)
+        Spheres that the variants b and d leave out.
+    window : Convex, optional
+        What the lines of c and d are clipped to; None if these are not scanned.
+    medium : CellGrains, optional
+        The grains of a periodic packing, each once, if its whole is scanned, which has no edge.
+    origin : array_like, optional
+        Where the origin of these positions lies in the dump's coordinates, shape (3,).
+
+    Raises
+    ------
+    PackingError
+        If the shapes do not fit.
+
+    Examples
+    --------
+    >>> from scanfab import Solids, sphere
+    >>> Solids([[0, 0, 0], [2, 0, 0]], [1, 1], [False, True], window=sphere(3.0))
+    Solids: 2 spheres, 1 of them void in b and d, window of radius 3
     """
 
     position: FloatArray
-    """Shape (N, 3)."""
     radius: FloatArray
-    """Shape (N,)."""
     removed: BoolArray
-    """Spheres that the variants b and d leave out, shape (N,)."""
     window: Convex | None = None
-    """What the lines of c and d are clipped to; None if these are not scanned."""
     medium: CellGrains | None = None
-    """The grains of a periodic packing, each once, if its whole is scanned, which has no edge."""
     origin: FloatArray = field(default_factory=lambda: np.zeros(3))
-    """Where the origin of these positions lies in the dump's coordinates, shape (3,)."""
 
     def __post_init__(self) -> None:
         """Cast without a copy; PackingError if the shapes do not fit."""

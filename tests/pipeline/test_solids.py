@@ -7,6 +7,8 @@ import pytest
 
 import scanfab
 from scanfab import Cell, Packing, PackingError, Sample, Settings, SettingsError, Solids, Window
+from scanfab.packing.window import SurfaceBox
+from scanfab.pipeline.frames import Frames
 from tests.helpers.lattices import shaken_cubic
 
 COUNT = 6
@@ -25,7 +27,7 @@ def packing(periodic=False):
 
 def window_of(table_radius, sample):
     """The RV of compute()."""
-    box = scanfab.packing.window.SurfaceBox.of(sample.packing, sample.gathered)
+    box = SurfaceBox.of(sample.packing, sample.gathered)
     return Window(box.center, scanfab.sphere(table_radius))
 
 
@@ -104,7 +106,7 @@ def test_a_window_about_no_point_is_refused():
 
 
 def test_the_chosen_frames_of_a_series_are_samples():
-    frames = scanfab.Frames(packing(), Settings(boundary="type=2"))
+    frames = Frames(packing(), Settings(boundary="type=2"))
     ((number, sample),) = frames.samples()
     assert number == 0
     np.testing.assert_array_equal(sample.boundary, sample.packing.columns["type"] == 2)
