@@ -20,7 +20,7 @@ GROUPS = {
         "Table", "Row", "load", "read_rows", "compare_tables", "Comparison", "COLUMNS", "Column",
     ),
     "Scanning by hand": (
-        "Sample", "Window", "sphere", "Convex", "solids_of", "Solids", "direction_rule",
+        "samples", "Sample", "Window", "sphere", "Convex", "solids_of", "Solids", "direction_rule",
         "DirectionRule", "scan_lines", "ScanSums", "void_fabric", "VoidFabric", "contact_fabric",
         "FabricTensor",
     ),

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from scanfab.packing.window import Window
     from scanfab.pipeline.calibration import Calibration, calibrate
     from scanfab.pipeline.compute import compute
+    from scanfab.pipeline.samples import samples
     from scanfab.pipeline.settings import Settings
     from scanfab.pipeline.solids import solids_of
     from scanfab.scan.directions import DirectionRule, direction_rule
@@ -86,6 +87,7 @@ _HOME = {
     "read": "io.opening",
     "read_rows": "table.reading",
     "read_series": "io.opening",
+    "samples": "pipeline.samples",
     "scan_lines": "scan.scan",
     "solids_of": "pipeline.solids",
     "sphere": "base.convex",
@@ -132,6 +134,7 @@ __all__ = [
     "read",
     "read_rows",
     "read_series",
+    "samples",
     "scan_lines",
     "solids_of",
     "sphere",

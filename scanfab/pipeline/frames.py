@@ -87,27 +87,6 @@ class Frames:
         source, chosen = self.source, as_written(self.settings.frames)
         return f"Frames {chosen} of {source!r}"
 
-    def samples(self) -> Iterator[tuple[int, Sample]]:
-        """
-        The chosen frames as samples, one in memory at a time; passed over are damaged ones.
-
-        Yields
-        ------
-        int
-            The number of the frame in the series.
-        Sample
-            Its grains, boundary and rattlers.
-
-        Raises
-        ------
-        ScanfabError
-            If a frame is damaged, unless such frames are skipped, or if there is none.
-        """
-        for number, frame in self.due():
-            sample = self.sample(number, frame)
-            if sample is not None:
-                yield number, sample
-
     def __iter__(self) -> Iterator[tuple[int, Readable]]:
         """All frames with their numbers, not read."""
         if isinstance(self.source, Packing):

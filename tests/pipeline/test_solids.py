@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab import Cell, Packing, PackingError, Sample, Settings, SettingsError, Solids, Window
+from scanfab import Cell, Packing, PackingError, Sample, SettingsError, Solids, Window
 from scanfab.packing.window import SurfaceBox
-from scanfab.pipeline.frames import Frames
 from tests.helpers.lattices import shaken_cubic
 
 COUNT = 6
@@ -103,11 +102,3 @@ def test_solids_whose_shapes_do_not_fit_are_refused(wrong):
 def test_a_window_about_no_point_is_refused():
     with pytest.raises(PackingError, match="center"):
         Window([0.0, 1.0], scanfab.sphere(1.0))
-
-
-def test_the_chosen_frames_of_a_series_are_samples():
-    frames = Frames(packing(), Settings(boundary="type=2"))
-    ((number, sample),) = frames.samples()
-    assert number == 0
-    np.testing.assert_array_equal(sample.boundary, sample.packing.columns["type"] == 2)
-    assert repr(frames).startswith("Frames : of Packing: 216 particles")
