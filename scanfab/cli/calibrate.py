@@ -114,7 +114,7 @@ def calibrate(
             raise click.UsageError(f"one series can be calibrated at a time, found {names}")
         tell_inputs(series, settings.workers)
         with working():
-            found = calibrate_series(series[0], settings, frame=frame)
+            found = calibrate_series(series[0], frame=frame, **vars(settings))
         rows = tuple(replace(row, note=as_options(row.note)) for row in found.rows)
         found = replace(found, rows=rows)
         command = _command_line(ctx, source, found.options)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -145,9 +144,9 @@ class Series:
         return self._with(numbers)
 
     def _with(self, numbers: range) -> Series:
-        """Other frames of the same series, which knows what is known already of its files."""
-        other = copy.copy(self)
-        object.__setattr__(other, "numbers", numbers)
+        """Other frames of the same series; what is known of its files is known to both."""
+        other = object.__new__(Series)
+        vars(other).update({**vars(self), "numbers": numbers})
         return other
 
     def numbers_of(self, frames: slice) -> range:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from scanfab.base.errors import PackingError
+from scanfab.base.note import Note
 from scanfab.base.typing import FloatArray
 from scanfab.packing.packing import Packing
 from scanfab.packing.periodicity import fitting_periods
@@ -47,7 +48,7 @@ def refuse_impossible(sample: Sample) -> None:
             raise PackingError(text)
 
 
-def doubts_of(sample: Sample, *, cell_is_named: bool = False) -> list[str]:
+def doubts_of(sample: Sample, *, cell_is_named: bool = False) -> list[Note]:
     """
     What a user should know of a frame whose contacts are known.
 
@@ -62,11 +63,14 @@ def doubts_of(sample: Sample, *, cell_is_named: bool = False) -> list[str]:
     if len(packing) < FEWEST:
         return []
     clumps = _clumps(packing)
-    texts = [clumps, _own_images(packing), _empty_period(packing) if cell_is_named else ""]
-    if not clumps:
-        texts.append(_many_contacts(sample))
-    texts.append(_no_contacts(sample))
-    return [text for text in texts if text]
+    texts = {
+        "clumps": clumps,
+        "own_images": _own_images(packing),
+        "empty_period": _empty_period(packing) if cell_is_named else "",
+        "many_contacts": "" if clumps else _many_contacts(sample),
+        "no_contacts": _no_contacts(sample),
+    }
+    return [Note(code, text) for code, text in texts.items() if text]
 
 
 def cell_doubt(sample: Sample, carries: str) -> str:

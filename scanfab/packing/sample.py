@@ -12,13 +12,16 @@ from functools import cached_property
 import numpy as np
 
 from scanfab.base.errors import PackingError
+from scanfab.base.note import Note
 from scanfab.base.spelling import counted
 from scanfab.base.typing import BoolArray, IntArray
+from scanfab.packing.boundary import BoundaryRule, select_boundary
 from scanfab.packing.escaped import Escaped, escaped_grains
 from scanfab.packing.packing import Contacts, Packing
+from scanfab.packing.search import find_contacts
 from scanfab.packing.window import SurfaceBox, Window
 
-__all__ = ["VARIANTS", "Sample", "Variant"]
+__all__ = ["VARIANTS", "Sample", "SampleRule", "Variant"]
 
 
 # grains that a message names
@@ -120,18 +123,19 @@ class Sample:
         """Grains that the sample's extents are those of: none that have escaped, shape (N,)."""
         return self.grains if self.escaped.are_many else self.grains & ~self.escaped.grains
 
-    def doubt_of_escaped(self) -> str | None:
+    def doubts_of_escaped(self) -> list[Note]:
         """
         What to tell of grains that have escaped.
 
         Returns
         -------
-        str or None
-            None without any.
+        list of Note
+            Empty without any.
         """
         rows = np.flatnonzero(self.escaped.grains)
-        if not len(rows):
-            return None
+        return [Note("escaped", self._escaped(rows))] if len(rows) else []
+
+    def _escaped(self, rows: IntArray) -> str:
         first, packing = rows[0], self.packing
         place = ", ".join(f"{x:g}" for x in packing.position[first])
         others = f" and {len(rows) - 1} more" if len(rows) > 1 else ""
@@ -301,3 +305,28 @@ class Sample:
             else self.contact_numbers
         )
         return float(numbers[counted].mean())
+
+
+@dataclass(frozen=True)
+class SampleRule:
+    """How particles are told apart, and contacts found: the same for all frames of a series."""
+
+    boundary: tuple[BoundaryRule, ...] = ()
+    """Particles that fit one of them are boundary."""
+    min_contacts: int = 2
+    """A grain with fewer contacts is a rattler."""
+    contact_tolerance: float = 0.0
+    """Of contacts by geometry, where no file lists them; relative to the sum of the radii."""
+
+    def sample(self, packing: Packing) -> Sample:
+        """
+        The packing told apart.
+
+        Raises
+        ------
+        SettingsError
+            If the packing lacks a column that a rule for the boundary names.
+        """
+        if packing.contacts is None:
+            packing = find_contacts(packing, self.contact_tolerance)
+        return Sample(packing, select_boundary(packing, self.boundary), self.min_contacts)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import logging
 import math
-import re
 import time
-import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
-from scanfab.base.errors import PackingError, ScanfabWarning, SettingsError
+from scanfab.base.errors import PackingError, SettingsError
+from scanfab.base.note import Note, tell
+from scanfab.base.option import options_of, refuse_unknown
 from scanfab.base.spelling import counted
 from scanfab.io.series import Series
 from scanfab.packing.packing import Packing
@@ -25,12 +26,12 @@ from scanfab.pipeline.calibration_ladders import (
     sentence,
     sentence_of_recommended,
 )
-from scanfab.pipeline.frame import frame_result
+from scanfab.pipeline.frame import OTHER_CUTOFFS, compute_frame
 from scanfab.pipeline.frames import Frames
 from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.plan import Plan, make_plan
 from scanfab.pipeline.settings import AUTO_RULE, Length, Settings
-from scanfab.pipeline.tolerance import missing_work
+from scanfab.pipeline.tolerance import TOLERANCE_MISSED, missing_work
 from scanfab.scan.directions import direction_rule
 from scanfab.table.table import Row
 
@@ -93,7 +94,7 @@ class Calibration:
 
 
 def calibrate(
-    source: Packing | Series, settings: Settings | None = None, *, frame: int = -1
+    source: Packing | Series, *, frame: int = -1, variants: str = "cd", **options: Any
 ) -> Calibration:
     """
     How the void fabric of one frame changes with the settings of the scan.
@@ -103,12 +104,14 @@ def calibrate(
     source : Packing or Series
         Lengths relative to radii and the RV come from the first frame of the series that has
         grains, as for :func:`scanfab.compute`.
-    settings : Settings, optional
-        ``directions`` are those of the ladder of spacings, ``spacing`` that of the ladder of
-        directions; the cut-offs and RVs are scanned to the ``tolerance``. Variants c and d by
-        default.
     frame : int, optional
         Which frame, the last by default.
+    variants : str, optional
+        Letters out of abcd.
+    **options
+        Those of :func:`scanfab.compute`: ``directions`` are those of the ladder of spacings,
+        ``spacing`` that of the ladder of directions; the cut-offs and RVs are scanned to the
+        ``tolerance``.
 
     Returns
     -------
@@ -122,18 +125,21 @@ def calibrate(
     ------
     SettingsError
         If there is no such frame, or no step has a void fabric.
+    TypeError
+        If there is no such option; names the nearest that there is.
 
     Examples
     --------
     >>> import numpy as np
-    >>> from scanfab import Packing, Settings, calibrate
+    >>> from scanfab import Packing, calibrate
     >>> grid = np.stack(np.meshgrid(*3 * [np.arange(6.0)]), axis=-1).reshape(-1, 3)
-    >>> settings = Settings(variants="c", tolerance=0.01, rv=0.6, contact_tolerance=1e-4)
-    >>> found = calibrate(Packing(grid, 0.5), settings)
+    >>> options = {"tolerance": 0.01, "rv": 0.6, "contact_tolerance": 1e-4}
+    >>> found = calibrate(Packing(grid, 0.5), variants="c", **options)
     >>> sorted({row.ladder for row in found.rows})
     ['cutoff', 'directions', 'recommended', 'rv', 'spacing']
     """
-    settings = settings or Settings(variants="cd")
+    refuse_unknown("calibrate", options, [one.name for one in options_of(Settings)])
+    settings = Settings(variants=variants, **options)
     if settings.lists_gaps:
         raise SettingsError("calibrate: cutoffs and moment have no meaning for its ladders")
     return _Calibrator(source, settings, frame).all()
@@ -146,13 +152,11 @@ class _Calibrator:
         self.name = "" if isinstance(source, Packing) else source.name
         self.settings = settings
         self.first, self.number, self.sample = _samples(source, settings, frame)
-        doubt = self.sample.doubt_of_escaped()
-        if doubt is not None:
-            warnings.warn(f"frame {self.number}: {doubt}", ScanfabWarning, stacklevel=3)
+        tell(self.sample.doubts_of_escaped(), f"frame {self.number}")
         radius = self.first.packing.radius[self.first.grains]
         self.r_min = float(radius.min())
-        # its warnings concern every step
-        make_plan(settings, self.first)
+        # what it says concerns every step
+        tell(make_plan(settings, self.first).notes)
 
     def all(self) -> Calibration:
         """The ladders, what they say, and what follows."""
@@ -213,22 +217,21 @@ class _Calibrator:
         except SettingsError as error:
             if ladder == "cutoff":
                 raise
-            warnings.warn(f"{ladder} {value:g} left out: {error}", ScanfabWarning, stacklevel=2)
+            tell([Note("step_left_out", f"{ladder} {value:g} left out: {error}")])
 
     def _measured(
         self, ladder: str, value: float | None, settings: Settings
     ) -> tuple[list[StepRow], Measurement]:
         """The rows of one step, and what they were made from."""
         begun = time.perf_counter()
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            plan = make_plan(settings, self.first)
-            self._check_budget(ladder, plan)
-            result = frame_result(self.name, self.number, self.sample, plan, settings, None)
+        plan = make_plan(settings, self.first)
+        self._check_budget(ladder, plan)
+        result = compute_frame(self.sample, plan, number=self.number, source=self.name)
         seconds = time.perf_counter() - begun
         LOGGER.info("%s %s: %.2g s", ladder, "" if value is None else f"{value:g}", seconds)
         rows = [
-            self._row(row, ladder, value, plan, seconds, _notes(caught, row)) for row in result.rows
+            self._row(row, ladder, value, plan, seconds, _told(result.notes, row.variant))
+            for row in result.rows
         ]
         return rows, result.scanned
 
@@ -298,7 +301,7 @@ class _Calibrator:
                 seed=self.settings.seed + 1,
             )
             found = self._measured("recommended", len(rule), settings)[1]
-            missing = missing_work(found.sums, found.plan, settings)
+            missing = missing_work(found.sums, found.plan, settings.variants)
             if missing <= 1.0:
                 break
             wanted = len(rule) * missing
@@ -320,18 +323,16 @@ def _samples(
     first = frames.first()
     if first is None:
         raise PackingError("no frame has any grains: there is nothing to calibrate")
-    frames.tell_doubts(*first[1:])
+    tell(frames.notes(*first[1:]))
     sample = first[2] if first[0] == number else frames.sample(number, one)
     if sample is None or not sample.grains.any():
         raise PackingError(f"frame {number} has no grains: choose another frame")
     return first[2], number, sample
 
 
-def _notes(caught: list[warnings.WarningMessage], row: Row) -> str:
-    """The scan's own warnings about one row."""
-    texts = [str(one.message) for one in caught if issubclass(one.category, ScanfabWarning)]
-    named = [re.search(r"variants? ([a-d](?:, [a-d])*): (.*)", text) for text in texts]
-    own = [match[2] for match in named if match and row.variant in match[1].split(", ")]
-    return "; ".join(
-        dict.fromkeys(own + [text for text in texts if "before the tolerance" in text])
-    )
+def _told(notes: Iterable[Note], variant: str) -> str:
+    """What the scan itself said of one row."""
+    # errors at other cut-offs than the scan's stand in the rows themselves
+    own = [one for one in notes if variant in one.variants and one.code != OTHER_CUTOFFS]
+    whole = [one for one in notes if one.code == TOLERANCE_MISSED]
+    return "; ".join(one.text for one in (*own, *whole))

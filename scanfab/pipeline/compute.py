@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 import logging
+import os
 import time
+import warnings
 from collections.abc import Callable, Container, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import chain, islice
 from pathlib import Path
 
+from scanfab.base.errors import PackingError, ReadError
+from scanfab.base.note import SKIPPED, Note, tell
 from scanfab.base.option import options_of, takes_options
 from scanfab.base.threads import in_order
-from scanfab.io.series import Series
-from scanfab.packing.packing import Packing
+from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
-from scanfab.pipeline.frame import FrameResult, frame_result
-from scanfab.pipeline.frames import Frames, Readable
-from scanfab.pipeline.plan import Plan, make_plan
+from scanfab.pipeline.frame import FrameResult, compute_frame
+from scanfab.pipeline.frames import Frames, Readable, Source
+from scanfab.pipeline.plan import Plan, make_plan, plan_without_grains
 from scanfab.pipeline.settings import MAX_CHORDS, Settings
-from scanfab.pipeline.strain import Strains
+from scanfab.pipeline.strain import Flips, Strains
 from scanfab.scan.directions import DirectionRule
 from scanfab.table.table import Row, Table
 
@@ -33,8 +36,9 @@ Observer = Callable[[FrameResult], None]
 
 @takes_options(options_of(Settings))
 def compute(
-    source: Packing | Series,
+    source: Source,
     *,
+    executor: Executor | None = None,
     variants: str = "abcd",
     rv: float = 0.7,
     rv_radius: float | None = None,
@@ -65,8 +69,13 @@ def compute(
 
     Parameters
     ----------
-    source : Packing or Series
-        One frame, or what :func:`scanfab.read_series` returns: one frame in memory at a time.
+    source : Packing, Series or iterable of Packing
+        One frame, or many: what :func:`scanfab.read_series` returns, or packings from anywhere, for
+        instance a generator that yields those of a running simulation. One frame a worker is in
+        memory, unless `frames` counts from the end of an iterable.
+    executor : concurrent.futures.Executor, optional
+        Computes the frames in place of threads of this process, `workers` of them at a time, each
+        scanned by one thread.
     {options}
 
     Returns
@@ -92,34 +101,88 @@ def compute(
     """
     given = locals()
     settings = Settings(**{option.name: given[option.name] for option in options_of(Settings)})
-    return Table(compute_rows(source, settings))
+    return Table(compute_rows(source, settings, executor=executor))
 
 
 def compute_rows(
-    source: Packing | Series,
+    source: Source,
     settings: Settings,
     *,
     done: Container[int] = (),
     observe: Observer | None = None,
+    executor: Executor | None = None,
 ) -> Iterator[Row]:
     """
     The rows of :func:`compute`, in the order of the frames, each as soon as it may come.
 
     Parameters
     ----------
-    source, settings
+    source, settings, executor
         As for :func:`compute`.
     done : container of int, optional
         Leave out these frames, which an earlier run has computed.
     observe : callable, optional
-        Called with the :class:`FrameResult` of each frame, by the thread that computed it.
+        Called with the :class:`FrameResult` of each frame, where that is computed.
     """
-    run = _Run(Frames(source, settings), done, observe)
-    with _Pool(settings.workers) as pool:
-        for rows in pool.in_order(run.jobs()):
-            yield from rows
-    if run.plan is None:
-        run.frames.complain_of_no_grains()
+    run = _Run(Frames(source, settings))
+    with _Pool(settings.workers, executor) as pool:
+        for computed in pool.in_order(run.jobs(done, observe)):
+            run.tell(computed)
+            yield from computed.rows
+    if not run.has_grains:
+        tell([run.frames.without_grains()], run.frames.name)
+
+
+@dataclass(frozen=True, eq=False)
+class _Computed:
+    """What comes back of a frame, also from another process."""
+
+    number: int
+    rows: list[Row] = field(default_factory=list)
+    notes: tuple[Note, ...] = ()
+    cell: Cell | None = None
+    """None also if the frame has no grains."""
+    heard: tuple[Warning, ...] = ()
+    """Warnings of another process, where nobody hears them."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Job:
+    """One frame to be computed, here or in another process."""
+
+    frame: Sample | Readable
+    plan: Plan
+    number: int
+    source: str
+    skips_damaged: bool
+    observe: Observer | None
+    home: int
+    """The process that hears warnings."""
+
+    def __call__(self, threads: int) -> _Computed:
+        plan = replace(self.plan, workers=threads)
+        if os.getpid() == self.home:
+            return self._computed(plan)
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            found = self._computed(plan)
+        heard = tuple(one.message for one in caught if isinstance(one.message, Warning))
+        return replace(found, heard=heard)
+
+    def _computed(self, plan: Plan) -> _Computed:
+        begun = time.perf_counter()
+        try:
+            found = compute_frame(self.frame, plan, number=self.number, source=self.source)
+        except (PackingError, ReadError) as error:
+            if not self.skips_damaged:
+                raise
+            return _Computed(self.number, notes=(Note(SKIPPED, str(error)),))
+        seconds, grains = time.perf_counter() - begun, int(found.sample.grains.sum())
+        LOGGER.info("%s: frame %d: %d grains in %.2g s", self.source, self.number, grains, seconds)
+        if self.observe is not None:
+            self.observe(found)
+        cell = found.sample.packing.cell if grains else None
+        return _Computed(self.number, found.rows, found.notes, cell)
 
 
 class _Run:
@@ -130,61 +193,66 @@ class _Run:
     another.
     """
 
-    def __init__(self, frames: Frames, done: Container[int], observe: Observer | None) -> None:
+    def __init__(self, frames: Frames) -> None:
         self.frames = frames
-        self.settings = frames.settings
-        self.done = done
-        self.observe = observe
-        self.plan: Plan | None = None
-        self.strains = Strains(frames.settings)
+        self.has_grains = False
+        self._flips = Flips(frames.settings.frames.step)
 
-    def jobs(self) -> Iterator[Callable[[int], list[Row]]]:
-        """For each chosen frame what computes its rows, with a number of threads."""
-        first = self.frames.first()
-        if first is not None:
-            self._start(*first[1:])
+    def jobs(self, done: Container[int], observe: Observer | None) -> Iterator[_Job]:
+        """The chosen frames that are not done."""
+        plan = self._plan()
+        name, skips = self.frames.name, self.frames.settings.on_error == "skip"
         for number, frame in self.frames.due():
-            if number not in self.done:
-                yield partial(self._rows, number, frame)
+            known = self.frames.sample_if_read(number, frame)
+            if number not in done and known is not None:
+                yield _Job(known, plan, number, name, skips, observe, os.getpid())
 
-    def _start(self, frame: Readable, sample: Sample) -> None:
-        """Make the plan."""
-        self.frames.tell_doubts(frame, sample)
-        self.plan = make_plan(self.settings, sample)
-        self.strains.start(sample)
+    def _plan(self) -> Plan:
+        """Settings end here."""
+        settings = self.frames.settings
+        strains = Strains.of(settings)
+        first = self.frames.first()
+        if first is None:
+            return plan_without_grains(settings)
+        self.has_grains = True
+        _, frame, sample = first
+        tell(self.frames.notes(frame, sample))
+        plan = make_plan(settings, sample, strains)
+        tell(plan.notes)
+        return plan
 
-    def _rows(self, number: int, frame: Readable, threads: int) -> list[Row]:
-        sample = self.frames.sample(number, frame)
-        if sample is None:
-            return []
-        settings = replace(self.settings, workers=threads)
-        strains = self.strains.at(number, sample)
-        begun = time.perf_counter()
-        result = frame_result(self.frames.name, number, sample, self.plan, settings, *strains)
-        seconds, grains = time.perf_counter() - begun, int(sample.grains.sum())
-        LOGGER.info("%s: frame %d: %d grains in %.2g s", self.frames.name, number, grains, seconds)
-        if self.observe is not None:
-            self.observe(result)
-        return result.rows
+    def tell(self, computed: _Computed) -> None:
+        """Tell what there is to tell of a frame."""
+        for warning in computed.heard:
+            warnings.warn(warning, stacklevel=3)
+        tell(computed.notes, f"frame {computed.number}")
+        tell(self._flips.notes(computed.number, computed.cell))
 
 
 class _Pool:
-    """Threads that compute frames; with few frames, each has more of them for its scan."""
+    """What computes frames; with few frames, each has more threads for its scan."""
 
-    def __init__(self, workers: int) -> None:
+    def __init__(self, workers: int, executor: Executor | None) -> None:
         self.workers = workers
-        self._pool = ThreadPoolExecutor(workers)
+        self.executor = executor
+        self._own = None if executor is not None else ThreadPoolExecutor(workers)
 
     def __enter__(self) -> _Pool:
         return self
 
     def __exit__(self, *_: object) -> None:
         # an interrupted run does not wait for the frames under way
-        self._pool.shutdown(wait=False, cancel_futures=True)
+        if self._own is not None:
+            self._own.shutdown(wait=False, cancel_futures=True)
 
-    def in_order(self, jobs: Iterator[Callable[[int], list[Row]]]) -> Iterator[list[Row]]:
+    def in_order(self, jobs: Iterator[_Job]) -> Iterator[_Computed]:
         """The results in the order of the jobs, of which one a worker is under way."""
         first = list(islice(jobs, self.workers))
         threads = max(1, self.workers // max(len(first), 1))
+        pool = self._own or self.executor
+        assert pool is not None
+        if self._own is None:
+            # how many processors there are elsewhere, only the executor knows
+            threads = 1
         every = (partial(job, threads) for job in chain(first, jobs))
-        return in_order(self._pool, every, self.workers)
+        return in_order(pool, every, self.workers)

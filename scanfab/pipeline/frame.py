@@ -1,23 +1,26 @@
-"""One frame: from its classified grains and contacts to the rows of the fabric table."""
+"""One frame: from its grains and contacts to the rows of the fabric table."""
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from scanfab.base.errors import ScanfabWarning
+from scanfab.base.note import Note, joined
 from scanfab.base.spelling import spelt_apart
+from scanfab.packing.packing import Packing
 from scanfab.packing.sample import VARIANTS, Sample
+from scanfab.pipeline.frames import Readable
 from scanfab.pipeline.measurement import Measurement, measure
 from scanfab.pipeline.plan import Plan
-from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.variant_columns import VariantColumns, no_columns
 from scanfab.table.columns import complete_row
 from scanfab.table.row import Row
 
-__all__ = ["FrameResult", "frame_result"]
+__all__ = ["OTHER_CUTOFFS", "FrameResult", "compute_frame"]
+
+OTHER_CUTOFFS = "error_at_other_cutoffs"
+"""The code of a note: the scan is fine enough for its cut-off, but not for another."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +33,8 @@ class FrameResult:
     measurement: Measurement | None
     """None if there is nothing to scan."""
     rows: list[Row]
+    notes: tuple[Note, ...] = ()
+    """What is doubtful about them."""
 
     @property
     def scanned(self) -> Measurement:
@@ -38,68 +43,75 @@ class FrameResult:
         return self.measurement
 
 
-def frame_result(
-    name: str,
-    number: int,
-    sample: Sample,
-    plan: Plan | None,
-    settings: Settings,
-    strain: float | None,
-    shear_strain: float | None = None,
+def compute_frame(
+    frame: Packing | Sample | Readable, plan: Plan, *, number: int = 0, source: str = ""
 ) -> FrameResult:
-    """Scan one frame; of a frame without grains there are rows without numbers."""
-    frame: dict[str, Any] = {
-        "source": name,
+    """
+    Compute one frame of a series; frames do not depend on one another.
+
+    Parameters
+    ----------
+    frame : Packing, Sample or Frame
+        What is not read yet, is read here.
+    plan : Plan
+        Of the series: the same for all its frames.
+    number : int, optional
+        Of the frame in the series, from 0.
+    source : str, optional
+        The name of the series.
+
+    Returns
+    -------
+    FrameResult
+        With rows without numbers if the frame has no grains.
+
+    Raises
+    ------
+    ScanfabError
+        If the frame cannot be read or measured.
+    """
+    if not isinstance(frame, Sample):
+        packing = frame if isinstance(frame, Packing) else frame.read()
+        frame = plan.samples.sample(packing)
+    known: dict[str, Any] = {
+        "source": source,
         "frame": number,
-        "step": sample.packing.step,
-        "time": sample.packing.time,
-        "strain": strain,
-        "shear_strain": shear_strain,
-        "contacts_from": sample.contacts.source,
+        "step": frame.packing.step,
+        "time": frame.packing.time,
+        "contacts_from": frame.contacts.source,
+        **plan.strains.at(number, frame),
     }
-    if plan is None or not sample.grains.any():
-        empty = [
-            complete_row({**no_columns(), **frame, "variant": variant})
-            for variant in settings.variants
-            for _ in settings.cutoffs or (settings.cutoff,)
-        ]
-        return FrameResult(name, number, sample, None, empty)
-    doubt = sample.doubt_of_escaped()
-    if doubt is not None:
-        warnings.warn(f"frame {number}: {doubt}", ScanfabWarning, stacklevel=2)
-    measurement = measure(sample, plan, settings, f"frame {number}")
-    rows = []
-    doubts: dict[str, list[str]] = {}
-    for variant in settings.variants:
-        for place in range(len(plan.cutoffs)):
-            row = VariantColumns(measurement, VARIANTS[variant], place, settings)
-            rows.append(complete_row({**frame, "variant": variant, **row.columns()}))
-            for text in row.doubts():
-                doubts.setdefault(text, []).append(variant)
-    for text, variants in doubts.items():
-        warnings.warn(f"frame {number}, {_named(variants)}: {text}", ScanfabWarning, stacklevel=2)
-    if plan.auto and settings.lists_gaps:
-        _warn_of_large_errors(rows, plan, settings)
-    return FrameResult(name, number, sample, measurement, rows)
+    if not frame.grains.any():
+        empty = {**no_columns(), **known}
+        rows = [complete_row({**empty, "variant": v}) for v in plan.variants for _ in plan.cutoffs]
+        return FrameResult(source, number, frame, None, rows)
+    measurement = measure(frame, plan, f"frame {number}")
+    columns = [
+        VariantColumns(measurement, VARIANTS[variant], place)
+        for variant in plan.variants
+        for place in range(len(plan.cutoffs))
+    ]
+    rows = [complete_row({**known, "variant": c.variant.name, **c.columns()}) for c in columns]
+    notes = [
+        *frame.doubts_of_escaped(),
+        *measurement.notes,
+        *joined(note for one in columns for note in one.notes()),
+        *_large_errors(rows, plan),
+    ]
+    return FrameResult(source, number, frame, measurement, rows, tuple(notes))
 
 
-def _named(variants: Sequence[str]) -> str:
-    """The variants that a message is about, each once."""
-    named = list(dict.fromkeys(variants))
-    return f"variant{'s' if len(named) > 1 else ''} {', '.join(named)}"
-
-
-def _warn_of_large_errors(rows: list[Row], plan: Plan, settings: Settings) -> None:
+def _large_errors(rows: list[Row], plan: Plan) -> Iterator[Note]:
     """Other cut-offs and the second moment are measured along lines that are chosen for one."""
+    if not (plan.auto and plan.lists_gaps):
+        return
     worst = max(rows, key=lambda row: row.alpha_vs_axial_se or 0.0)
     error = worst.alpha_vs_axial_se or 0.0
-    if error > settings.tolerance:
-        reached, tolerance = spelt_apart(error, settings.tolerance)
-        warnings.warn(
-            f"frame {worst.frame}, variant {worst.variant}, cut-off {worst.cutoff:g}: "
-            f"alpha_vs_axial_se is {reached}, above the tolerance {tolerance}, which "
-            f"holds for the mean length at the cut-off {plan.cutoff:g}: choose a smaller "
-            f"`tolerance`",
-            ScanfabWarning,
-            stacklevel=3,
+    if error > plan.tolerance:
+        reached, tolerance = spelt_apart(error, plan.tolerance)
+        text = (
+            f"at the cut-off {worst.cutoff:g} alpha_vs_axial_se is {reached}, above the tolerance "
+            f"{tolerance}, which holds for the mean length at the cut-off {plan.cutoff:g}: choose "
+            f"a smaller `tolerance`"
         )
+        yield Note(OTHER_CUTOFFS, text, (worst.variant,))

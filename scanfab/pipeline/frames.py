@@ -2,31 +2,41 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 from scanfab.base.errors import (
     PackingError,
     ReadError,
-    ScanfabWarning,
     SettingsError,
-    SkippedFrameWarning,
 )
+from scanfab.base.note import SKIPPED, Note, tell
 from scanfab.io.reader import Carries
 from scanfab.io.series import ENDLESS, Series
-from scanfab.packing.boundary import enclosing_class, existing_values, select_boundary
+from scanfab.packing.boundary import enclosing_class, existing_values
 from scanfab.packing.doubts import cell_doubt, doubts_of
 from scanfab.packing.packing import Packing
-from scanfab.packing.sample import Sample
-from scanfab.packing.search import find_contacts
+from scanfab.packing.sample import Sample, SampleRule
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import as_written
 
-__all__ = ["Frames", "Readable", "boundary_hint", "chosen_frames", "of_whole"]
+__all__ = [
+    "Frames",
+    "Readable",
+    "Source",
+    "boundary_hints",
+    "chosen_frames",
+    "of_whole",
+    "sample_rule",
+]
+
+
+Source = Packing | Series | Iterable[Packing]
+"""One frame, a series that is read frame by frame, or packings from anywhere."""
 
 
 class Readable(Protocol):
@@ -53,6 +63,43 @@ class _Given:
         return self.packing
 
 
+class _Stream:
+    """Packings that come one after the other, for instance out of a running simulation."""
+
+    name = ""
+
+    def __init__(self, packings: Iterable[Packing]) -> None:
+        self._coming = iter(packings)
+        self._kept: deque[_Given] = deque()
+        self._number_taken = 0
+
+    def __iter__(self) -> Iterator[_Given]:
+        """Those that are not taken yet; what has come is kept until it is taken."""
+        number = 0
+        while number < len(self._kept) or self._kept_another():
+            yield self._kept[number]
+            number += 1
+
+    def taken(self) -> Iterator[_Given]:
+        """Each for the last time, so that no more of them are in memory than need be."""
+        while self._kept or self._kept_another():
+            self._number_taken += 1
+            yield self._kept.popleft()
+
+    def count(self) -> int:
+        """How many there are in all."""
+        return sum(1 for _ in self) + self._number_taken
+
+    def _kept_another(self) -> bool:
+        """Whether there was one more, which is kept now."""
+        for packing in self._coming:
+            if not isinstance(packing, Packing):
+                raise SettingsError(f"expected packings, found {packing!r} among them")
+            self._kept.append(_Given(packing))
+            return True
+        return False
+
+
 class Frames:
     """
     One source, frame by frame, for all that look at samples; a packing is a series of one.
@@ -63,7 +110,7 @@ class Frames:
 
     Parameters
     ----------
-    source : Packing or Series
+    source : Packing, Series or iterable of Packing
         One frame, or many.
     settings : Settings
         ``frames``, ``on_error``, ``boundary``, ``min_contacts`` and ``contact_tolerance`` count.
@@ -74,11 +121,19 @@ class Frames:
         If the source is something else.
     """
 
-    def __init__(self, source: Packing | Series, settings: Settings) -> None:
-        if not isinstance(source, Packing | Series):
-            raise SettingsError(f"expected a Packing or a Series, found {source!r}")
-        self.source, self.settings = of_whole(source, settings)
-        self.name = "" if isinstance(source, Packing) else source.name
+    def __init__(self, source: Source, settings: Settings) -> None:
+        if isinstance(source, Packing):
+            source = [source]
+        if isinstance(source, str) or not isinstance(source, Iterable):
+            raise SettingsError(
+                f"expected a Packing, a Series or an iterable of packings, found {source!r}"
+            )
+        self.source: Series | _Stream
+        if isinstance(source, Series):
+            self.source, self.settings = of_whole(source, settings)
+        else:
+            self.source, self.settings = _Stream(source), settings
+        self.name = self.source.name
         self.particles = 0
         """Of the frames that were read on the way to the first that has grains."""
         self._ready: dict[int, Sample | None] = {}
@@ -89,10 +144,7 @@ class Frames:
 
     def __iter__(self) -> Iterator[tuple[int, Readable]]:
         """All frames with their numbers, not read."""
-        if isinstance(self.source, Packing):
-            yield 0, _Given(self.source)
-        else:
-            yield from enumerate(self.source)
+        return enumerate(self.source)
 
     @cached_property
     def chosen(self) -> range:
@@ -101,26 +153,32 @@ class Frames:
 
     def due(self) -> Iterator[tuple[int, Readable]]:
         """
-        The chosen frames with their numbers, not read.
+        The chosen frames with their numbers, not read; the last time that frames are gone through.
 
         Raises
         ------
         SettingsError
             At the end, if there is none.
         """
-        found = False
-        for number, frame in self:
-            if number in self.chosen:
+        # where they are counted from the end, that comes first
+        chosen, found = self.chosen, False
+        stream = self.source
+        last_time: Iterable[Readable] = stream.taken() if isinstance(stream, _Stream) else stream
+        for number, frame in enumerate(last_time):
+            if number in chosen:
                 found = True
                 yield number, frame
-            if number >= self.chosen.stop - 1:
+            if number >= chosen.stop - 1:
                 break
         if not found:
             raise self.no_such_frames()
 
     def one(self) -> tuple[int, Readable]:
         """The first chosen frame; SettingsError if there is none."""
-        return next(self.due())
+        for number, frame in self:
+            if number in self.chosen:
+                return number, frame
+        raise self.no_such_frames()
 
     def first(self) -> tuple[int, Readable, Sample] | None:
         """
@@ -139,7 +197,7 @@ class Frames:
                 continue
             self.particles += len(sample.packing)
             if sample.grains.any():
-                self.refuse_unknown_boundary(sample)
+                tell(self.check_boundary(sample))
                 return number, frame, sample
         return None
 
@@ -152,39 +210,40 @@ class Frames:
         except (PackingError, ReadError) as error:
             if self.settings.on_error == "stop":
                 raise
-            warnings.warn(f"frame {number} skipped: {error}", SkippedFrameWarning, stacklevel=2)
+            tell([Note(SKIPPED, str(error))], f"frame {number}")
             return None
 
-    def tell_doubts(self, frame: Readable, sample: Sample) -> None:
-        """Warn of what looks wrong in a frame before anything is measured."""
-        doubts = doubts_of(sample, cell_is_named=frame.cell_is_named)
-        doubts.append(cell_doubt(sample, frame.carries))
-        if not self.settings.boundary:
-            doubts.append(boundary_hint(sample, self.settings) or "")
-        for doubt in filter(None, doubts):
-            warnings.warn(doubt, ScanfabWarning, stacklevel=3)
+    def sample_if_read(self, number: int, frame: Readable) -> Sample | Readable | None:
+        """The same of a frame that has been read on the way to the first; else the frame."""
+        return self._ready.pop(number, frame)
 
-    def complain_of_no_grains(self) -> None:
-        """An error or a warning: no frame has any."""
+    def notes(self, frame: Readable, sample: Sample) -> list[Note]:
+        """What looks wrong in a frame before anything is measured."""
+        notes = doubts_of(sample, cell_is_named=frame.cell_is_named)
+        if no_cell := cell_doubt(sample, frame.carries):
+            notes.append(Note("no_cell", no_cell))
+        if not self.settings.boundary:
+            notes += boundary_hints(sample, self.settings)
+        return notes
+
+    def without_grains(self) -> Note:
+        """What to tell where no frame has any; SettingsError if the boundary takes them all."""
         if self.particles:
             named = " or ".join(rule.text for rule in self.settings.boundary)
             raise SettingsError(
                 f"boundary: {named} selects all particles of every frame: no grain is left"
             )
-        warnings.warn(f"{self.name}: no frame has any grains", ScanfabWarning, stacklevel=3)
+        return Note("no_grains", "no frame has any grains")
 
     def read(self, frame: Readable) -> Sample:
         """A frame told apart, by its contacts and the boundary; raises if it is damaged."""
-        packing, settings = frame.read(), self.settings
-        if packing.contacts is None:
-            packing = find_contacts(packing, settings.contact_tolerance)
-        return Sample(packing, select_boundary(packing, settings.boundary), settings.min_contacts)
+        return sample_rule(self.settings).sample(frame.read())
 
-    def refuse_unknown_boundary(self, first: Sample) -> None:
+    def check_boundary(self, first: Sample) -> list[Note]:
         """
         SettingsError if no frame has any of the boundary's particles.
 
-        A warning if one rule fits none. Particles may come in later frames, so those are looked
+        A note if one rule fits none. Particles may come in later frames, so those are looked
         through if the ``first`` has none.
         """
         rules = self.settings.boundary
@@ -196,17 +255,17 @@ class Frames:
             if not missing:
                 break
         if not missing:
-            return
+            return []
         named = " or ".join(rule.text for rule in missing)
         values = existing_values(first.packing, missing)
         message = f"boundary: no particle of any frame has {named}: {values}"
         if len(missing) == len(rules):
             raise SettingsError(message)
-        warnings.warn(message, ScanfabWarning, stacklevel=4)
+        return [Note("no_such_boundary", message)]
 
     def no_such_frames(self) -> SettingsError:
         """The error for a choice that meets no frame."""
-        count = sum(1 for _ in self)
+        count = self.source.count() if isinstance(self.source, _Stream) else len(list(self.source))
         name, frames = self.name or "the packing", self.settings.frames
         has = "1 frame, 0" if count == 1 else f"{count} frames, 0 to {count - 1}"
         return SettingsError(
@@ -214,38 +273,54 @@ class Frames:
         )
 
 
-def chosen_frames(source: Packing | Series, frames: slice) -> range:
+def sample_rule(settings: Settings) -> SampleRule:
+    """What settings say of how particles are told apart."""
+    return SampleRule(settings.boundary, settings.min_contacts, settings.contact_tolerance)
+
+
+def chosen_frames(source: Iterable[Any], frames: slice) -> range:
     """The frames to compute, in the order of the source."""
-    chosen = range(1)[frames] if isinstance(source, Packing) else source.numbers_of(frames)
+    chosen = _numbers(source, frames)
     return chosen if chosen.step > 0 else chosen[::-1]
 
 
-def of_whole(source: Packing | Series, settings: Settings) -> tuple[Packing | Series, Settings]:
+def _numbers(source: Iterable[Any], frames: slice) -> range:
+    if isinstance(source, Series):
+        return source.numbers_of(frames)
+    bounds = (frames.start, frames.stop, frames.step)
+    if any(bound is not None and bound < 0 for bound in bounds):
+        return range(sum(1 for _ in source))[frames]
+    # without counting the frames first: they may still come
+    return range(ENDLESS)[frames]
+
+
+def of_whole(series: Series, settings: Settings) -> tuple[Series, Settings]:
     """
     The whole of a series of which some frames are given, and settings that choose these.
 
     Which frames are asked for decides neither RV, rmin nor L0, whichever way it is said.
     """
-    if isinstance(source, Packing) or source.is_whole:
-        return source, settings
-    chosen = chosen_frames(source, settings.frames)
+    if series.is_whole:
+        return series, settings
+    chosen = chosen_frames(series, settings.frames)
     stop = None if chosen.stop >= ENDLESS else chosen.stop
     step = None if chosen.step == 1 else chosen.step
-    return source.whole, replace(settings, frames=slice(chosen.start, stop, step))
+    return series.whole, replace(settings, frames=slice(chosen.start, stop, step))
 
 
-def boundary_hint(sample: Sample, settings: Settings) -> str | None:
+def boundary_hints(sample: Sample, settings: Settings) -> list[Note]:
     """What to tell of boundary particles that are not named, or of a name that fits none."""
     if settings.boundary:
         named = " or ".join(rule.text for rule in settings.boundary)
         if sample.boundary.any():
-            return None
+            return []
         values = existing_values(sample.packing, settings.boundary)
-        return f"boundary: no particle has {named}: {values}"
+        return [Note("no_such_boundary", f"boundary: no particle has {named}: {values}")]
     expression = enclosing_class(sample.packing)
     if expression is None:
-        return None
-    return (
+        return []
+    text = (
         f"the particles with {expression} enclose the others: if they are a boundary, "
         f'name them: `boundary="{expression}"`'
     )
+    return [Note("unnamed_boundary", text)]

@@ -10,12 +10,13 @@ from typing import Annotated
 
 from scanfab.base.column import LENGTH
 from scanfab.base.errors import PackingError, ReadError, ScanfabNote
+from scanfab.base.note import tell
 from scanfab.io.frame import Frame
 from scanfab.io.series import Series
 from scanfab.packing.doubts import cell_doubt, cell_hint, doubts_of, refuse_impossible
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import SurfaceBox, Window
-from scanfab.pipeline.frames import Frames, boundary_hint
+from scanfab.pipeline.frames import Frames, boundary_hints
 from scanfab.pipeline.plan import rv_of
 from scanfab.pipeline.settings import Settings
 from scanfab.table.row import Record
@@ -113,7 +114,7 @@ def _rv(frames: Frames, sample: Sample) -> Window | None:
     """The RV, and a word on the boundary, from the first frame that has grains."""
     if not sample.grains.any():
         return None
-    frames.refuse_unknown_boundary(sample)
+    tell(frames.check_boundary(sample))
     return rv_of(sample, frames.settings)
 
 
@@ -156,17 +157,15 @@ def _report(
 
 def _hints(frame: Frame, sample: Sample, settings: Settings) -> list[str]:
     """What looks wrong, also what makes the frame impossible to measure."""
-    hints = [boundary_hint(sample, settings)] if len(sample.packing) else []
+    hints = [one.text for one in boundary_hints(sample, settings)] if len(sample.packing) else []
     try:
         refuse_impossible(sample)
     except PackingError as error:
         hints.append(str(error))
     no_cell = cell_doubt(sample, frame.carries)
-    hints += [
-        *doubts_of(sample, cell_is_named=frame.cell_is_named),
-        no_cell,
-        sample.doubt_of_escaped(),
-    ]
+    hints += [one.text for one in doubts_of(sample, cell_is_named=frame.cell_is_named)]
+    hints += [no_cell] if no_cell else []
+    hints += [one.text for one in sample.doubts_of_escaped()]
     if not no_cell and (hint := cell_hint(sample, frame.carries)):
         warnings.warn(hint, ScanfabNote, stacklevel=2)
-    return [hint for hint in hints if hint]
+    return hints

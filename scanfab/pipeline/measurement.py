@@ -10,10 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.convex import Convex, sphere
+from scanfab.base.note import Note
 from scanfab.base.typing import FloatArray
 from scanfab.packing.sample import Sample, Variant
 from scanfab.pipeline.plan import CLOSE, Plan
-from scanfab.pipeline.settings import AUTO_RULE, Settings
+from scanfab.pipeline.settings import AUTO_RULE
 from scanfab.pipeline.solids import solids_of
 from scanfab.pipeline.tolerance import scan_to_tolerance
 from scanfab.scan.directions import DirectionRule, design_of, direction_rule
@@ -56,8 +57,8 @@ class Measurement:
     """The directions of these lines."""
     blocks: tuple[Blocks, Blocks]
     """Octants of the whole sample and of the window, of places in the dump's coordinates."""
-    moment: int
-    """1: ℓ is the mean length; 2: the mean of squares over the mean."""
+    notes: tuple[Note, ...] = ()
+    """What the scan did not reach."""
 
     def kept(
         self, variant: str, place: int = 0
@@ -65,7 +66,7 @@ class Measurement:
         """As :meth:`GapSums.kept`, at one of the plan's cut-offs, with the moment of the table."""
         if self.gaps is None:
             return self.sums.kept(variant)
-        return self.gaps.kept(variant, place, self.moment)
+        return self.gaps.kept(variant, place, self.plan.moment)
 
     def spheres_of(self, variant: Variant) -> tuple[FloatArray, FloatArray, Convex | None]:
         """
@@ -86,25 +87,23 @@ class Measurement:
         return position[solid], radius[solid], window
 
 
-def measure(
-    sample: Sample, plan: Plan, settings: Settings, where: str = "the frame"
-) -> Measurement:
-    """Scan one frame that has grains; ``where`` names it in messages."""
-    solids = solids_of(sample, plan.window, variants=settings.variants)
-    sums, plan = scan_to_tolerance(solids, plan, settings, where)
-    blocks = _blocks(sample, plan, settings)
+def measure(sample: Sample, plan: Plan, where: str = "the frame") -> Measurement:
+    """Scan one frame that has grains; ``where`` names it where progress is told."""
+    solids = solids_of(sample, plan.window, variants=plan.variants)
+    sums, plan, notes = scan_to_tolerance(solids, plan, where)
+    blocks = _blocks(sample, plan)
     origin = solids.origin
     lines: dict[str, Any] = {
         "cutoffs": plan.cutoffs,
         "blocks": tuple(Blocks(one.matrix, one.shift + one.matrix @ origin) for one in blocks),
-        "variants": settings.variants,
-        "seed": settings.seed,
-        "workers": settings.workers,
+        "variants": plan.variants,
+        "seed": plan.seed,
+        "workers": plan.workers,
         # what these scans take is known from the one before them
         "most_steps": math.inf,
     }
     gaps: GapSums | None = None
-    if settings.lists_gaps:
+    if plan.lists_gaps:
         every = range(sums.replicates)
         gaps = scan_gaps(solids, plan.rule, spacing=plan.spacing, replicates=every, **lines)
     block_rule = _block_rule(solids)
@@ -115,25 +114,23 @@ def measure(
         replicates=range(BLOCK_REPLICATES),
         **lines,
     )
-    return Measurement(
-        sample, plan, solids, sums, gaps, blocked, block_rule, blocks, settings.moment
-    )
+    return Measurement(sample, plan, solids, sums, gaps, blocked, block_rule, blocks, tuple(notes))
 
 
-def _blocks(sample: Sample, plan: Plan, settings: Settings) -> tuple[Blocks, Blocks]:
+def _blocks(sample: Sample, plan: Plan) -> tuple[Blocks, Blocks]:
     """The octants about the middle of the sample (of the cell), and about the window's centre."""
     packing = sample.packing
     position = packing.position[sample.gathered]
     low, high = position.min(axis=0), position.max(axis=0)
     radius = float(packing.radius.max())
     reach = float(np.linalg.norm(high - low)) + radius
-    whole = Blocks.about(0.5 * (low + high), reach, settings.axis)
+    whole = Blocks.about(0.5 * (low + high), reach, plan.axis)
     if packing.cell is not None and packing.is_periodic:
         cell = packing.cell
         whole = Blocks.of_periods(cell.vectors, cell.origin, np.array(cell.periodic), position)
     if plan.window is None:
         return whole, whole
-    return whole, Blocks.about(plan.window.center, plan.window.radius + radius, settings.axis)
+    return whole, Blocks.about(plan.window.center, plan.window.radius + radius, plan.axis)
 
 
 def _block_rule(solids: Solids) -> DirectionRule:

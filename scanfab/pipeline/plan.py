@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import math
-import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from scanfab.base.convex import sphere
-from scanfab.base.errors import ScanfabWarning, SettingsError
+from scanfab.base.errors import SettingsError
+from scanfab.base.note import Note
 from scanfab.packing.doubts import refuse_impossible
-from scanfab.packing.sample import Sample
+from scanfab.packing.sample import Sample, SampleRule
 from scanfab.packing.window import RV_MEANING, SurfaceBox, Window
-from scanfab.pipeline.settings import AUTO_RULE, Settings
+from scanfab.pipeline.frames import sample_rule
+from scanfab.pipeline.settings import AUTO_RULE, Settings, Vector
+from scanfab.pipeline.strain import Strains
 from scanfab.scan.directions import DirectionRule, direction_rule
 
-__all__ = ["CLOSE", "GROWTH_WITH_SPACING", "Plan", "make_plan", "rv_of"]
+__all__ = ["CLOSE", "GROWTH_WITH_SPACING", "Plan", "make_plan", "plan_without_grains", "rv_of"]
 
 # replicates of a fixed scan, and at least of an auto scan
 REPLICATES = 16
@@ -37,8 +40,23 @@ CLOSE = 0.3
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Lengths (dump's unit) and rule that hold for all frames of a series."""
+    """All that the frames of a series need to be computed; lengths in the dump's unit."""
 
+    samples: SampleRule
+    """What is a grain, and what a rattler."""
+    strains: Strains
+    variants: str
+    axis: Vector
+    """Loading axis, a unit vector."""
+    moment: int
+    """1: ℓ is the mean length; 2: the mean of squares over the mean."""
+    seed: int
+    workers: int
+    """Threads of a frame's scan."""
+    tolerance: float
+    """Of an auto scan: the wanted standard error of alpha_vs_axial."""
+    max_chords: float
+    """An auto scan stops before it cuts more."""
     window: Window | None
     cutoff: float
     """Of the scan that is to meet the tolerance."""
@@ -51,11 +69,26 @@ class Plan:
     """Of a fixed scan; of the first round of an auto scan."""
     auto: str
     """What the scan may add to meet the tolerance: ``""``, ``replicates`` or ``directions``."""
+    rule_is_asked_for: bool
+    """Then an auto scan keeps it."""
+    lists_gaps: bool
+    """Whether sums for one cut-off do not suffice."""
+    notes: tuple[Note, ...] = ()
+    """What is doubtful about the settings, for a user who has chosen them."""
 
 
-def make_plan(settings: Settings, sample: Sample) -> Plan:
+def make_plan(settings: Settings, sample: Sample, strains: Strains | None = None) -> Plan:
     """
     Resolve settings with the first frame that has grains.
+
+    Parameters
+    ----------
+    settings : Settings
+        Nothing behind the plan sees them.
+    sample : Sample
+        The first frame that has grains.
+    strains : Strains, optional
+        What the settings say of strains, if that has been looked up already.
 
     Raises
     ------
@@ -73,26 +106,40 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
         "rmax": float(radii.max()),
     }
     box = SurfaceBox.of(sample.packing, sample.gathered)
+    plan = _without_lengths(settings, strains or Strains.of(settings))
+    notes: list[Note] = []
     window = rv_of(sample, settings) if settings.needs_window else None
     if window is not None:
-        _check_window(window, sample, box, lengths["rmax"])
+        notes += _doubts_of_window(window, sample, box, lengths["rmax"])
     reach = 0.5 * box.smallest_extent if window is None else window.radius
-    rule = settings.directions or direction_rule(AUTO_RULE)
+    rule = plan.rule
     if rule.bias > 0.1 * settings.tolerance:
-        warnings.warn(
-            f"directions {rule.name}: an isotropic sample would get alpha = {rule.bias:.2g}",
-            ScanfabWarning,
-            stacklevel=2,
-        )
+        text = f"directions {rule.name}: an isotropic sample would get alpha = {rule.bias:.2g}"
+        notes.append(Note("biased_directions", text))
     cutoff = settings.cutoff.resolve(lengths)
     # as many as were asked for, also if two are equal: every frame has the same number of rows
     cutoffs = tuple(sorted(one.resolve(lengths) for one in settings.cutoffs)) or (cutoff,)
+    return replace(
+        plan,
+        strains=plan.strains.since(sample),
+        window=window,
+        cutoff=cutoff,
+        cutoffs=cutoffs,
+        notes=tuple(notes),
+        **_lines(settings, rule, reach, lengths),
+    )
+
+
+def _lines(
+    settings: Settings, rule: DirectionRule, reach: float, lengths: dict[str, float]
+) -> dict[str, Any]:
+    """How close the lines are, in how many replicates, and what an auto scan may add."""
     if settings.spacing is None:
         spacing = _auto_spacing(settings, len(rule), reach, lengths)
-        return Plan(window, cutoff, cutoffs, rule, spacing, REPLICATES, "replicates")
+        return {"spacing": spacing, "replicates": REPLICATES, "auto": "replicates"}
     asked = settings.spacing.resolve(lengths)
     if asked > 2.0 * reach:
-        what = "sample" if window is None else "RV"
+        what = "RV" if settings.needs_window else "sample"
         raise SettingsError(
             f"spacing: {asked:g} between lines is more than the {what} is wide ({2.0 * reach:g}): "
             f"lengths are in the dump's unit; did you mean 1rmin ({lengths['rmin']:g})?"
@@ -106,7 +153,36 @@ def make_plan(settings: Settings, sample: Sample) -> Plan:
     auto = "directions" if settings.directions is None else ""
     fewest, most = (REPLICATES, MOST_REPLICATES) if auto else (1, REPLICATES)
     replicates = int(min(max(lines / FEWEST_LINES, fewest), most))
-    return Plan(window, cutoff, cutoffs, rule, asked * math.sqrt(replicates), replicates, auto)
+    return {"spacing": asked * math.sqrt(replicates), "replicates": replicates, "auto": auto}
+
+
+def plan_without_grains(settings: Settings) -> Plan:
+    """The plan of a series without any grain: its frames have rows, but nothing is scanned."""
+    return _without_lengths(settings, Strains.of(settings))
+
+
+def _without_lengths(settings: Settings, strains: Strains) -> Plan:
+    """What settings say by themselves."""
+    return Plan(
+        samples=sample_rule(settings),
+        strains=strains,
+        variants=settings.variants,
+        axis=settings.axis,
+        moment=settings.moment,
+        seed=settings.seed,
+        workers=settings.workers,
+        tolerance=settings.tolerance,
+        max_chords=settings.max_chords,
+        window=None,
+        cutoff=math.nan,
+        cutoffs=(math.nan,) * max(len(settings.cutoffs), 1),
+        rule=settings.directions or direction_rule(AUTO_RULE),
+        spacing=math.nan,
+        replicates=0,
+        auto="",
+        rule_is_asked_for=settings.directions is not None,
+        lists_gaps=settings.lists_gaps,
+    )
 
 
 def rv_of(sample: Sample, settings: Settings) -> Window:
@@ -132,8 +208,10 @@ def rv_of(sample: Sample, settings: Settings) -> Window:
     return Window(center, sphere(radius))
 
 
-def _check_window(window: Window, sample: Sample, box: SurfaceBox, largest: float) -> None:
-    """Refuse an RV without grains or larger than the sample; warn of one at its surface."""
+def _doubts_of_window(
+    window: Window, sample: Sample, box: SurfaceBox, largest: float
+) -> list[Note]:
+    """What to tell of an RV at the sample's surface; refuses one without grains, or too large."""
     packing, grains = sample.packing, sample.grains
     room = box.room_around(window)
     if not window.may_meet(packing.position[grains], packing.radius[grains], packing).any():
@@ -146,14 +224,14 @@ def _check_window(window: Window, sample: Sample, box: SurfaceBox, largest: floa
             f"largest radii ({largest:g}): choose another `rv_center` or a smaller `rv`, "
             f"{RV_MEANING}"
         )
-    if room < largest:
-        warnings.warn(
-            f"the {window} comes within one of the largest radii ({largest:g}) of the sample's "
-            f"surface: it cuts the outermost layer of grains, which a boundary arranges: choose a "
-            f"smaller `rv`, or use more grains",
-            ScanfabWarning,
-            stacklevel=3,
-        )
+    if room >= largest:
+        return []
+    text = (
+        f"the {window} comes within one of the largest radii ({largest:g}) of the sample's "
+        f"surface: it cuts the outermost layer of grains, which a boundary arranges: choose a "
+        f"smaller `rv`, or use more grains"
+    )
+    return [Note("rv_at_surface", text)]
 
 
 def _auto_spacing(settings: Settings, axes: int, reach: float, lengths: dict[str, float]) -> float:

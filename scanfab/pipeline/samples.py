@@ -5,22 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from scanfab.io.series import Series
-from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample
-from scanfab.pipeline.frames import Frames
+from scanfab.pipeline.frames import Frames, Source
 from scanfab.pipeline.settings import Settings
 
 __all__ = ["samples"]
 
 
-def samples(source: Packing | Series, **options: Any) -> Iterator[tuple[int, Sample]]:
+def samples(source: Source, **options: Any) -> Iterator[tuple[int, Sample]]:
     """
     The chosen frames as samples, one in memory at a time, as :func:`scanfab.compute` sees them.
 
     Parameters
     ----------
-    source : Packing or Series
+    source : Packing, Series or iterable of Packing
         One frame, or many.
     **options
         Those of :func:`scanfab.compute`, of which ``boundary``, ``min_contacts``,

@@ -315,8 +315,3 @@ class Settings:
     def needs_window(self) -> bool:
         """Whether a variant of the RV is asked for."""
         return "c" in self.variants or "d" in self.variants
-
-    @property
-    def needs_whole(self) -> bool:
-        """Whether a variant of the whole sample is asked for."""
-        return "a" in self.variants or "b" in self.variants

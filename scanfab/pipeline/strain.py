@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import warnings
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from scanfab.base.errors import ScanfabWarning, SettingsError
+from scanfab.base.errors import SettingsError
+from scanfab.base.note import Note
 from scanfab.io.frame_csv import FrameFile
 from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.settings import STRAIN_MODES, Settings, Vector
 
-__all__ = ["StrainFile", "Strains", "axial_length", "is_flipped", "shear_strain"]
+__all__ = ["Flips", "StrainFile", "Strains", "axial_length", "is_flipped", "shear_strain"]
 
 # programs that flip their cells do so when it leans by half a length or a little later
 MOST_TILT = 0.61
@@ -147,49 +148,72 @@ class StrainFile:
         return None if found is None else found[0]
 
 
+@dataclass(frozen=True, eq=False)
 class Strains:
-    """Strains of the frames of a series, from its first frame that has grains."""
+    """Strains of the frames of a series, since its first frame that has grains."""
 
-    def __init__(self, settings: Settings) -> None:
-        self.settings = settings
-        self.file = None if settings.strain in STRAIN_MODES else StrainFile(Path(settings.strain))
-        self.first: float | None = None
-        self.first_cell: Cell | None = None
-        self.cells: dict[int, Cell | None] = {}
+    mode: str
+    """As for :func:`axial_length`; of no meaning if there is a file."""
+    axis: Vector
+    file: StrainFile | None = None
+    length: float | None = None
+    """Of the first frame that has grains, dump's length unit."""
+    cell: Cell | None = None
+    """Of that frame."""
 
-    def start(self, sample: Sample) -> None:
-        """Take the lengths of the first frame that has grains."""
-        self.first_cell = sample.packing.cell
-        if self.file is None:
-            self.first = axial_length(sample, self.settings.strain, self.settings.axis)
+    @classmethod
+    def of(cls, settings: Settings) -> Strains:
+        """
+        Before the first frame is known.
 
-    def at(self, number: int, sample: Sample) -> tuple[float | None, float | None]:
-        """Axial and shear strain of a frame."""
-        if not sample.grains.any():
-            return self._axial(number, sample), None
-        cell = sample.packing.cell
-        self._warn_of_flips(number, cell)
-        return self._axial(number, sample), shear_strain(cell, self.first_cell)
+        Raises
+        ------
+        ReadError
+            If the file of strains cannot be read.
+        """
+        file = None if settings.strain in STRAIN_MODES else StrainFile(Path(settings.strain))
+        return cls(settings.strain, settings.axis, file)
+
+    def since(self, sample: Sample) -> Strains:
+        """From a frame on; raises as :func:`axial_length`."""
+        length = axial_length(sample, self.mode, self.axis) if self.file is None else None
+        return replace(self, length=length, cell=sample.packing.cell)
+
+    def at(self, number: int, sample: Sample) -> dict[str, float | None]:
+        """Axial and shear strain of a frame, by the names of their columns."""
+        shear: float | None = None
+        if sample.grains.any():
+            shear = shear_strain(sample.packing.cell, self.cell)
+        return {"strain": self._axial(number, sample), "shear_strain": shear}
 
     def _axial(self, number: int, sample: Sample) -> float | None:
         if self.file is not None:
             return self.file.at(number, sample.packing.step)
-        if self.first is None or not sample.grains.any():
+        if self.length is None or not sample.grains.any():
             return None
-        length = axial_length(sample, self.settings.strain, self.settings.axis)
-        return None if length is None or self.first == 0 else 1.0 - length / self.first
+        length = axial_length(sample, self.mode, self.axis)
+        return None if length is None or self.length == 0 else 1.0 - length / self.length
 
-    def _warn_of_flips(self, number: int, cell: Cell | None) -> None:
-        """Frames come in any order: each is held against both neighbours that are known."""
+
+class Flips:
+    """The cells of a series, each held against those of the frames before and behind it."""
+
+    def __init__(self, step: int | None) -> None:
+        """Frames are chosen with a step, as in a slice."""
+        self.step = abs(step or 1)
+        self.cells: dict[int, Cell | None] = {}
+
+    def notes(self, number: int, cell: Cell | None) -> list[Note]:
+        """What to tell once the cell of one more frame is known."""
         self.cells[number] = cell
-        step = abs(self.settings.frames.step or 1)
-        for early in (number - step, number):
-            late = early + step
-            if is_flipped(self.cells.get(late), self.cells.get(early)):
-                warnings.warn(
-                    f"the cell seems to be flipped between the frames {early} and {late}: from "
-                    f"there on its vectors are others than in the first frame, and shear_strain is "
-                    f"not the strain since then (LAMMPS: fix deform ... flip no)",
-                    ScanfabWarning,
-                    stacklevel=2,
-                )
+        pairs = [(early, early + self.step) for early in (number - self.step, number)]
+        flipped = [p for p in pairs if is_flipped(self.cells.get(p[1]), self.cells.get(p[0]))]
+        return [Note("flipped_cell", _flipped(*pair)) for pair in flipped]
+
+
+def _flipped(early: int, late: int) -> str:
+    return (
+        f"the cell seems to be flipped between the frames {early} and {late}: from there on its "
+        f"vectors are others than in the first frame, and shear_strain is not the strain since "
+        f"then (LAMMPS: fix deform ... flip no)"
+    )

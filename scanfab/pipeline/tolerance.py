@@ -5,23 +5,26 @@ from __future__ import annotations
 import logging
 import math
 import time
-import warnings
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from scanfab.base.errors import ScanfabWarning, SettingsError
+from scanfab.base.errors import SettingsError
+from scanfab.base.note import Note
 from scanfab.base.spelling import spelt_apart, spelt_time
 from scanfab.fabric.void import void_fabric
 from scanfab.pipeline.plan import CLOSE, GROWTH_WITH_SPACING, Plan
-from scanfab.pipeline.settings import Settings
 from scanfab.scan.directions import design_of, direction_rule
 from scanfab.scan.scan import FollowedTooFarError, ScanSums, scan_lines
 from scanfab.scan.solids import Solids, is_affordable, most_lines
 
-__all__ = ["missing_work", "scan_to_tolerance"]
+__all__ = ["TOLERANCE_MISSED", "missing_work", "scan_to_tolerance"]
 
 LOGGER = logging.getLogger("scanfab")
+
+TOLERANCE_MISSED = "tolerance_missed"
+"""The code of a note: an auto scan ended before its tolerance was met."""
 
 # beyond these there is more overhead than scan
 MAX_REPLICATES = 16_384
@@ -50,12 +53,12 @@ FAR_MORE = 1000
 
 
 def scan_to_tolerance(
-    solids: Solids, plan: Plan, settings: Settings, where: str = "the frame"
-) -> tuple[ScanSums, Plan]:
+    solids: Solids, plan: Plan, where: str = "the frame"
+) -> tuple[ScanSums, Plan, list[Note]]:
     """
     Scan one frame as planned, and where the plan is ``auto``, on until the tolerance holds.
 
-    Progress goes to the logger ``scanfab``; ``where`` names the frame there and in warnings.
+    Progress goes to the logger ``scanfab``, where ``where`` names the frame.
 
     Returns
     -------
@@ -63,29 +66,32 @@ def scan_to_tolerance(
         Of all replicates.
     Plan
         With the rule and the spacing of each replicate as they were in the end.
+    list of Note
+        What was not reached.
     """
     if not plan.auto:
         every = range(plan.replicates)
-        return _scan(solids, plan, settings, every, settings.max_chords), plan
-    plan = _within_budget(plan, solids, settings)
+        return _scan(solids, plan, every, plan.max_chords), plan, []
+    plan = _within_budget(plan, solids)
+    notes: list[Note] = []
     planned = plan.spacing
     sums: ScanSums | None = None
     start, stop, spent = 0, plan.replicates, 0.0
     begun = time.perf_counter()
     while True:
         if start == 0:
-            batch, plan = _first_round(solids, plan, settings)
+            batch, plan = _first_round(solids, plan)
         else:
-            batch = _scan(solids, plan, settings, range(start, stop))
+            batch = _scan(solids, plan, range(start, stop))
         # a line costs as much as a chord, also if it meets nothing
         lines = most_lines(solids, plan.spacing) * len(plan.rule)
         spent += float(batch.work.sum()) + lines * batch.replicates
         sums = batch if sums is None or start == 0 else ScanSums.concatenate([sums, batch])
         # as many replicates as the budget allows
-        left = (settings.max_chords - spent) / max(float(sums.work.mean()) + lines, 1.0)
-        counted = _counted_variants(sums, plan, solids, settings, left)
+        left = (plan.max_chords - spent) / max(float(sums.work.mean()) + lines, 1.0)
+        counted = _counted_variants(sums, plan, solids, left)
         missing = missing_work(sums, plan, counted)
-        rest = min(missing, settings.max_chords / spent) - 1.0
+        rest = min(missing, plan.max_chords / spent) - 1.0
         if rest > 0.0:
             seconds = rest * (time.perf_counter() - begun)
             _tell_progress(sums, plan, counted, where, seconds)
@@ -100,14 +106,13 @@ def scan_to_tolerance(
         more = math.ceil(max(min(missing, GROWTH), SMALLEST_ROUND) * stop)
         more = min(more, MAX_REPLICATES, int(stop + left))
         if plan.auto == "directions" or more <= stop:
-            _warn_of_missed_tolerance(missing, spent, sums, settings, where)
+            notes.append(_missed_tolerance(missing, spent, sums, plan))
             break
         start, stop = stop, more
-    _warn_of_dropped_variants(sums, plan, counted, settings, where)
-    return sums, plan
+    return sums, plan, [*notes, *_dropped_variants(sums, plan, counted)]
 
 
-def _first_round(solids: Solids, plan: Plan, settings: Settings) -> tuple[ScanSums, Plan]:
+def _first_round(solids: Solids, plan: Plan) -> tuple[ScanSums, Plan]:
     """
     Scan the first replicates, with wider lines if following them takes more steps than allowed.
 
@@ -116,12 +121,12 @@ def _first_round(solids: Solids, plan: Plan, settings: Settings) -> tuple[ScanSu
     """
     every = plan.replicates
     if solids.medium is None:
-        return _scan(solids, plan, settings, range(every)), plan
+        return _scan(solids, plan, range(every)), plan
     while True:
         try:
-            sums = _scan(solids, plan, settings, range(1), settings.max_chords / every)
+            sums = _scan(solids, plan, range(1), plan.max_chords / every)
             if every > 1:
-                rest = _scan(solids, plan, settings, range(1, every), settings.max_chords)
+                rest = _scan(solids, plan, range(1, every), plan.max_chords)
                 sums = ScanSums.concatenate([sums, rest])
             return sums, plan
         except FollowedTooFarError:
@@ -134,7 +139,6 @@ def _first_round(solids: Solids, plan: Plan, settings: Settings) -> tuple[ScanSu
 def _scan(
     solids: Solids,
     plan: Plan,
-    settings: Settings,
     replicates: range,
     most_steps: float = math.inf,
 ) -> ScanSums:
@@ -143,26 +147,26 @@ def _scan(
         plan.rule,
         spacing=plan.spacing,
         cutoff=plan.cutoff,
-        variants=settings.variants,
+        variants=plan.variants,
         replicates=replicates,
-        seed=settings.seed,
-        workers=settings.workers,
+        seed=plan.seed,
+        workers=plan.workers,
         most_steps=most_steps,
     )
 
 
 def _better_plan(
-    sums: ScanSums, plan: Plan, missing: float, solids: Solids, settings: Settings, left: float
+    sums: ScanSums, plan: Plan, missing: float, solids: Solids, counted: str, left: float
 ) -> Plan | None:
     """After the first round, a plan to start afresh with, if that is worth it and affordable."""
     closest = CLOSEST * solids.grain_radius.min(initial=np.inf)
     better = plan
     if plan.auto == "directions":
         better = _with_more_axes(plan, missing)
-    elif _too_few_lines(sums, settings) and 0.5 * plan.spacing > closest:
+    elif _too_few_lines(sums, counted) and 0.5 * plan.spacing > closest:
         better = replace(plan, spacing=0.5 * plan.spacing)
     elif missing >= AFRESH_FROM and len(solids.grain_radius):
-        better = _with_closer_lines(plan, missing, solids, settings)
+        better = _with_closer_lines(plan, missing, solids)
     growth = len(better.rule) / len(plan.rule) * (plan.spacing / better.spacing) ** 2
     affordable = growth * plan.replicates <= left and is_affordable(solids, better.spacing)
     return better if growth > 1.0 and affordable else None
@@ -175,37 +179,37 @@ def _with_more_axes(plan: Plan, missing: float) -> Plan:
     return replace(plan, rule=direction_rule(str(math.ceil(min(missing, GROWTH) * len(plan.rule)))))
 
 
-def _with_closer_lines(plan: Plan, missing: float, solids: Solids, settings: Settings) -> Plan:
+def _with_closer_lines(plan: Plan, missing: float, solids: Solids) -> Plan:
     """The plan with lines as close as is of use, and a finer rule for what is missing then."""
     power = 2.0 + GROWTH_WITH_SPACING
     closest = min(CLOSE * float(solids.grain_radius.mean()), plan.spacing)
     spacing = max(plan.spacing / missing ** (1.0 / power), closest)
     missing /= (plan.spacing / spacing) ** power
     plan = replace(plan, spacing=spacing)
-    if settings.directions is not None or missing <= 1.0:
+    if plan.rule_is_asked_for or missing <= 1.0:
         return plan
     axes = math.ceil(min(missing, FINER_UP_TO) * len(plan.rule))
     return replace(plan, rule=design_of(axes))
 
 
-def _within_budget(plan: Plan, solids: Solids, settings: Settings) -> Plan:
+def _within_budget(plan: Plan, solids: Solids) -> Plan:
     """The plan, with wider lines if its first round alone would cut more chords than allowed."""
     chords = solids.cross_section / plan.spacing**2 + most_lines(solids, plan.spacing)
     chords *= len(plan.rule) * plan.replicates
-    if chords <= settings.max_chords:
+    if chords <= plan.max_chords:
         return plan
     if plan.auto == "replicates":
-        wider = plan.spacing * math.sqrt(chords / settings.max_chords)
+        wider = plan.spacing * math.sqrt(chords / plan.max_chords)
         if wider > _width(solids):
             raise SettingsError(
-                f"max_chords: {settings.max_chords:g} leave less than one line for each of "
+                f"max_chords: {plan.max_chords:g} leave less than one line for each of "
                 f"{plan.replicates} replicates of {len(plan.rule)} directions: allow more, or take "
                 f"fewer `directions`"
             )
         return replace(plan, spacing=wider)
     raise SettingsError(
         f"spacing: {plan.replicates} replicates of {len(plan.rule)} directions would cut "
-        f"{chords:.2g} chords from the grains, more than `max_chords` {settings.max_chords:g}: "
+        f"{chords:.2g} chords from the grains, more than `max_chords` {plan.max_chords:g}: "
         f"choose a wider spacing"
     )
 
@@ -221,29 +225,25 @@ def _width(solids: Solids) -> float:
     return float((high - low).max())
 
 
-def _counted_variants(
-    sums: ScanSums, plan: Plan, solids: Solids, settings: Settings, left: float
-) -> Settings:
+def _counted_variants(sums: ScanSums, plan: Plan, solids: Solids, left: float) -> str:
     """
-    The settings with the variants that the scan goes on for.
+    The variants that the scan goes on for.
 
     One that keeps but a few grains does not hold back the others, nor one whose tolerance is out of
     reach of the budget, which allows so many more replicates; such are all variants, or none.
     """
-    alone = {name: replace(settings, variants=name) for name in settings.variants}
-    missing = {name: missing_work(sums, plan, one) for name, one in alone.items()}
+    missing = {name: missing_work(sums, plan, name) for name in plan.variants}
     few = [name for name in missing if _kept_grains(solids, name) < FEW_KEPT]
     usual = max((missing[name] for name in missing if name not in few), default=math.inf)
     held_back = {
         name
         for name in few
-        if missing[name] > HELD_BACK * usual
-        or (usual < math.inf and _too_few_lines(sums, alone[name]))
+        if missing[name] > HELD_BACK * usual or (usual < math.inf and _too_few_lines(sums, name))
     }
     # closer lines tell more than more of them; and early estimates of the error are uncertain
     reach = GROWTH * (1.0 + left / sums.replicates) ** (1.0 + 0.5 * GROWTH_WITH_SPACING)
     near = "".join(n for n in missing if n not in held_back and missing[n] <= reach)
-    return replace(settings, variants=near or settings.variants)
+    return near or plan.variants
 
 
 def _kept_grains(solids: Solids, variant: str) -> float:
@@ -257,18 +257,18 @@ def _kept_grains(solids: Solids, variant: str) -> float:
     return 1.0 - float(removed.mean()) if len(removed) else 1.0
 
 
-def _too_few_lines(sums: ScanSums, settings: Settings) -> bool:
+def _too_few_lines(sums: ScanSums, variants: str) -> bool:
     """Whether some variant keeps segments, but none in too many directions of a replicate."""
-    for variant in settings.variants:
+    for variant in variants:
         _, segments = sums.kept(variant)
         if segments.any() and np.mean(segments == 0) > MOST_EMPTY:
             return True
     return False
 
 
-def missing_work(sums: ScanSums, plan: Plan, settings: Settings) -> float:
+def missing_work(sums: ScanSums, plan: Plan, variants: str) -> float:
     """
-    By what factor the lines must grow for every variant to meet the tolerance; <= 1: done.
+    By what factor the lines must grow for these variants to meet the tolerance; <= 1: done.
 
     The one rule for all scans that are chosen by their error: ``auto`` ones, and those that a
     calibration recommends.
@@ -277,14 +277,14 @@ def missing_work(sums: ScanSums, plan: Plan, settings: Settings) -> float:
     if plan.auto != "replicates" and sums.replicates > 1:
         margin = 1.0 + SIGMAS / math.sqrt(2.0 * (sums.replicates - 1))
     missing = expected = 0.0
-    for variant in settings.variants:
+    for variant in variants:
         length, segments = sums.kept(variant)
         fabric = void_fabric(sums.axes, plan.rule.weights, length, segments)
         if fabric is not None:
-            error = fabric.axial_error(settings.axis) or 0.0
-            missing = max(missing, (error / settings.tolerance) ** 2)
-            error = fabric.expected_error(settings.axis, plan.rule.degree) or error
-            expected = max(expected, (margin * error / settings.tolerance) ** 2)
+            error = fabric.axial_error(plan.axis) or 0.0
+            missing = max(missing, (error / plan.tolerance) ** 2)
+            error = fabric.expected_error(plan.axis, plan.rule.degree) or error
+            expected = max(expected, (margin * error / plan.tolerance) ** 2)
         elif segments.any() and plan.auto == "replicates" and sums.replicates < 256:
             # a direction without any segment may still get one
             return GROWTH
@@ -295,9 +295,7 @@ def missing_work(sums: ScanSums, plan: Plan, settings: Settings) -> float:
     return max(expected, min(missing, 1.1))
 
 
-def _warn_of_missed_tolerance(
-    factor: float, spent: float, sums: ScanSums, settings: Settings, where: str
-) -> None:
+def _missed_tolerance(factor: float, spent: float, sums: ScanSums, plan: Plan) -> Note:
     more = "at least " if factor >= GROWTH else ""
     if factor > FAR_MORE:
         more, factor = "more than ", FAR_MORE
@@ -308,44 +306,35 @@ def _warn_of_missed_tolerance(
             f"segments through the images of the cell: is it too large, or periodic where the "
             f"sample is not (`cell`, `periodic`)?"
         )
-    warnings.warn(
-        f"{where}: the scan stopped after {spent:.2g} chords before the tolerance "
-        f"{settings.tolerance:g} was met: alpha_vs_axial_se is what it reached; {more}"
-        f"{factor:.4g} times as many lines would be needed (`max_chords`, `tolerance`){why}",
-        ScanfabWarning,
-        stacklevel=3,
+    text = (
+        f"the scan stopped after {spent:.2g} chords before the tolerance {plan.tolerance:g} was "
+        f"met: alpha_vs_axial_se is what it reached; {more}{factor:.4g} times as many lines would "
+        f"be needed (`max_chords`, `tolerance`){why}"
     )
+    return Note(TOLERANCE_MISSED, text)
 
 
-def _warn_of_dropped_variants(
-    sums: ScanSums, plan: Plan, counted: Settings, settings: Settings, where: str
-) -> None:
-    """Say of variants that the scan did not go on for what they have reached."""
-    for name in settings.variants:
+def _dropped_variants(sums: ScanSums, plan: Plan, counted: str) -> Iterator[Note]:
+    """What variants have reached that the scan did not go on for."""
+    for name in plan.variants:
         fabric = void_fabric(sums.axes, plan.rule.weights, *sums.kept(name))
-        error = math.inf if fabric is None else fabric.axial_error(settings.axis) or 0.0
-        if name in counted.variants or error <= settings.tolerance:
+        error = math.inf if fabric is None else fabric.axial_error(plan.axis) or 0.0
+        if name in counted or error <= plan.tolerance:
             continue
-        reached, tolerance = spelt_apart(error, settings.tolerance)
+        reached, tolerance = spelt_apart(error, plan.tolerance)
         said = f"alpha_vs_axial_se is {reached}, above the tolerance {tolerance}"
-        warnings.warn(
-            f"{where}, variant {name}: {said if fabric else 'there is no void fabric yet'}: it "
-            f'keeps few grains, or would need far more lines than the others (`variants="{name}"` '
-            f"scans it alone)",
-            ScanfabWarning,
-            stacklevel=3,
+        text = (
+            f"{said if fabric else 'there is no void fabric yet'}: it keeps few grains, or would "
+            f'need far more lines than the others (`variants="{name}"` scans it alone)'
         )
+        yield Note("variant_dropped", text, (name,))
 
 
-def _tell_progress(
-    sums: ScanSums, plan: Plan, settings: Settings, where: str, seconds: float
-) -> None:
+def _tell_progress(sums: ScanSums, plan: Plan, counted: str, where: str, seconds: float) -> None:
     """The largest error so far, and about how long the rest of the scan will take."""
     if not LOGGER.isEnabledFor(logging.INFO):
         return
-    fabrics = [
-        void_fabric(sums.axes, plan.rule.weights, *sums.kept(name)) for name in settings.variants
-    ]
-    errors = [one.axial_error(settings.axis) or 0.0 for one in fabrics if one is not None]
-    worst, tolerance = spelt_apart(max(errors, default=math.inf), settings.tolerance)
+    fabrics = [void_fabric(sums.axes, plan.rule.weights, *sums.kept(name)) for name in counted]
+    errors = [one.axial_error(plan.axis) or 0.0 for one in fabrics if one is not None]
+    worst, tolerance = spelt_apart(max(errors, default=math.inf), plan.tolerance)
     LOGGER.info("%s: error %s of %s, about %s", where, worst, tolerance, spelt_time(seconds))

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from scanfab.base.note import Note
 from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.fabric.contact import axial_error, contact_fabric
 from scanfab.fabric.jackknife import (
@@ -25,7 +26,6 @@ from scanfab.fabric.tensor import axis_values, tensor_values
 from scanfab.fabric.void import VoidFabric, void_fabric
 from scanfab.packing.sample import Variant
 from scanfab.pipeline.measurement import Measurement
-from scanfab.pipeline.settings import Settings
 from scanfab.table.columns import table_columns
 
 __all__ = ["VariantColumns", "no_columns"]
@@ -38,13 +38,10 @@ ABSURD = 100.0
 class VariantColumns:
     """The columns of one variant and cut-off."""
 
-    def __init__(
-        self, measurement: Measurement, variant: Variant, place: int, settings: Settings
-    ) -> None:
+    def __init__(self, measurement: Measurement, variant: Variant, place: int) -> None:
         self.measurement = measurement
         self.variant = variant
         self.place = place
-        self.settings = settings
         self.sample, self.plan, self.sums = measurement.sample, measurement.plan, measurement.sums
         self.which = "abcd".index(variant.name)
 
@@ -118,7 +115,7 @@ class VariantColumns:
         return 1.0 - float(weights @ self.sums.void[:, self.which].sum(axis=0)) / length
 
     def _void(self) -> dict[str, Any]:
-        fabric, axis = self.fabric, self.settings.axis
+        fabric, axis = self.fabric, self.plan.axis
         value = fabric.tensor.axial(axis) if fabric else None
         scatter = self._void_scatter() if fabric else None
         return {
@@ -133,14 +130,14 @@ class VariantColumns:
         }
 
     def _void_scatter(self) -> Jackknife | None:
-        gaps, moment = self.measurement.blocked, self.settings.moment
+        gaps, moment = self.measurement.blocked, self.plan.moment
         words = (self.variant.name, self.place, moment)
         return void_jackknife(
             gaps.axes,
             self.measurement.block_rule.weights,
             gaps.kept(*words),
             [gaps.kept(*words, without=block) for block in range(BLOCKS)],
-            self.settings.axis,
+            self.plan.axis,
         )
 
     @cached_property
@@ -161,7 +158,7 @@ class VariantColumns:
         return np.compress(self._chosen, self.sample.contacts.point, axis=0)
 
     def _contact(self) -> dict[str, Any]:
-        normals, axis = self._normals, self.settings.axis
+        normals, axis = self._normals, self.plan.axis
         tensor = contact_fabric(normals)
         value = tensor.axial(axis) if tensor else None
         scatter: Jackknife | None = None
@@ -193,7 +190,7 @@ class VariantColumns:
             return {}
         length, segments = self.measurement.kept(self.variant.name, self.place)
         measured = Measured(
-            np.asarray(self.settings.axis),
+            np.asarray(self.plan.axis),
             self.sums.axes,
             self.plan.rule.weights,
             length,
@@ -214,23 +211,30 @@ class VariantColumns:
             f"did you mean 1rmin?"
         )
 
-    def doubts(self) -> Iterator[str]:
+    def notes(self) -> Iterator[Note]:
         """Whether there is no void fabric, or a doubtful one, or lines without a grain."""
+        texts = {"channels": self._channels(), **self._of_void_fabric()}
+        return (Note(code, text, (self.variant.name,)) for code, text in texts.items() if text)
+
+    def _channels(self) -> str:
         channels = int(self.sums.channels[:, self.which].sum())
-        if channels:
-            lines = channels + int(self.sums.lines[:, self.which].sum())
-            yield f"{channels} of {lines} lines stay in a channel and meet no grain"
+        lines = channels + int(self.sums.lines[:, self.which].sum())
+        return f"{channels} of {lines} lines stay in a channel and meet no grain" * bool(channels)
+
+    def _of_void_fabric(self) -> dict[str, str]:
         if self._no_solid:
-            yield self._no_solid
-        elif self.segments == 0:
-            yield self._too_long(self.plan.cutoffs[self.place])
-        elif self.fabric is None:
-            yield "in some direction no void segment is kept, so there is no void fabric"
-        elif self.fabric.filled > 0.01:
-            yield (
-                f"{self.fabric.filled:.0%} of the directions keep no void segment in a replicate: "
-                f"choose a smaller spacing"
-            )
+            return {"no_solid": self._no_solid}
+        if self.segments == 0:
+            return {"cutoff_too_long": self._too_long(self.plan.cutoffs[self.place])}
+        if self.fabric is None:
+            text = "in some direction no void segment is kept, so there is no void fabric"
+            return {"empty_direction": text}
+        if self.fabric.filled <= 0.01:
+            return {}
+        return {
+            "filled_directions": f"{self.fabric.filled:.0%} of the directions keep no void segment "
+            f"in a replicate: choose a smaller spacing"
+        }
 
 
 def no_columns() -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,9 +9,9 @@ from pathlib import Path
 from scanfab.base.errors import (
     PackingError,
     ReadError,
-    ScanfabWarning,
     SettingsError,
 )
+from scanfab.base.note import Note, tell
 from scanfab.io.series import Series
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.frames import Frames
@@ -67,7 +66,7 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
     frame = series[number]
     number = frame.number
     sample = frames.read(frame)
-    frames.tell_doubts(frame, sample)
+    tell(frames.notes(frame, sample))
     found = frames.first()
     first = None if found is None else found[2]
     plan = None if first is None else _plan(first, settings)
@@ -82,10 +81,13 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
 def _plan(first: Sample, settings: Settings) -> Plan | None:
     """The plan of the series; None, with a warning, if it cannot be made."""
     try:
-        return make_plan(settings, first)
+        # of a strain that cannot be had the view says nothing
+        plan = make_plan(replace(settings, strain="auto"), first)
     except SettingsError as error:
-        warnings.warn(f"the RV is not shown: {error}", ScanfabWarning, stacklevel=3)
+        tell([Note("no_rv", f"the RV is not shown: {error}")])
         return None
+    tell(plan.notes)
+    return plan
 
 
 def _strains(

@@ -88,8 +88,8 @@ def main() -> int:
         table = scanfab.compute(last_frame(name), workers=asked.workers, **options, **TRUTH)
         truth = table["alpha_vs_axial"]
         print(f"{name} truth: {truth.round(6)} ± {table['alpha_vs_axial_se'].round(6)}", flush=True)
-        settings = scanfab.Settings(variants=VARIANTS, workers=asked.workers, **options)
-        found = scanfab.calibrate(last_frame(name), settings)
+        words = {"variants": VARIANTS, "workers": asked.workers, **options}
+        found = scanfab.calibrate(last_frame(name), **words)
         for kind, scan in {**SCANS, "calibrate": found.options}.items():
             right = coverage(name, kind, options, scan, asked.seeds, truth, asked.workers)
             outside += not right

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -118,6 +120,16 @@ def test_a_file_is_looked_through_once_to_count_its_frames_and_to_find_them(seri
     assert len(list(series)) == len(series) == COUNT
     assert series[-1].number == series[2:][-1].number == COUNT - 1
     assert len(looked_into) == len(set(looked_into)) == len(series.grains.files)
+
+
+def test_a_frame_that_goes_to_another_process_leaves_the_others_behind(series):
+    list(series)
+    frame = series[2:][1]
+    twin = pickle.loads(pickle.dumps(frame))
+    assert (twin.number, twin.step, twin.series.numbers) == (3, 30, frame.series.numbers)
+    assert b"Snapshot" not in pickle.dumps(series)
+    assert twin.read().step == 30
+    assert len(twin.series) == 5
 
 
 def test_early_frames_are_found_without_the_files_of_later_ones(tmp_path, looked_into):

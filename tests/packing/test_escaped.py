@@ -75,7 +75,8 @@ def test_more_than_a_few_stay_but_not_without_a_word(number, far):
     packing = with_flown(*(4 + directions * (5 + far + 2 * np.arange(number)[:, None])))
     assert escaped_of(packing) == []
     assert np.array_equal(sample_of(packing).gathered, np.ones(729 + number, bool))
-    told = sample_of(packing).doubt_of_escaped()
+    (note,) = sample_of(packing).doubts_of_escaped()
+    told = note.text
     assert "too many to be left out, so they widen" in told
     assert '`boundary="id=7' in told
 
@@ -91,7 +92,7 @@ def test_in_a_gas_no_grain_is_farther_out_than_others(count, solid_fraction):
         ball = ball_points(random, count, 0.6)
         pyramid = np.column_stack([box[:, :2] * np.cbrt(box[:, 2:]), np.cbrt(box[:, 2])])
         for shape in (box, ball, pyramid):
-            assert sample_of(Packing(edge * shape, radius)).doubt_of_escaped() is None
+            assert sample_of(Packing(edge * shape, radius)).doubts_of_escaped() == []
 
 
 @pytest.mark.parametrize("scale", [1.0, 3.0, 30.0])

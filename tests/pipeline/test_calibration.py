@@ -10,7 +10,6 @@ from scanfab import (
     Packing,
     PackingError,
     ScanfabWarning,
-    Settings,
     SettingsError,
     calibrate,
     compute,
@@ -35,7 +34,7 @@ def packing():
 
 @pytest.fixture(scope="module")
 def found(packing):
-    return calibrate(packing, Settings(**QUICK))
+    return calibrate(packing, **QUICK)
 
 
 def ladder(found, name, variant="c"):
@@ -92,7 +91,7 @@ def test_a_recommendation_that_misses_what_was_wanted_says_so(error, missed):
 
 
 def test_whole_sample_has_no_ladder_of_rvs(packing):
-    found = calibrate(packing, Settings(**{**QUICK, "variants": "a", "tolerance": 0.02}))
+    found = calibrate(packing, **{**QUICK, "variants": "a", "tolerance": 0.02})
     assert {row.ladder for row in found.rows} == {"spacing", "directions", "cutoff", "recommended"}
     assert {row.rv_radius for row in found.rows} == {None}
 
@@ -173,19 +172,24 @@ def test_no_grain_is_refused():
 @pytest.mark.parametrize("frame", [1, 7, -2])
 def test_a_frame_that_is_not_there_is_refused(packing, frame):
     with pytest.raises(SettingsError, match=f"frames: the series has no frame in {frame}:"):
-        calibrate(packing, Settings(**QUICK), frame=frame)
+        calibrate(packing, **QUICK, frame=frame)
 
 
 def test_cutoffs_and_moments_are_refused(packing):
     with pytest.raises(SettingsError, match="cutoffs and moment have no meaning"):
-        calibrate(packing, Settings(moment=2))
+        calibrate(packing, moment=2)
+
+
+def test_an_option_that_does_not_exist_is_named_with_the_nearest(packing):
+    with pytest.raises(TypeError, match=r"calibrate has no option 'tolerence': .*'tolerance'"):
+        calibrate(packing, tolerence=0.02)
 
 
 def test_steps_beyond_the_budget_are_left_out_with_a_word(packing):
     chords = np.pi * np.sum(packing.radius**2) * 16 / (0.2 * packing.radius.min()) ** 2
-    settings = Settings(**{**QUICK, "tolerance": 0.02, "max_chords": 1.05 * chords})
+    options = {**QUICK, "tolerance": 0.02, "max_chords": 1.05 * chords}
     with pytest.warns(ScanfabWarning) as told:
-        few = calibrate(packing, settings)
+        few = calibrate(packing, **options)
     assert [row.value for row in ladder(few, "spacing")] == [4, 2, 1, 0.5, 0.2]
     assert any("spacing 0.1 left out: it would cut" in str(one.message) for one in told)
     assert "would take too many lines" in few.findings[0]
@@ -253,7 +257,7 @@ def test_what_looks_wrong_in_the_frame_is_told_here_too(packing):
     bodies = np.repeat(np.arange(count), 2)[:count] + 1
     flown = find_contacts(Packing(position, radius, columns={"clump": bodies}))
     with pytest.warns(ScanfabWarning) as told:
-        calibrate(flown, Settings(**{**QUICK, "tolerance": 0.02}))
+        calibrate(flown, **{**QUICK, "tolerance": 0.02})
     texts = [str(one.message) for one in told]
     assert any("away from all others" in text for text in texts)
     assert any("clumps are not read as bodies" in text for text in texts)

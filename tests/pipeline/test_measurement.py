@@ -125,7 +125,9 @@ def test_octants_about_an_oblique_axis_are_parted_along_it(packing):
 def test_cut_offs_whose_errors_are_above_the_tolerance_are_told(packing):
     """Few segments reach the larger one, along lines that suffice for the other."""
     words = {"variants": "c", "tolerance": 2e-3, "cutoff": 0.2}
-    with pytest.warns(ScanfabWarning, match=r"c, cut-off 0.8: .* above the tolerance 0.002, which"):
+    with pytest.warns(
+        ScanfabWarning, match=r"c: at the cut-off 0.8 .* above the tolerance 0.002, which"
+    ):
         table = compute(packing, **words, cutoffs="0.2,0.8")
     low, high = table
     assert low.alpha_vs_axial_se <= 2e-3 < high.alpha_vs_axial_se
@@ -154,7 +156,7 @@ def test_a_window_made_up_of_half_spaces_is_measured_like_any_other(packing):
     sample, settings = Sample(packing, np.zeros(len(packing), bool)), Settings(**LINES)
     plan = make_plan(settings, sample)
     window = Window(plan.window.center, box([1.0, 1.5, 2.0], rotation(np.random.default_rng(1))))
-    found = measure(sample, replace(plan, window=window, auto=""), settings)
+    found = measure(sample, replace(plan, window=window, auto=""))
     position = packing.position - window.center
     removed = sample.rattlers
     solids = Solids(position, packing.radius, removed, window.shape)

@@ -1,7 +1,7 @@
 """The plan: settings turned into lengths, lines and replicates by the first frame."""
 
 import math
-import warnings
+import re
 
 import numpy as np
 import pytest
@@ -165,10 +165,17 @@ def test_window_may_be_given_in_lengths(packing):
 
 
 def test_rule_with_a_bias_warns_of_it(packing):
-    with pytest.warns(ScanfabWarning, match=r"an isotropic sample would get alpha = 0\.43"):
-        plan_of(packing, directions="equal-angle:10")
-    with pytest.warns(ScanfabWarning, match=r"fibonacci:100: .* alpha = 0\.007"):
-        plan_of(packing, directions="fibonacci:100")
+    (coarse,) = plan_of(packing, directions="equal-angle:10").notes
+    assert coarse.text.endswith("an isotropic sample would get alpha = 0.43")
+    (fine,) = plan_of(packing, directions="fibonacci:100").notes
+    assert re.search(r"fibonacci:100: .* alpha = 0\.007", fine.text)
+    assert coarse.code == fine.code == "biased_directions"
+
+
+def test_what_a_plan_says_is_told_once(packing):
+    with pytest.warns(ScanfabWarning, match=r"fibonacci:100: .* alpha = 0\.007") as told:
+        compute(packing, directions="fibonacci:100", spacing=0.3, variants="a")
+    assert len(told) == 1
 
 
 def test_rv_of_a_periodic_cell_is_a_fraction_of_its_height(packing):
@@ -197,11 +204,8 @@ def test_spacing_wider_than_the_sample_is_refused(packing, variants):
 @pytest.mark.parametrize(("tolerance", "warns"), [(0.08, False), (0.07, True)])
 def test_bias_of_a_rule_counts_over_a_tenth_of_the_tolerance(packing, tolerance, warns):
     """That of 100 Fibonacci directions is 0.0075."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        plan_of(packing, directions="fibonacci:100", tolerance=tolerance)
-    found = [str(one.message) for one in caught if "isotropic" in str(one.message)]
-    assert bool(found) == warns
+    notes = plan_of(packing, directions="fibonacci:100", tolerance=tolerance).notes
+    assert any("isotropic" in note.text for note in notes) == warns
 
 
 def test_exact_rules_have_no_bias_to_warn_of(packing):

@@ -117,13 +117,9 @@ def test_variants_are_always_in_the_same_order():
     assert Settings(variants="aab").variants == "ab"
 
 
-@pytest.mark.parametrize(
-    ("variants", "window", "whole"),
-    [("ab", False, True), ("cd", True, False), ("ad", True, True)],
-)
-def test_variants_say_what_is_needed(variants, window, whole):
-    settings = Settings(variants=variants)
-    assert (settings.needs_window, settings.needs_whole) == (window, whole)
+@pytest.mark.parametrize(("variants", "window"), [("ab", False), ("cd", True), ("ad", True)])
+def test_variants_say_what_is_needed(variants, window):
+    assert Settings(variants=variants).needs_window == window
 
 
 def test_directions_are_a_number_a_rule_or_auto():
@@ -324,7 +320,8 @@ def test_numbers_do_where_the_command_line_has_text():
 
 def test_the_signature_of_compute_has_every_option_and_its_default():
     signature = inspect.signature(scanfab.compute).parameters
-    options = {name: one.default for name, one in signature.items() if name != "source"}
+    others = ("source", "executor")
+    options = {name: one.default for name, one in signature.items() if name not in others}
     assert options == {one.name: one.default for one in options_of(Settings)}
     kinds = {one.kind for name, one in signature.items() if name != "source"}
     assert kinds == {inspect.Parameter.KEYWORD_ONLY}
@@ -340,7 +337,7 @@ def test_compute_hands_every_option_to_the_settings(monkeypatch):
     """Each in its own place."""
     taken = {}
 
-    def rows(source, settings):
+    def rows(source, settings, executor):
         taken.update(vars(settings))
         return iter(())
 

@@ -61,7 +61,7 @@ def test_rounds_of_an_auto_scan_never_draw_the_same_lines_again(packing):
         variants="c", tolerance=2e-5, workers=1, cutoff=0.4, directions="icosahedral:9"
     )
     plan = make_plan(settings, Sample(find_contacts(centred), np.zeros(len(packing), bool)))
-    sums, plan = adaptive.scan_to_tolerance(solids, plan, settings)
+    sums, plan, _ = adaptive.scan_to_tolerance(solids, plan)
     again = scan_lines(
         solids,
         plan.rule,
@@ -90,7 +90,7 @@ def test_a_scan_of_a_given_spacing_does_not_stop_at_an_error_that_is_small_by_ch
             variants="c", tolerance=1e-3, spacing=0.15, cutoff=0.4, seed=seed, workers=1
         )
         plan = make_plan(settings, Sample(centred, np.zeros(len(packing), bool)))
-        sums, plan = adaptive.scan_to_tolerance(solids, plan, settings)
+        sums, plan, _ = adaptive.scan_to_tolerance(solids, plan)
         fabric = void_fabric(sums.axes, plan.rule.weights, *sums.kept("c"))
         assert 1.2 * fabric.expected_error(settings.axis, plan.rule.degree) <= 1e-3
         assert fabric.axial_error(settings.axis) <= 1e-3

@@ -1,0 +1,185 @@
+"""Packings from lists and generators, frames in other processes, and frames one by one."""
+
+from __future__ import annotations
+
+import pickle
+import weakref
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab.base.errors import ScanfabWarning, SettingsError, SkippedFrameWarning
+from scanfab.packing.packing import Packing
+from scanfab.packing.sample import Sample
+from scanfab.pipeline.compute import compute_rows
+from scanfab.pipeline.frame import compute_frame
+from scanfab.pipeline.plan import make_plan
+from scanfab.pipeline.settings import Settings
+from tests.helpers.dumps import dump_text, write
+from tests.helpers.lattices import shaken_cubic
+
+SCAN = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin", "variants": "cd"}
+NAMES = "id type x y z radius"
+
+
+def packings(count=4):
+    """The same grains, pressed together a little more from one to the next."""
+    first = shaken_cubic(np.random.default_rng(2), 5)
+    for k in range(count):
+        squeezed = first.position * [1.0, 1.0, 1.0 - 0.01 * k]
+        yield Packing(squeezed, first.radius, step=k)
+
+
+def series_in(folder, count=4):
+    """The same as a dump of snapshots."""
+    texts = []
+    for one in packings(count):
+        rows = zip(one.id, one.position.tolist(), one.radius, strict=True)
+        table = [(int(id) + 1, 1, *place, float(radius)) for id, place, radius in rows]
+        texts.append(dump_text(table, NAMES, step=one.step, box=((0, 10),) * 3))
+    return scanfab.read_series(write(folder / "dump.txt", "".join(texts)))
+
+
+def test_an_iterable_of_packings_is_a_series():
+    table = scanfab.compute(list(packings()), strain="grains", **SCAN)
+    assert [row.frame for row in table] == [0, 0, 1, 1, 2, 2, 3, 3]
+    assert [row.step for row in table] == [0, 0, 1, 1, 2, 2, 3, 3]
+    assert [row.source for row in table] == [""] * 8
+    assert [row.strain for row in table[::2]] == pytest.approx([0.0, 0.01, 0.02, 0.03])
+
+
+def test_each_comes_with_the_plan_of_the_first():
+    every = scanfab.compute(list(packings()), **SCAN)
+    window = make_plan(Settings(**SCAN), Sample(next(packings()), np.zeros(125, bool))).window
+    last = list(packings())[-1]
+    words = {"rv_radius": window.radius, "rv_center": tuple(window.center)}
+    alone = scanfab.compute(last, **SCAN, **words)
+    assert [row.gvs_zz for row in every[-2:]] == [row.gvs_zz for row in alone]
+
+
+@pytest.mark.parametrize("frames", [None, "1:3", "::2", "-2:", "-1"])
+def test_a_generator_gives_what_a_list_gives(frames):
+    lists = scanfab.compute(list(packings()), frames=frames, **SCAN)
+    assert scanfab.compute(packings(), frames=frames, **SCAN) == lists
+
+
+def test_rows_of_a_stream_come_before_its_end():
+    """Those of a running simulation, of which nobody knows how long it goes on."""
+
+    def endless():
+        while True:
+            yield from packings()
+
+    rows = compute_rows(endless(), Settings(workers=2, **SCAN))
+    assert [next(rows).frame for _ in range(12)] == [k // 2 for k in range(12)]
+    rows.close()
+
+
+def test_a_stream_is_not_kept_in_memory():
+    alive = weakref.WeakSet()
+
+    def watched():
+        for one in packings(12):
+            alive.add(one)
+            yield one
+            assert len(alive) <= 5
+
+    assert len(scanfab.compute(watched(), workers=1, **SCAN)) == 24
+
+
+def test_what_is_no_packing_is_named():
+    with pytest.raises(SettingsError, match="expected packings, found 3 among them"):
+        scanfab.compute([*packings(1), 3], **SCAN)
+    with pytest.raises(SettingsError, match="a Series or an iterable of packings, found 'dumps/'"):
+        scanfab.compute("dumps/", **SCAN)
+    with pytest.raises(SettingsError, match="a Series or an iterable of packings, found 7"):
+        scanfab.compute(7, **SCAN)
+
+
+@pytest.mark.parametrize("source", [list, iter])
+def test_frames_that_do_not_exist_are_told_with_how_many_there_are(source):
+    with pytest.raises(SettingsError, match=r"no frame in 7:9: .*has 4 frames, 0 to 3"):
+        scanfab.compute(source(list(packings())), frames="7:9", **SCAN)
+
+
+def test_an_executor_of_threads_gives_the_same_rows(tmp_path):
+    series = series_in(tmp_path)
+    with ThreadPoolExecutor(2) as executor:
+        found = scanfab.compute(series, executor=executor, **SCAN)
+        # it belongs to whoever made it, and goes on
+        assert executor.submit(int, "3").result() == 3
+    assert found == scanfab.compute(series, **SCAN)
+
+
+@pytest.fixture(scope="module")
+def processes():
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as executor:
+        yield executor
+
+
+def test_other_processes_give_the_same_rows(tmp_path, processes):
+    series = series_in(tmp_path)
+    found = scanfab.compute(series, executor=processes, **SCAN)
+    assert found == scanfab.compute(series, **SCAN)
+    packed = scanfab.compute(packings(), executor=processes, **SCAN)
+    assert packed == scanfab.compute(packings(), **SCAN)
+
+
+def test_what_another_process_is_told_is_heard_here(tmp_path, processes):
+    """Notes of the scan, and warnings of whoever reads."""
+    series = series_in(tmp_path, 2)
+    words = {**SCAN, "cutoff": 50.0, "executor": processes}
+    with pytest.warns(ScanfabWarning) as told:
+        scanfab.compute(series, **words)
+    texts = [str(one.message) for one in told]
+    for number in (0, 1):
+        about = f"frame {number}, variants c, d: no void segment reaches the cut-off 50"
+        assert sum(text.startswith(about) for text in texts) == 1
+
+
+def test_a_damaged_frame_stops_or_is_left_out_elsewhere_too(tmp_path, processes):
+    text = (series_in(tmp_path, 3), (tmp_path / "dump.txt").read_text())[1]
+    lines = text.splitlines(keepends=True)
+    second = [k for k, line in enumerate(lines) if line.startswith("ITEM: ATOMS")][1]
+    lines[second + 1] = "1 1 a b c 0.5\n"
+    series = scanfab.read_series(write(tmp_path / "broken.txt", "".join(lines)))
+    with pytest.warns(SkippedFrameWarning, match=r"frame 1 skipped: .*broken\.txt"):
+        table = scanfab.compute(series, executor=processes, on_error="skip", **SCAN)
+    assert [row.frame for row in table] == [0, 0, 2, 2]
+    with pytest.raises(scanfab.ReadError, match=r"broken\.txt"):
+        scanfab.compute(series, executor=processes, **SCAN)
+
+
+def test_a_frame_is_computed_alone_from_its_plan(tmp_path):
+    series = series_in(tmp_path)
+    every = scanfab.compute(series, **SCAN)
+    first, *_, last = series
+    plan = make_plan(Settings(**SCAN), plan_sample(first.read()))
+    found = compute_frame(last, pickle.loads(pickle.dumps(plan)), number=3, source=series.name)
+    assert [row.gvs_zz for row in found.rows] == [row.gvs_zz for row in every[-2:]]
+    assert [(row.source, row.frame) for row in found.rows] == [(series.name, 3)] * 2
+
+
+def plan_sample(packing):
+    return Sample(scanfab.find_contacts(packing), np.zeros(len(packing), bool))
+
+
+def test_notes_of_a_frame_are_data():
+    packing = next(packings())
+    plan = make_plan(Settings(**{**SCAN, "cutoff": 50.0}), plan_sample(packing))
+    (note,) = compute_frame(packing, plan).notes
+    assert note.code == "cutoff_too_long"
+    assert note.variants == ("c", "d")
+    assert note.text.startswith("no void segment reaches the cut-off 50")
+
+
+def test_a_frame_without_grains_has_rows_without_numbers():
+    plan = make_plan(Settings(**SCAN), plan_sample(next(packings())))
+    rows = compute_frame(Packing(np.zeros((0, 3)), []), plan, number=5).rows
+    assert [(row.frame, row.variant, row.grains, row.gvs_zz) for row in rows] == [
+        (5, "c", 0, None),
+        (5, "d", 0, None),
+    ]
