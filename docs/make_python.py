@@ -15,10 +15,11 @@ BEGIN, END = "<!-- names -->", "<!-- end of names -->"
 GROUPS = {
     "Reading": ("read", "read_series", "Series", "Frame"),
     "Packings from anywhere": ("Packing", "Cell", "ContactList", "Contacts", "find_contacts"),
-    "Computing": ("compute", "Settings", "calibrate", "Calibration"),
+    "Computing": ("compute", "compute_file", "Settings", "calibrate", "Calibration"),
     "Tables": (
         "Table", "Row", "load", "read_rows", "compare_tables", "Comparison", "COLUMNS", "Column",
     ),
+    "Reports": ("make_report", "Report"),
     "Scanning by hand": (
         "samples", "Sample", "Window", "sphere", "Convex", "solids_of", "Solids", "direction_rule",
         "DirectionRule", "scan_lines", "ScanSums", "void_fabric", "VoidFabric", "contact_fabric",

@@ -45,6 +45,8 @@ if TYPE_CHECKING:
     from scanfab.table.reading import read_rows
     from scanfab.table.row import Row
     from scanfab.table.table import Table, load
+    from scanfab.viz.compute_file import compute_file
+    from scanfab.viz.report.report import Report, make_report
 
 # numpy, numba and the readers are loaded by the first name that needs them
 _HOME = {
@@ -63,6 +65,7 @@ _HOME = {
     "Packing": "packing.packing",
     "PackingError": "base.errors",
     "ReadError": "base.errors",
+    "Report": "viz.report.report",
     "Row": "table.row",
     "Sample": "packing.sample",
     "ScanSums": "scan.scan",
@@ -80,10 +83,12 @@ _HOME = {
     "calibrate": "pipeline.calibration",
     "compare_tables": "table.compare",
     "compute": "pipeline.compute",
+    "compute_file": "viz.compute_file",
     "contact_fabric": "fabric.contact",
     "direction_rule": "scan.directions",
     "find_contacts": "packing.search",
     "load": "table.table",
+    "make_report": "viz.report.report",
     "read": "io.opening",
     "read_rows": "table.reading",
     "read_series": "io.opening",
@@ -110,6 +115,7 @@ __all__ = [
     "Packing",
     "PackingError",
     "ReadError",
+    "Report",
     "Row",
     "Sample",
     "ScanSums",
@@ -127,10 +133,12 @@ __all__ = [
     "calibrate",
     "compare_tables",
     "compute",
+    "compute_file",
     "contact_fabric",
     "direction_rule",
     "find_contacts",
     "load",
+    "make_report",
     "read",
     "read_rows",
     "read_series",

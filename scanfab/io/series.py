@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
@@ -54,6 +54,10 @@ class Series:
         What the user tells of the dump.
     cells : FrameFile or None
         The cell of each frame, in the place of one for all in the options.
+    sources : tuple of str
+        What :func:`scanfab.read_series` was given.
+    reading : mapping
+        Its options, as a manifest lists them.
     numbers : range
         Which frames of the whole series these are; there may be fewer.
 
@@ -73,6 +77,8 @@ class Series:
     contacts_from: ContactsFrom = "auto"
     options: ReadOptions = field(default_factory=ReadOptions)
     cells: FrameFile | None = None
+    sources: tuple[str, ...] = field(default=(), repr=False, compare=False)
+    reading: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
     numbers: range = range(ENDLESS)
     # a file that holds the contacts of many frames is indexed once
     _contact_snapshots: dict[Path, list[Snapshot]] = field(

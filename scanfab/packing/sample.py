@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
+from scanfab.base.arrays import cast
 from scanfab.base.errors import PackingError
 from scanfab.base.note import Note
 from scanfab.base.spelling import counted
@@ -18,6 +19,7 @@ from scanfab.base.typing import BoolArray, IntArray
 from scanfab.packing.boundary import BoundaryRule, select_boundary
 from scanfab.packing.escaped import Escaped, escaped_grains
 from scanfab.packing.packing import Contacts, Packing
+from scanfab.packing.rattlers import RattlerRule, Touching, count, installed_rules
 from scanfab.packing.search import find_contacts
 from scanfab.packing.window import SurfaceBox, Window
 
@@ -60,6 +62,8 @@ class Sample:
         Particles that are boundary, not grains.
     min_contacts : int, optional
         A grain with fewer contacts is a rattler.
+    rattler_rule : callable, optional
+        Tells them by their contacts; by default every grain on its own, in one pass.
 
     Raises
     ------
@@ -81,6 +85,7 @@ class Sample:
     packing: Packing
     boundary: BoolArray
     min_contacts: int = 2
+    rattler_rule: RattlerRule = count
 
     def __post_init__(self) -> None:
         """PackingError if the boundary is no truth value for each particle."""
@@ -95,7 +100,10 @@ class Sample:
         what = f"Sample: {counted(int(self.grains.sum()), 'grain')}"
         if self.packing.contacts is not None:
             rattlers = counted(int(self.rattlers.sum()), "rattler")
-            what += f", {rattlers} (fewer than {counted(self.min_contacts, 'contact')})"
+            rule = f"fewer than {counted(self.min_contacts, 'contact')}"
+            if self.rattler_rule is not count:
+                rule = f"by {getattr(self.rattler_rule, '__name__', 'a rule')} of {rule}"
+            what += f", {rattlers} ({rule})"
         boundary = int(self.boundary.sum())
         return what + (f"; {counted(boundary, 'boundary particle')}" if boundary else "")
 
@@ -163,25 +171,25 @@ class Sample:
 
     @cached_property
     def rattlers(self) -> BoolArray:
-        """
-        Grains with fewer than ``min_contacts`` contacts, shape (N,).
+        """Grains that are rattlers by the rule, shape (N,)."""
+        told = self.rattler_rule(self._touching)
+        found: BoolArray = cast("rattlers", told, np.bool_, (len(self.packing),))
+        return self.grains & found
 
-        One pass, no repetition; contacts with boundary particles and walls count.
-        """
-        return self.grains & (self.contact_numbers < self.min_contacts)
+    @property
+    def _touching(self) -> Touching:
+        return Touching(self.contacts, self.contact_numbers, self.grains, self.min_contacts)
 
     @cached_property
     def contact_numbers(self) -> IntArray:
         """Number of contacts of each particle, those with walls included, shape (N,)."""
-        return self._numbers_of(self.contacts.pairs)
+        ends = np.bincount(self.contacts.pairs.ravel(), minlength=len(self.packing))
+        return ends + self.packing.wall_contacts
 
     @cached_property
     def contact_numbers_without_rattlers(self) -> IntArray:
         """The same without contacts that a rattler has part in."""
-        return self._numbers_of(self.contacts.pairs[self.contacts_without(self.rattlers)])
-
-    def _numbers_of(self, pairs: IntArray) -> IntArray:
-        return np.bincount(pairs.ravel(), minlength=len(self.packing)) + self.packing.wall_contacts
+        return self._touching.numbers_without(~self.contacts_without(self.rattlers))
 
     def removed(self, variant: Variant) -> BoolArray:
         """
@@ -315,6 +323,8 @@ class SampleRule:
     """Particles that fit one of them are boundary."""
     min_contacts: int = 2
     """A grain with fewer contacts is a rattler."""
+    rattlers: str = "count"
+    """By which of the installed rules."""
     contact_tolerance: float = 0.0
     """Of contacts by geometry, where no file lists them; relative to the sum of the radii."""
 
@@ -329,4 +339,5 @@ class SampleRule:
         """
         if packing.contacts is None:
             packing = find_contacts(packing, self.contact_tolerance)
-        return Sample(packing, select_boundary(packing, self.boundary), self.min_contacts)
+        boundary = select_boundary(packing, self.boundary)
+        return Sample(packing, boundary, self.min_contacts, installed_rules()[self.rattlers])

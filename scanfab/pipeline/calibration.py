@@ -72,10 +72,10 @@ class Calibration:
     Examples
     --------
     >>> import numpy as np
-    >>> from scanfab import Packing, Settings, Table, calibrate
+    >>> from scanfab import Packing, Table, calibrate
     >>> grid = np.stack(np.meshgrid(*3 * [np.arange(6.0)]), axis=-1).reshape(-1, 3)
-    >>> settings = Settings(variants="c", tolerance=0.01, rv=0.6, contact_tolerance=1e-4)
-    >>> found = calibrate(Packing(grid, 0.5), settings)
+    >>> packing = Packing(grid, 0.5)
+    >>> found = calibrate(packing, variants="c", tolerance=0.01, rv=0.6, contact_tolerance=1e-4)
     >>> sorted(found.options)
     ['directions', 'spacing']
     >>> len(Table(found.rows)) == len(found.rows)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from scanfab.base.errors import SettingsError
-from scanfab.base.option import number, unusable, whole
+from scanfab.base.option import number, one_of, unusable, whole
 from scanfab.base.spelling import shortest
 
 if TYPE_CHECKING:
@@ -33,12 +33,14 @@ __all__ = [
     "parse_frames",
     "parse_length",
     "parse_lengths",
+    "parse_rattlers",
     "parse_spacing",
     "parse_strain",
     "parse_tolerance",
     "parse_variants",
     "parse_vector",
     "parse_workers",
+    "rattler_rules",
 ]
 
 Vector = tuple[float, float, float]
@@ -261,6 +263,18 @@ def parse_tolerance(name: str, value: Any) -> float:
     if not 1e-15 <= found <= 1e15:
         raise unusable(name, "a number from 1e-15 to 1e15", value)
     return float(found)
+
+
+def rattler_rules() -> Iterable[str]:
+    """The names of the rules that are installed."""
+    from scanfab.packing.rattlers import installed_rules
+
+    return installed_rules()
+
+
+def parse_rattlers(name: str, value: Any) -> str:
+    """The name of a rule that is installed."""
+    return str(one_of(*rattler_rules())(name, value))
 
 
 def parse_strain(name: str, value: Any) -> str:

@@ -12,7 +12,8 @@ from typing import Any
 import scanfab
 
 SECTIONS = (
-    "Parameters", "Attributes", "Returns", "Yields", "Raises", "Notes", "References", "Examples",
+    "Parameters", "Attributes", "Returns", "Yields", "Raises", "Warns", "Notes", "References",
+    "Examples",
 )  # fmt: skip
 
 
@@ -76,10 +77,11 @@ def _is_attribute(kind: type, name: str) -> bool:
 def members_of(kind: type) -> Iterator[tuple[str, Any]]:
     """The public methods and properties that a class of this package brings itself."""
     for name in dir(kind):
-        if name.startswith("_"):
-            continue
         member = inspect.getattr_static(kind, name)
         owner = next(one for one in kind.__mro__ if name in vars(one))
+        # a field may have a function for its usual value
+        if name.startswith("_") or name in vars(owner).get("__annotations__", {}):
+            continue
         if owner.__module__.startswith("scanfab"):
             yield name, member
 
