@@ -54,8 +54,8 @@ class Report:
     Examples
     --------
     >>> from scanfab import Report
-    >>> Report("<!doctype html>", has_void_fabric=True)
-    Report: an HTML page of 1.5e-05 MB, with void fabric
+    >>> Report("<!doctype html>" + 2_000_000 * " ", has_void_fabric=True)
+    Report: an HTML page of 2 MB, with void fabric
     """
 
     page: str = field(repr=False)
@@ -136,8 +136,8 @@ def make_report(
     ...     scanfab.Table([row]).save(f"{folder}/fabric.csv")
     ...     report = scanfab.make_report(f"{folder}/fabric.csv", title="A box")
     ...     report.save(f"{folder}/report.html")
-    >>> report
-    Report(has_void_fabric=True)
+    >>> report.has_void_fabric
+    True
     """
     named = [tables] if isinstance(tables, str | os.PathLike) else tables
     heard = _Heard()
