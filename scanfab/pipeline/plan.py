@@ -76,11 +76,6 @@ class Plan:
     notes: tuple[Note, ...] = ()
     """What is doubtful about the settings, for a user who has chosen them."""
 
-    @property
-    def needs_whole(self) -> bool:
-        """Whether a variant of the whole sample is asked for."""
-        return "a" in self.variants or "b" in self.variants
-
 
 def make_plan(settings: Settings, sample: Sample, strains: Strains | None = None) -> Plan:
     """

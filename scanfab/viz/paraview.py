@@ -81,7 +81,7 @@ class VtkFolder:
         fields = _fields([row])
         if result.measurement is None:
             return
-        center = result.measurement.origin
+        center = result.measurement.solids.origin
         lines = scan_line_sample(result, row.variant, self.axis)
         mesh = vtk.line_mesh(lines, result.measurement.plan.cutoff)
         self._save(f"lines-{row.variant}", mesh, result, fields)
@@ -133,7 +133,7 @@ def scan_line_sample(
     # along the axis, and along the first direction across it
     frames = np.stack([frame, np.roll(frame, -1, axis=0)])
     found = sample_segments(position, radius, frames, lines, window)
-    return replace(found, ends=found.ends + result.scanned.origin)
+    return replace(found, ends=found.ends + result.scanned.solids.origin)
 
 
 def _time(result: FrameResult) -> float:

@@ -202,7 +202,9 @@ class ScannedFrames:
         chosen = slice(first, last + 1, max(last - first, 1))
         settings = replace(self.settings, variants=variants, frames=chosen, cutoffs=())
         results: list[FrameResult] = []
-        computed = compute_rows(self.source, settings, observe=results.append)
+        # frames are numbered in the whole series, also those of a part
+        whole = self.source.whole if isinstance(self.source, Series) else self.source
+        computed = compute_rows(whole, settings, observe=results.append)
         rows = [row for row in computed if row["variant"] == self.variant]
         self._refuse_none(rows)
         # of the table: what is asked of a strain file now may be another

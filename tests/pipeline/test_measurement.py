@@ -182,10 +182,10 @@ def test_the_origin_leads_back_to_the_coordinates_of_the_dump(packing, variants)
     """Of the positions of the solids; where there is no RV it is the middle of the grains."""
     found = measured(packing, **LINES, variants=variants, rv_center=(1.5, 1.0, 1.25))
     center = packing.position.mean(axis=0) if variants == "ab" else (1.5, 1.0, 1.25)
-    assert found.origin == pytest.approx(center)
+    assert found.solids.origin == pytest.approx(center)
     for variant in variants:
         position, radius, _ = found.spheres_of(VARIANTS[variant])
-        placed = np.column_stack([position + found.origin, radius])
+        placed = np.column_stack([position + found.solids.origin, radius])
         rows = np.column_stack([packing.position, packing.radius])
         near = cKDTree(rows).query(placed)[0]
         assert near == pytest.approx(np.zeros(len(placed)), abs=1e-12)

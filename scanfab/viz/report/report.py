@@ -38,12 +38,29 @@ __all__ = ["Report", "make_report"]
 
 @dataclass(frozen=True)
 class Report:
-    """A report on fabric tables, as :func:`make_report` makes it."""
+    """
+    A report on fabric tables, as :func:`make_report` makes it.
+
+    Attributes
+    ----------
+    page : str
+        HTML that needs nothing else.
+    has_void_fabric : bool
+        Whether any row of the tables has one.
+
+    Examples
+    --------
+    >>> from scanfab import Report
+    >>> Report("<!doctype html>" + 2_000_000 * " ", has_void_fabric=True)
+    Report: an HTML page of 2 MB, with void fabric
+    """
 
     page: str = field(repr=False)
-    """HTML that needs nothing else."""
     has_void_fabric: bool
-    """Whether any row of the tables has one."""
+
+    def __repr__(self) -> str:
+        fabric = "with" if self.has_void_fabric else "without any"
+        return f"Report: an HTML page of {len(self.page) / 1e6:.2g} MB, {fabric} void fabric"
 
     def save(self, path: PathLike) -> None:
         """
@@ -116,8 +133,8 @@ def make_report(
     ...     scanfab.Table([row]).save(f"{folder}/fabric.csv")
     ...     report = scanfab.make_report(f"{folder}/fabric.csv", title="A box")
     ...     report.save(f"{folder}/report.html")
-    >>> report
-    Report(has_void_fabric=True)
+    >>> report.has_void_fabric
+    True
     """
     named = [tables] if isinstance(tables, str | os.PathLike) else tables
     heard = _Heard()
