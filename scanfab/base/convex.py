@@ -33,24 +33,60 @@ EVERYWHERE = Quadric(0.0, np.zeros((3, 3)), 1.0)
 
 @dataclass(frozen=True, eq=False)
 class Convex:
-    """A convex region about the origin, bounded; its surface is not part of it."""
+    """
+    A convex region about the origin, bounded; its surface is not part of it.
+
+    Parameters
+    ----------
+    planes : ndarray
+        Rows n, d with unit vectors n: of each plane the side n·x < d, shape (P, 4).
+    quadric : Quadric
+        It holds the region as well; ``EVERYWHERE`` of planes alone, which bounds nothing.
+    low : ndarray
+        The box along x, y and z that holds the region, shape (3,).
+    high : ndarray, shape (3,)
+        Its opposite corner.
+    reach : float
+        Radius of the ball about the origin that holds the region; of a sphere its own.
+    size : str
+        How messages tell its size, for instance ``radius 2``.
+
+    Examples
+    --------
+    >>> from scanfab import sphere
+    >>> ball = sphere(2.0)
+    >>> ball
+    Convex: radius 2 about the origin
+    >>> ball.reach, ball.low.tolist()
+    (2.0, [-2.0, -2.0, -2.0])
+    """
 
     planes: FloatArray
-    """Rows n, d with unit vectors n: of each plane the side n·x < d, shape (P, 4)."""
     quadric: Quadric
     low: FloatArray
-    """The box along x, y and z that holds the region, shape (3,)."""
     high: FloatArray
     reach: float
-    """Radius of the ball about the origin that holds the region; of a sphere its own."""
     size: str
-    """How messages tell its size, for instance ``radius 2``."""
+
+    def __repr__(self) -> str:
+        return f"Convex: {self.size} about the origin"
 
     def __str__(self) -> str:
         return self.size
 
     def contains(self, points: FloatArray) -> BoolArray:
-        """Which points lie inside, shape (N,)."""
+        """
+        Which points lie inside.
+
+        Parameters
+        ----------
+        points : ndarray, shape (N, 3)
+            From the origin of the region.
+
+        Returns
+        -------
+        ndarray of bool, shape (N,)
+        """
         isotropic, deviator, level = self.quadric
         form = isotropic * np.einsum("ij,ij->i", points, points)
         form += np.einsum("ij,ij->i", points @ deviator, points)
@@ -62,9 +98,20 @@ class Convex:
 
     def may_meet(self, points: FloatArray, radius: FloatArray) -> BoolArray:
         """
-        Which spheres may reach inside, shape (N,): all that do, and of a sphere no others.
+        Which spheres may reach inside: all that do, and of a sphere no others.
 
         Past an edge, or a quadric that is no sphere, some are told that only come near.
+
+        Parameters
+        ----------
+        points : ndarray, shape (N, 3)
+            Their centres, from the origin of the region.
+        radius : ndarray, shape (N,)
+            Their radii.
+
+        Returns
+        -------
+        ndarray of bool, shape (N,)
         """
         near = np.sqrt(np.einsum("ij,ij->i", points, points)) < self.reach + radius
         for plane in self.planes:
@@ -75,6 +122,16 @@ class Convex:
 def sphere(radius: float) -> Convex:
     """
     A sphere about the origin.
+
+    Parameters
+    ----------
+    radius : float
+        Dump's length unit.
+
+    Returns
+    -------
+    Convex
+        The shape of a :class:`scanfab.Window`, or the window of :class:`scanfab.Solids`.
 
     Examples
     --------

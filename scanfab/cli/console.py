@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 import click
 
+from scanfab.base import column as base
 from scanfab.base.errors import ScanfabNote, ScanfabWarning
 from scanfab.cli.options import AS_CSV
 from scanfab.cli.tables import Column, print_columns, spelt
@@ -99,7 +100,9 @@ def announce_compiling() -> None:
     )
 
 
-def print_csv(rows: Iterable[Mapping[str, Any]], excerpt: Excerpt, kind: type = Row) -> None:
+def print_csv(
+    rows: Iterable[Mapping[str, Any]], excerpt: Excerpt, kind: type | Sequence[base.Column] = Row
+) -> None:
     """Rows of a kind as CSV on standard output, each as it comes."""
     from scanfab.table.columns import columns_of
     from scanfab.table.writing import row_writer

@@ -43,6 +43,7 @@ def compute(
     rv: float = 0.7,
     rv_radius: float | None = None,
     rv_center: Sequence[float] | None = None,
+    edge: str = "clip",
     boundary: str | Sequence[str] = (),
     cutoff: str | float = "1rmin",
     cutoffs: str | float | Iterable[str | float] | None = None,

@@ -82,8 +82,12 @@ def compute_frame(
         **plan.strains.at(number, frame),
     }
     if not frame.grains.any():
-        empty = {**no_columns(), **known}
-        rows = [complete_row({**empty, "variant": v}) for v in plan.variants for _ in plan.cutoffs]
+        empty = {**no_columns(plan.further_columns), **known}
+        rows = [
+            complete_row({**empty, "variant": v}, plan.further_columns)
+            for v in plan.variants
+            for _ in plan.cutoffs
+        ]
         return FrameResult(source, number, frame, None, rows)
     measurement = measure(frame, plan, f"frame {number}")
     columns = [
@@ -91,7 +95,10 @@ def compute_frame(
         for variant in plan.variants
         for place in range(len(plan.cutoffs))
     ]
-    rows = [complete_row({**known, "variant": c.variant.name, **c.columns()}) for c in columns]
+    rows = [
+        complete_row({**known, "variant": one.variant.name, **one.columns()}, plan.further_columns)
+        for one in columns
+    ]
     notes = [
         *frame.doubts_of_escaped(),
         *measurement.notes,

@@ -71,15 +71,14 @@ class Plan:
     """What the scan may add to meet the tolerance: ``""``, ``replicates`` or ``directions``."""
     rule_is_asked_for: bool
     """Then an auto scan keeps it."""
+    edge: str
+    """What counts at the window's surface, see :mod:`scanfab.scan.edges`."""
+    further_columns: tuple[str, ...]
+    """Of the table, which others have not."""
     lists_gaps: bool
     """Whether sums for one cut-off do not suffice."""
     notes: tuple[Note, ...] = ()
     """What is doubtful about the settings, for a user who has chosen them."""
-
-    @property
-    def needs_whole(self) -> bool:
-        """Whether a variant of the whole sample is asked for."""
-        return "a" in self.variants or "b" in self.variants
 
 
 def make_plan(settings: Settings, sample: Sample, strains: Strains | None = None) -> Plan:
@@ -186,6 +185,8 @@ def _without_lengths(settings: Settings, strains: Strains) -> Plan:
         replicates=0,
         auto="",
         rule_is_asked_for=settings.directions is not None,
+        edge=settings.edge,
+        further_columns=settings.further_columns,
         lists_gaps=settings.lists_gaps,
     )
 

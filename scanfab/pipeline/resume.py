@@ -227,15 +227,16 @@ def _by_frame(
     for (source, frame), group in groupby(rows, key=lambda row: (row["source"], row["frame"])):
         if source not in found:
             raise _refused(path, f"its source {source} is not named now")
-        own = [_row(row) for row in group]
+        own = [_row(row, settings.further_columns) for row in group]
         if len(own) == settings.rows_per_frame:
             found[source][frame] = own
     return found
 
 
-def _row(values: Mapping[str, Any]) -> Row:
+def _row(values: Mapping[str, Any], further: Collection[str]) -> Row:
     """A row as it was written; columns that were not are empty, and are not written again."""
-    return complete_row({column.name: values.get(column.name) for column in table_columns()})
+    columns = table_columns(further)
+    return complete_row({column.name: values.get(column.name) for column in columns}, further)
 
 
 def _refused(path: Path, reason: str) -> SettingsError:

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from scanfab.base.errors import SettingsError
 from scanfab.base.option import (
     number,
     one_of,
@@ -21,6 +22,7 @@ from scanfab.pipeline.values import (
     Axis,
     Length,
     Vector,
+    as_written,
     parse_axis,
     parse_boundary,
     parse_cutoff,
@@ -36,6 +38,8 @@ from scanfab.pipeline.values import (
     parse_workers,
     rattler_rules,
 )
+from scanfab.scan.columns import EDGE_COLUMNS
+from scanfab.scan.edges import CLIP, EDGES, ENDS
 
 if TYPE_CHECKING:
     from scanfab.packing.boundary import BoundaryRule
@@ -60,6 +64,11 @@ class Settings:
 
     Settings are made of the options of :func:`scanfab.compute`, written as there; the attributes
     are what they mean, with lengths in the dump's unit.
+
+    Parameters
+    ----------
+    **options
+        Those of :func:`scanfab.compute`.
 
     Raises
     ------
@@ -114,6 +123,17 @@ class Settings:
         kind=float,
         metavar="X Y Z",
         words=3,
+    )
+    edge: str = option(
+        default=CLIP,
+        parse=one_of(*EDGES),
+        group="window",
+        help="What counts at the surface of the RV: clip cuts the void segments there; start takes "
+        "their full length if they begin or end inside, ends their ends inside.",
+        meaning="clip: void segments are cut at the RV's surface; start: those that begin or end "
+        "in it count with their full length; ends: by their ends in it, in the whole, too",
+        metavar="|".join(EDGES),
+        choices=lambda: EDGES,
     )
     boundary: tuple[BoundaryRule, ...] = option(
         default=(),
@@ -298,11 +318,31 @@ class Settings:
         for one in declared:
             value = one.parse(one.name, options.get(one.name, one.default))
             object.__setattr__(self, one.name, value)
+        if self.edge == ENDS and self.moment != 1:
+            raise SettingsError(
+                "moment: from what lies inside the window alone, as `edge=ends` takes it, the "
+                "second moment of the full lengths is not known: choose `edge=start`, or "
+                "`moment=1`"
+            )
+
+    def __repr__(self) -> str:
+        usual = Settings()
+        chosen = [
+            f"{one.name}={as_written(getattr(self, one.name))!r}"
+            for one in options_of(type(self))
+            if getattr(self, one.name) != getattr(usual, one.name)
+        ]
+        return f"Settings({', '.join(chosen)})"
 
     @property
     def lists_gaps(self) -> bool:
         """Whether sums for one cut-off do not suffice."""
         return bool(self.cutoffs) or self.moment != 1
+
+    @property
+    def further_columns(self) -> tuple[str, ...]:
+        """The columns of its table that others have not."""
+        return () if self.edge == CLIP else tuple(one.name for one in EDGE_COLUMNS)
 
     @property
     def rows_per_frame(self) -> int:
@@ -313,8 +353,3 @@ class Settings:
     def needs_window(self) -> bool:
         """Whether a variant of the RV is asked for."""
         return "c" in self.variants or "d" in self.variants
-
-    @property
-    def needs_whole(self) -> bool:
-        """Whether a variant of the whole sample is asked for."""
-        return "a" in self.variants or "b" in self.variants

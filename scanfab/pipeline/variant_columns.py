@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -16,6 +16,7 @@ from scanfab.fabric.jackknife import BLOCKS, BlockedSums
 from scanfab.fabric.registry import OWN_FABRICS, Measured, installed_fabrics
 from scanfab.packing.sample import Variant
 from scanfab.pipeline.measurement import Measurement
+from scanfab.scan.edges import CLIP, ENDS, START
 from scanfab.table.columns import table_columns
 
 __all__ = ["VariantColumns", "no_columns"]
@@ -23,6 +24,12 @@ __all__ = ["VariantColumns", "no_columns"]
 
 # in smallest radii: a cut-off that nobody means
 ABSURD = 100.0
+# of the segments: so many may leave the sample
+MOST_LEFT_OUT = 0.01
+NO_INNER_WINDOW = (
+    "the sample is flat or too small: by the rule `edge=ends` the whole is measured in the "
+    "ellipsoid that lies a largest radius within the hull of its centres, and there is none"
+)
 
 
 class VariantColumns:
@@ -38,6 +45,7 @@ class VariantColumns:
     def columns(self) -> dict[str, Any]:
         """All that depend on the variant."""
         found = {**self._sample(), **self._scan()}
+        found |= {name: self._edge()[name] for name in self.plan.further_columns}
         for fabric in (*OWN_FABRICS.values(), *installed_fabrics().values()):
             found |= fabric.values(self.measured)
         return found
@@ -104,6 +112,28 @@ class VariantColumns:
             "cutoff": self.plan.cutoffs[self.place],
         }
 
+    def _edge(self) -> dict[str, Any]:
+        """The rule at the window's surface, and what leaves the sample by it."""
+        return {"edge": self.edge, "left_out": self.left_out}
+
+    @property
+    def edge(self) -> str | None:
+        """The rule of this variant; a whole that repeats has no edge."""
+        if self.variant.in_window:
+            return self.plan.edge
+        if self.measurement.solids.medium is not None:
+            return None
+        return ENDS if self.plan.edge == ENDS else CLIP
+
+    @cached_property
+    def left_out(self) -> float | None:
+        """Share of the segments that leave the sample, and so are not counted."""
+        if self.edge != START:
+            return None
+        left = float(self.sums.left_out[:, self.which].sum())
+        every = left + float(self.sums.segments[:, self.which].sum())
+        return left / every if every else None
+
     def _solid_fraction(self) -> float | None:
         """1 - void length / line length in the window, weighted like the directions."""
         cell = self.sample.packing.cell
@@ -146,7 +176,8 @@ class VariantColumns:
 
     def notes(self) -> Iterator[Note]:
         """Whether there is no void fabric, or a doubtful one, or lines without a grain."""
-        texts = {"channels": self._channels(), **self._of_void_fabric()}
+        texts = {"channels": self._channels(), "left_out": self._left_out()}
+        texts |= self._of_void_fabric()
         return (Note(code, text, (self.variant.name,)) for code, text in texts.items() if text)
 
     def _channels(self) -> str:
@@ -154,10 +185,22 @@ class VariantColumns:
         lines = channels + int(self.sums.lines[:, self.which].sum())
         return f"{channels} of {lines} lines stay in a channel and meet no grain" * bool(channels)
 
+    def _left_out(self) -> str:
+        if (self.left_out or 0.0) <= MOST_LEFT_OUT:
+            return ""
+        return (
+            f"{self.left_out:.1%} of the void segments of the RV leave the sample and are left "
+            f"out: they are the long ones, so the mean length is too small: choose a smaller `rv`, "
+            f"or `edge=ends`, which needs nothing from outside"
+        )
+
     def _of_void_fabric(self) -> dict[str, str]:
         void = self.measured.void
         if self._no_solid:
             return {"no_solid": self._no_solid}
+        is_inner = self.edge == ENDS and not self.variant.in_window
+        if is_inner and self.measurement.solids.inner is None:
+            return {"no_inner_window": NO_INNER_WINDOW}
         if self.segments == 0:
             return {"cutoff_too_long": self._too_long(self.plan.cutoffs[self.place])}
         if void is None:
@@ -171,7 +214,7 @@ class VariantColumns:
         }
 
 
-def no_columns() -> dict[str, Any]:
+def no_columns(further: Collection[str] = ()) -> dict[str, Any]:
     """The columns of a frame without grains."""
-    empty = {column.name: None for column in table_columns()}
+    empty = {column.name: None for column in table_columns(further)}
     return {**empty, "grains": 0, "rattlers": 0, "contacts": 0}

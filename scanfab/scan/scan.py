@@ -12,9 +12,10 @@ import numpy as np
 
 from scanfab.base.errors import SettingsError
 from scanfab.base.jit import Flag
+from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.directions import DirectionRule
-from scanfab.scan.edges import CLIP, ENDS, START, edge_of
+from scanfab.scan.edges import CLIP, ENDS, START
 from scanfab.scan.kernels import sweep
 from scanfab.scan.kernels.axes import scan_axes, scan_cell
 from scanfab.scan.kernels.bins import OF_WHOLE, OF_WINDOW, Bins, no_bins
@@ -51,50 +52,66 @@ class ScanSums:
 
     A segment counts in ``length`` and ``segments`` if it is kept, that is not shorter than the
     cut-off; ``void`` is the length of all. Lengths in the dump's unit.
+
+    Attributes
+    ----------
+    axes : ndarray
+        Unit vectors, shape (R, D, 3).
+    length : ndarray
+        Sum of the lengths of the kept segments, shape (R, 4, D).
+    segments : ndarray
+        Number of the kept segments, shape (R, 4, D). By the rules ``start`` and ``ends`` half the
+        number of their ends in the window; then ``length`` is weighted, too, so that the ratio of
+        the two is the mean length.
+    lines : ndarray of int
+        Lines that meet the window (for the whole: any solid), shape (R, 4, D).
+    void : ndarray
+        Length of all void in the window, kept or not, shape (R, 4, D). For a periodic whole that in
+        the measured length of its lines; 0 for an open one.
+    line_length : ndarray
+        Length of the lines in the window, shape (R, 4, D); for the whole likewise.
+    chords : ndarray of int
+        Chords that all spheres together cut from the lines, shape (R,); of spheres that few lines
+        meet, at times as many as are to be expected.
+    channels : ndarray of int
+        Lines of the whole that meet no grain however far they go, shape (R, 4, D).
+    steps : ndarray of int
+        Steps of following lines through a periodic medium, beyond what is listed of it, shape (R,).
+        A line makes one for each grain of each cell that it crosses; a step costs about as much as
+        a chord.
+    left_out : ndarray
+        Number of segments that leave the sample, and so are not counted, shape (R, 4, D): by the
+        rule ``start``, each by half the number of its ends in the window; else 0.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab import Solids, direction_rule, scan_lines, sphere
+    >>> solids = Solids(np.zeros((1, 3)), np.ones(1), np.zeros(1, bool), window=sphere(2.0))
+    >>> sums = scan_lines(solids, direction_rule("3"), spacing=0.5, cutoff=0.0, variants="c")
+    >>> sums.segments.shape, bool((sums.length <= sums.void).all())
+    ((16, 4, 3), True)
     """
 
     axes: FloatArray
-    """Unit vectors, shape (R, D, 3)."""
     length: FloatArray
-    """Sum of the lengths of the kept segments, shape (R, 4, D)."""
     segments: FloatArray | IntArray
-    """
-    Number of the kept segments, shape (R, 4, D).
-
-    By the rules ``start`` and ``ends`` half the number of their ends in the window; then ``length``
-    is weighted, too, so that the ratio of the two is the mean length.
-    """
     lines: IntArray
-    """Lines that meet the window (for the whole: any solid), shape (R, 4, D)."""
     void: FloatArray
-    """
-    Length of all void in the window, kept or not, shape (R, 4, D).
-
-    For a periodic whole that in the measured length of its lines; 0 for an open one.
-    """
     line_length: FloatArray
-    """Length of the lines in the window, shape (R, 4, D); for the whole likewise."""
     chords: IntArray
-    """
-    Chords that all spheres together cut from the lines, shape (R,); of spheres that few lines meet,
-    at times as many as are to be expected.
-    """
     channels: IntArray
-    """Lines of the whole that meet no grain however far they go, shape (R, 4, D)."""
     steps: IntArray
-    """
-    Steps of following lines through a periodic medium, beyond what is listed of it, shape (R,).
-
-    A line makes one for each grain of each cell that it crosses; a step costs about as much as a
-    chord.
-    """
-
     left_out: FloatArray
-    """
-    Number of segments that leave the sample, and so are not counted, shape (R, 4, D).
 
-    By the rule ``start``, each by half the number of its ends in the window; else 0.
-    """
+    def __repr__(self) -> str:
+        sums = zip("abcd", self.segments.sum((0, 2)), self.lines.sum((0, 2)), strict=True)
+        told = [
+            f"{name} {kept:g} on {counted(lines, 'line')}" for name, kept, lines in sums if lines
+        ]
+        axes = counted(self.axes.shape[1], "axis", "axes")
+        head = f"ScanSums: {counted(self.replicates, 'replicate')} of {axes}"
+        return f"{head}; segments kept: {', '.join(told) or 'none'}"
 
     @property
     def work(self) -> IntArray:
@@ -107,13 +124,38 @@ class ScanSums:
         return len(self.axes)
 
     def kept(self, variant: str) -> tuple[FloatArray, FloatArray | IntArray]:
-        """Lengths and numbers of one variant's kept segments, shapes (R, D)."""
+        """
+        What is kept of one variant, as :func:`scanfab.void_fabric` takes it.
+
+        Parameters
+        ----------
+        variant : str
+            One of a, b, c, d.
+
+        Returns
+        -------
+        length : ndarray, shape (R, D)
+            Sum of the lengths of the kept segments, dump's length unit.
+        segments : ndarray, shape (R, D)
+            Number of the kept segments.
+        """
         which = "abcd".index(variant)
         return self.length[:, which], self.segments[:, which]
 
     @classmethod
     def concatenate(cls, parts: Iterable[ScanSums]) -> ScanSums:
-        """All replicates of several scans."""
+        """
+        All replicates of several scans.
+
+        Parameters
+        ----------
+        parts : iterable of ScanSums
+            Along as many axes each.
+
+        Returns
+        -------
+        ScanSums
+        """
         parts = list(parts)
         return cls(
             *(
@@ -206,6 +248,7 @@ def scan_lines(
     Returns
     -------
     ScanSums
+        Lengths and numbers of the segments of each replicate, variant and axis.
 
     Raises
     ------
@@ -383,7 +426,7 @@ class _Lines(NamedTuple):
         if inner is None:
             return
         found, room = np.zeros_like(tallies), bins.of_whole(inner.center)
-        self.scan(None, edge_of(ENDS, 0.0), found, room, inner=inner)
+        self.scan(None, Edge(True, None, 0.0), found, room, inner=inner)
         tallies[..., sweep.WHOLE : sweep.WINDOW] += found[..., sweep.WINDOW : sweep.CHORDS]
         tallies[..., sweep.CHORDS] += found[..., sweep.CHORDS]
         bins.sums[:, OF_WHOLE] += room.sums[:, OF_WINDOW]
@@ -392,7 +435,7 @@ class _Lines(NamedTuple):
         """The window, by a rule that knows what is cut."""
         solids = self.solids
         cells = solids.cells if solids.edge == START and len(solids.grain_radius) else None
-        edge = edge_of(solids.edge, solids.margin)
+        edge = Edge(True, None, 0.0) if cells is None else Edge(None, True, solids.margin)
         if solids.edge == START and cells is None:
             return
         before = float(tallies[:, 0, sweep.STEPS].sum())

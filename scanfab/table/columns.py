@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import is_dataclass
 from typing import Any
 
 from scanfab.base.column import Column, columns_of_fields, no_column
 from scanfab.fabric.registry import OWN_FABRICS, installed_fabrics
 from scanfab.packing.columns import SAMPLE_COLUMNS
-from scanfab.scan.columns import SCAN_COLUMNS
+from scanfab.scan.columns import EDGE_COLUMNS, SCAN_COLUMNS
 from scanfab.table.row import Row
 
-__all__ = ["COLUMNS", "OWN_COLUMNS", "columns_of", "complete_row", "table_columns"]
+__all__ = [
+    "COLUMNS",
+    "FURTHER_COLUMNS",
+    "OWN_COLUMNS",
+    "columns_of",
+    "complete_row",
+    "table_columns",
+]
 
 FRAME_COLUMNS = (
     Column("source", str, "", "the series as given: folder, file, or the files' common folder"),
@@ -51,20 +58,31 @@ COLUMNS: tuple[str, ...] = tuple(one.name for one in OWN_COLUMNS)
 """Their names."""
 
 
-def table_columns() -> tuple[Column, ...]:
-    """The columns of the tables that are computed here: behind the own, those of other fabrics."""
+FURTHER_COLUMNS = EDGE_COLUMNS
+"""Those that are there only where the settings ask for them."""
+
+
+def table_columns(further: Collection[str] = ()) -> tuple[Column, ...]:
+    """
+    The columns of the tables that are computed here.
+
+    Behind the own ones, further ones that are asked for, and those of other fabrics.
+    """
+    asked = (column for column in FURTHER_COLUMNS if column.name in further)
     more = (column for fabric in installed_fabrics().values() for column in fabric.columns)
-    return (*OWN_COLUMNS, *more)
+    return (*OWN_COLUMNS, *asked, *more)
 
 
-def columns_of(kind: type) -> tuple[Column, ...]:
+def columns_of(kind: type | Sequence[Column]) -> tuple[Column, ...]:
     """The columns of a kind of rows: the fabric table's, or the fields of a dataclass."""
+    if not isinstance(kind, type):
+        return tuple(kind)
     return columns_of_fields(kind) if is_dataclass(kind) else table_columns()
 
 
-def complete_row(values: Mapping[str, Any]) -> Row:
+def complete_row(values: Mapping[str, Any], further: Collection[str] = ()) -> Row:
     """
-    A row that has all columns, in their order.
+    A row that has all columns, in their order, and those further ones that are asked for.
 
     Raises
     ------
@@ -78,7 +96,7 @@ def complete_row(values: Mapping[str, Any]) -> Row:
     >>> complete_row({**dict.fromkeys(COLUMNS), "frame": 3}).frame
     3
     """
-    names = [one.name for one in table_columns()]
+    names = [one.name for one in table_columns(further)]
     for name in values:
         if name not in names:
             raise TypeError(no_column(name, names))

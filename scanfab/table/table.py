@@ -14,7 +14,7 @@ from scanfab.base.column import Column, NoColumnError, no_column
 from scanfab.base.errors import SettingsError
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.tensor import COMPONENTS
-from scanfab.table.columns import COLUMNS, columns_of, table_columns
+from scanfab.table.columns import COLUMNS, FURTHER_COLUMNS, columns_of, table_columns
 from scanfab.table.plots import Plots
 from scanfab.table.preview import as_html, as_text
 from scanfab.table.reading import read_rows
@@ -127,7 +127,7 @@ class Table(Sequence[Row]):
     @property
     def plot(self) -> Plots:
         """The figures that are installed: ``table.plot.evolution(ax=ax)`` draws one on its Axes."""
-        return Plots(self)
+        return Plots(self, "table")
 
     def select(self, **wanted: Any) -> Table:
         """
@@ -248,7 +248,12 @@ class Table(Sequence[Row]):
 
     def to_pandas(self) -> pandas.DataFrame:
         """
-        The table as a data frame of pandas; missing numbers are NaN.
+        The table as a data frame of pandas.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Missing numbers are NaN.
 
         Raises
         ------
@@ -263,7 +268,12 @@ class Table(Sequence[Row]):
 
     def to_polars(self) -> polars.DataFrame:
         """
-        The table as a data frame of polars; missing values are null.
+        The table as a data frame of polars.
+
+        Returns
+        -------
+        polars.DataFrame
+            Missing values are null.
 
         Examples
         --------
@@ -294,7 +304,7 @@ def _columns(rows: Sequence[Mapping[str, Any]]) -> tuple[Column, ...]:
         return table_columns()
     if is_dataclass(rows[0]):
         return columns_of(type(rows[0]))
-    known = {column.name: column for column in table_columns()}
+    known = {column.name: column for column in (*table_columns(), *FURTHER_COLUMNS)}
     names = dict.fromkeys(name for row in rows for name in row)
     return tuple(known.get(name) or _found(name, rows) for name in names)
 

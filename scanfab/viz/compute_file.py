@@ -13,11 +13,12 @@ from scanfab.io.grain_files import PathLike, expanded
 from scanfab.io.opening import READING, open_sources
 from scanfab.io.options import take_reading
 from scanfab.io.series import Series
+from scanfab.pipeline.frames import of_whole
 from scanfab.pipeline.job import Job
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.told import recorded
+from scanfab.table.columns import table_columns
 from scanfab.table.result_file import ResultFile
-from scanfab.table.row import Row
 from scanfab.table.table import Table, load
 from scanfab.table.writing import Excerpt
 from scanfab.viz.paraview import vtk_folders
@@ -105,15 +106,17 @@ def compute_file(
     """
     known = [*READING, *(one.name for one in options_of(Settings))]
     refuse_unknown("compute_file", options, known)
-    excerpt = Excerpt.make(Row, fields, digits)
+    asked = Settings(**{name: options[name] for name in options if name not in READING})
+    columns = table_columns(asked.further_columns)
+    excerpt = Excerpt.make(columns, fields, digits)
     with recorded() as told:
         series, sources, reading = _opened(source, options)
-        settings = Settings(**options)
+        series, settings = _whole(series, asked)
         folders = () if vtk is None else vtk_folders(Path(vtk), len(series), settings, go_on=resume)
         job = Job(
             series,
             settings,
-            ResultFile(Path(output), Row, excerpt),
+            ResultFile(Path(output), columns, excerpt),
             sources=sources,
             reading=reading,
             resume=resume,
@@ -147,6 +150,18 @@ def _opened(
     sources = [os.fspath(path) for one in given for path in expanded(one)]
     reading = take_reading(options)
     return open_sources(sources, **reading), sources, reading
+
+
+def _whole(series: Sequence[Series], settings: Settings) -> tuple[list[Series], Settings]:
+    """Whole series, and settings that choose the frames of the parts that were given."""
+    found = [of_whole(one, settings) for one in series]
+    chosen = found[0][1]
+    if any(one.frames != chosen.frames for _, one in found):
+        raise SettingsError(
+            "the series of one table are to be parts of the same frames, as its manifest names "
+            "them once: compute them into tables of their own"
+        )
+    return [one for one, _ in found], chosen
 
 
 def _opened_before(

@@ -8,11 +8,10 @@ from scanfab import Cell, Solids, direction_rule, scan_lines, sphere
 from scanfab.base.convex import Convex
 from scanfab.scan.edges import EDGES
 from scanfab.scan.gaps import Blocks, scan_gaps
-from scanfab.scan.lines import line_triads, turned_triads
 from scanfab.scan.solids import CellGrains
 from tests.helpers import naive
-from tests.helpers.lattices import ball_points, poisson_spheres, rotation
-from tests.helpers.scanning import ratio, scan_triads, solids_of
+from tests.helpers.lattices import ball_points, rotation
+from tests.helpers.scanning import scan_triads
 from tests.helpers.windows import random_window
 from tests.scan.kernels.test_axes import KINDS
 
@@ -29,15 +28,15 @@ def narrow_margin(monkeypatch):
 def open_solids(position, radius, removed, window, edge):
     """Spheres about a window, and all of them around it."""
     around = CellGrains(position, radius, removed, np.eye(3), np.zeros(3, bool))
-    return Solids(position, radius, removed, window, None, edge, around)
+    return Solids(position, radius, removed, window, edge=edge, around=around)
 
 
 def periodic_solids(cell, position, radius, removed, window, edge):
     """Images of grains about a window, and the grains, each once."""
     around = CellGrains(position, radius, removed, cell.vectors, np.array(cell.periodic))
-    empty = Solids(position, radius, removed, window, None, edge, around)
+    empty = Solids(position, radius, removed, window, edge=edge, around=around)
     images, row = cell.images_near_origin(position, radius + window.reach + empty.margin)
-    return Solids(images, radius[row], removed[row], window, None, edge, around)
+    return Solids(images, radius[row], removed[row], window, edge=edge, around=around)
 
 
 def slow_sums(line_solids, triad, offset, spacing, window, cutoff, edge):

@@ -9,7 +9,7 @@ import numpy as np
 from scanfab.base.jit import ZERO, inner
 from scanfab.base.typing import FloatArray
 from scanfab.scan.kernels.bins import Bins, add_gaps, list_gap, room_for_gaps
-from scanfab.scan.kernels.cells import Cells, next_solid
+from scanfab.scan.kernels.cells import Cells, Ray, next_solid, room_for_ray
 from scanfab.scan.kernels.edges import cut_at_entry, listed_to, window_gap
 from scanfab.scan.kernels.strips import (
     END,
@@ -53,8 +53,10 @@ def add_followed(
     tally: FloatArray,
     bins: Bins,
 ) -> None:
-    """Add a segment whose ends are known to the tallies or the bins."""
-    if bins.cutoffs.size > 0:
+    """Add a segment to the tallies or the bins; one without an end to those that are left out."""
+    if high - low > 0.5 * FAR:
+        tally[which, LEFT] += 0.5
+    elif bins.cutoffs.size > 0:
         one = room_for_gaps(1)
         list_gap(one, ZERO, u, low, high, enters, leaves, None, edge, None)
         add_gaps(bins, one, np.uint64(1), 1.0, which, v, None, edge)
@@ -62,6 +64,19 @@ def add_followed(
         length, number, _ = window_gap(low, high, least, enters, leaves, None, edge)
         tally[which, WINDOW + LENGTH] += length
         tally[which, WINDOW + KEPT] += number
+
+
+@inner(error_model="numpy")
+def followed(
+    beyond: Beyond, ray: Ray, which: int, u: float, v: float, depth: float, sign: float
+) -> tuple[float, float]:
+    """How far from a place of a line the next solid is, along it or back; and the steps of that."""
+    triad = beyond.triad
+    for i in range(3):
+        ray.place[i] = u * triad[0, i] + v * triad[1, i] + depth * triad[2, i]
+        ray.along[i] = sign * triad[2, i]
+    without = beyond.without_removed or which == 1
+    return next_solid(beyond.cells, ray, without, beyond.most_steps)
 
 
 @inner(error_model="numpy")
@@ -82,12 +97,8 @@ def follow_beyond(
     sample: only their number is known.
     """
     # to it every place of a segment's beginning is known
-    everywhere = Edge(edge.ends, edge.start, FAR)
-    without = beyond.without_removed or which == 1
-    triad = beyond.triad
-    place, back = np.empty(3), np.empty(3)
-    for i in range(3):
-        back[i] = -triad[2, i]
+    known = Edge(edge.ends, edge.start, FAR)
+    ray = room_for_ray()
     for row in range(strip.rows):
         v = strip.first_v + row * strip.spacing
         for column in range(strip.low[row], strip.high[row]):
@@ -98,35 +109,17 @@ def follow_beyond(
             if cut_at_entry(lines[state + GAP_START], lines[state + GAP_END], enters, leaves, edge):
                 first = lines[state + GAP_END]
             goes_on = (end > enters) & (end < leaves)
-            if first == -FAR and not goes_on:
+            if (first == -FAR and not goes_on) or tally[0, STEPS] >= beyond.most_steps:
                 continue
-            if tally[0, STEPS] >= beyond.most_steps:
-                return
-            left = beyond.most_steps - tally[0, STEPS]
             u = strip.first_u + column * strip.spacing
+            words = u, v, enters, leaves, least, which, known, tally, bins
             if first > -FAR:
-                depth = enters - listed_to(edge)
-                for i in range(3):
-                    place[i] = u * triad[0, i] + v * triad[1, i] + depth * triad[2, i]
-                far, steps = next_solid(beyond.cells, place, back, without, left)
+                before = enters - listed_to(edge)
+                far, steps = followed(beyond, ray, which, u, v, before, -1.0)
                 tally[0, STEPS] += steps
-                if far < FAR:
-                    add_followed(
-                        depth - far, first, u, v, enters, leaves, least, which, everywhere, tally,
-                        bins,
-                    )  # fmt: skip
-                else:
-                    tally[which, LEFT] += 0.5
+                add_followed(before - far, first, *words)
             if goes_on:
-                depth = leaves + listed_to(edge)
-                for i in range(3):
-                    place[i] = u * triad[0, i] + v * triad[1, i] + depth * triad[2, i]
-                far, steps = next_solid(beyond.cells, place, triad[2], without, left)
+                behind = leaves + listed_to(edge)
+                far, steps = followed(beyond, ray, which, u, v, behind, 1.0)
                 tally[0, STEPS] += steps
-                if far < FAR:
-                    add_followed(
-                        end, depth + far, u, v, enters, leaves, least, which, everywhere, tally,
-                        bins,
-                    )  # fmt: skip
-                else:
-                    tally[which, LEFT] += 0.5
+                add_followed(end, behind + far, *words)

@@ -135,7 +135,8 @@ def list_gap(
             gaps[WEIGHT, k] = ends_inside(low, high, enters, leaves)
         if window.start is not None:
             # those that begin beyond the listed solids are followed
-            gaps[FULL, k] = high - low if low > enters - listed_to(window) else 0.0
+            known = (low > enters - listed_to(window)) & (low < leaves) & (high > enters)
+            gaps[FULL, k] = high - low if known else 0.0
 
 
 @inner(inline="always")

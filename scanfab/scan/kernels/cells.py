@@ -16,7 +16,7 @@ from scanfab.base.jit import inner, kernel
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.scan.kernels.strips import FAR
 
-__all__ = ["Cells", "fill_cells", "next_solid"]
+__all__ = ["Cells", "Ray", "fill_cells", "next_solid", "room_for_ray"]
 
 
 class Cells(NamedTuple):
@@ -82,63 +82,112 @@ def fill_cells(
                     start[cell] += 1
 
 
+class Ray(NamedTuple):
+    """A half line on its way through the cells; room for one, used again and again."""
+
+    place: FloatArray
+    """Where it begins, in the void, shape (3,)."""
+    along: FloatArray
+    """Unit vector."""
+    at: FloatArray
+    """Where it begins, counted in cells."""
+    rise: FloatArray
+    """Cells along each edge of the grid for a length of 1."""
+    cell: IntArray
+    """In which it is, counted through the periods."""
+
+
+@inner()
+def room_for_ray() -> Ray:
+    """A ray to be filled in."""
+    return Ray(np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3, np.int64))
+
+
 @inner(error_model="numpy")
-def next_solid(
-    cells: Cells, place: FloatArray, along: FloatArray, without_removed: bool, most_steps: float
-) -> tuple[float, float]:
+def first_in_cell(cells: Cells, ray: Ray, without_removed: bool) -> tuple[float, int]:
     """
-    How far from a place in the void the next solid is along a unit vector; FAR if there is none.
+    How far the first solid is of those that reach into the ray's cell, and how many these are.
 
-    And the steps that this took: one for each cell and each grain in it.
-
-    As the place lies in void, each chord of the ray is before or behind it; by its middle, as that
+    As the ray begins in void, each of its chords is before or behind that; by its middle, as that
     of a solid that ends there may lie before it by rounding.
     """
-    at, rise = np.empty(3), np.empty(3)
-    cell, turn = np.empty(3, np.int64), np.empty(3, np.int64)
-    found, steps = FAR, 0.0
+    parts, vectors = cells.parts, cells.vectors
+    i, j, k = ray.cell[0] // parts[0], ray.cell[1] // parts[1], ray.cell[2] // parts[2]
+    number = cell_of(
+        parts,
+        ray.cell[0] - i * parts[0],
+        ray.cell[1] - j * parts[1],
+        ray.cell[2] - k * parts[2],
+    )
+    first, last = np.uint64(cells.start[number]), np.uint64(cells.start[number + 1])
+    n_x, n_y, n_z = ray.along[0], ray.along[1], ray.along[2]
+    found = FAR
+    for entry in range(first, last):
+        g = np.uint64(cells.grain[entry])
+        if without_removed and cells.removed[g]:
+            continue
+        x = cells.position[g, 0] - ray.place[0]
+        y = cells.position[g, 1] - ray.place[1]
+        z = cells.position[g, 2] - ray.place[2]
+        p, q, r = i + cells.image[entry, 0], j + cells.image[entry, 1], k + cells.image[entry, 2]
+        if p != 0 or q != 0 or r != 0:
+            x += p * vectors[0, 0] + q * vectors[1, 0] + r * vectors[2, 0]
+            y += p * vectors[0, 1] + q * vectors[1, 1] + r * vectors[2, 1]
+            z += p * vectors[0, 2] + q * vectors[1, 2] + r * vectors[2, 2]
+        depth = x * n_x + y * n_y + z * n_z
+        reach2 = cells.radius[g] * cells.radius[g] - (x * x + y * y + z * z - depth * depth)
+        if depth > 0.0 and reach2 > 0.0:
+            found = min(found, depth - np.sqrt(reach2))
+    return found, int(last - first)
+
+
+@inner(error_model="numpy")
+def way_out(ray: Ray) -> tuple[float, int]:
+    """How far the ray's way out of its cell is, and through which pair of faces it leads."""
+    nearest, through = FAR, 0
     for i in range(3):
-        at[i] = rise[i] = 0.0
+        rise = ray.rise[i]
+        if rise != 0.0:
+            face = (ray.cell[i] + (1 if rise > 0.0 else 0) - ray.at[i]) / rise
+            if face < nearest:
+                nearest, through = face, i
+    return nearest, through
+
+
+@inner(error_model="numpy")
+def begins_inside(cells: Cells, ray: Ray) -> bool:
+    """Let the ray begin; whether that is in the grid, which has no end where grains repeat."""
+    inside = True
+    for i in range(3):
+        at = rise = 0.0
         for j in range(3):
-            at[i] += (place[j] - cells.corner[j]) * cells.inverse[j, i] * cells.parts[i]
-            rise[i] += along[j] * cells.inverse[j, i] * cells.parts[i]
-        cell[i] = int(np.floor(at[i]))
-        if not cells.periodic[i] and (cell[i] < 0 or cell[i] >= cells.parts[i]):
-            return FAR, steps
-    while True:
-        for i in range(3):
-            turn[i] = cell[i] // cells.parts[i]
-        number = cell_of(
-            cells.parts,
-            cell[0] - turn[0] * cells.parts[0],
-            cell[1] - turn[1] * cells.parts[1],
-            cell[2] - turn[2] * cells.parts[2],
-        )
-        for entry in range(cells.start[number], cells.start[number + 1]):
-            g = cells.grain[entry]
-            if without_removed and cells.removed[g]:
-                continue
-            depth = across2 = 0.0
-            for j in range(3):
-                to = cells.position[g, j] - place[j]
-                for i in range(3):
-                    to += (turn[i] + cells.image[entry, i]) * cells.vectors[i, j]
-                depth += to * along[j]
-                across2 += to * to
-            reach2 = cells.radius[g] * cells.radius[g] - (across2 - depth * depth)
-            if depth > 0.0 and reach2 > 0.0:
-                found = min(found, depth - np.sqrt(reach2))
-        steps += 1.0 + cells.start[number + 1] - cells.start[number]
-        # where the ray leaves the cell, and through which face
-        leaves, through = FAR, 0
-        for i in range(3):
-            if rise[i] != 0.0:
-                face = (cell[i] + (1 if rise[i] > 0.0 else 0) - at[i]) / rise[i]
-                if face < leaves:
-                    leaves, through = face, i
-        if found <= leaves or leaves > cells.farthest or steps > most_steps:
-            return found, steps
-        cell[through] += 1 if rise[through] > 0.0 else -1
-        outside = cell[through] < 0 or cell[through] >= cells.parts[through]
-        if outside and not cells.periodic[through]:
-            return found, steps
+            at += (ray.place[j] - cells.corner[j]) * cells.inverse[j, i]
+            rise += ray.along[j] * cells.inverse[j, i]
+        ray.at[i], ray.rise[i] = at * cells.parts[i], rise * cells.parts[i]
+        ray.cell[i] = int(np.floor(ray.at[i]))
+        inside &= cells.periodic[i] or 0 <= ray.cell[i] < cells.parts[i]
+    return inside
+
+
+@inner(error_model="numpy")
+def next_solid(
+    cells: Cells, ray: Ray, without_removed: bool, most_steps: float
+) -> tuple[float, float]:
+    """
+    How far from its place in the void a ray meets the next solid; FAR if there is none.
+
+    And the steps that this took: one for each cell and each grain in it.
+    """
+    found, steps = FAR, 0.0
+    goes_on = begins_inside(cells, ray)
+    while goes_on:
+        here, grains = first_in_cell(cells, ray, without_removed)
+        found = min(found, here)
+        steps += 1.0 + grains
+        out, through = way_out(ray)
+        # what is found behind the cell may have others before it
+        goes_on = found > out and out <= cells.farthest and steps <= most_steps
+        ray.cell[through] += 1 if ray.rise[through] > 0.0 else -1
+        inside = 0 <= ray.cell[through] < cells.parts[through]
+        goes_on &= cells.periodic[through] or inside
+    return found, steps

@@ -37,9 +37,8 @@ CLIPPED = Edge(None, None, 0.0)
 
 @inner(forceinline=True, error_model="numpy")
 def ends_inside(low: float, high: float, enters: float, leaves: float) -> float:
-    """Half the number of a segment's ends that lie in the window."""
-    begins = 0.5 if (low > enters) & (low < leaves) else 0.0
-    return begins + (0.5 if (high > enters) & (high < leaves) else 0.0)
+    """Half the number of ends in the window of a segment that has a part there."""
+    return (0.5 if low > enters else 0.0) + (0.5 if high < leaves else 0.0)
 
 
 @inner(forceinline=True, error_model="numpy")
@@ -68,11 +67,11 @@ def window_gap(
     void = inside if inside > 0.0 else 0.0
     if edge.start is not None:
         length = high - low
-        weight = ends_inside(low, high, enters, leaves)
         # the others are followed
         known = (low > enters - listed_to(edge)) & (length < 0.5 * FAR)
-        weight = weight if known & (length >= least) else 0.0
-        return weight * length if weight > 0.0 else 0.0, weight, void
+        kept = (inside > 0.0) & (length >= least) & known
+        weight = ends_inside(low, high, enters, leaves)
+        return weight * length if kept else 0.0, weight if kept else 0.0, void
     kept = inside >= least
     if edge.ends is not None:
         weight = ends_inside(low, high, enters, leaves)

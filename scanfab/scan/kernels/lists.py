@@ -248,11 +248,9 @@ def bin_lists(
                 depth, reach2 = chords[np.uint64(place)], chords[np.uint64(place + ABREAST)]
                 half_chord = np.sqrt(abs(reach2))
                 start, stop = depth - half_chord, depth + half_chord
-                if measured is not None and not start - enters < measured.known:
+                if listed(start, stop, enters, leaves, window, measured)[0] != start:
                     continue
                 if window is not None and window.start is not None:
-                    if not start < leaves + window.margin:
-                        continue
                     cut = cut_at_entry(low, high, enters, leaves, window)
                     lines[i + FIRST] = high if cut and start > end else lines[i + FIRST]
                 # listed anyhow, as chords are
