@@ -45,6 +45,8 @@ def inner_ellipsoid(position: FloatArray, largest: float) -> Window | None:
     # loaded here, as few scans need it
     from scipy.spatial import ConvexHull, QhullError
 
+    if not len(position):
+        return None
     center = position.mean(axis=0)
     try:
         facets = ConvexHull(position - center).equations

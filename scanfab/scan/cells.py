@@ -33,7 +33,7 @@ def cells_of(grains: CellGrains) -> Cells:
     """
     vectors: FloatArray = grains.vectors.astype(np.float64)
     corner = np.zeros(3)
-    once: FloatArray = np.linalg.inv(vectors)
+    once = np.linalg.inv(vectors)
     along = grains.position @ once
     reach = grains.radius[:, None] * np.linalg.norm(once, axis=0)
     for k in np.flatnonzero(~grains.periodic):
@@ -41,7 +41,7 @@ def cells_of(grains: CellGrains) -> Cells:
         low, high = (along - reach)[:, k].min(), (along + reach)[:, k].max()
         corner = corner + low * vectors[k]
         vectors[k] *= high - low
-    inverse: FloatArray = np.asarray(np.linalg.inv(vectors), np.float64)
+    inverse = np.linalg.inv(vectors).astype(np.float64)
     per_length = np.linalg.norm(inverse, axis=0)
     volume = abs(float(np.linalg.det(vectors)))
     wide = max(
@@ -58,9 +58,10 @@ def cells_of(grains: CellGrains) -> Cells:
     start = np.cumsum(start)
     grain, image = np.empty(start[-1], np.int64), np.empty((start[-1], 3), np.int64)
     fill_cells(low, high, grains.periodic, parts, start[:-1].copy(), grain, image)
+    sphere = np.column_stack([grains.position[grain] + image @ vectors, grains.radius[grain]])
     return Cells(
-        np.ascontiguousarray(grains.position), grains.radius, grains.removed, vectors, inverse,
-        corner, grains.periodic, parts, start, grain, image, _farthest(grains, volume),
+        sphere, grains.removed[grain], vectors, inverse, corner, grains.periodic, parts, start,
+        _farthest(grains, volume),
     )  # fmt: skip
 
 

@@ -8,14 +8,15 @@ from scanfab import Cell, Solids, direction_rule, scan_lines, sphere
 from scanfab.base.convex import Convex
 from scanfab.scan.edges import EDGES
 from scanfab.scan.gaps import Blocks, scan_gaps
+from scanfab.scan.lines import line_triads
 from scanfab.scan.solids import CellGrains
 from tests.helpers import naive
 from tests.helpers.lattices import ball_points, rotation
-from tests.helpers.scanning import scan_triads
+from tests.helpers.scanning import ratio, scan_triads
 from tests.helpers.windows import random_window
 from tests.scan.kernels.test_axes import KINDS
 
-RUNS_OF_A_KIND = 40
+RUNS_OF_A_KIND = 25
 CUTOFFS = [0.0, 0.3, 0.8]
 
 
@@ -150,3 +151,55 @@ def test_solid_fraction_is_that_of_the_window_by_every_rule(edge):
     np.testing.assert_allclose(other.void, clip.void, rtol=1e-12)
     np.testing.assert_allclose(other.line_length, clip.line_length, rtol=1e-12)
     assert np.array_equal(other.lines, clip.lines)
+
+
+def of_poisson(edge, cutoff, packings=120):
+    """Mean length in windows of six largest radii, of freely overlapping spheres."""
+    length, number = [], []
+    edge_length, density, rule = 26.0, 0.2, direction_rule("lebedev:5")
+    triads, cell = line_triads(rule.axes), Cell([edge_length] * 3)
+    for seed in range(packings):
+        random = np.random.default_rng([seed, 9])
+        count = random.poisson(density * edge_length**3)
+        position, radius = edge_length * random.random((count, 3)), random.uniform(0.5, 1.5, count)
+        solids = periodic_solids(cell, position, radius, radius < 0, sphere(9.0), edge)
+        sums = scan_triads(solids, triads, random.random((len(rule), 2)), 1.2, cutoff, "c")
+        length.append(sums.length[0, 2].sum())
+        number.append(sums.segments[0, 2].sum())
+    return ratio(np.array(length), np.array(number, dtype=float))
+
+
+@pytest.mark.parametrize("edge", EDGES)
+def test_poisson_spheres_have_their_mean_length_in_small_windows(edge):
+    """
+    ``start`` and ``ends`` c + 1/β, ``clip`` c + A1/(A0 + βA1).
+
+    tests/campaigns/edges.py repeats it with 3,000 packings, and for the anisotropy.
+    """
+    cutoff, window, beta = 0.5, 9.0, 0.2 * np.pi * 13 / 12
+    a0 = 1 - cutoff**2 / (4 * window**2)
+    a1 = 4 * window / 3 - cutoff + cutoff**3 / (12 * window**2)
+    found = of_poisson(edge, cutoff)
+    expected = cutoff + (a1 / (a0 + beta * a1) if edge == "clip" else 1 / beta)
+    assert found.error < 6e-3 * expected
+    assert found.agrees(expected, within=2e-2)
+    # what clip misses is seen
+    assert edge == "clip" or not found.agrees(cutoff + a1 / (a0 + beta * a1), within=1.0)
+
+
+def test_a_segment_that_reaches_through_many_cells_is_followed():
+    """One small grain in a long cell: nearly all segments leave the window, few the medium."""
+    cell = Cell([[3.0, 0, 0], [0, 3.0, 0], [0, 0, 3.0]])
+    position, radius = np.zeros((1, 3)), np.full(1, 0.5)
+    triad, offset = np.eye(3), np.array([0.13, 0.29])
+    window = sphere(1.3)
+    solids = periodic_solids(cell, position, radius, radius < 0, window, "start")
+    sums = scan_triads(solids, triad[None], offset[None], 0.1, 0.0, "c")
+    # along z lines that meet the grain have segments of 3 - chord, whose two ends are inside
+    length, number = (float(one.sum()) for one in sums.kept("c"))
+    points = (np.arange(-20, 20) + offset[:, None]) * 0.1
+    square = 0.25 - points[0][:, None] ** 2 - points[1] ** 2
+    expected = 3.0 - 2.0 * np.sqrt(square[square > 0])
+    assert number == len(expected)
+    assert length == pytest.approx(expected.sum(), rel=1e-9)
+    assert sums.left_out.sum() == 0.0

@@ -20,12 +20,17 @@ __all__ = ["Cells", "Ray", "fill_cells", "next_solid", "room_for_ray"]
 
 
 class Cells(NamedTuple):
-    """Grains by the cell of a grid; its first cell begins at the origin that positions have."""
+    """Grains by the cell of a grid."""
 
-    position: FloatArray
-    """Of the grains, shape (N, 3)."""
-    radius: FloatArray
+    sphere: FloatArray
+    """
+    Centre and radius of each entry, shape (K, 4).
+
+    Entries of a cell lie together, as to look up each grain elsewhere would take longer than all
+    else.
+    """
     removed: BoolArray
+    """Of each entry, shape (K,)."""
     vectors: FloatArray
     """Rows: the edges of the whole grid; those along which grains repeat are the periods."""
     inverse: FloatArray
@@ -35,10 +40,6 @@ class Cells(NamedTuple):
     """Cells along each edge, shape (3,)."""
     start: IntArray
     """First entry of each cell, and behind the last one, first edge fastest."""
-    grain: IntArray
-    """Of each entry its row, shape (K,)."""
-    image: IntArray
-    """The periods by which its image in that cell lies behind it, shape (K, 3)."""
     farthest: float
     """Rays that have met nothing so far stay in a channel; of periodic grains, a length."""
 
@@ -111,7 +112,8 @@ def first_in_cell(cells: Cells, ray: Ray, without_removed: bool) -> tuple[float,
     As the ray begins in void, each of its chords is before or behind that; by its middle, as that
     of a solid that ends there may lie before it by rounding.
     """
-    parts, vectors = cells.parts, cells.vectors
+    # no array is looked up in the loop
+    parts, vectors, sphere, removed = cells.parts, cells.vectors, cells.sphere, cells.removed
     i, j, k = ray.cell[0] // parts[0], ray.cell[1] // parts[1], ray.cell[2] // parts[2]
     number = cell_of(
         parts,
@@ -120,22 +122,19 @@ def first_in_cell(cells: Cells, ray: Ray, without_removed: bool) -> tuple[float,
         ray.cell[2] - k * parts[2],
     )
     first, last = np.uint64(cells.start[number]), np.uint64(cells.start[number + 1])
+    # the ray's place, moved to the first period
+    p_x = ray.place[0] - i * vectors[0, 0] - j * vectors[1, 0] - k * vectors[2, 0]
+    p_y = ray.place[1] - i * vectors[0, 1] - j * vectors[1, 1] - k * vectors[2, 1]
+    p_z = ray.place[2] - i * vectors[0, 2] - j * vectors[1, 2] - k * vectors[2, 2]
     n_x, n_y, n_z = ray.along[0], ray.along[1], ray.along[2]
     found = FAR
     for entry in range(first, last):
-        g = np.uint64(cells.grain[entry])
-        if without_removed and cells.removed[g]:
+        if without_removed and removed[entry]:
             continue
-        x = cells.position[g, 0] - ray.place[0]
-        y = cells.position[g, 1] - ray.place[1]
-        z = cells.position[g, 2] - ray.place[2]
-        p, q, r = i + cells.image[entry, 0], j + cells.image[entry, 1], k + cells.image[entry, 2]
-        if p != 0 or q != 0 or r != 0:
-            x += p * vectors[0, 0] + q * vectors[1, 0] + r * vectors[2, 0]
-            y += p * vectors[0, 1] + q * vectors[1, 1] + r * vectors[2, 1]
-            z += p * vectors[0, 2] + q * vectors[1, 2] + r * vectors[2, 2]
+        x, y, z = sphere[entry, 0] - p_x, sphere[entry, 1] - p_y, sphere[entry, 2] - p_z
         depth = x * n_x + y * n_y + z * n_z
-        reach2 = cells.radius[g] * cells.radius[g] - (x * x + y * y + z * z - depth * depth)
+        radius = sphere[entry, 3]
+        reach2 = radius * radius - (x * x + y * y + z * z - depth * depth)
         if depth > 0.0 and reach2 > 0.0:
             found = min(found, depth - np.sqrt(reach2))
     return found, int(last - first)
