@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from scanfab.table.table import Table, load
     from scanfab.viz.compute_file import compute_file
     from scanfab.viz.report.report import Report, make_report
+    from scanfab.viz.scanned_frames import ScannedFrames, scan_frames
 
 # numpy, numba and the readers are loaded by the first name that needs them
 _HOME = {
@@ -72,6 +73,7 @@ _HOME = {
     "ScanfabError": "base.errors",
     "ScanfabNote": "base.errors",
     "ScanfabWarning": "base.errors",
+    "ScannedFrames": "viz.scanned_frames",
     "Series": "io.series",
     "Settings": "pipeline.settings",
     "SettingsError": "base.errors",
@@ -93,6 +95,7 @@ _HOME = {
     "read_rows": "table.reading",
     "read_series": "io.opening",
     "samples": "pipeline.samples",
+    "scan_frames": "viz.scanned_frames",
     "scan_lines": "scan.scan",
     "solids_of": "pipeline.solids",
     "sphere": "base.convex",
@@ -122,6 +125,7 @@ __all__ = [
     "ScanfabError",
     "ScanfabNote",
     "ScanfabWarning",
+    "ScannedFrames",
     "Series",
     "Settings",
     "SettingsError",
@@ -143,6 +147,7 @@ __all__ = [
     "read_rows",
     "read_series",
     "samples",
+    "scan_frames",
     "scan_lines",
     "solids_of",
     "sphere",

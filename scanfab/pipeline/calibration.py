@@ -33,6 +33,7 @@ from scanfab.pipeline.plan import Plan, make_plan
 from scanfab.pipeline.settings import AUTO_RULE, Length, Settings
 from scanfab.pipeline.tolerance import TOLERANCE_MISSED, missing_work
 from scanfab.scan.directions import direction_rule
+from scanfab.table.plots import Plots
 from scanfab.table.table import Row
 
 __all__ = ["Calibration", "calibrate"]
@@ -91,6 +92,11 @@ class Calibration:
         options = ", ".join(f"{name}={value!r}" for name, value in self.options.items())
         lines = [*self.findings, f"recommended: {options}"]
         return "\n  ".join([f"Calibration: {steps}", *lines])
+
+    @property
+    def plot(self) -> Plots:
+        """Its figure: ``found.plot.calibration(ax=ax, ladder="cutoff")``."""
+        return Plots(self.rows, "calibration")
 
 
 def calibrate(

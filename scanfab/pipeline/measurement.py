@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -47,7 +48,7 @@ class Measurement:
     plan: Plan
     """With the rule and the spacing as they were in the end."""
     solids: Solids
-    """What the lines met."""
+    """What the lines met; their origin is the centre of the RV, or of the grains without one."""
     sums: ScanSums
     gaps: GapSums | None
     """All gaps of the same lines, where more than one cut-off or moment is asked for."""
@@ -72,8 +73,8 @@ class Measurement:
         """
         What a few lines of a variant meet, to be looked at.
 
-        Positions (N, 3) and radii (N,) of its solids, and what its lines are clipped to, if
-        anything. Of a periodic whole that is a sphere, a part of it.
+        Positions (N, 3) from the solids' origin and radii (N,) of its solids, and what its lines
+        are clipped to, if anything. Of a periodic whole that is a sphere, a part of it.
         """
         solids, medium = self.solids, self.solids.medium
         position, radius, removed = solids.position, solids.radius, solids.removed
@@ -86,35 +87,70 @@ class Measurement:
         solid = ~removed if variant.without_rattlers else np.ones(len(radius), bool)
         return position[solid], radius[solid], window
 
+    def at_cutoffs(self, cutoffs: Iterable[float]) -> Measurement:
+        """The same lines evaluated with other cut-offs, in the dump's unit."""
+        plan = replace(self.plan, cutoffs=tuple(sorted(cutoffs)), lists_gaps=True)
+        placed, sums = _about(self.solids.origin, self.blocks), self.sums
+        gaps = _every_gap(self.solids, placed, sums, plan)
+        blocked = _blocked_gaps(self.solids, placed, self.block_rule, sums, plan)
+        return replace(self, plan=plan, gaps=gaps, blocked=blocked)
+
 
 def measure(sample: Sample, plan: Plan, where: str = "the frame") -> Measurement:
     """Scan one frame that has grains; ``where`` names it where progress is told."""
     solids = solids_of(sample, plan.window, variants=plan.variants)
     sums, plan, notes = scan_to_tolerance(solids, plan, where)
     blocks = _blocks(sample, plan)
-    origin = solids.origin
-    lines: dict[str, Any] = {
+    placed = _about(solids.origin, blocks)
+    gaps = _every_gap(solids, placed, sums, plan) if plan.lists_gaps else None
+    block_rule = _block_rule(solids)
+    blocked = _blocked_gaps(solids, placed, block_rule, sums, plan)
+    return Measurement(sample, plan, solids, sums, gaps, blocked, block_rule, blocks, tuple(notes))
+
+
+def _every_gap(
+    solids: Solids, blocks: tuple[Blocks, Blocks], sums: ScanSums, plan: Plan
+) -> GapSums:
+    """All gaps of the lines that the sums are of, at the plan's cut-offs."""
+    return scan_gaps(
+        solids,
+        plan.rule,
+        spacing=plan.spacing,
+        replicates=range(sums.replicates),
+        **_lines(blocks, plan),
+    )
+
+
+def _blocked_gaps(
+    solids: Solids, blocks: tuple[Blocks, Blocks], rule: DirectionRule, sums: ScanSums, plan: Plan
+) -> GapSums:
+    """Gaps of fewer lines, for the sample's scatter."""
+    return scan_gaps(
+        solids,
+        rule,
+        spacing=_block_spacing(solids, rule, sums, plan),
+        replicates=range(BLOCK_REPLICATES),
+        **_lines(blocks, plan),
+    )
+
+
+def _lines(blocks: tuple[Blocks, Blocks], plan: Plan) -> dict[str, Any]:
+    """What both lists of gaps are made with."""
+    return {
         "cutoffs": plan.cutoffs,
-        "blocks": tuple(Blocks(one.matrix, one.shift + one.matrix @ origin) for one in blocks),
+        "blocks": blocks,
         "variants": plan.variants,
         "seed": plan.seed,
         "workers": plan.workers,
         # what these scans take is known from the one before them
         "most_steps": math.inf,
     }
-    gaps: GapSums | None = None
-    if plan.lists_gaps:
-        every = range(sums.replicates)
-        gaps = scan_gaps(solids, plan.rule, spacing=plan.spacing, replicates=every, **lines)
-    block_rule = _block_rule(solids)
-    blocked = scan_gaps(
-        solids,
-        block_rule,
-        spacing=_block_spacing(solids, block_rule, sums, plan),
-        replicates=range(BLOCK_REPLICATES),
-        **lines,
-    )
-    return Measurement(sample, plan, solids, sums, gaps, blocked, block_rule, blocks, tuple(notes))
+
+
+def _about(origin: FloatArray, blocks: tuple[Blocks, Blocks]) -> tuple[Blocks, Blocks]:
+    """Blocks of the dump's coordinates as blocks of places from an origin."""
+    whole, window = (replace(one, shift=one.shift + one.matrix @ origin) for one in blocks)
+    return whole, window
 
 
 def _blocks(sample: Sample, plan: Plan) -> tuple[Blocks, Blocks]:

@@ -127,7 +127,7 @@ class Table(Sequence[Row]):
     @property
     def plot(self) -> Plots:
         """The figures that are installed: ``table.plot.evolution(ax=ax)`` draws one on its Axes."""
-        return Plots(self)
+        return Plots(self, "table")
 
     def select(self, **wanted: Any) -> Table:
         """

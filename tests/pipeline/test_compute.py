@@ -7,6 +7,7 @@ import io
 
 import numpy as np
 import pytest
+from scanfab.viz.figures.scanned import scan_frames
 
 import scanfab
 from scanfab.base.errors import ScanfabWarning, SettingsError
@@ -17,7 +18,6 @@ from scanfab.pipeline.frames import Frames
 from scanfab.pipeline.settings import Settings
 from scanfab.table.formats.text import TextWriter
 from scanfab.table.table import COLUMNS
-from scanfab.viz.figures.scanned import scan_frames
 from scanfab.viz.frame_view import look_at
 from tests.helpers.dumps import dump_text, pairs_text, write, yade_spheres
 
