@@ -19,7 +19,7 @@ GROUPS = {
     "Tables": (
         "Table", "Row", "load", "read_rows", "compare_tables", "Comparison", "COLUMNS", "Column",
     ),
-    "Figures and reports": ("scan_frames", "make_report", "Report"),
+    "Figures and reports": ("scan_frames", "ScannedFrames", "make_report", "Report"),
     "Scanning by hand": (
         "samples", "Sample", "Window", "sphere", "Convex", "solids_of", "Solids", "direction_rule",
         "DirectionRule", "scan_lines", "ScanSums", "void_fabric", "VoidFabric", "contact_fabric",
