@@ -55,7 +55,7 @@ class Report:
     Report: an HTML page of 2 MB, with void fabric
     """
 
-    page: str = field(repr=False)
+    page: str
     has_void_fabric: bool
 
     def __repr__(self) -> str:
