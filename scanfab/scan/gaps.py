@@ -18,10 +18,12 @@ from scanfab.base.jit import Flag
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.edges import ENDS
+from scanfab.scan.following import MOST_STEPS, Following
 from scanfab.scan.kernels.bins import Bins
 from scanfab.scan.lines import drawn_lines, line_triads
-from scanfab.scan.scan import MOST_STEPS, Following, in_parts, tally_triads
+from scanfab.scan.scan import in_parts
 from scanfab.scan.solids import Solids, shortest_gap
+from scanfab.scan.tallies import tally_triads
 
 __all__ = ["Blocks", "GapSums", "scan_gaps"]
 

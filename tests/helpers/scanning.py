@@ -8,8 +8,9 @@ from scanfab.base.convex import Convex, sphere
 from scanfab.fabric.void import void_fabric
 from scanfab.scan.directions import direction_rule
 from scanfab.scan.lines import line_triads
-from scanfab.scan.scan import ScanSums, scan_lines, sums_of, tally_triads
+from scanfab.scan.scan import ScanSums, scan_lines, sums_of
 from scanfab.scan.solids import Solids
+from scanfab.scan.tallies import tally_triads
 
 Z = np.array([[0.0, 0.0, 1.0]])
 
