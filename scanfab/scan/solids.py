@@ -37,7 +37,7 @@ MAX_LINES = 50_000_000
 # Of the smallest radius: what lies between surfaces that coincide but for rounding is no gap.
 SHORTEST = 1e-9
 # of the mean radius: the wider, the more chords are swept, and the fewer segments followed alone
-MARGIN = 4.0
+MARGIN = 4.5
 
 
 class Inner(NamedTuple):

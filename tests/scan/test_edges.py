@@ -13,6 +13,7 @@ from scanfab.scan.solids import CellGrains
 from tests.helpers import naive
 from tests.helpers.lattices import ball_points, rotation
 from tests.helpers.scanning import ratio, scan_triads
+from tests.helpers.uncompiled import run_uncompiled
 from tests.helpers.windows import random_window
 from tests.scan.kernels.test_axes import KINDS
 
@@ -203,3 +204,16 @@ def test_a_segment_that_reaches_through_many_cells_is_followed():
     assert number == len(expected)
     assert length == pytest.approx(expected.sum(), rel=1e-9)
     assert sums.left_out.sum() == 0.0
+
+
+@pytest.mark.parametrize("edge", ["start", "ends"])
+def test_kernels_run_without_the_compiler(edge):
+    run_uncompiled(
+        f"""
+import numpy as np
+from tests.scan.kernels.test_axes import overlapping
+from tests.scan.test_edges import check_open
+for seed in range(3):
+    check_open(overlapping, np.random.default_rng(seed), "{edge}")
+"""
+    )
