@@ -215,7 +215,7 @@ def embree(projected: Projected, folder: Path):
 
 
 def run(repeats: int) -> dict[str, str]:
-    """The sections ``chords``, ``variants`` and ``threads``."""
+    """The sections ``chords``, ``variants``, ``edges`` and ``threads``."""
     solids = rv_solids()
     projected = Projected(solids)
     count = projected.floor()[1]
