@@ -13,11 +13,11 @@ import numpy as np
 from scanfab.base.note import Note
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.jackknife import BLOCKS, BlockedSums
-from scanfab.fabric.registry import OWN_FABRICS, Measured, installed_fabrics
+from scanfab.fabric.registry import OWN_FABRICS, Measured, checked_values
 from scanfab.packing.columns import sample_values
 from scanfab.packing.sample import Variant
 from scanfab.pipeline.measurement import Measurement
-from scanfab.table.columns import table_columns
+from scanfab.table.columns import installed_fabrics, table_columns
 
 __all__ = ["VariantColumns", "no_columns"]
 
@@ -40,8 +40,10 @@ class VariantColumns:
         """All that depend on the variant."""
         contacts = len(self.measured.normals)
         found = sample_values(self.sample, self.variant, self.plan.window, contacts) | self._scan()
-        for fabric in (*OWN_FABRICS.values(), *installed_fabrics().values()):
+        for fabric in OWN_FABRICS.values():
             found |= fabric.values(self.measured)
+        for name, fabric in installed_fabrics().items():
+            found |= checked_values(name, fabric, self.measured)
         return found
 
     @cached_property

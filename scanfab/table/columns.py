@@ -4,15 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import is_dataclass
+from functools import cache
 from typing import Any
 
 from scanfab.base.column import Column, columns_of_fields, no_column
-from scanfab.fabric.registry import OWN_FABRICS, installed_fabrics
+from scanfab.fabric.registry import OWN_FABRICS, Fabric, load_fabrics
 from scanfab.packing.columns import SAMPLE_COLUMNS
 from scanfab.scan.columns import SCAN_COLUMNS
 from scanfab.table.row import Row
 
-__all__ = ["COLUMNS", "OWN_COLUMNS", "columns_of", "complete_row", "table_columns"]
+__all__ = [
+    "COLUMNS",
+    "OWN_COLUMNS",
+    "columns_of",
+    "complete_row",
+    "installed_fabrics",
+    "table_columns",
+]
 
 FRAME_COLUMNS = (
     Column("source", str, "", "the series as given: folder, file, or the files' common folder"),
@@ -49,6 +57,12 @@ OWN_COLUMNS = tuple(_own_columns())
 
 COLUMNS: tuple[str, ...] = tuple(one.name for one in OWN_COLUMNS)
 """Their names."""
+
+
+@cache
+def installed_fabrics() -> dict[str, Fabric]:
+    """The fabrics of other packages by name; none as a rule."""
+    return load_fabrics(COLUMNS)
 
 
 def table_columns() -> tuple[Column, ...]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import IO, Any, Protocol
 
 from scanfab.base.column import Column
 from scanfab.base.errors import SettingsError
-from scanfab.base.plugins import load_plugins
+from scanfab.base.plugins import having, load_plugins
 from scanfab.table.formats.json_rows import JsonArray, JsonLines
 from scanfab.table.formats.parquet import Parquet
 from scanfab.table.formats.text import SeparatedText
@@ -89,7 +89,13 @@ OWN_FORMATS: tuple[TableFormat, ...] = (
 
 @cache
 def _foreign_formats() -> tuple[TableFormat, ...]:
-    return tuple(load_plugins(GROUP, "table format").values())
+    make = having(
+        "an object with the members of scanfab.table.formats.registry.TableFormat",
+        **dict.fromkeys(("suffix", "description"), str),
+        **dict.fromkeys(("is_text", "appends"), bool),
+        **dict.fromkeys(("check", "recognises", "read", "writer"), Callable),
+    )
+    return tuple(load_plugins(GROUP, "table format", make).values())
 
 
 def known_formats() -> dict[str, TableFormat]:
