@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from scanfab.base.option import number
 from scanfab.base.typing import BoolArray, FloatArray
 
 __all__ = ["EVERYWHERE", "Convex", "Quadric", "sphere"]
@@ -133,6 +135,11 @@ def sphere(radius: float) -> Convex:
     Convex
         The shape of a :class:`scanfab.Window`, or the window of :class:`scanfab.Solids`.
 
+    Raises
+    ------
+    SettingsError
+        If the radius is not a finite number above 0.
+
     Examples
     --------
     >>> import numpy as np
@@ -140,6 +147,7 @@ def sphere(radius: float) -> Convex:
     >>> sphere(2.0).contains(np.array([[0.0, 0.0, 1.9], [0.0, 2.1, 0.0]]))
     array([ True, False])
     """
+    radius = number("a length above 0", lambda value: 0 < value < math.inf)("radius", radius)
     return Convex(
         planes=np.zeros((0, 4)),
         quadric=Quadric(1.0, np.zeros((3, 3)), radius * radius),

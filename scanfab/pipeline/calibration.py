@@ -13,8 +13,6 @@ from scanfab.base.errors import PackingError, SettingsError
 from scanfab.base.note import Note, tell
 from scanfab.base.option import options_of, refuse_unknown
 from scanfab.base.spelling import counted
-from scanfab.io.series import Series
-from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.calibration_ladders import (
     PAPER_CUTOFF,
@@ -27,11 +25,12 @@ from scanfab.pipeline.calibration_ladders import (
     sentence_of_recommended,
 )
 from scanfab.pipeline.frame import OTHER_CUTOFFS, compute_frame
-from scanfab.pipeline.frames import Frames
+from scanfab.pipeline.frames import Frames, Source
 from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.plan import Plan, make_plan
 from scanfab.pipeline.settings import AUTO_RULE, Length, Settings
 from scanfab.pipeline.tolerance import TOLERANCE_MISSED, missing_work
+from scanfab.pipeline.values import parse_frames
 from scanfab.scan.directions import direction_rule
 from scanfab.table.plots import Plots
 from scanfab.table.table import Row
@@ -100,14 +99,14 @@ class Calibration:
 
 
 def calibrate(
-    source: Packing | Series, *, frame: int = -1, variants: str = "cd", **options: Any
+    source: Source, *, frame: int = -1, variants: str = "cd", **options: Any
 ) -> Calibration:
     """
     How the void fabric of one frame changes with the settings of the scan.
 
     Parameters
     ----------
-    source : Packing or Series
+    source : Packing, Series or iterable of Packing
         Lengths relative to radii and the RV come from the first frame of the series that has
         grains, as for :func:`scanfab.compute`.
     frame : int, optional
@@ -154,10 +153,11 @@ def calibrate(
 class _Calibrator:
     """One frame, and the plan-making first frame of its series."""
 
-    def __init__(self, source: Packing | Series, settings: Settings, frame: int) -> None:
-        self.name = "" if isinstance(source, Packing) else source.name
+    def __init__(self, source: Source, settings: Settings, frame: int) -> None:
+        frames = Frames(source, replace(settings, frames=parse_frames(frame, "frame")))
+        self.name = frames.name
         self.settings = settings
-        self.first, self.number, self.sample = _samples(source, settings, frame)
+        self.first, self.number, self.sample = _samples(frames)
         tell(self.sample.doubts_of_escaped(), f"frame {self.number}")
         radius = self.first.packing.radius[self.first.grains]
         self.r_min = float(radius.min())
@@ -319,12 +319,8 @@ class _Calibrator:
         return rows, {"spacing": f"{spacing:g}rmin", "directions": rule.name}
 
 
-def _samples(
-    source: Packing | Series, settings: Settings, frame: int
-) -> tuple[Sample, int, Sample]:
+def _samples(frames: Frames) -> tuple[Sample, int, Sample]:
     """The first frame that has grains, and the wanted one with its number."""
-    wanted = slice(frame, frame + 1 if frame != -1 else None)
-    frames = Frames(source, replace(settings, frames=wanted))
     number, one = frames.one()
     first = frames.first()
     if first is None:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.note import SKIPPED, Note, tell
-from scanfab.base.option import options_of, takes_options
+from scanfab.base.option import options_of, takes_options, unusable
 from scanfab.base.threads import in_order
 from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
@@ -234,6 +234,8 @@ class _Pool:
     """What computes frames; with few frames, each has more threads for its scan."""
 
     def __init__(self, workers: int, executor: Executor | None) -> None:
+        if not isinstance(executor, Executor | None):
+            raise unusable("executor", "a concurrent.futures.Executor", executor)
         self.workers = workers
         self.executor = executor
         self._own = None if executor is not None else ThreadPoolExecutor(workers)

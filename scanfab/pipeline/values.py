@@ -279,8 +279,10 @@ def parse_rattlers(name: str, value: Any) -> str:
 
 def parse_strain(name: str, value: Any) -> str:
     """Where the axial strain comes from: a word, or a file that exists."""
-    if str(value) not in STRAIN_MODES and not Path(value).is_file():
-        raise unusable(name, "auto, cell, boundary, grains or a CSV file that exists", str(value))
+    is_path = isinstance(value, str | os.PathLike)
+    if not is_path or (str(value) not in STRAIN_MODES and not Path(value).is_file()):
+        found = str(value) if is_path else value
+        raise unusable(name, "auto, cell, boundary, grains or a CSV file that exists", found)
     return str(value)
 
 

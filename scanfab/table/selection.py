@@ -24,11 +24,11 @@ NAMES = ("source", "variant")
 NUMBERS = tuple(column.name for column in OWN_COLUMNS if column.kind is not str)
 # columns that no fabric table has, and the table that they give away
 OTHER_TABLES = {
-    ("alpha_vs_axial_norm", "alpha_c_axial_norm"): "compare",
-    ("slope", "slope_origin"): "compare --summary",
-    ("variants", "difference"): "compare --differences",
-    ("ladder", "value"): "calibrate",
-    ("radius_min", "contacts_from"): "inspect --json",
+    ("alpha_vs_axial_norm", "alpha_c_axial_norm"): "a table of scanfab compare",
+    ("slope", "slope_origin"): "the summary of scanfab compare",
+    ("variants", "difference"): "the differences of scanfab compare",
+    ("ladder", "value"): "a table of scanfab calibrate",
+    ("radius_min", "contacts_from"): "the frames of scanfab inspect",
 }
 # cut-offs that agree in three digits, as they are printed for people, are the same
 ROUNDING = 5e-3
@@ -113,11 +113,10 @@ def check_rows(rows: Sequence[Mapping[str, Any]], table: str = "") -> None:
 
 
 def _check_columns(where: str, row: Mapping[str, Any]) -> None:
-    for columns, command in OTHER_TABLES.items():
+    for columns, other in OTHER_TABLES.items():
         if all(name in row for name in columns):
             raise SettingsError(
-                f"{where}this is a table of scanfab {command}: expected one of scanfab compute, "
-                f"from which it was made"
+                f"{where}this is {other}: expected one of scanfab compute, from which it was made"
             )
     missing = [name for name in NEEDED if name not in row]
     if missing:

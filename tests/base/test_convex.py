@@ -1,9 +1,11 @@
 """Regions as data: what lies in them, told by the numbers alone."""
 
+import math
+
 import numpy as np
 import pytest
 
-from scanfab import sphere
+from scanfab import SettingsError, sphere
 from tests.helpers.lattices import rotation
 from tests.helpers.windows import box, cut_ball, cylinder, ellipsoid
 
@@ -56,3 +58,9 @@ def test_only_spheres_that_reach_into_a_sphere_meet_it():
 def test_a_point_on_the_surface_is_outside():
     for radius in RANDOM.uniform(0.1, 9.0, 100):
         assert not sphere(radius).contains(np.array([[0.0, 0.0, radius]]))[0]
+
+
+@pytest.mark.parametrize("radius", [-1, 0, math.inf, math.nan, "x"])
+def test_a_sphere_has_a_radius_above_0(radius):
+    with pytest.raises(SettingsError, match="radius: expected a length above 0, found"):
+        sphere(radius)

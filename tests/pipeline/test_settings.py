@@ -380,3 +380,8 @@ def test_settings_made_of_settings_are_the_same():
     settings = Settings(axis="1,2,3", cutoffs="1,2rmin", boundary="type=2", directions=9)
     again = dataclasses.replace(settings, seed=1)
     assert dataclasses.replace(again, seed=0) == settings
+
+
+def test_settings_with_the_same_directions_are_equal():
+    assert Settings(directions=13) == Settings(directions=13)
+    assert Settings(directions=13) != Settings(directions=25)

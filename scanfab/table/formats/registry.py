@@ -129,6 +129,8 @@ def format_of(path: Path) -> TableFormat:
 def reading_format(path: Path, data: bytes) -> TableFormat:
     """The format that knows a file's content; others are asked unless the suffix is an own one."""
     own = {one.suffix: one for one in OWN_FORMATS}
+    if not data and path.suffix.lower() == ".jsonl":
+        return own[".jsonl"]  # without rows it has no content to be told by
     if path.suffix.lower() not in own:
         for one in _foreign_formats():
             if one.recognises(data):
