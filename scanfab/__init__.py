@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         SettingsError,
         UnknownFormatError,
     )
+    from scanfab.base.shapes import box, cylinder, ellipsoid, polyhedron
     from scanfab.fabric.contact import contact_fabric
     from scanfab.fabric.tensor import FabricTensor
     from scanfab.fabric.void import VoidFabric, void_fabric
@@ -64,13 +65,17 @@ _HOME = {
     "Table": "table.table",
     "UnknownFormatError": "base.errors",
     "VoidFabric": "fabric.void",
+    "box": "base.shapes",
     "calibrate": "pipeline.calibration",
     "compare_tables": "table.compare",
     "compute": "pipeline.compute",
     "contact_fabric": "fabric.contact",
+    "cylinder": "base.shapes",
     "direction_rule": "scan.directions",
+    "ellipsoid": "base.shapes",
     "find_contacts": "packing.search",
     "load": "table.table",
+    "polyhedron": "base.shapes",
     "read": "io.opening",
     "read_rows": "table.reading",
     "read_series": "io.opening",
@@ -103,13 +108,17 @@ __all__ = [
     "Table",
     "UnknownFormatError",
     "VoidFabric",
+    "box",
     "calibrate",
     "compare_tables",
     "compute",
     "contact_fabric",
+    "cylinder",
     "direction_rule",
+    "ellipsoid",
     "find_contacts",
     "load",
+    "polyhedron",
     "read",
     "read_rows",
     "read_series",
