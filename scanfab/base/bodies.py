@@ -175,6 +175,8 @@ class Hull:
 
     outline: FloatArray
     planes: FloatArray
+    areas: FloatArray
+    """Of the face in each plane, shape (P,)."""
     volume: float
 
     form = np.zeros(3)
@@ -191,18 +193,23 @@ class Hull:
 
     def overlap(self, shift: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
         """
-        Of its own chords t: g = s² Σ max(0, t - z), -g' = s² #(t ≥ z), s² the area of a line.
+        Of its own chords t: g = V Σ max(0, t - z) / Σ t, and -g' = A #(t ≥ z) / #(t > 0).
 
-        There is no formula for it; a few hundred lines along each of many directions tell it to
-        1e-3, and what a sum over these directions needs far better.
+        A few hundred lines along each of many directions tell these shares to some 1e-3, and what a
+        sum over the directions needs far better. Volume and projected area, A = ½ Σ A_f |n·n_f| over
+        the faces, are exact.
         """
+        shadow = 0.5 * np.abs(shift @ self.planes[:, :3].T) @ self.areas
+        if length == 0.0:
+            return np.full(len(shift), self.volume), shadow
         lines = MOST_CUTS // (len(self.planes) * max(len(shift), 1))
         lines = min(max(lines, FEWEST_LINES), MOST_LINES)
-        found = [self._overlap_along(one, length, lines) for one in shift]
-        shared, slope = np.array(found).reshape(-1, 2).T
-        return shared, slope
+        found = [self._long_shares(one, length, lines) for one in shift]
+        shared, number = np.array(found).reshape(-1, 2).T
+        return self.volume * shared, shadow * number
 
-    def _overlap_along(self, shift: FloatArray, length: float, lines: int) -> tuple[float, float]:
+    def _long_shares(self, shift: FloatArray, length: float, lines: int) -> tuple[float, float]:
+        """The share of its chords that is beyond a length, of all together and of their number."""
         step = float(np.linalg.norm(shift))
         axis = shift / step
         u = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
@@ -221,9 +228,9 @@ class Hull:
         leaves = np.min(ends, axis=1, where=steep > 1e-14, initial=np.inf)
         enters = np.max(ends, axis=1, where=steep < -1e-14, initial=-np.inf)
         chords = np.where(outside, 0.0, np.maximum(leaves - enters, 0.0))
-        area = float(extent.prod()) / lines
-        long = chords[(chords > 0.0) & (chords >= length * step)]
-        return area * float(np.sum(long - length * step)), area * len(long) * step
+        chords = chords[chords > 0.0]
+        long = chords[chords >= length * step]
+        return float(np.sum(long - length * step) / chords.sum()), len(long) / len(chords)
 
 
 BALL, COLUMN, BLOCK = Ball(), Column(), Block()

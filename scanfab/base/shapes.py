@@ -21,13 +21,13 @@ TOLERANCE = 1e-6
 MOST_FACES = 1000
 
 
-def box(edges: Sequence[float], turn: npt.ArrayLike | None = None) -> Convex:
+def box(edges: Sequence[float] | FloatArray, turn: npt.ArrayLike | None = None) -> Convex:
     """
     A box about the origin.
 
     Parameters
     ----------
-    edges : three floats
+    edges : sequence of 3 floats
         Full lengths.
     turn : array_like, shape (3, 3), optional
         Orthonormal rows along which the edges lie; x, y, z by default.
@@ -42,13 +42,13 @@ def box(edges: Sequence[float], turn: npt.ArrayLike | None = None) -> Convex:
     return image_of(BLOCK, _turned(0.5 * np.asarray(edges, dtype=float), turn), size)
 
 
-def ellipsoid(semi_axes: Sequence[float], turn: npt.ArrayLike | None = None) -> Convex:
+def ellipsoid(semi_axes: Sequence[float] | FloatArray, turn: npt.ArrayLike | None = None) -> Convex:
     """
     An ellipsoid about the origin.
 
     Parameters
     ----------
-    semi_axes : three floats
+    semi_axes : sequence of 3 floats
         Half of its diameters.
     turn : array_like, shape (3, 3), optional
         Orthonormal rows along which they lie; x, y, z by default.
@@ -145,7 +145,8 @@ def polyhedron(points: FloatArray, triangles: IntArray) -> tuple[Convex, FloatAr
         )
     centroid = _centroid(points, hull.simplices)
     planes[:, 3] -= planes[:, :3] @ centroid
-    body = Hull(points[hull.vertices] - centroid, planes, float(hull.volume))
+    areas = _areas(points[hull.simplices], hull.equations[:, :3], planes)
+    body = Hull(points[hull.vertices] - centroid, planes, areas, float(hull.volume))
     return image_of(body, np.eye(3), f"surface of {len(planes)} faces"), middle + centroid
 
 
@@ -209,6 +210,14 @@ def _check_convex(
         raise SettingsError(
             f"the surface is not convex: {inside} of its {len(triangles)} faces lie inside its hull"
         )
+
+
+def _areas(triangles: FloatArray, normals: FloatArray, planes: FloatArray) -> FloatArray:
+    """Of the faces, from a hull's triangles (T, 3, 3), each in the plane that faces its way."""
+    sides = triangles[:, 1:] - triangles[:, :1]
+    each = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    face = np.argmax(normals @ planes[:, :3].T, axis=1)
+    return np.bincount(face, weights=each, minlength=len(planes))
 
 
 def _centroid(points: FloatArray, triangles: IntArray) -> FloatArray:

@@ -73,8 +73,8 @@ def compute(
     from scanfab.cli.console import announce_compiling, reported_warnings
     from scanfab.pipeline.manifest import asked_for
     from scanfab.pipeline.settings import Settings
+    from scanfab.table.columns import table_columns
     from scanfab.table.result_file import ResultFile
-    from scanfab.table.table import Row
     from scanfab.table.writing import Excerpt
 
     if resume and output is None:
@@ -86,9 +86,11 @@ def compute(
             raise click.UsageError("--vtk and --plot are of one cut-off: leave out --cutoffs")
         with settings_file.named_errors():
             reading = reading_arguments(chosen)
-            excerpt = Excerpt.make(Row, chosen.pop("fields"), int(chosen.pop("digits")))
+            fields, digits = chosen.pop("fields"), int(chosen.pop("digits"))
             settings = Settings(**chosen)
-            result = None if output is None else ResultFile(output, Row, excerpt)
+            columns = table_columns(settings.more_columns)
+            excerpt = Excerpt.make(columns, fields, digits)
+            result = None if output is None else ResultFile(output, columns, excerpt)
             if manifest_path is not None:
                 check_folder(manifest_path)
         asked = {**asked_for(sources, reading, settings), **excerpt.asked()}
@@ -214,7 +216,8 @@ def _write(run: Run, asked: dict[str, Any], result: ResultFile | None, excerpt: 
     elif is_readable():
         print_table(list(run.rows()), excerpt)
     else:
-        printer = row_writer(".csv", sys.stdout, table_columns(), excerpt=excerpt)
+        columns = table_columns(run.settings.more_columns)
+        printer = row_writer(".csv", sys.stdout, columns, excerpt=excerpt)
         for row in run.rows():
             printer.write(row)
 

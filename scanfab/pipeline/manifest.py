@@ -13,9 +13,10 @@ from typing import Any
 from scanfab.base.option import options_of
 from scanfab.io.series import Series
 from scanfab.pipeline.settings import STRAIN_MODES, Settings
+from scanfab.pipeline.values import SHAPES
 from scanfab.scan.directions import DirectionRule
 
-__all__ = ["Inputs", "asked_for", "manifest", "strain_file", "with_frames"]
+__all__ = ["Inputs", "asked_for", "manifest", "strain_file", "surface_file", "with_frames"]
 
 PACKAGES = (
     "scanfab", "numpy", "numba", "scipy", "meshio", "pyvista", "click", "rich", "h5py",
@@ -90,9 +91,7 @@ def manifest(
     """
     inputs = inputs or Inputs()
     files = {path for one in series for path in one.files()}
-    strains = strain_file(asked)
-    if strains is not None:
-        files.add(strains)
+    files.update(one for one in (strain_file(asked), surface_file(asked)) if one is not None)
     return {
         "settings": asked,
         "seed": asked["seed"],
@@ -110,6 +109,12 @@ def strain_file(asked: Mapping[str, Any]) -> Path | None:
     """The file of ``--strain FILE.csv``."""
     strain = asked.get("strain", "auto")
     return None if strain in STRAIN_MODES else Path(strain)
+
+
+def surface_file(asked: Mapping[str, Any]) -> Path | None:
+    """The file of ``--rv-shape FILE``."""
+    shape = asked.get("rv_shape", "sphere")
+    return None if shape in SHAPES else Path(shape)
 
 
 def _plain(value: Any) -> Any:

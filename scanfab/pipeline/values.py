@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AXES",
+    "SHAPES",
     "STRAIN_MODES",
     "Axis",
     "Length",
@@ -32,6 +33,8 @@ __all__ = [
     "parse_frames",
     "parse_length",
     "parse_lengths",
+    "parse_shape",
+    "parse_sizes",
     "parse_spacing",
     "parse_strain",
     "parse_tolerance",
@@ -42,6 +45,13 @@ __all__ = [
 
 Vector = tuple[float, float, float]
 STRAIN_MODES = ("auto", "cell", "boundary", "grains")
+# of windows, with the sizes that each takes
+SHAPES = {
+    "sphere": "",
+    "box": "A,B,C, its edges",
+    "cylinder": "R,H, its radius and height",
+    "ellipsoid": "A,B,C, its semi-axes",
+}
 MOST_CUTOFFS = 1000
 
 
@@ -167,14 +177,44 @@ def parse_variants(name: str, letters: object) -> str:
 
 
 def parse_vector(name: str, values: Any) -> Vector:
-    """Three finite numbers."""
+    """Three finite numbers, in a text between commas or blanks."""
     try:
-        x, y, z = map(float, () if isinstance(values, str) else values)
+        x, y, z = map(float, _words(values))
     except (TypeError, ValueError):
         x = y = z = math.nan
     if not all(map(math.isfinite, (x, y, z))):
         raise unusable(name, "three finite numbers", values)
     return (x, y, z)
+
+
+def _words(values: Any) -> Iterable[Any]:
+    return values.replace(",", " ").split() if isinstance(values, str) else values
+
+
+def parse_sizes(name: str, values: Any) -> tuple[float, ...]:
+    """Two or three lengths above 0, in a text between commas or blanks; none if not given."""
+    if values is None or values == ():
+        return ()
+    try:
+        sizes = tuple(map(float, _words(values)))
+    except (TypeError, ValueError):
+        sizes = ()
+    if not all(0 < size < math.inf for size in sizes) or not 2 <= len(sizes) <= 3:
+        raise unusable(name, "two or three lengths above 0, such as 2,3,4", values)
+    return sizes
+
+
+def parse_shape(name: str, value: Any) -> str:
+    """The shape of a window: a word, or a file with its surface that exists."""
+    if str(value) in SHAPES:
+        return str(value)
+    from scanfab.io.parse.surface import SUFFIXES
+
+    path = Path(value)
+    if path.suffix.lower() not in SUFFIXES or not path.is_file():
+        words = f"{', '.join(SHAPES)} or a closed convex surface that exists ({' '.join(SUFFIXES)})"
+        raise unusable(name, words, str(value))
+    return str(value)
 
 
 def parse_boundary(name: str, rules: Any) -> tuple[BoundaryRule, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -24,6 +24,7 @@ from scanfab.fabric.jackknife import (
 from scanfab.fabric.registry import Measured, installed_fabrics
 from scanfab.fabric.tensor import axis_values, tensor_values
 from scanfab.fabric.void import VoidFabric, void_fabric
+from scanfab.fabric.window import WINDOW_ALPHA, window_alpha
 from scanfab.packing.sample import Variant
 from scanfab.pipeline.measurement import Measurement
 from scanfab.table.columns import table_columns
@@ -52,6 +53,7 @@ class VariantColumns:
             **self._scan(),
             **self._void(),
             **self._contact(),
+            **self._window(),
             **self._others(),
         }
 
@@ -183,6 +185,16 @@ class VariantColumns:
             ),
         }
 
+    def _window(self) -> dict[str, Any]:
+        """What the window alone would give, where its column is there."""
+        name, window, value = WINDOW_ALPHA.name, self.plan.window, None
+        if name not in self.plan.more_columns:
+            return {}
+        if self.variant.in_window and window is not None and self.fabric and self.plan.moment == 1:
+            cutoff = self.plan.cutoffs[self.place]
+            value = window_alpha(window.shape, self.fabric, cutoff, np.asarray(self.plan.axis))
+        return {name: value}
+
     def _others(self) -> dict[str, Any]:
         """The columns of the fabrics of other packages."""
         fabrics = installed_fabrics().values()
@@ -237,7 +249,7 @@ class VariantColumns:
         }
 
 
-def no_columns() -> dict[str, Any]:
+def no_columns(more: Collection[str] = ()) -> dict[str, Any]:
     """The columns of a frame without grains."""
-    empty = {column.name: None for column in table_columns()}
+    empty = {column.name: None for column in table_columns(more)}
     return {**empty, "grains": 0, "rattlers": 0, "contacts": 0}

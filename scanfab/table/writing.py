@@ -55,8 +55,7 @@ class Excerpt:
         if fields_text is None:
             return cls(digits=digits)
         names = tuple(name.strip() for name in fields_text.split(","))
-        columns = columns_of(columns) if isinstance(columns, type) else columns
-        known = [column.name for column in columns]
+        known = [column.name for column in columns_of(columns)]
         for name in names:
             if name not in known:
                 raise SettingsError(f"fields: {no_column(name, known)}")
