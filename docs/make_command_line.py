@@ -30,7 +30,8 @@ rows and computes only what is missing: frames that were written later, other `-
 that were skipped. The result has the bytes of one run over all of them. That needs
 `FILE.manifest.json`, the same settings (but `--workers` and `--frames`) and the same inputs.
 Without `--resume` a run starts afresh, and a `FILE.part` that holds rows is kept under another
-name.
+name. From Python it is `scanfab.compute_file("dumps/", "fabric.csv", resume=True)`, with the same
+files.
 
 A file `scanfab.toml` beside the dumps holds options of `scanfab compute` in its section
 `[compute]`, as `boundary = "mask=3"`. Every command takes those that it has and that its line

@@ -39,6 +39,8 @@ if TYPE_CHECKING:
     from scanfab.table.reading import read_rows
     from scanfab.table.row import Row
     from scanfab.table.table import Table, load
+    from scanfab.viz.compute_file import compute_file
+    from scanfab.viz.report.report import Report, make_report
 
 # numpy, numba and the readers are loaded by the first name that needs them
 _HOME = {
@@ -53,6 +55,7 @@ _HOME = {
     "Packing": "packing.packing",
     "PackingError": "base.errors",
     "ReadError": "base.errors",
+    "Report": "viz.report.report",
     "Row": "table.row",
     "ScanSums": "scan.scan",
     "ScanfabError": "base.errors",
@@ -69,12 +72,14 @@ _HOME = {
     "calibrate": "pipeline.calibration",
     "compare_tables": "table.compare",
     "compute": "pipeline.compute",
+    "compute_file": "viz.compute_file",
     "contact_fabric": "fabric.contact",
     "cylinder": "base.shapes",
     "direction_rule": "scan.directions",
     "ellipsoid": "base.shapes",
     "find_contacts": "packing.search",
     "load": "table.table",
+    "make_report": "viz.report.report",
     "polyhedron": "base.shapes",
     "read": "io.opening",
     "read_rows": "table.reading",
@@ -96,6 +101,7 @@ __all__ = [
     "Packing",
     "PackingError",
     "ReadError",
+    "Report",
     "Row",
     "ScanSums",
     "ScanfabError",
@@ -112,12 +118,14 @@ __all__ = [
     "calibrate",
     "compare_tables",
     "compute",
+    "compute_file",
     "contact_fabric",
     "cylinder",
     "direction_rule",
     "ellipsoid",
     "find_contacts",
     "load",
+    "make_report",
     "polyhedron",
     "read",
     "read_rows",

@@ -51,7 +51,7 @@ def _open_locked(path: Path) -> IO[bytes]:
             stream.close()
             raise ScanfabError(
                 f"{path}: another run is writing to it: wait until that one has ended, or name "
-                f"another -o FILE"
+                f"another `output=FILE`"
             ) from None
         # the run that had it may have ended meanwhile, and given the file its last name
         with suppress(FileNotFoundError):

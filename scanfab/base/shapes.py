@@ -217,7 +217,8 @@ def _areas(triangles: FloatArray, normals: FloatArray, planes: FloatArray) -> Fl
     sides = triangles[:, 1:] - triangles[:, :1]
     each = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
     face = np.argmax(normals @ planes[:, :3].T, axis=1)
-    return np.bincount(face, weights=each, minlength=len(planes))
+    areas: FloatArray = np.bincount(face, weights=each, minlength=len(planes)).astype(float)
+    return areas
 
 
 def _centroid(points: FloatArray, triangles: IntArray) -> FloatArray:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shlex
-import sys
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
@@ -29,9 +28,7 @@ from scanfab.cli.talk import talk_options, tell_inputs, working
 from scanfab.pipeline.options import as_options
 
 if TYPE_CHECKING:
-    from scanfab.pipeline.calibration import Calibration
     from scanfab.pipeline.calibration_ladders import StepRow
-    from scanfab.table.writing import Excerpt
 
 __all__ = ["calibrate"]
 
@@ -91,7 +88,7 @@ def calibrate(
 
     On a terminal a readable table; else the steps as CSV, and what they show on standard error.
     """
-    from scanfab.cli.console import announce_compiling, is_readable, reported_warnings
+    from scanfab.cli.console import announce_compiling, is_readable, print_csv, reported_warnings
     from scanfab.pipeline.calibration import calibrate as calibrate_series
     from scanfab.pipeline.calibration_ladders import StepRow
     from scanfab.pipeline.settings import Settings
@@ -119,15 +116,17 @@ def calibrate(
         found = replace(found, rows=rows)
         command = _command_line(ctx, source, found.options)
         if result is not None:
-            with result.writer({}) as writer:
-                for row in found.rows:
-                    writer.write(row)
+            result.save(found.rows)
         if plot is not None:
             plot_calibration(found.rows, plot)
-        if result is not None or is_readable():
-            _show(found, command, result is None)
-        else:
-            _write_rows(found, command, excerpt)
+        tells_all = result is not None or is_readable()
+        if result is None and tells_all:
+            _print(found.rows)
+        elif result is None:
+            print_csv(found.rows, excerpt, StepRow)
+        # behind rows on standard output, what they show goes beside them
+        for sentence in (*found.findings, command):
+            click.echo(sentence, err=not tells_all)
     return 0
 
 
@@ -149,27 +148,6 @@ def _command_line(ctx: click.Context, source: str, recommended: dict[str, str]) 
     for name, value in recommended.items():
         words += [f"--{name}", value]
     return shlex.join(words)
-
-
-def _show(found: Calibration, command: str, tables: bool) -> None:
-    """What was found, in words, on a terminal behind tables of the steps."""
-    if tables:
-        _print(found.rows)
-    for sentence in (*found.findings, command):
-        click.echo(sentence)
-
-
-def _write_rows(found: Calibration, command: str, excerpt: Excerpt) -> None:
-    """The steps on one stream, and what was found on the other."""
-    from scanfab.pipeline.calibration_ladders import StepRow
-    from scanfab.table.columns import columns_of
-    from scanfab.table.writing import row_writer
-
-    writer = row_writer(".csv", sys.stdout, columns_of(StepRow), excerpt=excerpt)
-    for row in found.rows:
-        writer.write(row)
-    for sentence in (*found.findings, command):
-        click.echo(sentence, err=True)
 
 
 def _print(rows: tuple[StepRow, ...]) -> None:

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from scanfab.cli.options import EXCERPT, OF_SEVERAL, check_plot, options, usage_errors
 from scanfab.cli.talk import talk_options
-
-if TYPE_CHECKING:
-    from scanfab.table.writing import Excerpt
 
 __all__ = ["compare"]
 
@@ -59,10 +55,11 @@ def compare(
     """
     from scanfab.base.errors import SettingsError
     from scanfab.cli.comparison_tables import print_comparison
-    from scanfab.cli.console import is_readable, reported_warnings
+    from scanfab.cli.console import is_readable, print_csv, reported_warnings
     from scanfab.table.compare import compare_tables
     from scanfab.table.formats.registry import format_of
     from scanfab.table.reading import read_rows
+    from scanfab.table.result_file import ResultFile
     from scanfab.table.selection import choose_rows
     from scanfab.table.writing import Excerpt
     from scanfab.viz.figures.fitted import TABLE_FIGURES, plot_rows
@@ -90,28 +87,11 @@ def compare(
         with usage_errors():
             excerpt = Excerpt.make(type(chosen[0]), fields, digits)
         if output is not None:
-            _write_file(chosen, output, excerpt)
+            ResultFile(output, type(chosen[0]), excerpt).save(chosen)
         elif is_readable() and not differences and excerpt.is_all:
             print_comparison(comparison)
         else:
-            _write_csv(chosen, excerpt)
+            print_csv(chosen, excerpt, type(chosen[0]))
         if plot is not None:
             plot_rows(plot, rows, figure, comparison)
     return 0 if any(row.alpha_vs_axial is not None for row in comparison.frames) else 1
-
-
-def _write_csv(rows: Sequence[Any], excerpt: Excerpt) -> None:
-    from scanfab.table.columns import columns_of
-    from scanfab.table.writing import row_writer
-
-    writer = row_writer(".csv", sys.stdout, columns_of(type(rows[0])), excerpt=excerpt)
-    for row in rows:
-        writer.write(row)
-
-
-def _write_file(rows: Sequence[Any], output: Path, excerpt: Excerpt) -> None:
-    from scanfab.table.result_file import ResultFile
-
-    with ResultFile(output, type(rows[0]), excerpt).writer({}) as writer:
-        for row in rows:
-            writer.write(row)

@@ -4,21 +4,29 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 import click
 
-from scanfab.base.errors import ScanfabNote, ScanfabWarning, SkippedFrameWarning
+from scanfab.base import column
+from scanfab.base.errors import ScanfabNote, ScanfabWarning
 from scanfab.cli.options import AS_CSV
 from scanfab.cli.tables import Column, print_columns, spelt
 from scanfab.cli.talk import Level, level
 from scanfab.pipeline.options import as_options
+from scanfab.pipeline.told import Told
 from scanfab.table.table import Row
 from scanfab.table.writing import Excerpt
 
-__all__ = ["Told", "announce_compiling", "is_readable", "print_table", "reported_warnings"]
+__all__ = [
+    "announce_compiling",
+    "is_readable",
+    "print_csv",
+    "print_table",
+    "reported_warnings",
+]
 
 # titles of the columns that a terminal always shows, and of those for which there may be room, the
 # most telling first
@@ -47,39 +55,16 @@ ORDER = (
 )  # fmt: skip
 
 
-class Told:
-    """What the warnings amount to."""
-
-    skipped = 0
-    """Frames that were skipped."""
-
-    def __init__(self, level: Level = Level.USUAL) -> None:
-        self.level = level
-        self.texts: list[str] = []
-        """Warnings, each text once."""
-        self.notes: list[str] = []
-        """Notes, each text once."""
-
-    def hear(self, category: type[Warning], text: str) -> None:
-        """Tell a warning or note of scanfab, if it is new."""
-        text = as_options(text)
-        self.skipped += issubclass(category, SkippedFrameWarning)
-        known, kind = (
-            (self.notes, "note") if issubclass(category, ScanfabNote) else (self.texts, "warning")
-        )
-        if issubclass(category, ScanfabWarning | ScanfabNote) and text not in known:
-            known.append(text)
-            if kind == "warning" or self.level is not Level.QUIET:
-                click.echo(f"scanfab: {kind}: {text}", err=True)
-
-
 @contextmanager
 def reported_warnings() -> Iterator[Told]:
     """Warnings and notes of scanfab as single lines on standard error, each text once."""
-    told = Told(level())
+    told, is_quiet = Told(), level() is Level.QUIET
 
     def show(message: Any, category: type[Warning], *rest: Any, **more: Any) -> None:
-        told.hear(category, str(message))
+        is_note = issubclass(category, ScanfabNote)
+        if told.add(category, str(message)) and not (is_note and is_quiet):
+            kind = "note" if is_note else "warning"
+            click.echo(f"scanfab: {kind}: {as_options(str(message))}", err=True)
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -113,6 +98,18 @@ def announce_compiling() -> None:
             )
         )
     )
+
+
+def print_csv(
+    rows: Iterable[Mapping[str, Any]], excerpt: Excerpt, kind: type | Sequence[column.Column] = Row
+) -> None:
+    """Rows of a kind, or of some columns, as CSV on standard output, each as it comes."""
+    from scanfab.table.columns import columns_of
+    from scanfab.table.writing import row_writer
+
+    writer = row_writer(".csv", sys.stdout, columns_of(kind), excerpt=excerpt)
+    for row in rows:
+        writer.write(row)
 
 
 def print_table(rows: Iterable[Row], excerpt: Excerpt) -> None:

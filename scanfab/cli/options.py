@@ -36,7 +36,7 @@ Command = Callable[..., Any]
 Completion = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
 
 READING = ("format", "columns", "contact_columns", "radius", "cell", "periodic", "contacts")
-SAMPLE = ("boundary", "min_contacts", "contact_tolerance")
+SAMPLE = ("boundary", "min_contacts", "rattlers", "contact_tolerance")
 WINDOW = ("rv", "rv_radius", "rv_center", "rv_shape", "rv_size", "rv_axis", "rv_follows")
 EXCERPT = ("fields", "digits")
 # the cut-off of commands that take tables
@@ -143,7 +143,7 @@ a_file = partial(click.Path, dir_okay=False, path_type=Path)
 MORE: dict[str, dict[str, Any]] = {
     "fields": {"shell_complete": _complete_fields},
     "output": {"type": a_file(allow_dash=True), "callback": _output},
-    "vtk_folder": {"type": click.Path(file_okay=False, path_type=Path)},
+    "vtk": {"type": click.Path(file_okay=False, path_type=Path)},
 }
 
 

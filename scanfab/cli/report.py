@@ -50,7 +50,7 @@ def report(
     come from TABLE.manifest.json beside it; without it, the report says that they are not known.
     """
     from scanfab.cli.console import announce_compiling, reported_warnings
-    from scanfab.viz.report.page import check_page_file, save_page
+    from scanfab.viz.report.page import check_page_file
     from scanfab.viz.report.report import make_report
 
     if labels and len(labels) != len(tables):
@@ -67,7 +67,7 @@ def report(
                 cutoff=cutoff,
                 labels=labels,
             )
-        save_page(output, made.page)
+        made.save(output)
     if not made.has_void_fabric:
         click.echo("scanfab: warning: no row of the tables has a void fabric", err=True)
     return 0 if made.has_void_fabric else 1

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from scanfab.cli.options import usage_errors, write_groups
-from scanfab.io.options import READING_OPTIONS
+from scanfab.io.options import take_reading
 
 if TYPE_CHECKING:
     from scanfab.io.series import Series
@@ -44,7 +44,7 @@ class SourceCommand(click.Command):
 def reading_arguments(options: dict[str, Any]) -> dict[str, Any]:
     """Take the reading options out of a command's, as arguments of ``read_series``."""
     with usage_errors():
-        taken = {one.name: one.parse(one.name, options.pop(one.name)) for one in READING_OPTIONS}
+        taken = take_reading(options)
     if taken["format"] is not None:
         _check_format(taken["format"])
     return taken

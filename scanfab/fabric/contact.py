@@ -7,28 +7,18 @@ Conferences 140; the tensor is that of Satake (1982) and Oda (1982).
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.column import Column
-from scanfab.fabric.tensor import FabricTensor, tensor_columns
+from scanfab.fabric.tensor import FabricTensor, tensor_columns, tensor_values
 
-__all__ = ["CONTACT_COLUMNS", "axial_error", "contact_fabric"]
+if TYPE_CHECKING:
+    from scanfab.fabric.measured import Measured
 
-CONTACT_COLUMNS = (
-    *tensor_columns("gc", "contact fabric"),
-    Column("alpha_c", float, "", "largest minus smallest principal value of the contact fabric"),
-    Column(
-        "alpha_c_axial", float, "", "signed anisotropy of the contact fabric along the loading axis"
-    ),
-    Column(
-        "alpha_c_axial_se",
-        float,
-        "",
-        "its standard error if contacts were independent; too large by about half in relaxed dense "
-        "packings",
-    ),
-)
+__all__ = ["Contact", "axial_error", "contact_fabric"]
 
 
 def contact_fabric(normals: npt.ArrayLike) -> FabricTensor | None:
@@ -68,3 +58,37 @@ def axial_error(normals: npt.ArrayLike, axis: npt.ArrayLike) -> float | None:
     if len(cosine) < 2:
         return None
     return float(np.std(1.5 * cosine**2 - 0.5, ddof=1) / np.sqrt(len(cosine)))
+
+
+class Contact:
+    """The columns of the contact fabric."""
+
+    columns = (
+        *tensor_columns("gc", "contact fabric"),
+        Column(
+            "alpha_c", float, "", "largest minus smallest principal value of the contact fabric"
+        ),
+        Column(
+            "alpha_c_axial",
+            float,
+            "",
+            "signed anisotropy of the contact fabric along the loading axis",
+        ),
+        Column(
+            "alpha_c_axial_se",
+            float,
+            "",
+            "its standard error if contacts were independent; too large by about half in relaxed "
+            "dense packings",
+        ),
+    )
+
+    def values(self, measured: Measured) -> dict[str, Any]:
+        """All None without contacts."""
+        tensor, axis = measured.contact, measured.axis
+        return {
+            **tensor_values("gc", tensor),
+            "alpha_c": tensor.alpha if tensor else None,
+            "alpha_c_axial": tensor.axial(axis) if tensor else None,
+            "alpha_c_axial_se": axial_error(measured.normals, axis),
+        }

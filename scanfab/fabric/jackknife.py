@@ -9,28 +9,29 @@ Efron and Stein (1981), doi:10.1214/aos/1176345462.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.column import Column
-from scanfab.base.typing import FloatArray
+from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.tensor import axial
 from scanfab.fabric.void import void_fabric
 
+if TYPE_CHECKING:
+    from scanfab.fabric.measured import Measured
+
 __all__ = [
     "BLOCKS",
+    "BlockedSums",
+    "Halves",
     "Jackknife",
+    "Scatter",
     "contact_jackknife",
-    "half_columns",
-    "half_values",
     "jackknife_error",
-    "sample_column",
-    "scatter_values",
     "variance_without_noise",
     "void_jackknife",
-    "without_columns",
 ]
 
 
@@ -40,6 +41,24 @@ ORDER = (
     " (-x, -y, -z; x counts fastest; for an oblique loading axis the octants are turned so that "
     "one of their axes lies along it)"
 )
+# the anisotropies, by the names of their columns
+VOID, CONTACT = "alpha_vs_axial", "alpha_c_axial"
+
+Sums = tuple[FloatArray, FloatArray | IntArray]
+"""Lengths and numbers of the kept void segments, each of shape (R, D)."""
+
+
+class BlockedSums(NamedTuple):
+    """A scan whose void segments are told apart by the block that their middle is in."""
+
+    axes: FloatArray
+    """Unit vectors of each replicate, shape (R, D, 3)."""
+    weights: FloatArray
+    """Of the direction rule, shape (D,)."""
+    full: Sums
+    """Of all blocks; the lengths in the dump's length unit."""
+    without: list[Sums]
+    """Of all but one block, for each of the eight."""
 
 
 class Jackknife(NamedTuple):
@@ -111,24 +130,14 @@ def contact_jackknife(
     return Jackknife(rest - along.mean(), jackknife_error(rest), np.zeros(BLOCKS))
 
 
-def void_jackknife(
-    axes: FloatArray,
-    weights: FloatArray,
-    full: tuple[FloatArray, FloatArray],
-    without: list[tuple[FloatArray, FloatArray]],
-    axis: npt.ArrayLike,
-) -> Jackknife | None:
+def void_jackknife(sums: BlockedSums, axis: npt.ArrayLike) -> Jackknife | None:
     """
     The void fabric's axial anisotropy without the segments of each block.
 
     Parameters
     ----------
-    axes, weights
-        As for :func:`scanfab.void_fabric`.
-    full : two ndarray, shapes (R, D)
-        Sums of lengths and numbers of all segments.
-    without : list of the same
-        Without each block.
+    sums : BlockedSums
+        Of a scan.
     axis : array_like, shape (3,)
         Loading axis, a unit vector.
 
@@ -139,7 +148,8 @@ def void_jackknife(
         scatter between blocks is known from its replicates, and taken off the error; where nothing
         is left, the error is None: too few lines to see it, which is no proof that there is none.
     """
-    fabrics = [void_fabric(axes, weights, *sums) for sums in (full, *without)]
+    every = (sums.full, *sums.without)
+    fabrics = [void_fabric(sums.axes, sums.weights, *one) for one in every]
     if any(fabric is None for fabric in fabrics):
         return None
     values = np.array([axial(fabric.replicates, axis) for fabric in fabrics if fabric is not None])
@@ -173,29 +183,45 @@ def variance_without_noise(values: FloatArray) -> float:
     return float((count * of_mean - of_single) / (count - 1))
 
 
-def sample_column(name: str) -> Column:
-    """The column of an anisotropy's standard error from the sample."""
-    meaning = f"the sample's own scatter of {name}, by a jackknife over eight octants"
-    return Column(f"{name}_sample_se", float, "", meaning)
+class Scatter:
+    """The columns of the sample's own scatter: its error, and each anisotropy without a block."""
 
-
-def without_columns(name: str, what: str) -> tuple[Column, ...]:
-    """The columns of an anisotropy without each block's segments or contacts."""
-    return tuple(
-        Column(
-            f"{name}_without_{block}",
-            float,
-            "",
-            f"{name} without the {what} of octant {block}" + (ORDER if block == 1 else ""),
-        )
-        for block in range(1, BLOCKS + 1)
+    columns = (
+        *(
+            Column(
+                f"{name}_sample_se",
+                float,
+                "",
+                f"the sample's own scatter of {name}, by a jackknife over eight octants",
+            )
+            for name in (VOID, CONTACT)
+        ),
+        *(
+            Column(
+                f"{name}_without_{block}",
+                float,
+                "",
+                f"{name} without the {what} of octant {block}" + (ORDER if block == 1 else ""),
+            )
+            for name, what in ((VOID, "segments"), (CONTACT, "contacts"))
+            for block in range(1, BLOCKS + 1)
+        ),
     )
 
+    def values(self, measured: Measured) -> dict[str, Any]:
+        """All None where there is no fabric, or none without some block."""
+        void, contact, axis = measured.void, measured.contact, measured.axis
+        along_void = void.tensor.axial(axis) if void else None
+        along_contact = contact.axial(axis) if contact else None
+        return {
+            **_scatter_values(VOID, along_void, measured.void_scatter),
+            **_scatter_values(CONTACT, along_contact, measured.contact_scatter),
+        }
 
-def scatter_values(
+
+def _scatter_values(
     name: str, value: float | None, scatter: Jackknife | None
 ) -> dict[str, float | None]:
-    """The values of the columns that :func:`sample_column` and :func:`without_columns` declare."""
     without = [
         None if value is None or scatter is None else value + float(scatter.shift[block])
         for block in range(BLOCKS)
@@ -206,21 +232,22 @@ def scatter_values(
     }
 
 
-def half_columns(name: str) -> tuple[Column, ...]:
-    """The columns of what the scan's noise makes of an anisotropy without each block."""
-    return tuple(
+class Halves:
+    """The columns of what the scan's noise makes of the void fabric without each block."""
+
+    columns = tuple(
         Column(
-            f"{name}_half_{block}",
+            f"{VOID}_half_{block}",
             float,
             "",
-            f"{name}_without_{block} is the mean of two replicates: half their difference, which "
+            f"{VOID}_without_{block} is the mean of two replicates: half their difference, which "
             f"tells compare the scan's noise in a slope",
         )
         for block in range(1, BLOCKS + 1)
     )
 
-
-def half_values(name: str, scatter: Jackknife | None) -> dict[str, float | None]:
-    """The values of these columns."""
-    halves = [None] * BLOCKS if scatter is None else scatter.half.tolist()
-    return {f"{name}_half_{block}": half for block, half in enumerate(halves, start=1)}
+    def values(self, measured: Measured) -> dict[str, Any]:
+        """All None where there is no void fabric, or none without some block."""
+        scatter = measured.void_scatter
+        halves = [None] * BLOCKS if scatter is None else scatter.half.tolist()
+        return {f"{VOID}_half_{block}": half for block, half in enumerate(halves, start=1)}

@@ -12,12 +12,9 @@ from scanfab.base.column import Column
 from scanfab.base.typing import FloatArray
 
 __all__ = [
-    "COAXIALITY",
     "COMPONENTS",
     "FabricTensor",
     "axial",
-    "axis_columns",
-    "axis_values",
     "tensor_columns",
     "tensor_values",
 ]
@@ -114,14 +111,6 @@ class FabricTensor:
         return {name: float(self.matrix[place]) for name, place in COMPONENTS.items()}
 
 
-COAXIALITY = Column(
-    "coaxiality_deg",
-    float,
-    "degrees",
-    "angle between the major axes of void and contact fabric, 0 to 90",
-)
-
-
 def tensor_columns(prefix: str, what: str) -> tuple[Column, ...]:
     """
     The columns of a tensor's six components.
@@ -142,17 +131,3 @@ def tensor_values(prefix: str, tensor: FabricTensor | None) -> dict[str, float |
     """The values of these columns."""
     found = tensor.components() if tensor else dict.fromkeys(COMPONENTS)
     return {f"{prefix}_{name}": value for name, value in found.items()}
-
-
-def axis_columns(prefix: str, what: str) -> tuple[Column, ...]:
-    """The columns of a tensor's major axis."""
-    meaning = f"direction of the {what}'s largest principal value, a unit vector"
-    return tuple(
-        Column(f"{prefix}_axis_{name}", float, "", f"{name} of the {meaning}") for name in "xyz"
-    )
-
-
-def axis_values(prefix: str, tensor: FabricTensor | None) -> dict[str, float | None]:
-    """The values of these columns."""
-    axis = [None] * 3 if tensor is None else tensor.major_axis.tolist()
-    return {f"{prefix}_axis_{name}": one for name, one in zip("xyz", axis, strict=True)}

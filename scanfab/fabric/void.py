@@ -9,33 +9,22 @@ doi:10.3208/sandf1972.25.3_85. As printed the weights w of the directions are 1;
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.column import LENGTH, Column
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.fabric.tensor import FabricTensor, axial, tensor_columns
+from scanfab.fabric.tensor import FabricTensor, axial, tensor_columns, tensor_values
 
-__all__ = ["VOID_COLUMNS", "VoidFabric", "void_fabric"]
+if TYPE_CHECKING:
+    from scanfab.fabric.measured import Measured
+
+__all__ = ["Void", "VoidFabric", "void_fabric"]
 
 
 MOST_FILLED = 0.5
-
-VOID_COLUMNS = (
-    Column("mean_length", float, LENGTH, "mean length of the kept segments, Σ w·sum / Σ w·count"),
-    *tensor_columns("gvs", "void fabric"),
-    Column("alpha_vs", float, "", "largest minus smallest principal value of the void fabric"),
-    Column(
-        "alpha_vs_axial", float, "", "signed anisotropy of the void fabric along the loading axis"
-    ),
-    Column(
-        "alpha_vs_axial_se",
-        float,
-        "",
-        "its standard error from the scan, by the scatter of the replicates",
-    ),
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,3 +146,38 @@ def void_fabric(
         mean_lengths=mean,
         filled=float(empty.mean()),
     )
+
+
+class Void:
+    """The columns of the void fabric."""
+
+    columns = (
+        Column(
+            "mean_length", float, LENGTH, "mean length of the kept segments, Σ w·sum / Σ w·count"
+        ),
+        *tensor_columns("gvs", "void fabric"),
+        Column("alpha_vs", float, "", "largest minus smallest principal value of the void fabric"),
+        Column(
+            "alpha_vs_axial",
+            float,
+            "",
+            "signed anisotropy of the void fabric along the loading axis",
+        ),
+        Column(
+            "alpha_vs_axial_se",
+            float,
+            "",
+            "its standard error from the scan, by the scatter of the replicates",
+        ),
+    )
+
+    def values(self, measured: Measured) -> dict[str, Any]:
+        """All None if there is no void fabric."""
+        fabric, axis = measured.void, measured.axis
+        return {
+            "mean_length": fabric.mean_length if fabric else None,
+            **tensor_values("gvs", fabric.tensor if fabric else None),
+            "alpha_vs": fabric.tensor.alpha if fabric else None,
+            "alpha_vs_axial": fabric.tensor.axial(axis) if fabric else None,
+            "alpha_vs_axial_se": fabric.axial_error(axis) if fabric else None,
+        }

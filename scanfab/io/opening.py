@@ -133,6 +133,7 @@ def read_series(
     >>> [frame.read().step for frame in series]
     [30000, 60000]
     """
+    arguments = locals()
     given = [source] if isinstance(source, str | os.PathLike) else list(source)
     paths = [Path(one) for one in named_once(given)]
     cells = None if cell is None or isinstance(cell, tuple | list) else _cell_file(cell)
@@ -141,13 +142,15 @@ def read_series(
     families = sort_into_families([file for path in paths for file in files_of(path)], format)
     grains = choose_grains(paths, families, radius is not None).check()
     name = _as_text(os.fspath(given[0]) if len(paths) == len(given) == 1 else _common_folder(paths))
+    sources = tuple(os.fspath(path) for one in given for path in expanded(one))
+    reading = {name: arguments[name] for name in READING}
     own = [family for family in families if family.kind == "contacts"]
     _note_passed_over(families, [grains, *own])
     _note_below(paths, grains)
 
     def series(files: Sequence[Family], contacts_from: ContactsFrom) -> Series:
         checked = tuple(family.check() for family in files)
-        return Series(name, grains, checked, contacts_from, options, cells)
+        return Series(name, grains, checked, contacts_from, options, cells, sources, reading)
 
     if contacts == "geometric":
         return series((), "geometric")

@@ -10,7 +10,14 @@ from typing import Any
 
 from scanfab.base.option import Option, number, optional, unusable
 
-__all__ = ["READING_OPTIONS", "parse_cell", "parse_columns", "parse_periodic", "parse_radius"]
+__all__ = [
+    "READING_OPTIONS",
+    "parse_cell",
+    "parse_columns",
+    "parse_periodic",
+    "parse_radius",
+    "take_reading",
+]
 
 
 def _reader_names() -> Iterable[str]:
@@ -128,3 +135,17 @@ READING_OPTIONS = (
         files=True,
     ),
 )
+
+
+def take_reading(options: dict[str, Any]) -> dict[str, Any]:
+    """
+    Take the options of ``read_series`` out of others, checked, and the usual ones in their place.
+
+    Raises
+    ------
+    SettingsError
+        If a value cannot be used.
+    """
+    return {
+        one.name: one.parse(one.name, options.pop(one.name, one.default)) for one in READING_OPTIONS
+    }

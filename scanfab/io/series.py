@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -224,6 +224,10 @@ class Series:
     options: ReadOptions = field(default_factory=ReadOptions)
     cells: FrameFile | None = None
     """The cell of each frame, in the place of one for all in the options."""
+    sources: tuple[str, ...] = field(default=(), repr=False, compare=False)
+    """What ``read_series`` was given."""
+    reading: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
+    """Its options, as a manifest lists them."""
     # a file that holds the contacts of many frames is indexed once
     _contact_snapshots: dict[Path, list[Snapshot]] = field(
         default_factory=dict, init=False, repr=False, compare=False

@@ -11,11 +11,13 @@ from functools import cached_property
 
 import numpy as np
 
+from scanfab.base.arrays import cast
 from scanfab.base.note import Note
 from scanfab.base.typing import BoolArray, IntArray
 from scanfab.packing.boundary import BoundaryRule, select_boundary
 from scanfab.packing.escaped import Escaped, escaped_grains
 from scanfab.packing.packing import Contacts, Packing
+from scanfab.packing.rattlers import RattlerRule, Touching, count, installed_rules
 from scanfab.packing.search import find_contacts
 from scanfab.packing.window import SurfaceBox, Window
 
@@ -54,6 +56,8 @@ class Sample:
     """Shape (N,)."""
     min_contacts: int = 2
     """A grain with fewer contacts is a rattler."""
+    rattler_rule: RattlerRule = count
+    """Tells them by their contacts."""
 
     @property
     def contacts(self) -> Contacts:
@@ -109,25 +113,25 @@ class Sample:
 
     @cached_property
     def rattlers(self) -> BoolArray:
-        """
-        Grains with fewer than ``min_contacts`` contacts, shape (N,).
+        """Grains that are rattlers by the rule, shape (N,)."""
+        told = self.rattler_rule(self._touching)
+        found: BoolArray = cast("rattlers", told, np.bool_, (len(self.packing),))
+        return self.grains & found
 
-        One pass, no repetition; contacts with boundary particles and walls count.
-        """
-        return self.grains & (self.contact_numbers < self.min_contacts)
+    @property
+    def _touching(self) -> Touching:
+        return Touching(self.contacts, self.contact_numbers, self.grains, self.min_contacts)
 
     @cached_property
     def contact_numbers(self) -> IntArray:
         """Number of contacts of each particle, those with walls included, shape (N,)."""
-        return self._numbers_of(self.contacts.pairs)
+        ends = np.bincount(self.contacts.pairs.ravel(), minlength=len(self.packing))
+        return ends + self.packing.wall_contacts
 
     @cached_property
     def contact_numbers_without_rattlers(self) -> IntArray:
         """The same without contacts that a rattler has part in."""
-        return self._numbers_of(self.contacts.pairs[self.contacts_without(self.rattlers)])
-
-    def _numbers_of(self, pairs: IntArray) -> IntArray:
-        return np.bincount(pairs.ravel(), minlength=len(self.packing)) + self.packing.wall_contacts
+        return self._touching.numbers_without(~self.contacts_without(self.rattlers))
 
     def removed(self, variant: Variant) -> BoolArray:
         """Grains that the variant leaves out, shape (N,)."""
@@ -188,6 +192,8 @@ class SampleRule:
     """Particles that fit one of them are boundary."""
     min_contacts: int = 2
     """A grain with fewer contacts is a rattler."""
+    rattlers: str = "count"
+    """By which of the installed rules."""
     contact_tolerance: float = 0.0
     """Of contacts by geometry, where no file lists them; relative to the sum of the radii."""
 
@@ -202,4 +208,5 @@ class SampleRule:
         """
         if packing.contacts is None:
             packing = find_contacts(packing, self.contact_tolerance)
-        return Sample(packing, select_boundary(packing, self.boundary), self.min_contacts)
+        boundary = select_boundary(packing, self.boundary)
+        return Sample(packing, boundary, self.min_contacts, installed_rules()[self.rattlers])

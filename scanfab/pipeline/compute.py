@@ -56,6 +56,7 @@ def compute(
     tolerance: float = 1e-4,
     max_chords: float = MAX_CHORDS,
     min_contacts: int = 2,
+    rattlers: str = "count",
     contact_tolerance: float = 0.0,
     axis: str | Sequence[float] = "z",
     strain: str | Path = "auto",

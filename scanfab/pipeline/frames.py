@@ -104,7 +104,8 @@ class Frames:
     source : Packing, Series or iterable of Packing
         One frame, or many.
     settings : Settings
-        ``frames``, ``on_error``, ``boundary``, ``min_contacts`` and ``contact_tolerance`` count.
+        ``frames``, ``on_error``, ``boundary``, ``min_contacts``, ``rattlers`` and
+        ``contact_tolerance`` count.
 
     Raises
     ------
@@ -259,7 +260,9 @@ class Frames:
 
 def sample_rule(settings: Settings) -> SampleRule:
     """What settings say of how particles are told apart."""
-    return SampleRule(settings.boundary, settings.min_contacts, settings.contact_tolerance)
+    return SampleRule(
+        settings.boundary, settings.min_contacts, settings.rattlers, settings.contact_tolerance
+    )
 
 
 def chosen_frames(source: Iterable[Any], frames: slice) -> range:

@@ -76,7 +76,8 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
     series : Series
         The frames.
     settings : Settings
-        ``boundary``, ``frames``, ``min_contacts``, ``contact_tolerance`` and the RV count.
+        ``boundary``, ``frames``, ``min_contacts``, ``rattlers``, ``contact_tolerance`` and the RV
+        count.
 
     Raises
     ------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import platform
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
@@ -10,13 +11,24 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from scanfab.base.files import whole_file
 from scanfab.base.option import options_of
 from scanfab.io.series import Series
 from scanfab.pipeline.settings import STRAIN_MODES, Settings
 from scanfab.pipeline.values import SHAPES
 from scanfab.scan.directions import DirectionRule
+from scanfab.table.writing import ALL, Excerpt
 
-__all__ = ["Inputs", "asked_for", "manifest", "strain_file", "surface_file", "with_frames"]
+__all__ = [
+    "Inputs",
+    "asked_for",
+    "default_settings",
+    "manifest",
+    "strain_file",
+    "surface_file",
+    "with_frames",
+    "write_manifest",
+]
 
 PACKAGES = (
     "scanfab", "numpy", "numba", "scipy", "meshio", "pyvista", "click", "rich", "h5py",
@@ -25,7 +37,10 @@ PACKAGES = (
 
 
 def asked_for(
-    sources: Sequence[str], reading: dict[str, Any], settings: Settings
+    sources: Sequence[str],
+    reading: Mapping[str, Any],
+    settings: Settings,
+    excerpt: Excerpt = ALL,
 ) -> dict[str, Any]:
     """
     What decides the bytes of a result, as JSON can hold it: all but the number of workers.
@@ -34,17 +49,28 @@ def asked_for(
     ----------
     sources : sequence of str
         As given.
-    reading : dict
+    reading : mapping
         Options of ``read_series``.
     settings : Settings
         Of the computation.
+    excerpt : Excerpt, optional
+        Columns and digits of the result.
     """
-    chosen = {
+    named = {"scanfab": version("scanfab"), "sources": list(sources)}
+    return {**named, **_plain(dict(reading)), **_chosen(settings), **excerpt.asked()}
+
+
+def default_settings() -> dict[str, Any]:
+    """What an older manifest means that says nothing of a setting: there was no choice."""
+    return _chosen(Settings())
+
+
+def _chosen(settings: Settings) -> dict[str, Any]:
+    return {
         one.name: _plain(getattr(settings, one.name))
         for one in options_of(type(settings))
         if one.meaning
     }
-    return {"scanfab": version("scanfab"), "sources": list(sources), **_plain(reading), **chosen}
 
 
 def with_frames(asked: dict[str, Any], frames: slice) -> dict[str, Any]:
@@ -103,6 +129,14 @@ def manifest(
         "warnings": list(warnings),
         "notes": list(notes),
     }
+
+
+def write_manifest(path: Path, found: Mapping[str, Any]) -> None:
+    """Write a manifest as JSON; the file is complete or untouched."""
+    text = json.dumps(found, indent=1, ensure_ascii=False)
+    with whole_file(path) as part:
+        # names of files need be no text; what replaces their letters is how JSON spells them
+        part.write_text(text + "\n", encoding="utf-8", errors="backslashreplace")
 
 
 def strain_file(asked: Mapping[str, Any]) -> Path | None:

@@ -47,21 +47,19 @@ OUTPUT_OPTIONS = (
         kind=bool,
     ),
     Option(
-        name="manifest_path",
+        name="manifest",
         group="output",
         help="Settings, seed, versions, inputs with size and hash, as JSON (with `output=FILE` "
         "also FILE.manifest.json without asking).",
         kind=Path,
         metavar="FILE",
-        spelling="--manifest",
     ),
     Option(
-        name="vtk_folder",
+        name="vtk",
         group="output",
         help="Write files for ParaView of each frame that is computed now.",
         kind=Path,
         metavar="DIR",
-        spelling="--vtk",
     ),
     Option(
         name="plot",

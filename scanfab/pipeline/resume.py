@@ -12,7 +12,7 @@ from typing import Any
 from scanfab.base.errors import SettingsError
 from scanfab.io.series import Series
 from scanfab.pipeline.frames import chosen_frames
-from scanfab.pipeline.manifest import Inputs, strain_file, surface_file
+from scanfab.pipeline.manifest import Inputs, default_settings, strain_file, surface_file
 from scanfab.pipeline.repeat import read_manifest
 from scanfab.pipeline.settings import Settings
 from scanfab.table.columns import complete_row, table_columns
@@ -121,7 +121,8 @@ def finished_table(
     manifest = read_manifest(path)
     if manifest is None:
         raise _refused(path, f"there is no {path.name}.manifest.json, which says what made it")
-    differing = differing_settings(manifest["settings"], dict(asked), FREE)
+    before = {**default_settings(), **manifest["settings"]}
+    differing = differing_settings(before, dict(asked), FREE)
     if differing:
         raise _refused(path, f"it was made with other settings ({', '.join(differing)})")
     rows = read_rows(path)

@@ -29,6 +29,7 @@ from scanfab.pipeline.values import (
     parse_cutoffs,
     parse_directions,
     parse_frames,
+    parse_rattlers,
     parse_shape,
     parse_sizes,
     parse_spacing,
@@ -37,6 +38,7 @@ from scanfab.pipeline.values import (
     parse_variants,
     parse_vector,
     parse_workers,
+    rattler_rules,
 )
 
 if TYPE_CHECKING:
@@ -254,6 +256,17 @@ class Settings:
         takes="int",
         kind=int,
         metavar="N",
+    )
+    rattlers: str = option(
+        default="count",
+        parse=parse_rattlers,
+        group="sample",
+        help="Rule for rattlers: count is one pass over all contacts; recursive repeats it without "
+        "those of rattlers, until there is no new one.",
+        meaning="rule for rattlers; count: one pass over all contacts; recursive: again without "
+        "those of rattlers, until there is no new one",
+        metavar="RULE",
+        choices=rattler_rules,
     )
     contact_tolerance: float = option(
         default=0.0,

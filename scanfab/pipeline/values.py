@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from scanfab.base.errors import SettingsError
-from scanfab.base.option import number, unusable, whole
+from scanfab.base.option import number, one_of, unusable, whole
 
 if TYPE_CHECKING:
     # their modules need numpy, for which the help of a command does not wait
@@ -33,6 +33,7 @@ __all__ = [
     "parse_frames",
     "parse_length",
     "parse_lengths",
+    "parse_rattlers",
     "parse_shape",
     "parse_sizes",
     "parse_spacing",
@@ -41,6 +42,7 @@ __all__ = [
     "parse_variants",
     "parse_vector",
     "parse_workers",
+    "rattler_rules",
 ]
 
 Vector = tuple[float, float, float]
@@ -193,7 +195,7 @@ def _words(values: Any) -> Iterable[Any]:
 
 def parse_sizes(name: str, values: Any) -> tuple[float, ...]:
     """Two or three lengths above 0, in a text between commas or blanks; none if not given."""
-    if values is None or values == ():
+    if values is None or (isinstance(values, tuple | list) and not values):
         return ()
     try:
         sizes = tuple(map(float, _words(values)))
@@ -277,6 +279,18 @@ def parse_tolerance(name: str, value: Any) -> float:
     if not 1e-15 <= found <= 1e15:
         raise unusable(name, "a number from 1e-15 to 1e15", value)
     return float(found)
+
+
+def rattler_rules() -> Iterable[str]:
+    """The names of the rules that are installed."""
+    from scanfab.packing.rattlers import installed_rules
+
+    return installed_rules()
+
+
+def parse_rattlers(name: str, value: Any) -> str:
+    """The name of a rule that is installed."""
+    return str(one_of(*rattler_rules())(name, value))
 
 
 def parse_strain(name: str, value: Any) -> str:

@@ -11,19 +11,9 @@ from typing import Any
 import numpy as np
 
 from scanfab.base.note import Note
-from scanfab.base.typing import BoolArray, FloatArray
-from scanfab.fabric.contact import axial_error, contact_fabric
-from scanfab.fabric.jackknife import (
-    BLOCKS,
-    Jackknife,
-    contact_jackknife,
-    half_values,
-    scatter_values,
-    void_jackknife,
-)
-from scanfab.fabric.registry import Measured, installed_fabrics
-from scanfab.fabric.tensor import axis_values, tensor_values
-from scanfab.fabric.void import VoidFabric, void_fabric
+from scanfab.base.typing import FloatArray, IntArray
+from scanfab.fabric.jackknife import BLOCKS, BlockedSums
+from scanfab.fabric.registry import OWN_FABRICS, Measured, installed_fabrics
 from scanfab.fabric.window import WINDOW_ALPHA, window_alpha
 from scanfab.packing.sample import Variant
 from scanfab.pipeline.measurement import Measurement
@@ -48,22 +38,31 @@ class VariantColumns:
 
     def columns(self) -> dict[str, Any]:
         """All that depend on the variant."""
-        return {
-            **self._sample(),
-            **self._scan(),
-            **self._void(),
-            **self._contact(),
-            **self._window(),
-            **self._others(),
-        }
+        found = {**self._sample(), **self._scan()}
+        for fabric in (*OWN_FABRICS.values(), *installed_fabrics().values()):
+            found |= fabric.values(self.measured)
+        return {**found, **self._window()}
 
     @cached_property
-    def fabric(self) -> VoidFabric | None:
-        """The void fabric; a window without any solid has none."""
-        if self._no_solid:
-            return None
-        kept = self.measurement.kept(self.variant.name, self.place)
-        return void_fabric(self.sums.axes, self.plan.rule.weights, *kept)
+    def measured(self) -> Measured:
+        """What the fabrics are computed from."""
+        length, segments = self.measurement.kept(self.variant.name, self.place)
+        chosen = self.sample.fabric_contacts(self.variant, self.plan.window)
+        contacts = self.sample.contacts
+        # np.compress is several times as fast as to index with a mask
+        points = np.compress(chosen, contacts.point, axis=0)
+        return Measured(
+            axis=np.asarray(self.plan.axis),
+            axes=self.sums.axes,
+            weights=self.plan.rule.weights,
+            length=length,
+            segments=segments,
+            meets_solids=not self._no_solid,
+            blocked=self._blocked_sums(),
+            normals=np.compress(chosen, contacts.normal, axis=0),
+            points=points,
+            blocks=self._blocks_of(points),
+        )
 
     @cached_property
     def _no_solid(self) -> str:
@@ -91,6 +90,7 @@ class VariantColumns:
             "grains": int((counted & ~self.sample.removed(self.variant)).sum()),
             "rattlers": int((counted & self.sample.rattlers).sum()),
             "coordination": self.sample.coordination(self.variant, window),
+            "contacts": len(self.measured.normals),
         }
 
     def _scan(self) -> dict[str, Any]:
@@ -116,101 +116,34 @@ class VariantColumns:
             return None
         return 1.0 - float(weights @ self.sums.void[:, self.which].sum(axis=0)) / length
 
-    def _void(self) -> dict[str, Any]:
-        fabric, axis = self.fabric, self.plan.axis
-        value = fabric.tensor.axial(axis) if fabric else None
-        scatter = self._void_scatter() if fabric else None
-        return {
-            "mean_length": fabric.mean_length if fabric else None,
-            **tensor_values("gvs", fabric.tensor if fabric else None),
-            "alpha_vs": fabric.tensor.alpha if fabric else None,
-            "alpha_vs_axial": value,
-            "alpha_vs_axial_se": fabric.axial_error(axis) if fabric else None,
-            **scatter_values("alpha_vs_axial", value, scatter),
-            **half_values("alpha_vs_axial", scatter),
-            **axis_values("gvs", fabric.tensor if fabric else None),
-        }
-
-    def _void_scatter(self) -> Jackknife | None:
-        gaps, moment = self.measurement.blocked, self.plan.moment
-        words = (self.variant.name, self.place, moment)
-        return void_jackknife(
+    def _blocked_sums(self) -> BlockedSums:
+        gaps = self.measurement.blocked
+        words = (self.variant.name, self.place, self.plan.moment)
+        return BlockedSums(
             gaps.axes,
             self.measurement.block_rule.weights,
             gaps.kept(*words),
             [gaps.kept(*words, without=block) for block in range(BLOCKS)],
-            self.plan.axis,
         )
-
-    @cached_property
-    def _chosen(self) -> BoolArray:
-        """The contacts that enter the contact fabric."""
-        return self.sample.fabric_contacts(self.variant, self.plan.window)
-
-    # np.compress is several times as fast as to index with a mask
-
-    @cached_property
-    def _normals(self) -> FloatArray:
-        """Of these contacts, shape (M, 3)."""
-        return np.compress(self._chosen, self.sample.contacts.normal, axis=0)
-
-    @cached_property
-    def _points(self) -> FloatArray:
-        """Of these contacts, shape (M, 3), dump's length unit."""
-        return np.compress(self._chosen, self.sample.contacts.point, axis=0)
-
-    def _contact(self) -> dict[str, Any]:
-        normals, axis = self._normals, self.plan.axis
-        tensor = contact_fabric(normals)
-        value = tensor.axial(axis) if tensor else None
-        scatter: Jackknife | None = None
-        if tensor:
-            points = self._points
-            if self.variant.in_window:
-                window = self.plan.window
-                assert window is not None
-                points = window.center + window.branches(points, self.sample.packing)
-            places = self.measurement.blocks[self.variant.in_window].of(points)
-            scatter = contact_jackknife(normals, places, axis)
-        return {
-            "contacts": len(normals),
-            **tensor_values("gc", tensor),
-            "alpha_c": tensor.alpha if tensor else None,
-            "alpha_c_axial": value,
-            "alpha_c_axial_se": axial_error(normals, axis),
-            **scatter_values("alpha_c_axial", value, scatter),
-            **axis_values("gc", tensor),
-            "coaxiality_deg": (
-                self.fabric.tensor.angle_to(tensor) if self.fabric and tensor else None
-            ),
-        }
 
     def _window(self) -> dict[str, Any]:
         """What the window alone would give, where its column is there."""
-        name, window, value = WINDOW_ALPHA.name, self.plan.window, None
+        name, window, fabric = WINDOW_ALPHA.name, self.plan.window, self.measured.void
         if name not in self.plan.more_columns:
             return {}
-        if self.variant.in_window and window is not None and self.fabric and self.plan.moment == 1:
+        value: float | None = None
+        if self.variant.in_window and window is not None and fabric and self.plan.moment == 1:
             cutoff = self.plan.cutoffs[self.place]
-            value = window_alpha(window.shape, self.fabric, cutoff, np.asarray(self.plan.axis))
+            value = window_alpha(window.shape, fabric, cutoff, self.measured.axis)
         return {name: value}
 
-    def _others(self) -> dict[str, Any]:
-        """The columns of the fabrics of other packages."""
-        fabrics = installed_fabrics().values()
-        if not fabrics:
-            return {}
-        length, segments = self.measurement.kept(self.variant.name, self.place)
-        measured = Measured(
-            np.asarray(self.plan.axis),
-            self.sums.axes,
-            self.plan.rule.weights,
-            length,
-            segments,
-            self._normals,
-            self._points,
-        )
-        return {name: one for each in fabrics for name, one in each.values(measured).items()}
+    def _blocks_of(self, points: FloatArray) -> IntArray:
+        """The block of each place; of the window those next to its centre."""
+        if self.variant.in_window:
+            window = self.plan.window
+            assert window is not None
+            points = window.center + window.branches(points, self.sample.packing)
+        return self.measurement.blocks[self.variant.in_window].of(points)
 
     def _too_long(self, cutoff: float) -> str:
         """Of a cut-off that no segment reaches; a large number may be one in another unit."""
@@ -234,17 +167,18 @@ class VariantColumns:
         return f"{channels} of {lines} lines stay in a channel and meet no grain" * bool(channels)
 
     def _of_void_fabric(self) -> dict[str, str]:
+        void = self.measured.void
         if self._no_solid:
             return {"no_solid": self._no_solid}
         if self.segments == 0:
             return {"cutoff_too_long": self._too_long(self.plan.cutoffs[self.place])}
-        if self.fabric is None:
+        if void is None:
             text = "in some direction no void segment is kept, so there is no void fabric"
             return {"empty_direction": text}
-        if self.fabric.filled <= 0.01:
+        if void.filled <= 0.01:
             return {}
         return {
-            "filled_directions": f"{self.fabric.filled:.0%} of the directions keep no void segment "
+            "filled_directions": f"{void.filled:.0%} of the directions keep no void segment "
             f"in a replicate: choose a smaller spacing"
         }
 

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import is_dataclass
 from typing import Any
 
 from scanfab.base.column import Column, columns_of_fields, no_column
-from scanfab.fabric.contact import CONTACT_COLUMNS
-from scanfab.fabric.jackknife import half_columns, sample_column, without_columns
-from scanfab.fabric.registry import installed_fabrics
-from scanfab.fabric.tensor import COAXIALITY, axis_columns
-from scanfab.fabric.void import VOID_COLUMNS
+from scanfab.fabric.registry import OWN_FABRICS, installed_fabrics
 from scanfab.fabric.window import WINDOW_ALPHA
 from scanfab.packing.columns import SAMPLE_COLUMNS
 from scanfab.scan.columns import SCAN_COLUMNS
@@ -47,22 +43,16 @@ SHEAR_STRAIN = Column(
     "logarithmic strain's deviator e; else empty",
 )
 
-OWN_COLUMNS = (
-    *FRAME_COLUMNS,
-    *SAMPLE_COLUMNS,
-    *SCAN_COLUMNS,
-    *VOID_COLUMNS,
-    *CONTACT_COLUMNS,
-    sample_column("alpha_vs_axial"),
-    sample_column("alpha_c_axial"),
-    *without_columns("alpha_vs_axial", "segments"),
-    *without_columns("alpha_c_axial", "contacts"),
-    *axis_columns("gvs", "void fabric"),
-    *axis_columns("gc", "contact fabric"),
-    COAXIALITY,
-    SHEAR_STRAIN,
-    *half_columns("alpha_vs_axial"),
-)
+
+def _own_columns() -> Iterator[Column]:
+    yield from (*FRAME_COLUMNS, *SAMPLE_COLUMNS, *SCAN_COLUMNS)
+    for name, fabric in OWN_FABRICS.items():
+        if name == "halves":  # which are newer than the shear strain
+            yield SHEAR_STRAIN
+        yield from fabric.columns
+
+
+OWN_COLUMNS = tuple(_own_columns())
 """Those of every fabric table."""
 
 COLUMNS: tuple[str, ...] = tuple(one.name for one in OWN_COLUMNS)

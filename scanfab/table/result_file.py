@@ -17,7 +17,7 @@ import os
 import shutil
 import sys
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
@@ -70,7 +70,7 @@ class ResultFile:
             if (found := kind_of(one)) is not None:
                 raise SettingsError(
                     f"{one}: is {found}, expected a file or nothing, as rows are kept there until "
-                    f"{path.name} is complete: remove it, or name another -o FILE"
+                    f"{path.name} is complete: remove it, or name another `output=FILE`"
                 )
         as_it_is = table_format.appends and excerpt.is_all
         self._part_suffix = self.suffix if as_it_is else ".jsonl"
@@ -98,7 +98,9 @@ class ResultFile:
                 self._remove_empty_part()
                 self._lock = None
 
-    def finished_rows(self, asked: dict[str, Any], rows_per_frame: int) -> list[dict[str, Any]]:
+    def finished_rows(
+        self, asked: dict[str, Any], rows_per_frame: int, usual: Mapping[str, Any] | None = None
+    ) -> list[dict[str, Any]]:
         """
         The rows of the finished frames in FILE.part, which is cut behind them; none without it.
 
@@ -108,6 +110,8 @@ class ResultFile:
             What is asked for now.
         rows_per_frame : int
             A frame with fewer rows is not finished.
+        usual : mapping, optional
+            Settings that hold where FILE.part says nothing of them, as they are newer than it.
 
         Raises
         ------
@@ -119,7 +123,7 @@ class ResultFile:
         if not self.has_part:
             return []
         before, _ = self._recorded()
-        differing = differing_settings(before, asked)
+        differing = differing_settings({**(usual or {}), **before}, asked)
         if differing:
             raise SettingsError(
                 f"{self.part}: was made with other settings ({', '.join(differing)}): repeat "
@@ -158,6 +162,12 @@ class ResultFile:
             else:
                 self._convert()
             self._record.unlink(missing_ok=True)
+
+    def save(self, rows: Iterable[Mapping[str, Any]]) -> None:
+        """Write rows that are all there."""
+        with self.writer({}) as writer:
+            for row in rows:
+                writer.write(row)
 
     def record(self, inputs: Sequence[Mapping[str, Any]]) -> None:
         """Keep what files held, before rows come that are of them."""

@@ -73,7 +73,7 @@ def choose_rows(
     named = [(str(name), [_with_source(row) for row in rows]) for name, rows in tables]
     if labels and len(labels) != len(named):
         raise SettingsError(
-            f"label: expected one for each table, in their order: found {len(labels)} for "
+            f"labels: expected one for each table, in their order: found {len(labels)} for "
             f"{len(named)}"
         )
     chosen = []

@@ -17,14 +17,14 @@ from scanfab.fabric.distribution import mean_length_function, sphere_points
 from scanfab.fabric.tensor import COMPONENTS
 from scanfab.packing.sample import VARIANTS
 from scanfab.pipeline.frame import FrameResult
-from scanfab.pipeline.settings import Vector
+from scanfab.pipeline.settings import Settings, Vector
 from scanfab.scan.lines import line_triads
 from scanfab.scan.segments import Segments, sample_segments
 from scanfab.table.table import Row
 from scanfab.viz import vtk_files as vtk
 from scanfab.viz.scene import contact_lines, grains_of, scene_of
 
-__all__ = ["VtkFolder", "scan_line_sample"]
+__all__ = ["VtkFolder", "scan_line_sample", "vtk_folders"]
 
 
 LINES = 120
@@ -107,6 +107,21 @@ class VtkFolder:
             path = self.folder / f"{kind}.pvd"
             self._collections[kind] = vtk.Collection(path, self.go_on)
         self._collections[kind].add(file, _time(result))
+
+
+def vtk_folders(folder: Path, count: int, settings: Settings, go_on: bool) -> list[VtkFolder]:
+    """
+    The folders of so many series; if there are several, each has its own in the one.
+
+    Raises
+    ------
+    SettingsError
+        If a folder cannot be made or written to, or if there are several cut-offs.
+    """
+    if settings.cutoffs:
+        raise SettingsError("vtk: files for ParaView are of one cut-off: leave out `cutoffs`")
+    own = [folder / f"series-{number}" for number in range(1, count + 1)]
+    return [VtkFolder(one, settings.axis, go_on) for one in (own if count > 1 else [folder])]
 
 
 def scan_line_sample(

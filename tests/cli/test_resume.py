@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import signal
@@ -129,6 +130,17 @@ def test_other_settings_are_wrong_usage(compute, stopped, capsys, words, named):
 @pytest.mark.parametrize("workers", ["1", "2", "5"])
 def test_other_workers_are_no_other_settings(compute, stopped, workers):
     assert compute(stopped(), "--resume", "--workers", workers) == 0
+
+
+@pytest.mark.parametrize("words", [[], ["--rattlers", "recursive"]])
+def test_a_part_older_than_a_setting_was_made_with_its_default(compute, stopped, tmp_path, words):
+    output = stopped()
+    record = Path(f"{output}.manifest.json.part")
+    first, *inputs = record.read_text("utf-8").splitlines(keepends=True)
+    settings = json.loads(first)
+    del settings["settings"]["rattlers"]
+    record.write_text("".join([json.dumps(settings) + "\n", *inputs]), "utf-8")
+    assert compute(output, "--resume", *words) == (2 if words else 0)
 
 
 def test_without_a_part_everything_is_computed(compute, tmp_path):

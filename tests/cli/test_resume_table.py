@@ -137,6 +137,18 @@ def test_other_settings_are_refused_and_named(compute, tmp_path, capsys, words, 
     assert table.read_bytes() == before
 
 
+@pytest.mark.parametrize("words", [[], ["--rattlers", "recursive"]])
+def test_a_manifest_older_than_a_setting_means_its_default(compute, tmp_path, capsys, words):
+    table = tmp_path / "table.csv"
+    assert compute(table) == (0, 3)
+    path = tmp_path / "table.csv.manifest.json"
+    manifest = json.loads(path.read_text("utf-8"))
+    del manifest["settings"]["rattlers"]
+    path.write_text(json.dumps(manifest), "utf-8")
+    assert compute(table, "--resume", *words) == ((2, 0) if words else (0, 0))
+    assert ("made with other settings (rattlers)" in capsys.readouterr().err) == bool(words)
+
+
 def test_a_table_without_its_manifest_is_refused(compute, tmp_path, capsys):
     table = tmp_path / "table.csv"
     assert compute(table)[0] == 0

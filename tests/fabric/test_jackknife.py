@@ -5,6 +5,7 @@ import pytest
 
 from scanfab import direction_rule
 from scanfab.fabric.jackknife import (
+    BlockedSums,
     contact_jackknife,
     jackknife_error,
     variance_without_noise,
@@ -86,7 +87,7 @@ def void_of(axes, length, number):
     weights = np.full(3, 1 / 3)
     total = length.sum(axis=0), number.sum(axis=0)
     without = [(total[0] - length[b], total[1] - number[b]) for b in range(8)]
-    return void_jackknife(axes, weights, total, without, AXIS)
+    return void_jackknife(BlockedSums(axes, weights, total, without), AXIS)
 
 
 def test_void_jackknife_is_a_recomputation_without_each_octant():

@@ -298,3 +298,20 @@ def periodic_gaps(position, radius, vectors, periods, foot, direction, measured,
         for before, after in pairwise(solids)
         if not measured or 0 <= before[1] < measured
     ]
+
+
+def held_grains(pairs, walls, grains, least):
+    """Grains left when one after another goes that too few of those left, or others, hold."""
+    left = set(range(len(grains)))
+
+    def numbers():
+        found = dict(zip(range(len(grains)), walls, strict=True))
+        for one, two in pairs:
+            if one in left and two in left:
+                found[one] += 1
+                found[two] += 1
+        return found
+
+    while loose := [row for row in left if grains[row] and numbers()[row] < least]:
+        left.remove(loose[-1])
+    return {row for row in left if grains[row]}

@@ -21,6 +21,7 @@ COMMANDS = [
     "d --variants cd --rv 0.65 --cutoff 0.2rmean --spacing 0.1rmin --directions lebedev:11",
     "d --rv-radius 0.0045 --rv-center 0 -1.5 2e-07 --axis 1,2,-2 --strain grains",
     "d --frames -1: --seed 7 --on-error skip --min-contacts 4 --contact-tolerance 0.0001",
+    "d --rattlers recursive",
     "d --frames 3",
     "d --frames ::2 --tolerance 1e-3 --cutoff 0.000123456789",
     "d --cell 1 2 3 --periodic xy --radius 0.5 --contacts geometric --format vtk",
@@ -37,11 +38,11 @@ def asked_by(command, monkeypatch, tmp_path):
             (tmp_path / word).parent.mkdir(exist_ok=True, parents=True)
     monkeypatch.setattr("scanfab.cli.compute.open_series", lambda *_: [])
 
-    def remember(sources, reading, settings):
-        found.update(asked_for(sources, reading, settings))
+    def remember(*given):
+        found.update(asked_for(*given))
         raise ReadError("enough")
 
-    monkeypatch.setattr("scanfab.pipeline.manifest.asked_for", remember)
+    monkeypatch.setattr("scanfab.pipeline.job.asked_for", remember)
     # sources need not exist for this
     monkeypatch.setattr(compute.params[0].type, "exists", False)
     with pytest.raises(ReadError, match="enough"):
@@ -63,6 +64,13 @@ def test_the_command_asks_for_the_same(command, monkeypatch, tmp_path):
 def test_what_is_usual_is_not_repeated():
     asked = asked_for(["dumps"], {"contacts": "auto"}, Settings())
     assert repeat_command(json.loads(json.dumps(asked))) == "scanfab compute dumps"
+
+
+def test_settings_that_an_older_manifest_does_not_know_have_their_defaults():
+    asked = json.loads(json.dumps(asked_for(["d"], {}, Settings(seed=3))))
+    del asked["rattlers"]
+    assert restored_settings(asked) == Settings(seed=3)
+    assert repeat_command(asked) == "scanfab compute d --seed 3"
 
 
 def test_settings_come_back():

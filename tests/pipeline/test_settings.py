@@ -105,6 +105,7 @@ def test_the_defaults_are_those_of_the_command_line():
     assert settings.directions is None
     assert settings.tolerance == 1e-4
     assert settings.min_contacts == 2
+    assert settings.rattlers == "count"
     assert settings.contact_tolerance == 0
     assert settings.axis == (0, 0, 1)
     assert settings.strain == "auto"
@@ -166,6 +167,8 @@ def test_boundary_is_one_expression_or_several():
         ("tolerance", -1e-3),
         ("tolerance", float("nan")),
         ("min_contacts", -1),
+        ("rattlers", "loose"),
+        ("rattlers", None),
         ("contact_tolerance", -1e-9),
         ("contact_tolerance", float("inf")),
         ("strain", "volume"),
@@ -350,8 +353,8 @@ def test_compute_hands_every_option_to_the_settings(monkeypatch):
         "variants": "cd", "rv": 0.6, "rv_radius": 2.0, "rv_center": (1.0, 2.0, 3.0),
         "boundary": ("type=2",), "cutoff": "2rmin", "cutoffs": "1,2", "moment": 2,
         "spacing": "1rmean", "directions": direction_rule("9"), "tolerance": 1e-3,
-        "max_chords": 1e5, "min_contacts": 3, "contact_tolerance": 1e-4, "axis": "x",
-        "strain": "cell",
+        "max_chords": 1e5, "min_contacts": 3, "rattlers": "recursive",
+        "contact_tolerance": 1e-4, "axis": "x", "strain": "cell",
         "frames": "1:2", "seed": 5, "workers": 3, "on_error": "skip",
     }  # fmt: skip
     scanfab.compute(None, **given)

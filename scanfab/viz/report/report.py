@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -10,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.base.errors import ScanfabError, ScanfabNote, ScanfabWarning, SettingsError
+from scanfab.io.grain_files import PathLike
 from scanfab.pipeline.options import as_options
 from scanfab.pipeline.repeat import repeat_command
 from scanfab.table.compare import compare_tables
@@ -18,7 +20,15 @@ from scanfab.viz.figures.fitted import fits_of
 from scanfab.viz.report.caveats import caveats_of
 from scanfab.viz.report.frames import data_url, show_frames
 from scanfab.viz.report.inputs import Input, read_inputs
-from scanfab.viz.report.page import Content, Picture, Section, Shown, render_page
+from scanfab.viz.report.page import (
+    Content,
+    Picture,
+    Section,
+    Shown,
+    check_page_file,
+    render_page,
+    save_page,
+)
 from scanfab.viz.report.setting_meanings import settings_table
 from scanfab.viz.report.tables import frame_table, input_table, overview, results_tables
 
@@ -31,12 +41,29 @@ PIXELS = 96
 
 @dataclass(frozen=True)
 class Report:
-    """A report on fabric tables."""
+    """A report on fabric tables, as :func:`make_report` makes it."""
 
-    page: str
+    page: str = field(repr=False)
     """HTML that needs nothing else."""
     has_void_fabric: bool
     """Whether any row of the tables has one."""
+
+    def save(self, path: PathLike) -> None:
+        """
+        Write the page.
+
+        Parameters
+        ----------
+        path : path
+            ``.html``; the file is complete or untouched.
+
+        Raises
+        ------
+        SettingsError
+            If it has another suffix, or the folder does not exist.
+        """
+        check_page_file(Path(path))
+        save_page(Path(path), self.page)
 
 
 @dataclass
@@ -48,7 +75,7 @@ class _Heard:
 
 
 def make_report(
-    tables: Sequence[Path],
+    tables: PathLike | Sequence[PathLike],
     *,
     title: str | None = None,
     author: str = "",
@@ -61,9 +88,10 @@ def make_report(
 
     Parameters
     ----------
-    tables : sequence of Path
-        Tables of :func:`scanfab.compute`; settings and versions come from the manifest beside
-        each, ``TABLE.manifest.json``, and the view from the source that it names.
+    tables : path, or sequence of paths
+        Files of :func:`scanfab.compute_file` or ``scanfab compute -o``; settings and versions come
+        from the manifest beside each, ``TABLE.manifest.json``, and the view from the source that it
+        names. Without a manifest, the report says that they are not known.
     title, author : str, optional
         Of the page; by default the sources' names, and none.
     cutoff : float, optional
@@ -73,14 +101,31 @@ def make_report(
     today : date, optional
         The date of the report.
 
+    Returns
+    -------
+    Report
+        To be saved: ``report.save("report.html")``.
+
     Raises
     ------
     ScanfabError
         If a table cannot be read, is no fabric table, or holds no frames.
+
+    Examples
+    --------
+    >>> import scanfab, tempfile
+    >>> row = dict(source="box", frame=0, variant="c", alpha_vs_axial=0.012, alpha_c_axial=0.1)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     scanfab.Table([row]).save(f"{folder}/fabric.csv")
+    ...     report = scanfab.make_report(f"{folder}/fabric.csv", title="A box")
+    ...     report.save(f"{folder}/report.html")
+    >>> report
+    Report(has_void_fabric=True)
     """
+    named = [tables] if isinstance(tables, str | os.PathLike) else tables
     heard = _Heard()
     with _listening(heard, tell=True):
-        inputs = read_inputs(tables, cutoff, labels)
+        inputs = read_inputs([Path(one) for one in named], cutoff, labels)
         rows = [row for one in inputs for row in one.rows]
         comparison = compare_tables(rows)
         pictures = _table_pictures(rows, comparison)

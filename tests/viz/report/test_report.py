@@ -15,7 +15,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from scanfab.base.errors import ReadError
+from scanfab.base.errors import ReadError, SettingsError
 from scanfab.cli.main import run
 from scanfab.io.opening import read_series
 from scanfab.pipeline.compute import compute_rows
@@ -480,3 +480,14 @@ def test_notes_are_not_warnings(copied, quick):
     assert "a loud word" in warned
     assert "a quiet word" not in warned
     assert "a quiet word" in noted
+
+
+def test_a_report_is_saved_by_one_call(table, tmp_path):
+    path = table(curve())
+    report = make_report(str(path), title="One")
+    assert repr(report) == "Report(has_void_fabric=True)"
+    report.save(str(tmp_path / "report.html"))
+    assert (tmp_path / "report.html").read_text("utf-8") == report.page
+    assert make_report([path], title="One").page == report.page
+    with pytest.raises(SettingsError, match="reports are HTML"):
+        report.save(tmp_path / "report.pdf")

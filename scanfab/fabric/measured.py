@@ -1,0 +1,72 @@
+"""What fabrics are computed from: the scan and the contacts of one frame, variant and cut-off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from scanfab.base.typing import FloatArray, IntArray
+from scanfab.fabric.contact import contact_fabric
+from scanfab.fabric.jackknife import BlockedSums, Jackknife, contact_jackknife, void_jackknife
+from scanfab.fabric.tensor import FabricTensor
+from scanfab.fabric.void import VoidFabric, void_fabric
+
+__all__ = ["Measured"]
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What a fabric is computed from, and what several of them need of that."""
+
+    axis: FloatArray
+    """Loading axis, a unit vector, shape (3,)."""
+    axes: FloatArray
+    """Unit vectors along which each replicate was scanned, shape (R, D, 3)."""
+    weights: FloatArray
+    """Of the direction rule, shape (D,)."""
+    length: FloatArray
+    """
+    Sum of the lengths of the kept void segments, shape (R, D), dump's length unit.
+
+    For the second moment (option `moment`) the sum of their squares, in that unit squared.
+    """
+    segments: FloatArray | IntArray
+    """
+    Number of the kept void segments, shape (R, D).
+
+    For the second moment the sum of their lengths, dump's length unit.
+    """
+    meets_solids: bool
+    """Whether the lines may meet any solid: a window in which there is none has no void fabric."""
+    blocked: BlockedSums
+    """The same sums of other lines of the frame, without each block of the sample."""
+    normals: FloatArray
+    """Unit normals of the contacts, shape (M, 3)."""
+    points: FloatArray
+    """Where these contacts are, shape (M, 3), dump's length unit."""
+    blocks: IntArray
+    """In which block of the sample each of these contacts is, from 0, shape (M,)."""
+
+    @cached_property
+    def void(self) -> VoidFabric | None:
+        """The void fabric; None if there is none."""
+        if not self.meets_solids:
+            return None
+        return void_fabric(self.axes, self.weights, self.length, self.segments)
+
+    @cached_property
+    def contact(self) -> FabricTensor | None:
+        """The contact fabric; None without a contact."""
+        return contact_fabric(self.normals)
+
+    @cached_property
+    def void_scatter(self) -> Jackknife | None:
+        """The void fabric's anisotropy without each block."""
+        return None if self.void is None else void_jackknife(self.blocked, self.axis)
+
+    @cached_property
+    def contact_scatter(self) -> Jackknife | None:
+        """The contact fabric's anisotropy without each block."""
+        if self.contact is None:
+            return None
+        return contact_jackknife(self.normals, self.blocks, self.axis)

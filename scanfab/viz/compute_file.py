@@ -1,0 +1,166 @@
+"""compute_file(): a fabric table in a file, with its manifest and ParaView files, by one call."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from scanfab.base.errors import SettingsError
+from scanfab.base.option import options_of, refuse_unknown
+from scanfab.io.grain_files import PathLike, expanded
+from scanfab.io.opening import READING, open_sources
+from scanfab.io.options import take_reading
+from scanfab.io.series import Series
+from scanfab.pipeline.job import Job
+from scanfab.pipeline.settings import Settings
+from scanfab.pipeline.told import recorded
+from scanfab.table.columns import table_columns
+from scanfab.table.result_file import ResultFile
+from scanfab.table.table import Table, load
+from scanfab.table.writing import Excerpt
+from scanfab.viz.paraview import vtk_folders
+
+__all__ = ["compute_file"]
+
+Source = Series | PathLike
+
+
+def compute_file(
+    source: Source | Sequence[Source],
+    output: PathLike,
+    *,
+    resume: bool = False,
+    vtk: PathLike | None = None,
+    manifest: PathLike | None = None,
+    fields: str | None = None,
+    digits: int = 17,
+    progress: Callable[[int, int], object] | None = None,
+    **options: Any,
+) -> Table:
+    """
+    Compute the fabric table of a series into a file, frame by frame: ``scanfab compute -o``.
+
+    Rows are kept in ``FILE.part`` as they come, so that an interrupted computation can be gone on
+    with; that becomes FILE at the end, which is complete or untouched. Files are those of the
+    command line, byte for byte: what one has begun, the other can resume.
+
+    Parameters
+    ----------
+    source : Series, path, or sequence of them
+        What :func:`scanfab.read_series` returns, or files and folders: each folder is a series of
+        its own, all single files together are one.
+    output : path
+        ``.csv``, ``.tsv``, ``.json``, ``.jsonl``, ``.parquet``, or a format of another package.
+        ``FILE.manifest.json`` beside it says what made it: settings, versions, inputs with size and
+        hash, and what was told.
+    resume : bool, optional
+        Go on with ``FILE.part``, or add to a complete FILE the frames that it lacks. The result is
+        that of one computation of all frames; settings and inputs must be the same.
+    vtk : path, optional
+        A folder for ParaView files of each frame that is computed now.
+    manifest : path, optional
+        A copy of the manifest.
+    fields : str, optional
+        Names of columns, separated by commas, in the order in which to write them.
+    digits : int, optional
+        Significant digits of floats; with 17 they read back the same.
+    progress : callable, optional
+        Called after each frame with the number of finished frames, and about how many there are.
+    **options
+        Those of :func:`scanfab.compute`; for paths those of :func:`scanfab.read_series` too.
+
+    Returns
+    -------
+    Table
+        What the file holds.
+
+    Raises
+    ------
+    ScanfabError
+        If a frame cannot be read or computed (what is finished can be resumed), if another run
+        writes to the file, or if what is there was made by other settings or of other inputs.
+    OSError
+        If the file cannot be written to, as on a full disk; this can be resumed as well.
+    TypeError
+        If there is no such option; names the nearest that there is.
+
+    Warns
+    -----
+    ScanfabWarning, ScanfabNote
+        Doubts of frames, and frames that were skipped; the manifest lists them, also those that are
+        filtered away.
+
+    Examples
+    --------
+    >>> import scanfab, tempfile
+    >>> series = scanfab.read_series("sample_data/liggghts_periodic")
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     table = scanfab.compute_file(
+    ...         series, f"{folder}/fabric.csv", frames=":2", variants="a", tolerance=0.01
+    ...     )
+    >>> [row.step for row in table]
+    [30000, 60000]
+    """
+    known = [*READING, *(one.name for one in options_of(Settings))]
+    refuse_unknown("compute_file", options, known)
+    with recorded() as told:
+        series, sources, reading = _opened(source, options)
+        settings = Settings(**options)
+        columns = table_columns(settings.more_columns)
+        excerpt = Excerpt.make(columns, fields, digits)
+        folders = () if vtk is None else vtk_folders(Path(vtk), len(series), settings, go_on=resume)
+        job = Job(
+            series,
+            settings,
+            ResultFile(Path(output), columns, excerpt),
+            sources=sources,
+            reading=reading,
+            resume=resume,
+            manifest_path=None if manifest is None else Path(manifest),
+            observers=folders,
+            told=told,
+        )
+
+        def advance(new: bool) -> None:
+            if progress is not None:
+                progress(job.done, job.frames())
+
+        with job.begun():
+            job.write(advance)
+        job.save_manifests()
+    return load(Path(output))
+
+
+def _opened(
+    source: Source | Sequence[Source], options: dict[str, Any]
+) -> tuple[list[Series], list[str], dict[str, Any]]:
+    """Series, with what they were opened by; its options are taken out of others."""
+    one = isinstance(source, Series | str | os.PathLike)
+    given: list[Any] = [source] if one else list(source)  # type: ignore[arg-type]
+    if given and all(isinstance(one, Series) for one in given):
+        return given, *_opened_before(given, options)
+    if not given or not all(isinstance(one, str | os.PathLike) for one in given):
+        raise SettingsError(
+            f"expected a Series or the path of dumps, or several of one kind, found {source!r}"
+        )
+    sources = [os.fspath(path) for one in given for path in expanded(one)]
+    reading = take_reading(options)
+    return open_sources(sources, **reading), sources, reading
+
+
+def _opened_before(
+    series: Sequence[Series], options: dict[str, Any]
+) -> tuple[list[str], dict[str, Any]]:
+    """What ``read_series`` was given."""
+    for name in READING:
+        if name in options:
+            raise SettingsError(f"{name}: the series is open already: hand it to `read_series`")
+    reading = [take_reading(dict(one.reading)) for one in series]
+    if any(one != reading[0] for one in reading):
+        raise SettingsError(
+            "the series of one table are to be read with the same options, as its manifest names "
+            "them once: compute them into tables of their own"
+        )
+    return [source for one in series for source in one.sources or (one.name,)], reading[0]

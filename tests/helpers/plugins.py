@@ -1,0 +1,22 @@
+"""Plugins that a package would offer, made up by a test."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib.metadata import entry_points
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from scanfab.base import plugins
+
+
+def offer(monkeypatch: pytest.MonkeyPatch, group: str, name: str, load: Callable[[], Any]) -> None:
+    """One more entry point of a group; what is kept of the group has to be forgotten."""
+    point = SimpleNamespace(name=name, value=name, load=load, dist=SimpleNamespace(name="made-up"))
+
+    def found(group: str, asked: str = group) -> list[Any]:
+        return [*entry_points(group=group), *([point] if group == asked else [])]
+
+    monkeypatch.setattr(plugins, "entry_points", found)

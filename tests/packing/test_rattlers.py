@@ -1,0 +1,115 @@
+"""The rules for rattlers: known networks of contacts, identities, a twin that goes one by one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scanfab import Cell, Packing, PackingError, find_contacts
+from scanfab.packing.rattlers import count, installed_rules, recursive
+from scanfab.packing.sample import Sample
+from tests.helpers import naive
+from tests.helpers.lattices import shaken_cubic
+
+
+def network(pairs, size, *, boundary=(), walls=None, least=2, rule=recursive):
+    """Grains whose contacts are these, wherever they are."""
+    position = np.zeros((size, 3))
+    position[:, 0] = 0.01 * np.arange(size)
+    packing = Packing(position, 1.0, contacts=np.reshape(pairs, (-1, 2)), wall_contacts=walls)
+    return Sample(packing, np.isin(np.arange(size), boundary), least, rule)
+
+
+def row(size):
+    return [(k, k + 1) for k in range(size - 1)]
+
+
+def found(sample):
+    return np.flatnonzero(sample.rattlers).tolist()
+
+
+def test_both_are_found_by_name_where_those_of_others_are():
+    assert installed_rules() == {"count": count, "recursive": recursive}
+
+
+def test_a_row_falls_apart_from_its_ends():
+    assert found(network(row(7), 7, rule=count)) == [0, 6]
+    assert found(network(row(7), 7)) == list(range(7))
+
+
+def test_a_row_between_boundary_particles_or_walls_stays():
+    assert found(network(row(7), 7, boundary=[0, 6])) == []
+    assert found(network(row(7), 7, walls=[1, 0, 0, 0, 0, 0, 1])) == []
+    assert found(network(row(7), 7, boundary=[0])) == [1, 2, 3, 4, 5, 6]
+
+
+def test_of_a_ring_with_a_tail_the_ring_stays():
+    ring = [(0, 1), (1, 2), (2, 3), (3, 0)]
+    tail = [(3, 4), (4, 5), (5, 6)]
+    assert found(network([*ring, *tail], 7, rule=count)) == [6]
+    assert found(network([*ring, *tail], 7)) == [4, 5, 6]
+    assert found(network([*ring, *tail], 7, least=3)) == list(range(7))
+
+
+def test_what_touches_through_two_images_is_held_twice():
+    assert found(network([(0, 1)], 2)) == [0, 1]
+    periodic = find_contacts(Packing([[1, 1, 1]], 0.6, cell=Cell([1.0, 4.0, 4.0])))
+    assert found(Sample(periodic, np.zeros(1, bool), 2, recursive)) == []
+
+
+def test_without_contacts_all_grains_are_rattlers_and_none_if_none_are_asked_for():
+    assert found(network([], 3, boundary=[1])) == [0, 2]
+    assert found(network([], 3, least=0)) == []
+
+
+def random_network(seed):
+    random = np.random.default_rng(seed)
+    size = int(random.integers(5, 40))
+    pairs = random.integers(0, size, (int(random.integers(0, 3 * size)), 2))
+    pairs = np.unique(np.sort(pairs[pairs[:, 0] != pairs[:, 1]], axis=1), axis=0)
+    walls = random.integers(0, 2, size) * random.integers(0, 2, size)
+    boundary = np.flatnonzero(random.random(size) < 0.2)
+    return pairs, size, boundary, walls
+
+
+@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("least", [1, 2, 3, 4])
+def test_recursive_is_its_naive_twin(seed, least):
+    pairs, size, boundary, walls = random_network(seed)
+    sample = network(pairs, size, boundary=boundary, walls=walls, least=least)
+    held = naive.held_grains(pairs.tolist(), walls.tolist(), sample.grains.tolist(), least)
+    assert set(np.flatnonzero(sample.grains & ~sample.rattlers).tolist()) == held
+
+
+@pytest.mark.parametrize("least", [2, 3, 4])
+def test_every_grain_left_is_held_by_what_is_left(least):
+    """And whoever is a rattler by one pass is one by more of them."""
+    packing = find_contacts(Packing(*shaken_cubic(np.random.default_rng(3), 9)))
+    boundary = packing.position[:, 2] < 0.8
+    sample = Sample(packing, boundary, least, recursive)
+    one_pass = Sample(packing, boundary, least).rattlers
+    assert 0 < one_pass.sum() <= sample.rattlers.sum()
+    left = sample.grains & ~sample.rattlers
+    assert np.all(sample.contact_numbers_without_rattlers[left] >= least)
+    assert not np.any(sample.rattlers & boundary)
+
+
+def test_contacts_that_do_not_count_are_taken_off():
+    """What a rule by force needs: here those of which a force says so."""
+
+    def forceless(touching):
+        weak = np.asarray(touching.contacts.pairs[:, 0] == 2)
+        return touching.grains & (touching.numbers_without(weak) < touching.min_contacts)
+
+    assert found(network(row(6), 6, rule=forceless)) == [0, 2, 3, 5]
+
+
+def test_a_rule_says_nothing_of_boundary_particles():
+    sample = network(row(4), 4, boundary=[1], rule=lambda touching: touching.numbers < 9)
+    assert found(sample) == [0, 2, 3]
+
+
+def test_a_rule_that_gives_something_else_is_an_error():
+    sample = network(row(4), 4, rule=lambda touching: np.array([0, 3]))
+    with pytest.raises(PackingError, match=r"rattlers: expected shape \(4\), found \(2,\)"):
+        _ = sample.rattlers

@@ -1,0 +1,115 @@
+"""The rule for rattlers, chosen by name: a made-up one of another package, too."""
+
+from __future__ import annotations
+
+import json
+import warnings
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab import Settings, SettingsError
+from scanfab.cli.main import run
+from scanfab.packing import rattlers
+from scanfab.pipeline.calibration import calibrate
+from scanfab.pipeline.inspection import inspect_series
+from scanfab.table.reading import read_rows
+from scanfab.viz.frame_view import look_at
+from tests.helpers.dumps import dump_text, write
+from tests.helpers.lattices import simple_cubic
+from tests.helpers.plugins import offer
+
+SCAN = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.1rmin", "variants": "ab"}
+WORDS = ["--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.1rmin", "--variants", "ab"]
+RADIUS = 0.55
+
+
+def block_with_a_tail():
+    """A block in which all grains touch three or more, on it a tail of two, and one alone."""
+    random = np.random.default_rng(1)
+    block = simple_cubic(4).position + random.uniform(-0.03, 0.03, (64, 3))
+    tail = [(0.5, 0.5, 4.55), (0.5, 0.5, 5.6)]
+    return np.vstack([block, tail, [(3.5, 3.5, 5.2)]])
+
+
+@pytest.fixture
+def dump(tmp_path):
+    rows = [(k, 1, *place, RADIUS) for k, place in enumerate(block_with_a_tail().tolist(), start=1)]
+    return write(tmp_path / "dump.txt", dump_text(rows, box=((-1, 7),) * 3))
+
+
+@pytest.fixture
+def series(dump):
+    return scanfab.read_series(dump)
+
+
+def untouched(touching):
+    """A made-up rule: only what nothing touches."""
+    return touching.numbers == 0
+
+
+@pytest.fixture
+def made_up(monkeypatch):
+    offer(monkeypatch, "scanfab.rattlers", "untouched", lambda: untouched)
+    rattlers.installed_rules.cache_clear()
+    yield
+    rattlers.installed_rules.cache_clear()
+
+
+EXPECTED = [("count", 2), ("recursive", 3), ("untouched", 1)]
+
+
+@pytest.mark.usefixtures("made_up")
+@pytest.mark.parametrize(("rule", "expected"), EXPECTED)
+def test_tables_tell_the_rattlers_of_the_rule_and_b_leaves_them_out(series, rule, expected):
+    whole, without = scanfab.compute(series, rattlers=rule, **SCAN)
+    assert whole.rattlers == without.rattlers == expected
+    assert without.grains == whole.grains - expected == 67 - expected
+    # the one alone has no contact, the tail has two
+    assert without.contacts == whole.contacts - (expected - 1)
+    assert without.coordination == pytest.approx(2 * without.contacts / without.grains)
+    assert without.solid_fraction is None
+    assert without.alpha_vs_axial is not None
+
+
+@pytest.mark.usefixtures("made_up")
+@pytest.mark.parametrize(("rule", "expected"), EXPECTED)
+def test_inspect_and_views_take_the_rule_too(series, rule, expected):
+    settings = Settings(rattlers=rule, variants="c")
+    (report,) = inspect_series(series, settings)
+    assert report.rattlers == expected
+    assert look_at(series, settings).scene.grains.rattler.sum() == expected
+
+
+@pytest.mark.usefixtures("made_up")
+def test_calibrate_takes_the_rule_too(series):
+    lines = {"variants": "b", "tolerance": 0.1, "cutoff": "0.1rmin", "max_chords": 1e5}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of a sample as small as this
+        found = [calibrate(series, Settings(rattlers=rule, **lines)) for rule, _ in EXPECTED]
+    lengths = [[row.mean_length for row in one.rows if row.ladder == "cutoff"] for one in found]
+    assert len({steps[0] for steps in lengths} - {None}) == len(EXPECTED)
+
+
+@pytest.mark.usefixtures("made_up")
+@pytest.mark.parametrize(("rule", "expected"), EXPECTED)
+def test_the_command_line_takes_it_by_name_and_the_manifest_keeps_it(
+    dump, tmp_path, rule, expected
+):
+    table = tmp_path / "table.csv"
+    assert run(["compute", str(dump), *WORDS, "--rattlers", rule, "-o", str(table)]) == 0
+    assert [row["rattlers"] for row in read_rows(table)] == [expected, expected]
+    manifest = json.loads((tmp_path / "table.csv.manifest.json").read_text())
+    assert manifest["settings"]["rattlers"] == rule
+
+
+@pytest.mark.usefixtures("made_up")
+def test_a_rule_that_there_is_not_is_told_with_those_that_there_are():
+    with pytest.raises(SettingsError, match="rattlers: expected count, recursive or untouched, f"):
+        Settings(rattlers="force")
+
+
+def test_the_made_up_one_is_gone_without_its_package():
+    with pytest.raises(SettingsError, match="expected count or recursive, found 'untouched'"):
+        Settings(rattlers="untouched")

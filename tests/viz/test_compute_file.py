@@ -1,0 +1,249 @@
+"""Tables in files from Python: the files of the command line, and each goes on with the other's."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import warnings
+from pathlib import Path
+
+import pytest
+
+import scanfab
+from scanfab.base.errors import SkippedFrameWarning
+from scanfab.cli.main import run
+from scanfab.table.formats.json_rows import LinesWriter
+from scanfab.table.formats.text import TextWriter
+from tests.cli.test_resume import _wait_for_frames_under_way
+from tests.helpers.dumps import write
+from tests.helpers.interruptions import interrupted_at_row, write_series
+
+WORDS = (
+    "--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac",
+    "--workers", "2",
+)  # fmt: skip
+OPTIONS = {
+    "directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin", "variants": "ac", "workers": 2,
+}  # fmt: skip
+SUFFIXES = [".csv", ".tsv", ".json", ".jsonl", ".parquet"]
+
+
+@pytest.fixture(scope="module")
+def short_series(tmp_path_factory):
+    return write_series(tmp_path_factory.mktemp("short") / "series", 4)
+
+
+@pytest.fixture
+def dumps(short_series, tmp_path):
+    """A copy of the series, whose files may change."""
+    return shutil.copytree(short_series, tmp_path / "dumps")
+
+
+def commanded(output: Path, *words: str, sources: tuple[Path, ...]) -> int:
+    return run(["compute", *map(str, sources), *WORDS, "-o", str(output), *words])
+
+
+def from_python(output: Path, source, **options) -> scanfab.Table:
+    return scanfab.compute_file(source, output, **{**OPTIONS, **options})
+
+
+def manifest_of(output: Path) -> bytes:
+    return Path(f"{output}.manifest.json").read_bytes()
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_table_and_manifest_are_those_of_the_command(short_series, tmp_path, capsys, suffix):
+    ours, other = tmp_path / f"ours{suffix}", tmp_path / f"other{suffix}"
+    assert commanded(other, sources=(short_series,)) == 0
+    capsys.readouterr()
+    table = from_python(ours, short_series)
+    assert capsys.readouterr() == ("", "")
+    assert ours.read_bytes() == other.read_bytes()
+    assert manifest_of(ours) == manifest_of(other)
+    assert table == scanfab.compute(scanfab.read_series(short_series), **OPTIONS)
+
+
+@pytest.mark.parametrize("name", ["table.csv", "table.json", "table.parquet"])
+@pytest.mark.parametrize("excerpt", [{}, {"fields": "source,frame,variant,gc_xx", "digits": 5}])
+@pytest.mark.parametrize("begins", ["the command", "Python"])
+def test_each_goes_on_with_what_the_other_has_left(
+    short_series, tmp_path, monkeypatch, name, excerpt, begins
+):
+    """The bytes are those of a run that nobody interrupts; so is what both say of it."""
+    output, whole = tmp_path / name, tmp_path / "whole" / name
+    whole.parent.mkdir()
+    words = [word for key, value in excerpt.items() for word in (f"--{key}", str(value))]
+    writer = TextWriter if name.endswith("csv") and not excerpt else LinesWriter
+    with interrupted_at_row(monkeypatch, 6, writer):
+        if begins == "Python":
+            with pytest.raises(KeyboardInterrupt):
+                from_python(output, short_series, **excerpt)
+        else:
+            assert commanded(output, *words, sources=(short_series,)) == 130
+    _wait_for_frames_under_way()
+    assert Path(f"{output}.part").stat().st_size > 0
+    computed = []
+    if begins == "Python":
+        assert commanded(output, *words, "--resume", sources=(short_series,)) == 0
+    else:
+        from_python(
+            output, short_series, resume=True, progress=lambda *now: computed.append(now), **excerpt
+        )
+        assert computed == [(3, 4), (4, 4)]
+    from_python(whole, short_series, **excerpt)
+    assert output.read_bytes() == whole.read_bytes()
+    assert manifest_of(output) == manifest_of(whole)
+    assert {path.name for path in tmp_path.iterdir()} == {name, f"{name}.manifest.json", "whole"}
+
+
+def test_frames_that_came_later_join_a_table_of_the_command(dumps, tmp_path):
+    table, whole = tmp_path / "table.csv", tmp_path / "whole.csv"
+    late = dumps / "dump_300.txt"
+    text = late.read_text()
+    late.unlink()
+    assert commanded(table, sources=(dumps,)) == 0
+    late.write_text(text)
+    assert len(from_python(table, dumps, resume=True)) == 8
+    from_python(whole, dumps)
+    assert table.read_bytes() == whole.read_bytes()
+    assert manifest_of(table) == manifest_of(whole)
+
+
+def test_an_open_series_leaves_the_files_of_its_path(short_series, tmp_path):
+    """Its manifest names the options by which it was opened, so that both can be resumed."""
+    files = sorted(short_series.iterdir())
+    reading = {"contacts": "geometric", "cell": [4, 4, 4]}
+    for number, source in enumerate([short_series, str(files[0]), files]):
+        path, opened = tmp_path / f"path{number}.csv", tmp_path / f"opened{number}.csv"
+        from_python(path, source, **reading)
+        from_python(opened, scanfab.read_series(source, **reading))
+        assert opened.read_bytes() == path.read_bytes()
+        assert manifest_of(opened) == manifest_of(path)
+        from_python(path, scanfab.read_series(source, **reading), resume=True)
+        words = ("--contacts", "geometric", "--cell", "4", "4", "4", "--resume")
+        sources = tuple(map(Path, source if isinstance(source, list) else [source]))
+        assert commanded(opened, *words, sources=sources) == 0
+
+
+def test_several_series_are_one_table(short_series, dumps, tmp_path):
+    ours, other, opened = (tmp_path / f"{name}.csv" for name in ("ours", "other", "opened"))
+    assert commanded(other, sources=(short_series, dumps)) == 0
+    from_python(ours, [short_series, dumps])
+    from_python(opened, [scanfab.read_series(one) for one in (short_series, dumps)])
+    assert ours.read_bytes() == other.read_bytes() == opened.read_bytes()
+    assert manifest_of(ours) == manifest_of(other) == manifest_of(opened)
+
+
+def test_paraview_files_are_those_of_the_command(short_series, dumps, tmp_path):
+    for name, sources in (("one", (short_series,)), ("two", (short_series, dumps))):
+        ours, other = tmp_path / f"{name}-ours", tmp_path / f"{name}-other"
+        words = ("--vtk", str(other), "--frames", ":2")
+        assert commanded(tmp_path / "t.csv", *words, sources=sources) == 0
+        from_python(tmp_path / "table.csv", list(sources), vtk=ours, frames=":2")
+        found = [path.relative_to(other) for path in sorted(other.rglob("*.*"))]
+        assert found == [path.relative_to(ours) for path in sorted(ours.rglob("*.*"))]
+        assert all((ours / path).read_bytes() == (other / path).read_bytes() for path in found)
+
+
+def test_a_resumed_collection_keeps_the_frames_that_it_has(short_series, tmp_path):
+    output, folder = tmp_path / "table.csv", tmp_path / "vtk"
+    for frames in (":2", ":4"):
+        from_python(output, short_series, vtk=folder, frames=frames, resume=True)
+    assert (folder / "grains.pvd").read_text().count("<DataSet ") == 4
+
+
+def test_a_second_manifest_may_be_asked_for(short_series, tmp_path):
+    output, copy = tmp_path / "table.csv", tmp_path / "copy.json"
+    from_python(output, short_series, manifest=copy)
+    assert copy.read_bytes() == manifest_of(output)
+
+
+@pytest.fixture
+def damaged(dumps):
+    """The second of four frames cannot be read."""
+    write(dumps / "dump_100.txt", "ITEM: TIMESTEP\n")
+    return dumps
+
+
+def test_skipped_frames_are_warned_of_and_stand_in_the_manifest(damaged, tmp_path):
+    output = tmp_path / "table.csv"
+    with pytest.warns(SkippedFrameWarning, match="frame 1 skipped") as caught:
+        table = from_python(output, damaged, on_error="skip")
+    assert len([one for one in caught if one.category is SkippedFrameWarning]) == 1
+    assert sorted(set(table["frame"])) == [0, 2, 3]
+    told = json.loads(manifest_of(output))["warnings"]
+    assert len(told) == 1
+    assert told[0].startswith("frame 1 skipped")
+
+
+def test_what_filters_hide_stands_in_the_manifest_all_the_same(damaged, tmp_path):
+    ours, other = tmp_path / "ours.csv", tmp_path / "other.csv"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        from_python(ours, damaged, on_error="skip")
+    assert commanded(other, "--on-error", "skip", sources=(damaged,)) == 1
+    assert manifest_of(ours) == manifest_of(other)
+
+
+def test_a_failure_is_an_error_and_leaves_what_is_finished(damaged, tmp_path):
+    output = tmp_path / "table.csv"
+    with pytest.raises(scanfab.ReadError, match=r"dump_100\.txt"):
+        from_python(output, damaged, workers=1)
+    assert not output.exists()
+    assert len(Path(f"{output}.part").read_text().splitlines()) == 3
+
+
+def test_a_second_computation_into_the_same_file_is_refused(short_series, tmp_path):
+    output, refused = tmp_path / "table.csv", []
+
+    def second(*_):
+        if not refused:
+            with pytest.raises(scanfab.ScanfabError, match="another run is writing") as told:
+                from_python(output, short_series)
+            refused.append(str(told.value))
+
+    assert len(from_python(output, short_series, progress=second)) == 8
+    assert refused[0].endswith("or name another `output=FILE`")
+
+
+def test_what_cannot_be_resumed_names_arguments(short_series, tmp_path):
+    output = tmp_path / "table.csv"
+    from_python(output, short_series)
+    with pytest.raises(scanfab.SettingsError, match=r"other settings \(seed\).*leave out `resume`"):
+        from_python(output, short_series, seed=1, resume=True)
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "said"),
+    [
+        ({"toleranc": 1e-3}, TypeError, "compute_file has no option 'toleranc': did you mean 'tol"),
+        ({"fields": "alpha"}, scanfab.SettingsError, "fields: there is no column 'alpha'"),
+        ({"radius": -1}, scanfab.SettingsError, "radius: expected a length above 0, found -1"),
+        ({"output": "table.doc"}, scanfab.SettingsError, "results can be written as .csv"),
+        ({"manifest": "none/here.json"}, scanfab.SettingsError, "none"),
+        ({"vtk": "v", "cutoff": "1rmin", "cutoffs": "1,2"}, scanfab.SettingsError, "one cut-off"),
+        ({"source": []}, scanfab.SettingsError, "expected a Series or the path of dumps"),
+        ({"source": [3]}, scanfab.SettingsError, "expected a Series or the path of dumps"),
+    ],
+)
+def test_wrong_arguments_are_named(short_series, tmp_path, monkeypatch, change, error, said):
+    monkeypatch.chdir(tmp_path)
+    given = {"source": short_series, "output": "table.csv", **change}
+    with pytest.raises(error, match=said):
+        scanfab.compute_file(given.pop("source"), given.pop("output"), **given)
+    assert not Path("table.csv.part").exists()
+
+
+def test_an_open_series_takes_no_options_of_reading(short_series, tmp_path):
+    series = scanfab.read_series(short_series)
+    with pytest.raises(scanfab.SettingsError, match="radius: the series is open already"):
+        from_python(tmp_path / "table.csv", series, radius=1.0)
+
+
+def test_series_that_one_table_cannot_tell_apart_are_refused(short_series, dumps, tmp_path):
+    series = scanfab.read_series(short_series)
+    with pytest.raises(scanfab.SettingsError, match="named twice among the series"):
+        from_python(tmp_path / "table.csv", [series, series])
+    other = scanfab.read_series(dumps, contacts="geometric")
+    with pytest.raises(scanfab.SettingsError, match="read with the same options"):
+        from_python(tmp_path / "table.csv", [series, other])
