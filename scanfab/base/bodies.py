@@ -195,9 +195,9 @@ class Hull:
         """
         Of its own chords t: g = V Σ max(0, t - z) / Σ t, and -g' = A #(t ≥ z) / #(t > 0).
 
-        A few hundred lines along each of many directions tell these shares to some 1e-3, and what
-        a sum over the directions needs far better. Volume and projected area are exact, the latter by
-        A = ½ Σ A_f |n·n_f| over the faces.
+        A few hundred lines along each of many directions tell these shares to some 1e-3, and
+        what a sum over the directions needs far better. Volume and projected area are exact, the
+        latter by A = ½ Σ A_f |n·n_f| over the faces.
         """
         shadow = 0.5 * np.abs(shift @ self.planes[:, :3].T) @ self.areas
         if length == 0.0:

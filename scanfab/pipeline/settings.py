@@ -354,10 +354,10 @@ class Settings:
             hint = (
                 "choose its `rv_radius`" if shape == "sphere" else "its file says how large it is"
             )
-            raise SettingsError(f"rv_size: a window of the shape {shape} has none: {hint}")
+            raise SettingsError(f"rv_size: the shape {shape} takes none: {hint}")
         if sizes and len(sizes) != 2 + (shape != "cylinder"):
             found = ",".join(f"{size:g}" for size in sizes)
-            raise SettingsError(f"rv_size: expected {takes} of a {shape}, found {found}")
+            raise SettingsError(f"rv_size: expected {takes} (`rv_shape` is {shape}), found {found}")
         if self.rv_radius is not None and shape != "sphere":
             hint = f"choose `rv_size` ({takes})" if takes else "its file says how large it is"
             raise SettingsError(

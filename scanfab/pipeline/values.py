@@ -50,9 +50,9 @@ STRAIN_MODES = ("auto", "cell", "boundary", "grains")
 # of windows, with the sizes that each takes
 SHAPES = {
     "sphere": "",
-    "box": "A,B,C, its edges",
-    "cylinder": "R,H, its radius and height",
-    "ellipsoid": "A,B,C, its semi-axes",
+    "box": "A,B,C, full edges",
+    "cylinder": "R,H, radius and height",
+    "ellipsoid": "A,B,C, semi-axes",
 }
 MOST_CUTOFFS = 1000
 
