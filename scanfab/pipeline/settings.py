@@ -351,9 +351,7 @@ class Settings:
         shape, sizes = self.rv_shape, self.rv_size
         takes = SHAPES.get(shape, "")
         if sizes and not takes:
-            hint = (
-                "choose its `rv_radius`" if shape == "sphere" else "its file says how large it is"
-            )
+            hint = "choose `rv_radius`" if shape == "sphere" else "its file says how large it is"
             raise SettingsError(f"rv_size: the shape {shape} takes none: {hint}")
         if sizes and len(sizes) != 2 + (shape != "cylinder"):
             found = ",".join(f"{size:g}" for size in sizes)
