@@ -9,8 +9,9 @@ if TYPE_CHECKING:
     from typing import Any
 
     from scanfab.base.column import Column
-    from scanfab.base.convex import sphere
+    from scanfab.base.convex import Convex, sphere
     from scanfab.base.errors import (
+        NoFrameError,
         PackingError,
         ReadError,
         ScanfabError,
@@ -23,24 +24,31 @@ if TYPE_CHECKING:
     from scanfab.fabric.contact import contact_fabric
     from scanfab.fabric.tensor import FabricTensor
     from scanfab.fabric.void import VoidFabric, void_fabric
+    from scanfab.io.frame import Frame
     from scanfab.io.opening import read, read_series
     from scanfab.io.series import Series
     from scanfab.packing.cell import Cell
     from scanfab.packing.packing import ContactList, Contacts, Packing
+    from scanfab.packing.sample import Sample
     from scanfab.packing.search import find_contacts
+    from scanfab.packing.window import Window
     from scanfab.pipeline.calibration import Calibration, calibrate
     from scanfab.pipeline.compute import compute
+    from scanfab.pipeline.samples import samples
     from scanfab.pipeline.settings import Settings
+    from scanfab.pipeline.solids import solids_of
     from scanfab.scan.directions import DirectionRule, direction_rule
     from scanfab.scan.scan import ScanSums, scan_lines
     from scanfab.scan.solids import Solids
     from scanfab.table.columns import COLUMNS
     from scanfab.table.compare import compare_tables
+    from scanfab.table.comparison_rows import Comparison
     from scanfab.table.reading import read_rows
     from scanfab.table.row import Row
     from scanfab.table.table import Table, load
     from scanfab.viz.compute_file import compute_file
     from scanfab.viz.report.report import Report, make_report
+    from scanfab.viz.scanned_frames import ScannedFrames, scan_frames
 
 # numpy, numba and the readers are loaded by the first name that needs them
 _HOME = {
@@ -48,19 +56,25 @@ _HOME = {
     "Calibration": "pipeline.calibration",
     "Cell": "packing.cell",
     "Column": "base.column",
+    "Comparison": "table.comparison_rows",
     "ContactList": "packing.packing",
     "Contacts": "packing.packing",
+    "Convex": "base.convex",
     "DirectionRule": "scan.directions",
     "FabricTensor": "fabric.tensor",
+    "Frame": "io.frame",
+    "NoFrameError": "base.errors",
     "Packing": "packing.packing",
     "PackingError": "base.errors",
     "ReadError": "base.errors",
     "Report": "viz.report.report",
     "Row": "table.row",
+    "Sample": "packing.sample",
     "ScanSums": "scan.scan",
     "ScanfabError": "base.errors",
     "ScanfabNote": "base.errors",
     "ScanfabWarning": "base.errors",
+    "ScannedFrames": "viz.scanned_frames",
     "Series": "io.series",
     "Settings": "pipeline.settings",
     "SettingsError": "base.errors",
@@ -68,6 +82,7 @@ _HOME = {
     "Table": "table.table",
     "UnknownFormatError": "base.errors",
     "VoidFabric": "fabric.void",
+    "Window": "packing.window",
     "box": "base.shapes",
     "calibrate": "pipeline.calibration",
     "compare_tables": "table.compare",
@@ -84,7 +99,10 @@ _HOME = {
     "read": "io.opening",
     "read_rows": "table.reading",
     "read_series": "io.opening",
+    "samples": "pipeline.samples",
+    "scan_frames": "viz.scanned_frames",
     "scan_lines": "scan.scan",
+    "solids_of": "pipeline.solids",
     "sphere": "base.convex",
     "void_fabric": "fabric.void",
 }
@@ -94,19 +112,25 @@ __all__ = [
     "Calibration",
     "Cell",
     "Column",
+    "Comparison",
     "ContactList",
     "Contacts",
+    "Convex",
     "DirectionRule",
     "FabricTensor",
+    "Frame",
+    "NoFrameError",
     "Packing",
     "PackingError",
     "ReadError",
     "Report",
     "Row",
+    "Sample",
     "ScanSums",
     "ScanfabError",
     "ScanfabNote",
     "ScanfabWarning",
+    "ScannedFrames",
     "Series",
     "Settings",
     "SettingsError",
@@ -114,6 +138,7 @@ __all__ = [
     "Table",
     "UnknownFormatError",
     "VoidFabric",
+    "Window",
     "box",
     "calibrate",
     "compare_tables",
@@ -130,7 +155,10 @@ __all__ = [
     "read",
     "read_rows",
     "read_series",
+    "samples",
+    "scan_frames",
     "scan_lines",
+    "solids_of",
     "sphere",
     "void_fabric",
 ]

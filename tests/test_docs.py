@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import doctest
 import importlib.util
-import inspect
 import math
 import pkgutil
 import re
@@ -24,6 +23,7 @@ from scanfab.pipeline import calibration_ladders, inspection
 from scanfab.scan.directions import RULES
 from scanfab.table import comparison_rows
 from scanfab.table.columns import columns_of
+from tests.helpers.docstrings import faults, faults_of_function
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -48,6 +48,15 @@ def test_the_command_line_page_is_fresh() -> None:
     assert (DOCS / "command-line.md").read_text(encoding="utf-8") == script(
         "make_command_line"
     ).page(), "run python docs/make_command_line.py"
+
+
+def test_the_python_page_is_fresh_and_has_every_public_name_once() -> None:
+    python = script("make_python")
+    page = (DOCS / "python.md").read_text(encoding="utf-8")
+    assert page == python.page(), "run python docs/make_python.py"
+    assert sorted(name for group in python.GROUPS.values() for name in group) == sorted(
+        scanfab.__all__
+    )
 
 
 def test_the_rooms_are_drawn_as_they_are() -> None:
@@ -137,9 +146,40 @@ def test_examples_in_docstrings_run(name: str, monkeypatch: pytest.MonkeyPatch) 
     assert doctest.testmod(import_module(name)).failed == 0
 
 
-@pytest.mark.parametrize("name", [n for n in scanfab.__all__ if n[0].islower()])
-def test_every_public_function_has_an_example(name: str) -> None:
-    assert ">>>" in (inspect.getdoc(getattr(scanfab, name)) or "")
+@pytest.mark.parametrize("name", scanfab.__all__)
+def test_every_public_name_says_what_it_takes_and_gives_with_an_example(name: str) -> None:
+    assert faults(name) == []
+
+
+def test_a_docstring_that_does_not_fit_its_signature_is_found() -> None:
+    def badly(first: int, second: int, *, third: int = 3) -> int:
+        """
+        Add
+
+        Parameters
+        ----------
+        first, third : int
+            Numbers.
+
+        Examples
+        --------
+        Raises
+        ------
+        NoSuchError
+            Never.
+        """
+        return first + second + third
+
+    found = " ".join(faults_of_function(badly, with_example=True))
+    for fault in (
+        "no summary that is a sentence",
+        "['first', 'third'], but takes ['first', 'second', 'third']",
+        "does not say what it returns",
+        "no example",
+        "another order",
+        "NoSuchError",
+    ):
+        assert fault in found
 
 
 def python_blocks() -> list[tuple[str, str]]:

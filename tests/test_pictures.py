@@ -9,10 +9,8 @@ from types import ModuleType
 import pytest
 from PIL import Image
 
-from scanfab.table.compare import compare_tables
-from scanfab.viz.figures import of_tables as plot_table
-from scanfab.viz.figures.fitted import fits_of
-from scanfab.viz.figures.style import new_figure
+from scanfab.viz.figures.evolution import Evolution
+from scanfab.viz.figures.page import drawn_page, make_figures
 from tests.conftest import ROOT
 from tests.helpers.tables import curve
 
@@ -29,9 +27,9 @@ def script() -> ModuleType:
     return module
 
 
-make_figures = script()
+pictures = script()
 NAMES = (
-    *make_figures.TABLE_FIGURES, *make_figures.FRAME_FIGURES, *make_figures.VIEWS, "picture",
+    *pictures.TABLE_FIGURES, *pictures.FRAME_FIGURES, *pictures.VIEWS, "picture",
 )  # fmt: skip
 
 
@@ -40,14 +38,14 @@ def made(tmp_path_factory) -> dict:
     """What all pictures would be drawn from today; nothing is drawn."""
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(ROOT)
-        return make_figures.made(tmp_path_factory.mktemp("pictures"), draw=False)
+        return pictures.made(tmp_path_factory.mktemp("pictures"), draw=False)
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_pictures_are_fresh(made, name):
-    folder = make_figures.COVER.parent if name == "picture" else make_figures.PICTURES
-    stored = make_figures.content_of(folder / f"{name}.png")
-    assert make_figures.differences(stored, made[name]) == [], "run python docs/make_figures.py"
+    folder = pictures.COVER.parent if name == "picture" else pictures.PICTURES
+    stored = pictures.content_of(folder / f"{name}.png")
+    assert pictures.differences(stored, made[name]) == [], "run python docs/make_figures.py"
 
 
 def test_every_picture_of_the_pages_is_one_of_them():
@@ -56,37 +54,36 @@ def test_every_picture_of_the_pages_is_one_of_them():
 
 
 def content(rows):
-    with new_figure(5, 3) as figure:
-        plot_table.draw_table(figure, rows, fits_of(compare_tables(rows)))
-        return make_figures.of_figure(figure)
+    with drawn_page(make_figures(rows, "table")) as page:
+        return pictures.of_figure(page)
 
 
 def test_other_numbers_words_and_colours_are_told(monkeypatch):
     """A test that could not fail would be worth nothing."""
     rows = curve()
     before = content(rows)
-    assert make_figures.differences(before, content(rows)) == []
+    assert pictures.differences(before, content(rows)) == []
     other = [{**row, "alpha_vs_axial": 1.01 * row["alpha_vs_axial"]} for row in rows]
-    assert make_figures.differences(before, content(other))
-    assert make_figures.differences(before, content(rows[:-1]))
+    assert pictures.differences(before, content(other))
+    assert pictures.differences(before, content(rows[:-1]))
     errors = [{**row, "alpha_c_axial_sample_se": 1e-3} for row in rows]
-    assert make_figures.differences(before, content(errors))
-    monkeypatch.setitem(plot_table.SIZES, "evolution", (5.4, 3.5))
-    assert make_figures.differences(before, content(rows))
+    assert pictures.differences(before, content(errors))
+    monkeypatch.setattr(Evolution, "height", 3.5)
+    assert pictures.differences(before, content(rows))
     monkeypatch.undo()
     monkeypatch.setattr("scanfab.viz.figures.groups.MEANINGS", {"c": "another word"})
-    assert make_figures.differences(before, content(rows))
+    assert pictures.differences(before, content(rows))
 
 
 def test_last_digits_are_not_told():
-    assert make_figures.differences([1.0, "a", 0.0], [1.0 + 1e-5, "a", 1e-9]) == []
-    assert make_figures.differences([1.0, "a"], [1.01, "a"]) == ["1.0, now 1.01"]
-    assert make_figures.differences([1.0, "a"], [1.0, "b"]) == ["'a', now 'b'"]
+    assert pictures.differences([1.0, "a", 0.0], [1.0 + 1e-5, "a", 1e-9]) == []
+    assert pictures.differences([1.0, "a"], [1.01, "a"]) == ["1.0, now 1.01"]
+    assert pictures.differences([1.0, "a"], [1.0, "b"]) == ["'a', now 'b'"]
 
 
 def test_a_picture_that_does_not_say_what_it_was_drawn_from_is_not_fresh(tmp_path: Path):
     Image.new("RGB", (2, 2)).save(tmp_path / "bare.png")
-    bare = make_figures.content_of(tmp_path / "bare.png")
-    assert make_figures.differences(bare, ["a"]) == ["0 words and numbers, now 1"]
-    make_figures.shrink(Image.new("RGB", (2, 2)), tmp_path / "said.png", ["a", 1.5])
-    assert make_figures.content_of(tmp_path / "said.png") == ["a", 1.5]
+    bare = pictures.content_of(tmp_path / "bare.png")
+    assert pictures.differences(bare, ["a"]) == ["0 words and numbers, now 1"]
+    pictures.shrink(Image.new("RGB", (2, 2)), tmp_path / "said.png", ["a", 1.5])
+    assert pictures.content_of(tmp_path / "said.png") == ["a", 1.5]

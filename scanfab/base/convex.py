@@ -44,22 +44,47 @@ class Convex:
 
     Planes and quadric are all that decides what lies in it; the body and the frame of which it is
     the image tell volume, shadow and surface, and what becomes of it when it is deformed.
+
+    Parameters
+    ----------
+    planes : ndarray
+        Rows n, d with unit vectors n: of each plane the side n·x < d, shape (P, 4).
+    quadric : Quadric
+        It holds the region as well; ``EVERYWHERE`` of planes alone, which bounds nothing.
+    low : ndarray
+        The box along x, y and z that holds the region, shape (3,).
+    high : ndarray, shape (3,)
+        Its opposite corner.
+    reach : float
+        Radius of the ball about the origin that holds the region; of a sphere its own.
+    size : str
+        How messages tell its size, for instance ``radius 2``.
+    body : Body
+        What it is the image of.
+    frame : ndarray, shape (3, 3)
+        It holds the places frame @ x with x in the body.
+
+    Examples
+    --------
+    >>> from scanfab import sphere
+    >>> ball = sphere(2.0)
+    >>> ball
+    Convex: radius 2 about the origin
+    >>> ball.reach, ball.low.tolist()
+    (2.0, [-2.0, -2.0, -2.0])
     """
 
     planes: FloatArray
-    """Rows n, d with unit vectors n: of each plane the side n·x < d, shape (P, 4)."""
     quadric: Quadric
     low: FloatArray
-    """The box along x, y and z that holds the region, shape (3,)."""
     high: FloatArray
     reach: float
-    """Radius of a ball about the origin that holds the region; of a sphere its own."""
     size: str
-    """How messages tell its size, for instance ``radius 2``."""
     body: Body
-    """What it is the image of."""
     frame: FloatArray
-    """It holds the places frame @ x with x in the body, shape (3, 3)."""
+
+    def __repr__(self) -> str:
+        return f"Convex: {self.size} about the origin"
 
     def __str__(self) -> str:
         return self.size
@@ -86,7 +111,18 @@ class Convex:
         return self.body.outline @ self.frame.T
 
     def contains(self, points: FloatArray) -> BoolArray:
-        """Which points lie inside, shape (N,)."""
+        """
+        Which points lie inside.
+
+        Parameters
+        ----------
+        points : ndarray, shape (N, 3)
+            From the origin of the region.
+
+        Returns
+        -------
+        ndarray of bool, shape (N,)
+        """
         isotropic, deviator, level = self.quadric
         form = isotropic * np.einsum("ij,ij->i", points, points)
         form += np.einsum("ij,ij->i", points @ deviator, points)
@@ -97,7 +133,20 @@ class Convex:
         return np.asarray(inside)
 
     def may_meet(self, points: FloatArray, radius: FloatArray) -> BoolArray:
-        """Which spheres reach inside, shape (N,); at times one that all but touches."""
+        """
+        Which spheres reach inside; at times one that all but touches.
+
+        Parameters
+        ----------
+        points : ndarray, shape (N, 3)
+            Their centres, from the origin of the region.
+        radius : ndarray, shape (N,)
+            Their radii.
+
+        Returns
+        -------
+        ndarray of bool, shape (N,)
+        """
         near = np.sqrt(np.einsum("ij,ij->i", points, points)) < self.reach + radius
         for plane in self.planes:
             near &= points @ plane[:3] < plane[3] + radius
@@ -211,6 +260,16 @@ def image_of(body: Body, frame: FloatArray, size: str) -> Convex:
 def sphere(radius: float) -> Convex:
     """
     A sphere about the origin.
+
+    Parameters
+    ----------
+    radius : float
+        Dump's length unit.
+
+    Returns
+    -------
+    Convex
+        The shape of a :class:`scanfab.Window`, or the window of :class:`scanfab.Solids`.
 
     Examples
     --------

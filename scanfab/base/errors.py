@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 __all__ = [
+    "NoFrameError",
     "PackingError",
     "ReadError",
     "ScanfabError",
@@ -24,6 +25,10 @@ class ReadError(ScanfabError):
 
 class UnknownFormatError(ReadError):
     """No reader knows the file, or the named reader does not exist."""
+
+
+class NoFrameError(ReadError, IndexError):
+    """A series has no frame of this number; says how many it has."""
 
 
 class PackingError(ScanfabError):

@@ -20,7 +20,11 @@ class Offer(NamedTuple):
     """The name of the package."""
 
 
-def load_plugins(group: str, what: str) -> dict[str, Any]:
+def _as_it_is(plugin: Any) -> Any:
+    return plugin
+
+
+def load_plugins(group: str, what: str, make: Callable[[Any], Any] = _as_it_is) -> dict[str, Any]:
     """
     The objects that packages offer, by name and in alphabetical order.
 
@@ -32,20 +36,22 @@ def load_plugins(group: str, what: str) -> dict[str, Any]:
         The entry point, for instance ``scanfab.fabrics``.
     what : str
         What one of them is called in a message.
+    make : callable, optional
+        Turns into a plugin what is loaded, or raises where it is none.
 
     Raises
     ------
     ScanfabError
         If two packages use one name.
     """
-    offers = load_offers(entry_points(group=group), what)
+    offers = load_offers(entry_points(group=group), what, make)
     return {name: offer.plugin for name, offer in offers.items()}
 
 
 def load_offers(
-    points: Iterable[EntryPoint], what: str, make: Callable[[Any], Any] = lambda plugin: plugin
+    points: Iterable[EntryPoint], what: str, make: Callable[[Any], Any] = _as_it_is
 ) -> dict[str, Offer]:
-    """As :func:`load_plugins`, with the package of each; ``make`` turns into one what is loaded."""
+    """As :func:`load_plugins`, with the package of each."""
     found: dict[str, Offer] = {}
     for point in sorted(points, key=lambda point: (point.name, point.value)):
         package = point.dist.name if point.dist is not None else "unknown package"

@@ -2,7 +2,61 @@
 
 from __future__ import annotations
 
-__all__ = ["spelt_apart", "spelt_time"]
+from collections.abc import Iterable
+
+__all__ = ["counted", "shortest", "spelt_apart", "spelt_place", "spelt_range", "spelt_time"]
+
+
+def counted(number: int, one: str, several: str = "") -> str:
+    """
+    A number of things.
+
+    Examples
+    --------
+    >>> from scanfab.base.spelling import counted
+    >>> counted(1, "grain"), counted(1800, "grain"), counted(2, "axis", "axes")
+    ('1 grain', '1800 grains', '2 axes')
+    """
+    return f"{number} {one if number == 1 else several or one + 's'}"
+
+
+def shortest(value: float) -> str:
+    """
+    A number as short as reads back the same.
+
+    Examples
+    --------
+    >>> from scanfab.base.spelling import shortest
+    >>> shortest(2.0), shortest(0.1 + 0.2)
+    ('2', '0.30000000000000004')
+    """
+    return f"{value:g}" if float(f"{value:g}") == value else repr(float(value))
+
+
+def spelt_place(values: Iterable[float]) -> str:
+    """
+    A point or vector to four digits.
+
+    Examples
+    --------
+    >>> from scanfab.base.spelling import spelt_place
+    >>> spelt_place([1 / 3, -0.0, 2e-9])
+    '(0.3333, 0, 2e-09)'
+    """
+    return f"({', '.join(f'{value + 0.0:.4g}' for value in values)})"
+
+
+def spelt_range(low: float, high: float) -> str:
+    """
+    From where to where, to four digits; one number where both are the same.
+
+    Examples
+    --------
+    >>> from scanfab.base.spelling import spelt_range
+    >>> spelt_range(0.5, 1.5), spelt_range(1.0, 1.0)
+    ('0.5 to 1.5', '1')
+    """
+    return f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
 
 
 def spelt_time(seconds: float) -> str:

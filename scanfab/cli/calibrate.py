@@ -94,9 +94,9 @@ def calibrate(
     from scanfab.pipeline.settings import Settings
     from scanfab.table.result_file import ResultFile
     from scanfab.table.writing import Excerpt
-    from scanfab.viz.figures.calibration import plot_calibration
+    from scanfab.viz.figures.page import make_figures, save_figures
 
-    check_plot(plot, None, ())
+    check_plot(plot, None)
     with reported_warnings():
         chosen, settings_file = fill_from_file(ctx, (source,), chosen)
         with settings_file.named_errors():
@@ -118,7 +118,7 @@ def calibrate(
         if result is not None:
             result.save(found.rows)
         if plot is not None:
-            plot_calibration(found.rows, plot)
+            save_figures(plot, make_figures(found.rows, "calibration"))
         tells_all = result is not None or is_readable()
         if result is None and tells_all:
             _print(found.rows)

@@ -62,9 +62,9 @@ def compare(
     from scanfab.table.result_file import ResultFile
     from scanfab.table.selection import choose_rows
     from scanfab.table.writing import Excerpt
-    from scanfab.viz.figures.fitted import TABLE_FIGURES, plot_rows
+    from scanfab.viz.figures.page import make_figures, save_figures
 
-    check_plot(plot, figure, TABLE_FIGURES)
+    check_plot(plot, figure, "table")
     if summary and differences:
         raise click.UsageError("--summary and --differences are two tables: ask for one of them")
     if labels and len(labels) != len(tables):
@@ -93,5 +93,5 @@ def compare(
         else:
             print_csv(chosen, excerpt, type(chosen[0]))
         if plot is not None:
-            plot_rows(plot, rows, figure, comparison)
+            save_figures(plot, make_figures(rows, "table", figure, comparison=comparison))
     return 0 if any(row.alpha_vs_axial is not None for row in comparison.frames) else 1

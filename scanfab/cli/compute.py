@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 __all__ = ["OF_THE_LINE", "compute"]
 
+# of data that there are figures of
+KINDS = ("table", "frames")
 # in the order of the help
 ORDER = ("output", "sample", "reading", "window", "scan", "fabric")
 # what a settings file says nothing of: what is read, where results go, and what is told
@@ -120,28 +122,23 @@ def compute(
 
 
 def _check_figure(plot: Path | None, figure: str | None) -> None:
-    if plot is None and figure is None:
-        return
-    from scanfab.viz.figures.fitted import TABLE_FIGURES
-    from scanfab.viz.figures.scanned import FRAME_FIGURES, parse_figure
-
-    check_plot(plot, figure, [*TABLE_FIGURES, *FRAME_FIGURES])
-    if figure is not None and _is_of_frames(figure):
-        with usage_errors():
-            parse_figure(figure)
+    if plot is not None or figure is not None:
+        check_plot(plot, figure, *KINDS)
 
 
 def _is_of_frames(figure: str) -> bool:
-    from scanfab.viz.figures.fitted import TABLE_FIGURES
+    from scanfab.viz.figures.page import find_figure
 
-    return figure not in TABLE_FIGURES
+    return find_figure(figure, *KINDS)[0].kind == "frames"
 
 
 def _columns_drawn(figure: str | None) -> tuple[str, ...]:
-    """The columns of the table without which a figure cannot be."""
-    of_curves = ("strain", "alpha_c_axial")
-    needed = () if figure is not None and _is_of_frames(figure) else of_curves
-    return ("variant", "alpha_vs_axial", *needed)
+    """The columns of the table without which the figures cannot be."""
+    from scanfab.table.plots import figures_of
+    from scanfab.viz.figures.page import find_figure
+
+    asked = figures_of("table").values() if figure is None else [find_figure(figure, *KINDS)[0]]
+    return tuple(dict.fromkeys(name for one in asked for name in one.columns))
 
 
 def _observers(
@@ -156,15 +153,18 @@ def _observers(
 
 
 def _draw(plot: Path, figure: str | None, job: Job) -> None:
-    from scanfab.viz.figures.fitted import plot_rows
-    from scanfab.viz.figures.scanned import plot_frames
+    from scanfab.table.compare import compare_tables
+    from scanfab.viz.figures.page import make_figures, save_figures
+    from scanfab.viz.scanned_frames import ScannedFrames
 
     if not job.found_void_fabric:
         click.echo(f"scanfab: {plot} is not drawn: no row has a void fabric", err=True)
     elif figure is not None and _is_of_frames(figure):
-        plot_frames(plot, job.series[0], job.settings, job.kept, figure)
+        frames = ScannedFrames(job.series[0], job.settings, job.kept)
+        save_figures(plot, make_figures(frames, "frames", figure))
     else:
-        plot_rows(plot, job.kept, figure)
+        comparison = compare_tables(job.kept)
+        save_figures(plot, make_figures(job.kept, "table", figure, comparison=comparison))
 
 
 def _write_or_say(job: Job, excerpt: Excerpt) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import glob
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -218,16 +218,17 @@ sources_argument = click.argument(
 )
 
 
-def check_plot(plot: Path | None, figure: str | None, figures: Iterable[str]) -> None:
-    """A usage error if no such figure can be drawn to such a file."""
+def check_plot(plot: Path | None, figure: str | None, *kinds: str) -> None:
+    """A usage error if no such figure of these kinds can be drawn to such a file."""
+    from scanfab.viz.figures.page import find_figure
     from scanfab.viz.figures.style import check_plot_file
 
     if plot is None:
         if figure is not None:
             raise click.UsageError("--figure goes with --plot FILE")
         return
-    name = "rose" if figure is not None and figure.startswith("rose:") else figure
-    if name is not None and name not in figures:
-        raise click.UsageError(f"--figure: expected {', '.join(figures)}, found {figure!r}")
+    with usage_errors():
+        if figure is not None:
+            find_figure(figure, *kinds)
     with usage_errors("--plot: "):
         check_plot_file(plot)

@@ -45,12 +45,7 @@ LONGEST_SOURCE = 60
 @click.option(
     "--cut", is_flag=True, help="Leave out the grains in front, and show scan lines in the section."
 )
-@click.option(
-    "--screenshot",
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE.png",
-    help="Write a picture instead of opening a window; needs no screen.",
-)
+@options("screenshot")
 @talk_options
 @click.pass_context
 def view(

@@ -23,7 +23,7 @@ __all__ = ["Contact", "axial_error", "contact_fabric"]
 
 def contact_fabric(normals: npt.ArrayLike) -> FabricTensor | None:
     """
-    The fabric tensor of contact normals.
+    The fabric tensor of contact normals: G_c = (1/N_c) Σ n⊗n.
 
     Parameters
     ----------
@@ -34,6 +34,12 @@ def contact_fabric(normals: npt.ArrayLike) -> FabricTensor | None:
     -------
     FabricTensor or None
         None if there is no contact.
+
+    References
+    ----------
+    Satake (1982) and Oda (1982); Eq. 2 of Theocharis, Vairaktaris and Dafalias, 3D scan line method
+    for identifying void fabric of granular materials, Powders and Grains 2017, EPJ Web of
+    Conferences 140.
 
     Examples
     --------

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.column import Column
+from scanfab.base.spelling import spelt_place
 from scanfab.base.typing import FloatArray
 
 __all__ = [
@@ -58,6 +59,11 @@ class FabricTensor:
     """
     A fabric tensor G, dimensionless.
 
+    Parameters
+    ----------
+    matrix : ndarray, shape (3, 3)
+        Trace 1.
+
     Examples
     --------
     >>> import numpy as np
@@ -67,7 +73,13 @@ class FabricTensor:
     """
 
     matrix: FloatArray
-    """Shape (3, 3), trace 1."""
+
+    def __repr__(self) -> str:
+        values = ", ".join(f"{value:.4g}" for value in self.principal_values)
+        return (
+            f"FabricTensor: alpha {self.alpha:.3g}, principal values {values}, major axis "
+            f"{spelt_place(np.round(self.major_axis, 4))}"
+        )
 
     @cached_property
     def _eigen(self) -> tuple[FloatArray, FloatArray]:
@@ -93,7 +105,19 @@ class FabricTensor:
         return upper
 
     def angle_to(self, other: FabricTensor) -> float:
-        """Angle between the major axes of two tensors, 0 to 90 degrees."""
+        """
+        Angle between the major axes of two tensors.
+
+        Parameters
+        ----------
+        other : FabricTensor
+            The other one.
+
+        Returns
+        -------
+        float
+            0 to 90 degrees.
+        """
         cosine = abs(float(self.major_axis @ other.major_axis))
         return float(np.degrees(np.arccos(min(cosine, 1.0))))
 
@@ -103,11 +127,30 @@ class FabricTensor:
         return float(self.principal_values[0] - self.principal_values[2])
 
     def axial(self, axis: npt.ArrayLike) -> float:
-        """Signed anisotropy along an axis, see :func:`axial`."""
+        """
+        Signed anisotropy along an axis: a·G·a - (1 - a·G·a)/2.
+
+        Linear in G, so nearly unbiased where α is small: the quantity to plot and to correlate.
+
+        Parameters
+        ----------
+        axis : array_like, shape (3,)
+            Unit vector.
+
+        Returns
+        -------
+        float
+        """
         return float(axial(self.matrix, axis))
 
     def components(self) -> dict[str, float]:
-        """The six components by name, ``xx`` to ``yz``."""
+        """
+        The six components by name, ``xx`` to ``yz``.
+
+        Returns
+        -------
+        dict of str to float
+        """
         return {name: float(self.matrix[place]) for name, place in COMPONENTS.items()}
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.column import LENGTH, Column
+from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.tensor import FabricTensor, axial, tensor_columns, tensor_values
 
@@ -29,28 +30,66 @@ MOST_FILLED = 0.5
 
 @dataclass(frozen=True, eq=False)
 class VoidFabric:
-    """Void fabric of one variant, with the scan's standard error."""
+    """
+    Void fabric of one variant, with the scan's standard error.
+
+    Attributes
+    ----------
+    tensor : FabricTensor
+        Mean over the replicates.
+    mean_length : float
+        Σ w·sum / Σ w·count, dump's length unit.
+    replicates : ndarray
+        The tensor of each replicate, shape (R, 3, 3).
+    axes : ndarray
+        Unit vectors of each replicate, shape (R, D, 3).
+    weights : ndarray
+        Of the direction rule, shape (D,).
+    mean_lengths : ndarray
+        ℓ of each replicate and axis, shape (R, D), dump's length unit.
+    filled : float
+        Fraction of a replicate's axes without any kept segment, given the mean of the others.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab import void_fabric
+    >>> ones = np.ones((1, 3))
+    >>> void_fabric(np.eye(3)[None], np.ones(3) / 3, ones * [1, 1, 2], ones)
+    VoidFabric: mean length 1.333 (dump's unit), 1 replicate of 3 axes
+      FabricTensor: alpha 0.25, principal values 0.5, 0.25, 0.25, major axis (0, 0, 1)
+    """
 
     tensor: FabricTensor
-    """Mean over the replicates."""
     mean_length: float
-    """Σ w·sum / Σ w·count, dump's length unit."""
     replicates: FloatArray
-    """The tensor of each replicate, shape (R, 3, 3)."""
     axes: FloatArray
-    """Unit vectors of each replicate, shape (R, D, 3)."""
     weights: FloatArray
-    """Of the direction rule, shape (D,)."""
     mean_lengths: FloatArray
-    """ℓ of each replicate and axis, shape (R, D), dump's length unit."""
     filled: float
-    """Fraction of a replicate's axes without any kept segment, given the mean of the others."""
+
+    def __repr__(self) -> str:
+        count, axes = self.mean_lengths.shape
+        return (
+            f"VoidFabric: mean length {self.mean_length:.4g} (dump's unit), "
+            f"{counted(count, 'replicate')} of {counted(axes, 'axis', 'axes')}\n  {self.tensor!r}"
+        )
 
     def axial_error(self, axis: npt.ArrayLike) -> float | None:
         """
         Standard error of the axial anisotropy, from the scatter of the replicates.
 
-        It covers the scan alone (which lines were drawn), not the sample; None for one replicate.
+        It covers the scan alone (which lines were drawn), not the sample.
+
+        Parameters
+        ----------
+        axis : array_like, shape (3,)
+            Unit vector.
+
+        Returns
+        -------
+        float or None
+            None for one replicate.
         """
         count = len(self.replicates)
         if count < 2:
@@ -62,15 +101,20 @@ class VoidFabric:
         The same from the scatter of the mean lengths about an even polynomial.
 
         Far less noisy for few replicates, as every axis counts, but it depends on the polynomial:
-        good for planning a scan. None if there are too few mean lengths.
+        good for planning a scan.
 
         Parameters
         ----------
-        axis : array of 3 floats
-            Loading axis.
+        axis : array_like, shape (3,)
+            Unit vector.
         degree : int, optional
             The direction rule's: what it integrates exactly is no error, so the polynomial has the
             highest even degree, from 4 to 8, whose product with n⊗n is exact.
+
+        Returns
+        -------
+        float or None
+            None if there are too few mean lengths.
         """
         count, number = self.mean_lengths.shape
         even = min(max((degree or 0) // 2 * 2 - 2, 4), 8)
@@ -117,6 +161,13 @@ def void_fabric(
     VoidFabric or None
         None if some axis keeps no segment in all replicates together, or if most axes keep none in
         their replicate: a tensor of directions that were filled in would look isotropic.
+
+    References
+    ----------
+    Theocharis, Vairaktaris and Dafalias, 3D scan line method for identifying void fabric of
+    granular materials, Powders and Grains 2017, EPJ Web of Conferences 140, Eq. 1.
+
+    Oda, Nemat-Nasser and Konishi, 1985, doi:10.3208/sandf1972.25.3_85.
 
     Examples
     --------

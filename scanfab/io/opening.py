@@ -68,12 +68,7 @@ def read(path: PathLike, *, frame: int = 0, **options: Any) -> Packing:
     >>> len(packing)
     1800
     """
-    frames = list(read_series(path, **options))
-    try:
-        chosen = frames[frame]
-    except IndexError:
-        raise ReadError(f"{path}: has {len(frames)} frames, there is no frame {frame}") from None
-    return chosen.read()
+    return read_series(path, **options)[frame].read()
 
 
 def read_series(

@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from collections import deque
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, SupportsIndex, overload
 
-import numpy as np
-
-from scanfab.base.errors import PackingError, ReadError, ScanfabNote, ScanfabWarning
-from scanfab.io.families import Family, nearest
+from scanfab.base.errors import NoFrameError, ReadError, SettingsError
+from scanfab.base.spelling import counted
+from scanfab.io.families import Family
+from scanfab.io.frame import Frame
 from scanfab.io.frame_csv import FrameFile
-from scanfab.io.reader import (
-    Carries,
-    GrainTable,
-    JoinedContacts,
-    Reader,
-    ReadOptions,
-    Snapshot,
-)
-from scanfab.packing.packing import Packing, check_lengths
+from scanfab.io.reader import ReadOptions, Snapshot
 
-__all__ = ["ContactsFrom", "Frame", "Series"]
+__all__ = ["ENDLESS", "ContactsFrom", "Series"]
+
+# size and time of a file, which change with its content; None if nobody can tell
+_Stamp = tuple[int, int] | None
+# more frames than there can be: the end of frames that nobody has counted
+ENDLESS = 2**62
 
 
 ContactsFrom = Literal["auto", "beside", "geometric", "path", "grains"]
@@ -35,238 +32,223 @@ ContactsFrom = Literal["auto", "beside", "geometric", "path", "grains"]
 
 
 @dataclass(frozen=True)
-class Frame:
-    """One frame of a series, not read yet."""
-
-    series: Series
-    snapshot: Snapshot
-    name_step: int | None
-    """The step in the file's name."""
-    number: int = 0
-    """In the series, from 0."""
-    problem: ReadError | None = None
-    """Why not even the frames of the file can be told."""
-
-    @property
-    def reader(self) -> Reader:
-        """The reader of the grain file."""
-        assert self.series.grains.reader is not None
-        return self.series.grains.reader
-
-    def read(self) -> Packing:
-        """
-        The frame's packing; its contacts are None if no file lists them.
-
-        Raises
-        ------
-        ReadError
-            If a file is not as it should be.
-        PackingError
-            If its content is no packing.
-        """
-        if self.problem is not None:
-            raise self.problem
-        options = self._options()
-        grains = self.reader.read_grains(self.snapshot, options)
-        with_own = self.series.contacts_from in ("auto", "beside", "grains")
-        own = grains.contacts if with_own else None
-        beside = self.series.contacts_from == "beside"
-        joined = [] if beside and own is not None else self._joined_contacts(grains, options)
-        listed = [part.contacts for part in joined if part.contacts is not None]
-        if own is not None:
-            listed.append(own)
-        if self.series.contacts_from == "grains" and not listed:
-            raise ReadError(
-                f'{self.snapshot.path}: `contacts="file"` was asked for, but there is no '
-                "contact file"
-            )
-        with _named(self.snapshot.path):
-            return Packing(
-                grains.position,
-                grains.radius,
-                id=grains.id,
-                columns=grains.columns,
-                contacts=listed[0] if listed else None,
-                wall_contacts=_wall_contacts(grains, joined, with_own),
-                cell=grains.cell,
-                step=self.step,
-                time=self.snapshot.time,
-            )
-
-    def _joined_contacts(self, grains: GrainTable, options: ReadOptions) -> list[JoinedContacts]:
-        """The contact files of the frame, joined to its grains; one of them lists grain pairs."""
-        files = self._contact_files()
-        if not files:
-            return []
-        # contacts are joined by lengths and ids: what is wrong with those comes first
-        with _named(self.snapshot.path):
-            id = np.arange(len(grains.radius)) if grains.id is None else grains.id
-            check_lengths(grains.position, grains.radius, id)
-        joined = [
-            (family, self._joined(family, snapshot, options, grains)) for family, snapshot in files
-        ]
-        lists = [family for family, part in joined if part.contacts is not None]
-        with_own = self.series.contacts_from == "auto" and grains.contacts is not None
-        paths = " and ".join(str(snapshot.path) for _, snapshot in files)
-        if len(lists) + with_own > 1:
-            others = self._left_out(lists, paths)
-            return [part for family, part in joined if family not in others]
-        if not lists and self.series.contacts_from == "path":
-            warnings.warn(
-                f"{paths}: lists contacts with walls only: contacts between grains are found by "
-                f"geometry, unless `contacts` names their file",
-                ScanfabWarning,
-                stacklevel=4,
-            )
-        return [part for _, part in joined]
-
-    def _joined(
-        self, family: Family, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
-    ) -> JoinedContacts:
-        assert family.reader is not None
-        try:
-            return family.reader.read_contacts(snapshot, options, grains)
-        except ReadError as error:
-            if self.series.contacts_from != "beside":
-                raise
-            raise ReadError(
-                f"{error} (this file lies beside the grains; "
-                '`contacts="geometric"` leaves it alone)'
-            ) from None
-
-    def _left_out(self, lists: list[Family], paths: str) -> Sequence[Family]:
-        """An error; but of files that lie beside grains all that are not the nearest by name."""
-        if self.series.contacts_from != "beside":
-            raise ReadError(f"two contact lists for one frame: {paths}: choose with `contacts`")
-        taken = nearest(self.series.grains, lists)
-        if taken is not None:
-            others = [family for family in lists if family is not taken]
-            warnings.warn(
-                f"{taken.pattern}: of several contact lists beside the grains this one is taken, "
-                f"whose name is the nearest: `contacts` names another",
-                ScanfabNote,
-                stacklevel=5,
-            )
-            return others
-        warnings.warn(
-            f"two contact lists lie beside {self.snapshot.path}: {paths}: none is taken; choose "
-            f"with `contacts`",
-            ScanfabWarning,
-            stacklevel=5,
-        )
-        return self.series.contacts
-
-    @property
-    def step(self) -> int | None:
-        """That of the dump, else the one in the file's name."""
-        return self.name_step if self.snapshot.step is None else self.snapshot.step
-
-    @property
-    def carries(self) -> Carries:
-        """What the dump or its user say of a cell."""
-        ask = getattr(self.reader, "carries", None)
-        options = self.series.options
-        told = self.series.cells or options.cell or options.periodic is not None
-        return "cell" if told or ask is None else ask(self.snapshot.path)
-
-    @property
-    def cell_is_named(self) -> bool:
-        """Whether the user names a cell, or what is periodic."""
-        options = self.series.options
-        return bool(self.series.cells or options.cell or options.periodic)
-
-    def _options(self) -> ReadOptions:
-        """How to read this frame, with its cell if a file names those of the frames."""
-        options, cells = self.series.options, self.series.cells
-        if cells is None:
-            return options
-        found = cells.at(self.number, self.step)
-        if found is None:
-            name = f"step {self.step}" if cells.key == "step" else f"frame {self.number}"
-            raise ReadError(
-                f"{cells.path}: names no cell for {name}, which is {self.snapshot.path}: add a row "
-                f"for it"
-            )
-        return replace(options, cell=found)
-
-    def _contact_files(self) -> list[tuple[Family, Snapshot]]:
-        """The snapshots of the contact files that belong to this frame."""
-        series, found = self.series, []
-        for family in series.contacts:
-            named = series.contacts_from == "path" and len(series.grains.files) == 1
-            contacts = series.contacts_of(self.snapshot, self.name_step, family, named)
-            if contacts is not None:
-                found.append((family, contacts))
-        if not found and series.contacts:
-            patterns = ", ".join(family.pattern for family in series.contacts)
-            message = f"{self.snapshot.path}: no contact file for step {self.step} among {patterns}"
-            if series.contacts_from == "path":
-                raise ReadError(message)
-            warnings.warn(
-                f"{message}: contacts are found by geometry", ScanfabWarning, stacklevel=3
-            )
-        return found
-
-
-@dataclass(frozen=True)
 class Series:
     """
     Frames in the order of their steps, read one at a time.
 
-    Iterating gives :class:`Frame` objects; ``frame.read()`` gives the packing.
+    Iterating gives :class:`Frame` objects; ``frame.read()`` gives the packing. ``series[-1]`` is a
+    frame, ``series[2:5]`` the same series with fewer frames: they keep their numbers, and RV,
+    ``rmin`` and the initial length stay those of the whole.
+
+    Attributes
+    ----------
+    name : str
+        As the user named it.
+    grains : Family
+        The files of grains, by step.
+    contacts : tuple of Family
+        The files of contacts, likewise.
+    contacts_from : str
+        Where contacts come from.
+    options : ReadOptions
+        What the user tells of the dump.
+    cells : FrameFile or None
+        The cell of each frame, in the place of one for all in the options.
+    sources : tuple of str
+        What :func:`scanfab.read_series` was given.
+    reading : mapping
+        Its options, as a manifest lists them.
+    numbers : range
+        Which frames of the whole series these are; there may be fewer.
+
+    Examples
+    --------
+    >>> import scanfab
+    >>> series = scanfab.read_series("sample_data/yade_triaxial/triaxial-spheres-*.vtk.gz")
+    >>> len(series), series[-1].number, [frame.number for frame in series[2:5]]
+    (7, 6, [2, 3, 4])
+    >>> [frame.number for frame in series[2:5][1:]]
+    [3, 4]
     """
 
     name: str
-    """As the user named it."""
     grains: Family
     contacts: tuple[Family, ...] = ()
     contacts_from: ContactsFrom = "auto"
     options: ReadOptions = field(default_factory=ReadOptions)
     cells: FrameFile | None = None
-    """The cell of each frame, in the place of one for all in the options."""
     sources: tuple[str, ...] = field(default=(), repr=False, compare=False)
-    """What ``read_series`` was given."""
     reading: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
-    """Its options, as a manifest lists them."""
+    numbers: range = range(ENDLESS)
     # a file that holds the contacts of many frames is indexed once
     _contact_snapshots: dict[Path, list[Snapshot]] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
-    _met: dict[Path, int] = field(default_factory=dict, init=False, repr=False, compare=False)
-    """How many frames the grain files hold that were looked into."""
+    _met: dict[Path, tuple[_Stamp, list[Snapshot]]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
+    """The frames of the grain files that were looked into, and how these files were then."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        # another process that computes a frame need not know where all others are
+        return {**self.__dict__, "_met": {}}
+
+    def __repr__(self) -> str:
+        grains, every = self.grains, all(path in self._met for path in self.grains.files.values())
+        number = (
+            counted(self.frames_expected(), "frame")
+            if every
+            else f"{counted(len(grains.files), 'file')} (frames not counted)"
+        )
+        if not self.is_whole:
+            stop = "" if self.numbers.stop >= ENDLESS else self.numbers.stop
+            step = "" if self.numbers.step == 1 else f":{self.numbers.step}"
+            number = f"frames {self.numbers.start}:{stop}{step}"
+        name = "" if grains.reader is None else f" ({grains.reader.name})"
+        contacts = ", ".join(Path(one.pattern).name for one in self.contacts)
+        return (
+            f"Series {self.name}: {number} of {Path(grains.pattern).name}{name}"
+            f"{f', contacts of {contacts}' if contacts else ''}"
+        )
 
     def __iter__(self) -> Iterator[Frame]:
-        reader = self.grains.reader
-        assert reader is not None
+        return islice(self._every(), self.numbers.start, self.numbers.stop, self.numbers.step)
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    def __bool__(self) -> bool:
+        # without counting them
+        return next(iter(self), None) is not None
+
+    @overload
+    def __getitem__(self, key: SupportsIndex) -> Frame: ...
+    @overload
+    def __getitem__(self, key: slice) -> Series: ...
+    def __getitem__(self, key: SupportsIndex | slice) -> Frame | Series:
+        if isinstance(key, slice):
+            return self._part(key)
+        if not hasattr(key, "__index__"):
+            raise TypeError(f"a frame of a series is named by a number or a slice, not by {key!r}")
+        place = key.__index__()
+        if place >= 0:
+            found = next(islice(self, place, None), None)
+        else:
+            last = deque(self, maxlen=-place)
+            found = last[0] if len(last) == -place else None
+        if found is None:
+            raise NoFrameError(f"{self.name}: has {len(self)} frames, there is no frame {place}")
+        return found
+
+    def _part(self, frames: slice) -> Series:
+        numbers = self.numbers_of(frames)
+        if numbers.step < 0:
+            raise SettingsError(
+                "the frames of a series stay in the order of their steps, found a step below 0: "
+                "list(series)[::-1] goes backwards"
+            )
+        return self._with(numbers)
+
+    def _with(self, numbers: range) -> Series:
+        """Other frames of the same series; what is known of its files is known to both."""
+        other = object.__new__(Series)
+        vars(other).update({**vars(self), "numbers": numbers})
+        return other
+
+    def numbers_of(self, frames: slice) -> range:
+        """
+        The numbers, in the whole series, of some of these frames.
+
+        Parameters
+        ----------
+        frames : slice
+            As of a list of these frames. They are counted only where it counts from their end.
+
+        Returns
+        -------
+        range
+            There may be fewer frames than that.
+        """
+        bounds = (frames.start, frames.stop, frames.step)
+        if any(bound is not None and bound < 0 for bound in bounds):
+            return self.numbers[: len(self)][frames]
+        return self.numbers[frames]
+
+    @property
+    def whole(self) -> Series:
+        """All frames of the series that these are some of."""
+        return self._with(range(ENDLESS))
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether these are all frames of the series."""
+        return self.numbers == range(ENDLESS)
+
+    def _every(self) -> Iterator[Frame]:
+        """All frames of the whole series."""
         number = 0
         for name_step, path in self.grains.files.items():
-            problem: ReadError | None = None
-            try:
-                snapshots = reader.snapshots(path)
-            except ReadError as error:
-                snapshots, problem = [Snapshot(path)], error
-            self._met[path] = len(snapshots)
+            snapshots, problem = self._look_into(path)
             for snapshot in snapshots:
                 yield Frame(self, snapshot, name_step, number, problem)
                 number += 1
+
+    def _look_into(self, path: Path) -> tuple[list[Snapshot], ReadError | None]:
+        """
+        The frames of a grain file, or one in their place and what is wrong with the file.
+
+        A file is looked through once for as long as it stays as it is.
+        """
+        assert self.grains.reader is not None
+        stamp = _stamp(path)
+        before, snapshots = self._met.get(path, (None, []))
+        if stamp is not None and stamp == before:
+            return snapshots, None
+        problem: ReadError | None = None
+        try:
+            snapshots = self.grains.reader.snapshots(path)
+        except ReadError as error:
+            stamp, snapshots, problem = None, [Snapshot(path)], error
+        self._met[path] = stamp, snapshots
+        return snapshots, problem
 
     def frames_expected(self) -> int:
         """
         About how many frames there are, without looking for them.
 
         Files that nobody has looked into yet count as many as the last one that was, at first one.
+
+        Returns
+        -------
+        int
         """
-        met = list(self._met.values())
-        return sum(met) + (len(self.grains.files) - len(met)) * (met[-1] if met else 1)
+        met = [len(snapshots) for _, snapshots in self._met.values()]
+        every = sum(met) + (len(self.grains.files) - len(met)) * (met[-1] if met else 1)
+        return len(range(self.numbers.start, min(self.numbers.stop, every), self.numbers.step))
 
     def contacts_of(
         self, grains: Snapshot, name_step: int | None, family: Family, named: bool
     ) -> Snapshot | None:
         """
-        The contacts of a grain snapshot in a family of contact files; None if there are none.
+        The contacts of a grain snapshot in a family of contact files.
 
-        Steps inside the files decide; where a file has none, the number in its name does. A single
-        contact file that the user named for a single grain file needs no number.
+        Steps inside the files decide; where a file has none, the number in its name does.
+
+        Parameters
+        ----------
+        grains : Snapshot
+            Of the grains.
+        name_step : int or None
+            The step in the name of their file.
+        family : Family
+            The contact files.
+        named : bool
+            Whether a single contact file was named for a single grain file: it needs no number.
+
+        Returns
+        -------
+        Snapshot or None
+            None if there are none.
         """
         step = name_step if grains.step is None else grains.step
         path = family.files.get(name_step, family.files.get(step))
@@ -285,7 +267,18 @@ class Series:
         return next((one for one in snapshots if one.step == grains.step), None)
 
     def beside(self, path: Path) -> list[Path]:
-        """What is read with a file of grains: its cell, or the dumps that an index names."""
+        """
+        What is read with a file of grains: its cell, or the dumps that an index names.
+
+        Parameters
+        ----------
+        path : Path
+            A file of grains.
+
+        Returns
+        -------
+        list of Path
+        """
         listed = self._listed(path) if self.grains.kind == "index" else []
         ask = getattr(self.grains.reader, "beside", None)
         named = self.cells is not None or self.options.cell is not None
@@ -304,15 +297,27 @@ class Series:
 
     def files_through(self, number: int) -> Iterator[tuple[Path, bool]]:
         """
-        The files of the frames up to one, and whether each is a file of grains.
+        The files of the frames up to one.
 
         All of these frames have been looked for: one file may hold many.
+
+        Parameters
+        ----------
+        number : int
+            The last frame, in the whole series.
+
+        Yields
+        ------
+        path : Path
+            Each file.
+        is_grains : bool
+            Whether it holds grains.
         """
         steps, met = [], 0
         for step, path in self.grains.files.items():
             steps.append(step)
             yield path, True
-            met += self._met.get(path, 1)
+            met += len(self._met[path][1]) if path in self._met else 1
             if met > number:
                 break
         last = max((step for step in steps if step is not None), default=None)
@@ -322,7 +327,13 @@ class Series:
                     yield path, False
 
     def files(self) -> Iterator[Path]:
-        """Every file that the frames come from."""
+        """
+        Every file that the frames come from.
+
+        Yields
+        ------
+        Path
+        """
         for family in (self.grains, *self.contacts):
             yield from family.files.values()
         for path in self.grains.files.values():
@@ -331,18 +342,9 @@ class Series:
             yield self.cells.path
 
 
-@contextmanager
-def _named(path: Path) -> Iterator[None]:
-    """Let errors of a packing begin with its file."""
+def _stamp(path: Path) -> _Stamp:
     try:
-        yield
-    except PackingError as error:
-        raise PackingError(f"{path}: {error}") from None
-
-
-def _wall_contacts(grains: GrainTable, joined: list[JoinedContacts], with_own: bool) -> Any:
-    own = grains.wall_contacts if with_own else None
-    if not joined:
-        return own
-    first = np.zeros(len(grains.radius), np.int64) if own is None else own
-    return sum((part.wall_contacts for part in joined), first)
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_size, found.st_mtime_ns

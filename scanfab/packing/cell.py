@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import PackingError
+from scanfab.base.spelling import spelt_place
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.lattice import Lattice, reduced_lattice
 
@@ -68,10 +69,17 @@ class Cell:
             raise PackingError(f"the cell's vectors span no volume: {self.vectors.tolist()}")
 
     def __repr__(self) -> str:
-        return (
-            f"Cell({self.vectors.tolist()}, periodic={self.periodic}, "
-            f"origin={self.origin.tolist()})"
-        )
+        edges = np.diag(self.vectors)
+        if np.array_equal(self.vectors, np.diag(edges)):
+            shape = " x ".join(f"{edge:.4g}" for edge in edges)
+        else:
+            shape = ", ".join(spelt_place(vector) for vector in self.vectors)
+        along = [name for name, repeats in zip("xyz", self.periodic, strict=True) if repeats]
+        if len(along) == 3 or not along:
+            repeats = "periodic" if along else "not periodic"
+        else:
+            repeats = f"periodic along {' and '.join(along)}"
+        return f"Cell: {shape} from {spelt_place(self.origin)}, {repeats}"
 
     @property
     def is_periodic(self) -> bool:
@@ -91,7 +99,19 @@ class Cell:
         return center
 
     def fractional(self, position: npt.ArrayLike) -> FloatArray:
-        """Coordinates along the lattice vectors, 0 to 1 inside the cell; dimensionless."""
+        """
+        Coordinates along the lattice vectors, 0 to 1 inside the cell.
+
+        Parameters
+        ----------
+        position : array_like, shape (N, 3)
+            Dump's length unit.
+
+        Returns
+        -------
+        ndarray, shape (N, 3)
+            Dimensionless.
+        """
         fractions: FloatArray = (np.asarray(position, dtype=np.float64) - self.origin) @ (
             np.linalg.inv(self.vectors)
         )
@@ -122,7 +142,18 @@ class Cell:
         return wrapped, (turns + on_face).astype(np.int64)
 
     def wrap(self, position: npt.ArrayLike) -> FloatArray:
-        """Positions moved into the cell along its periodic vectors, shape (N, 3)."""
+        """
+        Positions moved into the cell along its periodic vectors.
+
+        Parameters
+        ----------
+        position : array_like, shape (N, 3)
+            Dump's length unit.
+
+        Returns
+        -------
+        ndarray, shape (N, 3)
+        """
         return self.place(position)[0]
 
     @cached_property

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from scanfab.base.arrays import cast, grains_named
 from scanfab.base.errors import PackingError, ScanfabWarning
+from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.cell import Cell
 
@@ -20,19 +21,41 @@ ContactSource = Literal["file", "geometric"]
 
 
 class ContactList(NamedTuple):
-    """Contacts as a source names them, before the packing works out their geometry."""
+    """
+    Contacts as a source names them, before the packing works out their geometry.
+
+    Parameters
+    ----------
+    pairs : array_like of int, shape (M, 2)
+        Rows of the two grains.
+    image : array_like of int, shape (M, 3), optional
+        Lattice translation of the second grain, from the positions as they are given, wrapped or
+        not; nearest image by default.
+    force : array_like, shape (M, 3), optional
+        Force on the second grain, dump's force unit.
+    source : str, optional
+        Where the list comes from: ``file`` or ``geometric``.
+
+    Examples
+    --------
+    >>> from scanfab import ContactList, Packing
+    >>> listed = ContactList([[0, 1]], force=[[2.0, 0.0, 0.0]])
+    >>> listed
+    ContactList: 1 contact from file, with forces
+    >>> Packing([[0, 0, 0], [2, 0, 0]], 1.0, contacts=listed).contacts.force
+    array([[2., 0., 0.]])
+    """
 
     pairs: npt.ArrayLike
-    """Rows of the two grains, shape (M, 2)."""
     image: npt.ArrayLike | None = None
-    """
-    Lattice translation of the second grain, shape (M, 3), from the positions as they are given,
-    wrapped or not; nearest image by default.
-    """
     force: npt.ArrayLike | None = None
-    """Force on the second grain, shape (M, 3), dump's force unit."""
     source: ContactSource = "file"
-    """Where the list comes from."""
+
+    def __repr__(self) -> str:
+        named = {"images": self.image, "forces": self.force}
+        has = [f"with {name}" for name, values in named.items() if values is not None]
+        number = counted(len(np.asarray(self.pairs)), "contact")
+        return f"ContactList: {', '.join([f'{number} from {self.source}', *has])}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,23 +66,56 @@ class Contacts:
     The normal is the unit branch vector from the first to the second centre; the point is the
     middle of the overlap on the branch. Both come from positions and radii, whatever the file
     stores, so that every format gives the same answer.
+
+    Attributes
+    ----------
+    pairs : ndarray of int
+        Rows of the two grains, shape (M, 2).
+    image : ndarray of int
+        Lattice translation of the second grain, shape (M, 3).
+    normal : ndarray
+        Unit normals, shape (M, 3), dimensionless.
+    point : ndarray
+        Contact points, shape (M, 3), dump's length unit; next to the first grain.
+    force : ndarray or None
+        Force on the second grain, shape (M, 3), dump's force unit; None if the dump has none.
+    source : str
+        ``file`` or ``geometric``.
+
+    Examples
+    --------
+    >>> from scanfab import Packing
+    >>> contacts = Packing([[0, 0, 0], [1.5, 0, 0]], 1.0, contacts=[[0, 1], [1, 0]]).contacts
+    >>> contacts
+    Contacts: 1 contact from file
+    >>> contacts.normal, contacts.point
+    (array([[1., 0., 0.]]), array([[0.75, 0.  , 0.  ]]))
     """
 
     pairs: IntArray
-    """Rows of the two grains, shape (M, 2)."""
     image: IntArray
-    """Lattice translation of the second grain, shape (M, 3)."""
     normal: FloatArray
-    """Unit normals, shape (M, 3), dimensionless."""
     point: FloatArray
-    """Contact points, shape (M, 3), dump's length unit; next to the first grain."""
     force: FloatArray | None
-    """Force on the second grain, shape (M, 3), dump's force unit; None if the dump has none."""
     source: ContactSource
-    """``file`` or ``geometric``."""
 
     def __len__(self) -> int:
         return len(self.pairs)
+
+    def __repr__(self) -> str:
+        return f"Contacts: {self.in_words()}"
+
+    def in_words(self) -> str:
+        """
+        How many there are, and where they come from.
+
+        Returns
+        -------
+        str
+        """
+        whence = "from file" if self.source == "file" else "by geometry"
+        forces = "" if self.force is None else " with forces"
+        return f"{counted(len(self), 'contact')} {whence}{forces}"
 
 
 class Spheres(NamedTuple):

@@ -7,16 +7,14 @@ import numpy as np
 from scanfab.base.errors import PackingError
 from scanfab.base.note import Note
 from scanfab.base.typing import FloatArray
+from scanfab.packing.bodies import CLUMP_COLUMNS
 from scanfab.packing.packing import Packing
 from scanfab.packing.periodicity import fitting_periods
 from scanfab.packing.sample import Sample
 
-__all__ = ["CLUMP_COLUMNS", "cell_doubt", "cell_hint", "doubts_of", "refuse_impossible"]
+__all__ = ["cell_doubt", "cell_hint", "doubts_of", "refuse_impossible"]
 
 
-# columns that say which body a sphere is part of, by names in lower case; all but the first few
-# number molecules, too
-CLUMP_COLUMNS = ("clump", "clumpid", "clump_id", "id_multisphere", "mol", "molecule")
 # particles below which nothing is said of a sample's form
 FEWEST = 10
 # a clump is smaller than this part of the sample

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from scanfab.base.arrays import cast, grains_named
 from scanfab.base.errors import PackingError
 from scanfab.base.lengths import LEAST, MOST, all_within
+from scanfab.base.spelling import counted, spelt_range
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import ContactList, Contacts, Spheres, resolve_contacts
@@ -178,8 +179,13 @@ class Packing:
         return len(self.radius)
 
     def __repr__(self) -> str:
-        contacts = "unknown" if self.contacts is None else len(self.contacts)
-        return f"Packing(grains={len(self)}, contacts={contacts}, step={self.step})"
+        radii = ""
+        if len(self):
+            radii = f" of radius {spelt_range(self.radius.min(), self.radius.max())}"
+        what = [counted(len(self), "particle") + radii]
+        what.append("contacts not known" if self.contacts is None else self.contacts.in_words())
+        what += [] if self.step is None else [f"step {self.step}"]
+        return f"Packing: {', '.join(what)}" + ("" if self.cell is None else f"\n  {self.cell!r}")
 
     @property
     def is_periodic(self) -> bool:
@@ -199,6 +205,10 @@ class Packing:
             are taken as they are.
         wall_contacts : array_like of int, shape (N,), optional
             Those of this packing by default.
+
+        Returns
+        -------
+        Packing
         """
         other = copy.copy(self)
         if wall_contacts is not None:

@@ -12,7 +12,9 @@ from functools import cached_property
 import numpy as np
 
 from scanfab.base.arrays import cast
+from scanfab.base.errors import PackingError
 from scanfab.base.note import Note
+from scanfab.base.spelling import counted
 from scanfab.base.typing import BoolArray, IntArray
 from scanfab.packing.boundary import BoundaryRule, select_boundary
 from scanfab.packing.escaped import Escaped, escaped_grains
@@ -49,20 +51,69 @@ VARIANTS = {
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """A packing whose particles are told apart: boundary, grains, rattlers."""
+    """
+    A packing whose particles are told apart: boundary, grains, rattlers.
+
+    Parameters
+    ----------
+    packing : Packing
+        Its contacts tell the rattlers.
+    boundary : ndarray of bool, shape (N,)
+        Particles that are boundary, not grains.
+    min_contacts : int, optional
+        A grain with fewer contacts is a rattler.
+    rattler_rule : callable, optional
+        Tells them by their contacts; by default every grain on its own, in one pass.
+
+    Raises
+    ------
+    PackingError
+        If the boundary is no truth value for each particle.
+
+    Examples
+    --------
+    >>> from scanfab import Packing, Sample
+    >>> row = [[0, 0, 0], [2, 0, 0], [4, 0, 0]]
+    >>> packing = Packing(row, 1.0, contacts=[[0, 1], [1, 2]], columns={"type": [1, 1, 2]})
+    >>> sample = Sample(packing, packing.columns["type"] == 2)
+    >>> sample
+    Sample: 2 grains, 1 rattler (fewer than 2 contacts); 1 boundary particle
+    >>> sample.rattlers
+    array([ True, False, False])
+    """
 
     packing: Packing
     boundary: BoolArray
-    """Shape (N,)."""
     min_contacts: int = 2
-    """A grain with fewer contacts is a rattler."""
     rattler_rule: RattlerRule = count
-    """Tells them by their contacts."""
+
+    def __post_init__(self) -> None:
+        """PackingError if the boundary is no truth value for each particle."""
+        boundary = np.asarray(self.boundary)
+        if boundary.shape != (len(self.packing),) or boundary.dtype != np.bool_:
+            raise PackingError(
+                f"boundary: expected a truth value for each of {len(self.packing)} particles, such "
+                f'as packing.columns["type"] == 2, found {boundary.dtype} of shape {boundary.shape}'
+            )
+
+    def __repr__(self) -> str:
+        what = f"Sample: {counted(int(self.grains.sum()), 'grain')}"
+        if self.packing.contacts is not None:
+            rattlers = counted(int(self.rattlers.sum()), "rattler")
+            rule = f"fewer than {counted(self.min_contacts, 'contact')}"
+            if self.rattler_rule is not count:
+                rule = f"by {getattr(self.rattler_rule, '__name__', 'a rule')} of {rule}"
+            what += f", {rattlers} ({rule})"
+        boundary = int(self.boundary.sum())
+        return what + (f"; {counted(boundary, 'boundary particle')}" if boundary else "")
 
     @property
     def contacts(self) -> Contacts:
-        """The contacts of the packing, which must be known."""
-        assert self.packing.contacts is not None
+        """The contacts of the packing; PackingError if they are not known."""
+        if self.packing.contacts is None:
+            raise PackingError(
+                "the contacts of the packing are not known: find_contacts(packing) finds them"
+            )
         return self.packing.contacts
 
     @property
@@ -81,7 +132,14 @@ class Sample:
         return self.grains if self.escaped.are_many else self.grains & ~self.escaped.grains
 
     def doubts_of_escaped(self) -> list[Note]:
-        """What to tell of grains that have escaped, if there are any."""
+        """
+        What to tell of grains that have escaped.
+
+        Returns
+        -------
+        list of Note
+            Empty without any.
+        """
         rows = np.flatnonzero(self.escaped.grains)
         return [Note("escaped", self._escaped(rows))] if len(rows) else []
 
@@ -134,18 +192,55 @@ class Sample:
         return self._touching.numbers_without(~self.contacts_without(self.rattlers))
 
     def removed(self, variant: Variant) -> BoolArray:
-        """Grains that the variant leaves out, shape (N,)."""
+        """
+        Grains that the variant leaves out.
+
+        Parameters
+        ----------
+        variant : Variant
+            One of ``VARIANTS``.
+
+        Returns
+        -------
+        ndarray of bool, shape (N,)
+        """
         return self.rattlers if variant.without_rattlers else np.zeros(len(self.packing), bool)
 
     def counted(self, variant: Variant, window: Window | None) -> BoolArray:
-        """Grains whose centre lies in the variant's window, rattlers included, shape (N,)."""
+        """
+        Grains whose centre lies in the variant's window, rattlers included.
+
+        Parameters
+        ----------
+        variant : Variant
+            One of ``VARIANTS``.
+        window : Window or None
+            Of c and d.
+
+        Returns
+        -------
+        ndarray of bool, shape (N,)
+        """
         if not variant.in_window:
             return self.grains
         assert window is not None
         return self.grains & window.contains(self.packing.position, self.packing)
 
     def solids(self, variant: Variant, window: Window | None) -> BoolArray:
-        """Grains of which the variant's lines may meet a part, shape (N,)."""
+        """
+        Grains of which the variant's lines may meet a part.
+
+        Parameters
+        ----------
+        variant : Variant
+            One of ``VARIANTS``.
+        window : Window or None
+            Of c and d.
+
+        Returns
+        -------
+        ndarray of bool, shape (N,)
+        """
         left = self.grains & ~self.removed(variant)
         if not variant.in_window:
             return left
@@ -154,12 +249,36 @@ class Sample:
         return left & window.may_meet(position, radius, self.packing)
 
     def contacts_without(self, left_out: BoolArray) -> BoolArray:
-        """Contacts of which neither particle is left out, shape (M,)."""
+        """
+        Contacts of which neither particle is left out.
+
+        Parameters
+        ----------
+        left_out : ndarray of bool, shape (N,)
+            Particles.
+
+        Returns
+        -------
+        ndarray of bool, shape (M,)
+        """
         one, two = self.contacts.pairs.T
         return np.asarray(~(left_out[one] | left_out[two]))
 
     def fabric_contacts(self, variant: Variant, window: Window | None) -> BoolArray:
-        """Which grain-grain contacts enter the variant's contact fabric, shape (M,)."""
+        """
+        Which grain-grain contacts enter the variant's contact fabric.
+
+        Parameters
+        ----------
+        variant : Variant
+            One of ``VARIANTS``.
+        window : Window or None
+            Of c and d.
+
+        Returns
+        -------
+        ndarray of bool, shape (M,)
+        """
         contacts = self.contacts
         chosen = self.contacts_without(self.boundary | self.removed(variant))
         if variant.in_window:
@@ -171,7 +290,19 @@ class Sample:
         """
         Mean number of contacts of the variant's grains, boundary's included.
 
-        Contacts with removed grains are left out. None if there is no grain.
+        Contacts with removed grains are left out.
+
+        Parameters
+        ----------
+        variant : Variant
+            One of ``VARIANTS``.
+        window : Window or None
+            Of c and d.
+
+        Returns
+        -------
+        float or None
+            None if there is no grain.
         """
         counted = self.counted(variant, window) & ~self.removed(variant)
         if not counted.any():

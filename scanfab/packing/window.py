@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scanfab.base.arrays import cast
 from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
+from scanfab.base.spelling import spelt_place
 from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
@@ -23,12 +25,35 @@ MOST_PERIODS = 10
 
 @dataclass(frozen=True, eq=False)
 class Window:
-    """An RV, fixed for a series: a region about a centre; lengths in the dump's unit."""
+    """
+    An RV, fixed for a series: a region about a centre; lengths in the dump's unit.
+
+    Parameters
+    ----------
+    center : array_like, shape (3,)
+        Dump's length unit.
+    shape : Convex
+        The region, as if its centre were the origin.
+
+    Raises
+    ------
+    PackingError
+        If the centre is no point.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab import Packing, Window, sphere
+    >>> window = Window([0.0, 0.0, 1.0], sphere(2.0))
+    >>> window
+    Window: radius 2 about (0, 0, 1) (dump's unit)
+    >>> packing = Packing([[0, 0, 0], [0, 0, 3.5]], 1.0)
+    >>> window.contains(packing.position, packing)
+    array([ True, False])
+    """
 
     center: FloatArray
-    """Shape (3,)."""
     shape: Convex
-    """The region, as if its centre were the origin."""
 
     @property
     def radius(self) -> float:
@@ -36,11 +61,39 @@ class Window:
         return self.shape.reach
 
     def contains(self, points: FloatArray, packing: Packing) -> BoolArray:
-        """Which points (shape (N, 3)) lie in the window, through periodic faces too."""
+        """
+        Which points lie in the window, through periodic faces too.
+
+        Parameters
+        ----------
+        points : ndarray, shape (N, 3)
+            Dump's coordinates.
+        packing : Packing
+            Whose cell repeats, if it does.
+
+        Returns
+        -------
+        ndarray of bool, shape (N,)
+        """
         return self.shape.contains(self.branches(points, packing))
 
     def may_meet(self, points: FloatArray, radius: FloatArray, packing: Packing) -> BoolArray:
-        """Which spheres may reach into it, likewise: see :meth:`Convex.may_meet`."""
+        """
+        Which spheres may reach into the window, likewise: see :meth:`Convex.may_meet`.
+
+        Parameters
+        ----------
+        points : ndarray, shape (N, 3)
+            Their centres, in the dump's coordinates.
+        radius : ndarray, shape (N,)
+            Their radii.
+        packing : Packing
+            Whose cell repeats, if it does.
+
+        Returns
+        -------
+        ndarray of bool, shape (N,)
+        """
         branch = self._nearest(points, packing)
         meets = self.shape.may_meet(branch, radius)
         if self.shape.is_sphere or packing.cell is None or not packing.is_periodic:
@@ -53,12 +106,24 @@ class Window:
             meets[left] = self.shape.may_meet(branch[left] + shift, radius[left])
         return meets
 
+    def __post_init__(self) -> None:
+        """PackingError if the centre is no point."""
+        object.__setattr__(self, "center", cast("center", self.center, np.float64, (3,)))
+
+    def __repr__(self) -> str:
+        return f"Window: {self.shape} about {spelt_place(self.center)} (dump's unit)"
+
     def __str__(self) -> str:
         return f"RV ({self.shape} about {np.round(self.center, 9).tolist()})"
 
     def check_fits(self, packing: Packing) -> None:
         """
         Make sure that no two images of a grain have their centres in the window.
+
+        Parameters
+        ----------
+        packing : Packing
+            Whose cell repeats, if it does.
 
         Raises
         ------
@@ -90,9 +155,20 @@ class Window:
 
     def branches(self, points: FloatArray, packing: Packing) -> FloatArray:
         """
-        From the centre to an image of each point, shape (N, 3).
+        From the window's centre to an image of each point.
 
         To the image that lies in the window, if there is one; else to the nearest.
+
+        Parameters
+        ----------
+        points : ndarray, shape (N, 3)
+            Dump's coordinates.
+        packing : Packing
+            Whose cell repeats, if it does.
+
+        Returns
+        -------
+        ndarray, shape (N, 3)
         """
         branch = self._nearest(points, packing)
         if packing.cell is None or not packing.is_periodic:

@@ -12,6 +12,7 @@ from typing import Any
 from scanfab.base.errors import PackingError, SettingsError
 from scanfab.base.note import Note, tell
 from scanfab.base.option import options_of, refuse_unknown
+from scanfab.base.spelling import counted
 from scanfab.io.series import Series
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample
@@ -33,6 +34,7 @@ from scanfab.pipeline.settings import AUTO_RULE, Length, Settings
 from scanfab.pipeline.tolerance import TOLERANCE_MISSED, missing_work
 from scanfab.pipeline.values import SHAPES
 from scanfab.scan.directions import direction_rule
+from scanfab.table.plots import Plots
 from scanfab.table.table import Row
 
 __all__ = ["Calibration", "calibrate"]
@@ -55,14 +57,47 @@ ROUNDS = 5
 
 @dataclass(frozen=True)
 class Calibration:
-    """What :func:`calibrate` finds."""
+    """
+    What :func:`calibrate` finds.
+
+    ``Table(found.rows)`` shows all steps.
+
+    Attributes
+    ----------
+    rows : tuple of StepRow
+        All steps of all ladders, then the recommended settings.
+    findings : tuple of str
+        One sentence for each ladder, and one for the recommended settings.
+    options : dict
+        The recommended settings by the names of their options.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab import Packing, Table, calibrate
+    >>> grid = np.stack(np.meshgrid(*3 * [np.arange(6.0)]), axis=-1).reshape(-1, 3)
+    >>> packing = Packing(grid, 0.5)
+    >>> found = calibrate(packing, variants="c", tolerance=0.01, rv=0.6, contact_tolerance=1e-4)
+    >>> sorted(found.options)
+    ['directions', 'spacing']
+    >>> len(Table(found.rows)) == len(found.rows)
+    True
+    """
 
     rows: tuple[StepRow, ...]
-    """All steps of all ladders, then the recommended settings."""
     findings: tuple[str, ...]
-    """One sentence for each ladder, and one for the recommended settings."""
     options: dict[str, str]
-    """The recommended settings by the names of their options."""
+
+    def __repr__(self) -> str:
+        steps = counted(len(self.rows), "step of a variant", "steps of variants")
+        options = ", ".join(f"{name}={value!r}" for name, value in self.options.items())
+        lines = [*self.findings, f"recommended: {options}"]
+        return "\n  ".join([f"Calibration: {steps}", *lines])
+
+    @property
+    def plot(self) -> Plots:
+        """Its figure: ``found.plot.calibration(ax=ax, ladder="cutoff")``."""
+        return Plots(self.rows, "calibration")
 
 
 def calibrate(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -16,14 +16,23 @@ from scanfab.base.errors import (
 )
 from scanfab.base.note import SKIPPED, Note, tell
 from scanfab.io.reader import Carries
-from scanfab.io.series import Series
+from scanfab.io.series import ENDLESS, Series
 from scanfab.packing.boundary import enclosing_class, existing_values
 from scanfab.packing.doubts import cell_doubt, doubts_of
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample, SampleRule
 from scanfab.pipeline.settings import Settings
+from scanfab.pipeline.values import as_written
 
-__all__ = ["Frames", "Readable", "Source", "boundary_hints", "chosen_frames", "sample_rule"]
+__all__ = [
+    "Frames",
+    "Readable",
+    "Source",
+    "boundary_hints",
+    "chosen_frames",
+    "of_whole",
+    "sample_rule",
+]
 
 
 Source = Packing | Series | Iterable[Packing]
@@ -120,12 +129,19 @@ class Frames:
             raise SettingsError(
                 f"expected a Packing, a Series or an iterable of packings, found {source!r}"
             )
-        self.source = source if isinstance(source, Series) else _Stream(source)
-        self.settings = settings
+        self.source: Series | _Stream
+        if isinstance(source, Series):
+            self.source, self.settings = of_whole(source, settings)
+        else:
+            self.source, self.settings = _Stream(source), settings
         self.name = self.source.name
         self.particles = 0
         """Of the frames that were read on the way to the first that has grains."""
         self._ready: dict[int, Sample | None] = {}
+
+    def __repr__(self) -> str:
+        source, chosen = self.source, as_written(self.settings.frames)
+        return f"Frames {chosen} of {source!r}"
 
     def __iter__(self) -> Iterator[tuple[int, Readable]]:
         """All frames with their numbers, not read."""
@@ -253,9 +269,9 @@ class Frames:
         count = self.source.count() if isinstance(self.source, _Stream) else len(list(self.source))
         name, frames = self.name or "the packing", self.settings.frames
         has = "1 frame, 0" if count == 1 else f"{count} frames, 0 to {count - 1}"
-        parts = [frames.start, frames.stop, *([] if frames.step is None else [frames.step])]
-        spelt = ":".join("" if part is None else str(part) for part in parts)
-        return SettingsError(f"frames: the series has no frame in {spelt}: {name} has {has}")
+        return SettingsError(
+            f"frames: the series has no frame in {as_written(frames)}: {name} has {has}"
+        )
 
 
 def sample_rule(settings: Settings) -> SampleRule:
@@ -267,13 +283,32 @@ def sample_rule(settings: Settings) -> SampleRule:
 
 def chosen_frames(source: Iterable[Any], frames: slice) -> range:
     """The frames to compute, in the order of the source."""
+    chosen = _numbers(source, frames)
+    return chosen if chosen.step > 0 else chosen[::-1]
+
+
+def _numbers(source: Iterable[Any], frames: slice) -> range:
+    if isinstance(source, Series):
+        return source.numbers_of(frames)
     bounds = (frames.start, frames.stop, frames.step)
     if any(bound is not None and bound < 0 for bound in bounds):
-        chosen = range(sum(1 for _ in source))[frames]
-        return chosen if chosen.step > 0 else chosen[::-1]
-    # without counting the frames first: a dump may hold very many
-    endless = 2**62
-    return range(endless)[frames]
+        return range(sum(1 for _ in source))[frames]
+    # without counting the frames first: they may still come
+    return range(ENDLESS)[frames]
+
+
+def of_whole(series: Series, settings: Settings) -> tuple[Series, Settings]:
+    """
+    The whole of a series of which some frames are given, and settings that choose these.
+
+    Which frames are asked for decides neither RV, rmin nor L0, whichever way it is said.
+    """
+    if series.is_whole:
+        return series, settings
+    chosen = chosen_frames(series, settings.frames)
+    stop = None if chosen.stop >= ENDLESS else chosen.stop
+    step = None if chosen.step == 1 else chosen.step
+    return series.whole, replace(settings, frames=slice(chosen.start, stop, step))
 
 
 def boundary_hints(sample: Sample, settings: Settings) -> list[Note]:

@@ -11,7 +11,8 @@ from typing import Annotated
 from scanfab.base.column import LENGTH
 from scanfab.base.errors import PackingError, ReadError, ScanfabNote
 from scanfab.base.note import tell
-from scanfab.io.series import Frame, Series
+from scanfab.io.frame import Frame
+from scanfab.io.series import Series
 from scanfab.packing.doubts import cell_doubt, cell_hint, doubts_of, refuse_impossible
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import SurfaceBox, Window
@@ -86,7 +87,7 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
     """
     frames, found = Frames(series, settings), False
     window: Window | None = None
-    for number, frame in enumerate(series):
+    for number, frame in enumerate(series.whole):
         if number in frames.chosen:
             found = True
             sample, told = _read(frames, frame)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,11 +16,12 @@ from scanfab.base.typing import FloatArray
 from scanfab.packing.sample import Sample, Variant
 from scanfab.pipeline.plan import CLOSE, Plan
 from scanfab.pipeline.settings import AUTO_RULE
+from scanfab.pipeline.solids import solids_of
 from scanfab.pipeline.tolerance import scan_to_tolerance
 from scanfab.scan.directions import DirectionRule, design_of, direction_rule
 from scanfab.scan.gaps import Blocks, GapSums, scan_gaps
 from scanfab.scan.scan import ScanSums
-from scanfab.scan.solids import CellGrains, Solids, most_lines
+from scanfab.scan.solids import Solids, most_lines
 
 __all__ = ["Measurement", "measure"]
 
@@ -46,7 +48,7 @@ class Measurement:
     plan: Plan
     """With the rule and the spacing as they were in the end."""
     solids: Solids
-    """What the lines met."""
+    """What the lines met; their origin is the centre of the RV, or of the grains without one."""
     sums: ScanSums
     gaps: GapSums | None
     """All gaps of the same lines, where more than one cut-off or moment is asked for."""
@@ -71,8 +73,8 @@ class Measurement:
         """
         What a few lines of a variant meet, to be looked at.
 
-        Positions (N, 3) and radii (N,) of its solids, and what its lines are clipped to, if
-        anything. Of a periodic whole that is a sphere, a part of it.
+        Positions (N, 3) from the solids' origin and radii (N,) of its solids, and what its lines
+        are clipped to, if anything. Of a periodic whole that is a sphere, a part of it.
         """
         solids, medium = self.solids, self.solids.medium
         position, radius, removed = solids.position, solids.radius, solids.removed
@@ -85,63 +87,70 @@ class Measurement:
         solid = ~removed if variant.without_rattlers else np.ones(len(radius), bool)
         return position[solid], radius[solid], window
 
+    def at_cutoffs(self, cutoffs: Iterable[float]) -> Measurement:
+        """The same lines evaluated with other cut-offs, in the dump's unit."""
+        plan = replace(self.plan, cutoffs=tuple(sorted(cutoffs)), lists_gaps=True)
+        placed, sums = _about(self.solids.origin, self.blocks), self.sums
+        gaps = _every_gap(self.solids, placed, sums, plan)
+        blocked = _blocked_gaps(self.solids, placed, self.block_rule, sums, plan)
+        return replace(self, plan=plan, gaps=gaps, blocked=blocked)
+
 
 def measure(sample: Sample, plan: Plan, where: str = "the frame") -> Measurement:
     """Scan one frame that has grains; ``where`` names it where progress is told."""
-    if plan.window is not None:
-        plan.window.check_fits(sample.packing)
-    solids, origin = _solids(sample, plan)
+    solids = solids_of(sample, plan.window, variants=plan.variants)
     sums, plan, notes = scan_to_tolerance(solids, plan, where)
     blocks = _blocks(sample, plan)
-    lines: dict[str, Any] = {
+    placed = _about(solids.origin, blocks)
+    gaps = _every_gap(solids, placed, sums, plan) if plan.lists_gaps else None
+    block_rule = _block_rule(solids)
+    blocked = _blocked_gaps(solids, placed, block_rule, sums, plan)
+    return Measurement(sample, plan, solids, sums, gaps, blocked, block_rule, blocks, tuple(notes))
+
+
+def _every_gap(
+    solids: Solids, blocks: tuple[Blocks, Blocks], sums: ScanSums, plan: Plan
+) -> GapSums:
+    """All gaps of the lines that the sums are of, at the plan's cut-offs."""
+    return scan_gaps(
+        solids,
+        plan.rule,
+        spacing=plan.spacing,
+        replicates=range(sums.replicates),
+        **_lines(blocks, plan),
+    )
+
+
+def _blocked_gaps(
+    solids: Solids, blocks: tuple[Blocks, Blocks], rule: DirectionRule, sums: ScanSums, plan: Plan
+) -> GapSums:
+    """Gaps of fewer lines, for the sample's scatter."""
+    return scan_gaps(
+        solids,
+        rule,
+        spacing=_block_spacing(solids, rule, sums, plan),
+        replicates=range(BLOCK_REPLICATES),
+        **_lines(blocks, plan),
+    )
+
+
+def _lines(blocks: tuple[Blocks, Blocks], plan: Plan) -> dict[str, Any]:
+    """What both lists of gaps are made with."""
+    return {
         "cutoffs": plan.cutoffs,
-        "blocks": tuple(Blocks(one.matrix, one.shift + one.matrix @ origin) for one in blocks),
+        "blocks": blocks,
         "variants": plan.variants,
         "seed": plan.seed,
         "workers": plan.workers,
         # what these scans take is known from the one before them
         "most_steps": math.inf,
     }
-    gaps: GapSums | None = None
-    if plan.lists_gaps:
-        every = range(sums.replicates)
-        gaps = scan_gaps(solids, plan.rule, spacing=plan.spacing, replicates=every, **lines)
-    block_rule = _block_rule(solids)
-    blocked = scan_gaps(
-        solids,
-        block_rule,
-        spacing=_block_spacing(solids, block_rule, sums, plan),
-        replicates=range(BLOCK_REPLICATES),
-        **lines,
-    )
-    return Measurement(sample, plan, solids, sums, gaps, blocked, block_rule, blocks, tuple(notes))
 
 
-def _solids(sample: Sample, plan: Plan) -> tuple[Solids, FloatArray]:
-    """
-    The spheres that the lines may meet: all grains, or those that reach into the RV.
-
-    And the origin of their positions in the dump's coordinates.
-    """
-    packing, window = sample.packing, plan.window
-    position, radius = packing.position[sample.grains], packing.radius[sample.grains]
-    removed = sample.rattlers[sample.grains]
-    origin = position.mean(axis=0) if window is None else window.center
-    position = position - origin
-    shape = None if window is None else window.shape
-    reach = 0.0 if shape is None else shape.reach
-    if packing.cell is not None and packing.is_periodic:
-        medium: CellGrains | None = None
-        if plan.needs_whole:
-            vectors, periodic = packing.cell.short_vectors, np.array(packing.cell.periodic)
-            position = np.ascontiguousarray(position)
-            medium = CellGrains(position, radius, removed, vectors, periodic)
-        images, row = packing.cell.images_near_origin(position, radius + reach)
-        return Solids(images, radius[row], removed[row], shape, medium), origin
-    if shape is not None and not plan.needs_whole:
-        near = shape.may_meet(position, radius)
-        position, radius, removed = position[near], radius[near], removed[near]
-    return Solids(position, radius, removed, shape), origin
+def _about(origin: FloatArray, blocks: tuple[Blocks, Blocks]) -> tuple[Blocks, Blocks]:
+    """Blocks of the dump's coordinates as blocks of places from an origin."""
+    whole, window = (replace(one, shift=one.shift + one.matrix @ origin) for one in blocks)
+    return whole, window
 
 
 def _blocks(sample: Sample, plan: Plan) -> tuple[Blocks, Blocks]:

@@ -11,6 +11,15 @@ from scanfab.pipeline.settings import Settings
 
 __all__ = ["DECLARED", "MEANINGS", "OPTIONS", "OUTPUT_OPTIONS", "as_options"]
 
+
+def _figures() -> list[str]:
+    """All that compute draws; those of compare are among them."""
+    # what looks for plugins takes a moment to load
+    from scanfab.table.plots import figures_of
+
+    return [*figures_of("table"), *figures_of("frames")]
+
+
 OUTPUT_OPTIONS = (
     Option(
         name="output",
@@ -75,9 +84,7 @@ OUTPUT_OPTIONS = (
         "one page); of the first and last frame rose (or rose:30,60,90 for these polar angles), "
         "projection, histogram or cutoffs.",
         metavar="NAME",
-        choices=lambda: (
-            "evolution", "normalised", "correlation", "rose", "projection", "histogram", "cutoffs",
-        ),
+        choices=_figures,
     ),
 )  # fmt: skip
 
@@ -99,14 +106,27 @@ COMPARING_OPTIONS = (
     ),
 )
 
+VIEWING_OPTIONS = (
+    Option(
+        name="screenshot",
+        group="output",
+        help="Write a picture instead of opening a window; needs no screen.",
+        kind=Path,
+        metavar="FILE.png",
+    ),
+)
+
 OPTIONS = {one.name: one for one in (*READING_OPTIONS, *options_of(Settings), *OUTPUT_OPTIONS)}
 """The options of compute by name."""
 
 MEANINGS = {name: one.meaning for name, one in OPTIONS.items() if one.meaning}
 """What each option means that decides a result, in the words of the report."""
 
-DECLARED = {**OPTIONS, **{one.name: one for one in COMPARING_OPTIONS}}
-"""Those of ``compare`` too."""
+DECLARED = {
+    **OPTIONS,
+    **{one.name: one for one in (*COMPARING_OPTIONS, *VIEWING_OPTIONS)},
+}
+"""Those of ``compare`` and ``view`` too."""
 NAMES = "|".join(DECLARED)
 
 

@@ -80,11 +80,6 @@ class Plan:
     notes: tuple[Note, ...] = ()
     """What is doubtful about the settings, for a user who has chosen them."""
 
-    @property
-    def needs_whole(self) -> bool:
-        """Whether a variant of the whole sample is asked for."""
-        return "a" in self.variants or "b" in self.variants
-
     def in_frame(self, sample: Sample) -> Plan:
         """The plan with the window as it lies in a frame."""
         if self.window is None or self.deformation is None:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.base.errors import ReadError, SettingsError
+from scanfab.base.spelling import shortest
 from scanfab.io.opening import READING, open_sources
 from scanfab.io.series import Series
 from scanfab.pipeline.manifest import asked_for
@@ -150,7 +151,7 @@ def _spell(name: str, value: Any) -> Any:
     if name == "columns" and not isinstance(value, dict):
         raise TypeError
     if name == "axis" and isinstance(value, list):
-        return ",".join(map(_number, value))
+        return ",".join(map(shortest, value))
     if name == "cutoffs" and isinstance(value, list):
         return ",".join(_length(one) for one in value)
     if isinstance(value, dict) and {"value", "unit"} <= set(value):
@@ -163,7 +164,7 @@ def _spell(name: str, value: Any) -> Any:
 
 
 def _length(value: Mapping[str, Any]) -> str:
-    return f"{_number(value['value'])}{value['unit']}"
+    return f"{shortest(value['value'])}{value['unit']}"
 
 
 def _words(option: str, name: str, value: Any) -> list[str]:
@@ -177,12 +178,7 @@ def _words(option: str, name: str, value: Any) -> list[str]:
     if name == "boundary":
         return [word for rule in value for word in (option, rule)]
     if isinstance(value, tuple):
-        return [option, *map(_number, value)]
+        return [option, *map(shortest, value)]
     # a value that starts with a dash would be taken for an option
-    text = _number(value) if isinstance(value, float) else str(value)
+    text = shortest(value) if isinstance(value, float) else str(value)
     return [f"{option}={text}"] if text.startswith("-") else [option, text]
-
-
-def _number(value: float) -> str:
-    """As short as reads back the same."""
-    return f"{value:g}" if float(f"{value:g}") == value else repr(float(value))

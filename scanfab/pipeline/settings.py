@@ -23,6 +23,7 @@ from scanfab.pipeline.values import (
     Axis,
     Length,
     Vector,
+    as_written,
     parse_axis,
     parse_boundary,
     parse_cutoff,
@@ -64,6 +65,11 @@ class Settings:
 
     Settings are made of the options of :func:`scanfab.compute`, written as there; the attributes
     are what they mean, with lengths in the dump's unit.
+
+    Parameters
+    ----------
+    **options
+        Those of :func:`scanfab.compute`.
 
     Raises
     ------
@@ -378,6 +384,15 @@ class Settings:
         shaped = self.rv_shape != "sphere" or self.rv_follows != "none"
         return ("window_alpha_vs_axial",) if shaped and self.needs_window else ()
 
+    def __repr__(self) -> str:
+        usual = Settings()
+        chosen = [
+            f"{one.name}={as_written(getattr(self, one.name))!r}"
+            for one in options_of(type(self))
+            if getattr(self, one.name) != getattr(usual, one.name)
+        ]
+        return f"Settings({', '.join(chosen)})"
+
     @property
     def lists_gaps(self) -> bool:
         """Whether sums for one cut-off do not suffice."""
@@ -392,8 +407,3 @@ class Settings:
     def needs_window(self) -> bool:
         """Whether a variant of the RV is asked for."""
         return "c" in self.variants or "d" in self.variants
-
-    @property
-    def needs_whole(self) -> bool:
-        """Whether a variant of the whole sample is asked for."""
-        return "a" in self.variants or "b" in self.variants

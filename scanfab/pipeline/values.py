@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from scanfab.base.errors import SettingsError
 from scanfab.base.option import number, one_of, unusable, whole
+from scanfab.base.spelling import shortest
 
 if TYPE_CHECKING:
     # their modules need numpy, for which the help of a command does not wait
@@ -78,6 +79,29 @@ class Length:
     def resolve(self, radii: dict[str, float]) -> float:
         """The length in the dump's unit."""
         return self.value * (radii[self.unit] if self.unit else 1.0)
+
+
+def as_written(value: Any) -> Any:
+    """
+    What users write for a value of an option, from which the same is read again.
+
+    Examples
+    --------
+    >>> from scanfab.pipeline.values import Length, as_written
+    >>> as_written(Length(0.5, "rmin")), as_written(slice(2, None))
+    ('0.5rmin', '2:')
+    """
+    if isinstance(value, Length):
+        return f"{shortest(value.value)}{value.unit}" if value.unit else value.value
+    if isinstance(value, slice):
+        parts = [value.start, value.stop, *([] if value.step is None else [value.step])]
+        return ":".join("" if part is None else str(part) for part in parts)
+    if isinstance(value, Axis):
+        return next((name for name, axis in AXES.items() if axis == value), tuple(value))
+    if isinstance(value, tuple):
+        return [as_written(one) for one in value]
+    # of a boundary rule its text, of a rule of directions its name
+    return getattr(value, "text", getattr(value, "name", value))
 
 
 def parse_length(name: str, text: str | float | Length) -> Length:

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import SettingsError
+from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray
 
 __all__ = ["DirectionRule", "design_of", "direction_rule"]
@@ -32,21 +33,43 @@ class DirectionRule:
     A set of axes with weights that sum to 1: a quadrature rule for even functions on the sphere.
 
     n and -n are one line, so an axis stands for both.
+
+    Parameters
+    ----------
+    name : str
+        As users write it, for instance ``lebedev:11``.
+    axes : ndarray
+        Unit vectors, shape (D, 3), dimensionless.
+    weights : ndarray
+        Weights, shape (D,), sum 1, dimensionless.
+    degree : int or None
+        Exact for polynomials to this degree; None if for no degree worth the name.
+    turned : bool, optional
+        Whether replicates turn the rule at random; a literal grid is only shifted.
+
+    Examples
+    --------
+    >>> from scanfab import direction_rule
+    >>> rule = direction_rule("lebedev:11")
+    >>> rule
+    DirectionRule lebedev:11: 25 axes, exact to degree 11
+    >>> rule.axes.shape, round(float(rule.weights.sum()), 12)
+    ((25, 3), 1.0)
     """
 
     name: str
-    """As users write it, for instance ``lebedev:11``."""
     axes: FloatArray
-    """Unit vectors, shape (D, 3), dimensionless."""
     weights: FloatArray
-    """Weights, shape (D,), sum 1, dimensionless."""
     degree: int | None
-    """Exact for polynomials to this degree; None if for no degree worth the name."""
     turned: bool = True
-    """Whether replicates turn the rule at random; a literal grid is only shifted."""
 
     def __len__(self) -> int:
         return len(self.axes)
+
+    def __repr__(self) -> str:
+        degree = "of no degree" if self.degree is None else f"exact to degree {self.degree}"
+        bias = f", bias {self.bias:.2g}" if self.bias > 1e-9 else ""
+        return f"DirectionRule {self.name}: {counted(len(self), 'axis', 'axes')}, {degree}{bias}"
 
     @cached_property
     def isotropic_tensor(self) -> FloatArray:
@@ -79,6 +102,11 @@ def direction_rule(text: str) -> DirectionRule:
         ``equal-angle:STEP`` (the printed ranges of Eq. 1 of the 2017 paper, unit weights),
         ``equal-angle-full:STEP`` (the half sphere, unit weights); steps in degrees.
 
+    Returns
+    -------
+    DirectionRule
+        Its axes, their weights, and to which degree it is exact.
+
     Raises
     ------
     SettingsError
@@ -86,9 +114,19 @@ def direction_rule(text: str) -> DirectionRule:
 
     Notes
     -----
-    Lebedev rules: SciPy. Designs: antipodal spherical designs, equal weights, after Womersley
-    (2018), doi:10.1007/978-3-319-72456-0_57, computed for this package. A degree without a rule
-    is rounded up to the next that has one.
+    Designs are antipodal, with equal weights, and computed for this package. A degree without a
+    rule is rounded up to the next that has one.
+
+    References
+    ----------
+    Lebedev rules, from SciPy: V. I. Lebedev and D. N. Laikov, A quadrature formula for the sphere
+    of the 131st algebraic order of accuracy, Doklady Mathematics 59(3), 477-481, 1999.
+
+    Designs: R. S. Womersley, Efficient spherical designs with good geometric properties, 2018,
+    doi:10.1007/978-3-319-72456-0_57.
+
+    Equal angles: Theocharis, Vairaktaris and Dafalias, 3D scan line method for identifying void
+    fabric of granular materials, Powders and Grains 2017, EPJ Web of Conferences 140.
 
     Examples
     --------

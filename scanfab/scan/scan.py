@@ -11,6 +11,7 @@ import numpy as np
 
 from scanfab.base.errors import SettingsError
 from scanfab.base.jit import Flag
+from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.kernels import sweep
@@ -46,38 +47,58 @@ class ScanSums:
 
     A segment counts in ``length`` and ``segments`` if it is kept, that is not shorter than the
     cut-off; ``void`` is the length of all. Lengths in the dump's unit.
+
+    Attributes
+    ----------
+    axes : ndarray
+        Unit vectors, shape (R, D, 3).
+    length : ndarray
+        Sum of the lengths of the kept segments, shape (R, 4, D).
+    segments : ndarray of int
+        Number of the kept segments, shape (R, 4, D).
+    lines : ndarray of int
+        Lines that meet the window (for the whole: any solid), shape (R, 4, D).
+    void : ndarray
+        Length of all void in the window, kept or not, shape (R, 4, D). For a periodic whole that in
+        the measured length of its lines; 0 for an open one.
+    line_length : ndarray
+        Length of the lines in the window, shape (R, 4, D); for the whole likewise.
+    chords : ndarray of int
+        Chords that all spheres together cut from the lines, shape (R,); of spheres that few lines
+        meet, at times as many as are to be expected.
+    channels : ndarray of int
+        Lines of the whole that meet no grain however far they go, shape (R, 4, D).
+    steps : ndarray of int
+        Steps of following lines through a periodic medium, beyond what is listed of it, shape (R,).
+        A line makes one for each grain of each cell that it crosses; a step costs about as much as
+        a chord.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab import Solids, direction_rule, scan_lines, sphere
+    >>> solids = Solids(np.zeros((1, 3)), np.ones(1), np.zeros(1, bool), window=sphere(2.0))
+    >>> sums = scan_lines(solids, direction_rule("3"), spacing=0.5, cutoff=0.0, variants="c")
+    >>> sums.segments.shape, bool((sums.length <= sums.void).all())
+    ((16, 4, 3), True)
     """
 
     axes: FloatArray
-    """Unit vectors, shape (R, D, 3)."""
     length: FloatArray
-    """Sum of the lengths of the kept segments, shape (R, 4, D)."""
     segments: IntArray
-    """Number of the kept segments, shape (R, 4, D)."""
     lines: IntArray
-    """Lines that meet the window (for the whole: any solid), shape (R, 4, D)."""
     void: FloatArray
-    """
-    Length of all void in the window, kept or not, shape (R, 4, D).
-
-    For a periodic whole that in the measured length of its lines; 0 for an open one.
-    """
     line_length: FloatArray
-    """Length of the lines in the window, shape (R, 4, D); for the whole likewise."""
     chords: IntArray
-    """
-    Chords that all spheres together cut from the lines, shape (R,); of spheres that few lines meet,
-    at times as many as are to be expected.
-    """
     channels: IntArray
-    """Lines of the whole that meet no grain however far they go, shape (R, 4, D)."""
     steps: IntArray
-    """
-    Steps of following lines through a periodic medium, beyond what is listed of it, shape (R,).
 
-    A line makes one for each grain of each cell that it crosses; a step costs about as much as a
-    chord.
-    """
+    def __repr__(self) -> str:
+        sums = zip("abcd", self.segments.sum((0, 2)), self.lines.sum((0, 2)), strict=True)
+        told = [f"{name} {kept} on {counted(lines, 'line')}" for name, kept, lines in sums if lines]
+        axes = counted(self.axes.shape[1], "axis", "axes")
+        head = f"ScanSums: {counted(self.replicates, 'replicate')} of {axes}"
+        return f"{head}; segments kept: {', '.join(told) or 'none'}"
 
     @property
     def work(self) -> IntArray:
@@ -90,13 +111,38 @@ class ScanSums:
         return len(self.axes)
 
     def kept(self, variant: str) -> tuple[FloatArray, IntArray]:
-        """Lengths and numbers of one variant's kept segments, shapes (R, D)."""
+        """
+        What is kept of one variant, as :func:`scanfab.void_fabric` takes it.
+
+        Parameters
+        ----------
+        variant : str
+            One of a, b, c, d.
+
+        Returns
+        -------
+        length : ndarray, shape (R, D)
+            Sum of the lengths of the kept segments, dump's length unit.
+        segments : ndarray of int, shape (R, D)
+            Number of the kept segments.
+        """
         which = "abcd".index(variant)
         return self.length[:, which], self.segments[:, which]
 
     @classmethod
     def concatenate(cls, parts: Iterable[ScanSums]) -> ScanSums:
-        """All replicates of several scans."""
+        """
+        All replicates of several scans.
+
+        Parameters
+        ----------
+        parts : iterable of ScanSums
+            Along as many axes each.
+
+        Returns
+        -------
+        ScanSums
+        """
         parts = list(parts)
         return cls(
             *(
@@ -189,6 +235,7 @@ def scan_lines(
     Returns
     -------
     ScanSums
+        Lengths and numbers of the segments of each replicate, variant and axis.
 
     Raises
     ------

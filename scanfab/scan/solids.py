@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from scanfab.base.convex import Convex
-from scanfab.base.errors import SettingsError
+from scanfab.base.errors import PackingError, SettingsError
+from scanfab.base.spelling import counted
 from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.kernels.windows import Clip
@@ -35,18 +38,64 @@ class Solids:
     The spheres that lines meet, and the window; lengths in the dump's unit.
 
     Positions are relative to the window's origin, the centre of a sphere.
+
+    Parameters
+    ----------
+    position : array_like, shape (N, 3)
+        Centres, from the window's origin.
+    radius : array_like, shape (N,)
+        Radii.
+    removed : array_like of bool, shape (N,)
+        Spheres that the variants b and d leave out.
+    window : Convex, optional
+        What the lines of c and d are clipped to; None if these are not scanned.
+    medium : CellGrains, optional
+        The grains of a periodic packing, each once, if its whole is scanned, which has no edge.
+    origin : array_like, optional
+        Where the origin of these positions lies in the dump's coordinates, shape (3,).
+
+    Raises
+    ------
+    PackingError
+        If the shapes do not fit.
+
+    Examples
+    --------
+    >>> from scanfab import Solids, sphere
+    >>> Solids([[0, 0, 0], [2, 0, 0]], [1, 1], [False, True], window=sphere(3.0))
+    Solids: 2 spheres, 1 of them void in b and d, window of radius 3
     """
 
     position: FloatArray
-    """Shape (N, 3)."""
     radius: FloatArray
-    """Shape (N,)."""
     removed: BoolArray
-    """Spheres that the variants b and d leave out, shape (N,)."""
     window: Convex | None = None
-    """What the lines of c and d are clipped to; None if these are not scanned."""
     medium: CellGrains | None = None
-    """The grains of a periodic packing, each once, if its whole is scanned, which has no edge."""
+    origin: FloatArray = field(default_factory=lambda: np.zeros(3))
+
+    def __post_init__(self) -> None:
+        """Cast without a copy; PackingError if the shapes do not fit."""
+        count = np.size(self.radius)
+        kinds: dict[str, tuple[type, tuple[int, ...]]] = {
+            "position": (np.float64, (count, 3)),
+            "radius": (np.float64, (count,)),
+            "removed": (np.bool_, (count,)),
+            "origin": (np.float64, (3,)),
+        }
+        for name, (kind, shape) in kinds.items():
+            array: npt.NDArray[Any] = np.asarray(getattr(self, name), kind)
+            if array.shape != shape:
+                raise PackingError(f"solids: {name}: expected shape {shape}, found {array.shape}")
+            object.__setattr__(self, name, array)
+
+    def __repr__(self) -> str:
+        removed = int(np.sum(self.removed))
+        what = [counted(len(self.radius), "sphere")]
+        what += [f"{removed} of them void in b and d"] if removed else []
+        if self.medium is not None:
+            what.append(f"a periodic whole of {counted(len(self.medium.radius), 'grain')}")
+        what.append("no window" if self.window is None else f"window of {self.window}")
+        return f"Solids: {', '.join(what)}"
 
     @property
     def reach(self) -> float:

@@ -127,7 +127,7 @@ def _tell_of_few_frames(rows: Sequence[Mapping[str, Any]], strain_max: float) ->
         left = len(strains) - len(beyond)
         if left < FEWEST_FRAMES and beyond:
             warnings.warn(
-                f"strain-max: {strain_max:g} leaves {left} of {len(strains)} frames of {source}, "
+                f"strain_max: {strain_max:g} leaves {left} of {len(strains)} frames of {source}, "
                 f"and a line needs {FEWEST_FRAMES}: the nearest strain above is {beyond[0]:.10g}",
                 ScanfabWarning,
                 stacklevel=4,

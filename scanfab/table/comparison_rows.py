@@ -103,14 +103,38 @@ class DifferenceRow(Record):
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """The tables that :func:`scanfab.compare_tables` makes."""
+    """
+    The tables that :func:`scanfab.compare_tables` makes.
+
+    Attributes
+    ----------
+    frames : tuple of FrameRow
+        A row for each frame and variant, with both anisotropies divided by their largest.
+    summary : tuple of SummaryRow
+        A row for each source and variant: slope, peak, final value.
+    differences : tuple of DifferenceRow
+        A row for each frame and pair of variants.
+    points : tuple of ndarray
+        For each row of the summary, contact and void anisotropy of the frames in its fits, shape
+        (frames, 2).
+
+    Examples
+    --------
+    >>> from scanfab import Table
+    >>> rows = [dict(source="s", frame=k, strain=0.01 * k, variant="c", alpha_vs_axial=0.1 * x,
+    ...              alpha_c_axial=x) for k, x in enumerate([0.0, 0.02, 0.05])]
+    >>> found = Table(rows).compare()
+    >>> found
+    Comparison of 3 rows
+    s, variant c: slope 0.1, 3 frames
+    >>> round(float(found.slope[0]), 12)
+    0.1
+    """
 
     frames: tuple[FrameRow, ...]
     summary: tuple[SummaryRow, ...]
     differences: tuple[DifferenceRow, ...]
     points: tuple[FloatArray, ...]
-    """For each row of the summary, contact and void anisotropy of the frames in its fits, shape
-    (frames, 2)."""
 
     @property
     def slope(self) -> FloatArray:

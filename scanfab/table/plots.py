@@ -1,55 +1,88 @@
 """
-The figures of a table, found where they register: under the entry point ``scanfab.figures``.
+The figures that are installed, and those of some data: ``table.plot``.
 
-A figure is a function of a table and of matplotlib's Axes, which it draws on and gives back; the
-table knows no figure itself, so that more of them can come from anywhere.
+Each is a class that registers under the entry point ``scanfab.figures``, so that this room needs no
+drawing, and more of them can come from anywhere; :mod:`scanfab.viz.figures.figure` says how.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import cache, partial
+from collections.abc import Callable
+from functools import cache
+from inspect import Parameter, Signature, signature
 from typing import Any
 
 from scanfab.base.column import no_column
+from scanfab.base.option import refuse_unknown
 from scanfab.base.plugins import load_plugins
 
-__all__ = ["Plots", "installed_figures"]
+__all__ = ["Plots", "figures_of", "installed_figures"]
 
 GROUP = "scanfab.figures"
 
 
 @cache
-def installed_figures() -> dict[str, Callable[..., Any]]:
-    """The figures of tables by name."""
-    return load_plugins(GROUP, "figure")
+def installed_figures() -> dict[str, Any]:
+    """The classes of all figures by name, those of the package first."""
+    found = load_plugins(GROUP, "figure", _figure)
+    return dict(sorted(found.items(), key=lambda one: one[1].order))
+
+
+def figures_of(kind: str) -> dict[str, Any]:
+    """Those of a kind of data: ``table``, ``frames`` or ``calibration``."""
+    return {name: one for name, one in installed_figures().items() if one.kind == kind}
+
+
+def _figure(plugin: Any) -> Any:
+    if not hasattr(plugin, "kind") or not hasattr(plugin, "order"):
+        raise TypeError("expected a subclass of scanfab.viz.figures.figure.Figure")
+    return plugin
 
 
 class Plots:
     """
-    The figures of one table: ``table.plot.evolution(ax=ax)``.
+    The figures of some data: ``table.plot.evolution(ax=ax)``.
 
-    Each takes ``ax``, the Axes to draw on (its own in a new figure by default), and gives it back.
+    Each takes ``ax``, the Axes to draw on (its own in a new figure by default), and gives it back;
+    given a matplotlib Figure or SubFigure instead, it draws all its panels there.
 
     Examples
     --------
     >>> import scanfab
     >>> table = scanfab.load("sample_data/yade_triaxial/engine.csv")
-    >>> "evolution" in dir(table.plot)
-    True
+    >>> table.plot
+    Plots(evolution, normalised, correlation)
     """
 
-    def __init__(self, rows: Sequence[Mapping[str, Any]]) -> None:
-        self._rows = rows
+    def __init__(self, data: Any, kind: str) -> None:
+        self._data = data
+        self._kind = kind
 
     def __getattr__(self, name: str) -> Callable[..., Any]:
-        figures = installed_figures()
+        if name.startswith("_"):
+            raise AttributeError(name)
+        figures = figures_of(self._kind)
         if name not in figures:
             raise AttributeError(no_column(name, figures).replace("column", "figure"))
-        return partial(figures[name], self._rows)
+        return _plot(name, figures[name], self._data)
 
     def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *installed_figures()]
+        return [*super().__dir__(), *figures_of(self._kind)]
 
     def __repr__(self) -> str:
-        return f"Plots({', '.join(installed_figures())})"
+        return f"Plots({', '.join(figures_of(self._kind))})"
+
+
+def _plot(name: str, figure: Any, data: Any) -> Callable[..., Any]:
+    """A function of the Axes and of the figure's options, which a notebook shows with its help."""
+    options = [*signature(figure).parameters.values()][1:]
+
+    def plot(ax: Any = None, **given: Any) -> Any:
+        refuse_unknown(f"the figure {name}", given, [option.name for option in options])
+        return figure(data, **given).on(ax)
+
+    axes = Parameter("ax", Parameter.POSITIONAL_OR_KEYWORD, default=None)
+    named = [one.replace(kind=Parameter.KEYWORD_ONLY) for one in options]
+    plot.__name__, plot.__doc__ = name, figure.__doc__
+    plot.__signature__ = Signature([axes, *named])  # type: ignore[attr-defined]
+    return plot

@@ -24,6 +24,11 @@ def read_rows(path: Path | str) -> list[dict[str, Any]]:
     path : path
         A file, or ``-`` for standard input.
 
+    Returns
+    -------
+    list of dict
+        :func:`scanfab.load` makes a table of them.
+
     Raises
     ------
     ReadError

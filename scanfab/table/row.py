@@ -109,11 +109,35 @@ class Row(Mapping[str, Any]):
         return hash(tuple(self._values.values()))
 
     def get(self, name: str, default: Any = None) -> Any:
-        """The value of a column that need not exist."""
+        """
+        The value of a column that need not exist.
+
+        Parameters
+        ----------
+        name : str
+            Of the column.
+        default : object, optional
+            In place of a column that does not exist.
+
+        Returns
+        -------
+        object
+        """
         return self._values.get(name, default)
 
     def with_values(self, **values: Any) -> Self:
-        """The same row with other values, or with more columns behind."""
+        """
+        The same row with other values, or with more columns behind.
+
+        Parameters
+        ----------
+        **values
+            By the names of the columns.
+
+        Returns
+        -------
+        Row
+        """
         return type(self)(**{**self._values, **values})
 
     def __setattr__(self, name: str, value: Any) -> NoReturn:

@@ -127,7 +127,7 @@ class Table(Sequence[Row]):
     @property
     def plot(self) -> Plots:
         """The figures that are installed: ``table.plot.evolution(ax=ax)`` draws one on its Axes."""
-        return Plots(self)
+        return Plots(self, "table")
 
     def select(self, **wanted: Any) -> Table:
         """
@@ -248,7 +248,12 @@ class Table(Sequence[Row]):
 
     def to_pandas(self) -> pandas.DataFrame:
         """
-        The table as a data frame of pandas; missing numbers are NaN.
+        The table as a data frame of pandas.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Missing numbers are NaN.
 
         Raises
         ------
@@ -263,7 +268,12 @@ class Table(Sequence[Row]):
 
     def to_polars(self) -> polars.DataFrame:
         """
-        The table as a data frame of polars; missing values are null.
+        The table as a data frame of polars.
+
+        Returns
+        -------
+        polars.DataFrame
+            Missing values are null.
 
         Examples
         --------

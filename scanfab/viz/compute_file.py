@@ -13,6 +13,7 @@ from scanfab.io.grain_files import PathLike, expanded
 from scanfab.io.opening import READING, open_sources
 from scanfab.io.options import take_reading
 from scanfab.io.series import Series
+from scanfab.pipeline.frames import of_whole
 from scanfab.pipeline.job import Job
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.told import recorded
@@ -107,7 +108,7 @@ def compute_file(
     refuse_unknown("compute_file", options, known)
     with recorded() as told:
         series, sources, reading = _opened(source, options)
-        settings = Settings(**options)
+        series, settings = _whole(series, Settings(**options))
         columns = table_columns(settings.more_columns)
         excerpt = Excerpt.make(columns, fields, digits)
         folders = () if vtk is None else vtk_folders(Path(vtk), len(series), settings, go_on=resume)
@@ -148,6 +149,18 @@ def _opened(
     sources = [os.fspath(path) for one in given for path in expanded(one)]
     reading = take_reading(options)
     return open_sources(sources, **reading), sources, reading
+
+
+def _whole(series: Sequence[Series], settings: Settings) -> tuple[list[Series], Settings]:
+    """Whole series, and settings that choose the frames of the parts that were given."""
+    found = [of_whole(one, settings) for one in series]
+    chosen = found[0][1]
+    if any(one.frames != chosen.frames for _, one in found):
+        raise SettingsError(
+            "the series of one table are to be parts of the same frames, as its manifest names "
+            "them once: compute them into tables of their own"
+        )
+    return [one for one, _ in found], chosen
 
 
 def _opened_before(

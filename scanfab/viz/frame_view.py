@@ -12,7 +12,7 @@ from scanfab.base.errors import (
     SettingsError,
 )
 from scanfab.base.note import Note, tell
-from scanfab.io.series import Frame, Series
+from scanfab.io.series import Series
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.frames import Frames
 from scanfab.pipeline.plan import Plan, make_plan
@@ -63,7 +63,8 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
     """
     # of damaged frames only the one asked for counts
     frames = Frames(series, replace(settings, on_error="skip"))
-    number, frame = _frame(series, number)
+    frame = series[number]
+    number = frame.number
     sample = frames.read(frame)
     tell(frames.notes(frame, sample))
     found = frames.first()
@@ -77,19 +78,6 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
     strains = _strains(number, sample, first, settings)
     column = _strain_column(frames, strains, first, settings)
     return Look(scene, number, sample, strains, first, plan, column)
-
-
-def _frame(series: Series, number: int) -> tuple[int, Frame]:
-    """The frame, and its number from 0."""
-    count = 0
-    wanted = number
-    if number < 0:
-        count = sum(1 for _ in series)
-        wanted = number + count
-    for count, frame in enumerate(series, start=1):
-        if count == wanted + 1:
-            return wanted, frame
-    raise ReadError(f"{series.name}: has {count} frames, there is no frame {number}")
 
 
 def _plan(first: Sample, settings: Settings) -> Plan | None:

@@ -22,7 +22,7 @@ from scanfab.scan.lines import line_triads
 from scanfab.scan.segments import Segments, sample_segments
 from scanfab.table.table import Row
 from scanfab.viz import vtk_files as vtk
-from scanfab.viz.scene import contact_lines, grains_of, scene_of
+from scanfab.viz.scene import contact_lines, grains_of
 
 __all__ = ["VtkFolder", "scan_line_sample", "vtk_folders"]
 
@@ -81,7 +81,7 @@ class VtkFolder:
         fields = _fields([row])
         if result.measurement is None:
             return
-        center = scene_of(result.sample, result.measurement.plan.window).center
+        center = result.measurement.solids.origin
         lines = scan_line_sample(result, row.variant, self.axis)
         mesh = vtk.line_mesh(lines, result.measurement.plan.cutoff)
         self._save(f"lines-{row.variant}", mesh, result, fields)
@@ -133,8 +133,7 @@ def scan_line_sample(
     # along the axis, and along the first direction across it
     frames = np.stack([frame, np.roll(frame, -1, axis=0)])
     found = sample_segments(position, radius, frames, lines, window)
-    center = scene_of(result.sample, result.scanned.plan.window).center
-    return replace(found, ends=found.ends + center)
+    return replace(found, ends=found.ends + result.scanned.solids.origin)
 
 
 def _time(result: FrameResult) -> float:

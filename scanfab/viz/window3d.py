@@ -43,7 +43,7 @@ def check_screen() -> None:
     ):
         raise ScanfabError(
             "this machine has no screen for a window (DISPLAY is not set): "
-            "write a picture with --screenshot FILE.png"
+            'write a picture instead: `screenshot="FILE.png"`'
         )
 
 

@@ -17,10 +17,11 @@ from scanfab.io.opening import read_series
 from scanfab.pipeline.strain import shear_strain
 from scanfab.table.compare import compare_tables
 from scanfab.table.reading import read_rows
-from scanfab.viz.figures.fitted import fits_of, plot_rows
+from scanfab.viz.figures.correlation import fits_of
 from scanfab.viz.overlay import add_words
 from tests.conftest import ROOT, SAMPLE
 from tests.helpers.dumps import cubic_rows, dump_text, write
+from tests.helpers.figures import save_rows
 from tests.helpers.tables import curve
 
 FAST = ["--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac"]
@@ -45,7 +46,7 @@ def test_compute_draws_its_table(series, tmp_path):
     table, plot = tmp_path / "t.csv", tmp_path / "t.svg"
     assert run(["compute", series, *FAST, "-o", str(table), "--plot", str(plot)]) == 0
     again = tmp_path / "again.svg"
-    plot_rows(again, read_rows(table))
+    save_rows(again, read_rows(table))
     assert plot.read_bytes() == again.read_bytes()
 
 
@@ -125,7 +126,7 @@ def test_wrong_usage_is_told_before_the_work(series, table, words, message, comm
 
 def test_polar_angles_are_checked_before_the_work(series, capsys):
     assert run(["compute", series, "--plot", "x.png", "--figure", "rose:95"]) == 2
-    assert "polar angles lie above 0 and up to 90" in capsys.readouterr().err
+    assert "polar angles above 0 and up to 90" in capsys.readouterr().err
 
 
 def test_figures_of_frames_are_of_one_series(series, tmp_path, capsys):
@@ -338,6 +339,7 @@ def test_without_a_screen_view_says_what_to_do(series):
     answer = scanfab("view", series)
     assert answer.returncode == 1
     assert "has no screen" in answer.stderr
+    assert "write a picture instead: --screenshot FILE.png" in answer.stderr
     assert "--screenshot" in answer.stderr
 
 

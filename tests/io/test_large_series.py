@@ -8,7 +8,7 @@ import weakref
 import pytest
 
 import scanfab
-from scanfab.io import series as series_module
+from scanfab.io import frame as frame_module
 from scanfab.pipeline.compute import compute_rows
 from scanfab.pipeline.settings import Settings
 from tests.helpers.dumps import cubic_rows, dump_text, write
@@ -35,7 +35,7 @@ def packings(monkeypatch):
             super().__init__(*words, **named)
             found.append(weakref.ref(self))
 
-    monkeypatch.setattr(series_module, "Packing", Watched)
+    monkeypatch.setattr(frame_module, "Packing", Watched)
     return found
 
 

@@ -278,8 +278,3 @@ def test_centres_are_wrapped_into_the_cell(x):
 def test_centres_are_not_wrapped_along_vectors_that_do_not_repeat():
     packing = Packing([[6.0, -3.0, 0]], 1.0, cell=Cell([5.7, 9, 9], (True, False, False)))
     np.testing.assert_allclose(packing.position, [[0.3, -3.0, 0]])
-
-
-def test_a_packing_says_what_it_is():
-    assert repr(Packing(ROW, 1.0, step=5)) == "Packing(grains=3, contacts=unknown, step=5)"
-    assert "contacts=1" in repr(Packing(ROW, 1.0, contacts=[[0, 1]]))

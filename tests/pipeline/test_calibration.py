@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from scanfab import (
     Packing,
@@ -22,6 +23,8 @@ from scanfab.pipeline.calibration_ladders import (
     sentence_of_recommended,
 )
 from scanfab.table.columns import columns_of
+from scanfab.viz.figures.calibration import Ladders
+from scanfab.viz.figures.page import drawn_page, save_figures
 from tests.helpers.lattices import shaken_cubic
 
 QUICK = {"tolerance": 2e-3, "variants": "cd", "rv": 0.6, "workers": 1}
@@ -196,26 +199,20 @@ def test_steps_beyond_the_budget_are_left_out_with_a_word(packing):
 
 
 def test_figure_has_four_panels_with_labels(found, tmp_path):
-    from scanfab.viz.figures.calibration import plot_calibration
-
     for suffix, start in ((".png", b"\x89PNG"), (".svg", b"<?xml"), (".pdf", b"%PDF")):
-        plot_calibration(found.rows, tmp_path / f"ladders{suffix}")
+        save_figures(tmp_path / f"ladders{suffix}", [Ladders(found.rows)])
         assert (tmp_path / f"ladders{suffix}").read_bytes().startswith(start)
     with pytest.raises(SettingsError, match=r"figures can be written as \.png"):
-        plot_calibration(found.rows, tmp_path / "ladders.doc")
+        save_figures(tmp_path / "ladders.doc", [Ladders(found.rows)])
     assert math.isfinite(found.rows[-1].seconds)
 
 
-def test_figure_has_letters_total_errors_and_words(found, tmp_path, monkeypatch):
-    from scanfab.viz.figures import calibration as plot_calibration
-
-    drawn = []
-    monkeypatch.setattr(plot_calibration, "save_figure", lambda figure, _: drawn.append(figure))
-    plot_calibration.plot_calibration(found.rows, tmp_path / "ladders.png")
-    panels = drawn[0].axes
+def test_figure_has_letters_total_errors_and_words(found):
+    with drawn_page([Ladders(found.rows)]) as page:
+        panels = page.axes
     assert [axes.get_title(loc="left") for axes in panels] == ["(a)", "(b)", "(c)", "(d)"]
     assert all(axes.get_ylabel().endswith(", axial") for axes in panels)
-    note = drawn[0].legends[0].get_title().get_text()
+    note = page.legends[0].get_title().get_text()
     assert note.startswith(f"frame {found.rows[0].frame}\nbands: one total standard error")
     row = next(r for r in found.rows if r.ladder == "rv" and r.alpha_vs_axial_sample_se is not None)
     half = 1e3 * math.hypot(row.alpha_vs_axial_se, row.alpha_vs_axial_sample_se)
@@ -228,25 +225,32 @@ def test_figure_has_letters_total_errors_and_words(found, tmp_path, monkeypatch)
     assert any(height == pytest.approx(2 * half) for height in heights)
 
 
-def test_steps_of_one_replicate_have_no_band(found, tmp_path, monkeypatch):
+def test_steps_of_one_replicate_have_no_band(found, monkeypatch):
     """Of the sample's part alone it claimed to be of both, about a value that was far off."""
-    from scanfab.viz.figures import calibration as plot_calibration
-
-    drawn, bands = [], []
-    monkeypatch.setattr(plot_calibration, "save_figure", lambda figure, _: drawn.append(figure))
-    monkeypatch.setattr(plot_calibration, "band", lambda *asked: bands.append(asked))
+    bands = []
+    monkeypatch.setattr("scanfab.viz.figures.calibration.band", lambda *asked: bands.append(asked))
     rows = [
         replace(row, alpha_vs_axial_se=None) if (row.ladder, row.value) == ("spacing", 4) else row
         for row in found.rows
     ]
     assert any(row.alpha_vs_axial_sample_se for row in rows if row.alpha_vs_axial_se is None)
-    plot_calibration.plot_calibration(rows, tmp_path / "ladders.png")
+    with drawn_page([Ladders(rows)]) as page:
+        pass
     for panel, values, _, errors, _ in bands[:2]:
-        assert panel is drawn[0].axes[0]
+        assert panel is page.axes[0]
         assert np.isnan(errors[values == 4]).all()
         assert np.isfinite(errors[values < 2]).all()
-    note = drawn[0].legends[0].get_title().get_text()
+    note = page.legends[0].get_title().get_text()
     assert "\nno band where either part is not known\n" in note
+
+
+def test_one_ladder_is_drawn_on_the_axes_that_it_gets(found):
+    ax = Figure().subplots()
+    assert found.plot.calibration(ax=ax, ladder="cutoff") is ax
+    assert ax.get_xlabel() == "cut-off $c/r_{min}$"
+    assert [text.get_text() for text in ax.get_legend().get_texts()] == ["variant c", "variant d"]
+    with pytest.raises(SettingsError, match=r"ladder: expected spacing, .* found 'lines'"):
+        found.plot.calibration(ax=ax, ladder="lines")
 
 
 def test_what_looks_wrong_in_the_frame_is_told_here_too(packing):

@@ -7,15 +7,18 @@ import io
 
 import numpy as np
 import pytest
+from scanfab.viz.figures.scanned import scan_frames
 
 import scanfab
 from scanfab.base.errors import ScanfabWarning, SettingsError
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 from scanfab.pipeline.compute import compute_rows
+from scanfab.pipeline.frames import Frames
 from scanfab.pipeline.settings import Settings
 from scanfab.table.formats.text import TextWriter
 from scanfab.table.table import COLUMNS
+from scanfab.viz.frame_view import look_at
 from tests.helpers.dumps import dump_text, pairs_text, write, yade_spheres
 
 SCAN = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin"}
@@ -193,6 +196,48 @@ def test_no_frames_at_all_are_an_error(shrinking, frames):
     found = rf"^frames: the series has no frame in .*: {shrinking.name} has 4 frames, 0 to 3$"
     with pytest.raises(SettingsError, match=found):
         scanfab.compute(shrinking, frames=frames, **SCAN)
+
+
+@pytest.mark.parametrize(
+    ("part", "frames", "alone"),
+    [
+        (slice(1, 3), None, "1:3"),
+        (slice(-2, None), None, "-2:"),
+        (slice(None, None, 2), None, "::2"),
+        (slice(1, None), "1:", "2:"),
+        (slice(1, None), "-1:", "-1:"),
+        (slice(0, 3), "::-1", "0:3"),
+    ],
+)
+def test_a_part_of_a_series_has_the_rows_of_its_frames(shrinking, part, frames, alone):
+    """Strain, RV and rmin as well: they are those of the first frame of the whole."""
+    series = shrinking
+    own = scanfab.compute(series[part], frames=frames, **SCAN)
+    assert own == scanfab.compute(series, frames=alone, **SCAN)
+    assert len(own) > 0
+
+
+def test_a_part_looks_for_its_first_frame_with_grains_in_the_whole(shrinking):
+    """As calibrate and view do, whose frame is one of the part."""
+    frames = Frames(shrinking[1:3], Settings(frames=slice(-1, None)))
+    assert [number for number, _ in frames.due()] == [2]
+    assert frames.first()[0] == 0
+    look = look_at(shrinking[1:3], Settings(**SCAN), -1)
+    whole = look_at(shrinking, Settings(**SCAN), 2)
+    assert look.number == whole.number == 2
+    assert look.plan.window.radius == whole.plan.window.radius
+    assert look.strains == whole.strains
+
+
+def test_figures_of_a_part_are_of_its_frames(shrinking):
+    table = scanfab.compute(shrinking[1:3], variants="c", **SCAN)
+    drawn = scan_frames(shrinking[1:3], Settings(variants="c", **SCAN), table)
+    assert [one.number for one in drawn.results] == [1, 2]
+
+
+def test_no_frames_of_a_part_are_an_error(shrinking):
+    with pytest.raises(SettingsError, match="the series has no frame in"):
+        scanfab.compute(shrinking[1:1], **SCAN)
 
 
 def test_a_packing_is_frame_zero():

@@ -111,3 +111,12 @@ def test_every_value_is_plain(tmp_path):
 def test_frames_that_do_not_exist_are_an_error(tmp_path):
     with pytest.raises(scanfab.SettingsError, match="no frame in 99:100"):
         reports(tmp_path, [dump_text()], frames="99")
+
+
+def test_a_part_of_a_series_is_reported_as_its_frames_among_all(tmp_path):
+    texts = [dump_text(step=step) for step in range(4)]
+    write(tmp_path / "dump.txt", "".join(texts))
+    series = scanfab.read_series(tmp_path)
+    every = list(inspect_series(series, Settings()))
+    assert list(inspect_series(series[1:3], Settings())) == every[1:3]
+    assert list(inspect_series(series[1:], Settings(frames="-1"))) == every[3:]

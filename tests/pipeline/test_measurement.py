@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from scanfab import (
     Cell,
@@ -169,3 +170,36 @@ def test_a_window_made_up_of_half_spaces_is_measured_like_any_other(packing):
     along, across = found.sums.line_length[:, 2].mean(), plan.spacing**2
     assert along * across == pytest.approx(8 * 1.0 * 1.5 * 2.0, rel=0.01)
     assert sample.counted(VARIANTS["c"], window).sum() == window.shape.contains(position).sum()
+
+
+def measured(packing, **words):
+    sample, settings = Sample(packing, np.zeros(len(packing), bool)), Settings(**words)
+    return measure(sample, make_plan(settings, sample))
+
+
+@pytest.mark.parametrize("variants", ["ab", "abcd"])
+def test_the_origin_leads_back_to_the_coordinates_of_the_dump(packing, variants):
+    """Of the positions of the solids; where there is no RV it is the middle of the grains."""
+    found = measured(packing, **LINES, variants=variants, rv_center=(1.5, 1.0, 1.25))
+    center = packing.position.mean(axis=0) if variants == "ab" else (1.5, 1.0, 1.25)
+    assert found.solids.origin == pytest.approx(center)
+    for variant in variants:
+        position, radius, _ = found.spheres_of(VARIANTS[variant])
+        placed = np.column_stack([position + found.solids.origin, radius])
+        rows = np.column_stack([packing.position, packing.radius])
+        near = cKDTree(rows).query(placed)[0]
+        assert near == pytest.approx(np.zeros(len(placed)), abs=1e-12)
+
+
+def test_other_cut_offs_of_the_same_lines_are_those_of_a_scan_with_all_of_them(packing):
+    """To the last bit: nothing but the cut-offs is another."""
+    words = {"variants": "cd", "tolerance": 5e-3, "cutoff": 0.3}
+    found = measured(packing, **words)
+    again = found.at_cutoffs([0.6, 0.3, 0.0])
+    whole = measured(packing, **words, cutoffs="0,0.3,0.6")
+    assert again.plan.cutoffs == whole.plan.cutoffs
+    assert again.plan.spacing == whole.plan.spacing
+    for name in ("gaps", "blocked"):
+        one, other = getattr(again, name), getattr(whole, name)
+        for part in ("cutoffs", "number", "length", "square"):
+            assert np.array_equal(getattr(one, part), getattr(other, part))

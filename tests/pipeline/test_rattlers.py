@@ -87,7 +87,7 @@ def test_calibrate_takes_the_rule_too(series):
     lines = {"variants": "b", "tolerance": 0.1, "cutoff": "0.1rmin", "max_chords": 1e5}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of a sample as small as this
-        found = [calibrate(series, Settings(rattlers=rule, **lines)) for rule, _ in EXPECTED]
+        found = [calibrate(series, rattlers=rule, **lines) for rule, _ in EXPECTED]
     lengths = [[row.mean_length for row in one.rows if row.ladder == "cutoff"] for one in found]
     assert len({steps[0] for steps in lengths} - {None}) == len(EXPECTED)
 

@@ -118,13 +118,9 @@ def test_variants_are_always_in_the_same_order():
     assert Settings(variants="aab").variants == "ab"
 
 
-@pytest.mark.parametrize(
-    ("variants", "window", "whole"),
-    [("ab", False, True), ("cd", True, False), ("ad", True, True)],
-)
-def test_variants_say_what_is_needed(variants, window, whole):
-    settings = Settings(variants=variants)
-    assert (settings.needs_window, settings.needs_whole) == (window, whole)
+@pytest.mark.parametrize(("variants", "window"), [("ab", False), ("cd", True), ("ad", True)])
+def test_variants_say_what_is_needed(variants, window):
+    assert Settings(variants=variants).needs_window == window
 
 
 def test_directions_are_a_number_a_rule_or_auto():

@@ -165,7 +165,7 @@ def test_a_largest_strain_that_leaves_out_all_frames_is_a_warning():
 
 
 def test_a_largest_strain_that_leaves_too_few_frames_names_the_next_strain():
-    message = "strain-max: 0.01 leaves 2 of 5 frames of .*, and a line needs 3: .* above is 0.02$"
+    message = "strain_max: 0.01 leaves 2 of 5 frames of .*, and a line needs 3: .* above is 0.02$"
     with pytest.warns(ScanfabWarning, match=message):
         assert summary_of(curve(), strain_max=0.01).slope is None
 

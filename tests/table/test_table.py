@@ -331,6 +331,8 @@ def test_figures_draw_on_the_axes_that_they_get(results):
     assert ax.lines[0].get_ydata() == pytest.approx([0, 1, 2])
     with pytest.raises(SettingsError, match="of: expected voids or contacts, found 'both'"):
         results.plot.evolution(ax=ax, of="both")
+    with pytest.raises(TypeError, match="the figure evolution has no option 'fo': there are of"):
+        results.plot.evolution(ax=ax, fo="contacts")
     with pytest.raises(AttributeError, match="there is no figure 'evolutoin': did you mean evol"):
         results.plot.evolutoin()
 
@@ -344,14 +346,6 @@ def test_what_cannot_share_one_axes_is_refused(results):
     )
     with pytest.raises(SettingsError, match=r"too many for one Axes: choose some, .*select"):
         mixed.plot.evolution()
-
-
-def test_a_figure_of_another_package_is_found(results, monkeypatch):
-    def count(table, ax=None):
-        return len(table), ax
-
-    monkeypatch.setattr("scanfab.table.plots.installed_figures", lambda: {"count": count})
-    assert results.plot.count(ax="here") == (3, "here")
 
 
 @pytest.mark.parametrize("suffix", [one.suffix for one in OWN_FORMATS if one.suffix != ".jsonl"])

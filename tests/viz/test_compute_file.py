@@ -51,6 +51,26 @@ def manifest_of(output: Path) -> bytes:
     return Path(f"{output}.manifest.json").read_bytes()
 
 
+def test_a_part_of_a_series_makes_the_files_of_its_frames(short_series, tmp_path):
+    """Its first frame is not computed, but RV and rmin are of it."""
+    part, frames = tmp_path / "part.csv", tmp_path / "frames.csv"
+    series = scanfab.read_series(short_series)
+    from_python(part, series[1:3])
+    from_python(frames, series, frames="1:3")
+    assert part.read_bytes() == frames.read_bytes()
+    assert manifest_of(part) == manifest_of(frames)
+    from_python(part, series[1:], resume=True)
+    from_python(frames, series, frames="1:")
+    assert part.read_bytes() == frames.read_bytes()
+
+
+def test_parts_of_different_frames_make_no_table(short_series, tmp_path):
+    other = shutil.copytree(short_series, tmp_path / "other")
+    series = [scanfab.read_series(short_series)[1:], scanfab.read_series(other)[:2]]
+    with pytest.raises(scanfab.SettingsError, match="parts of the same frames"):
+        from_python(tmp_path / "fabric.csv", series)
+
+
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_table_and_manifest_are_those_of_the_command(short_series, tmp_path, capsys, suffix):
     ours, other = tmp_path / f"ours{suffix}", tmp_path / f"other{suffix}"

@@ -14,9 +14,9 @@ from scanfab.base.errors import ReadError
 from scanfab.base.lengths import all_within
 from scanfab.base.typing import FloatArray
 from scanfab.io.reader import GrainTable, ReadOptions
+from scanfab.packing.bodies import CLUMP_COLUMNS
 from scanfab.packing.boundary import CLASS_COLUMNS
 from scanfab.packing.cell import Cell
-from scanfab.packing.doubts import CLUMP_COLUMNS
 from scanfab.packing.packing import LazyColumns, lies_within
 
 __all__ = [

@@ -1,30 +1,25 @@
-"""The ladders of a calibration as a figure of four panels."""
+"""The figure calibration: void anisotropy over each ladder, in four panels."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.errors import SettingsError
 from scanfab.table.curves import short_names
 from scanfab.table.reading import total_error
-from scanfab.viz.figures.style import (
-    LOOKS,
-    VOID_AXIAL,
-    VOID_UNIT,
-    WIDTH,
-    band,
-    check_plot_file,
-    letter,
-    new_figure,
-    plain,
-    save_figure,
-)
+from scanfab.viz.figures.figure import Figure
+from scanfab.viz.figures.style import LOOKS, VOID_AXIAL, VOID_UNIT, WIDTH, band, plain
 
-__all__ = ["plot_calibration"]
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Page
+    from matplotlib.figure import SubFigure
+
+__all__ = ["Ladders"]
 
 # ladder: label of the axis, whether it is logarithmic, and the paper's choice
 PANELS: dict[str, tuple[str, bool, float | None]] = {
@@ -35,38 +30,63 @@ PANELS: dict[str, tuple[str, bool, float | None]] = {
 }
 
 
-def plot_calibration(rows: Sequence[Any], path: Path) -> None:
+class Ladders(Figure):
     """
-    Draw alpha_vs_axial over each ladder: bands are total standard errors, bars the scan's part.
+    Void anisotropy over each ladder of a calibration.
+
+    Bands are total standard errors, bars the scan's part.
 
     Parameters
     ----------
-    rows : sequence of StepRow
+    data : sequence of StepRow
         Of :func:`scanfab.calibrate`; lengths of the axes are relative to r_min.
-    path : Path
-        ``.png``, ``.svg`` or ``.pdf``.
+    ladder : str, optional
+        ``"spacing"``, ``"directions"``, ``"cutoff"`` or ``"rv"``, for one Axes.
 
     Raises
     ------
     SettingsError
-        If the file's name ends otherwise.
+        If there is no such ladder.
     """
-    check_plot_file(path)
-    with new_figure(WIDTH, 5.2) as figure:
-        panels = figure.subplots(2, 2).ravel()
+
+    kind = "calibration"
+    order = 8
+    lettered = True
+
+    def __init__(self, data: Sequence[Any], ladder: str = "spacing") -> None:
+        super().__init__(data)
+        if ladder not in PANELS:
+            raise SettingsError(f"ladder: expected {', '.join(PANELS)}, found {ladder!r}")
+        self.ladder = ladder
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Of two rows."""
+        return WIDTH, 5.2
+
+    def draw(self, ax: Axes) -> None:
+        """One of the ladders."""
+        _draw(ax, self._steps(self.ladder), self.ladder)
+        ax.legend()
+
+    def panels(self, part: Page | SubFigure) -> list[Axes]:
+        """All four."""
+        panels: list[Axes] = part.subplots(2, 2).ravel().tolist()
         for panel, ladder in zip(panels, PANELS, strict=True):
-            _draw(panel, [row for row in rows if row.ladder == ladder], ladder)
-        letter(panels)
+            _draw(panel, self._steps(ladder), ladder)
         handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(
+        part.legend(
             handles,
             labels,
             loc="outside upper center",
             ncols=4,
-            title=f"{_frame(rows)}bands: one total standard error, of scan and sample together"
-            f"{_missing(rows)}\nbars: the scan's part; dotted: the choice of the 2017 paper",
+            title=f"{_frame(self.data)}bands: one total standard error, of scan and sample together"
+            f"{_missing(self.data)}\nbars: the scan's part; dotted: the choice of the 2017 paper",
         )
-        save_figure(figure, path)
+        return panels
+
+    def _steps(self, ladder: str) -> list[Any]:
+        return [row for row in self.data if row.ladder == ladder]
 
 
 def _frame(rows: Sequence[Any]) -> str:

@@ -1,4 +1,4 @@
-"""Void against contact fabric, with the lines that the comparison fits."""
+"""The figure correlation: void against contact fabric, with the lines that a comparison fits."""
 
 from __future__ import annotations
 
@@ -9,8 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from scanfab.base.typing import FloatArray
-from scanfab.table.curves import Curve
-from scanfab.viz.figures.groups import Drawn, Group
+from scanfab.table.compare import compare_tables
+from scanfab.table.comparison_rows import Comparison, SummaryRow
+from scanfab.table.curves import Curve, is_turned
+from scanfab.table.table import Table
+from scanfab.viz.figures.figure import Figure
+from scanfab.viz.figures.groups import Drawn, Group, group_of, groups_of
+from scanfab.viz.figures.strain_curves import ROW
 from scanfab.viz.figures.style import (
     CONTACT,
     CONTACT_AXIAL,
@@ -20,14 +25,16 @@ from scanfab.viz.figures.style import (
     VOID_AXIAL,
     VOID_INTENSITY,
     VOID_UNIT,
+    WIDTH,
     widen,
 )
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
+    from matplotlib.figure import Figure as Page
+    from matplotlib.figure import SubFigure
 
-__all__ = ["PAPER_SLOPE", "Fit", "draw_correlation", "draw_group"]
+__all__ = ["PAPER_SLOPE", "Correlation", "Fit", "fits_of"]
 
 
 PAPER_SLOPE = 0.096
@@ -46,28 +53,90 @@ class Fit:
     """Their mean contact and void anisotropy, which the line goes through."""
 
 
-def draw_correlation(
-    part: Figure | SubFigure, groups: Sequence[Group], fits: Sequence[Fit | None], turned: bool
-) -> tuple[list[Axes], str]:
+def fits_of(comparison: Comparison) -> list[Fit | None]:
+    """The line of each source and variant as the comparison's summary has it; None without one."""
+    return [
+        _fit(one, points) for one, points in zip(comparison.summary, comparison.points, strict=True)
+    ]
+
+
+def _fit(summary: SummaryRow, points: FloatArray) -> Fit | None:
+    if summary.slope is None:
+        return None
+    middle = points.mean(axis=0)
+    return Fit(
+        slope=summary.slope,
+        slope_se=summary.slope_se,
+        r2=summary.r2,
+        contact=(float(points[:, 0].min()), float(points[:, 0].max())),
+        middle=(float(middle[0]), float(middle[1])),
+    )
+
+
+class Correlation(Figure):
     """
-    A panel for each group, beside it the legend, which has the numbers; and a caption.
+    Void against contact anisotropy, with the lines that the comparison fits.
 
-    Where the axes are turned, the intensities are drawn, of which there is no line.
+    Bars are total standard errors. Where the principal axes are not the loading axis, the
+    intensities are drawn, of which there is no line.
+
+    Parameters
+    ----------
+    data : Table
+        A fabric table; on one Axes of one source, or of one variant.
+    comparison : Comparison, optional
+        Of the same table, with the lines to draw: ``table.compare(strain_max=0.05)``. By default
+        all frames are fitted.
+
+    Raises
+    ------
+    SettingsError
+        If there is nothing to draw, or too much for one Axes.
     """
-    panels = part.subplots(len(groups), 2, squeeze=False, width_ratios=(3, 2))
-    lines: list[str] = []
-    for group, (axes, margin) in zip(groups, panels, strict=True):
-        lines += draw_group(axes, margin, group, fits, turned)
-    what = "intensity" if turned else "anisotropy along the loading axis"
-    drawn = f"with {' and '.join(dict.fromkeys(lines))}" if lines else "without a line"
-    return [axes for axes, _ in panels], f"Void against contact {what}, {drawn}"
+
+    order = 3
+    columns = ("variant", "alpha_vs_axial", "strain", "alpha_c_axial")
+    lettered = True
+
+    def __init__(self, data: Table, comparison: Comparison | None = None) -> None:
+        super().__init__(data)
+        self.groups = groups_of(data)
+        self.turned = is_turned(data)
+        self.fits = fits_of(compare_tables(data) if comparison is None else comparison)
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """A panel for each group, its legend beside it."""
+        return WIDTH, 2.6 + ROW * (len(self.groups) - 1)
+
+    @property
+    def caption(self) -> str:
+        """With which lines there are."""
+        what = "intensity" if self.turned else "anisotropy along the loading axis"
+        fits = [] if self.turned else [fit for fit in self.fits if fit is not None]
+        lines = ["fitted lines"] * bool(fits)
+        lines += ["the paper's slope"] * any(fit.contact[1] > 0 for fit in fits)
+        drawn = f"with {' and '.join(lines)}" if lines else "without a line"
+        return f"Void against contact {what}, {drawn}."
+
+    def draw(self, ax: Axes) -> None:
+        """With the legend in the panel."""
+        _draw_group(ax, None, group_of(self.groups), self.fits, self.turned)
+
+    def panels(self, part: Page | SubFigure) -> list[Axes]:
+        """A panel for each group, beside it the legend, which has the numbers."""
+        panels = part.subplots(len(self.groups), 2, squeeze=False, width_ratios=(3, 2))
+        for group, (axes, margin) in zip(self.groups, panels, strict=True):
+            _draw_group(axes, margin, group, self.fits, self.turned)
+            axes.set_title(group.title, loc="left")
+        return [axes for axes, _ in panels]
 
 
-def draw_group(
+def _draw_group(
     axes: Axes, margin: Axes | None, group: Group, fits: Sequence[Fit | None], turned: bool
-) -> list[str]:
+) -> None:
     """
-    The points and lines of one panel, and which kinds of lines there are.
+    The points and lines of one panel.
 
     The legend stands in the margin, or in the panel itself where there is none.
     """
@@ -75,8 +144,7 @@ def draw_group(
     fitted = [] if turned else [fits[one.place] for one in group.drawn]
     for one in group.drawn:
         _points(axes, one, None if turned else fits[one.place], legend, turned)
-    lines = ["fitted lines"] * any(fit is not None for fit in fitted)
-    lines += ["the paper's slope"] * _paper(axes, fitted, legend)
+    _paper(axes, fitted, legend)
     _errors(group, legend, turned)
     _label(axes, turned)
     title = "intensities" if turned else f"slope of {VOID} on {CONTACT}, axial"
@@ -84,7 +152,6 @@ def draw_group(
         axes.legend(legend.handles, legend.labels, title=title)
     else:
         legend.draw(margin, title)
-    return lines
 
 
 class _Legend:
@@ -142,13 +209,12 @@ def _bars(error: FloatArray) -> FloatArray | None:
     return np.nan_to_num(error) if np.isfinite(error).any() else None
 
 
-def _paper(axes: Axes, fits: Sequence[Fit | None], legend: _Legend) -> bool:
-    """The slope that the paper prints, through the origin; whether it is drawn."""
+def _paper(axes: Axes, fits: Sequence[Fit | None], legend: _Legend) -> None:
+    """The slope that the paper prints, through the origin, as far as there are contacts."""
     reach = max((fit.contact[1] for fit in fits if fit is not None), default=0.0)
     if reach > 0:
         (line,) = axes.plot([0, 1e2 * reach], [0, 1e3 * PAPER_SLOPE * reach], "k:", lw=0.9)
         legend.add(line, f"2017 paper: {PAPER_SLOPE:.3f}")
-    return reach > 0
 
 
 def _errors(group: Group, legend: _Legend, turned: bool) -> None:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from scanfab.table.curves import Curve
+import numpy as np
+
+from scanfab.base.errors import SettingsError
+from scanfab.table.curves import Curve, curves_of
 from scanfab.viz.figures.style import COLOURS, LOOKS, plain
 
-__all__ = ["Drawn", "Group", "grouped"]
+__all__ = ["Drawn", "Group", "group_of", "grouped", "groups_of"]
 
 Look = dict[str, Any]
 
@@ -66,6 +69,24 @@ def grouped(curves: Sequence[Curve]) -> list[Group]:
         _group(_spelt(variant), curves, _of(curves, "variant", variant), _by_source(sources))
         for variant in variants
     ]
+
+
+def groups_of(rows: Sequence[Mapping[str, Any]]) -> list[Group]:
+    """The groups of a table; SettingsError if it has nothing to draw."""
+    curves = curves_of(rows)
+    if not any(np.isfinite(curve.void).any() for curve in curves):
+        raise SettingsError("there is nothing to draw: no row of the table has a void fabric")
+    return grouped(curves)
+
+
+def group_of(groups: Sequence[Group]) -> Group:
+    """The only group; SettingsError if there are several, which one Axes cannot hold."""
+    if len(groups) > 1:
+        raise SettingsError(
+            "several variants of several sources are too many for one Axes: choose some, "
+            'for instance by table.select(variant="c")'
+        )
+    return groups[0]
 
 
 def _of(curves: Sequence[Curve], name: str, value: str) -> list[Curve]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
@@ -25,9 +25,12 @@ __all__ = [
     "CONTACT_AXIAL",
     "CONTACT_INTENSITY",
     "CONTACT_UNIT",
+    "DIRECTIONAL",
     "DPI",
+    "FRAME_LOOKS",
     "LOOKS",
     "PLOT_FORMATS",
+    "STYLE",
     "VOID",
     "VOID_AXIAL",
     "VOID_INTENSITY",
@@ -71,6 +74,15 @@ LOOKS: dict[str, dict[str, Any]] = {
     "c": {"color": COLOURS["vermilion"], "marker": "^", "ls": "-"},
     "d": {"color": COLOURS["green"], "marker": "D", "ls": "--", "mfc": "white", "ms": 5.5},
 }
+
+# of the first and the last frame, where they share a panel
+FRAME_LOOKS: tuple[dict[str, Any], ...] = (
+    {"color": COLOURS["blue"], "marker": "o", "ls": "--", "markerfacecolor": "white"},
+    {"color": COLOURS["vermilion"], "marker": "^", "ls": "-"},
+)
+
+# of panels of directional distributions
+DIRECTIONAL = {"voids": "mean void length", "contacts": "contact normals"}
 
 # the same words in every figure; the columns are alpha_vs_axial, alpha_c_axial, alpha_vs, alpha_c
 VOID, CONTACT = r"$\alpha_{vs}$", r"$\alpha_{c}$"
@@ -155,11 +167,11 @@ def widen(axes: Axes, smallest: float) -> None:
         axes.set_ylim(middle - 0.5 * smallest, middle + 0.5 * smallest)
 
 
-def letter(panels: Iterable[Axes], titles: Sequence[str] = (), first: int = 0) -> None:
+def letter(panels: Iterable[Axes], first: int = 0) -> None:
     """(a), (b) ... above the panels, before their titles; ``first`` panels have letters already."""
-    for place, axes in enumerate(panels):
-        title = titles[place] if place < len(titles) else ""
-        axes.set_title(f"({chr(ord('a') + first + place)}) {title}".rstrip(), loc="left")
+    for place, axes in enumerate(panels, start=first):
+        title = axes.get_title(loc="left")
+        axes.set_title(f"({chr(ord('a') + place)}) {title}".rstrip(), loc="left")
 
 
 def band(axes: Axes, x: FloatArray, y: FloatArray, error: FloatArray, colour: Any) -> None:

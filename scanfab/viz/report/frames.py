@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -15,21 +14,17 @@ from scanfab.packing.window import SurfaceBox
 from scanfab.pipeline.repeat import reopen, restored_settings
 from scanfab.pipeline.settings import Length, Settings
 from scanfab.table.reading import number_of
-from scanfab.viz.figures.of_frames import drawn_histogram, drawn_projection
-from scanfab.viz.figures.scanned import lengths_of, projections_of, scan_frames
-from scanfab.viz.figures.style import figure_bytes
+from scanfab.viz.figures.page import make_figures
 from scanfab.viz.frame_view import Look, look_at
-from scanfab.viz.report.frame_noise import noise_notes
 from scanfab.viz.report.inputs import Input
 from scanfab.viz.report.page import Picture, Shown, view_data
+from scanfab.viz.report.pictures import picture_of
+from scanfab.viz.scanned_frames import ScannedFrames
 
-__all__ = ["data_url", "show_frames"]
+__all__ = ["show_frames"]
 
 # segments of a scan that takes about half a minute: pictures that would need more are rougher
 MOST_SEGMENTS = 3e8
-DPI = 130
-# of pictures with two columns and one, CSS pixels
-WIDE, NARROW = 614, 326
 
 
 def show_frames(one: Input) -> Shown:
@@ -54,11 +49,6 @@ def show_frames(one: Input) -> Shown:
         facts=_facts(look, settings),
         pictures=_pictures(one, series, settings),
     )
-
-
-def data_url(kind: str, data: bytes) -> str:
-    """A file inside the page."""
-    return f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}"
 
 
 def _check_inputs(manifest: Mapping[str, Any]) -> None:
@@ -140,39 +130,21 @@ def _axis(settings: Settings) -> str:
 
 
 def _pictures(one: Input, series: Series, settings: Settings) -> list[Picture]:
-    """Of the first and the last frame, both from one scan."""
-    # the series may be named otherwise if it was opened from another folder
-    rows = [{**row, "source": series.name} for row in one.first_series]
+    """Of the first and the last frame, all from one scan."""
+    rows = one.first_series
     if all(row["alpha_vs_axial"] is None for row in rows):
         return []
     drawn = replace(settings, tolerance=_affordable_tolerance(rows, settings))
-    frames = scan_frames(series, drawn, rows)
-    projections = projections_of(frames)
-    # pixels, as the disks are pixels anyway, and few of them
-    with drawn_projection(projections) as figure:
-        disks = figure_bytes(figure, "png", DPI)
-    with drawn_histogram(lengths_of(frames)) as figure:
-        histogram = figure_bytes(figure, "png", DPI)
-    what = f"variant {frames.variant} of {one.rows[0]['source']}"
     rougher = ""
     if drawn.tolerance > settings.tolerance:
         rougher = (
-            f" Scanned to a standard error of {drawn.tolerance:.2g} instead of the table's "
+            f"Scanned to a standard error of {drawn.tolerance:.2g} instead of the table's "
             f"{settings.tolerance:.2g}, which would take too long for a picture."
         )
-    return [
-        Picture(
-            data_url("image/png", disks),
-            f"Mean void length and contact normals over all directions, {what}. "
-            f"{noise_notes(frames, projections)}{rougher}",
-            WIDE,
-        ),
-        Picture(
-            data_url("image/png", histogram),
-            f"Lengths of the void segments, {what}; those below the cut-off are dropped.",
-            NARROW,
-        ),
-    ]
+    frames = ScannedFrames(series, drawn, rows, rougher)
+    # pixels, as the disks are pixels anyway, and few of them
+    figures = [figure for figure in make_figures(frames, "frames") if not figure.slow]
+    return [picture_of(figure, "png") for figure in figures]
 
 
 def _affordable_tolerance(rows: list[dict[str, Any]], settings: Settings) -> float:

@@ -16,9 +16,9 @@ from scanfab.pipeline.options import as_options
 from scanfab.pipeline.repeat import repeat_command
 from scanfab.table.compare import compare_tables
 from scanfab.table.comparison_rows import Comparison
-from scanfab.viz.figures.fitted import fits_of
+from scanfab.viz.figures.page import make_figures
 from scanfab.viz.report.caveats import caveats_of
-from scanfab.viz.report.frames import data_url, show_frames
+from scanfab.viz.report.frames import show_frames
 from scanfab.viz.report.inputs import Input, read_inputs
 from scanfab.viz.report.page import (
     Content,
@@ -29,24 +29,38 @@ from scanfab.viz.report.page import (
     render_page,
     save_page,
 )
+from scanfab.viz.report.pictures import picture_of
 from scanfab.viz.report.setting_meanings import settings_table
 from scanfab.viz.report.tables import frame_table, input_table, overview, results_tables
 
 __all__ = ["Report", "make_report"]
 
 
-# CSS pixels an inch
-PIXELS = 96
-
-
 @dataclass(frozen=True)
 class Report:
-    """A report on fabric tables, as :func:`make_report` makes it."""
+    """
+    A report on fabric tables, as :func:`make_report` makes it.
+
+    Attributes
+    ----------
+    page : str
+        HTML that needs nothing else.
+    has_void_fabric : bool
+        Whether any row of the tables has one.
+
+    Examples
+    --------
+    >>> from scanfab import Report
+    >>> Report("<!doctype html>" + 2_000_000 * " ", has_void_fabric=True)
+    Report: an HTML page of 2 MB, with void fabric
+    """
 
     page: str = field(repr=False)
-    """HTML that needs nothing else."""
     has_void_fabric: bool
-    """Whether any row of the tables has one."""
+
+    def __repr__(self) -> str:
+        fabric = "with" if self.has_void_fabric else "without any"
+        return f"Report: an HTML page of {len(self.page) / 1e6:.2g} MB, {fabric} void fabric"
 
     def save(self, path: PathLike) -> None:
         """
@@ -119,8 +133,8 @@ def make_report(
     ...     scanfab.Table([row]).save(f"{folder}/fabric.csv")
     ...     report = scanfab.make_report(f"{folder}/fabric.csv", title="A box")
     ...     report.save(f"{folder}/report.html")
-    >>> report
-    Report(has_void_fabric=True)
+    >>> report.has_void_fabric
+    True
     """
     named = [tables] if isinstance(tables, str | os.PathLike) else tables
     heard = _Heard()
@@ -155,21 +169,11 @@ def _usual_title(rows: Sequence[Mapping[str, Any]]) -> str:
 
 def _table_pictures(rows: Sequence[Mapping[str, Any]], comparison: Comparison) -> list[Picture]:
     """The figures of the table; none if it has no void fabric."""
-    from scanfab.viz.figures.of_tables import SIZES, TABLE_FIGURES, draw_table
-    from scanfab.viz.figures.style import figure_bytes, new_figure
-
-    fits = fits_of(comparison)
-    pictures = []
-    for name in TABLE_FIGURES:
-        with new_figure(*SIZES[name]) as figure:
-            try:
-                (caption,) = draw_table(figure, rows, fits, name)
-            except SettingsError:
-                return []
-            url = data_url("image/svg+xml", figure_bytes(figure, "svg"))
-        width = round(PIXELS * SIZES[name][0])
-        pictures.append(Picture(url, f"{caption}.", width))
-    return pictures
+    try:
+        figures = make_figures(rows, "table", comparison=comparison)
+    except SettingsError:
+        return []
+    return [picture_of(one, "svg") for one in figures]
 
 
 def _frame_pictures(sections: Sequence[Section]) -> list[Picture]:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.distribution import HIGHEST_DEGREE, sphere_points
-from scanfab.pipeline.frame import FrameResult
 from scanfab.table.reading import number_of, total_error
-from scanfab.viz.figures.of_frames import Projection
-from scanfab.viz.figures.scanned import CONCENTRATION, ScannedFrames
+from scanfab.viz.figures.hemisphere import CONCENTRATION, Hemisphere
+
+if TYPE_CHECKING:
+    from scanfab.viz.scanned_frames import ScannedFrame
 
 __all__ = ["contact_noise", "noise_notes", "void_noise"]
 
@@ -26,24 +28,24 @@ SCAN_HARMONICS = sum(2 * degree + 1 for degree in range(2, HIGHEST_DEGREE + 1, 2
 CHANCE = 3.0
 
 
-def noise_notes(frames: ScannedFrames, projections: Sequence[Projection]) -> str:
+def noise_notes(frames: Sequence[ScannedFrame], hemispheres: Sequence[Hemisphere]) -> str:
     """
     What chance alone makes of the lobes of each frame, in words.
 
     The error of a lobe is of scan and sample together, as if it were the same in all directions.
     """
     notes = []
-    for result, picture in zip(frames.results, projections, strict=True):
+    for frame, picture in zip(frames, hemispheres, strict=True):
         known = [
             _note(what, error, deviation)
             for what, error, deviation in (
-                ("void lengths", void_noise(result), picture.void),
-                ("contact normals", contact_noise(result), picture.contact),
+                ("void lengths", void_noise(frame.row), picture.voids),
+                ("contact normals", contact_noise(frame.row), picture.contacts),
             )
             if error is not None and deviation is not None
         ]
         if known:
-            notes.append(f"Frame {result.number}: {'; '.join(known)}.")
+            notes.append(f"Frame {frame.number}: {'; '.join(known)}.")
     return " ".join(notes)
 
 
@@ -53,9 +55,8 @@ def _note(what: str, error: float, deviation: FloatArray) -> str:
     return f"{text}, so they are noise" if largest < CHANCE * error else text
 
 
-def void_noise(result: FrameResult) -> float | None:
+def void_noise(row: Mapping[str, Any]) -> float | None:
     """Standard error of a lobe of the mean void length, per cent of the mean."""
-    row = result.rows[0]
     scan, sample = (number_of(row, f"alpha_vs_axial_{part}") for part in ("se", "sample_se"))
     if sample is None:
         return None
@@ -63,9 +64,8 @@ def void_noise(result: FrameResult) -> float | None:
     return 100.0 * math.sqrt(5.0) * math.hypot(*parts)
 
 
-def contact_noise(result: FrameResult) -> float | None:
+def contact_noise(row: Mapping[str, Any]) -> float | None:
     """Standard error of the smoothed density of contact normals, per cent of the mean."""
-    row = result.rows[0]
     alone, error = number_of(row, "alpha_c_axial_se"), total_error(row, "alpha_c_axial")
     if not alone or error is None:
         return None

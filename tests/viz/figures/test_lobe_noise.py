@@ -9,15 +9,13 @@ import pytest
 
 from scanfab.fabric.contact import axial_error
 from scanfab.fabric.distribution import fit_even, sphere_points
-from scanfab.viz.figures.of_frames import Projection
-from scanfab.viz.figures.scanned import _smoothed_density
-from scanfab.viz.report.frame_noise import contact_noise, noise_notes, void_noise
-from tests.viz.figures.test_scanned import disk
+from scanfab.viz.figures.hemisphere import Hemisphere, disk, smoothed_density
+from scanfab.viz.figures.lobe_noise import contact_noise, noise_notes, void_noise
 
 
-def result_of(monkeypatch, number=0, **columns):
+def frame_of(number=0, **columns):
     """A frame of which nothing but some columns of its row is known."""
-    return SimpleNamespace(rows=[columns], number=number)
+    return SimpleNamespace(row=columns, number=number)
 
 
 def unit_vectors(rng, *shape):
@@ -25,7 +23,7 @@ def unit_vectors(rng, *shape):
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
-def test_the_noise_of_the_scan_is_that_of_fits_to_noise(monkeypatch):
+def test_the_noise_of_the_scan_is_that_of_fits_to_noise():
     """Mean lengths that differ from line to line alone, fitted as those of a scan are."""
     rng = np.random.default_rng(1)
     points, weights = sphere_points()
@@ -38,29 +36,28 @@ def test_the_noise_of_the_scan_is_that_of_fits_to_noise(monkeypatch):
         alphas.append(weights @ (deviation * second))
         deviations.append(deviation)
     row = {"alpha_vs_axial_se": float(np.std(alphas)), "alpha_vs_axial_sample_se": 0.0}
-    noise = void_noise(result_of(monkeypatch, **row))
+    noise = void_noise(row)
     assert noise == pytest.approx(100 * np.std(deviations), rel=0.25)
 
 
-def test_the_noise_of_contacts_is_that_of_isotropic_ones(monkeypatch):
+def test_the_noise_of_contacts_is_that_of_isotropic_ones():
     rng = np.random.default_rng(2)
     _, directions = disk()
     some = directions[::8, ::12]
-    deviations = [_smoothed_density(unit_vectors(rng, 500), some) - 1 for _ in range(40)]
+    deviations = [smoothed_density(unit_vectors(rng, 500), some) - 1 for _ in range(40)]
     alone = axial_error(unit_vectors(rng, 500), (0, 0, 1))
     row = {"contacts": 500, "alpha_c_axial_se": alone}
-    noise = contact_noise(result_of(monkeypatch, **row, alpha_c_axial_sample_se=alone))
+    noise = contact_noise({**row, "alpha_c_axial_sample_se": alone})
     assert noise == pytest.approx(100 * np.std(deviations), rel=0.1)
     # as neighbours are not independent, less of it is chance
-    half = contact_noise(result_of(monkeypatch, **row, alpha_c_axial_sample_se=0.5 * alone))
+    half = contact_noise({**row, "alpha_c_axial_sample_se": 0.5 * alone})
     assert half == pytest.approx(0.5 * noise)
 
 
 @pytest.mark.parametrize(("largest", "is_noise"), [(1.0, True), (4.0, False)])
-def test_lobes_below_the_noise_are_called_so(monkeypatch, largest, is_noise):
-    result = result_of(monkeypatch, 3, alpha_vs_axial_se=0.0, alpha_vs_axial_sample_se=2e-3)
-    frames = SimpleNamespace(results=[result])
-    text = noise_notes(frames, [Projection("", np.array([-largest, 0.5]), None)])
+def test_lobes_below_the_noise_are_called_so(largest, is_noise):
+    frame = frame_of(3, alpha_vs_axial_se=0.0, alpha_vs_axial_sample_se=2e-3)
+    text = noise_notes([frame], [Hemisphere("", np.array([-largest, 0.5]), None)])
     assert text.startswith(
         f"Frame 3: lobes of void lengths reach {largest:g} %, one standard error"
     )
@@ -68,7 +65,6 @@ def test_lobes_below_the_noise_are_called_so(monkeypatch, largest, is_noise):
     assert text.endswith("so they are noise.") == is_noise
 
 
-def test_without_the_sample_s_part_nothing_is_said(monkeypatch):
-    result = result_of(monkeypatch, alpha_vs_axial_se=1e-4, alpha_vs_axial_sample_se=None)
-    frames = SimpleNamespace(results=[result])
-    assert noise_notes(frames, [Projection("", np.zeros(2), None)]) == ""
+def test_without_the_sample_s_part_nothing_is_said():
+    frame = frame_of(alpha_vs_axial_se=1e-4, alpha_vs_axial_sample_se=None)
+    assert noise_notes([frame], [Hemisphere("", np.zeros(2), None)]) == ""

@@ -1,0 +1,250 @@
+"""One frame of a series, not read yet: its grains, its contacts, and how they become a packing."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from scanfab.base.errors import PackingError, ReadError, ScanfabNote, ScanfabWarning
+from scanfab.io.families import Family, nearest
+from scanfab.io.reader import (
+    Carries,
+    GrainTable,
+    JoinedContacts,
+    Reader,
+    ReadOptions,
+    Snapshot,
+)
+from scanfab.packing.packing import Packing, check_lengths
+
+if TYPE_CHECKING:
+    from scanfab.io.series import Series
+
+__all__ = ["Frame"]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """
+    One frame of a series, not read yet.
+
+    Attributes
+    ----------
+    series : Series
+        The series, or the part of it, that the frame is of.
+    snapshot : Snapshot
+        Where the frame lies in its file.
+    name_step : int or None
+        The step in the file's name.
+    number : int
+        In the series, from 0.
+    problem : ReadError or None
+        Why not even the frames of the file can be told.
+
+    Examples
+    --------
+    >>> import scanfab
+    >>> series = scanfab.read_series("sample_data/liggghts_periodic/dump_*.txt.gz")
+    >>> frame = series[0]
+    >>> frame.number, frame.step, len(frame.read())
+    (0, 30000, 800)
+    """
+
+    series: Series
+    snapshot: Snapshot
+    name_step: int | None
+    number: int = 0
+    problem: ReadError | None = None
+
+    def __repr__(self) -> str:
+        what = [self.snapshot.path.name, *([] if self.step is None else [f"step {self.step}"])]
+        what += [] if self.problem is None else ["damaged"]
+        return f"Frame {self.number} of {self.series.name}: {', '.join(what)}"
+
+    @property
+    def reader(self) -> Reader:
+        """The reader of the grain file."""
+        assert self.series.grains.reader is not None
+        return self.series.grains.reader
+
+    def read(self) -> Packing:
+        """
+        The frame's packing.
+
+        Returns
+        -------
+        Packing
+            Its contacts are None if no file lists them: :func:`scanfab.find_contacts` finds them.
+
+        Raises
+        ------
+        ReadError
+            If a file is not as it should be.
+        PackingError
+            If its content is no packing.
+        """
+        if self.problem is not None:
+            raise self.problem
+        options = self._options()
+        grains = self.reader.read_grains(self.snapshot, options)
+        with_own = self.series.contacts_from in ("auto", "beside", "grains")
+        own = grains.contacts if with_own else None
+        beside = self.series.contacts_from == "beside"
+        joined = [] if beside and own is not None else self._joined_contacts(grains, options)
+        listed = [part.contacts for part in joined if part.contacts is not None]
+        if own is not None:
+            listed.append(own)
+        if self.series.contacts_from == "grains" and not listed:
+            raise ReadError(
+                f'{self.snapshot.path}: `contacts="file"` was asked for, but there is no '
+                "contact file"
+            )
+        with _named(self.snapshot.path):
+            return Packing(
+                grains.position,
+                grains.radius,
+                id=grains.id,
+                columns=grains.columns,
+                contacts=listed[0] if listed else None,
+                wall_contacts=_wall_contacts(grains, joined, with_own),
+                cell=grains.cell,
+                step=self.step,
+                time=self.snapshot.time,
+            )
+
+    def _joined_contacts(self, grains: GrainTable, options: ReadOptions) -> list[JoinedContacts]:
+        """The contact files of the frame, joined to its grains; one of them lists grain pairs."""
+        files = self._contact_files()
+        if not files:
+            return []
+        # contacts are joined by lengths and ids: what is wrong with those comes first
+        with _named(self.snapshot.path):
+            id = np.arange(len(grains.radius)) if grains.id is None else grains.id
+            check_lengths(grains.position, grains.radius, id)
+        joined = [
+            (family, self._joined(family, snapshot, options, grains)) for family, snapshot in files
+        ]
+        lists = [family for family, part in joined if part.contacts is not None]
+        with_own = self.series.contacts_from == "auto" and grains.contacts is not None
+        paths = " and ".join(str(snapshot.path) for _, snapshot in files)
+        if len(lists) + with_own > 1:
+            others = self._left_out(lists, paths)
+            return [part for family, part in joined if family not in others]
+        if not lists and self.series.contacts_from == "path":
+            warnings.warn(
+                f"{paths}: lists contacts with walls only: contacts between grains are found by "
+                f"geometry, unless `contacts` names their file",
+                ScanfabWarning,
+                stacklevel=4,
+            )
+        return [part for _, part in joined]
+
+    def _joined(
+        self, family: Family, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
+    ) -> JoinedContacts:
+        assert family.reader is not None
+        try:
+            return family.reader.read_contacts(snapshot, options, grains)
+        except ReadError as error:
+            if self.series.contacts_from != "beside":
+                raise
+            raise ReadError(
+                f"{error} (this file lies beside the grains; "
+                '`contacts="geometric"` leaves it alone)'
+            ) from None
+
+    def _left_out(self, lists: list[Family], paths: str) -> Sequence[Family]:
+        """An error; but of files that lie beside grains all that are not the nearest by name."""
+        if self.series.contacts_from != "beside":
+            raise ReadError(f"two contact lists for one frame: {paths}: choose with `contacts`")
+        taken = nearest(self.series.grains, lists)
+        if taken is not None:
+            others = [family for family in lists if family is not taken]
+            warnings.warn(
+                f"{taken.pattern}: of several contact lists beside the grains this one is taken, "
+                f"whose name is the nearest: `contacts` names another",
+                ScanfabNote,
+                stacklevel=5,
+            )
+            return others
+        warnings.warn(
+            f"two contact lists lie beside {self.snapshot.path}: {paths}: none is taken; choose "
+            f"with `contacts`",
+            ScanfabWarning,
+            stacklevel=5,
+        )
+        return self.series.contacts
+
+    @property
+    def step(self) -> int | None:
+        """That of the dump, else the one in the file's name."""
+        return self.name_step if self.snapshot.step is None else self.snapshot.step
+
+    @property
+    def carries(self) -> Carries:
+        """What the dump or its user say of a cell."""
+        ask = getattr(self.reader, "carries", None)
+        options = self.series.options
+        told = self.series.cells or options.cell or options.periodic is not None
+        return "cell" if told or ask is None else ask(self.snapshot.path)
+
+    @property
+    def cell_is_named(self) -> bool:
+        """Whether the user names a cell, or what is periodic."""
+        options = self.series.options
+        return bool(self.series.cells or options.cell or options.periodic)
+
+    def _options(self) -> ReadOptions:
+        """How to read this frame, with its cell if a file names those of the frames."""
+        options, cells = self.series.options, self.series.cells
+        if cells is None:
+            return options
+        found = cells.at(self.number, self.step)
+        if found is None:
+            name = f"step {self.step}" if cells.key == "step" else f"frame {self.number}"
+            raise ReadError(
+                f"{cells.path}: names no cell for {name}, which is {self.snapshot.path}: add a row "
+                f"for it"
+            )
+        return replace(options, cell=found)
+
+    def _contact_files(self) -> list[tuple[Family, Snapshot]]:
+        """The snapshots of the contact files that belong to this frame."""
+        series, found = self.series, []
+        for family in series.contacts:
+            named = series.contacts_from == "path" and len(series.grains.files) == 1
+            contacts = series.contacts_of(self.snapshot, self.name_step, family, named)
+            if contacts is not None:
+                found.append((family, contacts))
+        if not found and series.contacts:
+            patterns = ", ".join(family.pattern for family in series.contacts)
+            message = f"{self.snapshot.path}: no contact file for step {self.step} among {patterns}"
+            if series.contacts_from == "path":
+                raise ReadError(message)
+            warnings.warn(
+                f"{message}: contacts are found by geometry", ScanfabWarning, stacklevel=3
+            )
+        return found
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """Let errors of a packing begin with its file."""
+    try:
+        yield
+    except PackingError as error:
+        raise PackingError(f"{path}: {error}") from None
+
+
+def _wall_contacts(grains: GrainTable, joined: list[JoinedContacts], with_own: bool) -> Any:
+    own = grains.wall_contacts if with_own else None
+    if not joined:
+        return own
+    first = np.zeros(len(grains.radius), np.int64) if own is None else own
+    return sum((part.wall_contacts for part in joined), first)

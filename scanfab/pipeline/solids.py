@@ -1,0 +1,80 @@
+"""What scan lines meet of a sample: all its grains, or those that reach into the RV."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scanfab.packing.sample import Sample
+from scanfab.packing.window import Window
+from scanfab.scan.solids import CellGrains, Solids
+
+__all__ = ["solids_of"]
+
+
+def solids_of(sample: Sample, window: Window | None = None, *, variants: str = "abcd") -> Solids:
+    """
+    The spheres that scan lines may meet.
+
+    Parameters
+    ----------
+    sample : Sample
+        Its grains are the solids, boundary particles never; its rattlers are those that b and d
+        remove.
+    window : Window, optional
+        The RV, which the lines of c and d are clipped to; without one these have no lines.
+    variants : str, optional
+        Which of a, b, c, d are to be scanned. Without a and b, grains outside the window are left
+        out, and of a periodic packing the whole.
+
+    Returns
+    -------
+    Solids
+        Positions relative to the window's centre; without one, to the mean of the grains' centres.
+        ``origin`` is that point.
+
+    Raises
+    ------
+    SettingsError
+        If the window is wider than a period of the cell.
+    PackingError
+        If the contacts, which tell the rattlers, are not known.
+
+    Examples
+    --------
+    A scan by hand, of a cubic lattice of touching spheres, whose fabric is isotropic:
+
+    >>> import numpy as np
+    >>> from scanfab import Packing, Sample, Window, direction_rule, find_contacts
+    >>> from scanfab import scan_lines, solids_of, sphere, void_fabric
+    >>> grid = np.stack(np.meshgrid(*3 * [np.arange(6.0)]), axis=-1).reshape(-1, 3)
+    >>> sample = Sample(find_contacts(Packing(grid, 0.5), 1e-4), boundary=grid[:, 2] < 0.5)
+    >>> window = Window(np.full(3, 2.5), sphere(1.8))
+    >>> solids = solids_of(sample, window, variants="c")
+    >>> rule = direction_rule("lebedev:11")
+    >>> sums = scan_lines(solids, rule, spacing=0.1, cutoff=0.5, variants="c")
+    >>> fabric = void_fabric(sums.axes, rule.weights, *sums.kept("c"))
+    >>> bool(fabric.tensor.alpha < 0.02)
+    True
+    """
+    packing = sample.packing
+    if window is not None:
+        window.check_fits(packing)
+    whole = "a" in variants or "b" in variants
+    position, radius = packing.position[sample.grains], packing.radius[sample.grains]
+    removed = sample.rattlers[sample.grains]
+    origin = position.mean(axis=0) if window is None else window.center
+    position = position - origin
+    shape = None if window is None else window.shape
+    reach = 0.0 if shape is None else shape.reach
+    if packing.cell is not None and packing.is_periodic:
+        medium: CellGrains | None = None
+        if whole:
+            vectors, periodic = packing.cell.short_vectors, np.array(packing.cell.periodic)
+            position = np.ascontiguousarray(position)
+            medium = CellGrains(position, radius, removed, vectors, periodic)
+        images, row = packing.cell.images_near_origin(position, radius + reach)
+        return Solids(images, radius[row], removed[row], shape, medium, origin)
+    if shape is not None and not whole:
+        near = shape.may_meet(position, radius)
+        position, radius, removed = position[near], radius[near], removed[near]
+    return Solids(position, radius, removed, shape, None, origin)

@@ -1,0 +1,139 @@
+"""Figures found by name, one or several on a page, and their files."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from inspect import signature
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from scanfab.base.errors import SettingsError
+from scanfab.table.plots import figures_of
+from scanfab.table.table import Table
+from scanfab.viz.figures.figure import Figure
+from scanfab.viz.figures.style import DPI, check_plot_file, letter, new_figure, save_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure as Page
+
+__all__ = ["drawn_page", "find_figure", "make_figures", "save_figures"]
+
+
+def find_figure(text: str, *kinds: str) -> tuple[type[Figure], dict[str, Any]]:
+    """
+    A figure by its name, and the options that stand behind a colon.
+
+    Parameters
+    ----------
+    text : str
+        As users name it, for instance ``rose:30,60,90``.
+    *kinds : str
+        Of which kinds of data it may be: ``table``, ``frames``, ``calibration``.
+
+    Raises
+    ------
+    SettingsError
+        If there is no such figure; names those that there are.
+
+    Examples
+    --------
+    >>> from scanfab.viz.figures.page import find_figure
+    >>> figure, options = find_figure("rose:45,90", "table", "frames")
+    >>> figure.kind, options
+    ('frames', {'angles': (45.0, 90.0)})
+    """
+    name, colon, argument = text.partition(":")
+    offered = {name: one for kind in kinds for name, one in figures_of(kind).items()}
+    found: type[Figure] | None = offered.get(name)
+    options: dict[str, Any] | None = {}
+    if found is not None and colon:
+        options = found.parse(argument)
+    if found is None or options is None:
+        raise SettingsError(f"figure: expected {', '.join(offered)}, found {text!r}")
+    return found, options
+
+
+def make_figures(data: Any, kind: str, text: str | None = None, **offered: Any) -> list[Figure]:
+    """
+    The figure of a name, or all of a kind.
+
+    Parameters
+    ----------
+    data : Table, rows of one, ScannedFrames or sequence of StepRow
+        What they are drawn of.
+    kind : str
+        ``table``, ``frames`` or ``calibration``.
+    text : str, optional
+        See :func:`find_figure`. By default all whose columns the table has, in their order.
+    **offered
+        Options for those that take them.
+
+    Raises
+    ------
+    SettingsError
+        If there is no such figure, it needs a column that the table lacks, or there is nothing to
+        draw.
+    """
+    if kind == "table" and not isinstance(data, Table):
+        data = Table(data)
+    if text is not None:
+        figure, options = find_figure(text, kind)
+        lacking = _lacking(figure, data)
+        if lacking:
+            raise SettingsError(
+                f"figure: {text} needs {', '.join(lacking)}, which the table does not have"
+            )
+        return [_made(figure, data, {**offered, **options})]
+    found = [one for one in figures_of(kind).values() if not _lacking(one, data)]
+    return [_made(one, data, offered) for one in found]
+
+
+def _lacking(figure: type[Figure], data: Any) -> list[str]:
+    return [name for name in figure.columns if isinstance(data, Table) and name not in data.names]
+
+
+def _made(figure: type[Figure], data: Any, offered: dict[str, Any]) -> Figure:
+    taken = signature(figure).parameters
+    return figure(data, **{name: one for name, one in offered.items() if name in taken})
+
+
+def save_figures(path: Path, figures: Sequence[Figure], dpi: int = DPI) -> None:
+    """
+    Draw figures to a file, all on one page.
+
+    Parameters
+    ----------
+    path : Path
+        ``.png``, ``.svg`` or ``.pdf``.
+    figures : sequence of Figure
+        See :func:`make_figures`.
+    dpi : int, optional
+        Pixels an inch.
+
+    Raises
+    ------
+    SettingsError
+        If the file's name ends otherwise.
+    """
+    check_plot_file(path)
+    with drawn_page(figures) as page:
+        save_figure(page, path, dpi)
+
+
+@contextmanager
+def drawn_page(figures: Sequence[Figure]) -> Iterator[Page]:
+    """Figures below one another, lettered through, in the style of the package."""
+    sizes = [one.size for one in figures]
+    widths, heights = zip(*sizes, strict=True)
+    with new_figure(max(widths), sum(heights)) as page:
+        parts: Any = [page]
+        if len(figures) > 1:
+            parts = page.subfigures(len(figures), 1, height_ratios=heights)
+        lettered = 0
+        for part, one in zip(parts, figures, strict=True):
+            panels = one.panels(part)
+            if one.lettered or len(figures) > 1:
+                letter(panels, lettered)
+                lettered += len(panels)
+        yield page

@@ -1,0 +1,252 @@
+"""The first and the last frame of a series, scanned to be drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+from scanfab.base.convex import Convex
+from scanfab.base.errors import SettingsError
+from scanfab.base.option import options_of, refuse_unknown
+from scanfab.base.typing import FloatArray
+from scanfab.io.series import Series
+from scanfab.packing.packing import Packing
+from scanfab.packing.sample import VARIANTS
+from scanfab.pipeline.compute import compute_rows
+from scanfab.pipeline.frame import FrameResult
+from scanfab.pipeline.frames import Frames
+from scanfab.pipeline.measurement import Measurement
+from scanfab.pipeline.settings import Settings
+from scanfab.table.abscissa import spelt_strain, strain_column
+from scanfab.table.plots import Plots
+from scanfab.table.reading import number_of
+from scanfab.table.row import Row
+
+__all__ = ["ScannedFrame", "ScannedFrames", "scan_frames"]
+
+Rows = Sequence[Mapping[str, Any]]
+
+
+def scan_frames(
+    source: Packing | Series, *, table: Iterable[Mapping[str, Any]] | None = None, **options: Any
+) -> ScannedFrames:
+    """
+    Scan the first and the last frame of a series, for figures of single frames.
+
+    They are drawn by ``.plot``: ``rose``, ``projection``, ``histogram``, ``cutoffs``, on Axes or,
+    with all panels, on a matplotlib Figure. Frames are scanned when the first figure needs them,
+    and once for all that follow.
+
+    Parameters
+    ----------
+    source : Packing or Series
+        One frame, or what :func:`scanfab.read_series` returns.
+    table : Table or iterable of mapping, optional
+        Their fabric table: then its first and its last frame that have a void fabric are drawn,
+        and titles have its strains. By default the first and the last of the chosen ``frames``.
+    **options
+        Those of :func:`scanfab.compute`, as they were for the table. Frames are drawn of variant c
+        if it is among the ``variants``, else of the first of them.
+
+    Returns
+    -------
+    ScannedFrames
+        With the figures of these frames: ``.plot``.
+
+    Raises
+    ------
+    ScanfabError
+        If the settings do not fit, or there is nothing to draw.
+    TypeError
+        If there is no such option; names the nearest that there is.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from matplotlib.figure import Figure
+    >>> import scanfab
+    >>> grid = np.stack(np.meshgrid(*3 * [np.arange(6.0)]), axis=-1).reshape(-1, 3)
+    >>> packing = scanfab.find_contacts(scanfab.Packing(grid, 0.5), tolerance=1e-4)
+    >>> frames = scanfab.scan_frames(packing, variants="c", tolerance=0.02)
+    >>> frames.plot
+    Plots(rose, projection, histogram, cutoffs)
+    >>> ax = Figure().subplots()
+    >>> frames.plot.histogram(ax=ax).get_ylabel()
+    'probability density'
+    """
+    refuse_unknown("scan_frames", options, [one.name for one in options_of(Settings)])
+    rows = None if table is None else list(table)
+    if rows is not None and len({row["source"] for row in rows}) > 1:
+        name = Frames(source, Settings()).name
+        rows = [row for row in rows if row["source"] == name]
+    return ScannedFrames(source, Settings(**options), rows)
+
+
+@dataclass(frozen=True, eq=False)
+class ScannedFrame:
+    """One frame and variant, with its title."""
+
+    result: FrameResult
+    title: str
+    variant: str
+
+    @property
+    def number(self) -> int:
+        """Of the frame, as in the table."""
+        return self.result.number
+
+    @property
+    def measurement(self) -> Measurement:
+        """What the scan says."""
+        return self.result.scanned
+
+    @property
+    def row(self) -> Row:
+        """Of the variant, at the first cut-off."""
+        return next(row for row in self.result.rows if row.variant == self.variant)
+
+    @property
+    def smallest(self) -> float:
+        """The radius of the smallest grain, dump's unit."""
+        sample = self.result.sample
+        return float(sample.packing.radius[sample.grains].min())
+
+    @property
+    def spheres(self) -> tuple[FloatArray, FloatArray, Convex | None]:
+        """What a few lines of the variant meet, and the window that clips them."""
+        return self.measurement.spheres_of(VARIANTS[self.variant])
+
+    @property
+    def normals(self) -> FloatArray:
+        """Of the contacts that the contact fabric counts, shape (M, 3)."""
+        sample, window = self.result.sample, self.measurement.plan.window
+        return sample.contacts.normal[sample.fabric_contacts(VARIANTS[self.variant], window)]
+
+
+class ScannedFrames:
+    """
+    The first and the last frame of a table that have a void fabric, for one variant.
+
+    They are scanned, again if they were for the table, when a figure needs them, and once for all.
+
+    Parameters
+    ----------
+    source : Packing or Series
+        Where the frames are.
+    settings : Settings
+        Those of the table. The variant is c, if it is among the settings', else the first.
+    rows : sequence of mapping, optional
+        The rows of this source in the table; by default the first and the last frame of the
+        settings are scanned.
+    note : str, optional
+        A sentence on how the scan differs from that of the table, for captions.
+
+    Raises
+    ------
+    SettingsError
+        If no frame has a void fabric of that variant.
+
+    Examples
+    --------
+    >>> import scanfab
+    >>> frames = scanfab.scan_frames(scanfab.Packing([[0.0, 0.0, 0.0]], 0.5), variants="a")
+    >>> frames
+    ScannedFrames(variant a, frame 0)
+    """
+
+    def __init__(
+        self, source: Packing | Series, settings: Settings, rows: Rows | None = None, note: str = ""
+    ) -> None:
+        self.source = source
+        self.settings = settings
+        self.note = note
+        self.variant = "c" if "c" in settings.variants else settings.variants[0]
+        self.rows: Rows | None = None
+        self._scanned: dict[str, list[ScannedFrame]] = {}
+        if rows is not None:
+            self.rows = [row for row in rows if row["variant"] == self.variant]
+            self._refuse_none(self.rows)
+
+    @property
+    def name(self) -> str:
+        """Of the variant, and of the source if it has a name."""
+        source = Frames(self.source, self.settings).name
+        if self.rows:
+            source = str(self.rows[0]["source"])
+        return f"variant {self.variant}{f' of {source}' if source else ''}"
+
+    @property
+    def plot(self) -> Plots:
+        """The figures of the frames: ``frames.plot.rose(ax=ax)`` draws one on its Axes."""
+        return Plots(self, "frames")
+
+    @property
+    def frames(self) -> list[ScannedFrame]:
+        """The frames, of which the variant alone is scanned."""
+        return self._of(self.variant)
+
+    @property
+    def with_lines_of_table(self) -> list[ScannedFrame]:
+        """The same along the lines of the table, which all its variants share."""
+        return self._of(self.settings.variants)
+
+    def _of(self, variants: str) -> list[ScannedFrame]:
+        if variants not in self._scanned:
+            self._scanned[variants] = self._scan(variants)
+        return self._scanned[variants]
+
+    def _scan(self, variants: str) -> list[ScannedFrame]:
+        first, last = self._ends
+        chosen = slice(first, last + 1, max(last - first, 1))
+        settings = replace(self.settings, variants=variants, frames=chosen, cutoffs=())
+        results: list[FrameResult] = []
+        # frames are numbered in the whole series, also those of a part
+        whole = self.source.whole if isinstance(self.source, Series) else self.source
+        computed = compute_rows(whole, settings, observe=results.append)
+        rows = [row for row in computed if row["variant"] == self.variant]
+        self._refuse_none(rows)
+        # of the table: what is asked of a strain file now may be another
+        rows_of = {row["frame"]: row for row in self.rows or rows}
+        column = strain_column(self.rows or rows)
+        drawn = {row["frame"] for row in rows if row["alpha_vs_axial"] is not None}
+        return [
+            ScannedFrame(
+                self._with_all_threads(one), self._title(rows_of[one.number], column), self.variant
+            )
+            for one in sorted(results, key=lambda result: result.number)
+            if one.number in drawn
+        ]
+
+    def _with_all_threads(self, result: FrameResult) -> FrameResult:
+        """A frame whose further scans have the threads that both frames have shared."""
+        plan = replace(result.scanned.plan, workers=self.settings.workers)
+        return replace(result, measurement=replace(result.scanned, plan=plan))
+
+    @cached_property
+    def _ends(self) -> tuple[int, int]:
+        """The numbers of both frames."""
+        if self.rows is None:
+            numbers = [number for number, _ in Frames(self.source, self.settings).due()]
+        else:
+            filled = [row for row in self.rows if number_of(row, "alpha_vs_axial") is not None]
+            numbers = [row["frame"] for row in filled]
+        return min(numbers), max(numbers)
+
+    def _title(self, row: Mapping[str, Any], column: str | None) -> str:
+        """Variant, frame and, if the table has one, the strain."""
+        strain = spelt_strain(row, column, symbol=True)
+        parts = (f"variant {self.variant}", f"frame {row['frame']}", strain)
+        return ", ".join(filter(None, parts))
+
+    def _refuse_none(self, rows: Rows) -> None:
+        if all(number_of(row, "alpha_vs_axial") is None for row in rows):
+            raise SettingsError(
+                f"there is nothing to draw: no frame has a void fabric of variant {self.variant}"
+            )
+
+    def __repr__(self) -> str:
+        first, last = self._ends
+        numbers = f"frame {first}" if first == last else f"frames {first} and {last}"
+        return f"ScannedFrames({self.name}, {numbers})"

@@ -1,0 +1,152 @@
+"""Frames of a series by number and slice: as those of a list, but with the numbers of the whole."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab.base.errors import NoFrameError, SettingsError
+from scanfab.io.formats.liggghts import LiggghtsReader
+from tests.helpers.dumps import dump_text, write
+
+COUNT = 7
+
+
+@pytest.fixture(params=["files", "one file"])
+def series(request, tmp_path):
+    """Seven frames, of which frame k has the step 10 k."""
+    texts = [dump_text(step=10 * number) for number in range(COUNT)]
+    if request.param == "one file":
+        return scanfab.read_series(write(tmp_path / "dump.txt", "".join(texts)))
+    for number, text in enumerate(texts):
+        write(tmp_path / f"dump_{10 * number}.txt", text)
+    return scanfab.read_series(tmp_path)
+
+
+def numbers(frames):
+    return [frame.number for frame in frames]
+
+
+def test_a_series_has_a_length(series):
+    assert len(series) == COUNT
+    assert numbers(series) == list(range(COUNT))
+
+
+@pytest.mark.parametrize("index", [0, 3, COUNT - 1, -1, -COUNT, np.int64(2), True])
+def test_a_frame_by_its_number(series, index):
+    frame = series[index]
+    assert frame.number == list(range(COUNT))[index]
+    assert frame.read().step == 10 * frame.number
+
+
+@pytest.mark.parametrize("index", [COUNT, 99, -COUNT - 1])
+def test_a_frame_that_is_not_there_is_an_error_in_words(series, index):
+    with pytest.raises(IndexError, match=f"has 7 frames, there is no frame {index}"):
+        series[index]
+    with pytest.raises(NoFrameError):
+        series[index]
+
+
+@pytest.mark.parametrize("index", ["2:5", 1.0, None, (1, 2)])
+def test_what_is_no_number_is_an_error_in_words(series, index):
+    with pytest.raises(TypeError, match="by a number or a slice, not by"):
+        series[index]
+
+
+SLICES = [
+    slice(2, 5), slice(None), slice(5, None), slice(-3, None), slice(None, -2), slice(1, None, 3),
+    slice(-5, -1, 2), slice(4, 2), slice(3, 99), slice(-99, 2),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("one", SLICES, ids=str)
+@pytest.mark.parametrize("other", SLICES, ids=str)
+def test_slices_and_slices_of_slices_are_those_of_a_list(series, one, other):
+    wanted = list(range(COUNT))[one]
+    part = series[one]
+    assert numbers(part) == wanted
+    assert len(part) == len(wanted)
+    assert bool(part) == bool(wanted)
+    assert numbers(part[other]) == wanted[other]
+    for index in (0, 1, -1, -2):
+        if -len(wanted) <= index < len(wanted):
+            assert part[index].number == wanted[index]
+        else:
+            with pytest.raises(IndexError, match=f"has {len(wanted)} frames"):
+                part[index]
+
+
+def test_frames_do_not_go_backwards(series):
+    with pytest.raises(SettingsError, match=r"stay in the order .* list\(series\)\[::-1\]"):
+        series[::-1]
+    assert numbers(list(series)[::-1]) == list(range(COUNT))[::-1]
+
+
+def test_a_part_knows_its_whole(series):
+    part = series[2:4]
+    assert not part.is_whole
+    assert part.whole.is_whole
+    assert part.whole == series
+    assert part != series
+    assert part.name == series.name
+
+
+def test_how_many_frames_are_expected_of_a_part(series):
+    list(series)
+    assert series.frames_expected() == COUNT
+    assert series[2:5].frames_expected() == 3
+    assert series[5:].frames_expected() == 2
+    assert series[1::2].frames_expected() == 3
+
+
+@pytest.fixture
+def looked_into(monkeypatch):
+    """The files that the reader has looked for frames in."""
+    found = []
+    snapshots = LiggghtsReader.snapshots
+
+    def watched(self, path):
+        found.append(path.name)
+        return snapshots(self, path)
+
+    monkeypatch.setattr(LiggghtsReader, "snapshots", watched)
+    return found
+
+
+def test_a_file_is_looked_through_once_to_count_its_frames_and_to_find_them(series, looked_into):
+    assert len(list(series)) == len(series) == COUNT
+    assert series[-1].number == series[2:][-1].number == COUNT - 1
+    assert len(looked_into) == len(set(looked_into)) == len(series.grains.files)
+
+
+def test_a_frame_that_goes_to_another_process_leaves_the_others_behind(series):
+    list(series)
+    frame = series[2:][1]
+    twin = pickle.loads(pickle.dumps(frame))
+    assert (twin.number, twin.step, twin.series.numbers) == (3, 30, frame.series.numbers)
+    assert b"Snapshot" not in pickle.dumps(series)
+    assert twin.read().step == 30
+    assert len(twin.series) == 5
+
+
+def test_early_frames_are_found_without_the_files_of_later_ones(tmp_path, looked_into):
+    for number in range(COUNT):
+        write(tmp_path / f"dump_{number}.txt", dump_text(step=number))
+    series = scanfab.read_series(tmp_path)
+    looked_into.clear()
+    assert series[1].number == 1
+    assert numbers(series[:2]) == [0, 1]
+    assert bool(series)
+    assert set(looked_into) == {"dump_0.txt", "dump_1.txt"}
+
+
+def test_a_file_that_has_grown_is_looked_through_again(tmp_path):
+    path = write(tmp_path / "dump.txt", dump_text(step=0))
+    series = scanfab.read_series(path)
+    assert len(series) == 1
+    write(path, dump_text(step=0) + dump_text(step=1))
+    assert len(series) == 2
+    assert series[-1].read().step == 1

@@ -1,0 +1,104 @@
+"""A scan by hand, of what the public face gives: the numbers of compute()."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab import Cell, Packing, PackingError, Sample, SettingsError, Solids, Window
+from scanfab.packing.window import SurfaceBox
+from tests.helpers.lattices import shaken_cubic
+
+COUNT = 6
+SPACING, CUTOFF = 0.2, 0.45
+RULE = scanfab.direction_rule("lebedev:7")
+
+
+def packing(periodic=False):
+    spheres = shaken_cubic(np.random.default_rng(4), COUNT)
+    cell = Cell([COUNT] * 3) if periodic else None
+    kinds = {"type": np.where(spheres.position[:, 2] < 1, 2, 1)}
+    return scanfab.find_contacts(
+        Packing(spheres.position, spheres.radius, columns=kinds, cell=cell, step=30)
+    )
+
+
+def window_of(table_radius, sample):
+    """The RV of compute()."""
+    box = SurfaceBox.of(sample.packing, sample.gathered)
+    return Window(box.center, scanfab.sphere(table_radius))
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
+@pytest.mark.parametrize("periodic", [False, True])
+@pytest.mark.parametrize("variants", ["abcd", "cd", "b"])
+def test_a_scan_by_hand_is_that_of_compute(periodic, variants):
+    one = packing(periodic)
+    table = scanfab.compute(
+        one, boundary="type=2", variants=variants, rv_radius=2.0, directions=RULE,
+        spacing=SPACING, cutoff=CUTOFF, seed=3,
+    )  # fmt: skip
+    sample = Sample(one, one.columns["type"] == 2)
+    window = None if variants == "b" else window_of(2.0, sample)
+    solids = scanfab.solids_of(sample, window, variants=variants)
+    replicates = table[0].replicates
+    sums = scanfab.scan_lines(
+        solids, RULE, spacing=SPACING * np.sqrt(replicates), cutoff=CUTOFF, variants=variants,
+        replicates=range(replicates), seed=3,
+    )  # fmt: skip
+    for row, tensor in zip(table, table.tensor("gvs"), strict=True):
+        fabric = scanfab.void_fabric(sums.axes, RULE.weights, *sums.kept(row.variant))
+        np.testing.assert_allclose(fabric.tensor.matrix, tensor, rtol=0, atol=1e-15)
+        assert fabric.mean_length == row.mean_length
+
+
+def test_positions_are_told_from_an_origin():
+    one = packing()
+    sample = Sample(one, np.zeros(len(one), bool))
+    for window in (None, Window([2.0, 3.0, 3.0], scanfab.sphere(1.5))):
+        solids = scanfab.solids_of(sample, window)
+        np.testing.assert_allclose(solids.position + solids.origin, one.position, atol=1e-14)
+    np.testing.assert_array_equal(solids.origin, window.center)
+
+
+def test_without_the_whole_only_what_reaches_into_the_window_is_kept():
+    one = packing()
+    sample = Sample(one, np.zeros(len(one), bool))
+    window = Window([3.0, 3.0, 3.0], scanfab.sphere(1.0))
+    near = np.linalg.norm(one.position - 3.0, axis=1) < 1.0 + one.radius
+    assert len(scanfab.solids_of(sample, window, variants="cd").radius) == near.sum()
+    assert len(scanfab.solids_of(sample, window).radius) == len(one)
+
+
+def test_a_window_wider_than_the_cell_is_refused():
+    sample = Sample(packing(periodic=True), np.zeros(COUNT**3, bool))
+    with pytest.raises(SettingsError, match="wider than the cell"):
+        scanfab.solids_of(sample, Window([3.0, 3.0, 3.0], scanfab.sphere(3.1)))
+
+
+def test_without_contacts_nobody_knows_rattlers():
+    sample = Sample(Packing([[0, 0, 0]], 1.0), np.zeros(1, bool))
+    with pytest.raises(PackingError, match=r"find_contacts\(packing\)"):
+        scanfab.solids_of(sample)
+
+
+@pytest.mark.parametrize("boundary", [[True], [0, 1], np.zeros((2, 1), bool), None])
+def test_a_boundary_that_is_none_is_refused(boundary):
+    with pytest.raises(PackingError, match="a truth value for each of 2 particles"):
+        Sample(Packing([[0, 0, 0], [3, 0, 0]], 1.0), boundary)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"position": [[0, 0]]}, {"removed": []}, {"origin": 0.0}, {"radius": [1, 1]}]
+)
+def test_solids_whose_shapes_do_not_fit_are_refused(wrong):
+    fine = {"position": [[0, 0, 0]], "radius": [1], "removed": [False]}
+    assert Solids(**fine).radius.dtype == np.float64
+    with pytest.raises(PackingError, match=r"solids: .* expected shape"):
+        Solids(**{**fine, **wrong})
+
+
+def test_a_window_about_no_point_is_refused():
+    with pytest.raises(PackingError, match="center"):
+        Window([0.0, 1.0], scanfab.sphere(1.0))

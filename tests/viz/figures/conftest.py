@@ -1,0 +1,33 @@
+"""What tests of figures look at: a drawn page, and the sample's frames."""
+
+from __future__ import annotations
+
+import pytest
+
+import scanfab
+from scanfab.table.compare import compare_tables
+from scanfab.viz.figures.page import drawn_page, make_figures
+from tests.conftest import ROOT, SAMPLE
+
+
+@pytest.fixture
+def drawn():
+    """Draw a figure of a table, or the page of all."""
+    pages = []
+
+    def draw(rows, name=None, strain_max=None):
+        comparison = compare_tables(rows, strain_max=strain_max)
+        pages.append(drawn_page(make_figures(rows, "table", name, comparison=comparison)))
+        page = pages[-1].__enter__()
+        page.canvas.draw()
+        return page
+
+    yield draw
+    for page in reversed(pages):
+        page.__exit__(None, None, None)
+
+
+@pytest.fixture
+def series(monkeypatch):
+    monkeypatch.chdir(ROOT)
+    return scanfab.read_series(SAMPLE)

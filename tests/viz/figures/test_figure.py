@@ -1,0 +1,169 @@
+"""A figure is a class in one file: made-up ones are reached wherever those of the package are."""
+
+from __future__ import annotations
+
+import inspect
+import json
+import re
+from importlib.metadata import EntryPoint
+
+import pytest
+from click import Context
+from matplotlib.figure import Figure
+
+from scanfab.base import plugins
+from scanfab.base.errors import ScanfabWarning, SettingsError
+from scanfab.cli.group import cli
+from scanfab.cli.main import run
+from scanfab.pipeline.settings import Settings
+from scanfab.table.plots import figures_of, installed_figures
+from scanfab.table.table import Table, load
+from scanfab.viz.figures.page import drawn_page, make_figures
+from scanfab.viz.report.report import make_report
+from scanfab.viz.scanned_frames import ScannedFrames
+from tests.conftest import ROOT, SAMPLE
+from tests.helpers.dumps import write
+from tests.helpers.tables import curve
+
+pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.base.errors.ScanfabNote")
+OWN = (
+    "evolution", "normalised", "correlation", "rose", "projection", "histogram", "cutoffs",
+    "calibration",
+)  # fmt: skip
+FAST = ["--boundary", "mask=3", "--tolerance", "3e-3", "--variants", "c", "--frames", "::6"]
+
+
+@pytest.fixture
+def offered(monkeypatch):
+    """Packages that offer figures besides what is installed."""
+    installed = plugins.entry_points
+
+    def offer(**values):
+        points = [EntryPoint(name, value, "scanfab.figures") for name, value in values.items()]
+
+        def entry_points(group):
+            return [*installed(group=group), *(one for one in points if one.group == group)]
+
+        monkeypatch.setattr(plugins, "entry_points", entry_points)
+        installed_figures.cache_clear()
+
+    yield offer
+    installed_figures.cache_clear()
+
+
+@pytest.fixture
+def made_up(offered):
+    module = "tests.helpers.made_up_figures"
+    offered(made_up=f"{module}:Rattlers", heights=f"{module}:Contacts")
+
+
+@pytest.fixture
+def table(tmp_path):
+    rows = [{**row, "rattlers": 5 * row["frame"]} for row in curve()]
+    return write(tmp_path / "t.jsonl", "".join(json.dumps(row) + "\n" for row in rows))
+
+
+def test_the_figures_of_the_package_stand_first_and_in_their_order(made_up):
+    assert tuple(installed_figures()) == (*OWN, "heights", "made_up")
+    assert [*figures_of("table")] == [*OWN[:3], "made_up"]
+    assert [*figures_of("frames")] == [*OWN[3:7], "heights"]
+
+
+@pytest.mark.parametrize(
+    ("command", "kinds"), [("compute", ("table", "frames")), ("compare", ("table",))]
+)
+def test_the_help_names_the_figures_that_there_are(command, kinds):
+    """It is written by hand, as to look for figures takes longer than to print it."""
+    (option,) = (
+        one for one in cli.get_command(Context(cli), command).params if one.name == "figure"
+    )
+    named = [name for name in OWN if re.search(rf"\b{name}\b", option.help)]
+    assert named == [name for kind in kinds for name in figures_of(kind)]
+
+
+@pytest.mark.usefixtures("made_up")
+def test_a_made_up_figure_draws_on_the_axes_that_it_gets(table):
+    ax = Figure().subplots()
+    plot = load(table).plot
+    assert plot.made_up(ax=ax) is ax
+    assert ax.lines[0].get_ydata().tolist() == [0, 5, 10, 15, 20]
+    assert repr(plot) == "Plots(evolution, normalised, correlation, made_up)"
+
+
+@pytest.mark.usefixtures("made_up")
+@pytest.mark.parametrize(("name", "gid"), [("made_up", "rattlers"), ("heights", "heights")])
+def test_compute_draws_a_made_up_figure_by_its_name(tmp_path, monkeypatch, name, gid):
+    monkeypatch.chdir(ROOT)
+    plot = tmp_path / "x.svg"
+    words = ["-o", str(tmp_path / "t.csv"), "--plot", str(plot), "--figure", name]
+    assert run(["compute", SAMPLE, *FAST, *words]) == 0
+    assert f'id="{gid}"' in plot.read_text()
+
+
+@pytest.mark.usefixtures("made_up")
+def test_compare_and_the_page_of_all_figures_draw_it_too(table, tmp_path):
+    for name in (["--figure", "made_up"], []):
+        plot = tmp_path / "x.svg"
+        assert run(["compare", str(table), "--plot", str(plot), *name]) == 0
+        assert 'id="rattlers"' in plot.read_text()
+    with drawn_page(make_figures(load(table), "table")) as page:
+        letters = [axes.get_title(loc="left") for axes in page.axes if axes.axison]
+    assert letters == [f"({letter})" for letter in "abcdef"]
+
+
+@pytest.mark.usefixtures("made_up")
+def test_the_report_has_it_with_its_caption(table):
+    page = make_report([table]).page
+    assert page.count("data:image/svg") == 4
+    assert "<figcaption>Rattlers over the frames.</figcaption>" in page
+
+
+@pytest.mark.usefixtures("made_up")
+def test_a_table_without_its_columns_goes_without_it(tmp_path, capsys):
+    rows = Table(curve())
+    assert len(make_figures(rows, "table")) == 3
+    with pytest.raises(SettingsError, match="figure: made_up needs rattlers, which the table does"):
+        make_figures(rows, "table", "made_up")
+    table = write(tmp_path / "t.jsonl", "".join(json.dumps(row) + "\n" for row in curve()))
+    words = ["--plot", str(tmp_path / "x.png"), "--figure", "made_up"]
+    assert run(["compare", str(table), *words]) == 1
+    assert "--figure: made_up needs rattlers" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("made_up")
+def test_what_there_is_instead_of_a_figure_names_the_made_up_ones(table, capsys):
+    assert run(["compare", str(table), "--plot", "x.png", "--figure", "pie"]) == 2
+    assert "expected evolution, normalised, correlation, made_up, found" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("made_up")
+def test_a_made_up_figure_of_frames_is_drawn_from_python(series, computed):
+    settings = Settings(boundary="mask=3", tolerance=3e-3)
+    plot = ScannedFrames(series, settings, computed.rows).plot
+    ax = Figure().subplots()
+    assert plot.heights(ax=ax, frame=0) is ax
+    heights = sum(bar.get_height() for bar in ax.patches)
+    row = next(r for r in computed.rows if (r["frame"], r["variant"]) == (0, "c"))
+    assert heights == row["contacts"]
+
+
+def test_what_is_no_figure_is_told_and_spoils_no_other(offered):
+    offered(odd="math:hypot")
+    with pytest.warns(ScanfabWarning, match="the figure 'odd' of .* expected a subclass of"):
+        assert tuple(installed_figures()) == OWN
+
+
+def test_a_notebook_shows_what_a_figure_takes():
+    plot = Table(curve()).plot.evolution
+    assert str(inspect.signature(plot)).startswith("(ax=None, *, of:")
+    assert "Bands are total standard errors" in plot.__doc__
+
+
+def test_axes_of_its_own_are_in_the_style_of_the_package():
+    from matplotlib import pyplot
+
+    pyplot.switch_backend("agg")
+    ax = Table(curve()).plot.evolution()
+    assert ax.xaxis.label.get_size() == 9
+    assert not ax.spines["top"].get_visible()
+    pyplot.close(ax.figure)
