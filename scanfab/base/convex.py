@@ -159,7 +159,18 @@ class Convex:
         return np.asarray(near)
 
     def support(self, along: FloatArray) -> FloatArray:
-        """The place that is furthest along each vector, shape (N, 3)."""
+        """
+        The place that is furthest along each vector.
+
+        Parameters
+        ----------
+        along : ndarray, shape (N, 3)
+            Of any length but 0.
+
+        Returns
+        -------
+        ndarray, shape (N, 3)
+        """
         furthest: FloatArray = self.body.support(along @ self.frame) @ self.frame.T
         return furthest
 
@@ -214,7 +225,18 @@ class Convex:
         return scale * shared, scale * slope
 
     def meets_itself(self, shift: FloatArray) -> bool:
-        """Whether it overlaps itself moved by a vector, shape (3,)."""
+        """
+        Whether it overlaps itself moved by a vector.
+
+        Parameters
+        ----------
+        shift : ndarray, shape (3,)
+            Dump's length unit.
+
+        Returns
+        -------
+        bool
+        """
         if self.body.is_symmetric:
             # the middle of two places of a symmetric region, x and -x + shift, is half the shift
             return bool(self.contains(0.5 * shift[None])[0])
@@ -232,6 +254,15 @@ class Convex:
         The image of the region under the map gradient @ x.
 
         A sphere becomes an ellipsoid, a box leans: planes and a quadric again.
+
+        Parameters
+        ----------
+        gradient : ndarray, shape (3, 3)
+            Not singular.
+
+        Returns
+        -------
+        Convex
         """
         if np.array_equal(gradient, np.eye(3)):
             return self

@@ -32,6 +32,10 @@ def box(edges: Sequence[float] | FloatArray, turn: npt.ArrayLike | None = None) 
     turn : array_like, shape (3, 3), optional
         Orthonormal rows along which the edges lie; x, y, z by default.
 
+    Returns
+    -------
+    Convex
+
     Examples
     --------
     >>> from scanfab import box
@@ -53,6 +57,10 @@ def ellipsoid(semi_axes: Sequence[float] | FloatArray, turn: npt.ArrayLike | Non
     turn : array_like, shape (3, 3), optional
         Orthonormal rows along which they lie; x, y, z by default.
 
+    Returns
+    -------
+    Convex
+
     Examples
     --------
     >>> from scanfab import ellipsoid
@@ -73,6 +81,10 @@ def cylinder(radius: float, height: float, axis: npt.ArrayLike = (0.0, 0.0, 1.0)
         From end to end it is as long as its height.
     axis : array_like, shape (3,), optional
         Of any length.
+
+    Returns
+    -------
+    Convex
 
     Examples
     --------

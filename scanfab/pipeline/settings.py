@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from scanfab.base.errors import SettingsError
 from scanfab.base.option import (
     number,
     one_of,
@@ -24,6 +23,7 @@ from scanfab.pipeline.values import (
     Length,
     Vector,
     as_written,
+    check_window,
     parse_axis,
     parse_boundary,
     parse_cutoff,
@@ -350,33 +350,7 @@ class Settings:
         for one in declared:
             value = one.parse(one.name, options.get(one.name, one.default))
             object.__setattr__(self, one.name, value)
-        self._check_window()
-
-    def _check_window(self) -> None:
-        """What is said of the RV must go together."""
-        shape, sizes = self.rv_shape, self.rv_size
-        takes = SHAPES.get(shape, "")
-        if sizes and not takes:
-            hint = "choose `rv_radius`" if shape == "sphere" else "its file says how large it is"
-            raise SettingsError(f"rv_size: the shape {shape} takes none: {hint}")
-        if sizes and len(sizes) != 2 + (shape != "cylinder"):
-            found = ",".join(f"{size:g}" for size in sizes)
-            raise SettingsError(f"rv_size: expected {takes} (`rv_shape` is {shape}), found {found}")
-        if self.rv_radius is not None and shape != "sphere":
-            hint = f"choose `rv_size` ({takes})" if takes else "its file says how large it is"
-            raise SettingsError(
-                f"rv_radius: is that of a sphere, but `rv_shape` is {shape}: {hint}"
-            )
-        if self.rv_axis is not None and shape != "cylinder":
-            raise SettingsError(
-                f"rv_axis: is that of a cylinder, but `rv_shape` is {shape}: leave it out, or "
-                f'choose `rv_shape="cylinder"`'
-            )
-        if self.rv_follows == "strain" and self.strain not in STRAIN_MODES:
-            raise SettingsError(
-                f"rv_follows: a file of strains ({self.strain}) does not say how the sample "
-                f"deforms along all axes: choose another `strain`, or leave out `rv_follows`"
-            )
+        check_window(self)
 
     @property
     def more_columns(self) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from scanfab.base.spelling import shortest
 if TYPE_CHECKING:
     # their modules need numpy, for which the help of a command does not wait
     from scanfab.packing.boundary import BoundaryRule
+    from scanfab.pipeline.settings import Settings
     from scanfab.scan.directions import DirectionRule
 
 __all__ = [
@@ -26,6 +27,7 @@ __all__ = [
     "Axis",
     "Length",
     "Vector",
+    "check_window",
     "parse_axis",
     "parse_boundary",
     "parse_cutoff",
@@ -241,6 +243,31 @@ def parse_shape(name: str, value: Any) -> str:
         words = f"{', '.join(SHAPES)} or a closed convex surface that exists ({' '.join(SUFFIXES)})"
         raise unusable(name, words, str(value))
     return str(value)
+
+
+def check_window(chosen: Settings) -> None:
+    """SettingsError if what is said of the RV does not go together."""
+    shape, sizes = chosen.rv_shape, chosen.rv_size
+    takes = SHAPES.get(shape, "")
+    if sizes and not takes:
+        hint = "choose `rv_radius`" if shape == "sphere" else "its file says how large it is"
+        raise SettingsError(f"rv_size: the shape {shape} takes none: {hint}")
+    if sizes and len(sizes) != 2 + (shape != "cylinder"):
+        found = ",".join(f"{size:g}" for size in sizes)
+        raise SettingsError(f"rv_size: expected {takes} (`rv_shape` is {shape}), found {found}")
+    if chosen.rv_radius is not None and shape != "sphere":
+        hint = f"choose `rv_size` ({takes})" if takes else "its file says how large it is"
+        raise SettingsError(f"rv_radius: is that of a sphere, but `rv_shape` is {shape}: {hint}")
+    if chosen.rv_axis is not None and shape != "cylinder":
+        raise SettingsError(
+            f"rv_axis: is that of a cylinder, but `rv_shape` is {shape}: leave it out, or "
+            f'choose `rv_shape="cylinder"`'
+        )
+    if chosen.rv_follows == "strain" and chosen.strain not in STRAIN_MODES:
+        raise SettingsError(
+            f"rv_follows: a file of strains ({chosen.strain}) does not say how the sample "
+            f"deforms along all axes: choose another `strain`, or leave out `rv_follows`"
+        )
 
 
 def parse_boundary(name: str, rules: Any) -> tuple[BoundaryRule, ...]:
