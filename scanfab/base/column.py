@@ -10,8 +10,20 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 from scanfab.base.errors import ScanfabError
 
-__all__ = ["LENGTH", "Column", "NoColumnError", "columns_of_fields", "no_column"]
+__all__ = [
+    "ALL_DIGITS",
+    "DEFAULT_DIGITS",
+    "LENGTH",
+    "Column",
+    "NoColumnError",
+    "columns_of_fields",
+    "no_column",
+]
 
+ALL_DIGITS = 17
+"""With so many significant digits every number that is written reads back the same."""
+DEFAULT_DIGITS = ALL_DIGITS
+"""Of written tables, unless others are asked for; manifests list only what differs from it."""
 # the unit of all lengths: that of the dump, as nothing is converted
 LENGTH = "length"
 

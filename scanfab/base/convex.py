@@ -50,7 +50,7 @@ class Convex:
     planes : ndarray
         Rows n, d with unit vectors n: of each plane the side n·x < d, shape (P, 4).
     quadric : Quadric
-        It holds the region as well; ``EVERYWHERE`` of planes alone, which bounds nothing.
+        The second bound of the region; ``EVERYWHERE`` where the planes are the only one.
     low : ndarray
         The box along x, y and z that holds the region, shape (3,).
     high : ndarray, shape (3,)

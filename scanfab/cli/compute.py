@@ -33,11 +33,6 @@ OF_THE_LINE = (
     "sources", "quiet", "verbose", "help", *(one.name for one in OUTPUT_OPTIONS if not one.meaning)
 )  # fmt: skip
 
-# of directions
-RULES = (
-    "lebedev", "design", "icosahedral", "product", "fibonacci", "equal-angle", "equal-angle-full",
-)  # fmt: skip
-
 
 @click.command(cls=SourceCommand)
 @sources_argument

@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from scanfab.base import column
+from scanfab.base.column import DEFAULT_DIGITS
 from scanfab.base.errors import ScanfabNote, ScanfabWarning
 from scanfab.cli.options import AS_CSV
 from scanfab.cli.tables import Column, print_columns, spelt
@@ -120,7 +121,7 @@ def print_table(rows: Iterable[Row], excerpt: Excerpt) -> None:
     for row in values:
         row["total"] = total_error(row, "alpha_vs_axial")
     # three digits say enough on a terminal, unless others were asked for
-    digits = excerpt.digits if excerpt.digits < 17 else 3
+    digits = 3 if excerpt.digits == DEFAULT_DIGITS else excerpt.digits
     titles = {name: name for name in excerpt.fields} or {**KEYS, **MORE}
     ranks = {} if excerpt.fields else {name: rank for rank, name in enumerate(MORE, start=1)}
     print_columns(

@@ -1,10 +1,17 @@
-"""The columns of a table that say what a frame holds: grains, rattlers, contacts."""
+"""The columns of a table that say what a frame holds, with their values: grains, contacts."""
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 from scanfab.base.column import Column
 
-__all__ = ["SAMPLE_COLUMNS"]
+# tables are read without what computes them
+if TYPE_CHECKING:
+    from scanfab.packing.sample import Sample, Variant
+    from scanfab.packing.window import Window
+
+__all__ = ["SAMPLE_COLUMNS", "sample_values"]
 
 SAMPLE_COLUMNS = (
     Column("grains", int, "", "solid in this variant, centre in the window"),
@@ -18,3 +25,20 @@ SAMPLE_COLUMNS = (
         "mean number of contacts of the grains counted in grains, boundary's included",
     ),
 )
+
+
+def sample_values(
+    sample: Sample, variant: Variant, window: Window | None, contacts: int
+) -> dict[str, Any]:
+    """
+    The values of these columns but ``contacts_from``, which is that of the whole frame.
+
+    ``contacts`` is the number of those that enter the contact fabric.
+    """
+    counted = sample.counted(variant, window)
+    return {
+        "grains": int((counted & ~sample.removed(variant)).sum()),
+        "rattlers": int((counted & sample.rattlers).sum()),
+        "contacts": contacts,
+        "coordination": sample.coordination(variant, window),
+    }

@@ -1,4 +1,4 @@
-"""compute(): the one place that knows all the steps, from packings to rows of the fabric table."""
+"""compute(): the frames of a series side by side, as rows of the fabric table in their order."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ class _Computed:
 
 
 @dataclass(frozen=True, eq=False)
-class _Job:
+class _FrameJob:
     """One frame to be computed, here or in another process."""
 
     frame: Sample | Readable
@@ -203,14 +203,14 @@ class _Run:
         self.has_grains = False
         self._flips = Flips(frames.settings.frames.step)
 
-    def jobs(self, done: Container[int], observe: Observer | None) -> Iterator[_Job]:
+    def jobs(self, done: Container[int], observe: Observer | None) -> Iterator[_FrameJob]:
         """The chosen frames that are not done."""
         plan = self._plan()
         name, skips = self.frames.name, self.frames.settings.on_error == "skip"
         for number, frame in self.frames.due():
             known = self.frames.sample_if_read(number, frame)
             if number not in done and known is not None:
-                yield _Job(known, plan, number, name, skips, observe, os.getpid())
+                yield _FrameJob(known, plan, number, name, skips, observe, os.getpid())
 
     def _plan(self) -> Plan:
         """Settings end here."""
@@ -250,7 +250,7 @@ class _Pool:
         if self._own is not None:
             self._own.shutdown(wait=False, cancel_futures=True)
 
-    def in_order(self, jobs: Iterator[_Job]) -> Iterator[_Computed]:
+    def in_order(self, jobs: Iterator[_FrameJob]) -> Iterator[_Computed]:
         """The results in the order of the jobs, of which one a worker is under way."""
         first = list(islice(jobs, self.workers))
         threads = max(1, self.workers // max(len(first), 1))

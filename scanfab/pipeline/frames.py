@@ -215,7 +215,7 @@ class Frames:
             return None
 
     def sample_if_read(self, number: int, frame: Readable) -> Sample | Readable | None:
-        """The same of a frame that has been read on the way to the first; else the frame."""
+        """What :meth:`sample` gives, of a frame that has been read; else the frame itself."""
         return self._ready.pop(number, frame)
 
     def notes(self, frame: Readable, sample: Sample) -> list[Note]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from scanfab.base.column import DEFAULT_DIGITS
 from scanfab.base.option import Option, options_of
 from scanfab.io.options import READING_OPTIONS
 from scanfab.pipeline.settings import Settings
@@ -40,7 +41,7 @@ OUTPUT_OPTIONS = (
     ),
     Option(
         name="digits",
-        default=17,
+        default=DEFAULT_DIGITS,
         group="output",
         help="Significant digits of written numbers; 17: as short as reads back the same.",
         meaning="significant digits of the numbers of the table",

@@ -24,7 +24,7 @@ class Told:
         """Frames that were skipped."""
 
     def add(self, category: type[Warning], text: str) -> bool:
-        """Keep one; whether it is a new one of scanfab's."""
+        """Keep a warning; says whether it is one of scanfab's that was not told before."""
         self.skipped += issubclass(category, SkippedFrameWarning)
         known = self.notes if issubclass(category, ScanfabNote) else self.warnings
         text = as_options(text)

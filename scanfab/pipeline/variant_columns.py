@@ -15,6 +15,7 @@ from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.jackknife import BLOCKS, BlockedSums
 from scanfab.fabric.registry import OWN_FABRICS, Measured, installed_fabrics
 from scanfab.fabric.window import WINDOW_ALPHA, window_alpha
+from scanfab.packing.columns import sample_values
 from scanfab.packing.sample import Variant
 from scanfab.pipeline.measurement import Measurement
 from scanfab.table.columns import table_columns
@@ -38,7 +39,8 @@ class VariantColumns:
 
     def columns(self) -> dict[str, Any]:
         """All that depend on the variant."""
-        found = {**self._sample(), **self._scan()}
+        contacts = len(self.measured.normals)
+        found = sample_values(self.sample, self.variant, self.plan.window, contacts) | self._scan()
         for fabric in (*OWN_FABRICS.values(), *installed_fabrics().values()):
             found |= fabric.values(self.measured)
         return {**found, **self._window()}
@@ -83,17 +85,8 @@ class VariantColumns:
             return int(self.sums.segments[:, self.which].sum())
         return int(self.measurement.gaps.number[:, self.which, ..., self.place].sum())
 
-    def _sample(self) -> dict[str, Any]:
-        window = self.plan.window
-        counted = self.sample.counted(self.variant, window)
-        return {
-            "grains": int((counted & ~self.sample.removed(self.variant)).sum()),
-            "rattlers": int((counted & self.sample.rattlers).sum()),
-            "coordination": self.sample.coordination(self.variant, window),
-            "contacts": len(self.measured.normals),
-        }
-
     def _scan(self) -> dict[str, Any]:
+        """The values of the columns that scan/columns.py declares."""
         return {
             "solid_fraction": self._solid_fraction(),
             "directions": len(self.plan.rule),

@@ -1,4 +1,4 @@
-"""The columns of a table that say how a sample was scanned, and what the lines met."""
+"""The columns of a table that say how a sample was scanned; `VariantColumns` has their values."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ def cut_lines(
     Parameters
     ----------
     position : ndarray, shape (N, 3)
-        Centres of the solids; the window, if any, is lies about the origin.
+        Centres of the solids; the window, if there is one, lies about the origin.
     radius : ndarray, shape (N,)
         Their radii, dump's length unit.
     triad : ndarray, shape (3, 3)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.column import Column, NoColumnError, no_column
+from scanfab.base.column import DEFAULT_DIGITS, Column, NoColumnError, no_column
 from scanfab.base.errors import SettingsError
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.tensor import COMPONENTS
@@ -214,7 +214,9 @@ class Table(Sequence[Row]):
 
         return compare_tables(self, strain_max=strain_max)
 
-    def save(self, path: Path | str, *, fields: str | None = None, digits: int = 17) -> None:
+    def save(
+        self, path: Path | str, *, fields: str | None = None, digits: int = DEFAULT_DIGITS
+    ) -> None:
         """
         Write the table; of a computed one the bytes are those of ``scanfab compute -o``.
 

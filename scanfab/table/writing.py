@@ -7,16 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
-from scanfab.base.column import Column, no_column
+from scanfab.base.column import ALL_DIGITS, DEFAULT_DIGITS, Column, no_column
 from scanfab.base.errors import SettingsError
 from scanfab.base.files import check_folder, whole_file
 from scanfab.table.columns import columns_of
 from scanfab.table.formats.registry import RowWriter, TableFormat, format_of
 
 __all__ = ["Excerpt", "open_table", "row_writer", "write_rows"]
-
-# with so many digits every number reads back the same
-ALL_DIGITS = 17
 
 
 @dataclass(frozen=True)
@@ -25,7 +22,7 @@ class Excerpt:
 
     fields: tuple[str, ...] = ()
     """In the order in which they are written; none: all, as the table has them."""
-    digits: int = ALL_DIGITS
+    digits: int = DEFAULT_DIGITS
     """Significant ones, of floats; with 17 the shortest form that reads back the same."""
 
     @classmethod
@@ -33,7 +30,7 @@ class Excerpt:
         cls,
         columns: type | Sequence[Column],
         fields_text: str | None,
-        digits: int = ALL_DIGITS,
+        digits: int = DEFAULT_DIGITS,
     ) -> Excerpt:
         """
         What users ask for, of some columns or of those of a kind of rows.
@@ -66,7 +63,7 @@ class Excerpt:
     @property
     def is_all(self) -> bool:
         """Whether nothing is left out."""
-        return self == Excerpt()
+        return not self.fields and self.digits == ALL_DIGITS
 
     def columns(self, columns: Sequence[Column]) -> list[Column]:
         """Those that are written, in their order."""
@@ -85,7 +82,7 @@ class Excerpt:
     def asked(self) -> dict[str, Any]:
         """What differs from the default, as a manifest lists it."""
         asked: dict[str, Any] = {"fields": list(self.fields)} if self.fields else {}
-        return asked if self.digits == ALL_DIGITS else {**asked, "digits": self.digits}
+        return asked if self.digits == DEFAULT_DIGITS else {**asked, "digits": self.digits}
 
     def _rounded(self, value: Any) -> Any:
         return float(f"{value:.{self.digits}g}") if isinstance(value, float) else value

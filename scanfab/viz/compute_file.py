@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from scanfab.base.column import DEFAULT_DIGITS
 from scanfab.base.errors import SettingsError
 from scanfab.base.option import options_of, refuse_unknown
 from scanfab.io.grain_files import PathLike, expanded
@@ -36,7 +37,7 @@ def compute_file(
     vtk: PathLike | None = None,
     manifest: PathLike | None = None,
     fields: str | None = None,
-    digits: int = 17,
+    digits: int = DEFAULT_DIGITS,
     progress: Callable[[int, int], object] | None = None,
     **options: Any,
 ) -> Table:

@@ -13,8 +13,8 @@ import numpy.typing as npt
 
 from scanfab.base.errors import ScanfabError
 from scanfab.base.files import whole_file
-from scanfab.base.logs import quiet_vtk
 from scanfab.base.typing import BoolArray, FloatArray
+from scanfab.base.vtk_log import quiet_vtk
 from scanfab.viz.figures.style import COLOURS
 from scanfab.viz.overlay import SIZE, Framing, add_scale, add_words
 from scanfab.viz.scene import Grains, Scene

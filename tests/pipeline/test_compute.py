@@ -7,7 +7,6 @@ import io
 
 import numpy as np
 import pytest
-from scanfab.viz.figures.scanned import scan_frames
 
 import scanfab
 from scanfab.base.errors import ScanfabWarning, SettingsError
@@ -19,6 +18,7 @@ from scanfab.pipeline.settings import Settings
 from scanfab.table.formats.text import TextWriter
 from scanfab.table.table import COLUMNS
 from scanfab.viz.frame_view import look_at
+from scanfab.viz.scanned_frames import scan_frames
 from tests.helpers.dumps import dump_text, pairs_text, write, yade_spheres
 
 SCAN = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin"}
@@ -231,8 +231,9 @@ def test_a_part_looks_for_its_first_frame_with_grains_in_the_whole(shrinking):
 
 def test_figures_of_a_part_are_of_its_frames(shrinking):
     table = scanfab.compute(shrinking[1:3], variants="c", **SCAN)
-    drawn = scan_frames(shrinking[1:3], Settings(variants="c", **SCAN), table)
-    assert [one.number for one in drawn.results] == [1, 2]
+    for rows in (None, table):
+        drawn = scan_frames(shrinking[1:3], table=rows, variants="c", **SCAN)
+        assert [one.number for one in drawn.frames] == [1, 2]
 
 
 def test_no_frames_of_a_part_are_an_error(shrinking):

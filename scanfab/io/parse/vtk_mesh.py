@@ -18,8 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
-from scanfab.base.logs import quiet_vtk
 from scanfab.base.typing import FloatArray, IntArray
+from scanfab.base.vtk_log import quiet_vtk
 from scanfab.io.files import bare_name, check_memory, first_bytes, plain
 from scanfab.io.parse.vtk_flaws import FlawError
 from scanfab.io.parse.vtk_legacy import check_legacy

@@ -30,7 +30,7 @@ from scanfab.viz.report.page import (
     save_page,
 )
 from scanfab.viz.report.pictures import picture_of
-from scanfab.viz.report.setting_meanings import settings_table
+from scanfab.viz.report.settings_table import settings_table
 from scanfab.viz.report.tables import frame_table, input_table, overview, results_tables
 
 __all__ = ["Report", "make_report"]
@@ -55,7 +55,7 @@ class Report:
     Report: an HTML page of 2 MB, with void fabric
     """
 
-    page: str = field(repr=False)
+    page: str
     has_void_fabric: bool
 
     def __repr__(self) -> str:

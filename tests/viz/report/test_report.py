@@ -484,7 +484,8 @@ def test_notes_are_not_warnings(copied, quick):
 def test_a_report_is_saved_by_one_call(table, tmp_path):
     path = table(curve())
     report = make_report(str(path), title="One")
-    assert repr(report) == "Report(has_void_fabric=True)"
+    assert repr(report).startswith("Report: an HTML page of ")
+    assert "\n" not in repr(report)
     report.save(str(tmp_path / "report.html"))
     assert (tmp_path / "report.html").read_text("utf-8") == report.page
     assert make_report([path], title="One").page == report.page
