@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import atexit
+import os
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
@@ -14,6 +16,13 @@ _steps: list[Step] = []
 
 def at_end(step: Step) -> None:
     """Call a function at the end of the process."""
+    if not _steps and "multiprocessing.process" in sys.modules:
+        from multiprocessing.process import parent_process
+        from multiprocessing.util import Finalize
+
+        if parent_process() is not None:
+            # such a process may leave without calling what atexit knows
+            Finalize(None, finish, exitpriority=0)
     _steps.append(step)
 
 
@@ -25,6 +34,11 @@ def undone_at_end(step: Step) -> Iterator[None]:
         yield
     finally:
         _steps.remove(step)
+
+
+if hasattr(os, "register_at_fork"):
+    # what a forked process inherits is left to its parent
+    os.register_at_fork(after_in_child=_steps.clear)
 
 
 @atexit.register

@@ -129,4 +129,4 @@ def _describe(error: Exception) -> str:
         return f"{error.filename or 'standard output'}: {error.strerror}"
     from scanfab.pipeline.options import as_options
 
-    return as_options(str(error)) or type(error).__name__
+    return as_options(error) or type(error).__name__

@@ -63,7 +63,7 @@ def usage_errors(before: str = "") -> Iterator[None]:
     try:
         yield
     except (SettingsError, UnknownFormatError) as error:
-        raise click.UsageError(f"{before}{as_options(str(error))}") from None
+        raise click.UsageError(f"{before}{as_options(error)}") from None
 
 
 def completed(option: Option) -> Completion:

@@ -50,6 +50,19 @@ _lock = Lock()
 _folder: list[str] = []
 
 
+def _forget_copies() -> None:
+    """A forked process has no copies: those that it knows are its parent's, who needs them."""
+    global _lock
+    _lock = Lock()  # a thread of the parent's may hold the other
+    _copies.clear()
+    _threads.clear()
+    _folder.clear()
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_forget_copies)
+
+
 def bare_name(path: Path) -> str:
     """The file name without the ending of a compression program."""
     return path.stem if path.suffix in COMPRESSED_SUFFIXES else path.name

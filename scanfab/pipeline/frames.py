@@ -259,10 +259,10 @@ class Frames:
             return []
         named = " or ".join(rule.text for rule in missing)
         values = existing_values(first.packing, missing)
-        message = f"boundary: no particle of any frame has {named}: {values}"
+        message = f"no particle of any frame has {named}: {values}"
         if len(missing) == len(rules):
-            raise SettingsError(message)
-        return [Note("no_such_boundary", message)]
+            raise SettingsError(f"boundary: {message}")
+        return [Note("no_such_boundary", f"`boundary`: {message}")]
 
     def no_such_frames(self) -> SettingsError:
         """The error for a choice that meets no frame."""
@@ -318,7 +318,7 @@ def boundary_hints(sample: Sample, settings: Settings) -> list[Note]:
         if sample.boundary.any():
             return []
         values = existing_values(sample.packing, settings.boundary)
-        return [Note("no_such_boundary", f"boundary: no particle has {named}: {values}")]
+        return [Note("no_such_boundary", f"`boundary`: no particle has {named}: {values}")]
     expression = enclosing_class(sample.packing)
     if expression is None:
         return []

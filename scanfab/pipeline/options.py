@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 from scanfab.base.column import DEFAULT_DIGITS
+from scanfab.base.errors import SettingsError
 from scanfab.base.option import Option, options_of
 from scanfab.io.options import READING_OPTIONS
 from scanfab.pipeline.settings import Settings
@@ -131,9 +132,12 @@ DECLARED = {
 NAMES = "|".join(DECLARED)
 
 
-def as_options(text: str) -> str:
+def as_options(told: str | Exception) -> str:
     """
-    A text of the library, which speaks of its arguments, in the words of the command line.
+    What the library tells, which speaks of its arguments, in the words of the command line.
+
+    The argument whose value is wrong stands in front of a SettingsError. Any other text may begin
+    with the name of a file, which may be that of an option too.
 
     Examples
     --------
@@ -141,9 +145,10 @@ def as_options(text: str) -> str:
     >>> as_options('choose another `rv_center`, or name the `cell=(LX, LY, LZ)`')
     'choose another --rv-center, or name the --cell LX LY LZ'
     """
-    # the argument whose value is wrong stands in front of a message
-    named = re.sub(rf"^({NAMES}): ", r"`\1`: ", text)
-    return re.sub(rf"`({NAMES})(?:=([^`]*))?`", _as_option, named)
+    text = str(told)
+    if isinstance(told, SettingsError):
+        text = re.sub(rf"^({NAMES}): ", r"`\1`: ", text)
+    return re.sub(rf"`({NAMES})(?:=([^`]*))?`", _as_option, text)
 
 
 def _as_option(found: re.Match[str]) -> str:

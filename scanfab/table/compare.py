@@ -98,7 +98,7 @@ def _tell_of_strains(rows: Sequence[Mapping[str, Any]], strain_max: float | None
         raise SettingsError(f"strain_max: expected a number, found {strain_max}")
     strains = numbers_of(rows, strain_column(rows) or "strain")
     if not strains:
-        warnings.warn("strain_max: no frame has a strain, so none is fitted", ScanfabWarning, 3)
+        warnings.warn("`strain_max`: no frame has a strain, so none is fitted", ScanfabWarning, 3)
     elif min(strains) > strain_max:
         warnings.warn(
             f"strain_max: {strain_max:g} leaves out all frames, so none is fitted: their strains "

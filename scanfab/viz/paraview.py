@@ -54,7 +54,7 @@ class VtkFolder:
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise SettingsError(f"{folder}: cannot be made: {error.strerror}") from None
+            raise SettingsError(f"vtk: {folder} cannot be made: {error.strerror}") from None
         check_folder(folder / "grains.pvd")
         self.folder = folder
         self.axis = axis

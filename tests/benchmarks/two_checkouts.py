@@ -19,14 +19,15 @@ import tempfile
 from pathlib import Path
 
 DATA = Path(__file__).parents[2] / "sample_data"
+CUTOFFS = ",".join(f"{0.2 * k:.1f}rmin" for k in range(1, 11))
 SCAN = {"directions": 61, "workers": 1, "seed": 3}
 CASES = {
     "open, abcd, r_min/5": ("liggghts_box", {"spacing": "0.2rmin"}),
     "open, c, r_min/10": ("liggghts_box", {"spacing": "0.1rmin", "variants": "c"}),
     "open, abcd, 4 r_min": ("liggghts_box", {"spacing": "4rmin", "directions": 1454}),
-    "open, ten cut-offs": ("liggghts_box", {"spacing": "0.5rmin", "cutoffs": "0.2:2:0.2"}),
+    "open, ten cut-offs": ("liggghts_box", {"spacing": "0.5rmin", "cutoffs": CUTOFFS}),
     "periodic, abcd, r_min/5": ("liggghts_periodic", {"spacing": "0.2rmin"}),
-    "periodic, ten cut-offs": ("liggghts_periodic", {"spacing": "0.5rmin", "cutoffs": "0.2:2:0.2"}),
+    "periodic, ten cut-offs": ("liggghts_periodic", {"spacing": "0.5rmin", "cutoffs": CUTOFFS}),
 }
 WORKER = """
 import json, sys, time, warnings

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import gzip
+import os
 import pickle
+import tempfile
 import weakref
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
@@ -35,12 +38,15 @@ def packings(count=4):
 
 def series_in(folder, count=4):
     """The same as a dump of snapshots."""
-    texts = []
-    for one in packings(count):
-        rows = zip(one.id, one.position.tolist(), one.radius, strict=True)
-        table = [(int(id) + 1, 1, *place, float(radius)) for id, place, radius in rows]
-        texts.append(dump_text(table, NAMES, step=one.step, box=((0, 10),) * 3))
-    return scanfab.read_series(write(folder / "dump.txt", "".join(texts)))
+    text = "".join(map(text_of, packings(count)))
+    return scanfab.read_series(write(folder / "dump.txt", text))
+
+
+def text_of(packing):
+    """One snapshot of a dump."""
+    rows = zip(packing.id, packing.position.tolist(), packing.radius, strict=True)
+    table = [(int(id) + 1, 1, *place, float(radius)) for id, place, radius in rows]
+    return dump_text(table, NAMES, step=packing.step, box=((0, 10),) * 3)
 
 
 def test_an_iterable_of_packings_is_a_series():
@@ -126,6 +132,22 @@ def test_other_processes_give_the_same_rows(tmp_path, processes):
     assert found == scanfab.compute(series, **SCAN)
     packed = scanfab.compute(packings(), executor=processes, **SCAN)
     assert packed == scanfab.compute(packings(), **SCAN)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
+def test_forked_processes_leave_the_copies_of_packed_files_alone(tmp_path, monkeypatch):
+    """Copies are those of one process; a forked one makes its own, and takes them with it."""
+    for number, one in enumerate(packings(30)):
+        (tmp_path / f"packed_{number}.txt.gz").write_bytes(gzip.compress(text_of(one).encode()))
+    series = scanfab.read_series(tmp_path / "packed_*.txt.gz")
+    before = scanfab.compute(series, workers=2, **SCAN)
+    copies = tmp_path / "copies"
+    copies.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(copies))
+    with ProcessPoolExecutor(2, mp_context=get_context("fork")) as forked:
+        assert scanfab.compute(series, executor=forked, workers=2, **SCAN) == before
+    assert scanfab.compute(series, workers=2, **SCAN) == before
+    assert list(copies.iterdir()) == []
 
 
 def test_what_another_process_is_told_is_heard_here(tmp_path, processes):

@@ -7,6 +7,7 @@ import inspect
 import pytest
 
 import scanfab
+from scanfab.base.errors import ReadError, SettingsError
 from scanfab.pipeline.options import DECLARED, MEANINGS, OPTIONS, as_options
 
 
@@ -26,7 +27,10 @@ from scanfab.pipeline.options import DECLARED, MEANINGS, OPTIONS, as_options
         ("`contact_tolerance=1e-4`", "--contact-tolerance 1e-4"),
         ('`columns={"x": ..., "y": "py"}`', "--columns x=...,y=py"),
         ("`output=FILE` and `labels=NAME`", "-o FILE and --label NAME"),
-        ("rv_radius: expected a length", "--rv-radius: expected a length"),
+        (SettingsError("rv_radius: expected a length"), "--rv-radius: expected a length"),
+        # a folder may have any name
+        (ReadError("frames: the folder holds no files"), "frames: the folder holds no files"),
+        ("seed: passed over", "seed: passed over"),
         ("--rv: said already of `rv`", "--rv: said already of --rv"),
         ("dumps: `unheard` of, `rv` of", "dumps: `unheard` of, --rv of"),
         ("frame 3: rv is 1", "frame 3: rv is 1"),

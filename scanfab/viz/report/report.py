@@ -198,7 +198,7 @@ def _section(one: Input, heard: _Heard) -> Section:
             with _listening(heard):
                 shown = show_frames(one)
         except (ScanfabError, OSError) as error:
-            no_view = f"The view is left out: {as_options(str(error))}."
+            no_view = f"The view is left out: {as_options(error)}."
     return Section(
         title=str(one.path),
         command=repeat_command(asked, one.path.name, _overridden(one.manifest)),
