@@ -83,7 +83,11 @@ class Sphere(NamedTuple):
 
 @inner(fastmath={"contract"}, error_model="numpy")
 def begin(lines: FloatArray, strip: Strip, section: Section, second: Flag, whole: Flag) -> None:
-    """Lines that have met nothing yet, and where they enter and leave the window."""
+    """
+    Lines that have met nothing yet, and where they enter and leave the window.
+
+    Rows lose the lines at their ends that miss its planes, if these serve the window alone.
+    """
     a, rise_u = section.a, section.rise_u
     chosen = np.empty(section.planes.shape[0], np.int64)
     for row in range(strip.rows):
@@ -215,9 +219,11 @@ def spans(clip: Clip, triad: FloatArray, points: FloatArray, ends: FloatArray) -
     ``ends`` has the same shape.
     """
     section, lines = section_along(clip, triad), np.empty(STATE_SIZE)
-    every = np.zeros(1, np.int64), np.ones(1, np.int64)
+    low, high = np.zeros(1, np.int64), np.ones(1, np.int64)
     for k in range(points.shape[0]):
-        strip = Strip(1.0, 1.0, points[k, 0], points[k, 1], 1, 1, 1 + LANES, every[0], every[1])
+        # a line that misses the window is taken out of its row
+        low[0], high[0] = 0, 1
+        strip = Strip(1.0, 1.0, points[k, 0], points[k, 1], 1, 1, 1 + LANES, low, high)
         begin(lines, strip, section, None, None)
         ends[k, 0], ends[k, 1] = lines[ENTRY], lines[EXIT]
 
