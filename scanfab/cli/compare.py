@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import click
 
@@ -57,6 +55,7 @@ def compare(
     from scanfab.cli.comparison_tables import print_comparison
     from scanfab.cli.console import is_readable, print_csv, reported_warnings
     from scanfab.table.compare import compare_tables
+    from scanfab.table.comparison_rows import DifferenceRow, FrameRow, SummaryRow
     from scanfab.table.formats.registry import format_of
     from scanfab.table.reading import read_rows
     from scanfab.table.result_file import ResultFile
@@ -76,22 +75,23 @@ def compare(
         read = [(table, read_rows(table)) for table in tables]
         rows = [row for one in choose_rows(read, cutoff, labels) for row in one]
         comparison = compare_tables(rows, strain_max=strain_max)
-        chosen: Sequence[Any] = comparison.frames
+        kind: type = FrameRow
+        chosen = comparison.frames
         if summary:
-            chosen = comparison.summary
+            chosen, kind = comparison.summary, SummaryRow
         elif differences:
-            chosen = comparison.differences
+            chosen, kind = comparison.differences, DifferenceRow
         if not chosen:
             lacking = "two variants of one frame" if comparison.frames else "frames"
             raise SettingsError(f"there is nothing to compare: the tables hold no {lacking}")
         with usage_errors():
-            excerpt = Excerpt.make(type(chosen[0]), fields, digits)
+            excerpt = Excerpt.make(kind, fields, digits)
         if output is not None:
-            ResultFile(output, type(chosen[0]), excerpt).save(chosen)
+            ResultFile(output, kind, excerpt).save(chosen)
         elif is_readable() and not differences and excerpt.is_all:
             print_comparison(comparison)
         else:
-            print_csv(chosen, excerpt, type(chosen[0]))
+            print_csv(chosen, excerpt, kind)
         if plot is not None:
             save_figures(plot, make_figures(rows, "table", figure, comparison=comparison))
     return 0 if any(row.alpha_vs_axial is not None for row in comparison.frames) else 1

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from scanfab.cli.tables import GAP, Column, print_columns, spelt, width_of
 
 if TYPE_CHECKING:
-    from scanfab.table.comparison_rows import Comparison, FrameRow, SummaryRow
+    from scanfab.table.comparison_rows import Comparison
+    from scanfab.table.row import Row
 
 __all__ = ["print_comparison"]
 
@@ -45,11 +46,11 @@ def print_comparison(comparison: Comparison) -> None:
     )
 
 
-def _sources(rows: Sequence[FrameRow | SummaryRow], names: dict[str, str]) -> Titled:
+def _sources(rows: Sequence[Row], names: dict[str, str]) -> Titled:
     return [("source", [names[row.source] for row in rows])] if len(names) > 1 else []
 
 
-def _slopes(rows: Sequence[SummaryRow]) -> Titled:
+def _slopes(rows: Sequence[Row]) -> Titled:
     return [
         ("variant", [row.variant for row in rows]),
         ("slope", [spelt(row.slope) for row in rows]),
@@ -63,7 +64,7 @@ def _slopes(rows: Sequence[SummaryRow]) -> Titled:
 
 def _curves(comparison: Comparison, longest: int) -> Titled:
     """Both anisotropies over the frames, as bars."""
-    groups: dict[tuple[str, str], list[FrameRow]] = {}
+    groups: dict[tuple[str, str], list[Row]] = {}
     for frame in comparison.frames:
         groups.setdefault((frame.source, frame.variant), []).append(frame)
     curves = [groups[row.source, row.variant] for row in comparison.summary]
@@ -73,7 +74,7 @@ def _curves(comparison: Comparison, longest: int) -> Titled:
     ]
 
 
-def _frames(rows: Sequence[FrameRow]) -> Titled:
+def _frames(rows: Sequence[Row]) -> Titled:
     from scanfab.table.abscissa import strain_column
 
     sheared = strain_column(rows) == "shear_strain"

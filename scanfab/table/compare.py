@@ -14,10 +14,12 @@ from scanfab.base.errors import ScanfabNote, ScanfabWarning, SettingsError
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.jackknife import BLOCKS, variance_without_noise
 from scanfab.table.abscissa import strain_column, why_not_strain
+from scanfab.table.columns import columns_of
 from scanfab.table.comparison_rows import Comparison, DifferenceRow, FrameRow, SummaryRow
 from scanfab.table.curves import is_turned
 from scanfab.table.reading import number_of, numbers_of, total_error
 from scanfab.table.selection import check_rows
+from scanfab.table.table import Table
 
 __all__ = ["compare_tables"]
 
@@ -77,12 +79,17 @@ def compare_tables(
     told_apart = {key: _with_strain(group, column) for key, group in groups.items()}
     points = [_points(group, strain_max) for group in told_apart.values()]
     return Comparison(
-        frames=tuple(row for group in groups.values() for row in _normalised(group)),
-        summary=tuple(
-            _summary(*key, group, fitted, strain_max)
-            for (key, group), fitted in zip(told_apart.items(), points, strict=True)
+        frames=Table(
+            (row for group in groups.values() for row in _normalised(group)), columns_of(FrameRow)
         ),
-        differences=tuple(_differences(groups)),
+        summary=Table(
+            (
+                _summary(*key, group, fitted, strain_max)
+                for (key, group), fitted in zip(told_apart.items(), points, strict=True)
+            ),
+            columns_of(SummaryRow),
+        ),
+        differences=Table(_differences(groups), columns_of(DifferenceRow)),
         points=tuple(points),
     )
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
-
+from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray
 from scanfab.table.preview import with_error
 from scanfab.table.row import Record
+
+if TYPE_CHECKING:
+    from scanfab.table.table import Table
 
 __all__ = [
     "Comparison",
@@ -108,11 +110,11 @@ class Comparison:
 
     Attributes
     ----------
-    frames : tuple of FrameRow
+    frames : Table
         A row for each frame and variant, with both anisotropies divided by their largest.
-    summary : tuple of SummaryRow
+    summary : Table
         A row for each source and variant: slope, peak, final value.
-    differences : tuple of DifferenceRow
+    differences : Table
         A row for each frame and pair of variants.
     points : tuple of ndarray
         For each row of the summary, contact and void anisotropy of the frames in its fits, shape
@@ -131,9 +133,9 @@ class Comparison:
     0.1
     """
 
-    frames: tuple[FrameRow, ...]
-    summary: tuple[SummaryRow, ...]
-    differences: tuple[DifferenceRow, ...]
+    frames: Table
+    summary: Table
+    differences: Table
     points: tuple[FloatArray, ...]
 
     @property
@@ -157,12 +159,12 @@ class Comparison:
         return self._numbers("peak")
 
     def _numbers(self, name: str) -> FloatArray:
-        return np.array([np.nan if row[name] is None else row[name] for row in self.summary], float)
+        return self.summary[name].astype(float)
 
     def __repr__(self) -> str:
         lines = [
             f"{one.source}, variant {one.variant}: slope {with_error(one.slope, one.slope_se)}, "
-            f"{one.frames} frames"
+            f"{counted(one.frames, 'frame')}"
             for one in self.summary
         ]
         return "\n".join([f"Comparison of {len(self.frames)} rows", *lines])

@@ -66,6 +66,8 @@ class Table(Sequence[Row]):
     ----------
     rows : iterable of mapping
         Values by column; missing values are None.
+    columns : sequence of Column, optional
+        What they hold; by default as declared, or as their values are.
 
     Examples
     --------
@@ -82,9 +84,11 @@ class Table(Sequence[Row]):
     columns: tuple[Column, ...]
     """What each column is called and holds."""
 
-    def __init__(self, rows: Iterable[Mapping[str, Any]] = ()) -> None:
+    def __init__(
+        self, rows: Iterable[Mapping[str, Any]] = (), columns: Sequence[Column] | None = None
+    ) -> None:
         given = list(rows)
-        self.columns = _columns(given)
+        self.columns = _columns(given) if columns is None else tuple(columns)
         names = [column.name for column in self.columns]
         self.rows = tuple(
             row if isinstance(row, Row) and len(row) == len(names) else _filled(row, names)
@@ -111,7 +115,7 @@ class Table(Sequence[Row]):
     def __getitem__(self, key: str) -> npt.NDArray[Any]: ...
     def __getitem__(self, key: int | slice | str) -> Row | Table | npt.NDArray[Any]:
         if isinstance(key, slice):
-            return Table(self.rows[key])
+            return Table(self.rows[key], self.columns)
         if not isinstance(key, str):
             return self.rows[key]
         self._check(key)
@@ -156,9 +160,8 @@ class Table(Sequence[Row]):
         """
         for name in wanted:
             self._check(name)
-        return Table(
-            row for row in self.rows if all(row[name] == value for name, value in wanted.items())
-        )
+        chosen = (row for row in self.rows if all(row[k] == value for k, value in wanted.items()))
+        return Table(chosen, self.columns)
 
     def tensor(self, name: str) -> FloatArray:
         """

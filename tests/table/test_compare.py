@@ -10,6 +10,7 @@ import pytest
 
 from scanfab.base.errors import ScanfabNote, ScanfabWarning, SettingsError
 from scanfab.table.compare import compare_tables
+from scanfab.table.table import load
 from tests.helpers.tables import CONTACT, STRAIN, VOID, curve, sheared
 
 
@@ -141,7 +142,7 @@ def test_frames_beyond_the_largest_strain_are_out_of_the_fit_alone():
 def test_frames_without_a_strain_are_out_of_a_fit_up_to_a_strain():
     rows = [{**row, "strain": None} for row in curve()]
     assert summary_of(rows).frames == 5
-    with pytest.warns(ScanfabWarning, match="strain_max: no frame has a strain"):
+    with pytest.warns(ScanfabWarning, match="`strain_max`: no frame has a strain"):
         assert summary_of(rows, strain_max=1.0).frames == 0
 
 
@@ -288,3 +289,13 @@ def test_the_noise_of_the_scan_is_taken_off_the_error_of_the_slope():
     error = variances.std() / np.sqrt(len(variances))
     assert variances.mean() == pytest.approx(exact, abs=4 * error)
     assert np.mean(without) > exact + 8 * error
+
+
+def test_a_comparison_is_made_of_tables_like_any_other(tmp_path):
+    comparison = compare_tables(curve())
+    for table in (comparison.frames, comparison.summary):
+        table.save(tmp_path / "again.csv")
+        assert list(load(tmp_path / "again.csv")) == list(table)
+    assert comparison.frames.to_polars().columns == list(comparison.frames.names)
+    assert len(comparison.differences) == 0
+    assert comparison.differences.names[:2] == ("source", "frame")

@@ -10,8 +10,9 @@ import numpy as np
 
 from scanfab.base.typing import FloatArray
 from scanfab.table.compare import compare_tables
-from scanfab.table.comparison_rows import Comparison, SummaryRow
+from scanfab.table.comparison_rows import Comparison
 from scanfab.table.curves import Curve, is_turned
+from scanfab.table.row import Row
 from scanfab.table.table import Table
 from scanfab.viz.figures.figure import Figure
 from scanfab.viz.figures.groups import Drawn, Group, group_of, groups_of
@@ -60,7 +61,7 @@ def fits_of(comparison: Comparison) -> list[Fit | None]:
     ]
 
 
-def _fit(summary: SummaryRow, points: FloatArray) -> Fit | None:
+def _fit(summary: Row, points: FloatArray) -> Fit | None:
     if summary.slope is None:
         return None
     middle = points.mean(axis=0)

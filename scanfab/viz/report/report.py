@@ -136,7 +136,12 @@ def make_report(
     >>> report.has_void_fabric
     True
     """
-    named = [tables] if isinstance(tables, str | os.PathLike) else tables
+    named = [tables] if isinstance(tables, str | os.PathLike) else list(tables)
+    if not all(isinstance(one, str | os.PathLike) for one in named):
+        raise SettingsError(
+            "expected files of tables, beside which manifests say what made them: save a table, or "
+            "compute it by scanfab.compute_file, and name its file"
+        )
     heard = _Heard()
     with _listening(heard, tell=True):
         inputs = read_inputs([Path(one) for one in named], cutoff, labels)

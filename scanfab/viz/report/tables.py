@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.table.abscissa import STRAINS, spelt_strain, strain_column
-from scanfab.table.comparison_rows import SummaryRow
 from scanfab.table.curves import is_turned
 from scanfab.table.reading import number_of, numbers_of, total_error
+from scanfab.table.row import Row as TableRow
 from scanfab.viz.report.page import Part
 
 __all__ = ["frame_table", "input_table", "overview", "results_tables"]
@@ -76,15 +76,15 @@ def _span(values: Sequence[str]) -> str:
     return values[0] if values[0] == values[-1] else f"{values[0]} to {values[-1]}"
 
 
-def results_tables(summary: Iterable[SummaryRow], rows: Sequence[Row]) -> list[Part]:
+def results_tables(summary: Iterable[TableRow], rows: Sequence[Row]) -> list[Part]:
     """A table for each source: a column for each variant, the key numbers first."""
-    sources: dict[str, list[SummaryRow]] = {}
+    sources: dict[str, list[TableRow]] = {}
     for one in summary:
         sources.setdefault(one.source, []).append(one)
     return [_results(source, lines, rows) for source, lines in sources.items()]
 
 
-def _results(source: str, summary: Sequence[SummaryRow], rows: Sequence[Row]) -> Part:
+def _results(source: str, summary: Sequence[TableRow], rows: Sequence[Row]) -> Part:
     ends = [_ends(one, rows) for one in summary]
     first, last = [one[0] for one in ends], [one[1] for one in ends]
     column = strain_column([row for row in rows if row["source"] == source])
@@ -114,7 +114,7 @@ def _results(source: str, summary: Sequence[SummaryRow], rows: Sequence[Row]) ->
 
 def _part(
     source: str,
-    summary: Sequence[SummaryRow],
+    summary: Sequence[TableRow],
     lines: Sequence[tuple[str, Sequence[str]]],
     note: str = "",
 ) -> Part:
@@ -124,7 +124,7 @@ def _part(
 
 
 def _turned_results(
-    source: str, summary: Sequence[SummaryRow], rows: Sequence[Row], where: tuple[str, str]
+    source: str, summary: Sequence[TableRow], rows: Sequence[Row], where: tuple[str, str]
 ) -> Part:
     """
     Of a source whose axes are turned: what is seen whichever way they point, as in its figures.
@@ -154,7 +154,7 @@ def _degrees(row: Row) -> str:
     return "-" if angle is None else f"{angle:.0f}°"
 
 
-def _ends(one: SummaryRow, rows: Sequence[Row]) -> tuple[Row, Row]:
+def _ends(one: TableRow, rows: Sequence[Row]) -> tuple[Row, Row]:
     """The first and the last row of a source and variant that have a void fabric."""
     group = [
         row

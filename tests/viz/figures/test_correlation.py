@@ -44,7 +44,7 @@ def test_the_slope_s_error_is_in_the_legend():
     comparison = compare_tables(curve())
     (one,) = comparison.summary
     assert one.slope_se is None
-    comparison = replace(comparison, summary=(replace(one, slope_se=0.0123),))
+    comparison = replace(comparison, summary=Table([{**one, "slope_se": 0.0123}]))
     with drawn_page([Correlation(Table(curve()), comparison)]) as page:
         assert r"$\pm$ 0.012" in legend_of(page.axes[1])[0]
 

@@ -20,6 +20,7 @@ from scanfab.cli.main import run
 from scanfab.io.opening import read_series
 from scanfab.pipeline.compute import compute_rows
 from scanfab.table.reading import read_rows
+from scanfab.table.table import Table
 from scanfab.viz.report.page import MOST_GRAINS, Picture, view_data
 from scanfab.viz.report.report import make_report
 from scanfab.viz.scene import Scene
@@ -491,3 +492,8 @@ def test_a_report_is_saved_by_one_call(table, tmp_path):
     assert make_report([path], title="One").page == report.page
     with pytest.raises(SettingsError, match="reports are HTML"):
         report.save(tmp_path / "report.pdf")
+
+
+def test_a_table_in_memory_is_refused_in_words():
+    with pytest.raises(SettingsError, match="expected files of tables"):
+        make_report(Table(curve()))
