@@ -68,8 +68,8 @@ def compute(
     from scanfab.cli.console import announce_compiling, reported_warnings
     from scanfab.pipeline.job import Job
     from scanfab.pipeline.settings import Settings
+    from scanfab.table.columns import table_columns
     from scanfab.table.result_file import ResultFile
-    from scanfab.table.row import Row
     from scanfab.table.writing import Excerpt
 
     if resume and output is None:
@@ -81,9 +81,11 @@ def compute(
             raise click.UsageError("--plot is of one cut-off: leave out --cutoffs")
         with settings_file.named_errors():
             reading = reading_arguments(chosen)
-            excerpt = Excerpt.make(Row, chosen.pop("fields"), int(chosen.pop("digits")))
+            fields, digits = chosen.pop("fields"), int(chosen.pop("digits"))
             settings = Settings(**chosen)
-            result = None if output is None else ResultFile(output, Row, excerpt)
+            columns = table_columns(settings.more_columns)
+            excerpt = Excerpt.make(columns, fields, digits)
+            result = None if output is None else ResultFile(output, columns, excerpt)
         series = open_series(sources, reading)
         if figure is not None and _is_of_frames(figure) and len(series) > 1:
             raise click.UsageError(f"--figure {figure} draws one series: name one source")
@@ -203,13 +205,14 @@ def _standing(job: Job, printed: bool) -> str:
 def _write(job: Job, excerpt: Excerpt) -> None:
     """Write the rows as they come; on a terminal, all of them as a table."""
     from scanfab.cli.console import is_readable, print_csv, print_table
+    from scanfab.table.columns import table_columns
 
     with working(job.frames, job.done) as advance:
         if job.result is not None:
             job.write(advance)
             return
         if not is_readable():
-            print_csv(job.rows(advance), excerpt)
+            print_csv(job.rows(advance), excerpt, table_columns(job.settings.more_columns))
             return
         rows = list(job.rows(advance))
     print_table(rows, excerpt)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import sys
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 import click
 
+from scanfab.base import column
 from scanfab.base.column import DEFAULT_DIGITS
 from scanfab.base.errors import ScanfabNote, ScanfabWarning
 from scanfab.cli.options import AS_CSV
@@ -100,8 +101,10 @@ def announce_compiling() -> None:
     )
 
 
-def print_csv(rows: Iterable[Mapping[str, Any]], excerpt: Excerpt, kind: type = Row) -> None:
-    """Rows of a kind as CSV on standard output, each as it comes."""
+def print_csv(
+    rows: Iterable[Mapping[str, Any]], excerpt: Excerpt, kind: type | Sequence[column.Column] = Row
+) -> None:
+    """Rows of a kind, or of some columns, as CSV on standard output, each as it comes."""
     from scanfab.table.columns import columns_of
     from scanfab.table.writing import row_writer
 

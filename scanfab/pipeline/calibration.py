@@ -30,7 +30,7 @@ from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.plan import Plan, make_plan
 from scanfab.pipeline.settings import AUTO_RULE, Length, Settings
 from scanfab.pipeline.tolerance import TOLERANCE_MISSED, missing_work
-from scanfab.pipeline.values import parse_frames
+from scanfab.pipeline.values import SHAPES, parse_frames
 from scanfab.scan.directions import direction_rule
 from scanfab.table.plots import Plots
 from scanfab.table.table import Row
@@ -179,7 +179,7 @@ class _Calibrator:
             "spacing": judged(self._spacings()),
             "directions": judged(self._directions()),
             "cutoff": cutoffs,
-            "rv": judged(self._rvs()) if self.settings.needs_window else [],
+            "rv": judged(self._rvs()) if self._rv_has_sizes else [],
         }
         sample = largest(cutoffs, "alpha_vs_axial_sample_se", self._default_cutoff())
         target = max(self.settings.tolerance, OF_SAMPLE * (sample or 0.0))
@@ -210,10 +210,15 @@ class _Calibrator:
         cutoffs = tuple(Length(value, "rmin") for value in CUTOFFS)
         yield from self._step("cutoff", None, replace(self.settings, cutoffs=cutoffs))
 
+    @property
+    def _rv_has_sizes(self) -> bool:
+        """Whether there is an RV, and not one that a file draws."""
+        return self.settings.needs_window and self.settings.rv_shape in SHAPES
+
     def _rvs(self) -> Iterator[StepRow]:
         variants = "".join(variant for variant in self.settings.variants if variant in "cd")
         for value in RV_FRACTIONS:
-            step = replace(self.settings, rv=value, rv_radius=None, variants=variants)
+            step = replace(self.settings, rv=value, rv_radius=None, rv_size=(), variants=variants)
             yield from self._step("rv", value, step)
 
     def _step(self, ladder: str, value: float | None, settings: Settings) -> Iterator[StepRow]:

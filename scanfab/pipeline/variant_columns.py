@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -14,6 +14,7 @@ from scanfab.base.note import Note
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.jackknife import BLOCKS, BlockedSums
 from scanfab.fabric.registry import OWN_FABRICS, Measured, checked_values
+from scanfab.fabric.window import WINDOW_ALPHA, window_alpha
 from scanfab.packing.columns import sample_values
 from scanfab.packing.sample import Variant
 from scanfab.pipeline.measurement import Measurement
@@ -44,7 +45,7 @@ class VariantColumns:
             found |= fabric.values(self.measured)
         for name, fabric in installed_fabrics().items():
             found |= checked_values(name, fabric, self.measured)
-        return found
+        return {**found, **self._window()}
 
     @cached_property
     def measured(self) -> Measured:
@@ -120,6 +121,17 @@ class VariantColumns:
             [gaps.kept(*words, without=block) for block in range(BLOCKS)],
         )
 
+    def _window(self) -> dict[str, Any]:
+        """What the window alone would give, where its column is there."""
+        name, window, fabric = WINDOW_ALPHA.name, self.plan.window, self.measured.void
+        if name not in self.plan.more_columns:
+            return {}
+        value: float | None = None
+        if self.variant.in_window and window is not None and fabric and self.plan.moment == 1:
+            cutoff = self.plan.cutoffs[self.place]
+            value = window_alpha(window.shape, fabric, cutoff, self.measured.axis)
+        return {name: value}
+
     def _blocks_of(self, points: FloatArray) -> IntArray:
         """The block of each place; of the window those next to its centre."""
         if self.variant.in_window:
@@ -166,7 +178,7 @@ class VariantColumns:
         }
 
 
-def no_columns() -> dict[str, Any]:
+def no_columns(more: Collection[str] = ()) -> dict[str, Any]:
     """The columns of a frame without grains."""
-    empty = {column.name: None for column in table_columns()}
+    empty = {column.name: None for column in table_columns(more)}
     return {**empty, "grains": 0, "rattlers": 0, "contacts": 0}

@@ -22,6 +22,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
+from scanfab.base.column import Column
 from scanfab.base.ending import undone_at_end
 from scanfab.base.errors import ReadError, ScanfabNote, SettingsError
 from scanfab.base.files import check_folder, named_errors, whole_file
@@ -43,8 +44,8 @@ class ResultFile:
     ----------
     path : Path
         Its suffix is the format.
-    kind : type
-        The class of the rows.
+    kind : type or sequence of Column
+        The class of the rows, or their columns.
     excerpt : Excerpt, optional
         Which columns of them are written, and with how many digits.
 
@@ -54,7 +55,7 @@ class ResultFile:
         If the suffix is not known, or there is no such folder.
     """
 
-    def __init__(self, path: Path, kind: type, excerpt: Excerpt = ALL) -> None:
+    def __init__(self, path: Path, kind: type | Sequence[Column], excerpt: Excerpt = ALL) -> None:
         table_format = format_of(path)
         check_folder(path)
         self.path = path

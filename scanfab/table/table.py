@@ -14,7 +14,7 @@ from scanfab.base.column import DEFAULT_DIGITS, Column, NoColumnError, no_column
 from scanfab.base.errors import SettingsError
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.tensor import COMPONENTS
-from scanfab.table.columns import COLUMNS, columns_of, table_columns
+from scanfab.table.columns import COLUMNS, MORE_COLUMNS, columns_of, table_columns
 from scanfab.table.plots import Plots
 from scanfab.table.preview import as_html, as_text
 from scanfab.table.reading import read_rows
@@ -320,7 +320,7 @@ def _columns(rows: Sequence[Mapping[str, Any]]) -> tuple[Column, ...]:
         return table_columns()
     if is_dataclass(rows[0]):
         return columns_of(type(rows[0]))
-    known = {column.name: column for column in table_columns()}
+    known = {column.name: column for column in (*table_columns(), *MORE_COLUMNS)}
     names = dict.fromkeys(name for row in rows for name in row)
     return tuple(known.get(name) or _found(name, rows) for name in names)
 

@@ -58,8 +58,7 @@ class Excerpt:
         if fields is None:
             return cls(digits=digits)
         names = _names(fields)
-        columns = columns_of(columns) if isinstance(columns, type) else columns
-        known = [column.name for column in columns]
+        known = [column.name for column in columns_of(columns)]
         for name in names:
             if name not in known:
                 raise SettingsError(f"fields: {no_column(name, known)}")

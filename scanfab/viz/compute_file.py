@@ -18,8 +18,8 @@ from scanfab.pipeline.frames import of_whole
 from scanfab.pipeline.job import Job
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.told import recorded
+from scanfab.table.columns import table_columns
 from scanfab.table.result_file import ResultFile
-from scanfab.table.row import Row
 from scanfab.table.table import Table, load
 from scanfab.table.writing import Excerpt
 from scanfab.viz.paraview import vtk_folders
@@ -107,15 +107,16 @@ def compute_file(
     """
     known = [*READING, *(one.name for one in options_of(Settings))]
     refuse_unknown("compute_file", options, known)
-    excerpt = Excerpt.make(Row, fields, digits)
     with recorded() as told:
         series, sources, reading = _opened(source, options)
         series, settings = _whole(series, Settings(**options))
+        columns = table_columns(settings.more_columns)
+        excerpt = Excerpt.make(columns, fields, digits)
         folders = () if vtk is None else vtk_folders(Path(vtk), len(series), settings, go_on=resume)
         job = Job(
             series,
             settings,
-            ResultFile(Path(output), Row, excerpt),
+            ResultFile(Path(output), columns, excerpt),
             sources=sources,
             reading=reading,
             resume=resume,
