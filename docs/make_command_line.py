@@ -10,7 +10,7 @@ from scanfab.base.column import Column, columns_of_fields
 from scanfab.cli.group import COMMANDS, cli
 from scanfab.pipeline.calibration_ladders import StepRow
 from scanfab.pipeline.inspection import FrameReport
-from scanfab.table.columns import OWN_COLUMNS
+from scanfab.table.columns import MORE_COLUMNS, OWN_COLUMNS
 from scanfab.table.comparison_rows import DifferenceRow, FrameRow, SummaryRow
 
 PAGE = Path(__file__).parent / "command-line.md"
@@ -47,6 +47,7 @@ series that has grains.
 
 TABLES = {
     "scanfab compute": OWN_COLUMNS,
+    "scanfab compute, where the options ask for more than the default": MORE_COLUMNS,
     "scanfab compare": columns_of_fields(FrameRow),
     "scanfab compare --summary": columns_of_fields(SummaryRow),
     "scanfab compare --differences": columns_of_fields(DifferenceRow),

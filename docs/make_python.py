@@ -21,9 +21,9 @@ GROUPS = {
     ),
     "Figures and reports": ("scan_frames", "ScannedFrames", "make_report", "Report"),
     "Scanning by hand": (
-        "samples", "Sample", "Window", "sphere", "Convex", "solids_of", "Solids", "direction_rule",
-        "DirectionRule", "scan_lines", "ScanSums", "void_fabric", "VoidFabric", "contact_fabric",
-        "FabricTensor",
+        "samples", "Sample", "Window", "sphere", "box", "cylinder", "ellipsoid", "polyhedron",
+        "Convex", "solids_of", "Solids", "direction_rule", "DirectionRule", "scan_lines",
+        "ScanSums", "void_fabric", "VoidFabric", "contact_fabric", "FabricTensor",
     ),
     "Errors and warnings": (
         "ScanfabError", "ReadError", "UnknownFormatError", "NoFrameError", "PackingError",

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from scanfab.base.bodies import BALL, Body
+from scanfab.base.option import number
 from scanfab.base.typing import BoolArray, FloatArray
 
-__all__ = ["EVERYWHERE", "Convex", "Quadric", "sphere"]
+__all__ = ["EVERYWHERE", "Convex", "Quadric", "image_of", "sphere"]
+
+# steps towards the nearest place of a region, and what of a distance is rounding
+STEPS, ROUNDING = 200, 1e-12
+# directions over which a shadow is averaged, for plans
+AXES = 200
 
 
 class Quadric(NamedTuple):
@@ -36,6 +44,9 @@ class Convex:
     """
     A convex region about the origin, bounded; its surface is not part of it.
 
+    Planes and quadric are all that decides what lies in it; the body and the frame of which it is
+    the image tell volume, shadow and surface, and what becomes of it when it is deformed.
+
     Parameters
     ----------
     planes : ndarray
@@ -50,6 +61,10 @@ class Convex:
         Radius of the ball about the origin that holds the region; of a sphere its own.
     size : str
         How messages tell its size, for instance ``radius 2``.
+    body : Body
+        What it is the image of.
+    frame : ndarray, shape (3, 3)
+        It holds the places frame @ x with x in the body.
 
     Examples
     --------
@@ -67,12 +82,35 @@ class Convex:
     high: FloatArray
     reach: float
     size: str
+    body: Body
+    frame: FloatArray
 
     def __repr__(self) -> str:
         return f"Convex: {self.size} about the origin"
 
     def __str__(self) -> str:
         return self.size
+
+    @property
+    def is_sphere(self) -> bool:
+        """Whether all its diameters are equal."""
+        return not len(self.planes) and not self.quadric.deviator.any()
+
+    @property
+    def volume(self) -> float:
+        """Dump's length unit, cubed."""
+        return float(self.body.volume * abs(np.linalg.det(self.frame)))
+
+    @property
+    def mean_shadow(self) -> float:
+        """Projected area in the mean of all directions, to some per cent."""
+        axes = BALL.outline[:: len(BALL.outline) // AXES]
+        return float(self.overlap(axes, 0.0)[1].mean())
+
+    @property
+    def outline(self) -> FloatArray:
+        """Points of the surface whose hull it is; of a curved one nearly; shape (K, 3)."""
+        return self.body.outline @ self.frame.T
 
     def contains(self, points: FloatArray) -> BoolArray:
         """
@@ -98,9 +136,7 @@ class Convex:
 
     def may_meet(self, points: FloatArray, radius: FloatArray) -> BoolArray:
         """
-        Which spheres may reach inside: all that do, and of a sphere no others.
-
-        Past an edge, or a quadric that is no sphere, some are told that only come near.
+        Which spheres reach inside; at times one that all but touches.
 
         Parameters
         ----------
@@ -116,7 +152,142 @@ class Convex:
         near = np.sqrt(np.einsum("ij,ij->i", points, points)) < self.reach + radius
         for plane in self.planes:
             near &= points @ plane[:3] < plane[3] + radius
+        if self.is_sphere:
+            return np.asarray(near)
+        # past an edge, or a quadric that is no sphere, these are too many
+        unsure = np.flatnonzero(near)
+        unsure = unsure[~self.contains(points[unsure])]
+        near[unsure] = self._meets(points[unsure], radius[unsure])
         return np.asarray(near)
+
+    def support(self, along: FloatArray) -> FloatArray:
+        """
+        The place that is furthest along each vector.
+
+        Parameters
+        ----------
+        along : ndarray, shape (N, 3)
+            Of any length but 0.
+
+        Returns
+        -------
+        ndarray, shape (N, 3)
+        """
+        furthest: FloatArray = self.body.support(along @ self.frame) @ self.frame.T
+        return furthest
+
+    def _meets(self, points: FloatArray, radius: FloatArray) -> BoolArray:
+        """
+        Which spheres about places outside reach inside, by walking towards the nearest place.
+
+        From a place x inside go as near to p as the way to the place furthest along p - x allows.
+        The distance of p is at most |p - x|, and at least that of the plane through the furthest
+        place; a sphere between the two after all steps may reach inside.
+        """
+        meets = np.ones(len(points), bool)
+        open_, at = np.arange(len(points)), np.zeros_like(points)
+        for _ in range(STEPS):
+            toward = points[open_] - at
+            distance = np.linalg.norm(toward, axis=1)
+            furthest = self.support(toward)
+            gap = np.einsum("ij,ij->i", points[open_] - furthest, toward) / distance
+            missed = gap >= radius[open_]
+            meets[open_[missed]] = False
+            unsure = ~missed & (distance >= radius[open_])
+            open_, toward, at = open_[unsure], toward[unsure], at[unsure]
+            if not len(open_):
+                break
+            way = furthest[unsure] - at
+            square = np.einsum("ij,ij->i", way, way)
+            share = np.einsum("ij,ij->i", toward, way) / np.where(square > 0.0, square, 1.0)
+            at = at + np.clip(share, 0.0, 1.0)[:, None] * way
+        return meets
+
+    def overlap(self, axes: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
+        """
+        What it shares with itself moved along axes, and how fast that falls.
+
+        Parameters
+        ----------
+        axes : ndarray, shape (N, 3)
+            Unit vectors.
+        length : float
+            How far it is moved, dump's length unit.
+
+        Returns
+        -------
+        shared : ndarray, shape (N,)
+            The covariogram g, a volume.
+        slope : ndarray, shape (N,)
+            -dg/dlength, the area of the lines with a piece in it that is at least so long; at
+            length 0 the projected area.
+        """
+        scale = abs(np.linalg.det(self.frame))
+        shared, slope = self.body.overlap(axes @ np.linalg.inv(self.frame).T, length)
+        return scale * shared, scale * slope
+
+    def meets_itself(self, shift: FloatArray) -> bool:
+        """
+        Whether it overlaps itself moved by a vector.
+
+        Parameters
+        ----------
+        shift : ndarray, shape (3,)
+            Dump's length unit.
+
+        Returns
+        -------
+        bool
+        """
+        if self.body.is_symmetric:
+            # the middle of two places of a symmetric region, x and -x + shift, is half the shift
+            return bool(self.contains(0.5 * shift[None])[0])
+        from scipy.optimize import linprog
+
+        # how deep a ball fits into both
+        normals, distance = self.planes[:, :3], self.planes[:, 3]
+        both = distance + np.minimum(normals @ shift, 0.0)
+        depth = np.column_stack([normals, np.ones(len(normals))])
+        found = linprog([0, 0, 0, -1], depth, both, bounds=[(None, None)] * 4)
+        return bool(found.x[3] > ROUNDING * self.reach)
+
+    def deformed(self, gradient: FloatArray) -> Convex:
+        """
+        The image of the region under the map gradient @ x.
+
+        A sphere becomes an ellipsoid, a box leans: planes and a quadric again.
+
+        Parameters
+        ----------
+        gradient : ndarray, shape (3, 3)
+            Not singular.
+
+        Returns
+        -------
+        Convex
+        """
+        if np.array_equal(gradient, np.eye(3)):
+            return self
+        return image_of(self.body, gradient @ self.frame, f"deformed, first {self.size}")
+
+
+def image_of(body: Body, frame: FloatArray, size: str) -> Convex:
+    """The places frame @ x with x in the body."""
+    inverse = np.linalg.inv(frame)
+    planes = np.column_stack([body.planes[:, :3] @ inverse, body.planes[:, 3]])
+    planes /= np.linalg.norm(planes[:, :3], axis=1, keepdims=True)
+    quadric = EVERYWHERE
+    if body.form.any():
+        form = inverse.T @ np.diag(body.form) @ inverse
+        # an isotropic part of 1, of whatever unit lengths are
+        level = 3.0 / np.trace(form)
+        quadric = Quadric(1.0, level * form - np.eye(3), float(level))
+    # the support along x, y, z; those of -x, -y, -z are not its opposites in every body
+    along = np.concatenate([np.eye(3), -np.eye(3)])
+    ends = np.einsum("ij,ij->i", body.support(along @ frame) @ frame.T, along)
+    return Convex(
+        planes, quadric, -ends[3:], ends[:3], body.reach(frame), size, body, frame
+    )  # fmt: skip
 
 
 def sphere(radius: float) -> Convex:
@@ -133,6 +304,11 @@ def sphere(radius: float) -> Convex:
     Convex
         The shape of a :class:`scanfab.Window`, or the window of :class:`scanfab.Solids`.
 
+    Raises
+    ------
+    SettingsError
+        If the radius is not a finite number above 0.
+
     Examples
     --------
     >>> import numpy as np
@@ -140,6 +316,7 @@ def sphere(radius: float) -> Convex:
     >>> sphere(2.0).contains(np.array([[0.0, 0.0, 1.9], [0.0, 2.1, 0.0]]))
     array([ True, False])
     """
+    radius = number("a length above 0", lambda value: 0 < value < math.inf)("radius", radius)
     return Convex(
         planes=np.zeros((0, 4)),
         quadric=Quadric(1.0, np.zeros((3, 3)), radius * radius),
@@ -147,4 +324,6 @@ def sphere(radius: float) -> Convex:
         high=np.full(3, radius),
         reach=radius,
         size=f"radius {radius:g}",
+        body=BALL,
+        frame=radius * np.eye(3),
     )

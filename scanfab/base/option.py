@@ -145,7 +145,10 @@ def takes_options(options: Sequence[Option]) -> Callable[[Callable[P, R]], Calla
 
 def _documented(option: Option) -> str:
     """An option as numpydoc has a parameter."""
-    text = textwrap.fill(option.help, 92, break_on_hyphens=False)
+    form = option.metavar or ""
+    # a single word such as FILE says no more than the type does
+    written = f" Written as ``{form}``." if set("|:,") & set(form) else ""
+    text = textwrap.fill(option.help + written, 92, break_on_hyphens=False)
     return f"{option.name} : {option.takes}, optional\n{textwrap.indent(text, '    ')}"
 
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from scanfab.base.errors import ScanfabError, ScanfabWarning
 
-__all__ = ["Offer", "load_offers", "load_plugins"]
+__all__ = ["Offer", "having", "load_offers", "load_plugins"]
 
 
 class Offer(NamedTuple):
@@ -22,6 +22,31 @@ class Offer(NamedTuple):
 
 def _as_it_is(plugin: Any) -> Any:
     return plugin
+
+
+def having(expected: str, **members: Any) -> Callable[[Any], Any]:
+    """
+    Of plugins that are objects: raises TypeError for one without these members, or a class.
+
+    Examples
+    --------
+    >>> from scanfab.base.plugins import having
+    >>> having("something with a length", __len__=Callable)(3)
+    Traceback (most recent call last):
+    TypeError: expected something with a length, found 3 without __len__
+    """
+
+    def make(plugin: Any) -> Any:
+        if isinstance(plugin, type):
+            raise TypeError(f"expected {expected}, found the class {plugin.__name__} itself")
+        for name, kind in members.items():
+            if not hasattr(plugin, name):
+                raise TypeError(f"expected {expected}, found {plugin!r} without {name}")
+            if not isinstance(value := getattr(plugin, name), kind):
+                raise TypeError(f"expected {expected}, found {plugin!r}, whose {name} is {value!r}")
+        return plugin
+
+    return make
 
 
 def load_plugins(group: str, what: str, make: Callable[[Any], Any] = _as_it_is) -> dict[str, Any]:

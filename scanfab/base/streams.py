@@ -26,7 +26,7 @@ def check_file(path: Path) -> None:
     if kind is not None:
         raise ReadError(
             f"{path}: is {kind}, expected a file: what a program writes is read from standard "
-            f"input, as in: zcat dump.gz | scanfab compute - --format NAME"
+            f"input, by - in place of its name and `format=NAME`"
         )
 
 

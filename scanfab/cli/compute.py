@@ -83,7 +83,7 @@ def compute(
             reading = reading_arguments(chosen)
             fields, digits = chosen.pop("fields"), int(chosen.pop("digits"))
             settings = Settings(**chosen)
-            columns = table_columns(settings.further_columns)
+            columns = table_columns(settings.more_columns)
             excerpt = Excerpt.make(columns, fields, digits)
             result = None if output is None else ResultFile(output, columns, excerpt)
         series = open_series(sources, reading)
@@ -212,7 +212,7 @@ def _write(job: Job, excerpt: Excerpt) -> None:
             job.write(advance)
             return
         if not is_readable():
-            print_csv(job.rows(advance), excerpt, table_columns(job.settings.further_columns))
+            print_csv(job.rows(advance), excerpt, table_columns(job.settings.more_columns))
             return
         rows = list(job.rows(advance))
     print_table(rows, excerpt)

@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from scanfab.base import column as base
+from scanfab.base import column
 from scanfab.base.column import DEFAULT_DIGITS
 from scanfab.base.errors import ScanfabNote, ScanfabWarning
 from scanfab.cli.options import AS_CSV
@@ -102,9 +102,9 @@ def announce_compiling() -> None:
 
 
 def print_csv(
-    rows: Iterable[Mapping[str, Any]], excerpt: Excerpt, kind: type | Sequence[base.Column] = Row
+    rows: Iterable[Mapping[str, Any]], excerpt: Excerpt, kind: type | Sequence[column.Column] = Row
 ) -> None:
-    """Rows of a kind as CSV on standard output, each as it comes."""
+    """Rows of a kind, or of some columns, as CSV on standard output, each as it comes."""
     from scanfab.table.columns import columns_of
     from scanfab.table.writing import row_writer
 

@@ -20,9 +20,10 @@ def formats() -> None:
             ("reader", name, " ".join(one.plugin.extensions), one.package, one.plugin.description)
             for name, one in installed_readers().items()
         ]
+        written = known_formats()
     lines += [
         ("writer", suffix.lstrip("."), suffix, type(one).__module__.split(".")[0], one.description)
-        for suffix, one in known_formats().items()
+        for suffix, one in written.items()
     ]
     lines += [
         ("figure", suffix.lstrip("."), suffix, "scanfab", description)

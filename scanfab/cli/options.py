@@ -37,7 +37,7 @@ Completion = Callable[[click.Context, click.Parameter, str], list[CompletionItem
 
 READING = ("format", "columns", "contact_columns", "radius", "cell", "periodic", "contacts")
 SAMPLE = ("boundary", "min_contacts", "rattlers", "contact_tolerance")
-WINDOW = ("rv", "rv_radius", "rv_center")
+WINDOW = ("rv", "rv_radius", "rv_center", "rv_shape", "rv_size", "rv_axis", "rv_follows")
 EXCERPT = ("fields", "digits")
 # the cut-off of commands that take tables
 OF_SEVERAL = {
@@ -126,14 +126,15 @@ def _complete_fields(
 ) -> list[CompletionItem]:
     """The columns of what a command writes, behind those that are named already."""
     from scanfab.pipeline.calibration_ladders import StepRow
-    from scanfab.table.columns import columns_of
+    from scanfab.table.columns import MORE_COLUMNS, columns_of
     from scanfab.table.comparison_rows import FrameRow, SummaryRow
     from scanfab.table.row import Row
 
     of_compare = SummaryRow if ctx.params.get("summary") else FrameRow
     kind: type = {"calibrate": StepRow, "compare": of_compare}.get(str(ctx.command.name), Row)
+    columns = (*columns_of(kind), *(MORE_COLUMNS if kind is Row else ()))
     before, comma, last = text.rpartition(",")
-    names = [one.name for one in columns_of(kind) if one.name not in before.split(",")]
+    names = [one.name for one in columns if one.name not in before.split(",")]
     return [CompletionItem(before + comma + name) for name in names if name.startswith(last)]
 
 

@@ -16,22 +16,25 @@ if TYPE_CHECKING:
 
 __all__ = ["SourceCommand", "open_series", "reading_arguments"]
 
+# numbers that may stand apart behind an option, as users write them
+COUNTS = {"--cell": (3, 6), "--rv-center": (3,), "--rv-size": (2, 3)}
+
 
 class SourceCommand(click.Command):
-    """A command with sources: help in groups, and --cell takes three or six numbers, or a file."""
+    """A command with sources: help in groups, and options whose numbers may stand apart."""
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """The options in their groups."""
         write_groups(self, ctx, formatter)
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Join the numbers behind --cell into one word, as click knows no variable count."""
+        """Join the numbers behind an option into one word, as click knows no variable count."""
         joined: list[str] = []
         rest = list(args)
         while rest:
             word = rest.pop(0)
             joined.append(word)
-            numbers = _leading_numbers(rest) if word == "--cell" else 0
+            numbers = _leading_numbers(rest, COUNTS[word]) if word in COUNTS else 0
             if numbers:
                 joined.append(" ".join(rest[:numbers]))
                 del rest[:numbers]
@@ -67,12 +70,12 @@ def open_series(sources: tuple[str, ...], reading: dict[str, Any]) -> list[Serie
     return [replace(read_series(copy, **reading), name="-")]
 
 
-def _leading_numbers(words: list[str]) -> int:
-    """How many numbers --cell takes: three, or six if six follow."""
+def _leading_numbers(words: list[str], counts: tuple[int, ...]) -> int:
+    """The largest of the counts that so many numbers follow; of fewer all that follow."""
     count = 0
     while count < len(words) and re.fullmatch(r"[-+]?[\d.]+([eE][-+]?\d+)?", words[count]):
         count += 1
-    return 6 if count >= 6 else min(count, 3)
+    return max((one for one in counts if one <= count), default=count)
 
 
 def _check_format(name: str) -> None:

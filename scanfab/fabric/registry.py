@@ -2,23 +2,27 @@
 The fabrics of a table: each an object in one file, with its columns, formula and source.
 
 Those of this package stand in ``OWN_FABRICS``. Another package offers one under the entry point
-``scanfab.fabrics``; its columns come behind the own ones of every table that is computed.
+``scanfab.fabrics``; its columns come behind the own ones of every table that is computed, none of
+which it may replace.
 """
 
 from __future__ import annotations
 
-from functools import cache
+import math
+from collections.abc import Callable, Iterable, Mapping
+from importlib.metadata import entry_points
 from typing import Any, Protocol
 
 from scanfab.base.column import Column
-from scanfab.base.plugins import load_plugins
+from scanfab.base.errors import ScanfabError
+from scanfab.base.plugins import having, load_offers
 from scanfab.fabric.contact import Contact
 from scanfab.fabric.jackknife import Halves, Scatter
 from scanfab.fabric.measured import Measured
 from scanfab.fabric.orientation import Orientation
 from scanfab.fabric.void import Void
 
-__all__ = ["OWN_FABRICS", "Fabric", "Measured", "installed_fabrics"]
+__all__ = ["OWN_FABRICS", "Fabric", "Measured", "checked_values", "load_fabrics"]
 
 GROUP = "scanfab.fabrics"
 
@@ -43,7 +47,82 @@ OWN_FABRICS: dict[str, Fabric] = {
 }
 
 
-@cache
-def installed_fabrics() -> dict[str, Fabric]:
-    """The fabrics of other packages by name; none as a rule."""
-    return load_plugins(GROUP, "fabric")
+def load_fabrics(taken: Iterable[str]) -> dict[str, Fabric]:
+    """
+    The fabrics of other packages by name; none as a rule.
+
+    One with a column whose name is taken is left out with a warning, like a broken one.
+
+    Raises
+    ------
+    ScanfabError
+        If two packages use one name for a fabric, or for a column.
+    """
+    names = set(taken)
+    offers = load_offers(entry_points(group=GROUP), "fabric", lambda one: _fabric(one, names))
+    owners: dict[str, str] = {}
+    for name, offer in offers.items():
+        who = f"{name!r} of {offer.package}"
+        for column in offer.plugin.columns:
+            if column.name in owners:
+                raise ScanfabError(
+                    f"two fabrics have a column called {column.name!r}: {owners[column.name]} and "
+                    f"{who}; remove one of them"
+                )
+            owners[column.name] = who
+    return {name: offer.plugin for name, offer in offers.items()}
+
+
+def _fabric(plugin: Any, taken: set[str]) -> Any:
+    expected = "an object with columns and values, as scanfab.fabric.registry.Fabric has them"
+    having(expected, columns=tuple | list, values=Callable)(plugin)
+    for column in plugin.columns:
+        if not isinstance(column, Column) or column.kind not in (int, float, str):
+            raise TypeError(f"expected columns that hold int, float or str, found {column!r}")
+        if column.name in taken:
+            raise TypeError(f"its column {column.name!r} is one of scanfab's own: rename it")
+    return plugin
+
+
+def checked_values(name: str, fabric: Fabric, measured: Measured) -> dict[str, Any]:
+    """
+    The values of another package's fabric by its columns; what is not finite does not exist.
+
+    Raises
+    ------
+    ScanfabError
+        If it fails, lacks a value, or gives one that its column cannot hold.
+    """
+    try:
+        found = dict(fabric.values(measured))
+    except ScanfabError:
+        raise
+    except Exception as error:  # a foreign package may fail in any way
+        raise ScanfabError(
+            f"the fabric {name!r} failed: {type(error).__name__}: {error}"
+        ) from error
+    columns = {column.name: column for column in fabric.columns}
+    for wrong in sorted(found.keys() ^ columns.keys(), key=str):
+        problem = "gives no value for its" if wrong in columns else "gives a value for an unknown"
+        raise ScanfabError(
+            f"the fabric {name!r} {problem} column {wrong!r}: expected one for each of "
+            f"{', '.join(columns)}, None where there is none"
+        )
+    return {key: _value(name, column, found) for key, column in columns.items()}
+
+
+def _value(name: str, column: Column, found: Mapping[str, Any]) -> Any:
+    """A value as its column holds it."""
+    value = found[column.name]
+    try:
+        if value is None or (column.kind is not str and not math.isfinite(value)):
+            return None
+        kept = column.kind(value)
+        if kept != value:
+            raise ValueError
+    except (TypeError, ValueError):
+        raise ScanfabError(
+            f"the fabric {name!r}: column {column.name!r}: expected {column.kind.__name__} or "
+            f"None, found {value!r}"
+        ) from None
+    return kept

@@ -56,7 +56,7 @@ def named_once(sources: Iterable[PathLike]) -> list[PathLike]:
     if again:
         named = ", ".join(again[:5]) + (f" and {len(again) - 5} more" if len(again) > 5 else "")
         warnings.warn(
-            f"{named}: named twice among the sources, and read once", ScanfabWarning, stacklevel=3
+            f"{named}: named twice among the sources, and read once", ScanfabWarning, stacklevel=4
         )
     return list(first.values())
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
+from scanfab.base.option import refuse_unknown, takes_options, unusable
 from scanfab.io.families import (
     SETTINGS_FILE,
     Family,
@@ -25,7 +26,7 @@ from scanfab.io.grain_files import (
     named_once,
     series_below,
 )
-from scanfab.io.options import READING_OPTIONS
+from scanfab.io.options import READING_OPTIONS, take_reading
 from scanfab.io.reader import ReadOptions
 from scanfab.io.series import ContactsFrom, Series
 from scanfab.packing.packing import Packing
@@ -68,9 +69,11 @@ def read(path: PathLike, *, frame: int = 0, **options: Any) -> Packing:
     >>> len(packing)
     1800
     """
+    refuse_unknown("read", options, [*READING, "frame"])
     return read_series(path, **options)[frame].read()
 
 
+@takes_options(READING_OPTIONS)
 def read_series(
     source: PathLike | Sequence[PathLike],
     *,
@@ -119,6 +122,10 @@ def read_series(
         If no reader knows the files.
     ReadError
         If there is no series, or more than one.
+    SettingsError
+        If an option has a value that cannot be used.
+    TypeError
+        If there is no such option; names the nearest that there is.
 
     Examples
     --------
@@ -129,23 +136,27 @@ def read_series(
     [30000, 60000]
     """
     arguments = locals()
-    given = [source] if isinstance(source, str | os.PathLike) else list(source)
+    reading = {name: arguments[name] for name in READING}
+    checked = take_reading(dict(reading))
+    given = _given(source)
     paths = [Path(one) for one in named_once(given)]
-    cells = None if cell is None or isinstance(cell, tuple | list) else _cell_file(cell)
-    one_cell = tuple(cell) if isinstance(cell, tuple | list) else None
-    options = ReadOptions(columns or {}, contact_columns, radius, one_cell, periodic)
+    named_cell = checked["cell"]
+    one_cell = named_cell if isinstance(named_cell, tuple) else None
+    cells = None if named_cell is None or one_cell is not None else _cell_file(named_cell)
+    options = ReadOptions(
+        checked["columns"] or {}, contact_columns, checked["radius"], one_cell, periodic
+    )
     families = sort_into_families([file for path in paths for file in files_of(path)], format)
     grains = choose_grains(paths, families, radius is not None).check()
     name = _as_text(os.fspath(given[0]) if len(paths) == len(given) == 1 else _common_folder(paths))
     sources = tuple(os.fspath(path) for one in given for path in expanded(one))
-    reading = {name: arguments[name] for name in READING}
     own = [family for family in families if family.kind == "contacts"]
     _note_passed_over(families, [grains, *own])
     _note_below(paths, grains)
 
     def series(files: Sequence[Family], contacts_from: ContactsFrom) -> Series:
-        checked = tuple(family.check() for family in files)
-        return Series(name, grains, checked, contacts_from, options, cells, sources, reading)
+        whole = tuple(family.check() for family in files)
+        return Series(name, grains, whole, contacts_from, options, cells, sources, reading)
 
     if contacts == "geometric":
         return series((), "geometric")
@@ -162,6 +173,15 @@ def read_series(
             )
         return series((), "grains")
     return series(own, "path" if contacts == "file" else "beside" if beside else "auto")
+
+
+def _given(source: PathLike | Sequence[PathLike]) -> list[PathLike]:
+    """What is named, one by one."""
+    one = isinstance(source, str | os.PathLike) or not isinstance(source, Iterable)
+    given: list[Any] = [source] if one else list(source)  # type: ignore[arg-type]
+    if not given or not all(isinstance(path, str | os.PathLike) for path in given):
+        raise unusable("source", "the path of a folder or file, or several of files", source)
+    return given
 
 
 def open_sources(sources: Sequence[PathLike], **options: Any) -> list[Series]:
@@ -224,7 +244,7 @@ def _patterns(families: Sequence[Family]) -> str:
 
 
 def _note(text: str) -> None:
-    warnings.warn(text, ScanfabNote, stacklevel=4)
+    warnings.warn(text, ScanfabNote, stacklevel=5)
 
 
 def _note_passed_over(families: Sequence[Family], used: Sequence[Family]) -> None:
@@ -238,7 +258,7 @@ def _note_passed_over(families: Sequence[Family], used: Sequence[Family]) -> Non
         _note(f"passed over, neither grains nor contacts: {names}{more}")
     for family in families:
         if family.problem is not None:
-            warnings.warn(f"passed over: {family.problem}", ScanfabWarning, stacklevel=3)
+            warnings.warn(f"passed over: {family.problem}", ScanfabWarning, stacklevel=4)
 
 
 def _note_below(paths: Sequence[Path], grains: Family) -> None:

@@ -26,6 +26,20 @@ def _reader_names() -> Iterable[str]:
     return installed_readers()
 
 
+def parse_text(name: str, value: Any) -> str | None:
+    """Words that whoever uses them checks."""
+    if not isinstance(value, str | None):
+        raise unusable(name, "text", value)
+    return value
+
+
+def parse_contacts(name: str, value: Any) -> str | PathLike[str]:
+    """A word or a path; whether that exists, is found out where it is looked for."""
+    if not isinstance(value, str | PathLike):
+        raise unusable(name, "auto, file, geometric or a path", value)
+    return value
+
+
 def parse_columns(name: str, value: Any) -> dict[str, str] | None:
     """Standard names to a file's own, from a mapping or from ``NAME=COLUMN,NAME=COLUMN``."""
     if value is None or isinstance(value, Mapping):
@@ -71,6 +85,7 @@ parse_radius = optional(number("a length above 0", lambda value: 0 < value < mat
 READING_OPTIONS = (
     Option(
         name="format",
+        parse=parse_text,
         group="reading",
         help="Reader to use (default: by content).",
         meaning="reader of the dumps; not given: found by their content",
@@ -88,6 +103,7 @@ READING_OPTIONS = (
     ),
     Option(
         name="contact_columns",
+        parse=parse_text,
         group="reading",
         help='Columns of a dump local: LIGGGHTS keywords "pos id force", or LAMMPS names '
         '"id1=NAME,id2=NAME".',
@@ -125,6 +141,7 @@ READING_OPTIONS = (
     Option(
         name="contacts",
         default="auto",
+        parse=parse_contacts,
         group="reading",
         help="Contacts: a file, folder or glob matched by step; from the dump's own contact files; "
         "or by geometry (default: file if there is one, else geometric).",

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 
 from scanfab.base.errors import ReadError, UnknownFormatError
-from scanfab.base.plugins import Offer, load_offers
+from scanfab.base.plugins import Offer, having, load_offers
 from scanfab.io.files import bare_name
 from scanfab.io.reader import Reader
 
@@ -34,7 +34,13 @@ def installed_readers() -> dict[str, Offer]:
 
 def load_readers(points: Iterable[EntryPoint]) -> dict[str, Offer]:
     """Load entry points; see :func:`installed_readers`."""
-    return load_offers(points, "reader", lambda reader: reader())
+    make = having(
+        "a class of objects with the members of scanfab.io.reader.Reader",
+        **dict.fromkeys(("name", "description"), str),
+        extensions=tuple,
+        **dict.fromkeys(("recognises", "kind", "snapshots", "read_grains"), Callable),
+    )
+    return load_offers(points, "reader", lambda reader: make(reader()))
 
 
 def reader_named(name: str) -> Reader:

@@ -66,7 +66,7 @@ class BoundaryRule:
         except ValueError:
             raise SettingsError(
                 f"boundary: expected COLUMN=VALUE, COLUMN=V1,V2, COLUMN=FROM..TO, or one of "
-                f"> >= < <= != (in quotes for the shell), found {text!r}"
+                f'> >= < <= !=, such as `boundary="id>=13723"`, found {text!r}'
             ) from None
         return cls(text, match[1], operator, ranges)
 

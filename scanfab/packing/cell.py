@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from itertools import product
 
@@ -14,6 +15,15 @@ from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.lattice import Lattice, reduced_lattice
 
 __all__ = ["Cell"]
+
+
+def _three_truths(periodic: Sequence[bool]) -> tuple[bool, bool, bool]:
+    if isinstance(periodic, str) or np.shape(periodic) != (3,):
+        raise PackingError(
+            f"periodic: expected three truth values, such as (True, True, False), "
+            f"found {periodic!r}"
+        )
+    return bool(periodic[0]), bool(periodic[1]), bool(periodic[2])
 
 
 class Cell:
@@ -49,14 +59,16 @@ class Cell:
         periodic: tuple[bool, bool, bool] = (True, True, True),
         origin: npt.ArrayLike = (0.0, 0.0, 0.0),
     ) -> None:
-        lattice = np.asarray(vectors, dtype=np.float64)
+        try:
+            lattice = np.asarray(vectors, dtype=np.float64)
+            self.origin: FloatArray = np.asarray(origin, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise PackingError(
+                f"a cell needs vectors of shape (3, 3) or (3,) and an origin of shape (3,), "
+                f"found {vectors!r} and {origin!r}"
+            ) from None
         self.vectors: FloatArray = np.diag(lattice) if lattice.shape == (3,) else lattice
-        self.periodic: tuple[bool, bool, bool] = (
-            bool(periodic[0]),
-            bool(periodic[1]),
-            bool(periodic[2]),
-        )
-        self.origin: FloatArray = np.asarray(origin, dtype=np.float64)
+        self.periodic = _three_truths(periodic)
         if self.vectors.shape != (3, 3) or self.origin.shape != (3,):
             raise PackingError(
                 f"a cell needs vectors of shape (3, 3) and an origin of shape (3,), "

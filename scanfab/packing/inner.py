@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from scanfab.base.convex import Convex, Quadric
+from scanfab.base.shapes import ellipsoid
 from scanfab.base.typing import FloatArray
 from scanfab.packing.window import Window
 
@@ -57,12 +57,4 @@ def inner_ellipsoid(position: FloatArray, largest: float) -> Window | None:
     scale = float(np.min((distance - largest) / np.sqrt(normals**2 @ variance)))
     if scale <= 0.0:
         return None
-    return Window(center, _ellipsoid(scale * np.sqrt(variance), axes))
-
-
-def _ellipsoid(half: FloatArray, axes: FloatArray) -> Convex:
-    """The ellipsoid with these semi-axes along the columns of a rotation."""
-    quadric = Quadric(0.0, (axes / half**2) @ axes.T, 1.0)
-    box = np.sqrt(axes**2 @ half**2)
-    size = "ellipsoid of semi-axes {:g}, {:g}, {:g}".format(*half)
-    return Convex(np.zeros((0, 4)), quadric, -box, box, float(half.max()), size)
+    return Window(center, ellipsoid(scale * np.sqrt(variance), axes.T))

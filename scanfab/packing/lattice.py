@@ -44,6 +44,20 @@ class Lattice:
         steps = [step for step in product((-1, 0, 1), repeat=len(self.vectors)) if any(step)]
         return np.array(steps, dtype=np.float64).reshape(-1, len(self.vectors)) @ self.vectors
 
+    def within(self, length: float) -> FloatArray:
+        """Translations that are shorter than a length, the shortest first, shape (T, 3)."""
+        most = np.floor(length / self.heights).astype(int)
+        steps = [step for step in product(*(range(-n, n + 1) for n in most)) if any(step)]
+        shifts = np.array(steps, dtype=np.float64).reshape(-1, len(self.vectors)) @ self.vectors
+        lengths = np.linalg.norm(shifts, axis=1)
+        found: FloatArray = shifts[np.argsort(lengths, kind="stable")]
+        return found[: int(np.sum(lengths < length))]
+
+    @property
+    def half_extent(self) -> float:
+        """No branch to a nearest image is longer, of those in the span of the lattice."""
+        return 0.5 * float(np.linalg.norm(self.vectors, axis=1).sum())
+
     def nearest(self, branch: FloatArray) -> IntArray:
         """Vectors of the cell to add to each branch, shape (M, 3), to make it shortest."""
         if len(self.vectors) == 0:

@@ -149,6 +149,8 @@ class Packing:
         step: int | None = None,
         time: float | None = None,
     ) -> None:
+        if not isinstance(cell, Cell | None):
+            raise PackingError(f"cell: expected a Cell, such as Cell([1, 1, 1]), found {cell!r}")
         centres = cast("position", position, np.float64, (None, 3))
         count = len(centres)
         radii = np.asarray(radius)

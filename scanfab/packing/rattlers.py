@@ -13,7 +13,7 @@ from functools import cache
 
 import numpy as np
 
-from scanfab.base.plugins import load_plugins
+from scanfab.base.plugins import having, load_plugins
 from scanfab.base.typing import BoolArray, IntArray
 from scanfab.packing.contacts import Contacts
 
@@ -82,4 +82,5 @@ def _ends(pairs: IntArray, touching: Touching) -> IntArray:
 @cache
 def installed_rules() -> dict[str, RattlerRule]:
     """The rules by name, those of other packages among them."""
-    return load_plugins(GROUP, "rattler rule")
+    make = having("a function of scanfab.packing.rattlers.Touching", __call__=Callable)
+    return load_plugins(GROUP, "rattler rule", make)

@@ -19,6 +19,9 @@ __all__ = ["RV_MEANING", "SurfaceBox", "Window"]
 # for messages: who writes 70 means per cent
 RV_MEANING = "which is a fraction of half the sample's smallest extent, such as 0.7"
 
+# half a window's length, in periods: a rod so long would have to miss thousands of its images
+MOST_PERIODS = 10
+
 
 @dataclass(frozen=True, eq=False)
 class Window:
@@ -54,7 +57,7 @@ class Window:
 
     @property
     def radius(self) -> float:
-        """Of the ball about the centre that holds the window; of a sphere its own."""
+        """Of a ball about the centre that holds the window; of a sphere its own."""
         return self.shape.reach
 
     def contains(self, points: FloatArray, packing: Packing) -> BoolArray:
@@ -91,7 +94,17 @@ class Window:
         -------
         ndarray of bool, shape (N,)
         """
-        return self.shape.may_meet(self.branches(points, packing), radius)
+        branch = self._nearest(points, packing)
+        meets = self.shape.may_meet(branch, radius)
+        if self.shape.is_sphere or packing.cell is None or not packing.is_periodic:
+            return meets
+        # which image is the nearest to the centre says little of a long window
+        lattice = packing.cell.lattice
+        reach = self.shape.reach + float(radius.max(initial=0.0)) + lattice.half_extent
+        for shift in lattice.within(reach):
+            left = np.flatnonzero(~meets)
+            meets[left] = self.shape.may_meet(branch[left] + shift, radius[left])
+        return meets
 
     def __post_init__(self) -> None:
         """PackingError if the centre is no point."""
@@ -119,16 +132,32 @@ class Window:
         """
         if packing.cell is None or not packing.is_periodic:
             return
-        shortest = packing.cell.lattice.shortest
-        if self.radius > 0.5 * shortest:
+        lattice = packing.cell.lattice
+        if self.shape.reach <= 0.5 * lattice.shortest:
+            return
+        if self.shape.is_sphere:
             raise SettingsError(
-                f"the {self} is wider than the cell's shortest period ({shortest:g}): "
+                f"the {self} is wider than the cell's shortest period ({lattice.shortest:g}): "
                 f"choose a smaller `rv`, {RV_MEANING}"
             )
+        if self.shape.reach > MOST_PERIODS * lattice.shortest:
+            raise SettingsError(
+                f"the {self} reaches through more than {MOST_PERIODS} periods of the cell "
+                f"({lattice.shortest:g}): choose a smaller one (`rv`, `rv_size`)"
+            )
+        for shift in lattice.within(2.0 * self.shape.reach):
+            if self.shape.meets_itself(shift):
+                period = ", ".join(f"{part:.4g}" for part in shift)
+                raise SettingsError(
+                    f"the {self} overlaps its own image, ({period}) away in the periodic cell, so "
+                    f"that grains would count twice: choose a smaller one (`rv`, `rv_size`)"
+                )
 
     def branches(self, points: FloatArray, packing: Packing) -> FloatArray:
         """
-        From the window's centre to the nearest image of each point.
+        From the window's centre to an image of each point.
+
+        To the image that lies in the window, if there is one; else to the nearest.
 
         Parameters
         ----------
@@ -141,6 +170,22 @@ class Window:
         -------
         ndarray, shape (N, 3)
         """
+        branch = self._nearest(points, packing)
+        if packing.cell is None or not packing.is_periodic:
+            return branch
+        lattice = packing.cell.lattice
+        if self.shape.reach <= 0.5 * lattice.shortest:
+            # no other image is as near
+            return branch
+        for shift in lattice.within(self.shape.reach + lattice.half_extent):
+            outside = np.flatnonzero(~self.shape.contains(branch))
+            moved = branch[outside] + shift
+            inside = self.shape.contains(moved)
+            branch[outside[inside]] = moved[inside]
+        return branch
+
+    def _nearest(self, points: FloatArray, packing: Packing) -> FloatArray:
+        """From the centre to the nearest image of each point, shape (N, 3)."""
         branch = points - self.center
         if packing.cell is not None and packing.is_periodic:
             branch = branch + packing.cell.nearest_image(branch) @ packing.cell.vectors
@@ -167,12 +212,17 @@ class SurfaceBox:
         return cls(low, high, packing.cell)
 
     @property
-    def smallest_extent(self) -> float:
-        """Of the box (of the cell, along its periodic vectors)."""
-        extent = self.high - self.low
+    def extents(self) -> FloatArray:
+        """Edges of the box (heights of the cell, along its periodic vectors), shape (3,)."""
+        extents = self.high - self.low
         if self.cell is not None:
-            extent = np.where(self.cell.periodic, self.cell.heights, extent)
-        return float(extent.min())
+            extents = np.where(self.cell.periodic, self.cell.heights, extents)
+        return extents
+
+    @property
+    def smallest_extent(self) -> float:
+        """The shortest of the edges."""
+        return float(self.extents.min())
 
     @property
     def center(self) -> FloatArray:

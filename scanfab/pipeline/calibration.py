@@ -13,8 +13,6 @@ from scanfab.base.errors import PackingError, SettingsError
 from scanfab.base.note import Note, tell
 from scanfab.base.option import options_of, refuse_unknown
 from scanfab.base.spelling import counted
-from scanfab.io.series import Series
-from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.calibration_ladders import (
     PAPER_CUTOFF,
@@ -27,11 +25,12 @@ from scanfab.pipeline.calibration_ladders import (
     sentence_of_recommended,
 )
 from scanfab.pipeline.frame import OTHER_CUTOFFS, compute_frame
-from scanfab.pipeline.frames import Frames
+from scanfab.pipeline.frames import Frames, Source
 from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.plan import Plan, make_plan
 from scanfab.pipeline.settings import AUTO_RULE, Length, Settings
 from scanfab.pipeline.tolerance import TOLERANCE_MISSED, missing_work
+from scanfab.pipeline.values import SHAPES, parse_frames
 from scanfab.scan.directions import direction_rule
 from scanfab.table.plots import Plots
 from scanfab.table.table import Row
@@ -100,14 +99,14 @@ class Calibration:
 
 
 def calibrate(
-    source: Packing | Series, *, frame: int = -1, variants: str = "cd", **options: Any
+    source: Source, *, frame: int = -1, variants: str = "cd", **options: Any
 ) -> Calibration:
     """
     How the void fabric of one frame changes with the settings of the scan.
 
     Parameters
     ----------
-    source : Packing or Series
+    source : Packing, Series or iterable of Packing
         Lengths relative to radii and the RV come from the first frame of the series that has
         grains, as for :func:`scanfab.compute`.
     frame : int, optional
@@ -154,10 +153,11 @@ def calibrate(
 class _Calibrator:
     """One frame, and the plan-making first frame of its series."""
 
-    def __init__(self, source: Packing | Series, settings: Settings, frame: int) -> None:
-        self.name = "" if isinstance(source, Packing) else source.name
+    def __init__(self, source: Source, settings: Settings, frame: int) -> None:
+        frames = Frames(source, replace(settings, frames=parse_frames(frame, "frame")))
+        self.name = frames.name
         self.settings = settings
-        self.first, self.number, self.sample = _samples(source, settings, frame)
+        self.first, self.number, self.sample = _samples(frames)
         tell(self.sample.doubts_of_escaped(), f"frame {self.number}")
         radius = self.first.packing.radius[self.first.grains]
         self.r_min = float(radius.min())
@@ -179,7 +179,7 @@ class _Calibrator:
             "spacing": judged(self._spacings()),
             "directions": judged(self._directions()),
             "cutoff": cutoffs,
-            "rv": judged(self._rvs()) if self.settings.needs_window else [],
+            "rv": judged(self._rvs()) if self._rv_has_sizes else [],
         }
         sample = largest(cutoffs, "alpha_vs_axial_sample_se", self._default_cutoff())
         target = max(self.settings.tolerance, OF_SAMPLE * (sample or 0.0))
@@ -210,10 +210,15 @@ class _Calibrator:
         cutoffs = tuple(Length(value, "rmin") for value in CUTOFFS)
         yield from self._step("cutoff", None, replace(self.settings, cutoffs=cutoffs))
 
+    @property
+    def _rv_has_sizes(self) -> bool:
+        """Whether there is an RV, and not one that a file draws."""
+        return self.settings.needs_window and self.settings.rv_shape in SHAPES
+
     def _rvs(self) -> Iterator[StepRow]:
         variants = "".join(variant for variant in self.settings.variants if variant in "cd")
         for value in RV_FRACTIONS:
-            step = replace(self.settings, rv=value, rv_radius=None, variants=variants)
+            step = replace(self.settings, rv=value, rv_radius=None, rv_size=(), variants=variants)
             yield from self._step("rv", value, step)
 
     def _step(self, ladder: str, value: float | None, settings: Settings) -> Iterator[StepRow]:
@@ -319,12 +324,8 @@ class _Calibrator:
         return rows, {"spacing": f"{spacing:g}rmin", "directions": rule.name}
 
 
-def _samples(
-    source: Packing | Series, settings: Settings, frame: int
-) -> tuple[Sample, int, Sample]:
+def _samples(frames: Frames) -> tuple[Sample, int, Sample]:
     """The first frame that has grains, and the wanted one with its number."""
-    wanted = slice(frame, frame + 1 if frame != -1 else None)
-    frames = Frames(source, replace(settings, frames=wanted))
     number, one = frames.one()
     first = frames.first()
     if first is None:

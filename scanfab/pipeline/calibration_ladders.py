@@ -58,7 +58,12 @@ class StepRow(Record):
         LENGTH,
     ]
     cutoff: Annotated[float | None, "shortest void segment kept", LENGTH]
-    rv_radius: Annotated[float | None, "radius of the RV; empty for the whole sample", LENGTH]
+    rv_radius: Annotated[
+        float | None,
+        "radius of the RV (of a shape that is no sphere, of the ball that holds it); empty for the "
+        "whole sample",
+        LENGTH,
+    ]
     segments: Annotated[int | None, "void segments kept"]
     seconds: Annotated[float, "time of the step, all variants (and all cut-offs) together", "s"]
     mean_length: Annotated[float | None, "mean length of the kept segments", LENGTH]

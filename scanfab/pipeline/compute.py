@@ -15,7 +15,7 @@ from pathlib import Path
 
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.note import SKIPPED, Note, tell
-from scanfab.base.option import options_of, takes_options
+from scanfab.base.option import options_of, takes_options, unusable
 from scanfab.base.threads import in_order
 from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
@@ -42,7 +42,11 @@ def compute(
     variants: str = "abcd",
     rv: float = 0.7,
     rv_radius: float | None = None,
-    rv_center: Sequence[float] | None = None,
+    rv_center: str | Sequence[float] | None = None,
+    rv_shape: str | Path = "sphere",
+    rv_size: str | Sequence[float] | None = None,
+    rv_axis: str | Sequence[float] | None = None,
+    rv_follows: str = "none",
     edge: str = "clip",
     boundary: str | Sequence[str] = (),
     cutoff: str | float = "1rmin",
@@ -235,6 +239,8 @@ class _Pool:
     """What computes frames; with few frames, each has more threads for its scan."""
 
     def __init__(self, workers: int, executor: Executor | None) -> None:
+        if not isinstance(executor, Executor | None):
+            raise unusable("executor", "a concurrent.futures.Executor", executor)
         self.workers = workers
         self.executor = executor
         self._own = None if executor is not None else ThreadPoolExecutor(workers)

@@ -82,21 +82,21 @@ def compute_frame(
         **plan.strains.at(number, frame),
     }
     if not frame.grains.any():
-        empty = {**no_columns(plan.further_columns), **known}
+        empty = {**no_columns(plan.more_columns), **known}
         rows = [
-            complete_row({**empty, "variant": v}, plan.further_columns)
-            for v in plan.variants
+            complete_row({**empty, "variant": variant}, plan.more_columns)
+            for variant in plan.variants
             for _ in plan.cutoffs
         ]
         return FrameResult(source, number, frame, None, rows)
-    measurement = measure(frame, plan, f"frame {number}")
+    measurement = measure(frame, plan.in_frame(frame), f"frame {number}")
     columns = [
         VariantColumns(measurement, VARIANTS[variant], place)
         for variant in plan.variants
         for place in range(len(plan.cutoffs))
     ]
     rows = [
-        complete_row({**known, "variant": one.variant.name, **one.columns()}, plan.further_columns)
+        complete_row({**known, "variant": one.variant.name, **one.columns()}, plan.more_columns)
         for one in columns
     ]
     notes = [

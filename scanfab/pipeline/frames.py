@@ -267,6 +267,8 @@ class Frames:
     def no_such_frames(self) -> SettingsError:
         """The error for a choice that meets no frame."""
         count = self.source.count() if isinstance(self.source, _Stream) else len(list(self.source))
+        if count == 0:
+            return SettingsError(f"expected frames, found none in {self.name or 'the source'}")
         name, frames = self.name or "the packing", self.settings.frames
         has = "1 frame, 0" if count == 1 else f"{count} frames, 0 to {count - 1}"
         return SettingsError(

@@ -17,7 +17,7 @@ from scanfab.packing.doubts import cell_doubt, cell_hint, doubts_of, refuse_impo
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.frames import Frames, boundary_hints
-from scanfab.pipeline.plan import rv_of
+from scanfab.pipeline.rv import rv_of
 from scanfab.pipeline.settings import Settings
 from scanfab.table.row import Record
 
@@ -62,7 +62,10 @@ class FrameReport(Record):
         "centre of the RV, which is that of the series' first frame that has grains",
         LENGTH,
     ]
-    rv_radius: Annotated[float | None, "its radius", LENGTH]
+    rv_radius: Annotated[
+        float | None, "its radius; of a shape that is no sphere, of the ball that holds it", LENGTH
+    ]
+    rv_shape: Annotated[str | None, "its shape and size in words"]
 
 
 def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
@@ -153,6 +156,7 @@ def _report(
         high=None if box is None else box.high.tolist(),
         rv_center=None if window is None else window.center.tolist(),
         rv_radius=None if window is None else window.radius,
+        rv_shape=None if window is None else str(window.shape),
     )
 
 

@@ -15,6 +15,7 @@ from scanfab.base.files import whole_file
 from scanfab.base.option import options_of
 from scanfab.io.series import Series
 from scanfab.pipeline.settings import STRAIN_MODES, Settings
+from scanfab.pipeline.values import SHAPES
 from scanfab.scan.directions import DirectionRule
 from scanfab.table.writing import ALL, Excerpt
 
@@ -24,6 +25,7 @@ __all__ = [
     "default_settings",
     "manifest",
     "strain_file",
+    "surface_file",
     "with_frames",
     "write_manifest",
 ]
@@ -115,9 +117,7 @@ def manifest(
     """
     inputs = inputs or Inputs()
     files = {path for one in series for path in one.files()}
-    strains = strain_file(asked)
-    if strains is not None:
-        files.add(strains)
+    files.update(one for one in (strain_file(asked), surface_file(asked)) if one is not None)
     return {
         "settings": asked,
         "seed": asked["seed"],
@@ -143,6 +143,12 @@ def strain_file(asked: Mapping[str, Any]) -> Path | None:
     """The file of ``--strain FILE.csv``."""
     strain = asked.get("strain", "auto")
     return None if strain in STRAIN_MODES else Path(strain)
+
+
+def surface_file(asked: Mapping[str, Any]) -> Path | None:
+    """The file of ``--rv-shape FILE``."""
+    shape = asked.get("rv_shape", "sphere")
+    return None if shape in SHAPES else Path(shape)
 
 
 def _plain(value: Any) -> Any:

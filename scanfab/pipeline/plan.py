@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
-import numpy as np
-
-from scanfab.base.convex import sphere
+from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
 from scanfab.base.note import Note
 from scanfab.packing.doubts import refuse_impossible
 from scanfab.packing.sample import Sample, SampleRule
-from scanfab.packing.window import RV_MEANING, SurfaceBox, Window
+from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.frames import sample_rule
+from scanfab.pipeline.rv import Deformation, doubts_of_rv, rv_of
 from scanfab.pipeline.settings import AUTO_RULE, Settings, Vector
 from scanfab.pipeline.strain import Strains
 from scanfab.scan.directions import DirectionRule, direction_rule
 
-__all__ = ["CLOSE", "GROWTH_WITH_SPACING", "Plan", "make_plan", "plan_without_grains", "rv_of"]
+__all__ = ["CLOSE", "GROWTH_WITH_SPACING", "Plan", "make_plan", "plan_without_grains"]
 
 # replicates of a fixed scan, and at least of an auto scan
 REPLICATES = 16
@@ -58,6 +57,11 @@ class Plan:
     max_chords: float
     """An auto scan stops before it cuts more."""
     window: Window | None
+    """Of the first frame that has grains, if :meth:`in_frame` has not put another in its place."""
+    deformation: Deformation | None
+    """What the window follows."""
+    more_columns: tuple[str, ...]
+    """Of the table, behind those that it always has."""
     cutoff: float
     """Of the scan that is to meet the tolerance."""
     cutoffs: tuple[float, ...]
@@ -73,12 +77,16 @@ class Plan:
     """Then an auto scan keeps it."""
     edge: str
     """What counts at the window's surface, see :mod:`scanfab.scan.edges`."""
-    further_columns: tuple[str, ...]
-    """Of the table, which others have not."""
     lists_gaps: bool
     """Whether sums for one cut-off do not suffice."""
     notes: tuple[Note, ...] = ()
     """What is doubtful about the settings, for a user who has chosen them."""
+
+    def in_frame(self, sample: Sample) -> Plan:
+        """The plan with the window as it lies in a frame."""
+        if self.window is None or self.deformation is None:
+            return self
+        return replace(self, window=self.deformation.window_in(sample, self.window))
 
 
 def make_plan(settings: Settings, sample: Sample, strains: Strains | None = None) -> Plan:
@@ -114,8 +122,8 @@ def make_plan(settings: Settings, sample: Sample, strains: Strains | None = None
     notes: list[Note] = []
     window = rv_of(sample, settings) if settings.needs_window else None
     if window is not None:
-        notes += _doubts_of_window(window, sample, box, lengths["rmax"])
-    reach = 0.5 * box.smallest_extent if window is None else window.radius
+        notes += doubts_of_rv(window, sample, box, lengths["rmax"])
+    scanned = _scanned(box, None if window is None else window.shape)
     rule = plan.rule
     if rule.bias > 0.1 * settings.tolerance:
         text = f"directions {rule.name}: an isotropic sample would get alpha = {rule.bias:.2g}"
@@ -127,19 +135,45 @@ def make_plan(settings: Settings, sample: Sample, strains: Strains | None = None
         plan,
         strains=plan.strains.since(sample),
         window=window,
+        deformation=_deformation(settings, sample),
         cutoff=cutoff,
         cutoffs=cutoffs,
         notes=tuple(notes),
-        **_lines(settings, rule, reach, lengths),
+        **_lines(settings, rule, scanned, lengths),
     )
 
 
+def _deformation(settings: Settings, sample: Sample) -> Deformation | None:
+    if settings.rv_follows == "none" or not settings.needs_window:
+        return None
+    return Deformation.since(sample, settings.strain, settings.axis)
+
+
+class _Scanned(NamedTuple):
+    """How large is what lines scan: the window, or of the whole half the smallest extent."""
+
+    reach: float
+    area: float
+    """That lines of one direction pierce, in the mean of all."""
+    depth: float
+    """Radius of the sphere in which lines are as long in the mean."""
+
+
+def _scanned(box: SurfaceBox, window: Convex | None) -> _Scanned:
+    if window is None or window.is_sphere:
+        reach = 0.5 * box.smallest_extent if window is None else window.reach
+        return _Scanned(reach, math.pi * reach**2, reach)
+    area = window.mean_shadow
+    return _Scanned(window.reach, area, 0.75 * window.volume / area)
+
+
 def _lines(
-    settings: Settings, rule: DirectionRule, reach: float, lengths: dict[str, float]
+    settings: Settings, rule: DirectionRule, scanned: _Scanned, lengths: dict[str, float]
 ) -> dict[str, Any]:
     """How close the lines are, in how many replicates, and what an auto scan may add."""
+    reach = scanned.reach
     if settings.spacing is None:
-        spacing = _auto_spacing(settings, len(rule), reach, lengths)
+        spacing = _auto_spacing(settings, len(rule), scanned, lengths)
         return {"spacing": spacing, "replicates": REPLICATES, "auto": "replicates"}
     asked = settings.spacing.resolve(lengths)
     if asked > 2.0 * reach:
@@ -153,7 +187,7 @@ def _lines(
             f"spacing: {asked:g} between lines is less than {CLOSEST:g} of the radius of what they "
             f"scan ({reach:g}): choose a wider spacing"
         )
-    lines = math.pi * reach**2 / asked**2
+    lines = scanned.area / asked**2
     auto = "directions" if settings.directions is None else ""
     fewest, most = (REPLICATES, MOST_REPLICATES) if auto else (1, REPLICATES)
     replicates = int(min(max(lines / FEWEST_LINES, fewest), most))
@@ -178,6 +212,8 @@ def _without_lengths(settings: Settings, strains: Strains) -> Plan:
         tolerance=settings.tolerance,
         max_chords=settings.max_chords,
         window=None,
+        deformation=None,
+        more_columns=settings.more_columns,
         cutoff=math.nan,
         cutoffs=(math.nan,) * max(len(settings.cutoffs), 1),
         rule=settings.directions or direction_rule(AUTO_RULE),
@@ -186,69 +222,20 @@ def _without_lengths(settings: Settings, strains: Strains) -> Plan:
         auto="",
         rule_is_asked_for=settings.directions is not None,
         edge=settings.edge,
-        further_columns=settings.further_columns,
         lists_gaps=settings.lists_gaps,
     )
 
 
-def rv_of(sample: Sample, settings: Settings) -> Window:
-    """
-    The RV that settings make of the first frame that has grains.
-
-    Raises
-    ------
-    SettingsError
-        If it is far smaller than any grain.
-    """
-    box = SurfaceBox.of(sample.packing, sample.gathered)
-    center = np.array(box.center if settings.rv_center is None else settings.rv_center, dtype=float)
-    radius = settings.rv_radius
-    if radius is None:
-        radius = settings.rv * 0.5 * box.smallest_extent
-    smallest = float(sample.packing.radius[sample.grains].min())
-    if radius < CLOSEST * smallest:
-        raise SettingsError(
-            f"rv: a radius of {radius:g} is nothing beside that of the smallest grain "
-            f"({smallest:g}): choose a larger `rv` or `rv_radius`"
-        )
-    return Window(center, sphere(radius))
-
-
-def _doubts_of_window(
-    window: Window, sample: Sample, box: SurfaceBox, largest: float
-) -> list[Note]:
-    """What to tell of an RV at the sample's surface; refuses one without grains, or too large."""
-    packing, grains = sample.packing, sample.grains
-    room = box.room_around(window)
-    if not window.may_meet(packing.position[grains], packing.radius[grains], packing).any():
-        raise SettingsError(
-            f"the {window} holds no grain: choose another `rv_center` or a larger `rv_radius`"
-        )
-    if room < -2 * largest:
-        raise SettingsError(
-            f"the {window} reaches {-room:g} beyond the sample, that is more than two of its "
-            f"largest radii ({largest:g}): choose another `rv_center` or a smaller `rv`, "
-            f"{RV_MEANING}"
-        )
-    if room >= largest:
-        return []
-    text = (
-        f"the {window} comes within one of the largest radii ({largest:g}) of the sample's "
-        f"surface: it cuts the outermost layer of grains, which a boundary arranges: choose a "
-        f"smaller `rv`, or use more grains"
-    )
-    return [Note("rv_at_surface", text)]
-
-
-def _auto_spacing(settings: Settings, axes: int, reach: float, lengths: dict[str, float]) -> float:
+def _auto_spacing(
+    settings: Settings, axes: int, scanned: _Scanned, lengths: dict[str, float]
+) -> float:
     """
     Spacing of one replicate's lines at which the first round is likely to meet the tolerance.
 
     Never so wide that lines get too few, nor closer than is of use: more directions are added then.
     """
-    area = math.pi * reach**2
-    radius = lengths["rmean"]
-    segments_per_line = max(reach / (3.0 * radius), 1.0)
+    area, radius = scanned.area, lengths["rmean"]
+    segments_per_line = max(scanned.depth / (3.0 * radius), 1.0)
     # lines * segments_per_line = segments, and lines are so many axes' area / spacing²
     lines = SEGMENTS_PER_VARIANCE / settings.tolerance**2 / (REPLICATES * axes * segments_per_line)
     apart = area / lines / radius**2

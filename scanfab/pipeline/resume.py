@@ -12,7 +12,7 @@ from typing import Any
 from scanfab.base.errors import SettingsError
 from scanfab.io.series import Series
 from scanfab.pipeline.frames import chosen_frames
-from scanfab.pipeline.manifest import Inputs, default_settings, strain_file
+from scanfab.pipeline.manifest import Inputs, default_settings, strain_file, surface_file
 from scanfab.pipeline.repeat import read_manifest
 from scanfab.pipeline.settings import Settings
 from scanfab.table.columns import complete_row, table_columns
@@ -183,8 +183,9 @@ class InputsOfRows:
         self._series = {one.name: one for one in series}
         self._inputs = inputs
         self._before: tuple[str, int] | None = None
-        strains = strain_file({"strain": settings.strain})
-        self._tables = [] if strains is None else [strains]
+        chosen = {"strain": settings.strain, "rv_shape": settings.rv_shape}
+        files = (strain_file(chosen), surface_file(chosen))
+        self._named = [file for file in files if file is not None]
         self._told: set[Path] = set()
 
     def new(self, row: Row) -> list[dict[str, Any]]:
@@ -197,7 +198,7 @@ class InputsOfRows:
         return [self._inputs.entry(file) for file in dict.fromkeys(found)]
 
     def _files(self, row: Row) -> Iterator[Path]:
-        yield from self._tables
+        yield from self._named
         for name, one in self._series.items():
             if one.cells is not None:
                 yield one.cells.path
@@ -227,16 +228,16 @@ def _by_frame(
     for (source, frame), group in groupby(rows, key=lambda row: (row["source"], row["frame"])):
         if source not in found:
             raise _refused(path, f"its source {source} is not named now")
-        own = [_row(row, settings.further_columns) for row in group]
+        own = [_row(row, settings.more_columns) for row in group]
         if len(own) == settings.rows_per_frame:
             found[source][frame] = own
     return found
 
 
-def _row(values: Mapping[str, Any], further: Collection[str]) -> Row:
+def _row(values: Mapping[str, Any], more: Collection[str]) -> Row:
     """A row as it was written; columns that were not are empty, and are not written again."""
-    columns = table_columns(further)
-    return complete_row({column.name: values.get(column.name) for column in columns}, further)
+    names = [column.name for column in table_columns(more)]
+    return complete_row({name: values.get(name) for name in names}, more)
 
 
 def _refused(path: Path, reason: str) -> SettingsError:
@@ -262,11 +263,16 @@ def _check_inputs(
     strains = strain_file(manifest["settings"])
     numbers = [strains, *(one.cells.path for one in series if one.cells is not None)]
     tables = [file for file in numbers if file is not None]
-    read = {*tables, *(file for one in series for file in one.files())}
+    surface = surface_file(manifest["settings"])
+    surfaces = [] if surface is None else [surface]
+    read = {*tables, *surfaces, *(file for one in series for file in one.files())}
     for gone in before.keys() - {str(file) for file in read}:
         raise _refused(path, f"{gone} is not among the files that are read now")
     for one in series:
         _check_frames(path, before, one, rows[one.name], one.name in over)
+    for file in surfaces:
+        if not _is_same(file, before.get(str(file))):
+            raise _refused(path, f"{file} has changed since")
     every = [row for frames in rows.values() for some in frames.values() for row in some]
     for file in tables:
         # a longer one may name the strains of frames that had none

@@ -18,11 +18,13 @@ from scanfab.base.option import (
 )
 from scanfab.pipeline.values import (
     AXES,
+    SHAPES,
     STRAIN_MODES,
     Axis,
     Length,
     Vector,
     as_written,
+    check_window,
     parse_axis,
     parse_boundary,
     parse_cutoff,
@@ -30,6 +32,8 @@ from scanfab.pipeline.values import (
     parse_directions,
     parse_frames,
     parse_rattlers,
+    parse_shape,
+    parse_sizes,
     parse_spacing,
     parse_strain,
     parse_tolerance,
@@ -98,8 +102,10 @@ class Settings:
         default=0.7,
         parse=number("a fraction above 0", lambda value: 0 < value < math.inf),
         group="window",
-        help="Radius of the sphere RV, as a fraction of half the smallest extent of the grains.",
-        meaning="radius of the RV over half the smallest extent of the grains",
+        help="Size of the RV: radius of the sphere as a fraction of half the smallest extent of "
+        "the grains; sizes of other shapes, of half the extents.",
+        meaning="radius of the RV over half the smallest extent of the grains; of other shapes "
+        "their sizes over half the extents",
         takes="float",
         kind=float,
         metavar="FRACTION",
@@ -108,7 +114,7 @@ class Settings:
     rv_radius: float | None = option(
         parse=optional(number("a length above 0", lambda value: 0 < value < math.inf)),
         group="window",
-        help="Radius of the RV in the dump's units, instead of `rv`.",
+        help="Radius of the sphere RV in the dump's units, instead of `rv`.",
         meaning="radius of the RV instead, dump's unit",
         takes="float",
         kind=float,
@@ -119,10 +125,50 @@ class Settings:
         group="window",
         help="Centre of the RV (default: middle).",
         meaning="centre of the RV, dump's unit; not given: the middle of the sample",
-        takes="three floats",
-        kind=float,
+        takes="str or three floats",
         metavar="X Y Z",
-        words=3,
+    )
+    rv_shape: str = option(
+        default="sphere",
+        parse=parse_shape,
+        group="window",
+        help="Shape of the RV; FILE is a closed convex surface in the dump's units (.stl .vtp .ply "
+        ".obj).",
+        meaning="shape of the RV: sphere, box, cylinder, ellipsoid, or the file of its surface",
+        takes="str or path",
+        metavar="sphere|box|cylinder|ellipsoid|FILE",
+        choices=lambda: SHAPES,
+        files=True,
+    )
+    rv_size: tuple[float, ...] = option(
+        parse=parse_sizes,
+        group="window",
+        help="In the dump's units, instead of `rv`: edges of the box, radius and height of the "
+        "cylinder, semi-axes of the ellipsoid.",
+        meaning="edges of the box, radius and height of the cylinder or semi-axes of the ellipsoid "
+        "instead, dump's unit",
+        takes="str or sequence of float",
+        metavar="A,B,C",
+    )
+    """None given: empty."""
+    rv_axis: Axis | None = option(
+        parse=optional(lambda name, value: parse_axis(value, name)),
+        group="window",
+        help="Axis of the cylinder (default: `axis`).",
+        meaning="axis of the cylinder; not given: the loading axis",
+        takes="str or three floats",
+        metavar="x|y|z|X,Y,Z",
+        choices=lambda: AXES,
+    )
+    rv_follows: str = option(
+        default="none",
+        parse=one_of("none", "strain"),
+        group="window",
+        help="The RV keeps its shape, or deforms with what `strain` is measured by: with the cell, "
+        "or by the extents of boundary or grains along x, y, z.",
+        meaning="none: the RV keeps its shape; strain: it deforms with the sample",
+        metavar="none|strain",
+        choices=lambda: ("none", "strain"),
     )
     edge: str = option(
         default=CLIP,
@@ -318,12 +364,20 @@ class Settings:
         for one in declared:
             value = one.parse(one.name, options.get(one.name, one.default))
             object.__setattr__(self, one.name, value)
+        check_window(self)
         if self.edge == ENDS and self.moment != 1:
             raise SettingsError(
                 "moment: from what lies inside the window alone, as `edge=ends` takes it, the "
                 "second moment of the full lengths is not known: choose `edge=start`, or "
                 "`moment=1`"
             )
+
+    @property
+    def more_columns(self) -> tuple[str, ...]:
+        """Columns that the table has because these settings ask for more than the default."""
+        shaped = self.rv_shape != "sphere" or self.rv_follows != "none"
+        columns = ("window_alpha_vs_axial",) if shaped and self.needs_window else ()
+        return columns if self.edge == CLIP else (*columns, *(one.name for one in EDGE_COLUMNS))
 
     def __repr__(self) -> str:
         usual = Settings()
@@ -338,11 +392,6 @@ class Settings:
     def lists_gaps(self) -> bool:
         """Whether sums for one cut-off do not suffice."""
         return bool(self.cutoffs) or self.moment != 1
-
-    @property
-    def further_columns(self) -> tuple[str, ...]:
-        """The columns of its table that others have not."""
-        return () if self.edge == CLIP else tuple(one.name for one in EDGE_COLUMNS)
 
     @property
     def rows_per_frame(self) -> int:

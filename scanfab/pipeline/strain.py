@@ -14,7 +14,15 @@ from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.settings import STRAIN_MODES, Settings, Vector
 
-__all__ = ["Flips", "StrainFile", "Strains", "axial_length", "is_flipped", "shear_strain"]
+__all__ = [
+    "Flips",
+    "StrainFile",
+    "Strains",
+    "axial_length",
+    "is_flipped",
+    "shear_strain",
+    "strain_mode",
+]
 
 # programs that flip their cells do so when it leans by half a length or a little later
 MOST_TILT = 0.61
@@ -45,16 +53,11 @@ def axial_length(sample: Sample, mode: str, axis: Vector) -> float | None:
     SettingsError
         If what the mode measures does not exist.
     """
+    mode = strain_mode(sample, mode, axis)
+    if not mode:
+        return None
     cell = sample.packing.cell
-    along = int(np.argmax(np.abs(axis)))
-    on_axis = abs(axis[along]) > 1 - 1e-12
-    if mode == "auto":
-        if cell is not None and on_axis and cell.periodic[along]:
-            mode = "cell"
-        elif sample.boundary.any():
-            mode = "boundary"
-        else:
-            return None
+    along, on_axis = _along(axis)
     if mode == "cell":
         if cell is None or not on_axis:
             what = "the dump has no cell" if cell is None else "the axis is not x, y or z"
@@ -67,6 +70,22 @@ def axial_length(sample: Sample, mode: str, axis: Vector) -> float | None:
             + (": name them with `boundary`" if mode == "boundary" else "")
         )
     return float(np.ptp(sample.packing.position[chosen] @ np.array(axis)))
+
+
+def strain_mode(sample: Sample, mode: str, axis: Vector) -> str:
+    """What ``auto`` stands for in a frame, empty where it finds nothing; else the mode itself."""
+    if mode != "auto":
+        return mode
+    cell, (along, on_axis) = sample.packing.cell, _along(axis)
+    if cell is not None and on_axis and cell.periodic[along]:
+        return "cell"
+    return "boundary" if sample.boundary.any() else ""
+
+
+def _along(axis: Vector) -> tuple[int, bool]:
+    """Which of x, y, z is nearest to the axis, and whether that is the axis itself."""
+    along = int(np.argmax(np.abs(axis)))
+    return along, abs(axis[along]) > 1 - 1e-12
 
 
 def shear_strain(cell: Cell | None, first: Cell | None) -> float | None:

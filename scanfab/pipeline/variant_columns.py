@@ -13,12 +13,13 @@ import numpy as np
 from scanfab.base.note import Note
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.jackknife import BLOCKS, BlockedSums
-from scanfab.fabric.registry import OWN_FABRICS, Measured, installed_fabrics
+from scanfab.fabric.registry import OWN_FABRICS, Measured, checked_values
+from scanfab.fabric.window import WINDOW_ALPHA, window_alpha
 from scanfab.packing.columns import sample_values
 from scanfab.packing.sample import Variant
 from scanfab.pipeline.measurement import Measurement
 from scanfab.scan.edges import CLIP, ENDS, START
-from scanfab.table.columns import table_columns
+from scanfab.table.columns import installed_fabrics, table_columns
 
 __all__ = ["VariantColumns", "no_columns"]
 
@@ -47,10 +48,12 @@ class VariantColumns:
         """All that depend on the variant."""
         contacts = len(self.measured.normals)
         found = sample_values(self.sample, self.variant, self.plan.window, contacts) | self._scan()
-        found |= {name: self._edge()[name] for name in self.plan.further_columns}
-        for fabric in (*OWN_FABRICS.values(), *installed_fabrics().values()):
+        for fabric in OWN_FABRICS.values():
             found |= fabric.values(self.measured)
-        return found
+        for name, fabric in installed_fabrics().items():
+            found |= checked_values(name, fabric, self.measured)
+        asked = {**self._window(), **self._edge()}
+        return {**found, **{name: asked[name] for name in self.plan.more_columns}}
 
     @cached_property
     def measured(self) -> Measured:
@@ -148,6 +151,20 @@ class VariantColumns:
             [gaps.kept(*words, without=block) for block in range(BLOCKS)],
         )
 
+    def _window(self) -> dict[str, Any]:
+        """What the window alone would give, where its column is there."""
+        name, window, fabric = WINDOW_ALPHA.name, self.plan.window, self.measured.void
+        if name not in self.plan.more_columns:
+            return {}
+        if self.plan.edge != CLIP and self.variant.in_window:
+            # by the other rules no window has one
+            return {name: 0.0 if fabric else None}
+        value: float | None = None
+        if self.variant.in_window and window is not None and fabric and self.plan.moment == 1:
+            cutoff = self.plan.cutoffs[self.place]
+            value = window_alpha(window.shape, fabric, cutoff, self.measured.axis)
+        return {name: value}
+
     def _blocks_of(self, points: FloatArray) -> IntArray:
         """The block of each place; of the window those next to its centre."""
         if self.variant.in_window:
@@ -207,7 +224,7 @@ class VariantColumns:
         }
 
 
-def no_columns(further: Collection[str] = ()) -> dict[str, Any]:
+def no_columns(more: Collection[str] = ()) -> dict[str, Any]:
     """The columns of a frame without grains."""
-    empty = {column.name: None for column in table_columns(further)}
+    empty = {column.name: None for column in table_columns(more)}
     return {**empty, "grains": 0, "rattlers": 0, "contacts": 0}

@@ -66,6 +66,16 @@ class DirectionRule:
     def __len__(self) -> int:
         return len(self.axes)
 
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, DirectionRule) and (
+            (self.name, self.degree, self.turned) == (other.name, other.degree, other.turned)
+            and np.array_equal(self.axes, other.axes)
+            and np.array_equal(self.weights, other.weights)
+        )
+
+    def __hash__(self) -> int:
+        return hash(self.name)
+
     def __repr__(self) -> str:
         degree = "of no degree" if self.degree is None else f"exact to degree {self.degree}"
         bias = f", bias {self.bias:.2g}" if self.bias > 1e-9 else ""
@@ -89,13 +99,13 @@ class DirectionRule:
         return bool(np.linalg.eigvalsh(self.isotropic_tensor)[0] < 1e-9)
 
 
-def direction_rule(text: str) -> DirectionRule:
+def direction_rule(text: str | int) -> DirectionRule:
     """
     The rule that a user names.
 
     Parameters
     ----------
-    text : str
+    text : str or int
         A number of axes N, rounded up to the next Lebedev rule with positive weights, or one of
         ``lebedev:DEGREE``, ``design:DEGREE``, ``icosahedral:DEGREE``, ``product:DEGREE``,
         ``fibonacci:N``,
@@ -135,6 +145,7 @@ def direction_rule(text: str) -> DirectionRule:
     >>> len(rule), rule.degree
     (25, 11)
     """
+    text = str(text)
     if re.fullmatch(r"\d+", text):
         return _at_least(int(text))
     name, _, argument = text.partition(":")

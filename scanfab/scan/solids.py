@@ -129,6 +129,18 @@ class Solids:
         assert self.around is not None
         return cells_of(self.around)
 
+    @cached_property
+    def near_window(self) -> BoolArray:
+        """Which spheres come within the margin of the window, shape (N,)."""
+        assert self.window is not None
+        return self.window.may_meet(self.position, self.radius + self.margin)
+
+    @cached_property
+    def near_inner(self) -> BoolArray:
+        """Which spheres reach into the whole's own window, shape (N,)."""
+        assert self.inner is not None
+        return self.inner.shape.may_meet(self.position - self.inner.center, self.radius)
+
     @property
     def margin(self) -> float:
         """How far beyond the window solids are listed, for the rule ``start``."""

@@ -107,12 +107,12 @@ class _Lines(NamedTuple):
         solids = self.solids
         position, radius, removed = solids.position, solids.radius, solids.removed
         shape = solids.window
+        solid = np.ones(len(radius), bool) if self.first else ~removed
         if inner is not None:
             position, shape = position - inner.center, inner.shape
-        solid = slice(None) if self.first else ~removed
-        if whole is None and window is not None and solids.edge != CLIP and shape is not None:
-            near = shape.may_meet(position, radius + window.margin)
-            solid = near if self.first else near & ~removed
+            solid &= solids.near_inner
+        elif window is not None and solids.edge != CLIP:
+            solid &= solids.near_window
         passes = (1 + (self.both is not None)) * ((whole is not None) + (window is not None))
         scan_axes(
             np.ascontiguousarray(position[solid]),

@@ -4,20 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import is_dataclass
+from functools import cache
 from typing import Any
 
 from scanfab.base.column import Column, columns_of_fields, no_column
-from scanfab.fabric.registry import OWN_FABRICS, installed_fabrics
+from scanfab.fabric.registry import OWN_FABRICS, Fabric, load_fabrics
+from scanfab.fabric.window import WINDOW_ALPHA
 from scanfab.packing.columns import SAMPLE_COLUMNS
 from scanfab.scan.columns import EDGE_COLUMNS, SCAN_COLUMNS
 from scanfab.table.row import Row
 
 __all__ = [
     "COLUMNS",
-    "FURTHER_COLUMNS",
+    "MORE_COLUMNS",
     "OWN_COLUMNS",
     "columns_of",
     "complete_row",
+    "installed_fabrics",
     "table_columns",
 ]
 
@@ -58,31 +61,37 @@ COLUMNS: tuple[str, ...] = tuple(one.name for one in OWN_COLUMNS)
 """Their names."""
 
 
-FURTHER_COLUMNS = EDGE_COLUMNS
-"""Those that are there only where the settings ask for them."""
+MORE_COLUMNS = (WINDOW_ALPHA, *EDGE_COLUMNS)
+"""Those of tables of which more is asked than the default."""
 
 
-def table_columns(further: Collection[str] = ()) -> tuple[Column, ...]:
+@cache
+def installed_fabrics() -> dict[str, Fabric]:
+    """The fabrics of other packages by name; none as a rule."""
+    return load_fabrics(COLUMNS)
+
+
+def table_columns(more: Collection[str] = ()) -> tuple[Column, ...]:
     """
-    The columns of the tables that are computed here.
+    The columns of the tables that are computed here: behind the own, those of other fabrics.
 
-    Behind the own ones, further ones that are asked for, and those of other fabrics.
+    ``more`` are the names of further own ones.
     """
-    asked = (column for column in FURTHER_COLUMNS if column.name in further)
-    more = (column for fabric in installed_fabrics().values() for column in fabric.columns)
-    return (*OWN_COLUMNS, *asked, *more)
+    asked = (column for column in MORE_COLUMNS if column.name in more)
+    others = (column for fabric in installed_fabrics().values() for column in fabric.columns)
+    return (*OWN_COLUMNS, *asked, *others)
 
 
 def columns_of(kind: type | Sequence[Column]) -> tuple[Column, ...]:
-    """The columns of a kind of rows: the fabric table's, or the fields of a dataclass."""
+    """The columns of a kind of rows: the fabric table's, or the fields of a dataclass; or these."""
     if not isinstance(kind, type):
         return tuple(kind)
     return columns_of_fields(kind) if is_dataclass(kind) else table_columns()
 
 
-def complete_row(values: Mapping[str, Any], further: Collection[str] = ()) -> Row:
+def complete_row(values: Mapping[str, Any], more: Collection[str] = ()) -> Row:
     """
-    A row that has all columns, in their order, and those further ones that are asked for.
+    A row that has all columns, in their order, and of further ones those that are named.
 
     Raises
     ------
@@ -96,7 +105,7 @@ def complete_row(values: Mapping[str, Any], further: Collection[str] = ()) -> Ro
     >>> complete_row({**dict.fromkeys(COLUMNS), "frame": 3}).frame
     3
     """
-    names = [one.name for one in table_columns(further)]
+    names = [one.name for one in table_columns(more)]
     for name in values:
         if name not in names:
             raise TypeError(no_column(name, names))

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.base.errors import ScanfabWarning, SettingsError
-from scanfab.table.columns import FURTHER_COLUMNS, OWN_COLUMNS
+from scanfab.table.columns import MORE_COLUMNS, OWN_COLUMNS
 from scanfab.table.reading import is_number
 
 __all__ = ["NEEDED", "check_rows", "choose_rows"]
@@ -21,14 +21,14 @@ Rows = list[dict[str, Any]]
 
 NEEDED = ("source", "frame", "strain", "variant", "alpha_vs_axial", "alpha_c_axial")
 NAMES = ("source", "variant")
-NUMBERS = tuple(one.name for one in (*OWN_COLUMNS, *FURTHER_COLUMNS) if one.kind is not str)
+NUMBERS = tuple(one.name for one in (*OWN_COLUMNS, *MORE_COLUMNS) if one.kind is not str)
 # columns that no fabric table has, and the table that they give away
 OTHER_TABLES = {
-    ("alpha_vs_axial_norm", "alpha_c_axial_norm"): "compare",
-    ("slope", "slope_origin"): "compare --summary",
-    ("variants", "difference"): "compare --differences",
-    ("ladder", "value"): "calibrate",
-    ("radius_min", "contacts_from"): "inspect --json",
+    ("alpha_vs_axial_norm", "alpha_c_axial_norm"): "a table of scanfab compare",
+    ("slope", "slope_origin"): "the summary of scanfab compare",
+    ("variants", "difference"): "the differences of scanfab compare",
+    ("ladder", "value"): "a table of scanfab calibrate",
+    ("radius_min", "contacts_from"): "the frames of scanfab inspect",
 }
 # cut-offs that agree in three digits, as they are printed for people, are the same
 ROUNDING = 5e-3
@@ -113,11 +113,10 @@ def check_rows(rows: Sequence[Mapping[str, Any]], table: str = "") -> None:
 
 
 def _check_columns(where: str, row: Mapping[str, Any]) -> None:
-    for columns, command in OTHER_TABLES.items():
+    for columns, other in OTHER_TABLES.items():
         if all(name in row for name in columns):
             raise SettingsError(
-                f"{where}this is a table of scanfab {command}: expected one of scanfab compute, "
-                f"from which it was made"
+                f"{where}this is {other}: expected one of scanfab compute, from which it was made"
             )
     missing = [name for name in NEEDED if name not in row]
     if missing:

@@ -14,7 +14,7 @@ from scanfab.base.column import DEFAULT_DIGITS, Column, NoColumnError, no_column
 from scanfab.base.errors import SettingsError
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.tensor import COMPONENTS
-from scanfab.table.columns import COLUMNS, FURTHER_COLUMNS, columns_of, table_columns
+from scanfab.table.columns import COLUMNS, MORE_COLUMNS, columns_of, table_columns
 from scanfab.table.plots import Plots
 from scanfab.table.preview import as_html, as_text
 from scanfab.table.reading import read_rows
@@ -218,7 +218,11 @@ class Table(Sequence[Row]):
         return compare_tables(self, strain_max=strain_max)
 
     def save(
-        self, path: Path | str, *, fields: str | None = None, digits: int = DEFAULT_DIGITS
+        self,
+        path: Path | str,
+        *,
+        fields: str | Sequence[str] | None = None,
+        digits: int = DEFAULT_DIGITS,
     ) -> None:
         """
         Write the table; of a computed one the bytes are those of ``scanfab compute -o``.
@@ -227,9 +231,10 @@ class Table(Sequence[Row]):
         ----------
         path : path
             ``.csv``, ``.tsv``, ``.json``, ``.jsonl``, ``.parquet``, or a format of another
-            package. A file that is there is replaced, all at once.
-        fields : str, optional
-            Names of columns, separated by commas, in the order in which to write them.
+            package. A file that is there is replaced, all at once. What is not finite is
+            written as a missing value.
+        fields : str or sequence of str, optional
+            Names of columns, one by one or separated by commas, in the order to write them in.
         digits : int, optional
             Significant digits of floats; with 17 they read back the same.
 
@@ -288,9 +293,15 @@ class Table(Sequence[Row]):
         """
         import polars
 
+        from scanfab.table.writing import plain
+
+        # the kind of a list's entries is found by polars
         kinds = {int: polars.Int64, float: polars.Float64, str: polars.String}
-        schema = {column.name: kinds.get(column.kind, polars.Object) for column in self.columns}
-        return polars.DataFrame([dict(row) for row in self], schema=schema, strict=False)
+        columns = []
+        for name, kind in ((one.name, one.kind) for one in self.columns):
+            values = [plain(row[name]) for row in self]
+            columns.append(polars.Series(name, values, kinds.get(kind), strict=False))
+        return polars.DataFrame(columns)
 
     def __repr__(self) -> str:
         return as_text(self.rows, self.names)
@@ -309,15 +320,17 @@ def _columns(rows: Sequence[Mapping[str, Any]]) -> tuple[Column, ...]:
         return table_columns()
     if is_dataclass(rows[0]):
         return columns_of(type(rows[0]))
-    known = {column.name: column for column in (*table_columns(), *FURTHER_COLUMNS)}
+    known = {column.name: column for column in (*table_columns(), *MORE_COLUMNS)}
     names = dict.fromkeys(name for row in rows for name in row)
     return tuple(known.get(name) or _found(name, rows) for name in names)
 
 
 def _found(name: str, rows: Sequence[Mapping[str, Any]]) -> Column:
     """A column that is not the fabric table's, by its values."""
-    kinds = {type(row[name]) for row in rows if row.get(name) is not None}
-    kind = next((kind for kind in (str, float, int) if kind in kinds), float)
+    from scanfab.table.writing import plain
+
+    kinds = {type(plain(row[name])) for row in rows if row.get(name) is not None}
+    kind = next((kind for kind in (list, str, float, int) if kind in kinds), float)
     return Column(name, kind, "", "")
 
 

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
+import numpy as np
+
 from scanfab.base.column import ALL_DIGITS, DEFAULT_DIGITS, Column, no_column
 from scanfab.base.errors import SettingsError
 from scanfab.base.files import check_folder, whole_file
+from scanfab.base.option import unusable, whole
 from scanfab.table.columns import columns_of
 from scanfab.table.formats.registry import RowWriter, TableFormat, format_of
 
-__all__ = ["Excerpt", "open_table", "row_writer", "write_rows"]
+__all__ = ["Excerpt", "open_table", "plain", "row_writer", "write_rows"]
 
 
 @dataclass(frozen=True)
@@ -29,11 +33,13 @@ class Excerpt:
     def make(
         cls,
         columns: type | Sequence[Column],
-        fields_text: str | None,
+        fields: str | Sequence[str] | None = None,
         digits: int = DEFAULT_DIGITS,
     ) -> Excerpt:
         """
         What users ask for, of some columns or of those of a kind of rows.
+
+        ``fields`` are their names, one by one or separated by commas.
 
         Raises
         ------
@@ -47,13 +53,12 @@ class Excerpt:
         >>> Excerpt.make(Row, "strain,alpha_vs_axial").fields
         ('strain', 'alpha_vs_axial')
         """
-        if not 1 <= digits <= ALL_DIGITS:
-            raise SettingsError(f"digits: expected 1 to {ALL_DIGITS} of them, found {digits}")
-        if fields_text is None:
+        expected = f"1 to {ALL_DIGITS} of them"
+        digits = int(whole(expected, lambda count: 1 <= count <= ALL_DIGITS)("digits", digits))
+        if fields is None:
             return cls(digits=digits)
-        names = tuple(name.strip() for name in fields_text.split(","))
-        columns = columns_of(columns) if isinstance(columns, type) else columns
-        known = [column.name for column in columns]
+        names = _names(fields)
+        known = [column.name for column in columns_of(columns)]
         for name in names:
             if name not in known:
                 raise SettingsError(f"fields: {no_column(name, known)}")
@@ -73,9 +78,7 @@ class Excerpt:
 
     def of(self, row: Mapping[str, Any]) -> dict[str, Any]:
         """The columns of a row that are written, by name."""
-        values = dict(row)
-        if self.fields:
-            values = {name: values[name] for name in self.fields}
+        values = {name: plain(row[name]) for name in self.fields or row}
         if self.digits == ALL_DIGITS:
             return values
         return {name: self._rounded(value) for name, value in values.items()}
@@ -86,7 +89,28 @@ class Excerpt:
         return asked if self.digits == DEFAULT_DIGITS else {**asked, "digits": self.digits}
 
     def _rounded(self, value: Any) -> Any:
-        return float(f"{value:.{self.digits}g}") if isinstance(value, float) else value
+        if not isinstance(value, float):
+            return value
+        rounded = float(f"{value:.{self.digits}g}")
+        # the largest of all floats would be rounded to infinity
+        return rounded if math.isfinite(rounded) else value
+
+
+def _names(fields: str | Sequence[str]) -> tuple[str, ...]:
+    if isinstance(fields, str):
+        return tuple(name.strip() for name in fields.split(","))
+    if not isinstance(fields, Iterable) or not (names := tuple(fields)):
+        raise unusable("fields", "names of columns", fields)
+    return names
+
+
+def plain(value: Any) -> Any:
+    """A value as all formats can write it: of Python's own kinds, None for what is not finite."""
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [plain(one) for one in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 ALL = Excerpt()
@@ -137,8 +161,7 @@ def row_writer(
         If there is no such format, or its package is missing.
     """
     table_format = format_of(Path(f"table{suffix}"))
-    writer = table_format.writer(stream, excerpt.columns(columns), header)
-    return writer if excerpt.is_all else ExcerptWriter(writer, excerpt)
+    return ExcerptWriter(table_format.writer(stream, excerpt.columns(columns), header), excerpt)
 
 
 def write_rows(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -36,7 +36,7 @@ def compute_file(
     resume: bool = False,
     vtk: PathLike | None = None,
     manifest: PathLike | None = None,
-    fields: str | None = None,
+    fields: str | Sequence[str] | None = None,
     digits: int = DEFAULT_DIGITS,
     progress: Callable[[int, int], object] | None = None,
     **options: Any,
@@ -64,8 +64,8 @@ def compute_file(
         A folder for ParaView files of each frame that is computed now.
     manifest : path, optional
         A copy of the manifest.
-    fields : str, optional
-        Names of columns, separated by commas, in the order in which to write them.
+    fields : str or sequence of str, optional
+        Names of columns, one by one or separated by commas, in the order in which to write them.
     digits : int, optional
         Significant digits of floats; with 17 they read back the same.
     progress : callable, optional
@@ -107,12 +107,11 @@ def compute_file(
     """
     known = [*READING, *(one.name for one in options_of(Settings))]
     refuse_unknown("compute_file", options, known)
-    asked = Settings(**{name: options[name] for name in options if name not in READING})
-    columns = table_columns(asked.further_columns)
-    excerpt = Excerpt.make(columns, fields, digits)
     with recorded() as told:
         series, sources, reading = _opened(source, options)
-        series, settings = _whole(series, asked)
+        series, settings = _whole(series, Settings(**options))
+        columns = table_columns(settings.more_columns)
+        excerpt = Excerpt.make(columns, fields, digits)
         folders = () if vtk is None else vtk_folders(Path(vtk), len(series), settings, go_on=resume)
         job = Job(
             series,
@@ -140,13 +139,14 @@ def _opened(
     source: Source | Sequence[Source], options: dict[str, Any]
 ) -> tuple[list[Series], list[str], dict[str, Any]]:
     """Series, with what they were opened by; its options are taken out of others."""
-    one = isinstance(source, Series | str | os.PathLike)
+    one = isinstance(source, Series | str | os.PathLike) or not isinstance(source, Iterable)
     given: list[Any] = [source] if one else list(source)  # type: ignore[arg-type]
     if given and all(isinstance(one, Series) for one in given):
         return given, *_opened_before(given, options)
     if not given or not all(isinstance(one, str | os.PathLike) for one in given):
         raise SettingsError(
-            f"expected a Series or the path of dumps, or several of one kind, found {source!r}"
+            f"expected a Series or the path of dumps, or several of one kind, found {source!r}: "
+            f"of packings, compute() makes a table, which has save()"
         )
     sources = [os.fspath(path) for one in given for path in expanded(one)]
     reading = take_reading(options)

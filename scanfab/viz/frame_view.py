@@ -70,6 +70,8 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
     found = frames.first()
     first = None if found is None else found[2]
     plan = None if first is None else _plan(first, settings)
+    if plan is not None and sample.grains.any():
+        plan = plan.in_frame(sample)
     scene = scene_of(sample, None if plan is None else plan.window)
     if plan is not None:
         scene = about_window(replace(scene, cutoff=plan.cutoff))
@@ -81,8 +83,9 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
 def _plan(first: Sample, settings: Settings) -> Plan | None:
     """The plan of the series; None, with a warning, if it cannot be made."""
     try:
-        # of a strain that cannot be had the view says nothing
-        plan = make_plan(replace(settings, strain="auto"), first)
+        # of a strain that cannot be had the view says nothing, if the RV does not follow it
+        strain = settings.strain if settings.rv_follows == "strain" else "auto"
+        plan = make_plan(replace(settings, strain=strain), first)
     except SettingsError as error:
         tell([Note("no_rv", f"the RV is not shown: {error}")])
         return None

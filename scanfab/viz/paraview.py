@@ -72,7 +72,7 @@ class VtkFolder:
             contacts = vtk.contact_mesh(contact_lines(result.sample, window))
             self._save("contacts", contacts, result, fields)
             if window is not None:
-                surface = vtk.window_mesh(window.center, window.radius)
+                surface = vtk.window_mesh(window.center, window.shape)
                 self._save("window", surface, result, fields)
             for row in result.rows:
                 self._save_variant(result, row)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.convex import sphere
+from scanfab.base.convex import Convex
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
@@ -67,8 +67,8 @@ class Scene:
     grains: Grains
     center: FloatArray
     """Of the RV, or of the grains without an RV, shape (3,)."""
-    window_radius: float | None
-    """None without an RV."""
+    window: Convex | None
+    """The RV about its centre; None without one."""
     lines: Segments | None = None
     """A few scan lines, in the dump's coordinates."""
     cutoff: float = 0.0
@@ -84,8 +84,8 @@ def scene_of(sample: Sample, window: Window | None) -> Scene:
     if window is None and len(sample.packing):
         center = sample.packing.position[chosen].mean(axis=0)
     cell = sample.packing.cell if sample.packing.is_periodic else None
-    radius = None if window is None else window.radius
-    return Scene(grains_of(sample, window), center, radius, cell=cell)
+    shape = None if window is None else window.shape
+    return Scene(grains_of(sample, window), center, shape, cell=cell)
 
 
 def about_window(scene: Scene) -> Scene:
@@ -96,11 +96,11 @@ def about_window(scene: Scene) -> Scene:
     that reach into the RV are there too.
     """
     cell, grains = scene.cell, scene.grains
-    if cell is None or scene.window_radius is None:
+    if cell is None or scene.window is None:
         return scene
     branch = grains.position - scene.center
     nearest = branch + cell.nearest_image(branch) @ cell.vectors
-    images, row = cell.images_near_origin(branch, grains.radius + scene.window_radius)
+    images, row = cell.images_near_origin(branch, grains.radius + scene.window.reach)
     other = np.linalg.norm(images - nearest[row], axis=1) > 1e-6 * grains.radius[row]
     rows = np.concatenate([np.arange(len(nearest)), row[other]])
     position = np.concatenate([nearest, images[other]]) + scene.center
@@ -108,7 +108,7 @@ def about_window(scene: Scene) -> Scene:
         name: getattr(grains, name)[rows]
         for name in ("radius", "id", "contacts", "rattler", "boundary", "in_window")
     }
-    shown["in_window"] = np.linalg.norm(position - scene.center, axis=1) < scene.window_radius
+    shown["in_window"] = scene.window.contains(position - scene.center)
     return replace(scene, grains=Grains(position=position, **shown))
 
 
@@ -130,15 +130,16 @@ def section_lines(scene: Scene, axis: npt.ArrayLike) -> Segments:
     frame = np.stack([np.cross(depth, along), depth, along])
     position = grains.position[solid] - scene.center
     radius = grains.radius[solid]
-    reach = scene.window_radius or float(np.linalg.norm(position, axis=1).max(initial=0.0))
-    if scene.cell is not None and scene.window_radius is not None:
+    reach = float(np.linalg.norm(position, axis=1).max(initial=0.0))
+    if scene.window is not None:
+        reach = scene.window.reach
+    if scene.cell is not None and scene.window is not None:
         position, row = scene.cell.images_near_origin(position, radius + reach)
         radius = radius[row]
     spacing = max(2.5 * float(radius.mean()), reach / 40) if len(radius) else reach
     steps = np.arange(-reach + 0.5 * spacing, reach, spacing) if spacing > 0 else np.zeros(0)
     points = np.column_stack([steps, np.zeros_like(steps)])
-    window = None if scene.window_radius is None else sphere(scene.window_radius)
-    found = cut_lines(position, radius, frame, points, window)
+    found = cut_lines(position, radius, frame, points, scene.window)
     return replace(found, ends=found.ends + scene.center)
 
 

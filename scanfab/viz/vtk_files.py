@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.convex import Convex
 from scanfab.base.files import whole_file
 from scanfab.base.typing import FloatArray
 from scanfab.scan.segments import Segments
@@ -84,11 +85,14 @@ def line_mesh(segments: Segments, cutoff: float) -> Any:
     return mesh
 
 
-def window_mesh(center: FloatArray, radius: float) -> Any:
-    """The surface of the RV."""
+def window_mesh(center: FloatArray, window: Convex, nsub: int = 4) -> Any:
+    """The surface of the RV; ``nsub`` says how fine that of a sphere is."""
     import pyvista
 
-    return pyvista.Icosphere(radius=radius, center=tuple(center), nsub=4)
+    if window.is_sphere:
+        return pyvista.Icosphere(radius=window.reach, center=tuple(center), nsub=nsub)
+    outline = window.outline
+    return pyvista.PolyData.from_regular_faces(center + outline, _triangles(outline))
 
 
 def distribution_mesh(directions: FloatArray, mean_length: FloatArray, weight: FloatArray) -> Any:

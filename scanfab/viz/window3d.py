@@ -18,6 +18,7 @@ from scanfab.base.vtk_log import quiet_vtk
 from scanfab.viz.figures.style import COLOURS
 from scanfab.viz.overlay import SIZE, Framing, add_scale, add_words
 from scanfab.viz.scene import Grains, Scene
+from scanfab.viz.vtk_files import window_mesh
 
 __all__ = ["check_screen", "show_scene"]
 
@@ -85,7 +86,7 @@ def _show(scene: Scene, up: FloatArray, title: str, screenshot: Path | None) -> 
     look = toward if scene.lines is not None else toward + 0.45 * np.cross(up, toward) + 0.35 * up
     drawn = _drawn(scene, toward, look)
     _add_grains(plotter, scene, drawn, toward)
-    if scene.window_radius is not None:
+    if scene.window is not None:
         _add_window(plotter, scene, toward)
     if scene.lines is not None:
         _add_lines(plotter, scene)
@@ -151,7 +152,7 @@ def _drawn(scene: Scene, toward: FloatArray, look: FloatArray) -> BoolArray:
     branch = grains.position - scene.center
     if scene.lines is not None:
         shown = branch @ toward < grains.radius
-    elif scene.window_radius is not None:
+    elif scene.window is not None:
         shown = grains.in_window | (branch @ look <= 0.0)
     else:
         shown = np.ones(len(branch), bool)
@@ -161,9 +162,9 @@ def _drawn(scene: Scene, toward: FloatArray, look: FloatArray) -> BoolArray:
 def _framing(scene: Scene, drawn: BoolArray, up: FloatArray, look: FloatArray) -> Framing:
     """About all that is drawn."""
     points, radius = scene.grains.position[drawn], scene.grains.radius[drawn]
-    if scene.window_radius is not None:
+    if scene.window is not None:
         points = np.vstack([points, scene.center])
-        radius = np.append(radius, scene.window_radius)
+        radius = np.append(radius, scene.window.reach)
     return Framing.about(points, radius, up, look)
 
 
@@ -171,7 +172,7 @@ def _add_grains(plotter: Any, scene: Scene, drawn: BoolArray, toward: FloatArray
     """Balls; if the scene has lines, cut by the plane through the centre."""
     grains = scene.grains
     height = (grains.position - scene.center) @ toward
-    for colour, kind in classes(grains, scene.window_radius is not None).values():
+    for colour, kind in classes(grains, scene.window is not None).values():
         chosen = kind & drawn
         if not chosen.any():
             continue
@@ -220,15 +221,21 @@ def _add_window(plotter: Any, scene: Scene, toward: FloatArray) -> None:
     """The RV's surface; in a section its outline."""
     import pyvista
 
-    center, radius = tuple(scene.center), scene.window_radius
-    assert radius is not None
+    center, window = tuple(scene.center), scene.window
+    assert window is not None
     if scene.lines is None:
-        surface = pyvista.Icosphere(radius=radius, center=center, nsub=5)
-        plotter.add_mesh(surface, color=COLOURS["blue"], opacity=0.12, smooth_shading=True)
+        surface = window_mesh(scene.center, window, nsub=5)
+        smooth = not len(window.planes)
+        plotter.add_mesh(surface, color=COLOURS["blue"], opacity=0.12, smooth_shading=smooth)
         return
-    outline = pyvista.Disc(
-        center=center, inner=radius, outer=1.008 * radius, normal=toward, c_res=180
-    )
+    if window.is_sphere:
+        radius = window.reach
+        outline = pyvista.Disc(
+            center=center, inner=radius, outer=1.008 * radius, normal=toward, c_res=180
+        )
+    else:
+        cut = window_mesh(scene.center, window).slice(normal=toward, origin=center)
+        outline = cut.tube(radius=0.004 * window.reach)
     plotter.add_mesh(outline, color=COLOURS["blue"], lighting=False)
 
 
@@ -249,7 +256,7 @@ def _add_lines(plotter: Any, scene: Scene) -> None:
 
 def _words(scene: Scene) -> dict[str, str]:
     """Names of the legend, each with its colour."""
-    found = classes(scene.grains, scene.window_radius is not None)
+    found = classes(scene.grains, scene.window is not None)
     names = {name: colour for name, (colour, _) in found.items()}
     if scene.lines is not None:
         names |= {"void segment kept": COLOURS["black"], "dropped": COLOURS["vermilion"]}

@@ -1,16 +1,33 @@
-"""Regions as data: what lies in them, told by the numbers alone."""
+"""Regions as data: what lies in them, told by the numbers alone, and what follows from them."""
+
+import math
 
 import numpy as np
 import pytest
 
-from scanfab import sphere
+from scanfab import SettingsError, box, cylinder, direction_rule, ellipsoid, sphere
+from scanfab.base.bodies import BLOCK, Hull
 from tests.helpers.lattices import rotation
-from tests.helpers.windows import box, cut_ball, cylinder, ellipsoid
+from tests.helpers.windows import box_by_corners, cut_ball, hull_of, leaning
 
 RANDOM = np.random.default_rng(3)
 POINTS = RANDOM.uniform(-2, 2, (2000, 3))
 TURN = rotation(RANDOM)
 HALF = np.array([0.5, 1.0, 1.7])
+AXES = direction_rule("lebedev:11").axes
+GRADIENT = np.eye(3) + RANDOM.uniform(-0.3, 0.3, (3, 3))
+
+SHAPES = {
+    "sphere": sphere(1.3),
+    "box": box(2 * HALF, TURN),
+    "cylinder": cylinder(0.8, 2.8, TURN[0]),
+    "ellipsoid": ellipsoid(HALF, TURN),
+    "polyhedron": hull_of(RANDOM.normal(size=(12, 3)))[0],
+    "deformed sphere": sphere(1.2).deformed(GRADIENT),
+    "deformed box": box(2 * HALF).deformed(GRADIENT),
+    "deformed cylinder": cylinder(0.8, 2.8).deformed(GRADIENT),
+    "deformed polyhedron": leaning(hull_of(RANDOM.normal(size=(12, 3)))[0], RANDOM),
+}
 
 
 def of_axis(points):
@@ -23,10 +40,10 @@ def of_axis(points):
     ("region", "inside"),
     [
         (sphere(1.3), np.linalg.norm(POINTS, axis=1) < 1.3),
-        (box(HALF), np.all(np.abs(POINTS) < HALF, axis=1)),
-        (box(HALF, TURN), np.all(np.abs(POINTS @ TURN.T) < HALF, axis=1)),
+        (box(2 * HALF), np.all(np.abs(POINTS) < HALF, axis=1)),
+        (box(2 * HALF, TURN), np.all(np.abs(POINTS @ TURN.T) < HALF, axis=1)),
         (
-            cylinder(TURN[0], 0.8, 1.4),
+            cylinder(0.8, 2.8, TURN[0]),
             (np.abs(of_axis(POINTS)[0]) < 1.4) & (of_axis(POINTS)[1] < 0.8),
         ),
         (ellipsoid(HALF, TURN), np.sum((POINTS @ TURN.T / HALF) ** 2, axis=1) < 1),
@@ -34,18 +51,55 @@ def of_axis(points):
             cut_ball(1.5, TURN[0], 0.2),
             (np.linalg.norm(POINTS, axis=1) < 1.5) & (POINTS @ TURN[0] < 0.2),
         ),
+        (
+            box(2 * HALF).deformed(GRADIENT),
+            np.all(np.abs(np.linalg.solve(GRADIENT, POINTS.T).T) < HALF, axis=1),
+        ),
+        (
+            sphere(1.2).deformed(GRADIENT),
+            np.linalg.norm(np.linalg.solve(GRADIENT, POINTS.T), axis=0) < 1.2,
+        ),
     ],
-    ids=["sphere", "box", "turned box", "cylinder", "ellipsoid", "cut ball"],
-)
+    ids=[
+        "sphere", "box", "turned box", "cylinder", "ellipsoid", "cut ball", "leaning box",
+        "deformed sphere",
+    ],
+)  # fmt: skip
 def test_points_inside_are_those_of_the_definition(region, inside):
     assert 20 < inside.sum() < 1500
     assert np.array_equal(region.contains(POINTS), inside)
     assert np.all(np.linalg.norm(POINTS[inside], axis=1) <= region.reach)
     assert np.all((region.low <= POINTS[inside]) & (POINTS[inside] <= region.high))
-    # a sphere about a point reaches inside if any of its own points does
-    radius = np.full(len(POINTS), 0.3)
-    for shift in 0.3 * np.concatenate([TURN, -TURN]):
-        assert np.all(region.may_meet(POINTS, radius)[region.contains(POINTS + 0.999 * shift)])
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_spheres_meet_a_region_whose_nearest_place_they_hold(name):
+    """Of many places of the surface the nearest one is almost the nearest of all."""
+    shape = SHAPES[name]
+    axes = direction_rule("fibonacci:20000").axes
+    axes = np.concatenate([axes, -axes])
+    # by halving between a place inside and one outside
+    inner, outer = np.zeros(len(axes)), np.full(len(axes), 2.0 * shape.reach)
+    for _ in range(50):
+        middle = 0.5 * (inner + outer)
+        inside = shape.contains(axes * middle[:, None])
+        inner, outer = np.where(inside, middle, inner), np.where(inside, outer, middle)
+    surface = axes * inner[:, None]
+    points = RANDOM.uniform(-3, 3, (400, 3))
+    points = points[~shape.contains(points)]
+    nearest = np.array([np.linalg.norm(surface - one, axis=1).min() for one in points])
+    assert np.all(shape.may_meet(points, nearest * 1.0001))
+    # the nearest of these places is further away by half a step between two, at most
+    off = nearest > 0.06
+    assert not np.any(shape.may_meet(points[off], nearest[off] - 0.06))
+    # the box along x, y, z that holds it is the least
+    assert shape.high == pytest.approx(surface.max(axis=0), rel=0.03)
+    assert shape.low == pytest.approx(surface.min(axis=0), rel=0.03)
+    assert np.all(surface <= shape.high + 1e-9)
+    assert np.all(surface >= shape.low - 1e-9)
+    reach = np.linalg.norm(surface, axis=1).max()
+    assert reach <= shape.reach * (1 + 1e-9)
+    assert shape.reach < (1.3 if "deformed" in name else 1.03) * reach
 
 
 def test_only_spheres_that_reach_into_a_sphere_meet_it():
@@ -53,6 +107,114 @@ def test_only_spheres_that_reach_into_a_sphere_meet_it():
     assert sphere(1.0).may_meet(points, np.array([0.5, 0.5, 0.0])).tolist() == [True, False, True]
 
 
+def test_a_sphere_beside_the_edge_of_a_box_does_not_meet_it():
+    """It reaches past both planes of the edge, but not to where they meet."""
+    cube, beside = box([2.0, 2.0, 2.0]), np.array([[1.5, 1.5, 0.0]])
+    assert cube.may_meet(beside, np.array([0.70])).tolist() == [False]
+    assert cube.may_meet(beside, np.array([0.71])).tolist() == [True]
+
+
 def test_a_point_on_the_surface_is_outside():
     for radius in RANDOM.uniform(0.1, 9.0, 100):
         assert not sphere(radius).contains(np.array([[0.0, 0.0, radius]]))[0]
+
+
+@pytest.mark.parametrize("radius", [-1, 0, math.inf, math.nan, "x"])
+def test_a_sphere_has_a_radius_above_0(radius):
+    with pytest.raises(SettingsError, match="radius: expected a length above 0, found"):
+        sphere(radius)
+
+
+@pytest.mark.parametrize(
+    ("shape", "volume", "shadow"),
+    [
+        (sphere(1.3), 4 / 3 * np.pi * 1.3**3, lambda n: np.pi * 1.3**2 + 0 * n[:, 0]),
+        (
+            box(2 * HALF),
+            8 * 0.5 * 1.0 * 1.7,
+            lambda n: 4 * np.abs(n) @ [1.0 * 1.7, 1.7 * 0.5, 0.5 * 1.0],
+        ),
+        (
+            cylinder(0.8, 2.8, TURN[0]),
+            np.pi * 0.64 * 2.8,
+            lambda n: (
+                np.pi * 0.64 * np.abs(n @ TURN[0]) + 2 * 0.8 * 2.8 * np.sqrt(1 - (n @ TURN[0]) ** 2)
+            ),
+        ),
+        (
+            ellipsoid(HALF),
+            4 / 3 * np.pi * HALF.prod(),
+            lambda n: np.pi * np.linalg.norm(n * HALF.prod() / HALF, axis=1),
+        ),
+    ],
+    ids=["sphere", "box", "cylinder", "ellipsoid"],
+)
+def test_volume_and_projected_area_are_those_of_the_books(shape, volume, shadow):
+    shared, area = shape.overlap(AXES, 0.0)
+    assert shape.volume == pytest.approx(volume)
+    assert shared == pytest.approx(np.full(len(AXES), volume))
+    assert area == pytest.approx(shadow(AXES))
+    assert shape.mean_shadow == pytest.approx(
+        shadow(direction_rule("lebedev:41").axes).mean(), 0.02
+    )
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_overlap_with_itself_is_what_points_say(name):
+    """g by counting points in both; -g' is its slope, and 0 where both have come apart."""
+    shape = SHAPES[name]
+    points = RANDOM.uniform(shape.low, shape.high, (400_000, 3))
+    points = points[shape.contains(points)]
+    hull = isinstance(shape.body, Hull)
+    for length in (0.3, 1.0):
+        shared, slope = shape.overlap(AXES, length)
+        for n, g in zip(AXES[:6], shared, strict=False):
+            share = shape.contains(points + length * n).mean()
+            assert g == pytest.approx(share * shape.volume, abs=0.01 * shape.volume)
+        more, less = (shape.overlap(AXES, length + step)[0] for step in (1e-5, -1e-5))
+        assert slope == pytest.approx((less - more) / 2e-5, abs=5e-2 if hull else 1e-4)
+    assert not np.any(shape.overlap(AXES, 2.1 * shape.reach))
+
+
+def test_a_box_by_its_corners_has_the_overlap_of_the_box():
+    """Once by a formula, once from chords."""
+    one, other = box(2 * HALF, TURN), box_by_corners(HALF, TURN)
+    for length in (0.0, 0.4):
+        shared, slope = one.overlap(AXES, length)
+        found, falls = other.overlap(AXES, length)
+        assert found == pytest.approx(shared, rel=5e-3)
+        assert falls == pytest.approx(slope, rel=2e-2)
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_a_region_meets_itself_until_it_has_been_moved_off(name):
+    shape = SHAPES[name]
+    for n in AXES[:10]:
+        # half way between where the overlap is something and where it is nothing
+        low, high = 0.0, 2.1 * shape.reach
+        for _ in range(40):
+            middle = 0.5 * (low + high)
+            apart = not shape.meets_itself(middle * n)
+            low, high = (low, middle) if apart else (middle, high)
+        points = shape.support(np.array([n, -n]))
+        assert high <= (points[0] - points[1]) @ n + 1e-6
+        if not isinstance(shape.body, Hull):
+            assert shape.overlap(n[None], 0.99 * high)[0][0] > 0.0
+            assert shape.overlap(n[None], 1.01 * high)[0][0] == 0.0
+
+
+def test_a_deformed_region_keeps_its_share_of_the_volume():
+    for name, shape in SHAPES.items():
+        changed = shape.deformed(GRADIENT)
+        assert changed.volume == pytest.approx(shape.volume * np.linalg.det(GRADIENT)), name
+        inside = shape.contains(POINTS)
+        assert np.array_equal(changed.contains(POINTS @ GRADIENT.T), inside), name
+    assert box(HALF).deformed(np.eye(3)).size == "box 0.5 x 1 x 1.7"
+    assert box(HALF).deformed(GRADIENT).body is BLOCK
+
+
+def test_an_outline_has_the_volume_of_the_region():
+    from scipy.spatial import ConvexHull
+
+    for name, shape in SHAPES.items():
+        assert ConvexHull(shape.outline).volume == pytest.approx(shape.volume, rel=6e-3), name

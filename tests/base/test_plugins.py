@@ -9,6 +9,11 @@ import pytest
 from scanfab.base import plugins
 from scanfab.base.errors import ScanfabError, ScanfabWarning
 from scanfab.base.plugins import load_plugins
+from scanfab.io.registry import load_readers
+from scanfab.packing import rattlers
+from scanfab.table.columns import installed_fabrics
+from scanfab.table.formats import registry as formats
+from tests.helpers.plugins import offer
 
 
 def broken():
@@ -41,3 +46,25 @@ def test_one_name_twice_is_an_error_that_names_both_packages(offered):
     offered += [point("a", lambda: 1), point("a", lambda: 2, "two")]
     with pytest.raises(ScanfabError, match="two packages offer a thing called 'a': one and two"):
         load_plugins("some.group", "thing")
+
+
+@pytest.mark.parametrize(
+    ("group", "installed", "rest"),
+    [
+        ("scanfab.rattlers", rattlers.installed_rules, ["count", "recursive"]),
+        ("scanfab.table_formats", formats._foreign_formats, []),
+        ("scanfab.fabrics", installed_fabrics, []),
+    ],
+)
+@pytest.mark.parametrize("plugin", [3, dict])
+def test_what_is_no_plugin_is_a_warning_in_every_group(monkeypatch, group, installed, rest, plugin):
+    offer(monkeypatch, group, "bad", lambda: plugin)
+    installed.cache_clear()
+    with pytest.warns(ScanfabWarning, match="'bad' of made-up cannot be loaded: TypeError: expec"):
+        assert list(installed()) == rest
+    installed.cache_clear()
+
+
+def test_what_is_no_reader_is_a_warning():
+    with pytest.warns(ScanfabWarning, match="'bad' of one cannot be loaded: TypeError: expected a"):
+        assert load_readers([point("bad", lambda: dict)]) == {}

@@ -503,7 +503,7 @@ def test_a_full_disk_leaves_the_old_result(tmp_path, compute, monkeypatch):
     write_row = TextWriter.write
 
     def full(writer, row):
-        if row.variant == "c":
+        if row["variant"] == "c":
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         write_row(writer, row)
 

@@ -61,7 +61,10 @@ def test_help_imports_no_heavy_package() -> None:
         (["--columns", "radius"], "--columns: expected NAME=COLUMN"),
         (["-o", "table.docx"], "results can be written as .csv"),
         (["--edge", "share"], "No such option"),
-        (["--rv-shape", "box"], "No such option"),
+        (
+            ["--rv-shape", "cone"],
+            "--rv-shape: expected sphere, box, cylinder, ellipsoid",
+        ),
     ],
 )
 def test_wrong_usage_is_exit_code_2_and_one_message(args: list[str], message: str) -> None:

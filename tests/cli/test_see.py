@@ -320,7 +320,7 @@ def test_damaged_frames_before_the_one_asked_for_are_skipped(tmp_path, monkeypat
     monkeypatch.setattr("scanfab.viz.window3d.show_scene", lambda *said: scenes.append(said[0]))
     words = ["--screenshot", str(tmp_path / "x.png")]
     assert run(["view", str(tmp_path), "--frame", "2", *words]) == 0
-    assert scenes[0].window_radius is not None
+    assert scenes[0].window is not None
     told = capsys.readouterr().err
     assert told.count("frame 0 skipped: ") == told.count("frame 1 skipped: ") == 1
     assert run(["view", str(tmp_path), "--frame", "0", *words]) == 1

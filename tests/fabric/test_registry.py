@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab import Column
-from scanfab.fabric import registry
+from scanfab import Column, ScanfabError, ScanfabWarning
 from scanfab.table import columns
 from scanfab.table.columns import COLUMNS, complete_row
 from scanfab.table.formats.registry import OWN_FORMATS
 from scanfab.table.reading import read_rows
 from scanfab.table.result_file import ResultFile
 from tests.helpers.lattices import simple_cubic
+from tests.helpers.plugins import offer
 
 
 class Cubic:
@@ -31,14 +31,19 @@ class Cubic:
 
 
 @pytest.fixture
-def cubic(monkeypatch):
-    for module in (columns, "scanfab.pipeline.variant_columns"):
-        target = module if isinstance(module, str) else module.__name__
-        monkeypatch.setattr(f"{target}.installed_fabrics", lambda: {"cubic": Cubic()})
+def offered(monkeypatch):
+    columns.installed_fabrics.cache_clear()
+    yield lambda name, plugin: offer(monkeypatch, "scanfab.fabrics", name, lambda: plugin)
+    columns.installed_fabrics.cache_clear()
+
+
+@pytest.fixture
+def cubic(offered):
+    offered("cubic", Cubic())
 
 
 def test_there_are_no_others_as_a_rule():
-    assert registry.installed_fabrics() == {}
+    assert columns.installed_fabrics() == {}
     assert tuple(column.name for column in columns.table_columns()) == COLUMNS
 
 
@@ -69,3 +74,71 @@ def test_a_value_that_it_forgets_is_an_error():
         complete_row(dict.fromkeys(COLUMNS) | {"c_fourth": 0.5})
     with pytest.raises(TypeError, match="there is no column 'c_forth': did you mean c_fourth"):
         complete_row(dict.fromkeys(COLUMNS) | {"c_forth": 0.5, "vs_longest": None})
+
+
+class Foreign:
+    """A fabric of another package that gives what a test says."""
+
+    def __init__(self, values=None, name="foreign", kind=float):
+        self.columns = (Column(name, kind, "", ""),)
+        self.found = {name: 1.0} if values is None else values
+
+    def values(self, measured):
+        if isinstance(self.found, Exception):
+            raise self.found
+        return self.found
+
+
+def computed():
+    packing = scanfab.Packing(simple_cubic(4).position, 0.5)
+    return scanfab.compute(packing, variants="a", tolerance=0.1, contact_tolerance=1e-4)
+
+
+BROKEN = [
+    (Foreign(name="alpha_vs"), "its column 'alpha_vs' is one of scanfab's own"),
+    (Foreign(name="strain"), "its column 'strain' is one of scanfab's own"),
+    (3, "found 3 without columns"),
+    (Foreign, "found the class Foreign itself"),
+    (Foreign(kind=list), "columns that hold int, float or str"),
+]
+
+
+@pytest.mark.parametrize(("plugin", "told"), BROKEN)
+def test_a_broken_one_is_left_out_with_a_warning(offered, plugin, told):
+    offered("bad", plugin)
+    with pytest.warns(ScanfabWarning, match=f"fabric 'bad' of made-up cannot be loaded: .*{told}"):
+        (row,) = computed()
+    assert tuple(row) == COLUMNS
+    assert row.alpha_vs < 0.5
+
+
+def test_two_with_one_column_are_an_error_that_names_both(offered):
+    offered("one", Foreign())
+    offered("two", Foreign())
+    with pytest.raises(ScanfabError, match="'foreign': 'one' of made-up and 'two' of made-up"):
+        columns.table_columns()
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, None])
+def test_a_value_that_is_not_finite_is_none(offered, tmp_path, value):
+    offered("fabric", Foreign({"foreign": value}))
+    computed().save(tmp_path / "t.json")
+    assert read_rows(tmp_path / "t.json")[0]["foreign"] is None
+
+
+WRONG = [
+    ({}, "'fabric' gives no value for its column 'foreign'"),
+    ({"foreign": 1.0, "other": 2.0}, "'fabric' gives a value for an unknown column 'other'"),
+    ({"foreign": "high"}, "'fabric': column 'foreign': expected float or None, found 'high'"),
+    (ZeroDivisionError("by 0"), "'fabric' failed: ZeroDivisionError: by 0"),
+    (3, "'fabric' failed: TypeError"),
+]
+
+
+@pytest.mark.parametrize(("values", "told"), WRONG)
+def test_a_wrong_value_is_an_error_that_names_the_fabric(offered, values, told):
+    fabric = Foreign({"foreign": 1.0})
+    fabric.found = values
+    offered("fabric", fabric)
+    with pytest.raises(ScanfabError, match=told):
+        computed()

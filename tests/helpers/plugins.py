@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib.metadata import entry_points
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from scanfab.base import plugins
+from scanfab.fabric import registry
 
 
 def offer(monkeypatch: pytest.MonkeyPatch, group: str, name: str, load: Callable[[], Any]) -> None:
     """One more entry point of a group; what is kept of the group has to be forgotten."""
     point = SimpleNamespace(name=name, value=name, load=load, dist=SimpleNamespace(name="made-up"))
 
-    def found(group: str, asked: str = group) -> list[Any]:
-        return [*entry_points(group=group), *([point] if group == asked else [])]
+    before = plugins.entry_points
 
-    monkeypatch.setattr(plugins, "entry_points", found)
+    def found(group: str, asked: str = group) -> list[Any]:
+        return [*before(group=group), *([point] if group == asked else [])]
+
+    for module in (plugins, registry):
+        monkeypatch.setattr(module, "entry_points", found)

@@ -1,46 +1,54 @@
-"""Windows made up from data alone: what a constructor of the next one would write."""
+"""Windows of every shape, and one that no constructor makes: a ball with a piece cut off."""
 
 import numpy as np
 
-from scanfab.base.convex import EVERYWHERE, Convex, Quadric
+from scanfab.base.bodies import Hull
+from scanfab.base.convex import Convex, Quadric
+from scanfab.base.shapes import box, cylinder, ellipsoid, polyhedron
+from scanfab.scan.directions import direction_rule
 from tests.helpers.lattices import rotation
 
-NO_PLANES = np.zeros((0, 4))
-
-
-def made_up(planes, quadric, reach):
-    """A region that a ball of this radius holds, with the box of the ball."""
-    box = np.full(3, float(reach))
-    return Convex(np.array(planes, dtype=float), quadric, -box, box, float(reach), "made up")
-
-
-def slabs(axes, half):
-    """Two planes across each axis, at this distance on either side."""
-    axes = np.concatenate([axes, np.negative(axes)])
-    return np.column_stack([axes, np.tile(half, 2)])
-
-
-def box(half, turn=None):
-    """Six half-spaces; the edges lie along the rows of ``turn``."""
-    planes = slabs(np.eye(3) if turn is None else turn, half)
-    return made_up(planes, EVERYWHERE, np.linalg.norm(half))
-
-
-def cylinder(axis, radius, half):
-    """A round column about an axis, between two planes."""
-    quadric = Quadric(1.0, -np.outer(axis, axis), radius**2)
-    return made_up(slabs([axis], [half]), quadric, np.hypot(radius, half))
-
-
-def ellipsoid(half, turn):
-    """A quadric alone, with half axes along the rows of ``turn``."""
-    return made_up(NO_PLANES, Quadric(0.0, turn.T @ np.diag(half**-2.0) @ turn, 1.0), half.max())
+# triangles of the box whose corners product((-1, 1), repeat=3) makes
+OF_A_BOX = np.array(
+    [
+        [0, 1, 3], [0, 3, 2], [4, 5, 7], [4, 7, 6], [0, 1, 5], [0, 5, 4],
+        [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 3, 7], [1, 7, 5],
+    ]
+)  # fmt: skip
 
 
 def cut_ball(radius, normal, distance):
     """A ball with a piece cut off by a plane."""
-    plane = np.append(normal, distance)
-    return made_up([plane], Quadric(1.0, np.zeros((3, 3)), radius**2), radius)
+    axes = direction_rule("lebedev:23").axes
+    points = radius * np.concatenate([axes, -axes])
+    over = np.maximum(points @ normal - distance, 0.0)
+    planes = np.append(normal, distance)[None]
+    body = Hull(points - np.outer(over, normal), planes, np.zeros(1), np.nan)
+    quadric, half = Quadric(1.0, np.zeros((3, 3)), radius**2), np.full(3, float(radius))
+    return Convex(planes, quadric, -half, half, float(radius), "cut ball", body, np.eye(3))
+
+
+def corners_of_a_box(half, turn=None):
+    """In the order of OF_A_BOX."""
+    signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
+    return signs * half @ (np.eye(3) if turn is None else turn)
+
+
+def box_by_corners(half, turn=None):
+    """A box as the polyhedron of its surface."""
+    return polyhedron(corners_of_a_box(half, turn), OF_A_BOX)[0]
+
+
+def hull_of(points):
+    """The polyhedron of some points that are corners of it, and its centroid."""
+    from scipy.spatial import ConvexHull
+
+    return polyhedron(points, ConvexHull(points).simplices)
+
+
+def leaning(window, random):
+    """The same, deformed."""
+    return window.deformed(np.eye(3) + random.uniform(-0.3, 0.3, (3, 3)))
 
 
 def random_window(random):
@@ -52,10 +60,13 @@ def random_window(random):
         lambda: random.uniform(0.3, 3.0),
         lambda: random.uniform(0.3, 3.0),
         lambda: random.uniform(0.3, 3.0),
-        lambda: box(half),
-        lambda: box(half, turn),
-        lambda: cylinder(turn[0], half[0], half[1]),
-        lambda: cylinder(np.eye(3)[random.integers(3)], half[0], half[1]),
+        lambda: box(2 * half),
+        lambda: box(2 * half, turn),
+        lambda: cylinder(half[0], 2 * half[1], turn[0]),
+        lambda: cylinder(half[0], 2 * half[1], np.eye(3)[random.integers(3)]),
         lambda: ellipsoid(half, turn),
         lambda: cut_ball(half[0], turn[0], random.uniform(0.1, 1.1) * half[0]),
-    ][random.integers(11)]()
+        lambda: hull_of(random.normal(size=(12, 3)))[0],
+        lambda: leaning(cylinder(half[0], 2 * half[1], turn[0]), random),
+        lambda: leaning(box(2 * half, turn), random),
+    ][random.integers(14)]()

@@ -16,6 +16,7 @@ import pytest
 import pyvista
 
 import scanfab
+from scanfab.base.errors import SettingsError
 from scanfab.cli.main import run
 from scanfab.io.opening import open_sources
 from tests.helpers.dumps import cubic_rows, dump_text, write
@@ -219,3 +220,29 @@ def test_a_signal_ends_the_process_with_its_code(sent: int, code: int, tmp_path:
     assert part.read_text().startswith("source,frame")
     left = {file.name for file in tmp_path.iterdir()}
     assert left == {"table.csv.part", "table.csv.manifest.json.part"}
+
+
+WRONG = [
+    ({"columns": 3}, "columns: expected"),
+    ({"contacts": 3}, "contacts: expected"),
+    ({"contact_columns": 3}, "contact_columns: expected"),
+    ({"format": 3}, "format: expected"),
+]
+
+
+@pytest.mark.parametrize(("options", "told"), WRONG)
+def test_a_value_of_another_kind_is_told_by_its_option(options, told):
+    with pytest.raises(SettingsError, match=told):
+        scanfab.read_series("sample_data", **options)
+
+
+@pytest.mark.parametrize("source", [[], 3, [3]])
+def test_what_is_no_path_is_told(source):
+    with pytest.raises(SettingsError, match="source: expected the path of a folder or file"):
+        scanfab.read_series(source)
+
+
+@pytest.mark.parametrize("read", [scanfab.read, scanfab.read_series])
+def test_an_unknown_option_is_told_with_the_nearest(read):
+    with pytest.raises(TypeError, match=f"{read.__name__} has no option .*: did you mean 'format'"):
+        read("sample_data", formt="yade")

@@ -193,3 +193,8 @@ def test_a_few_particles_are_not_judged():
 def test_a_class_column_of_words_is_passed_over():
     words = np.where(np.arange(350) < 200, "grain", "wall")
     assert enclosing_class(cloud(sphere_shell(), type=words)) is None
+
+
+def test_an_expression_is_told_in_python_s_words():
+    with pytest.raises(SettingsError, match="such as `boundary=\"id>=13723\"`, found 'id'"):
+        BoundaryRule.parse("id")

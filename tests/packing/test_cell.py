@@ -216,3 +216,18 @@ def test_a_cell_that_does_not_repeat_has_no_images():
 
 def test_no_points_have_no_images():
     assert len(Cell(EDGES).images(np.zeros((0, 3)), 1.0)[0]) == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("x",), "a cell needs vectors of shape .* found 'x'"),
+        (([[1, 2], [3]],), "a cell needs vectors"),
+        (([1, 1, 1], True), "periodic: expected three truth values, .* found True"),
+        (([1, 1, 1], "xyz"), "periodic: expected three truth values"),
+        (([1, 1, 1], (True, True)), "periodic: expected three truth values"),
+    ],
+)
+def test_what_makes_no_cell_is_told(words, told):
+    with pytest.raises(PackingError, match=told):
+        Cell(*words)

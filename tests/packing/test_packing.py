@@ -278,3 +278,8 @@ def test_centres_are_wrapped_into_the_cell(x):
 def test_centres_are_not_wrapped_along_vectors_that_do_not_repeat():
     packing = Packing([[6.0, -3.0, 0]], 1.0, cell=Cell([5.7, 9, 9], (True, False, False)))
     np.testing.assert_allclose(packing.position, [[0.3, -3.0, 0]])
+
+
+def test_what_is_no_cell_is_told():
+    with pytest.raises(PackingError, match=r"cell: expected a Cell, .* found 3"):
+        Packing([[0, 0, 0]], 1.0, cell=3)

@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scanfab import Cell, Packing, SettingsError, compute, sphere
+from scanfab import Cell, Packing, SettingsError, box, compute, sphere
 from scanfab.packing.window import SurfaceBox, Window
 from tests.helpers.lattices import shaken_cubic
-from tests.helpers.windows import box
 
 CELL = Cell([10.0, 8.0, 6.0], origin=(-1.0, 2.0, 3.0))
 ALL = np.ones(4, bool)
@@ -114,15 +113,16 @@ def test_room_around_the_window_is_to_the_nearest_surface_that_is_no_periodic_fa
 def test_a_window_as_data_is_looked_through_periodic_faces_too():
     """A box of which no code knows, about a corner of the cell."""
     packing = Packing([[0, 3, 4]], 1.0, cell=CELL)
-    window = Window(np.array([-1.0, 2.0, 3.0]), box([0.5, 1.0, 2.0]))
+    window = Window(np.array([-1.0, 2.0, 3.0]), box([1.0, 2.0, 4.0]))
     points = np.array([[8.6, 2.9, 3.0], [8.4, 2.0, 3.0], [-1.0, 9.1, 7.1], [-1.0, 8.9, 3.0]])
     assert window.contains(points, packing).tolist() == [True, False, True, False]
     assert window.may_meet(points, np.full(4, 0.15), packing).tolist() == [True] * 4
-    assert str(window) == "RV (made up about [-1.0, 2.0, 3.0])"
+    assert window.may_meet(points, np.full(4, 0.05), packing).tolist() == [True, False, True, False]
+    assert str(window) == "RV (box 1 x 2 x 4 about [-1.0, 2.0, 3.0])"
 
 
 def test_room_around_a_window_is_that_of_its_own_box():
     """Flat regions fit into flat samples, where the ball that holds them would not."""
-    flat = replace(box([4.0, 4.0, 0.5]), low=np.array([-4.0, -4, -0.5]), high=np.array([4.0, 4, 3]))
+    flat = replace(box([8.0, 8.0, 1.0]), low=np.array([-4.0, -4, -0.5]), high=np.array([4.0, 4, 3]))
     surfaces = SurfaceBox(np.array([-5.0, -6.0, -1.0]), np.array([5.5, 6.0, 3.2]), None)
     assert surfaces.room_around(Window(np.zeros(3), flat)) == pytest.approx(0.2)

@@ -25,7 +25,7 @@ from scanfab.pipeline.calibration_ladders import (
 from scanfab.table.columns import columns_of
 from scanfab.viz.figures.calibration import Ladders
 from scanfab.viz.figures.page import drawn_page, save_figures
-from tests.helpers.lattices import shaken_cubic
+from tests.helpers.lattices import shaken_cubic, simple_cubic
 
 QUICK = {"tolerance": 2e-3, "variants": "cd", "rv": 0.6, "workers": 1}
 
@@ -265,3 +265,17 @@ def test_what_looks_wrong_in_the_frame_is_told_here_too(packing):
     texts = [str(one.message) for one in told]
     assert any("away from all others" in text for text in texts)
     assert any("clumps are not read as bodies" in text for text in texts)
+
+
+@pytest.mark.parametrize("many", [list, iter])
+def test_packings_from_anywhere_are_calibrated(many):
+    packing = Packing(simple_cubic(4).position, 0.5)
+    options = {"variants": "c", "tolerance": 0.1, "rv": 0.6, "contact_tolerance": 1e-4}
+    found = calibrate(many([packing, packing]), **options)
+    assert {row.frame for row in found.rows} == {1}
+    assert found.options == calibrate(packing, **options).options
+
+
+def test_a_frame_that_is_no_number_is_told():
+    with pytest.raises(SettingsError, match="frame: expected"):
+        calibrate(Packing([[0, 0, 0]], 1.0), frame="x")

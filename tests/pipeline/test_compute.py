@@ -486,3 +486,26 @@ def test_clumps_are_warned_of_once_and_computed(tmp_path):
     with pytest.warns(ScanfabWarning, match="the column mol names") as told:
         assert len(scanfab.compute(series, variants="a", **SCAN)) == 2
     assert len(told) == 1
+
+
+WRONG = [
+    ({"executor": 4}, "executor: expected a concurrent.futures.Executor, found 4"),
+    ({"strain": 3}, "strain: expected auto, cell, boundary, grains or a CSV file .* found 3"),
+]
+
+
+@pytest.mark.parametrize(("options", "told"), WRONG)
+def test_a_value_of_another_kind_is_told_by_its_option(options, told):
+    with pytest.raises(SettingsError, match=told):
+        scanfab.compute(Packing([[0, 0, 0]], 1.0), **options)
+
+
+def test_no_packings_are_told_as_such():
+    with pytest.raises(SettingsError, match="expected frames, found none in the source"):
+        scanfab.compute([])
+
+
+def test_the_forms_of_options_are_in_the_help():
+    told = " ".join(scanfab.compute.__doc__.split())
+    for form in ("stop|skip", "auto|cell|boundary|grains|FILE.csv", "A:B:C", "x|y|z|X,Y,Z"):
+        assert f"Written as ``{form}``." in told

@@ -46,7 +46,7 @@ def test_a_boundary_that_fits_nothing_in_one_frame_is_a_warning(tmp_path):
     plate = [*ROWS, (4, 9, 0.9, 0.5, 0.5, 0.1)]
     texts = [dump_text(), dump_text(plate, step=1)]
     first, second = reports(tmp_path, texts, boundary="type=9")
-    assert first.warnings == ["boundary: no particle has type=9: type is 1 or 2"]
+    assert first.warnings == ["`boundary`: no particle has type=9: type is 1 or 2"]
     assert (first.boundary, second.boundary, second.warnings) == (0, 1, [])
 
 

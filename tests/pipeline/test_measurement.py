@@ -13,6 +13,7 @@ from scanfab import (
     ScanfabWarning,
     Settings,
     Solids,
+    box,
     compute,
     find_contacts,
     scan_lines,
@@ -24,7 +25,6 @@ from scanfab.pipeline.plan import make_plan
 from scanfab.scan.gaps import Blocks
 from tests.helpers import naive
 from tests.helpers.lattices import rotation, shaken_cubic
-from tests.helpers.windows import box
 
 LINES = {"directions": "lebedev:5", "spacing": 0.15}
 
@@ -156,7 +156,7 @@ def test_a_window_made_up_of_half_spaces_is_measured_like_any_other(packing):
     """All that a next window needs is its data: frame, solids, scan and blocks take it as it is."""
     sample, settings = Sample(packing, np.zeros(len(packing), bool)), Settings(**LINES)
     plan = make_plan(settings, sample)
-    window = Window(plan.window.center, box([1.0, 1.5, 2.0], rotation(np.random.default_rng(1))))
+    window = Window(plan.window.center, box([2.0, 3.0, 4.0], rotation(np.random.default_rng(1))))
     found = measure(sample, replace(plan, window=window, auto=""))
     position = packing.position - window.center
     removed = sample.rattlers

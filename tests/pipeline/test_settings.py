@@ -304,7 +304,7 @@ def test_three_directions_across_one_another_will_do():
         ("boundary", None),
         ("boundary", 5),
         ("rv_center", 5),
-        ("rv_center", "1,2,3"),
+        ("rv_center", "1,2"),
         ("frames", 1.5),
         ("cutoffs", [None]),
     ],
@@ -354,10 +354,64 @@ def test_compute_hands_every_option_to_the_settings(monkeypatch):
         "contact_tolerance": 1e-4, "axis": "x", "strain": "cell",
         "frames": "1:2", "seed": 5, "workers": 3, "on_error": "skip",
     }  # fmt: skip
-    scanfab.compute(None, **given)
-    assert taken == vars(Settings(**given))
-    usual = vars(Settings(workers=1))
-    assert [name for name in taken if taken[name] == usual[name]] == []
+    shaped = {
+        "rv_shape": "cylinder", "rv_size": (1.0, 2.0), "rv_axis": "y", "rv_follows": "strain"
+    }  # fmt: skip
+    usual, left = vars(Settings(workers=1)), None
+    # a radius is that of a sphere
+    for words in (given, {**given, **shaped, "rv_radius": None}):
+        scanfab.compute(None, **words)
+        assert taken == vars(Settings(**words))
+        same = {name for name in taken if taken[name] == usual[name]}
+        left = same if left is None else left & same
+    assert left == set()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"rv_shape": "cone"}, "rv_shape: expected sphere, box, cylinder, ellipsoid or a closed"),
+        ({"rv_shape": "none.stl"}, "rv_shape: expected sphere, .* that exists"),
+        ({"rv_size": "1,2,3"}, "rv_size: the shape sphere takes none: choose `rv_radius`"),
+        (
+            {"rv_shape": "box", "rv_size": "1,2"},
+            "rv_size: expected A,B,C, full edges .`rv_shape` is box., found 1,2",
+        ),
+        (
+            {"rv_shape": "cylinder", "rv_size": "1,2,3"},
+            "rv_size: expected R,H, radius and height .* found 1,2,3",
+        ),
+        ({"rv_shape": "box", "rv_size": "1,0,3"}, "rv_size: expected two or three lengths above 0"),
+        ({"rv_shape": "box", "rv_size": "1,-1,3"}, "two or three lengths above 0, .* '1,-1,3'"),
+        ({"rv_shape": "box", "rv_size": "1,nan,3"}, "two or three lengths above 0"),
+        ({"rv_shape": "box", "rv_size": "1"}, "two or three lengths above 0"),
+        ({"rv_shape": "box", "rv_size": "a"}, "two or three lengths above 0"),
+        ({"rv_shape": "box", "rv_size": 5}, "two or three lengths above 0"),
+        (
+            {"rv_shape": "ellipsoid", "rv_radius": 2.0},
+            "rv_radius: is that of a sphere, but `rv_shape` is ellipsoid: choose `rv_size`",
+        ),
+        ({"rv_shape": "box", "rv_axis": "x"}, "rv_axis: is that of a cylinder"),
+        ({"rv_follows": "cell"}, "rv_follows: expected none or strain, found 'cell'"),
+    ],
+)
+def test_what_is_said_of_the_window_must_go_together(options, words):
+    with pytest.raises(SettingsError, match=words):
+        Settings(**options)
+
+
+def test_sizes_and_centres_come_with_commas_or_blanks():
+    for text in ("1,2,3", "1 2 3", "1, 2, 3", [1, 2, 3], (1.0, 2.0, 3.0)):
+        found = Settings(rv_shape="box", rv_size=text, rv_center=text)
+        assert found.rv_size == found.rv_center == (1.0, 2.0, 3.0)
+    assert Settings(rv_size=[]).rv_size == ()
+
+
+def test_a_window_that_follows_a_file_of_strains_is_refused(tmp_path):
+    file = tmp_path / "strain.csv"
+    file.write_text("frame,strain\n0,0\n")
+    with pytest.raises(SettingsError, match="rv_follows: a file of strains"):
+        Settings(rv_follows="strain", strain=file)
 
 
 def test_a_wrong_name_is_named_with_the_nearest():
@@ -381,3 +435,8 @@ def test_settings_made_of_settings_are_the_same():
     settings = Settings(axis="1,2,3", cutoffs="1,2rmin", boundary="type=2", directions=9)
     again = dataclasses.replace(settings, seed=1)
     assert dataclasses.replace(again, seed=0) == settings
+
+
+def test_settings_with_the_same_directions_are_equal():
+    assert Settings(directions=13) == Settings(directions=13)
+    assert Settings(directions=13) != Settings(directions=25)

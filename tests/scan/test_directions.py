@@ -196,3 +196,9 @@ def test_degree_without_a_rule_is_rounded_up(text, name):
 def test_text_that_names_no_rule_is_an_error(text):
     with pytest.raises(SettingsError, match=r"^directions: "):
         direction_rule(text)
+
+
+def test_a_number_of_axes_need_not_be_text():
+    assert direction_rule(13) == direction_rule("13")
+    assert direction_rule(13) != direction_rule(25)
+    assert len({direction_rule(13), direction_rule(13)}) == 1

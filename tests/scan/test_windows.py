@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from scanfab import direction_rule, scan_lines, sphere
+from scanfab import box, cylinder, direction_rule, ellipsoid, scan_lines, sphere
 from scanfab.scan.gaps import Blocks, scan_gaps
 from scanfab.scan.kernels.strips import spans
 from scanfab.scan.kernels.windows import section_along
@@ -13,7 +13,7 @@ from scanfab.scan.solids import clip_of
 from tests.helpers import naive
 from tests.helpers.lattices import Spheres, poisson_spheres, rotation
 from tests.helpers.scanning import mean_lengths, scan_along, solids_of
-from tests.helpers.windows import box, cut_ball, cylinder, ellipsoid, random_window
+from tests.helpers.windows import cut_ball, random_window
 
 NOTHING = Spheres(np.zeros((0, 3)), np.zeros(0))
 TURN = rotation(np.random.default_rng(4))
@@ -22,8 +22,8 @@ RULE = direction_rule("lebedev:5")
 # with volume and surface
 WINDOWS = {
     "sphere": (sphere(1.2), 4 / 3 * np.pi * 1.2**3, 4 * np.pi * 1.2**2),
-    "box": (box(HALF, TURN), 8 * HALF.prod(), 8 * (0.8 * 1.1 + 1.1 * 1.5 + 1.5 * 0.8)),
-    "cylinder": (cylinder(TURN[0], 0.7, 1.3), np.pi * 0.49 * 2.6, 2 * np.pi * (0.49 + 0.7 * 2.6)),
+    "box": (box(2 * HALF, TURN), 8 * HALF.prod(), 8 * (0.8 * 1.1 + 1.1 * 1.5 + 1.5 * 0.8)),
+    "cylinder": (cylinder(0.7, 2.6, TURN[0]), np.pi * 0.49 * 2.6, 2 * np.pi * (0.49 + 0.7 * 2.6)),
     "half a ball": (cut_ball(1.3, TURN[1], 0.0), 2 / 3 * np.pi * 1.3**3, 3 * np.pi * 1.3**2),
 }
 
@@ -42,13 +42,13 @@ def test_lines_measure_the_volume_along_every_axis_and_the_surface_over_all(name
 
 
 def test_lines_through_an_empty_box_are_as_long_as_its_edges():
-    sums = scan_along(solids_of(NOTHING, box(HALF)), np.eye(3), 0.05)
+    sums = scan_along(solids_of(NOTHING, box(2 * HALF)), np.eye(3), 0.05)
     assert mean_lengths(sums, "c").value == pytest.approx(2 * HALF)
 
 
 def test_lines_along_a_cylinder_are_as_long_as_it_is():
     for axis in np.concatenate([TURN, direction_rule("lebedev:11").axes]):
-        sums = scan_along(solids_of(NOTHING, cylinder(axis, 0.7, 1.3)), [axis], 0.05)
+        sums = scan_along(solids_of(NOTHING, cylinder(0.7, 2.6, axis)), [axis], 0.05)
         assert mean_lengths(sums, "c").value == pytest.approx(2.6)
         assert sums.lines[:, 2].mean() * 0.05**2 == pytest.approx(np.pi * 0.49, rel=0.02)
 
@@ -92,7 +92,7 @@ def packed(window):
 
 
 @pytest.mark.parametrize("parts", [(2, 2, 2), (3, 1, 4), (1, 1, 1), (5, 3, 7)])
-@pytest.mark.parametrize("window", [sphere(2.0), box(HALF, TURN)], ids=["sphere", "box"])
+@pytest.mark.parametrize("window", [sphere(2.0), box(2 * HALF, TURN)], ids=["sphere", "box"])
 def test_all_blocks_of_any_number_together_are_the_scan_of_the_same_lines(window, parts):
     solids, cutoffs = packed(window), [0.0, 0.3]
     # about a quarter of a period across, so that there are places in every block
@@ -139,7 +139,7 @@ def test_whole_and_window_may_have_blocks_of_their_own():
 
 def test_nothing_is_tallied_of_lines_that_miss_a_region_inside_its_ball():
     """A thin plate: most lines across its ball pass it by."""
-    plate = box(np.array([1.0, 1.0, 0.01]))
+    plate = box([2.0, 2.0, 0.02])
     sums = scan_along(solids_of(NOTHING, plate), [[1.0, 0.0, 0.0]], 0.004)
     assert sums.lines[:, 2].mean() * 0.004**2 == pytest.approx(2.0 * 0.02, rel=0.01)
     assert sums.line_length[:, 2] == pytest.approx(2.0 * sums.lines[:, 2])

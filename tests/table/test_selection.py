@@ -137,18 +137,18 @@ def test_a_column_that_some_rows_lack_is_named_with_the_row():
 
 
 @pytest.mark.parametrize(
-    ("row", "command"),
+    ("row", "other"),
     [
-        (FrameRow, "compare"),
-        (SummaryRow, "compare --summary"),
-        (DifferenceRow, "compare --differences"),
-        (StepRow, "calibrate"),
-        (FrameReport, "inspect --json"),
+        (FrameRow, "a table of scanfab compare"),
+        (SummaryRow, "the summary of scanfab compare"),
+        (DifferenceRow, "the differences of scanfab compare"),
+        (StepRow, "a table of scanfab calibrate"),
+        (FrameReport, "the frames of scanfab inspect"),
     ],
 )
-def test_other_tables_are_called_by_their_name(row, command):
+def test_other_tables_are_called_by_their_name(row, other):
     rows = [{column.name: None for column in columns_of(row)}]
-    with pytest.raises(SettingsError, match=f"^t.csv: this is a table of scanfab {command}: "):
+    with pytest.raises(SettingsError, match=f"^t.csv: this is {other}: "):
         choose_rows([("t.csv", rows)])
 
 

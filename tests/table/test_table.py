@@ -359,3 +359,9 @@ def test_the_public_names():
     assert scanfab.load is load
     assert scanfab.Row is Row
     assert scanfab.COLUMNS is COLUMNS
+
+
+def test_lists_and_numbers_of_numpy_go_to_polars():
+    frame = Table([{"a": [1, 2], "n": np.int64(3)}, {"a": None, "n": None}]).to_polars()
+    assert frame["a"].to_list() == [[1, 2], None]
+    assert frame["n"].to_list() == [3, None]

@@ -8,6 +8,7 @@ import io
 import math
 import re
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -17,7 +18,7 @@ from scanfab.table.formats.registry import OWN_FORMATS, format_of
 from scanfab.table.formats.text import TextWriter
 from scanfab.table.reading import read_rows
 from scanfab.table.result_file import ResultFile
-from scanfab.table.table import COLUMNS, Row
+from scanfab.table.table import COLUMNS, Row, Table
 from scanfab.table.writing import Excerpt
 from tests.table.test_table import a_row
 
@@ -233,3 +234,55 @@ def test_columns_come_in_the_order_in_which_they_are_named(tmp_path, suffix):
 def test_columns_and_digits_that_do_not_exist_are_refused(fields, digits, message):
     with pytest.raises(SettingsError, match=re.escape(message)):
         Excerpt.make(Row, fields, digits)
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_numbers_of_numpy_are_written_and_what_is_not_finite_is_missing(tmp_path, suffix):
+    path = tmp_path / f"t{suffix}"
+    row = {
+        "frame": np.int64(0),
+        "a": np.float64(0.5),
+        "n": np.int32(3),
+        "b": math.nan,
+        "c": -math.inf,
+    }
+    Table([row]).save(path)
+    assert read_rows(path) == [{"frame": 0, "a": 0.5, "n": 3, "b": None, "c": None}]
+
+
+@pytest.mark.parametrize("suffix", [".json", ".parquet"])
+def test_lists_are_written_where_there_are_some(tmp_path, suffix):
+    Table([{"a": [1, 2]}, {"a": None}]).save(tmp_path / f"t{suffix}")
+    assert read_rows(tmp_path / f"t{suffix}") == [{"a": [1, 2]}, {"a": None}]
+
+
+def test_what_json_cannot_hold_is_an_error_of_the_package(tmp_path):
+    with pytest.raises(SettingsError, match=r"JSON cannot: .*complex"):
+        Table([{"a": 1j}]).save(tmp_path / "t.json")
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".json", ".jsonl", ".parquet"])
+def test_a_table_without_rows_reads_back(tmp_path, suffix):
+    Table().save(tmp_path / f"t{suffix}")
+    assert read_rows(tmp_path / f"t{suffix}") == []
+
+
+def test_the_names_of_columns_come_as_a_list_too(tmp_path):
+    table = Table([{"frame": 0, "step": 7, "alpha_vs": 0.5}])
+    table.save(tmp_path / "t.csv", fields=["alpha_vs", "frame"])
+    assert (tmp_path / "t.csv").read_text() == "alpha_vs,frame\n0.5,0\n"
+
+
+WRONG = [
+    ({"fields": 3}, "fields: expected names of columns, found 3"),
+    ({"fields": []}, r"fields: expected names of columns, found \[\]"),
+    ({"fields": ["fram"]}, "fields: .*did you mean frame"),
+    ({"digits": "x"}, "digits: expected 1 to 17 of them, found 'x'"),
+    ({"digits": 2.5}, "digits: expected 1 to 17 of them, found 2.5"),
+]
+
+
+@pytest.mark.parametrize(("options", "told"), WRONG)
+def test_other_columns_and_digits_are_refused(tmp_path, options, told):
+    with pytest.raises(SettingsError, match=told):
+        Table([{"frame": 0}]).save(tmp_path / "t.csv", **options)

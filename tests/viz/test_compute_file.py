@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import scanfab
-from scanfab.base.errors import SkippedFrameWarning
+from scanfab.base.errors import SettingsError, SkippedFrameWarning
 from scanfab.cli.main import run
 from scanfab.table.formats.json_rows import LinesWriter
 from scanfab.table.formats.text import TextWriter
@@ -267,3 +267,9 @@ def test_series_that_one_table_cannot_tell_apart_are_refused(short_series, dumps
     other = scanfab.read_series(dumps, contacts="geometric")
     with pytest.raises(scanfab.SettingsError, match="read with the same options"):
         from_python(tmp_path / "table.csv", [series, other])
+
+
+@pytest.mark.parametrize("source", [3, scanfab.Packing([[0, 0, 0]], 1.0)])
+def test_what_is_no_series_is_told(tmp_path, source):
+    with pytest.raises(SettingsError, match=r"expected a Series or the path of dumps.*save\(\)"):
+        scanfab.compute_file(source, tmp_path / "t.csv")

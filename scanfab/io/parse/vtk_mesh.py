@@ -25,7 +25,7 @@ from scanfab.io.parse.vtk_flaws import FlawError
 from scanfab.io.parse.vtk_legacy import check_legacy
 from scanfab.io.parse.vtk_xml import check_xml
 
-__all__ = ["Mesh", "form_of", "read_bounds", "read_mesh"]
+__all__ = ["Mesh", "form_of", "read_bounds", "read_faces", "read_mesh"]
 
 
 VTK_VERTEX, VTK_POLY_VERTEX, VTK_LINE = 1, 2, 3
@@ -322,3 +322,38 @@ def read_bounds(path: Path) -> FloatArray | None:
         except Exception as error:  # as above
             raise ReadError(f"{path}: cannot be read: {_first_line(error)}") from None
     return None if caught.error_events else bounds
+
+
+def read_faces(path: Path) -> tuple[FloatArray, list[IntArray]]:
+    """
+    The points of a surface, (N, 3), and its triangles.
+
+    Raises
+    ------
+    ReadError
+        If it cannot be read, or is no PolyData.
+    """
+    if form_of(path) != "PolyData":
+        raise ReadError(f"{path}: expected a surface (PolyData), found something else")
+    import pyvista
+
+    _refuse_flaws(path)
+    with (
+        _ONE_AT_A_TIME,
+        quiet_vtk(),
+        pyvista.VtkErrorCatcher(send_to_logging=False) as caught,
+    ):
+        try:
+            reader = pyvista.get_reader(str(plain(path)), force_ext=".vtp").reader
+            reader.Update()
+            output = reader.GetOutput()
+            _refuse_misfits(output)
+            # strips and polygons as triangles; vertices and lines left out
+            mesh: Any = pyvista.wrap(output).triangulate(pass_verts=False, pass_lines=False)
+            faces = np.asarray(mesh.faces, np.int64).reshape(-1, 4)[:, 1:]
+            points = np.asarray(mesh.points, np.float64)
+        except Exception as error:  # as above
+            raise ReadError(f"{path}: cannot be read: {_first_line(error)}") from None
+    if caught.error_events:
+        raise ReadError(f"{path}: cannot be read: {caught.error_events[0].alert}")
+    return points, [faces]

@@ -54,6 +54,7 @@ ENTRY, EXIT = np.uint64(6) * PLANE, np.uint64(7) * PLANE
 # are never touched.
 FIRST = np.uint64(8) * PLANE
 STATE_SIZE = int(12 * PLANE)
+ONE = np.uint64(1)
 # a sphere that is no more lines wide is visited as a square: to find where its chords begin and end
 # in each row would take longer than the corners
 NARROW = 12
@@ -108,11 +109,16 @@ def begin(
     whole: Flag,
     window: Edge | None,
 ) -> None:
-    """Lines that have met nothing yet, and where they enter and leave the window."""
+    """
+    Lines that have met nothing yet, and where they enter and leave the window.
+
+    Rows lose the lines at their ends that miss its planes, if these serve the window alone.
+    """
     before = 0.0
     if window is not None:
         before = window.margin
     a, rise_u = section.a, section.rise_u
+    chosen = np.empty(section.planes.shape[0], np.int64)
     for row in range(strip.rows):
         v = strip.first_v + row * strip.spacing
         rest, aslant = section.level - section.c * v * v, 2.0 * section.b * v
@@ -139,38 +145,88 @@ def begin(
                 if second is not None:
                     lines[i + SET + FIRST] = -FAR
         if section.planes.shape[0] > 0:
-            cut_row(lines, strip, section.planes, row, whole, before)
+            cut_row(lines, strip, section.planes, chosen, row, whole, before)
         no_lines(lines, at, np.uint64(0), np.uint64(strip.low[row]))
         no_lines(lines, at, np.uint64(strip.high[row]), np.uint64(strip.pitch))
 
 
-@inner(error_model="numpy")
+@inner()
+def cutting(planes: FloatArray, chosen: IntArray, first: float, last: float, v: float) -> int:
+    """
+    List the planes that may cut a line of a row before all others, from u = first to last.
+
+    Returns how many. A plane's distance from the origin is linear along the row: where it is beyond
+    that of another on its side at both ends, it is so everywhere; the others are the nearest at
+    either end.
+    """
+    nearest, beyond = np.full(4, np.inf), np.full(4, np.inf)
+    for k in range(planes.shape[0]):
+        side = 2 * int(planes[k, 3] < 0.0)
+        rest = planes[k, 0] - planes[k, 2] * v
+        start, stop = rest - planes[k, 1] * first, rest - planes[k, 1] * last
+        if start < nearest[side]:
+            nearest[side], beyond[side] = start, stop
+        if stop < nearest[side + 1]:
+            nearest[side + 1], beyond[side + 1] = stop, start
+    count = 0
+    for k in range(planes.shape[0]):
+        side = 2 * int(planes[k, 3] < 0.0)
+        rest = planes[k, 0] - planes[k, 2] * v
+        start, stop = rest - planes[k, 1] * first, rest - planes[k, 1] * last
+        if stop <= beyond[side] and start <= beyond[side + 1]:
+            chosen[count] = k
+            count += 1
+    return count
+
+
+@inner(fastmath={"contract"}, error_model="numpy")
 def cut_row(
-    lines: FloatArray, strip: Strip, planes: FloatArray, row: int, whole: Flag, before: float
+    lines: FloatArray,
+    strip: Strip,
+    planes: FloatArray,
+    chosen: IntArray,
+    row: int,
+    whole: Flag,
+    before: float,
 ) -> None:
     """Let the lines of a row enter and leave the window between its planes, too."""
     v = strip.first_v + row * strip.spacing
     at = np.uint64(row * strip.pitch)
-    for k in range(planes.shape[0]):
-        n_u, n_n = planes[k, 0], planes[k, 2]
-        rest = planes[k, 3] - planes[k, 1] * v
-        for j in range(np.uint64(strip.pitch)):
-            i = at + j
-            # infinite along a plane; NaN, a line that misses the quadric, stays NaN
-            cut = (rest - n_u * (strip.first_u + strip.spacing * np.int32(j))) / abs(n_n)
-            if n_n < 0.0:
+    low, high = np.uint64(strip.low[row]), np.uint64(strip.high[row])
+    first = strip.first_u + strip.spacing * strip.low[row]
+    last = strip.first_u + strip.spacing * (strip.high[row] - 1)
+    for place in range(cutting(planes, chosen, first, last, v)):
+        k = chosen[place]
+        slope, rest = planes[k, 1], planes[k, 0] - planes[k, 2] * v
+        # NaN, a line that misses the quadric, stays NaN
+        if planes[k, 3] < 0.0:
+            for j in range(low, high):
+                i = at + j
+                cut = slope * (strip.first_u + strip.spacing * np.int32(j)) - rest
                 enters = lines[i + ENTRY]
-                lines[i + ENTRY] = -cut if -cut > enters else enters
-            else:
+                lines[i + ENTRY] = cut if cut > enters else enters
+        else:
+            for j in range(low, high):
+                i = at + j
+                cut = rest - slope * (strip.first_u + strip.spacing * np.int32(j))
                 leaves = lines[i + EXIT]
                 lines[i + EXIT] = cut if cut < leaves else leaves
-    for j in range(np.uint64(strip.pitch)):
+    for j in range(low, high):
         i = at + j
-        missed = not lines[i + ENTRY] < lines[i + EXIT]
-        lines[i + ENTRY] = np.nan if missed else lines[i + ENTRY]
-        lines[i + EXIT] = np.nan if missed else lines[i + EXIT]
+        enters, leaves = lines[i + ENTRY], lines[i + EXIT]
+        enters = enters if enters < leaves else np.nan
+        lines[i + ENTRY] = enters
+        lines[i + EXIT] = leaves if enters < leaves else np.nan
         if whole is None:
-            lines[i + END] = lines[i + SET + END] = lines[i + ENTRY] - before
+            lines[i + END] = enters - before
+            lines[i + SET + END] = enters - before
+    if whole is None:
+        # lines that miss the window at either end of the row need not be visited
+        while low < high and np.isnan(lines[at + low + ENTRY]):
+            low += ONE
+        while low < high and np.isnan(lines[at + high - ONE + ENTRY]):
+            high -= ONE
+        strip.low[row], strip.high[row] = low, high
 
 
 @inner()
@@ -202,9 +258,11 @@ def spans(clip: Clip, triad: FloatArray, points: FloatArray, ends: FloatArray) -
     ``ends`` has the same shape.
     """
     section, lines = section_along(clip, triad), np.empty(STATE_SIZE)
-    every = np.zeros(1, np.int64), np.ones(1, np.int64)
+    low, high = np.zeros(1, np.int64), np.ones(1, np.int64)
     for k in range(points.shape[0]):
-        strip = Strip(1.0, 1.0, points[k, 0], points[k, 1], 1, 1, 1 + LANES, every[0], every[1])
+        # a line that misses the window is taken out of its row
+        low[0], high[0] = 0, 1
+        strip = Strip(1.0, 1.0, points[k, 0], points[k, 1], 1, 1, 1 + LANES, low, high)
         begin(lines, strip, section, None, None, None)
         ends[k, 0], ends[k, 1] = lines[ENTRY], lines[EXIT]
 

@@ -14,6 +14,8 @@ __all__ = ["Clip", "Section", "section_along"]
 # Of the quadric's own size: along a line for which it changes less than that by rounding alone, it
 # does not change at all. Such a line, one along a cylinder's axis, leaves it far beyond the planes.
 FLAT, LEAST = 1e-15, 1e-300
+# of the unit normal of a plane, along a line: where it is less, the line is taken for parallel
+GRAZING = 1e-100
 
 
 class Clip(NamedTuple):
@@ -36,7 +38,11 @@ class Section(NamedTuple):
     """
 
     planes: FloatArray
-    """Unit vectors along u, v, n and distances from the origin, shape (P, 4)."""
+    """
+    Rows h, p, q, side: the plane is met at the depth side * (h - p u - q v), shape (P, 4).
+
+    On the side 1 a line leaves the window there, on the side -1 it enters.
+    """
     level: float
     a: float
     b: float
@@ -54,6 +60,23 @@ def form(matrix: FloatArray, one: FloatArray, two: FloatArray) -> float:
         for j in range(3):
             total += one[i] * matrix[i, j] * two[j]
     return total
+
+
+@inner()
+def planes_along(planes: FloatArray, triad: FloatArray) -> FloatArray:
+    """As :class:`Section` has them."""
+    along = np.empty_like(planes)
+    for k in range(planes.shape[0]):
+        n_u, n_v, n_n = 0.0, 0.0, 0.0
+        for i in range(3):
+            n_u += triad[0, i] * planes[k, i]
+            n_v += triad[1, i] * planes[k, i]
+            n_n += triad[2, i] * planes[k, i]
+        # along a plane a line meets it far beyond all others, in front or behind
+        steep = max(abs(n_n), GRAZING)
+        along[k, 0], along[k, 1], along[k, 2] = planes[k, 3] / steep, n_u / steep, n_v / steep
+        along[k, 3] = -1.0 if n_n < 0.0 else 1.0
+    return along
 
 
 @inner()
@@ -79,15 +102,8 @@ def section_along(clip: Clip, triad: FloatArray) -> Section:
     if along < flat:
         along, lean_u, lean_v = flat, 0.0, 0.0
     lean_u, lean_v = lean_u / along, lean_v / along
-    planes = np.empty_like(clip.planes)
-    for k in range(planes.shape[0]):
-        for i in range(3):
-            planes[k, i] = 0.0
-            for j in range(3):
-                planes[k, i] += triad[i, j] * clip.planes[k, j]
-        planes[k, 3] = clip.planes[k, 3]
     return Section(
-        planes,
+        planes_along(clip.planes, triad),
         clip.level / along,
         (m + form(deviator, u, u)) / along - lean_u * lean_u,
         form(deviator, u, v) / along - lean_u * lean_v,

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import IO, Any
 
 from scanfab.base.column import Column
-from scanfab.base.errors import ReadError
+from scanfab.base.errors import ReadError, SettingsError
 from scanfab.table.formats.text import named_after, text_of
 
 __all__ = ["JsonArray", "JsonLines"]
@@ -96,7 +96,10 @@ class ArrayWriter:
 
 
 def _object(row: Mapping[str, Any]) -> str:
-    return json.dumps(dict(row), ensure_ascii=False, allow_nan=False)
+    try:
+        return json.dumps(dict(row), ensure_ascii=False, allow_nan=False)
+    except TypeError as error:
+        raise SettingsError(f"a row holds what JSON cannot: {error}") from None
 
 
 def _start(data: bytes) -> bytes:

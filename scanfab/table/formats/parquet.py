@@ -62,11 +62,20 @@ class ParquetWriter:
         """Keep one row."""
         self._rows.append(dict(row))
 
+    def _values(self, name: str) -> list[Any]:
+        return [row[name] for row in self._rows]
+
     def close(self) -> None:
         """Write the file."""
         import pyarrow
         from pyarrow import parquet
 
         kinds = {int: pyarrow.int64(), float: pyarrow.float64(), str: pyarrow.string()}
-        schema = pyarrow.schema([(column.name, kinds[column.kind]) for column in self.columns])
+        schema = pyarrow.schema(
+            [
+                # the kind of a list's entries is found by pyarrow
+                (one.name, kinds.get(one.kind) or pyarrow.infer_type(self._values(one.name)))
+                for one in self.columns
+            ]
+        )
         parquet.write_table(pyarrow.Table.from_pylist(self._rows, schema=schema), self.stream)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import IO, Any, Protocol
 
 from scanfab.base.column import Column
 from scanfab.base.errors import SettingsError
-from scanfab.base.plugins import load_plugins
+from scanfab.base.plugins import having, load_plugins
 from scanfab.table.formats.json_rows import JsonArray, JsonLines
 from scanfab.table.formats.parquet import Parquet
 from scanfab.table.formats.text import SeparatedText
@@ -89,7 +89,13 @@ OWN_FORMATS: tuple[TableFormat, ...] = (
 
 @cache
 def _foreign_formats() -> tuple[TableFormat, ...]:
-    return tuple(load_plugins(GROUP, "table format").values())
+    make = having(
+        "an object with the members of scanfab.table.formats.registry.TableFormat",
+        **dict.fromkeys(("suffix", "description"), str),
+        **dict.fromkeys(("is_text", "appends"), bool),
+        **dict.fromkeys(("check", "recognises", "read", "writer"), Callable),
+    )
+    return tuple(load_plugins(GROUP, "table format", make).values())
 
 
 def known_formats() -> dict[str, TableFormat]:
@@ -123,6 +129,8 @@ def format_of(path: Path) -> TableFormat:
 def reading_format(path: Path, data: bytes) -> TableFormat:
     """The format that knows a file's content; others are asked unless the suffix is an own one."""
     own = {one.suffix: one for one in OWN_FORMATS}
+    if not data and path.suffix.lower() == ".jsonl":
+        return own[".jsonl"]  # without rows it has no content to be told by
     if path.suffix.lower() not in own:
         for one in _foreign_formats():
             if one.recognises(data):

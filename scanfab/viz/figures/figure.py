@@ -106,6 +106,10 @@ class Figure:
             if self.lettered:
                 letter(panels)
             return place
+        if not hasattr(place, "plot"):
+            raise SettingsError(
+                f"ax: expected Axes, a Figure or a SubFigure of matplotlib, found {place!r}"
+            )
         if self.projection is not None and place.name != self.projection:
             raise SettingsError(
                 f"ax: expected {self.projection} Axes, found {place.name}: make them by "

@@ -88,8 +88,10 @@ def _facts(look: Look, settings: Settings) -> list[tuple[str, str]]:
     facts.append(("cut-off", f"{plan.cutoff:.4g}, {plan.cutoff / smallest:.3g} smallest radii"))
     if plan.window is not None:
         radius = plan.window.radius
+        facts.append(("centre of the RV", ", ".join(f"{one:.4g}" for one in plan.window.center)))
+        if not plan.window.shape.is_sphere:
+            return [*facts, ("shape of the RV", str(plan.window.shape))]
         facts += [
-            ("centre of the RV", ", ".join(f"{one:.4g}" for one in plan.window.center)),
             (
                 "radius of the RV",
                 f"{radius:.4g}, {_part_of_sample(first, look, radius)}, "

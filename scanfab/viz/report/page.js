@@ -32,8 +32,31 @@
     return [5, 2, 1].map((step) => step * power).find((step) => step <= value * (1 + 1e-9));
   }
 
-  // void pieces of parallel lines among disks [u, v, radius]: [u, v, u, v, whether it is kept]
-  function cutLines(disks, data) {
+  const dot = (one, other) => one[0] * other[0] + one[1] * other[1] + one[2] * other[2];
+  const sum = (a, one, b, other) => one.map((part, i) => a * part + b * other[i]);
+
+  // where the line through a place along a unit vector enters and leaves a window
+  function span(window, place, along) {
+    const [xx, yy, zz, xy, xz, yz] = window.form;
+    const rows = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
+    const image = rows.map((row) => dot(row, along));
+    const a = dot(along, image), b = dot(place, image);
+    const c = dot(place, rows.map((row) => dot(row, place))) - window.level;
+    if (a < 1e-9 && c > 0) return [0, 0];
+    const root = Math.sqrt(b * b - a * c);
+    let enters = a < 1e-9 ? -Infinity : (-b - root) / a, leaves = a < 1e-9 ? Infinity : (-b + root) / a;
+    for (const [x, y, z, distance] of window.planes) {
+      const steep = dot([x, y, z], along), rest = distance - dot([x, y, z], place);
+      if (Math.abs(steep) < 1e-9 && rest < 0) return [0, 0];
+      if (steep >= 1e-9) leaves = Math.min(leaves, rest / steep);
+      if (steep <= -1e-9) enters = Math.max(enters, rest / steep);
+    }
+    return [enters, leaves];
+  }
+
+  // void pieces of parallel lines among disks [u, v, radius]: [u, v, u, v, whether it is kept];
+  // right and up are unit vectors of the plane that they lie in
+  function cutLines(disks, data, right, up) {
     const mean = data.spheres.reduce((sum, ball) => sum + ball[3], 0) / data.spheres.length;
     const reach = data.rv === null ? 1000 : data.rv;
     const step = Math.max(2.5 * mean, reach / 40);
@@ -46,8 +69,12 @@
         const middle = cos * u + sin * v;
         if (half > 0) chords.push([middle - half, middle + half]);
       }
-      const end = Math.sqrt(reach * reach - offset * offset);
-      if (data.rv !== null) chords.push([-Infinity, -end], [end, Infinity]);
+      if (data.window !== null) {
+        const through = sum(-sin * offset, right, cos * offset, up);
+        const [enters, leaves] = span(data.window, through, sum(cos, right, sin, up));
+        if (!(enters < leaves)) continue;
+        chords.push([-Infinity, enters], [leaves, Infinity]);
+      }
       chords.sort((one, other) => one[0] - other[0]);
       let solid = chords.length ? chords[0][1] : 0;
       for (const [from, to] of chords) {
@@ -68,7 +95,7 @@
     const state = { ...START, cut: true };
     let waiting = false;
     // canvas pixels a CSS pixel, and canvas pixels a unit of the data
-    let dense = 1, scale = 1, place = null;
+    let dense = 1, scale = 1, place = null, right = null, up = null;
 
     function look() {
       const ct = Math.cos(state.turn), st = Math.sin(state.turn);
@@ -79,6 +106,8 @@
         const away = -st * x + ct * y;
         return [ct * x + st * y, ci * z + si * away, si * z - ci * away];
       };
+      right = [ct, st, 0];
+      up = [-si * st, si * ct, ci];
     }
 
     function draw() {
@@ -108,7 +137,7 @@
       }
       if (state.cut) {
         disks.forEach(drawDisk);
-        cutLines(solid, data).forEach(drawPiece);
+        cutLines(solid, data, right, up).forEach(drawPiece);
       }
       drawWindow();
       pen.setTransform(dense, 0, 0, dense, 0, 0);
@@ -136,12 +165,17 @@
     }
 
     function drawWindow() {
-      if (data.rv === null) return;
+      if (data.window === null) return;
       pen.strokeStyle = RV;
       pen.lineWidth = 2 * dense / scale;
       pen.setLineDash([8, 5].map((part) => part * dense / scale));
       pen.beginPath();
-      pen.arc(0, 0, data.rv, 0, 2 * Math.PI);
+      for (let step = 0; step < 360; step++) {
+        const cos = Math.cos(step * Math.PI / 180), sin = Math.sin(step * Math.PI / 180);
+        const end = span(data.window, [0, 0, 0], sum(cos, right, sin, up))[1];
+        pen.lineTo(cos * end, sin * end);
+      }
+      pen.closePath();
       pen.stroke();
       pen.setLineDash([]);
     }

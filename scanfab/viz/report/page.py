@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
 from scanfab.base.files import check_folder, whole_file
 from scanfab.base.typing import FloatArray
@@ -162,14 +163,14 @@ def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
     radius = grains.radius[shown]
     nearest = np.argsort(np.linalg.norm(position, axis=1), kind="stable")[:MOST_GRAINS]
     reach = np.linalg.norm(position[nearest], axis=1) + radius[nearest]
-    size = float(reach.max(initial=0.0)) or scene.window_radius or 1.0
+    size = float(reach.max(initial=0.0)) or (scene.window.reach if scene.window else 1.0)
     scale = 1000.0 / size
     up = np.asarray(axis, dtype=np.float64)
     turn = _upright(up)
     kinds = np.where(grains.in_window[shown], 0, 1)
     kinds[grains.rattler[shown]] = 2
     names = ["grains in the RV", "grains outside", "rattlers"]
-    if scene.window_radius is None:
+    if scene.window is None:
         names[1] = "grains"
     numbers = np.column_stack([position @ turn.T, radius])[nearest] * scale
     return {
@@ -184,10 +185,24 @@ def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
             )
         ],
         "axes": _axes(up, turn),
-        "rv": None if scene.window_radius is None else round(scene.window_radius * scale),
+        "rv": None if scene.window is None else round(scene.window.reach * scale),
+        "window": None if scene.window is None else _window_data(scene.window, turn, scale),
         "cutoff": scene.cutoff * scale,
         "size": size,
         "left_out": int(shown.sum() - len(nearest)),
+    }
+
+
+def _window_data(window: Convex, turn: FloatArray, scale: float) -> dict[str, Any]:
+    """Planes [x, y, z, distance], quadric (xx yy zz xy xz yz) and level, as the viewer has them."""
+    isotropic, deviator, level = window.quadric
+    form = isotropic * np.eye(3) + turn @ deviator @ turn.T
+    planes = np.column_stack([window.planes[:, :3] @ turn.T, window.planes[:, 3] * scale])
+    parts = form[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    return {
+        "planes": [_rounded(plane) for plane in planes],
+        "form": [round(part, 9) + 0.0 for part in parts.tolist()],
+        "level": round(level * scale**2, 3),
     }
 
 

@@ -167,3 +167,9 @@ def test_axes_of_its_own_are_in_the_style_of_the_package():
     assert ax.xaxis.label.get_size() == 9
     assert not ax.spines["top"].get_visible()
     pyplot.close(ax.figure)
+
+
+@pytest.mark.parametrize("place", [3, [1, 2]])
+def test_what_is_no_axes_is_told(place):
+    with pytest.raises(SettingsError, match="ax: expected Axes, a Figure or a SubFigure"):
+        Table(curve()).plot.evolution(ax=place)

@@ -1,0 +1,241 @@
+"""The shapes of windows besides the sphere, by their sizes or by their surface."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.base.bodies import BALL, BLOCK, COLUMN, Hull
+from scanfab.base.convex import Convex, image_of
+from scanfab.base.errors import SettingsError
+from scanfab.base.typing import FloatArray, IntArray
+
+__all__ = ["box", "cylinder", "ellipsoid", "polyhedron"]
+
+# Of the size of a surface, or of its distance from the origin, whichever is larger: what 4 bytes a
+# number, as STL has them, cannot tell apart.
+TOLERANCE = 1e-6
+# each line is cut by all of them
+MOST_FACES = 1000
+
+
+def box(edges: Sequence[float] | FloatArray, turn: npt.ArrayLike | None = None) -> Convex:
+    """
+    A box about the origin.
+
+    Parameters
+    ----------
+    edges : sequence of 3 floats
+        Full lengths.
+    turn : array_like, shape (3, 3), optional
+        Orthonormal rows along which the edges lie; x, y, z by default.
+
+    Returns
+    -------
+    Convex
+
+    Examples
+    --------
+    >>> from scanfab import box
+    >>> box([2.0, 3.0, 4.0]).high
+    array([1. , 1.5, 2. ])
+    """
+    size = "box {:g} x {:g} x {:g}".format(*edges)
+    return image_of(BLOCK, _turned(0.5 * np.asarray(edges, dtype=float), turn), size)
+
+
+def ellipsoid(semi_axes: Sequence[float] | FloatArray, turn: npt.ArrayLike | None = None) -> Convex:
+    """
+    An ellipsoid about the origin.
+
+    Parameters
+    ----------
+    semi_axes : sequence of 3 floats
+        Half of its diameters.
+    turn : array_like, shape (3, 3), optional
+        Orthonormal rows along which they lie; x, y, z by default.
+
+    Returns
+    -------
+    Convex
+
+    Examples
+    --------
+    >>> from scanfab import ellipsoid
+    >>> ellipsoid([2.0, 3.0, 4.0]).high
+    array([2., 3., 4.])
+    """
+    size = "ellipsoid of semi-axes {:g}, {:g}, {:g}".format(*semi_axes)
+    return image_of(BALL, _turned(np.asarray(semi_axes, dtype=float), turn), size)
+
+
+def cylinder(radius: float, height: float, axis: npt.ArrayLike = (0.0, 0.0, 1.0)) -> Convex:
+    """
+    A cylinder about the origin.
+
+    Parameters
+    ----------
+    radius, height : float
+        From end to end it is as long as its height.
+    axis : array_like, shape (3,), optional
+        Of any length.
+
+    Returns
+    -------
+    Convex
+
+    Examples
+    --------
+    >>> from scanfab import cylinder
+    >>> cylinder(1.0, 6.0).high
+    array([1., 1., 3.])
+    """
+    along = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    aside = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
+    aside /= np.linalg.norm(aside)
+    turn = np.array([aside, np.cross(along, aside), along])
+    size = f"cylinder of radius {radius:g}, height {height:g}"
+    return image_of(COLUMN, _turned(np.array([radius, radius, 0.5 * height]), turn), size)
+
+
+def polyhedron(points: FloatArray, triangles: IntArray) -> tuple[Convex, FloatArray]:
+    """
+    The convex polyhedron that a triangulated surface encloses, about its centroid.
+
+    Parameters
+    ----------
+    points : ndarray, shape (N, 3)
+        Those at one place count as one.
+    triangles : ndarray of int, shape (T, 3)
+        Rows of the points, in whatever sense of turn.
+
+    Returns
+    -------
+    Convex
+        The region.
+    ndarray, shape (3,)
+        The centroid, in the coordinates of the points.
+
+    Raises
+    ------
+    SettingsError
+        If the surface is flat, not closed or not convex, or has more faces than lines should be
+        cut by.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab import polyhedron
+    >>> corners = np.array([[0.0, 0, 0], [4, 0, 0], [0, 4, 0], [0, 0, 4]])
+    >>> shape, center = polyhedron(corners, np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]))
+    >>> center, round(shape.volume, 3)
+    (array([1., 1., 1.]), 10.667)
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    points, triangles, tolerance = _merged(points, triangles)
+    if len(points):
+        # of numbers about the middle less is lost by rounding
+        middle = points.mean(axis=0)
+        points = points - middle
+    try:
+        hull = ConvexHull(points)
+    except (QhullError, ValueError):
+        raise SettingsError("the surface encloses no volume: it is flat, or has no faces") from None
+    extent = float(np.ptp(points, axis=0).max())
+    if hull.volume < TOLERANCE * extent**3:
+        raise SettingsError("the surface encloses no volume: it is flat")
+    _check_closed(triangles)
+    planes = _faces(hull.equations, extent)
+    _check_convex(points, triangles, planes, tolerance)
+    if len(planes) > MOST_FACES:
+        raise SettingsError(
+            f"the surface has {len(planes)} faces, more than {MOST_FACES}, and each of them cuts "
+            f"every line: make it coarser"
+        )
+    centroid = _centroid(points, hull.simplices)
+    planes[:, 3] -= planes[:, :3] @ centroid
+    areas = _areas(points[hull.simplices], hull.equations[:, :3], planes)
+    body = Hull(points[hull.vertices] - centroid, planes, areas, float(hull.volume))
+    return image_of(body, np.eye(3), f"surface of {len(planes)} faces"), middle + centroid
+
+
+def _turned(sizes: FloatArray, turn: npt.ArrayLike | None) -> FloatArray:
+    """The frame with columns of these lengths along the rows of a turn."""
+    rows = np.eye(3) if turn is None else np.asarray(turn, dtype=float)
+    frame: FloatArray = rows.T * sizes
+    return frame
+
+
+def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray, float]:
+    """Points of the triangles, each once, triangles that are some, and what counts as one place."""
+    from scipy.spatial import cKDTree
+
+    points = np.asarray(points, dtype=float)
+    tolerance = TOLERANCE * float(np.abs(points).max(initial=0.0))
+    first = np.arange(len(points))
+    if len(points):
+        # the lowest row of those at one place; chains of places are shorter than the tolerance
+        for one, other in sorted(cKDTree(points).query_pairs(tolerance)):
+            first[other] = min(first[other], first[one])
+    rows, triangles = np.unique(first[triangles], return_inverse=True)
+    triangles = triangles.reshape(-1, 3)
+    a, b, c = triangles.T
+    return points[rows], triangles[(a != b) & (b != c) & (c != a)], tolerance
+
+
+def _check_closed(triangles: IntArray) -> None:
+    """Each edge has a triangle on either side."""
+    edges = np.sort(
+        np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    )
+    _, count = np.unique(edges, axis=0, return_counts=True)
+    wrong = int(np.sum(count != 2))
+    if wrong:
+        raise SettingsError(
+            f"the surface is not closed: {wrong} of its {len(count)} edges are not between two "
+            f"faces"
+        )
+
+
+def _faces(equations: FloatArray, extent: float) -> FloatArray:
+    """The planes of a hull's triangles, those that coincide once, the outermost of them."""
+    planes = np.column_stack([equations[:, :3], -equations[:, 3]])
+    kept: list[FloatArray] = []
+    left = planes[np.argsort(-planes[:, 3], kind="stable")]
+    while len(left):
+        kept.append(left[0])
+        apart = np.abs(left - left[0]) / [1.0, 1.0, 1.0, extent]
+        left = left[apart.max(axis=1) > TOLERANCE]
+    return np.array(kept)
+
+
+def _check_convex(
+    points: FloatArray, triangles: IntArray, planes: FloatArray, tolerance: float
+) -> None:
+    """All of the surface lies on that of its hull."""
+    off = np.abs(points @ planes[:, :3].T - planes[:, 3])
+    inside = sum(1 for one in triangles if off[one].max(axis=0).min() > 10.0 * tolerance)
+    if inside:
+        raise SettingsError(
+            f"the surface is not convex: {inside} of its {len(triangles)} faces lie inside its hull"
+        )
+
+
+def _areas(triangles: FloatArray, normals: FloatArray, planes: FloatArray) -> FloatArray:
+    """Of the faces, from a hull's triangles (T, 3, 3), each in the plane that faces its way."""
+    sides = triangles[:, 1:] - triangles[:, :1]
+    each = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    face = np.argmax(normals @ planes[:, :3].T, axis=1)
+    areas: FloatArray = np.bincount(face, weights=each, minlength=len(planes)).astype(float)
+    return areas
+
+
+def _centroid(points: FloatArray, triangles: IntArray) -> FloatArray:
+    """Of the hull, as tetrahedra with the origin, which lies inside."""
+    corners = points[triangles]
+    volume = np.abs(np.linalg.det(corners))
+    centroid: FloatArray = volume @ corners.sum(axis=1) / (4.0 * volume.sum())
+    return centroid

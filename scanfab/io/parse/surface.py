@@ -1,0 +1,67 @@
+"""Triangulated surfaces from files, by whichever library reads them: meshio, or VTK its own."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+from pathlib import Path
+
+import numpy as np
+
+from scanfab.base.errors import ReadError
+from scanfab.base.typing import FloatArray, IntArray
+from scanfab.io.files import check_memory
+from scanfab.io.parse.vtk_mesh import read_faces
+
+__all__ = ["SUFFIXES", "read_surface"]
+
+SUFFIXES = (".stl", ".vtp", ".ply", ".obj")
+
+
+def read_surface(path: Path) -> tuple[FloatArray, IntArray]:
+    """
+    The points of a surface, (N, 3), and its triangles, rows of points, (T, 3).
+
+    Polygons are cut into triangles about their first corner, as the faces of convex bodies can be.
+
+    Raises
+    ------
+    ReadError
+        If the file is damaged, or of another format.
+    """
+    if path.suffix.lower() == ".vtp":
+        points, faces = read_faces(path)
+    else:
+        points, faces = _from_meshio(path)
+    if points.shape != (len(points), 3) or not np.all(np.isfinite(points)):
+        raise ReadError(f"{path}: expected points of three finite numbers")
+    if any(one.size and not 0 <= one.min() <= one.max() < len(points) for one in faces):
+        raise ReadError(f"{path}: its faces name points that do not exist")
+    fans = [one[:, [0, k, k + 1]] for one in faces for k in range(1, one.shape[1] - 1)]
+    return points, np.concatenate([np.zeros((0, 3), np.int64), *fans])
+
+
+def _from_meshio(path: Path) -> tuple[FloatArray, list[IntArray]]:
+    import meshio
+
+    check_memory(path, 20.0 * path.stat().st_size)
+    silence = io.StringIO()
+    try:
+        with (
+            contextlib.redirect_stdout(silence),
+            contextlib.redirect_stderr(silence),
+            # of the number of triangles that a text in place of binary STL seems to name
+            np.errstate(over="ignore"),
+        ):
+            mesh = meshio.read(path, file_format=path.suffix.lower()[1:])
+            faces = [
+                np.asarray(block.data, np.int64)
+                for block in mesh.cells
+                if block.dim == 2 and len(block.data)
+            ]
+            points = np.asarray(mesh.points, np.float64)
+    # meshio raises whatever its parsing meets, and exits for what it does not know
+    except (Exception, SystemExit) as error:
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        raise ReadError(f"{path}: cannot be read as a surface: {reason}") from None
+    return points, faces

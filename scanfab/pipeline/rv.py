@@ -1,0 +1,190 @@
+"""The RV of a series: where settings put it in the first frame, and in frames that are deformed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from scanfab.base.convex import Convex, sphere
+from scanfab.base.errors import SettingsError
+from scanfab.base.note import Note
+from scanfab.base.shapes import box, cylinder, ellipsoid, polyhedron
+from scanfab.base.typing import FloatArray
+from scanfab.io.parse.surface import read_surface
+from scanfab.packing.sample import Sample
+from scanfab.packing.window import RV_MEANING, SurfaceBox, Window
+from scanfab.pipeline.settings import Settings, Vector
+from scanfab.pipeline.strain import strain_mode
+
+__all__ = ["Deformation", "doubts_of_rv", "rv_of"]
+
+# of the smallest grain: what nobody means
+SMALLEST = 1e-9
+
+
+def rv_of(sample: Sample, settings: Settings) -> Window:
+    """
+    The RV that settings make of the first frame that has grains.
+
+    Raises
+    ------
+    SettingsError
+        If it is far smaller than any grain, or its surface is that of no convex body.
+    ReadError
+        If the file of its surface cannot be read.
+    """
+    surfaces = SurfaceBox.of(sample.packing, sample.gathered)
+    shape, center = _shape(settings, 0.5 * surfaces.extents)
+    if settings.rv_center is not None:
+        center = np.array(settings.rv_center, dtype=float)
+    elif center is None:
+        center = np.array(surfaces.center, dtype=float)
+    smallest = float(sample.packing.radius[sample.grains].min())
+    half = 0.5 * float((shape.high - shape.low).min())
+    if half < SMALLEST * smallest:
+        what = f"a radius of {half:g}" if shape.is_sphere else f"a {shape}"
+        raise SettingsError(
+            f"rv: {what} is nothing beside that of the smallest grain ({smallest:g}): choose a "
+            f"larger `rv`, `rv_radius` or `rv_size`"
+        )
+    return Window(center, shape)
+
+
+def _shape(settings: Settings, half: FloatArray) -> tuple[Convex, FloatArray | None]:
+    """
+    The shape, and its centre if a file says where it is.
+
+    ``half`` are the sample's half extents, which the sizes are a fraction of where none are given.
+    """
+    sizes, part = settings.rv_size, settings.rv * half
+    if settings.rv_shape == "sphere":
+        radius = settings.rv_radius
+        return sphere(settings.rv * float(half.min()) if radius is None else radius), None
+    if settings.rv_shape == "box":
+        return box(sizes or 2.0 * part), None
+    if settings.rv_shape == "ellipsoid":
+        return ellipsoid(sizes or part), None
+    if settings.rv_shape == "cylinder":
+        axis = settings.rv_axis or settings.axis
+        radius, height = sizes or _cylinder_within(part, axis)
+        return cylinder(radius, height, axis), None
+    path = Path(settings.rv_shape)
+    try:
+        return polyhedron(*read_surface(path))
+    except SettingsError as error:
+        raise SettingsError(
+            f"rv_shape: {path}: {error}: expected a closed convex surface"
+        ) from None
+
+
+def _cylinder_within(half: FloatArray, axis: Vector) -> tuple[float, float]:
+    """
+    Radius and height of the cylinder that fills a box of these half edges.
+
+    Half as high, and as wide, as lines through the box's middle along the axis and across it are
+    long; if the axis is oblique, smaller by what its rims would stick out.
+    """
+    along = np.abs(np.array(axis))
+    across = np.sqrt(np.maximum(1.0 - along**2, 0.0))
+    with np.errstate(divide="ignore"):
+        length, radius = float((half / along).min()), float((half / across).min())
+    fits = min(1.0, float((half / (length * along + radius * across)).min()))
+    return fits * radius, 2.0 * fits * length
+
+
+def doubts_of_rv(window: Window, sample: Sample, box: SurfaceBox, largest: float) -> list[Note]:
+    """
+    What to tell of an RV at the sample's surface.
+
+    Raises
+    ------
+    SettingsError
+        If it holds no grain, reaches too far beyond the sample, or overlaps its own image.
+    """
+    packing, grains = sample.packing, sample.grains
+    window.check_fits(packing)
+    room = box.room_around(window)
+    if not window.may_meet(packing.position[grains], packing.radius[grains], packing).any():
+        raise SettingsError(
+            f"the {window} holds no grain: choose another `rv_center` or a larger one "
+            f"(`rv_radius`, `rv_size`)"
+        )
+    if room < -2 * largest:
+        raise SettingsError(
+            f"the {window} reaches {-room:g} beyond the sample, that is more than two of its "
+            f"largest radii ({largest:g}): choose another `rv_center` or a smaller `rv`, "
+            f"{RV_MEANING}" + ("" if window.shape.is_sphere else ", or a smaller `rv_size`")
+        )
+    if room >= largest:
+        return []
+    text = (
+        f"the {window} comes within one of the largest radii ({largest:g}) of the sample's "
+        f"surface: it cuts the outermost layer of grains, which a boundary arranges: choose a "
+        f"smaller `rv`, or use more grains"
+    )
+    return [Note("rv_at_surface", text)]
+
+
+@dataclass(frozen=True, eq=False)
+class Deformation:
+    """
+    How the sample is deformed since its first frame that has grains, as far as an RV follows it.
+
+    The place x of that frame lies at o + F (x - o₀) in another, F = H H₀⁻¹. With the cell, H has
+    its vectors as columns and o is its origin; with boundary or grains, H has the extents of their
+    centres along x, y, z on its diagonal, and o is the lower corner.
+    """
+
+    mode: str
+    """``cell``, ``boundary`` or ``grains``."""
+    origin: FloatArray
+    """o₀, shape (3,)."""
+    edges: FloatArray
+    """H₀, shape (3, 3)."""
+
+    @classmethod
+    def since(cls, sample: Sample, mode: str, axis: Vector) -> Deformation:
+        """
+        From a frame on, by what the strain is measured by.
+
+        Raises
+        ------
+        SettingsError
+            If there is nothing to measure, or it is flat.
+        """
+        mode = strain_mode(sample, mode, axis)
+        if not mode:
+            raise SettingsError(
+                "rv_follows: there is neither a periodic cell nor a boundary that tells how the "
+                'sample deforms: choose `strain="grains"`, or leave out `rv_follows`'
+            )
+        origin, edges = _edges(sample, mode)
+        if abs(np.linalg.det(edges / max(float(np.abs(edges).max()), 1e-300))) < 1e-9:
+            raise SettingsError(f"rv_follows: the {mode} it is to follow has no volume")
+        return cls(mode, origin, edges)
+
+    def window_in(self, sample: Sample, window: Window) -> Window:
+        """The window of the first frame as it lies in another."""
+        origin, edges = _edges(sample, self.mode)
+        if np.array_equal(origin, self.origin) and np.array_equal(edges, self.edges):
+            return window
+        gradient = edges @ np.linalg.inv(self.edges)
+        center = origin + gradient @ (window.center - self.origin)
+        return Window(center, window.shape.deformed(gradient))
+
+
+def _edges(sample: Sample, mode: str) -> tuple[FloatArray, FloatArray]:
+    """Origin and edges, as columns, of what is followed."""
+    if mode == "cell":
+        cell = sample.packing.cell
+        if cell is None:
+            raise SettingsError("rv_follows: the RV is to follow the cell, but the dump has none")
+        return cell.origin, cell.vectors.T
+    chosen = sample.boundary if mode == "boundary" else sample.gathered
+    if not chosen.any():
+        raise SettingsError(f"rv_follows: the RV is to follow the {mode}, but the frame has none")
+    position = sample.packing.position[chosen]
+    low, high = position.min(axis=0), position.max(axis=0)
+    return low, np.diag(high - low)

@@ -1,0 +1,195 @@
+"""Windows of every shape by the command line: tables, files for ParaView, pictures, refusals."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+import pyvista
+
+from scanfab.cli.main import run
+from tests.helpers.windows import OF_A_BOX, corners_of_a_box
+
+ROOT = Path(__file__).parents[2]
+BOX = str(ROOT / "sample_data" / "liggghts_box")
+SHEAR = str(ROOT / "sample_data" / "lammps_shear")
+FAST = ("--directions", "9", "--spacing", "1rmin", "--workers", "1")
+
+SHAPES = {
+    "box": ["--rv-shape", "box"],
+    "box by size": ["--rv-shape", "box", "--rv-size", "0.01,0.012,0.008"],
+    "size in blanks": ["--rv-shape", "box", "--rv-size", "0.01", "0.012", "0.008"],
+    "cylinder": ["--rv-shape", "cylinder", "--rv-axis", "1,1,0"],
+    "cylinder by size": ["--rv-shape", "cylinder", "--rv-size", "0.004", "0.01"],
+    "ellipsoid": ["--rv-shape", "ellipsoid", "--rv", "0.6"],
+    "follows": ["--rv-shape", "ellipsoid", "--rv-follows", "strain"],
+}
+
+
+@pytest.fixture
+def compute(tmp_path, capsys):
+    """The rows of a table, in this process; or the exit code and what was told."""
+
+    def call(*words, source=SHEAR, name="table.csv", frames="0:2"):
+        output = tmp_path / name
+        code = run(["compute", source, *FAST, "--frames", frames, *words, "-o", str(output)])
+        told = capsys.readouterr().err
+        if code:
+            return code, told
+        with open(output, newline="") as stream:
+            return list(csv.DictReader(stream))
+
+    return call
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_every_shape_has_its_rows_and_the_column_of_the_window(compute, name):
+    rows = compute(*SHAPES[name])
+    assert [row["variant"] for row in rows] == list("abcdabcd")
+    assert list(rows[0])[-1] == "window_alpha_vs_axial"
+    for row in rows:
+        assert (row["window_alpha_vs_axial"] == "") == (row["variant"] in "ab")
+        assert float(row["mean_length"]) > 0
+        assert int(row["grains"]) > 20
+
+
+def test_blanks_and_commas_are_the_same(compute):
+    assert compute(*SHAPES["box by size"]) == compute(*SHAPES["size in blanks"])
+
+
+def test_the_sphere_has_no_such_column(compute):
+    assert "window_alpha_vs_axial" not in compute()[0]
+    assert compute("--rv-shape", "sphere") == compute()
+    centre = ("--rv-center", "0.011", "0.012", "0.0105")
+    assert compute(*centre) == compute("--rv-center", "0.011,0.012,0.0105")
+
+
+def surface(path, half=0.004):
+    middle = np.array([0.01125, 0.012, 0.0105])
+    corners = middle + corners_of_a_box(np.full(3, half))
+    meshio.Mesh(corners, [("triangle", OF_A_BOX)]).write(path)
+    return str(path)
+
+
+@pytest.mark.parametrize("suffix", [".stl", ".ply", ".obj", ".vtp"])
+def test_a_surface_from_a_file_is_the_box_that_it_draws(compute, tmp_path, suffix):
+    file = tmp_path / f"box{suffix}"
+    if suffix == ".vtp":
+        pyvista.read(surface(tmp_path / "box.ply")).save(file)
+    else:
+        surface(file)
+    drawn = compute("--rv-shape", str(file), "--variants", "cd")
+    words = ("--rv-size", "0.008,0.008,0.008", "--rv-center", "0.01125,0.012,0.0105")
+    named = compute("--rv-shape", "box", *words, "--variants", "cd")
+    for one, other in zip(drawn, named, strict=True):
+        assert one["grains"] == other["grains"]
+        assert float(one["mean_length"]) == pytest.approx(float(other["mean_length"]), rel=1e-3)
+
+
+def test_the_manifest_names_shape_and_surface_and_a_changed_one_is_not_resumed(compute, tmp_path):
+    file = surface(tmp_path / "box.ply")
+    words = ("--rv-shape", file, "--variants", "c")
+    compute(*words, frames="0:1")
+    manifest = json.loads((tmp_path / "table.csv.manifest.json").read_text())
+    assert manifest["settings"]["rv_shape"] == file
+    assert file in [one["path"] for one in manifest["inputs"]]
+    resumed = compute(*words, "--resume")
+    whole = compute(*words, name="whole.csv")
+    assert resumed == whole
+    surface(tmp_path / "box.ply", half=0.0035)
+    code, told = compute(*words, "--resume", frames="0:3")
+    assert code == 2
+    assert f"{file} has changed since" in told
+
+
+def test_a_box_is_resumed_with_its_column(compute):
+    words = ("--rv-shape", "box", "--rv-follows", "strain", "--variants", "ac")
+    compute(*words, frames="0:1")
+    assert compute(*words, "--resume", frames="0:3") == compute(
+        *words, frames="0:3", name="whole.csv"
+    )
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--rv-shape", "box", "--rv-size", "1,2"], "--rv-size: expected A,B,C, full edges"),
+        (["--rv-shape", "cylinder", "--rv-size", "1,2,3"], "--rv-size: expected R,H, radius and"),
+        (["--rv-shape", "ellipsoid", "--rv-size", "1,0,1"], "two or three lengths above 0"),
+        (["--rv-size", "1,2,3"], "--rv-size: the shape sphere takes none: choose --rv-radius"),
+        (["--rv-shape", "box", "--rv-radius", "2"], "--rv-radius: is that of a sphere"),
+        (["--rv-shape", "box", "--rv-axis", "x"], "--rv-axis: is that of a cylinder"),
+        (["--rv-shape", "cone"], "--rv-shape: expected sphere, box, cylinder, ellipsoid or a"),
+        (["--rv-shape", "none.stl"], "closed convex surface that exists (.stl .vtp .ply .obj)"),
+        (["--rv-follows", "sand"], "--rv-follows: expected none or strain"),
+    ],
+)
+def test_what_cannot_be_is_told_with_what_to_choose(compute, words, message):
+    code, told = compute(*words)
+    assert code == 2
+    assert message in told
+    assert "Traceback" not in told
+
+
+@pytest.mark.parametrize(
+    ("source", "words", "message"),
+    [
+        (SHEAR, ["--rv-size", "0.1,0.1,0.1"], "overlaps its own image"),
+        (SHEAR, ["--rv-size", "1e-15,0.01,0.01"], "is nothing beside"),
+        (BOX, ["--rv-size", "0.2,0.01,0.01"], "beyond the sample, that is more than two"),
+        (BOX, ["--rv-size", "0.001,0.001,0.001", "--rv-center", "9", "9", "9"], "holds no grain"),
+        (BOX, ["--rv", "70"], "beyond the sample"),
+    ],
+)
+def test_a_box_that_does_not_fit_the_sample_is_refused(compute, source, words, message):
+    code, told = compute("--rv-shape", "box", *words, source=source)
+    assert code == 1
+    assert message in told
+
+
+def test_broken_surfaces_are_told(compute, tmp_path):
+    file = tmp_path / "open.ply"
+    corners = corners_of_a_box(np.full(3, 0.004))
+    meshio.Mesh(corners, [("triangle", OF_A_BOX[1:])]).write(file)
+    code, told = compute("--rv-shape", str(file))
+    assert code == 1
+    assert "open.ply: the surface is not closed: 3 of its 18 edges" in told
+    file.write_bytes(b"ply\nnonsense")
+    code, told = compute("--rv-shape", str(file))
+    assert code == 1
+    assert "open.ply: cannot be read as a surface" in told
+
+
+@pytest.mark.parametrize("name", ["box", "cylinder", "ellipsoid", "follows"])
+def test_paraview_gets_the_surface_of_the_window(compute, tmp_path, name):
+    compute(*SHAPES[name], "--vtk", str(tmp_path / "vtk"), "--variants", "c")
+    first, second = (pyvista.read(tmp_path / "vtk" / f"window_00000{k}.vtp") for k in (0, 1))
+    grains = pyvista.read(tmp_path / "vtk" / "grains_000000.vtp")
+    assert first.is_manifold
+    inside = np.asarray(grains.points)[np.asarray(grains["in_window"]) == 1]
+    assert len(inside) > 20
+    low, high = np.asarray(first.points).min(axis=0), np.asarray(first.points).max(axis=0)
+    cell = np.array([0.01755, 0.01872, 0.01638])
+    # an image of each lies in the box of the surface
+    images = inside + np.rint((0.5 * (low + high) - inside) / cell) * cell
+    assert np.all((images > low - 1e-3 * cell) & (images < high + 1e-3 * cell))
+    assert np.array_equal(first.points, second.points) == (name != "follows")
+
+
+@pytest.mark.parametrize("name", ["box", "cylinder"])
+@pytest.mark.parametrize("cut", [[], ["--cut"]])
+def test_view_draws_the_window(tmp_path, name, cut):
+    picture = tmp_path / "view.png"
+    words = [*SHAPES[name], *cut, "--screenshot", str(picture)]
+    assert run(["view", SHEAR, "--frame", "1", *words]) == 0
+    assert picture.stat().st_size > 10_000
+
+
+def test_inspect_says_the_shape(capsys):
+    assert run(["inspect", BOX, "--frames", "0", "--rv-shape", "cylinder", "--json"]) == 0
+    report = json.loads(capsys.readouterr().out)
+    assert report["rv_shape"].startswith("cylinder of radius ")

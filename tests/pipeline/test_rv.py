@@ -1,0 +1,287 @@
+"""The RV of every shape: default sizes, places, what is refused, and how it follows the sample."""
+
+import numpy as np
+import pytest
+
+from scanfab import Cell, Packing, Settings, SettingsError, box, compute, find_contacts, sphere
+from scanfab.packing.sample import Sample
+from scanfab.packing.window import SurfaceBox, Window
+from scanfab.pipeline.measurement import measure
+from scanfab.pipeline.plan import make_plan
+from scanfab.pipeline.rv import Deformation, rv_of
+from scanfab.scan.scan import scan_lines
+from scanfab.scan.solids import Solids
+from tests.helpers import naive
+from tests.helpers.lattices import rotation, shaken_cubic
+from tests.helpers.windows import OF_A_BOX, corners_of_a_box
+
+LINES = {"directions": "lebedev:5", "spacing": 0.3, "cutoff": 0.2}
+
+
+def sample_of(packing, boundary=None):
+    packing = find_contacts(packing) if packing.contacts is None else packing
+    none = np.zeros(len(packing), bool)
+    return Sample(packing, none if boundary is None else np.asarray(boundary))
+
+
+@pytest.fixture(scope="module")
+def flat():
+    """Grains in a box of about 10 x 8 x 5."""
+    position, radius = shaken_cubic(np.random.default_rng(0), 10)
+    chosen = (position < [10.0, 8.0, 5.0]).all(axis=1)
+    return sample_of(Packing(position[chosen], radius[chosen]))
+
+
+def window_of(sample, **options):
+    return rv_of(sample, Settings(**options))
+
+
+def test_sizes_are_fractions_of_the_half_extents(flat):
+    box_ = SurfaceBox.of(flat.packing, flat.grains)
+    half = 0.5 * box_.extents
+    assert half == pytest.approx([5.0, 4.0, 2.5], abs=0.2)
+    for shape in ("box", "ellipsoid"):
+        window = window_of(flat, rv_shape=shape, rv=0.6)
+        assert window.shape.high == pytest.approx(0.6 * half)
+        assert window.shape.low == pytest.approx(-0.6 * half)
+        assert window.center == pytest.approx(box_.center)
+    # of both extents across the axis the smaller one
+    for axis, across in (("x", 2), ("y", 2), ("z", 1)):
+        window = window_of(flat, rv_shape="cylinder", rv_axis=axis)
+        expected = np.full(3, 0.7 * half[across])
+        expected["xyz".index(axis)] = 0.7 * half["xyz".index(axis)]
+        assert window.shape.high == pytest.approx(expected)
+    along_x = window_of(flat, rv_shape="cylinder", axis="x")
+    assert along_x.shape.high[0] == pytest.approx(0.7 * half[0])
+
+
+def test_an_oblique_cylinder_fits_into_the_box_that_it_is_a_fraction_of(flat):
+    half = 0.5 * SurfaceBox.of(flat.packing, flat.grains).extents
+    random = np.random.default_rng(3)
+    for _ in range(50):
+        axis = rotation(random)[0]
+        window = window_of(flat, rv_shape="cylinder", rv_axis=tuple(axis), rv=0.9)
+        assert np.all(window.shape.high <= 0.9 * half * (1 + 1e-9))
+        assert np.any(window.shape.high > 0.7 * half)
+
+
+def test_sizes_and_centre_as_given(flat):
+    window = window_of(flat, rv_shape="box", rv_size="1,2,3", rv_center="4 4 2")
+    assert window.shape.high.tolist() == [0.5, 1.0, 1.5]
+    assert window.center.tolist() == [4.0, 4.0, 2.0]
+    window = window_of(flat, rv_shape="cylinder", rv_size="1,3")
+    assert window.shape.high == pytest.approx([1.0, 1.0, 1.5])
+    window = window_of(flat, rv_shape="ellipsoid", rv_size="1,2,1.5")
+    assert window.shape.high == pytest.approx([1.0, 2.0, 1.5])
+
+
+def surface(path, corners):
+    import meshio
+
+    meshio.Mesh(corners, [("triangle", OF_A_BOX)]).write(path)
+    return path
+
+
+def test_a_surface_lies_where_its_file_says_or_about_the_centre_that_is_asked_for(flat, tmp_path):
+    half, center = np.array([1.0, 1.5, 2.0]), np.array([4.0, 3.0, 2.5])
+    file = surface(tmp_path / "box.ply", center + corners_of_a_box(half))
+    window = window_of(flat, rv_shape=file)
+    assert window.center == pytest.approx(center)
+    assert window.shape.high == pytest.approx(half)
+    assert window_of(flat, rv_shape=file, rv_center="5,4,2").center.tolist() == [5.0, 4.0, 2.0]
+
+
+def test_a_surface_that_is_no_convex_body_is_refused_by_its_file(flat, tmp_path):
+    corners = corners_of_a_box(np.ones(3))
+    corners[0] *= 0.3
+    file = surface(tmp_path / "notch.ply", corners)
+    words = r"rv_shape: .*notch.ply: the surface is not convex: .*expected a closed convex surface"
+    with pytest.raises(SettingsError, match=words):
+        window_of(flat, rv_shape=file)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"rv_shape": "box", "rv_size": "14,2,2"}, "beyond the sample, .*or a smaller `rv_size`"),
+        ({"rv_shape": "ellipsoid", "rv_size": "2,2,5"}, "beyond the sample"),
+        ({"rv_shape": "cylinder", "rv_size": "1,9"}, "beyond the sample"),
+        ({"rv_shape": "box", "rv": 2.0}, "beyond the sample"),
+        (
+            {"rv_shape": "ellipsoid", "rv_size": "1e-12,1,1"},
+            "rv: a ellipsoid .* is nothing beside that of the smallest grain",
+        ),
+        ({"rv_shape": "box", "rv_size": "2,2,1e-11"}, "is nothing beside"),
+        (
+            {"rv_shape": "box", "rv_size": "0.1,0.1,0.1", "rv_center": "10.8,8.8,5.8"},
+            r"holds no grain: choose another `rv_center` or a larger one \(`rv_radius`, `rv_size`",
+        ),
+    ],
+)
+def test_windows_that_say_nothing_of_the_sample_are_refused(flat, options, words):
+    with pytest.raises(SettingsError, match=words):
+        make_plan(Settings(**options), flat)
+
+
+def test_a_box_may_be_as_flat_as_the_sample(flat):
+    """Where the ball that holds it reaches far beyond."""
+    plan = make_plan(Settings(rv_shape="box", rv_size="8,6,3.5"), flat)
+    assert plan.window.radius > 5.0
+    assert plan.spacing > 0
+
+
+TILTED = np.array([[6.0, 0.0, 0.0], [2.5, 6.0, 0.0], [-2.0, 1.5, 6.0]])
+
+
+@pytest.fixture(scope="module")
+def tilted():
+    """Overlapping grains in a cell that leans."""
+    random = np.random.default_rng(5)
+    position = random.random((110, 3)) @ TILTED
+    return sample_of(Packing(position, random.uniform(0.3, 0.8, 110), cell=Cell(TILTED)))
+
+
+PERIODIC = {
+    "box": {"rv_shape": "box"},
+    "cylinder": {"rv_shape": "cylinder", "rv_axis": "1,1,1"},
+    "ellipsoid": {"rv_shape": "ellipsoid"},
+    # longer than a period, and clear of its images
+    "long box": {"rv_shape": "box", "rv_size": "1.2,1.2,8.5"},
+    "sphere": {},
+}
+
+
+@pytest.mark.parametrize("center", [None, "0.2 0.3 -0.1", "5.9,3,9"])
+@pytest.mark.parametrize("name", PERIODIC)
+def test_a_window_across_periodic_faces_is_that_of_the_repeated_packing(tilted, name, center):
+    """The same solids and lines; the naive twin along one of them; grains and contacts inside."""
+    settings = Settings(**PERIODIC[name], rv_center=center, variants="cd", seed=3, **LINES)
+    plan = make_plan(settings, tilted)
+    window = plan.window
+    found = measure(tilted, plan)
+    shifts = np.array([[i, j, k] for i in range(-4, 5) for j in range(-4, 5) for k in range(-4, 5)])
+    images = (tilted.packing.position[None] + (shifts @ TILTED)[:, None]).reshape(-1, 3)
+    radius = np.tile(tilted.packing.radius, len(shifts))
+    removed = np.tile(tilted.rattlers, len(shifts))
+    branch = images - window.center
+    near = np.linalg.norm(branch, axis=1) < window.radius + radius
+    solids = Solids(branch[near], radius[near], removed[near], window.shape)
+    words = {"spacing": plan.spacing, "cutoff": 0.2, "variants": "cd", "seed": 3}
+    sums = scan_lines(solids, plan.rule, replicates=range(plan.replicates), **words)
+    assert np.array_equal(sums.segments, found.sums.segments)
+    np.testing.assert_allclose(sums.length, found.sums.length, rtol=1e-9)
+    # what lies in the window, whichever image of it
+    inside = window.shape.contains(branch).reshape(len(shifts), -1)
+    assert inside.sum(axis=0).max() <= 1
+    position, radii, packing = tilted.packing.position, tilted.packing.radius, tilted.packing
+    assert np.array_equal(window.contains(position, packing), inside.any(axis=0))
+    meets = window.shape.may_meet(branch, radius).reshape(len(shifts), -1).any(axis=0)
+    assert np.array_equal(window.may_meet(position, radii, packing), meets)
+    moved = window.center + window.branches(position, packing)
+    assert np.array_equal(window.shape.contains(moved - window.center), inside.any(axis=0))
+    # along one axis by the slow twin
+    triad, offset = rotation(np.random.default_rng(1)), np.array([0.3, 0.8])
+    if not window.shape.is_sphere:
+        from tests.helpers.scanning import scan_triads
+
+        gaps = naive.scan(branch[near], radius[near], triad, offset, 0.4, window.shape)
+        fast = scan_triads(found.solids, triad[None], offset[None], 0.4, 0.2, "c")
+        slow = naive.tally(gaps, 0.2)
+        assert fast.kept("c")[1][0, 0] == slow.window_kept
+        assert fast.kept("c")[0][0, 0] == pytest.approx(slow.window_length)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"rv": 1.5}, "wider than the cell's shortest period"),
+        ({"rv_shape": "box", "rv_size": "6.1,1,1"}, r"overlaps its own image, \(.*\) away"),
+        ({"rv_shape": "ellipsoid", "rv_size": "3.1,1,1"}, "overlaps its own image"),
+        ({"rv_shape": "cylinder", "rv_size": "0.4,100"}, "overlaps its own image"),
+        ({"rv_shape": "box", "rv_size": "1e9,1e9,1e9"}, "more than 10 periods"),
+    ],
+)
+def test_a_window_must_not_overlap_its_own_images(tilted, options, words):
+    with pytest.raises(SettingsError, match=words):
+        make_plan(Settings(**options), tilted)
+
+
+def test_a_polyhedron_must_not_overlap_its_own_images(tilted, tmp_path):
+    for half, fits in (([0.6, 0.6, 4.2], True), ([3.1, 0.6, 0.6], False)):
+        file = surface(tmp_path / "box.ply", np.array(half) * corners_of_a_box(np.ones(3)))
+        if fits:
+            make_plan(Settings(rv_shape=file), tilted)
+        else:
+            with pytest.raises(SettingsError, match="overlaps its own image"):
+                make_plan(Settings(rv_shape=file), tilted)
+
+
+def sheared(sample, gradient):
+    packing = sample.packing
+    cell = Cell(packing.cell.vectors @ gradient.T, origin=[1.0, 2.0, 3.0])
+    return sample_of(Packing(packing.position @ gradient.T + [1, 2, 3], packing.radius, cell=cell))
+
+
+def test_a_window_that_follows_the_cell_is_deformed_as_the_cell(tilted):
+    """Grains that move with the cell stay in it, or out of it."""
+    gradient = np.array([[0.9, 0.2, 0.0], [0.1, 1.1, 0.0], [0.0, 0.3, 0.95]])
+    plan = make_plan(Settings(rv_shape="box", rv_follows="strain"), tilted)
+    assert plan.in_frame(tilted).window is plan.window
+    after = sheared(tilted, gradient)
+    window = plan.in_frame(after).window
+    assert window.shape.volume == pytest.approx(plan.window.shape.volume * np.linalg.det(gradient))
+    assert window.center == pytest.approx(gradient @ plan.window.center + [1, 2, 3])
+    before = plan.window.contains(tilted.packing.position, tilted.packing)
+    assert 10 < before.sum() < 100
+    assert np.array_equal(before, window.contains(after.packing.position, after.packing))
+
+
+@pytest.mark.parametrize("mode", ["boundary", "grains"])
+def test_a_window_follows_the_extents_along_three_axes(flat, mode):
+    boundary = np.zeros(len(flat.packing), bool)
+    boundary[flat.packing.position[:, 0] < 1.0] = True
+    boundary[flat.packing.position[:, 0] > 9.0] = True
+    first = sample_of(flat.packing, boundary)
+    stretch, shift = np.array([1.1, 0.9, 0.8]), np.array([1.0, -2.0, 3.0])
+    packing = Packing(flat.packing.position * stretch + shift, flat.packing.radius)
+    plan = make_plan(Settings(rv_follows="strain", strain=mode, rv=0.5), first)
+    window = plan.in_frame(sample_of(packing, boundary)).window
+    assert window.center == pytest.approx(plan.window.center * stretch + shift)
+    assert window.shape.high == pytest.approx(plan.window.radius * stretch)
+    assert not window.shape.is_sphere
+
+
+def test_a_window_that_has_nothing_to_follow_is_told_what_to_choose(flat):
+    with pytest.raises(SettingsError, match=r'rv_follows: .*choose `strain="grains"`'):
+        make_plan(Settings(rv_follows="strain"), flat)
+    line = sample_of(Packing([[0, 0, 0], [0, 0, 2.0], [0, 0, 4.0]], 1.0))
+    with pytest.raises(SettingsError, match="the grains it is to follow has no volume"):
+        Deformation.since(line, "grains", (0.0, 0.0, 1.0))
+
+
+def test_the_column_of_the_window_alone_is_there_where_it_is_asked_for(flat):
+    words = {"tolerance": 0.02, "variants": "ac"}
+    plain = compute(flat.packing, **words)
+    assert "window_alpha_vs_axial" not in plain.names
+    table = compute(flat.packing, rv_shape="box", **words)
+    assert table.names == (*plain.names, "window_alpha_vs_axial")
+    of_whole, of_window = table["window_alpha_vs_axial"]
+    assert np.isnan(of_whole)
+    assert -0.01 < of_window < -0.003
+    shaped = compute(flat.packing, rv_follows="strain", strain="grains", **words)
+    # in the first frame it is the sphere that it was
+    assert shaped.select(variant="c")["window_alpha_vs_axial"].tolist() == [0.0]
+    second = compute(flat.packing, rv_shape="box", moment=2, **words)
+    assert np.isnan(second["window_alpha_vs_axial"]).all()
+
+
+def test_a_box_table_is_written_resumed_and_read_with_its_column(flat, tmp_path):
+    table = compute(flat.packing, rv_shape="box", tolerance=0.02, variants="c")
+    table.save(tmp_path / "table.csv")
+    header = (tmp_path / "table.csv").read_text().splitlines()[0]
+    assert header.endswith(",window_alpha_vs_axial")
+
+
+def test_windows_have_a_name_for_messages(flat):
+    assert str(Window(np.zeros(3), sphere(2.0))) == "RV (radius 2 about [0.0, 0.0, 0.0])"
+    assert str(Window(np.zeros(3), box([1, 2, 3]))) == "RV (box 1 x 2 x 3 about [0.0, 0.0, 0.0])"
