@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from scanfab.base.errors import SettingsError
 from scanfab.base.option import (
     number,
     one_of,
@@ -24,6 +23,7 @@ from scanfab.pipeline.values import (
     Length,
     Vector,
     as_written,
+    check_moment,
     check_window,
     parse_axis,
     parse_boundary,
@@ -43,7 +43,7 @@ from scanfab.pipeline.values import (
     rattler_rules,
 )
 from scanfab.scan.columns import EDGE_COLUMNS
-from scanfab.scan.edges import CLIP, EDGES, ENDS
+from scanfab.scan.edges import CLIP, EDGES
 
 if TYPE_CHECKING:
     from scanfab.packing.boundary import BoundaryRule
@@ -365,12 +365,7 @@ class Settings:
             value = one.parse(one.name, options.get(one.name, one.default))
             object.__setattr__(self, one.name, value)
         check_window(self)
-        if self.edge == ENDS and self.moment != 1:
-            raise SettingsError(
-                "moment: from what lies inside the window alone, as `edge=ends` takes it, the "
-                "second moment of the full lengths is not known: choose `edge=start`, or "
-                "`moment=1`"
-            )
+        check_moment(self)
 
     @property
     def more_columns(self) -> tuple[str, ...]:

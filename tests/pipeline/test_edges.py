@@ -109,3 +109,25 @@ def test_its_columns_are_written_read_back_and_resumed(ball, suffix, tmp_path):
 def test_another_word_is_refused():
     with pytest.raises(SettingsError, match="edge"):
         scanfab.Settings(edge="cut")
+
+
+@pytest.mark.parametrize("shape", ["box", "cylinder", "ellipsoid"])
+def test_a_window_of_any_shape_has_no_anisotropy_of_its_own_without_bias(shape):
+    """Of an isotropic medium, by a window twice as high as wide."""
+    random = np.random.default_rng(3)
+    cell = Cell([24.0, 24.0, 24.0])
+    packing = Packing(24 * random.random((2800, 3)), random.uniform(0.5, 1.5, 2800), cell=cell)
+    size = {"box": "7,7,14", "cylinder": "3.5,14", "ellipsoid": "4,4,8"}[shape]
+    words = {"rv_shape": shape, "rv_size": size, "variants": "c", "cutoff": 0.5}
+    scan = {"spacing": 1.0, "directions": "lebedev:11", "workers": 1}
+    clip, start, ends = (
+        compute(packing, edge=edge, **words, **scan)[0] for edge in ("clip", "start", "ends")
+    )
+    assert abs(clip.window_alpha_vs_axial) > 3e-3
+    assert start.window_alpha_vs_axial == ends.window_alpha_vs_axial == 0.0
+    # the sample's own scatter is in all three
+    assert clip.alpha_vs_axial - start.alpha_vs_axial == pytest.approx(
+        clip.window_alpha_vs_axial, abs=4e-3
+    )
+    assert start.alpha_vs_axial == pytest.approx(ends.alpha_vs_axial, abs=5e-3)
+    assert clip.mean_length < start.mean_length
