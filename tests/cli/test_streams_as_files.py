@@ -112,7 +112,7 @@ def test_what_a_shell_pipes_in_is_compared_but_no_source(dump, tmp_path):
     refused = bash('"$@" compute <(cat dump.txt)')
     assert refused.returncode == 1
     assert "is a pipe, expected a file" in refused.stderr
-    assert "scanfab compute - --format NAME" in refused.stderr
+    assert "by - in place of its name and --format NAME" in refused.stderr
 
 
 def test_the_library_says_the_same(pipe):
