@@ -107,12 +107,13 @@ class _Lines(NamedTuple):
         solids = self.solids
         position, radius, removed = solids.position, solids.radius, solids.removed
         shape = solids.window
-        solid = np.ones(len(radius), bool) if self.first else ~removed
+        # a mask of all would copy
+        solid = slice(None) if self.first else ~removed
         if inner is not None:
             position, shape = position - inner.center, inner.shape
-            solid &= solids.near_inner
+            solid = solids.near_inner & (self.first | ~removed)
         elif window is not None and solids.edge != CLIP:
-            solid &= solids.near_window
+            solid = solids.near_window & (self.first | ~removed)
         passes = (1 + (self.both is not None)) * ((whole is not None) + (window is not None))
         scan_axes(
             np.ascontiguousarray(position[solid]),

@@ -21,12 +21,10 @@ are concerned; segments that reach further are followed alone
 
 from __future__ import annotations
 
-import numpy as np
-
 from scanfab.base.jit import Flag, inner
 from scanfab.scan.kernels.strips import FAR, Edge
 
-__all__ = ["CLIPPED", "beyond_listed", "cut_at_entry", "ends_inside", "listed_to", "window_gap"]
+__all__ = ["CLIPPED", "cut_at_entry", "ends_inside", "listed_to", "window_gap"]
 
 # Of the margin: segments that reach so far are followed, whatever rounding says of its very end.
 NEARLY = 1.0 - 1e-6
@@ -81,12 +79,3 @@ def window_gap(
             void,
         )
     return inside if kept else 0.0, 1.0 if kept else 0.0, void
-
-
-@inner(forceinline=True, error_model="numpy")
-def beyond_listed(start: float, stop: float, leaves: float, edge: Edge) -> tuple[float, float]:
-    """A chord as it is, or NaN if it begins where some behind the window may not be listed."""
-    if edge.start is not None:
-        known = start < leaves + edge.margin
-        return start if known else np.nan, stop if known else np.nan
-    return start, stop

@@ -22,7 +22,7 @@ from scanfab.scan.kernels.strips import (
     Strip,
     span,
 )
-from scanfab.scan.kernels.sweep import Measured, add, counted, moved
+from scanfab.scan.kernels.sweep import Measured, add, counted, is_listed, moved
 
 __all__ = ["solve_closed"]
 
@@ -149,9 +149,7 @@ def gaps_of(
     count = 0
     for k in order:
         start, stop = chords[0, k], chords[1, k]
-        if measured is not None and start - enters >= measured.known:
-            continue
-        if window is not None and window.start is not None and start >= leaves + window.margin:
+        if not is_listed(start, enters, leaves, window, measured):
             continue
         if start > end:
             ends[0, count], ends[1, count] = low, high

@@ -36,7 +36,7 @@ from scanfab.scan.kernels.strips import (
     Strip,
     span,
 )
-from scanfab.scan.kernels.sweep import CHORDS, Measured, add, both, listed, meet, moved
+from scanfab.scan.kernels.sweep import CHORDS, Measured, add, both, is_listed, meet, moved
 
 __all__ = [
     "LISTED_LINES",
@@ -160,7 +160,8 @@ def sweep_abreast(
         half_chord = half_chord if np.int64(k) < lists.stop[i] else np.nan
         start, stop = depth - half_chord, depth + half_chord
         enters, leaves = lines[i + ENTRY], lines[i + EXIT]
-        start, stop = listed(start, stop, enters, leaves, window, measured)
+        known = is_listed(start, enters, leaves, window, measured)
+        start, stop = start if known else np.nan, stop if known else np.nan
         found = meet(lines, i, start, stop, least, enters, leaves, whole, window, measured)
         sums = both(sums, found)
         if second is not None:
@@ -248,7 +249,7 @@ def bin_lists(
                 depth, reach2 = chords[np.uint64(place)], chords[np.uint64(place + ABREAST)]
                 half_chord = np.sqrt(abs(reach2))
                 start, stop = depth - half_chord, depth + half_chord
-                if listed(start, stop, enters, leaves, window, measured)[0] != start:
+                if not is_listed(start, enters, leaves, window, measured):
                     continue
                 if window is not None and window.start is not None:
                     cut = cut_at_entry(low, high, enters, leaves, window)

@@ -28,7 +28,7 @@ import numpy as np
 
 from scanfab.base.jit import LANES, REORDERED, Flag, inner
 from scanfab.base.typing import FloatArray
-from scanfab.scan.kernels.edges import beyond_listed, cut_at_entry, window_gap
+from scanfab.scan.kernels.edges import cut_at_entry, window_gap
 from scanfab.scan.kernels.strips import (
     END,
     ENTRY,
@@ -61,7 +61,7 @@ __all__ = [
     "WINDOW",
     "Measured",
     "counted",
-    "listed",
+    "is_listed",
     "moved",
     "settle",
     "visit",
@@ -111,21 +111,16 @@ def whole_gap(
 
 
 @inner(forceinline=True, error_model="numpy")
-def listed(
-    start: float,
-    stop: float,
-    enters: float,
-    leaves: float,
-    window: Edge | None,
-    measured: Measured | None,
-) -> tuple[float, float]:
-    """A chord as it is, or NaN if it begins where some may not be listed."""
+def is_listed(
+    start: float, enters: float, leaves: float, window: Edge | None, measured: Measured | None
+) -> bool:
+    """Whether a chord begins where all of them are listed; others are left out."""
+    known = True
     if measured is not None:
-        stop = stop if start - enters < measured.known else np.nan
-        start = start if start - enters < measured.known else np.nan
-    if window is not None:
-        start, stop = beyond_listed(start, stop, leaves, window)
-    return start, stop
+        known = start - enters < measured.known
+    if window is not None and window.start is not None:
+        known = start < leaves + window.margin
+    return known
 
 
 @inner(forceinline=True, error_model="numpy")
@@ -254,7 +249,8 @@ def visit(
             start = sphere.depth - half_chord
             stop = sphere.depth + half_chord
             enters, leaves = lines[i + ENTRY], lines[i + EXIT]
-            start, stop = listed(start, stop, enters, leaves, window, measured)
+            known = is_listed(start, enters, leaves, window, measured)
+            start, stop = start if known else np.nan, stop if known else np.nan
             found = meet(lines, i, start, stop, least, enters, leaves, whole, window, measured)
             sums = both(sums, found)
             if second is not None:
