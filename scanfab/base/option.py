@@ -17,6 +17,7 @@ __all__ = [
     "GROUPS",
     "Option",
     "as_given",
+    "changed",
     "number",
     "one_of",
     "option",
@@ -98,6 +99,13 @@ class Option:
 def option(**declaration: Any) -> Any:
     """A field of a dataclass that declares an option, of the field's name."""
     declared = Option(**declaration)
+    return field(default=declared.default, metadata={"option": declared})
+
+
+def changed(holder: type, name: str, **changes: Any) -> Any:
+    """A field that declares an option of another dataclass once more, with some changes."""
+    declared = next(one for one in options_of(holder) if one.name == name)
+    declared = replace(declared, **changes)
     return field(default=declared.default, metadata={"option": declared})
 
 

@@ -21,6 +21,7 @@ from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.frame import FrameResult, compute_frame
 from scanfab.pipeline.frames import Frames, Readable, Source
+from scanfab.pipeline.map_frame import map_frame
 from scanfab.pipeline.plan import Plan, make_plan, plan_without_grains
 from scanfab.pipeline.settings import MAX_CHORDS, Settings
 from scanfab.pipeline.strain import Flips, Strains
@@ -178,7 +179,8 @@ class _FrameJob:
     def _computed(self, plan: Plan) -> _Computed:
         begun = time.perf_counter()
         try:
-            found = compute_frame(self.frame, plan, number=self.number, source=self.source)
+            words = {"number": self.number, "source": self.source}
+            found = (map_frame if plan.map_settings else compute_frame)(self.frame, plan, **words)
         except (PackingError, ReadError) as error:
             if not self.skips_damaged:
                 raise

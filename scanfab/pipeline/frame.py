@@ -17,7 +17,7 @@ from scanfab.pipeline.variant_columns import VariantColumns, no_columns
 from scanfab.table.columns import complete_row
 from scanfab.table.row import Row
 
-__all__ = ["OTHER_CUTOFFS", "FrameResult", "compute_frame"]
+__all__ = ["OTHER_CUTOFFS", "FrameResult", "as_sample", "compute_frame", "frame_values"]
 
 OTHER_CUTOFFS = "error_at_other_cutoffs"
 """The code of a note: the scan is fine enough for its cut-off, but not for another."""
@@ -70,17 +70,8 @@ def compute_frame(
     ScanfabError
         If the frame cannot be read or measured.
     """
-    if not isinstance(frame, Sample):
-        packing = frame if isinstance(frame, Packing) else frame.read()
-        frame = plan.samples.sample(packing)
-    known: dict[str, Any] = {
-        "source": source,
-        "frame": number,
-        "step": frame.packing.step,
-        "time": frame.packing.time,
-        "contacts_from": frame.contacts.source,
-        **plan.strains.at(number, frame),
-    }
+    frame = as_sample(frame, plan)
+    known = frame_values(frame, plan, number, source)
     if not frame.grains.any():
         empty = {**no_columns(plan.more_columns), **known}
         rows = [
@@ -106,6 +97,25 @@ def compute_frame(
         *_large_errors(rows, plan),
     ]
     return FrameResult(source, number, frame, measurement, rows, tuple(notes))
+
+
+def as_sample(frame: Packing | Sample | Readable, plan: Plan) -> Sample:
+    """A frame, read if it is not yet, and told apart."""
+    if isinstance(frame, Sample):
+        return frame
+    return plan.samples.sample(frame if isinstance(frame, Packing) else frame.read())
+
+
+def frame_values(sample: Sample, plan: Plan, number: int, source: str) -> dict[str, Any]:
+    """The columns that are the same in all rows of a frame."""
+    return {
+        "source": source,
+        "frame": number,
+        "step": sample.packing.step,
+        "time": sample.packing.time,
+        "contacts_from": sample.contacts.source,
+        **plan.strains.at(number, sample),
+    }
 
 
 def _large_errors(rows: list[Row], plan: Plan) -> Iterator[Note]:

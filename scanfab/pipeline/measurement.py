@@ -18,8 +18,9 @@ from scanfab.pipeline.plan import CLOSE, Plan
 from scanfab.pipeline.settings import AUTO_RULE
 from scanfab.pipeline.solids import solids_of
 from scanfab.pipeline.tolerance import scan_to_tolerance
+from scanfab.scan.blocks import Blocks
 from scanfab.scan.directions import DirectionRule, design_of, direction_rule
-from scanfab.scan.gaps import Blocks, GapSums, scan_gaps
+from scanfab.scan.gaps import GapSums, scan_gaps
 from scanfab.scan.scan import ScanSums
 from scanfab.scan.solids import Solids, most_lines
 

@@ -13,6 +13,8 @@ from scanfab.packing.doubts import refuse_impossible
 from scanfab.packing.sample import Sample, SampleRule
 from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.frames import sample_rule
+from scanfab.pipeline.map_blocks import MapBlocks, map_blocks
+from scanfab.pipeline.map_settings import MapSettings
 from scanfab.pipeline.rv import Deformation, doubts_of_rv, rv_of
 from scanfab.pipeline.settings import AUTO_RULE, Settings, Vector
 from scanfab.pipeline.strain import Strains
@@ -79,6 +81,10 @@ class Plan:
     """What counts at the window's surface, see :mod:`scanfab.scan.edges`."""
     lists_gaps: bool
     """Whether sums for one cut-off do not suffice."""
+    map_settings: MapSettings | None = None
+    """Of a map; else None."""
+    map_blocks: MapBlocks | None = None
+    """Of a map whose series has grains: what its blocks tile."""
     notes: tuple[Note, ...] = ()
     """What is doubtful about the settings, for a user who has chosen them."""
 
@@ -123,6 +129,10 @@ def make_plan(settings: Settings, sample: Sample, strains: Strains | None = None
     window = rv_of(sample, settings) if settings.needs_window else None
     if window is not None:
         notes += doubts_of_rv(window, sample, box, lengths["rmax"])
+    blocks: MapBlocks | None = None
+    if isinstance(settings, MapSettings):
+        blocks = map_blocks(settings, sample)
+        notes += blocks.doubts(sample, window, lengths["rmean"])
     scanned = _scanned(box, None if window is None else window.shape)
     rule = plan.rule
     if rule.bias > 0.1 * settings.tolerance:
@@ -138,6 +148,7 @@ def make_plan(settings: Settings, sample: Sample, strains: Strains | None = None
         deformation=_deformation(settings, sample),
         cutoff=cutoff,
         cutoffs=cutoffs,
+        map_blocks=blocks,
         notes=tuple(notes),
         **_lines(settings, rule, scanned, lengths),
     )
@@ -223,6 +234,7 @@ def _without_lengths(settings: Settings, strains: Strains) -> Plan:
         rule_is_asked_for=settings.directions is not None,
         edge=settings.edge,
         lists_gaps=settings.lists_gaps,
+        map_settings=settings if isinstance(settings, MapSettings) else None,
     )
 
 
@@ -238,6 +250,8 @@ def _auto_spacing(
     segments_per_line = max(scanned.depth / (3.0 * radius), 1.0)
     # lines * segments_per_line = segments, and lines are so many axes' area / spacing²
     lines = SEGMENTS_PER_VARIANCE / settings.tolerance**2 / (REPLICATES * axes * segments_per_line)
+    # of which each block gets its share
+    lines *= settings.blocks
     apart = area / lines / radius**2
     spacing = radius * max(
         min(math.pow(apart, 1.0 / (2.0 + GROWTH_WITH_SPACING)), WIDE),

@@ -9,13 +9,13 @@ from itertools import groupby, pairwise
 from pathlib import Path
 from typing import Any
 
+from scanfab.base.column import Column
 from scanfab.base.errors import SettingsError
 from scanfab.io.series import Series
 from scanfab.pipeline.frames import chosen_frames
 from scanfab.pipeline.manifest import Inputs, default_settings, strain_file, surface_file
 from scanfab.pipeline.repeat import read_manifest
 from scanfab.pipeline.settings import Settings
-from scanfab.table.columns import complete_row, table_columns
 from scanfab.table.reading import read_rows
 from scanfab.table.result_file import differing_settings
 from scanfab.table.row import Row
@@ -228,16 +228,15 @@ def _by_frame(
     for (source, frame), group in groupby(rows, key=lambda row: (row["source"], row["frame"])):
         if source not in found:
             raise _refused(path, f"its source {source} is not named now")
-        own = [_row(row, settings.more_columns) for row in group]
+        own = [_row(row, settings.columns) for row in group]
         if len(own) == settings.rows_per_frame:
             found[source][frame] = own
     return found
 
 
-def _row(values: Mapping[str, Any], more: Collection[str]) -> Row:
+def _row(values: Mapping[str, Any], columns: Collection[Column]) -> Row:
     """A row as it was written; columns that were not are empty, and are not written again."""
-    names = [column.name for column in table_columns(more)]
-    return complete_row({name: values.get(name) for name in names}, more)
+    return Row(**{one.name: values.get(one.name) for one in columns})
 
 
 def _refused(path: Path, reason: str) -> SettingsError:

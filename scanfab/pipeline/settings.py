@@ -46,6 +46,7 @@ from scanfab.scan.columns import EDGE_COLUMNS
 from scanfab.scan.edges import CLIP, EDGES
 
 if TYPE_CHECKING:
+    from scanfab.base.column import Column
     from scanfab.packing.boundary import BoundaryRule
     from scanfab.scan.directions import DirectionRule
 
@@ -375,18 +376,29 @@ class Settings:
         return columns if self.edge == CLIP else (*columns, *(one.name for one in EDGE_COLUMNS))
 
     def __repr__(self) -> str:
-        usual = Settings()
         chosen = [
             f"{one.name}={as_written(getattr(self, one.name))!r}"
             for one in options_of(type(self))
-            if getattr(self, one.name) != getattr(usual, one.name)
+            if getattr(self, one.name) != one.parse(one.name, one.default)
         ]
-        return f"Settings({', '.join(chosen)})"
+        return f"{type(self).__name__}({', '.join(chosen)})"
 
     @property
     def lists_gaps(self) -> bool:
         """Whether sums for one cut-off do not suffice."""
         return bool(self.cutoffs) or self.moment != 1
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """Of the table."""
+        from scanfab.table.columns import table_columns
+
+        return table_columns(self.more_columns)
+
+    @property
+    def blocks(self) -> int:
+        """How many parts of the sample a frame tells apart, each with rows of its own."""
+        return 1
 
     @property
     def rows_per_frame(self) -> int:

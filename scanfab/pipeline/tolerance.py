@@ -7,17 +7,17 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from scanfab.base.errors import SettingsError
 from scanfab.base.note import Note
 from scanfab.base.spelling import spelt_apart, spelt_time
-from scanfab.fabric.void import void_fabric
+from scanfab.pipeline.goal import EACH_VARIANT, Goal
 from scanfab.pipeline.plan import CLOSE, GROWTH_WITH_SPACING, Plan
 from scanfab.scan.directions import design_of, direction_rule
 from scanfab.scan.following import FollowedTooFarError
-from scanfab.scan.scan import ScanSums, scan_lines
 from scanfab.scan.solids import Solids, is_affordable, most_lines
 
 __all__ = ["TOLERANCE_MISSED", "missing_work", "scan_to_tolerance"]
@@ -54,8 +54,8 @@ FAR_MORE = 1000
 
 
 def scan_to_tolerance(
-    solids: Solids, plan: Plan, where: str = "the frame"
-) -> tuple[ScanSums, Plan, list[Note]]:
+    solids: Solids, plan: Plan, where: str = "the frame", goal: Goal = EACH_VARIANT
+) -> tuple[Any, Plan, list[Note]]:
     """
     Scan one frame as planned, and where the plan is ``auto``, on until the tolerance holds.
 
@@ -63,8 +63,8 @@ def scan_to_tolerance(
 
     Returns
     -------
-    ScanSums
-        Of all replicates.
+    sums
+        Of all replicates, as the goal scans them; without one a ScanSums.
     Plan
         With the rule and the spacing of each replicate as they were in the end.
     list of Note
@@ -72,33 +72,34 @@ def scan_to_tolerance(
     """
     if not plan.auto:
         every = range(plan.replicates)
-        return _scan(solids, plan, every, plan.max_chords), plan, []
+        return goal.scan(solids, plan, every, plan.max_chords), plan, []
     plan = _within_budget(plan, solids)
     notes: list[Note] = []
     planned = plan.spacing
-    sums: ScanSums | None = None
+    sums: Any = None
     start, stop, spent = 0, plan.replicates, 0.0
     begun = time.perf_counter()
     while True:
         if start == 0:
-            batch, plan = _first_round(solids, plan)
+            batch, plan = _first_round(solids, plan, goal)
         else:
-            batch = _scan(solids, plan, range(start, stop))
+            batch = goal.scan(solids, plan, range(start, stop))
         # a line costs as much as a chord, also if it meets nothing
         lines = most_lines(solids, plan.spacing) * len(plan.rule)
         spent += float(batch.work.sum()) + lines * batch.replicates
-        sums = batch if sums is None or start == 0 else ScanSums.concatenate([sums, batch])
+        sums = batch if start == 0 else goal.concatenate([sums, batch])
         # as many replicates as the budget allows
         left = (plan.max_chords - spent) / max(float(sums.work.mean()) + lines, 1.0)
-        counted = _counted_variants(sums, plan, solids, left)
-        missing = missing_work(sums, plan, counted)
+        counted = _counted_variants(sums, plan, solids, left, goal)
+        missing = missing_work(sums, plan, counted, goal)
         rest = min(missing, plan.max_chords / spent) - 1.0
         if rest > 0.0:
             seconds = rest * (time.perf_counter() - begun)
-            _tell_progress(sums, plan, counted, where, seconds)
+            _tell_progress(sums, plan, counted, goal, where, seconds)
         better: Plan | None = None
         if start == 0 and plan.spacing <= planned:
-            better = _better_plan(sums, plan, missing, solids, counted, left)
+            too_few = any(_too_few_lines(sums, name, goal) for name in counted)
+            better = _better_plan(plan, missing, solids, too_few, left)
         if better is not None:
             plan, planned = better, better.spacing
             continue
@@ -110,10 +111,10 @@ def scan_to_tolerance(
             notes.append(_missed_tolerance(missing, spent, sums, plan))
             break
         start, stop = stop, more
-    return sums, plan, [*notes, *_dropped_variants(sums, plan, counted)]
+    return sums, plan, [*notes, *_dropped_variants(sums, plan, counted, goal)]
 
 
-def _first_round(solids: Solids, plan: Plan) -> tuple[ScanSums, Plan]:
+def _first_round(solids: Solids, plan: Plan, goal: Goal) -> tuple[Any, Plan]:
     """
     Scan the first replicates, with wider lines if following them takes more steps than allowed.
 
@@ -122,13 +123,13 @@ def _first_round(solids: Solids, plan: Plan) -> tuple[ScanSums, Plan]:
     """
     every = plan.replicates
     if solids.medium is None:
-        return _scan(solids, plan, range(every)), plan
+        return goal.scan(solids, plan, range(every)), plan
     while True:
         try:
-            sums = _scan(solids, plan, range(1), plan.max_chords / every)
+            sums = goal.scan(solids, plan, range(1), plan.max_chords / every)
             if every > 1:
-                rest = _scan(solids, plan, range(1, every), plan.max_chords)
-                sums = ScanSums.concatenate([sums, rest])
+                rest = goal.scan(solids, plan, range(1, every), plan.max_chords)
+                sums = goal.concatenate([sums, rest])
             return sums, plan
         except FollowedTooFarError:
             wider = 2.0 * plan.spacing
@@ -137,34 +138,15 @@ def _first_round(solids: Solids, plan: Plan) -> tuple[ScanSums, Plan]:
             plan = replace(plan, spacing=wider)
 
 
-def _scan(
-    solids: Solids,
-    plan: Plan,
-    replicates: range,
-    most_steps: float = math.inf,
-) -> ScanSums:
-    return scan_lines(
-        solids,
-        plan.rule,
-        spacing=plan.spacing,
-        cutoff=plan.cutoff,
-        variants=plan.variants,
-        replicates=replicates,
-        seed=plan.seed,
-        workers=plan.workers,
-        most_steps=most_steps,
-    )
-
-
 def _better_plan(
-    sums: ScanSums, plan: Plan, missing: float, solids: Solids, counted: str, left: float
+    plan: Plan, missing: float, solids: Solids, too_few_lines: bool, left: float
 ) -> Plan | None:
     """After the first round, a plan to start afresh with, if that is worth it and affordable."""
     closest = CLOSEST * solids.grain_radius.min(initial=np.inf)
     better = plan
     if plan.auto == "directions":
         better = _with_more_axes(plan, missing)
-    elif _too_few_lines(sums, counted) and 0.5 * plan.spacing > closest:
+    elif too_few_lines and 0.5 * plan.spacing > closest:
         better = replace(plan, spacing=0.5 * plan.spacing)
     elif missing >= AFRESH_FROM and len(solids.grain_radius):
         better = _with_closer_lines(plan, missing, solids)
@@ -226,20 +208,21 @@ def _width(solids: Solids) -> float:
     return float((high - low).max())
 
 
-def _counted_variants(sums: ScanSums, plan: Plan, solids: Solids, left: float) -> str:
+def _counted_variants(sums: Any, plan: Plan, solids: Solids, left: float, goal: Goal) -> str:
     """
     The variants that the scan goes on for.
 
     One that keeps but a few grains does not hold back the others, nor one whose tolerance is out of
     reach of the budget, which allows so many more replicates; such are all variants, or none.
     """
-    missing = {name: missing_work(sums, plan, name) for name in plan.variants}
+    missing = {name: missing_work(sums, plan, name, goal) for name in plan.variants}
     few = [name for name in missing if _kept_grains(solids, name) < FEW_KEPT]
     usual = max((missing[name] for name in missing if name not in few), default=math.inf)
     held_back = {
         name
         for name in few
-        if missing[name] > HELD_BACK * usual or (usual < math.inf and _too_few_lines(sums, name))
+        if missing[name] > HELD_BACK * usual
+        or (usual < math.inf and _too_few_lines(sums, name, goal))
     }
     # closer lines tell more than more of them; and early estimates of the error are uncertain
     reach = GROWTH * (1.0 + left / sums.replicates) ** (1.0 + 0.5 * GROWTH_WITH_SPACING)
@@ -258,16 +241,12 @@ def _kept_grains(solids: Solids, variant: str) -> float:
     return 1.0 - float(removed.mean()) if len(removed) else 1.0
 
 
-def _too_few_lines(sums: ScanSums, variants: str) -> bool:
-    """Whether some variant keeps segments, but none in too many directions of a replicate."""
-    for variant in variants:
-        _, segments = sums.kept(variant)
-        if segments.any() and np.mean(segments == 0) > MOST_EMPTY:
-            return True
-    return False
+def _too_few_lines(sums: Any, variant: str, goal: Goal) -> bool:
+    """Whether a variant keeps segments, but none in too many directions of a replicate."""
+    return MOST_EMPTY < goal.empty_share(sums, variant) < 1.0
 
 
-def missing_work(sums: ScanSums, plan: Plan, variants: str) -> float:
+def missing_work(sums: Any, plan: Plan, variants: str, goal: Goal = EACH_VARIANT) -> float:
     """
     By what factor the lines must grow for these variants to meet the tolerance; <= 1: done.
 
@@ -279,14 +258,13 @@ def missing_work(sums: ScanSums, plan: Plan, variants: str) -> float:
         margin = 1.0 + SIGMAS / math.sqrt(2.0 * (sums.replicates - 1))
     missing = expected = 0.0
     for variant in variants:
-        length, segments = sums.kept(variant)
-        fabric = void_fabric(sums.axes, plan.rule.weights, length, segments)
-        if fabric is not None:
-            error = fabric.axial_error(plan.axis) or 0.0
-            missing = max(missing, (error / plan.tolerance) ** 2)
-            error = fabric.expected_error(plan.axis, plan.rule.degree) or error
-            expected = max(expected, (margin * error / plan.tolerance) ** 2)
-        elif segments.any() and plan.auto == "replicates" and sums.replicates < 256:
+        errors = goal.errors(sums, plan, variant)
+        if errors is not None:
+            missing = max(missing, (errors.reported / plan.tolerance) ** 2)
+            expected = max(expected, (margin * errors.expected / plan.tolerance) ** 2)
+            continue
+        has_segments = goal.empty_share(sums, variant) < 1.0
+        if has_segments and plan.auto == "replicates" and sums.replicates < 256:
             # a direction without any segment may still get one
             return GROWTH
     # the replicates' own scatter is what is reported, but too noisy to decide alone: a scan that
@@ -296,7 +274,7 @@ def missing_work(sums: ScanSums, plan: Plan, variants: str) -> float:
     return max(expected, min(missing, 1.1))
 
 
-def _missed_tolerance(factor: float, spent: float, sums: ScanSums, plan: Plan) -> Note:
+def _missed_tolerance(factor: float, spent: float, sums: Any, plan: Plan) -> Note:
     more = "at least " if factor >= GROWTH else ""
     if factor > FAR_MORE:
         more, factor = "more than ", FAR_MORE
@@ -315,27 +293,29 @@ def _missed_tolerance(factor: float, spent: float, sums: ScanSums, plan: Plan) -
     return Note(TOLERANCE_MISSED, text)
 
 
-def _dropped_variants(sums: ScanSums, plan: Plan, counted: str) -> Iterator[Note]:
+def _dropped_variants(sums: Any, plan: Plan, counted: str, goal: Goal) -> Iterator[Note]:
     """What variants have reached that the scan did not go on for."""
     for name in plan.variants:
-        fabric = void_fabric(sums.axes, plan.rule.weights, *sums.kept(name))
-        error = math.inf if fabric is None else fabric.axial_error(plan.axis) or 0.0
+        errors = goal.errors(sums, plan, name)
+        error = math.inf if errors is None else errors.reported
         if name in counted or error <= plan.tolerance:
             continue
         reached, tolerance = spelt_apart(error, plan.tolerance)
         said = f"alpha_vs_axial_se is {reached}, above the tolerance {tolerance}"
         text = (
-            f"{said if fabric else 'there is no void fabric yet'}: it keeps few grains, or would "
+            f"{said if errors else 'there is no void fabric yet'}: it keeps few grains, or would "
             f'need far more lines than the others (`variants="{name}"` scans it alone)'
         )
         yield Note("variant_dropped", text, (name,))
 
 
-def _tell_progress(sums: ScanSums, plan: Plan, counted: str, where: str, seconds: float) -> None:
+def _tell_progress(
+    sums: Any, plan: Plan, counted: str, goal: Goal, where: str, seconds: float
+) -> None:
     """The largest error so far, and about how long the rest of the scan will take."""
     if not LOGGER.isEnabledFor(logging.INFO):
         return
-    fabrics = [void_fabric(sums.axes, plan.rule.weights, *sums.kept(name)) for name in counted]
-    errors = [one.axial_error(plan.axis) or 0.0 for one in fabrics if one is not None]
+    every = [goal.errors(sums, plan, name) for name in counted]
+    errors = [one.reported for one in every if one is not None]
     worst, tolerance = spelt_apart(max(errors, default=math.inf), plan.tolerance)
     LOGGER.info("%s: error %s of %s, about %s", where, worst, tolerance, spelt_time(seconds))

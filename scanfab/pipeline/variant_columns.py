@@ -18,10 +18,20 @@ from scanfab.fabric.window import WINDOW_ALPHA, window_alpha
 from scanfab.packing.columns import sample_values
 from scanfab.packing.sample import Variant
 from scanfab.pipeline.measurement import Measurement
+from scanfab.pipeline.plan import Plan
 from scanfab.scan.edges import CLIP, ENDS, START
+from scanfab.scan.scan import ScanSums
+from scanfab.scan.solids import Solids
 from scanfab.table.columns import installed_fabrics, table_columns
 
-__all__ = ["VariantColumns", "no_columns"]
+__all__ = [
+    "VariantColumns",
+    "channels_text",
+    "edge_of",
+    "left_out_of",
+    "left_out_text",
+    "no_columns",
+]
 
 
 # in smallest radii: a cut-off that nobody means
@@ -115,20 +125,12 @@ class VariantColumns:
     @property
     def edge(self) -> str | None:
         """The rule of this variant; a whole that repeats has no edge."""
-        if self.variant.in_window:
-            return self.plan.edge
-        if self.measurement.solids.medium is not None:
-            return None
-        return ENDS if self.plan.edge == ENDS else CLIP
+        return edge_of(self.variant, self.plan, self.measurement.solids)
 
     @cached_property
     def left_out(self) -> float | None:
         """Share of the segments that leave the sample, and so are not counted."""
-        if self.edge != START:
-            return None
-        left = float(self.sums.left_out[:, self.which].sum())
-        every = left + float(self.sums.segments[:, self.which].sum())
-        return left / every if every else None
+        return left_out_of(self.sums, self.which, self.edge)
 
     def _solid_fraction(self) -> float | None:
         """1 - void length / line length in the window, weighted like the directions."""
@@ -186,23 +188,12 @@ class VariantColumns:
 
     def notes(self) -> Iterator[Note]:
         """Whether there is no void fabric, or a doubtful one, or lines without a grain."""
-        texts = {"channels": self._channels(), "left_out": self._left_out()}
+        texts = {
+            "channels": channels_text(self.sums, self.which),
+            "left_out": left_out_text(self.left_out),
+        }
         texts |= self._of_void_fabric()
         return (Note(code, text, (self.variant.name,)) for code, text in texts.items() if text)
-
-    def _channels(self) -> str:
-        channels = int(self.sums.channels[:, self.which].sum())
-        lines = channels + int(self.sums.lines[:, self.which].sum())
-        return f"{channels} of {lines} lines stay in a channel and meet no grain" * bool(channels)
-
-    def _left_out(self) -> str:
-        if (self.left_out or 0.0) <= MOST_LEFT_OUT:
-            return ""
-        return (
-            f"{self.left_out:.1%} of the void segments of the RV leave the sample and are left "
-            f"out: they are the long ones, so the mean length is too small: choose a smaller `rv`, "
-            f"or `edge=ends`, which needs nothing from outside"
-        )
 
     def _of_void_fabric(self) -> dict[str, str]:
         void = self.measured.void
@@ -228,3 +219,39 @@ def no_columns(more: Collection[str] = ()) -> dict[str, Any]:
     """The columns of a frame without grains."""
     empty = {column.name: None for column in table_columns(more)}
     return {**empty, "grains": 0, "rattlers": 0, "contacts": 0}
+
+
+def edge_of(variant: Variant, plan: Plan, solids: Solids) -> str | None:
+    """The rule at the surface of a variant's window; a whole that repeats has no edge."""
+    if variant.in_window:
+        return plan.edge
+    if solids.medium is not None:
+        return None
+    return ENDS if plan.edge == ENDS else CLIP
+
+
+def left_out_of(sums: ScanSums, which: int, edge: str | None) -> float | None:
+    """Share of a variant's segments that leave the sample, and so are not counted."""
+    if edge != START:
+        return None
+    left = float(sums.left_out[:, which].sum())
+    every = left + float(sums.segments[:, which].sum())
+    return left / every if every else None
+
+
+def channels_text(sums: ScanSums, which: int) -> str:
+    """Whether lines of a variant meet no grain, however far they go."""
+    channels = int(sums.channels[:, which].sum())
+    lines = channels + int(sums.lines[:, which].sum())
+    return f"{channels} of {lines} lines stay in a channel and meet no grain" * bool(channels)
+
+
+def left_out_text(left_out: float | None) -> str:
+    """Whether too many segments leave the sample."""
+    if (left_out or 0.0) <= MOST_LEFT_OUT:
+        return ""
+    return (
+        f"{left_out:.1%} of the void segments of the RV leave the sample and are left "
+        f"out: they are the long ones, so the mean length is too small: choose a smaller `rv`, "
+        f"or `edge=ends`, which needs nothing from outside"
+    )

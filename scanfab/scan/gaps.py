@@ -2,113 +2,31 @@
 The gap scan: all void segments, by the block of their middle and by cut-off.
 
 Slower than :mod:`scanfab.scan.scan`, about twice where lines are far apart, and for what that
-cannot tell: the sample's own scatter, every cut-off in one pass, and higher moments of the lengths.
+cannot tell: the sample's own scatter, maps, every cut-off in one pass, and higher moments of the
+lengths.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from scanfab.base.jit import Flag
-from scanfab.base.typing import BoolArray, FloatArray, IntArray
+from scanfab.base.typing import FloatArray
+from scanfab.scan.blocks import Blocks, partition_of
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.edges import ENDS
 from scanfab.scan.following import MOST_STEPS, Following
 from scanfab.scan.kernels.bins import Bins
-from scanfab.scan.lines import drawn_lines, line_triads
-from scanfab.scan.scan import in_parts
-from scanfab.scan.solids import Solids, shortest_gap
+from scanfab.scan.kernels.sweep import TALLY_SIZE
+from scanfab.scan.lines import drawn_lines
+from scanfab.scan.scan import ScanSums, in_parts, sums_of
+from scanfab.scan.solids import Solids, check_spacing, shortest_gap
 from scanfab.scan.tallies import tally_triads
 
-__all__ = ["Blocks", "GapSums", "scan_gaps"]
-
-
-@dataclass(frozen=True, eq=False)
-class Blocks:
-    """
-    Blocks of space, such as the octants about a centre, or those of a periodic cell.
-
-    Of the axis i, a place x lies in the part ⌊p_i f⌋, where f is the fractional part of
-    (M x + t)_i; block numbers from 0 count the first axis fastest.
-    """
-
-    matrix: FloatArray
-    """M, shape (3, 3), per length unit."""
-    shift: FloatArray
-    """t, shape (3,), dimensionless."""
-    parts: tuple[int, int, int] = (2, 2, 2)
-    """p: how many blocks there are along each axis."""
-
-    def __len__(self) -> int:
-        return math.prod(self.parts)
-
-    @classmethod
-    def about(cls, center: FloatArray, reach: float, axis: npt.ArrayLike = (0, 0, 1)) -> Blocks:
-        """
-        The octants about a centre, of places within a reach of it; dump's length unit.
-
-        One of the axes that part them is the given one: then they are mirror images of one another
-        with respect to it, as they must be in order to differ by chance alone.
-        """
-        along = np.asarray(axis, dtype=np.float64)
-        # about x, y or z the octants are those of the coordinates
-        parting = np.eye(3) if np.count_nonzero(along) == 1 else line_triads(along[None])[0]
-        matrix = parting / (4.0 * reach)
-        return cls(matrix, 0.5 - matrix @ center)
-
-    @classmethod
-    def of_periods(
-        cls, vectors: FloatArray, origin: FloatArray, periodic: BoolArray, position: FloatArray
-    ) -> Blocks:
-        """
-        Halves of a cell's periods; along its other vectors, of what the positions take.
-
-        Parameters
-        ----------
-        vectors, origin, periodic : ndarray, shapes (3, 3), (3,), (3,)
-            The cell: lattice vectors as rows, its corner, and which vectors repeat.
-        position : ndarray, shape (N, 3)
-            Of the grains, dump's length unit.
-        """
-        inverse = np.linalg.inv(vectors)
-        matrix = inverse.T
-        shift = -matrix @ origin
-        along = (position - origin) @ inverse
-        low, high = along.min(axis=0), along.max(axis=0)
-        # far less than a period, about the middle
-        scale = np.where(periodic, 1.0, 0.25 / (1.0 + high - low))
-        middle = np.where(periodic, 0.0, 0.5 - scale * 0.5 * (low + high))
-        return cls(scale[:, None] * matrix, scale * shift + middle)
-
-    def of(self, places: FloatArray) -> IntArray:
-        """
-        The block of each place, shape (N,).
-
-        Examples
-        --------
-        >>> import numpy as np
-        >>> from scanfab.scan.gaps import Blocks
-        >>> Blocks.about(np.zeros(3), 1.0).of(np.array([[-0.1, -0.2, -0.3], [0.1, -0.2, 0.3]]))
-        array([0, 5])
-        """
-        numbers = np.zeros(len(places), dtype=np.int64)
-        before = 1
-        for matrix, shift, parts in zip(self.matrix, self.shift, self.parts, strict=True):
-            along = places @ matrix + shift
-            along -= np.floor(along)
-            # rounding makes a whole period of what is just below 0
-            numbers += before * np.minimum((along * parts).astype(np.int64), parts - 1)
-            before *= parts
-        return numbers
-
-    def affine(self) -> FloatArray:
-        """M and t beside one another, shape (3, 4)."""
-        return np.column_stack([self.matrix, self.shift])
+__all__ = ["BlockSums", "GapSums", "scan_blocks", "scan_gaps"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,31 +102,121 @@ def scan_gaps(
     SettingsError
         If following lines through a periodic medium takes more steps than allowed.
     """
-    following = Following(most_steps)
     triads, offsets = drawn_lines(rule, seed, replicates)
     least = np.maximum(np.array(cutoffs, dtype=np.float64), shortest_gap(solids))
-    affine = np.array([one.affine() for one in blocks])
-    parts = np.array([one.parts for one in blocks], dtype=np.float64)
-    halves: Flag = True if np.all(parts == 2.0) else None
-    count = max(len(one) for one in blocks)
+    lines = _BinnedLines(solids, spacing, least, blocks, variants, Following(most_steps))
+    sums = in_parts(lambda *some: lines.sums(*some)[0], triads, offsets, workers)
+    number, length, square = np.moveaxis(np.swapaxes(sums, 1, 2), -1, 0)
+    return GapSums(triads[:, :, 2], least, number, length, square)
+
+
+@dataclass(frozen=True, eq=False)
+class BlockSums:
+    """
+    Sums over the gaps of replicate r, axis d, variant v, block b, at each cut-off.
+
+    Of the gaps not shorter than the cut-off; lengths in the dump's unit.
+    """
+
+    axes: FloatArray
+    """Unit vectors, shape (R, D, 3)."""
+    variants: str
+    """Which variants, in this order."""
+    number: FloatArray
+    """Number of gaps, shape (R, D, V, B, C)."""
+    length: FloatArray
+    """Sum of their lengths, same shape."""
+    square: FloatArray
+    """Sum of their squared lengths, same shape."""
+    scan: ScanSums
+    """Of the same lines all but what was put in blocks: lines, chords, steps, what is left out."""
+
+    def kept(self, variant: str, cutoff: int = 0, moment: int = 1) -> tuple[FloatArray, FloatArray]:
+        """Numerator and denominator of ℓ as of :meth:`GapSums.kept`, shapes (R, D, B)."""
+        which = self.variants.index(variant)
+        over, under = (self.length, self.number) if moment == 1 else (self.square, self.length)
+        return over[:, :, which, :, cutoff], under[:, :, which, :, cutoff]
+
+
+def scan_blocks(
+    solids: Solids,
+    rule: DirectionRule,
+    *,
+    spacing: float,
+    cutoffs: Sequence[float],
+    blocks: tuple[Blocks, Blocks],
+    variants: str = "abcd",
+    replicates: Iterable[int] = range(16),
+    seed: int = 0,
+    workers: int = 1,
+    most_steps: float = MOST_STEPS,
+) -> BlockSums:
+    """
+    Scan as :func:`scan_gaps` does, and keep the variants that are asked for, and what it took.
+
+    Parameters
+    ----------
+    solids, rule, spacing, cutoffs, blocks, variants, replicates, seed, workers, most_steps
+        As for :func:`scan_gaps`.
+    """
+    check_spacing(solids, spacing)
+    triads, offsets = drawn_lines(rule, seed, replicates)
+    least = np.maximum(np.array(cutoffs, dtype=np.float64), shortest_gap(solids))
+    lines = _BinnedLines(solids, spacing, least, blocks, variants, Following(most_steps))
 
     def some(triads: FloatArray, offsets: FloatArray) -> FloatArray:
-        room = np.zeros((len(triads), 2, 2, count * len(least), 3))
-        bins = Bins(affine, parts, halves, least, room)
-        tally_triads(solids, triads, offsets, spacing, least[0], variants, bins, following)
-        return bins.sums
+        sums, tallies = lines.sums(triads, offsets)
+        wanted = sums[:, ["abcd".index(variant) for variant in variants]]
+        # one array of both, as the parts of a scan come together
+        return np.concatenate(
+            [wanted.reshape(len(triads), -1), tallies.reshape(len(triads), -1)], axis=1
+        )
 
-    sums = in_parts(some, triads, offsets, workers)
-    # variants: whole (a, b) and window (c, d)
-    sums = sums.reshape(*offsets.shape[:2], 4, count, len(least), 3)
-    sums[:, :, [variant not in variants for variant in "abcd"]] = 0.0
-    # what reaches a cut-off reaches all below it
-    sums = np.flip(np.cumsum(np.flip(sums, axis=4), axis=4), axis=4)
-    number, length, square = np.moveaxis(np.swapaxes(sums, 1, 2), -1, 0)
-    if solids.edge == ENDS:
-        weighed = slice(None) if solids.medium is None else slice(2, None)
-        # the third sum is the number of the kept, see kernels/bins
-        length, square = length.copy(), square.copy()
-        length[:, weighed] -= least * (square - number)[:, weighed]
-        square[:, weighed] = np.nan
-    return GapSums(triads[:, :, 2], least, number, length, square)
+    found = in_parts(some, triads, offsets, workers)
+    tallies = found[:, :, -2 * TALLY_SIZE :].reshape(*offsets.shape[:2], 2, TALLY_SIZE)
+    sums = found[:, :, : -2 * TALLY_SIZE]
+    sums = sums.reshape(*offsets.shape[:2], len(variants), lines.blocks_kept, len(least), 3)
+    scan = sums_of(triads, tallies, variants, solids.edge)
+    return BlockSums(triads[:, :, 2], variants, sums[..., 0], sums[..., 1], sums[..., 2], scan)
+
+
+class _BinnedLines(NamedTuple):
+    """Lines whose gaps are put in bins."""
+
+    solids: Solids
+    spacing: float
+    least: FloatArray
+    """The cut-offs."""
+    blocks: tuple[Blocks, Blocks]
+    variants: str
+    following: Following
+
+    @property
+    def blocks_kept(self) -> int:
+        """For the whole and for the window the same number."""
+        return max(map(len, self.blocks))
+
+    def sums(self, triads: FloatArray, offsets: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """
+        Number, length and square along some axes, shape (A, 4, B, C, 3), and the tallies.
+
+        Of variants that are not asked for, zeros.
+        """
+        solids, least = self.solids, self.least
+        room = np.zeros((len(triads), 2, 2, self.blocks_kept * len(least), 3))
+        bins = Bins(partition_of(*self.blocks), least, room)
+        tallies = tally_triads(
+            solids, triads, offsets, self.spacing, least[0], self.variants, bins, self.following
+        )
+        # variants: whole (a, b) and window (c, d)
+        sums = bins.sums.reshape(len(triads), 4, self.blocks_kept, len(least), 3)
+        sums[:, [variant not in self.variants for variant in "abcd"]] = 0.0
+        # what reaches a cut-off reaches all below it
+        sums = np.flip(np.cumsum(np.flip(sums, axis=3), axis=3), axis=3)
+        if solids.edge == ENDS:
+            number, length, square = np.moveaxis(sums, -1, 0)
+            weighed = slice(None) if solids.medium is None else slice(2, None)
+            # the third sum is the number of the kept, see kernels/bins
+            length[:, weighed] -= least * (square - number)[:, weighed]
+            square[:, weighed] = np.nan
+        return sums, tallies

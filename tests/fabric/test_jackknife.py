@@ -11,7 +11,8 @@ from scanfab.fabric.jackknife import (
     variance_without_noise,
     void_jackknife,
 )
-from scanfab.scan.gaps import Blocks, scan_gaps
+from scanfab.scan.blocks import Blocks
+from scanfab.scan.gaps import scan_gaps
 from tests.helpers import naive
 from tests.helpers.lattices import Spheres, poisson_spheres
 from tests.helpers.scanning import solids_of

@@ -22,7 +22,7 @@ from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import Window
 from scanfab.pipeline.measurement import measure
 from scanfab.pipeline.plan import make_plan
-from scanfab.scan.gaps import Blocks
+from scanfab.scan.blocks import Blocks
 from tests.helpers import naive
 from tests.helpers.lattices import rotation, shaken_cubic
 

@@ -6,8 +6,9 @@ import pytest
 import scanfab.scan.solids
 from scanfab import Cell, Solids, direction_rule, scan_lines, sphere
 from scanfab.base.convex import Convex
+from scanfab.scan.blocks import Blocks
 from scanfab.scan.edges import EDGES
-from scanfab.scan.gaps import Blocks, scan_gaps
+from scanfab.scan.gaps import scan_gaps
 from scanfab.scan.lines import line_triads
 from scanfab.scan.solids import CellGrains, shortest_gap
 from tests.helpers import naive

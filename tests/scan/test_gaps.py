@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from scanfab import Cell, Solids, direction_rule, scan_lines, sphere
-from scanfab.scan.gaps import Blocks, scan_gaps
+from scanfab.scan.blocks import Blocks
+from scanfab.scan.gaps import scan_gaps
 from scanfab.scan.lines import line_triads, turned_triads
 from scanfab.scan.solids import CellGrains
 from tests.helpers import naive

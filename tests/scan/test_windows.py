@@ -5,7 +5,8 @@ import pytest
 from numba import njit
 
 from scanfab import box, cylinder, direction_rule, ellipsoid, scan_lines, sphere
-from scanfab.scan.gaps import Blocks, scan_gaps
+from scanfab.scan.blocks import Blocks
+from scanfab.scan.gaps import scan_gaps
 from scanfab.scan.kernels.strips import spans
 from scanfab.scan.kernels.windows import section_along
 from scanfab.scan.lines import line_triads

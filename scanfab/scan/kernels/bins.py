@@ -23,6 +23,7 @@ __all__ = [
     "OF_WINDOW",
     "SQUARE",
     "Bins",
+    "Partition",
     "add_gaps",
     "bins_along",
     "list_gap",
@@ -43,19 +44,30 @@ LINE_U, GAP_LOW, GAP_HIGH, COUNTED, PLACE = 0, 1, 3, 5, 7
 WEIGHT, FULL = 9, 10
 
 
+class Partition(NamedTuple):
+    """Blocks of space as numbers, for the whole and for the window; each array has a row a kind."""
+
+    to_block: FloatArray
+    """Affine maps of places to three coordinates, shape (2, 3, 4)."""
+    parts: FloatArray
+    """How many equal parts of 0 to 1 each has, and how many shells there are, shape (2, 4)."""
+    repeats: FloatArray
+    """1 where the fractional part of a coordinate counts, else 0, shape (2, 3)."""
+    form: FloatArray
+    """
+    The square of the distance from the middle as a form of the coordinates less ½, shape (2, 6).
+
+    The outermost shell ends at 1. Zeros where there are no shells.
+    """
+    halves: Flag
+    """True for halves of coordinates that repeat: octants, which are found in less time."""
+
+
 class Bins(NamedTuple):
     """What gaps are added to."""
 
-    to_block: FloatArray
-    """
-    Affine maps of places to three coordinates, of whose periods of 1 equal parts are blocks.
-
-    For the whole and the window, shape (2, 3, 4).
-    """
-    parts: FloatArray
-    """How many parts of each, whole numbers, shape (2, 3)."""
-    halves: Flag
-    """True if all of these are 2: octants, which are found in less time."""
+    partition: Partition
+    """In which block a gap's middle lies."""
     cutoffs: FloatArray
     """
     In ascending order, shape (C,); a gap goes to the bin of the largest that it reaches.
@@ -73,30 +85,34 @@ class Bins(NamedTuple):
 
     def of_whole(self, center: FloatArray) -> Bins:
         """Empty bins by the whole's blocks for what lies in a window about a centre."""
-        to_block = self.to_block[::-1].copy()
+        to_block, parts, repeats, form, halves = self.partition
+        to_block = to_block[::-1].copy()
         to_block[:, :, 3] += to_block[:, :, :3] @ center
-        return self._replace(
-            to_block=to_block, parts=self.parts[::-1].copy(), sums=np.zeros_like(self.sums)
-        )
+        numbers = (one[::-1].copy() for one in (parts, repeats, form))
+        partition = Partition(to_block, *numbers, halves)
+        return self._replace(partition=partition, sums=np.zeros_like(self.sums))
 
 
 def no_bins(axes: int) -> Bins:
     """For so many axes, none: a kernel that takes these is compiled once, with bins or without."""
     sums = np.zeros((axes, 2, 2, 0, 3))
-    return Bins(np.zeros((2, 3, 4)), np.ones((2, 3)), True, np.zeros(0), sums)
+    numbers = np.zeros((2, 3, 4)), np.ones((2, 4)), np.ones((2, 3)), np.zeros((2, 6))
+    return Bins(Partition(*numbers, True), np.zeros(0), sums)
 
 
 @inner()
 def bins_along(bins: Bins, triad: FloatArray, axis: int) -> Bins:
     """The bins of an axis, for places u, v, depth in its triad."""
-    to_block = bins.to_block.copy()
+    of = bins.partition
+    to_block = of.to_block.copy()
     for kind in range(2):
         for i in range(3):
             for j in range(3):
                 to_block[kind, i, j] = 0.0
                 for k in range(3):
-                    to_block[kind, i, j] += bins.to_block[kind, i, k] * triad[j, k]
-    return Bins(to_block, bins.parts, bins.halves, bins.cutoffs, bins.sums[axis])
+                    to_block[kind, i, j] += of.to_block[kind, i, k] * triad[j, k]
+    turned = Partition(to_block, of.parts, of.repeats, of.form, of.halves)
+    return Bins(turned, bins.cutoffs, bins.sums[axis])
 
 
 @inner()
@@ -140,14 +156,19 @@ def list_gap(
 
 
 @inner(inline="always")
-def part_of_period(x: float, parts: float, halves: Flag) -> float:
-    """In which of so many equal parts of its period of 1 a coordinate lies, from 0."""
-    if halves is not None:
-        return 1.0 if x - np.floor(x) >= 0.5 else 0.0
-    part = np.floor((x - np.floor(x)) * parts)
+def upper_half(x: float) -> float:
+    """1 where a coordinate lies in the upper half of its period of 1, else 0."""
+    return 1.0 if x - np.floor(x) >= 0.5 else 0.0
+
+
+@inner(inline="always")
+def part_of(x: float, parts: float) -> float:
+    """In which of so many equal parts of 0 to 1 a coordinate lies, from 0; outside in some."""
+    part = np.floor(x * parts)
     # rounding makes a whole period of what is just below 0; and NaN, of a line that misses the
     # window, must have some place, too
-    return part if part < parts - 1.0 else parts - 1.0
+    part = part if part < parts - 1.0 else parts - 1.0
+    return part if part > 0.0 else 0.0
 
 
 @inner(error_model="numpy")
@@ -160,14 +181,21 @@ def find_bins(
     window: Edge | None,
 ) -> None:
     """Of gaps on a row of lines, the lengths, 0 where they do not count, and the bins."""
-    cutoffs, to_block = bins.cutoffs, bins.to_block[kind]
+    cutoffs, of = bins.cutoffs, bins.partition
+    to_block, parts, repeats, form = (
+        of.to_block[kind],
+        of.parts[kind],
+        of.repeats[kind],
+        of.form[kind],
+    )
     x_u, y_u, z_u = to_block[0, 0], to_block[1, 0], to_block[2, 0]
     x_n, y_n, z_n = to_block[0, 2], to_block[1, 2], to_block[2, 2]
     x_v = to_block[0, 1] * v + to_block[0, 3]
     y_v = to_block[1, 1] * v + to_block[1, 3]
     z_v = to_block[2, 1] * v + to_block[2, 3]
-    in_x, in_y, in_z = bins.parts[kind, 0], bins.parts[kind, 1], bins.parts[kind, 2]
-    in_xy = in_x * in_y
+    in_x, in_y, in_z, shells = parts[0], parts[1], parts[2], parts[3]
+    by_x, by_y, by_z = repeats[0], repeats[1], repeats[2]
+    xx, yy, zz, xy, xz, yz = form[0], form[1], form[2], form[3], form[4], form[5]
     lows, highs = gaps[GAP_LOW + kind], gaps[GAP_HIGH + kind]
     lengths, places = gaps[COUNTED + kind], gaps[PLACE + kind]
     for k in range(count):
@@ -177,12 +205,20 @@ def find_bins(
         x = x_v + x_u * u + x_n * middle
         y = y_v + y_u * u + y_n * middle
         z = z_v + z_u * u + z_n * middle
-        block = part_of_period(x, in_x, bins.halves)
-        block += in_x * part_of_period(y, in_y, bins.halves)
-        block += in_xy * part_of_period(z, in_z, bins.halves)
+        is_inside = True
+        if of.halves is not None:
+            block = upper_half(x) + 2.0 * upper_half(y) + 4.0 * upper_half(z)
+        else:
+            x, y, z = x - by_x * np.floor(x), y - by_y * np.floor(y), z - by_z * np.floor(z)
+            block = part_of(x, in_x) + in_x * (part_of(y, in_y) + in_y * part_of(z, in_z))
+            x, y, z = x - 0.5, y - 0.5, z - 0.5
+            square = x * (xx * x + xy * y + xz * z) + y * (yy * y + yz * z) + zz * z * z
+            distance = np.sqrt(square if square > 0.0 else 0.0)
+            block += in_x * in_y * in_z * part_of(distance, shells)
+            is_inside = (abs(x) <= 0.5) & (abs(y) <= 0.5) & (abs(z) <= 0.5) & (distance <= 1.0)
         if window is not None and window.start is not None:
             length = gaps[FULL, k]
-        is_kept = (length > 0.0) & (length >= cutoffs[0]) & (length < 0.5 * FAR)
+        is_kept = (length > 0.0) & (length >= cutoffs[0]) & (length < 0.5 * FAR) & is_inside
         lengths[k] = length if is_kept else 0.0
         places[k] = block * cutoffs.size
     for number in range(1, cutoffs.size):

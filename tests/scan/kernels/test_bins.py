@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scanfab.scan.gaps import Blocks
+from scanfab.scan.blocks import Blocks, partition_of
 from scanfab.scan.kernels import axes, sweep
 from scanfab.scan.kernels.bins import Bins
 from scanfab.scan.kernels.edges import CLIPPED
@@ -23,7 +23,7 @@ def fast_sums(
     spheres, removed, triad, offset, spacing, window, cutoffs, centers, flags=(1, 1, 1), halves=True
 ):
     """What the kernel adds up: shape (whole or window, set of solids, octant, bin, sum)."""
-    blocks = np.array([Blocks.about(center, REACH).affine() for center in centers])
+    partition = partition_of(*(Blocks.about(center, REACH) for center in centers))
     sums = np.zeros((1, 2, 2, 8 * len(cutoffs), 3))
     axes.scan_axes(
         *line_words(spheres, removed, triad, offset, spacing),
@@ -33,7 +33,7 @@ def fast_sums(
         True,
         *(True if flag else None for flag in flags[:2]),
         CLIPPED if flags[2] else None,
-        Bins(blocks, np.full((2, 3), 2.0), halves or None, np.array(cutoffs), sums),
+        Bins(partition._replace(halves=halves or None), np.array(cutoffs), sums),
         None,
         False,
         np.inf,

@@ -1,0 +1,320 @@
+"""One frame of a map: from its grains and contacts to a row for each variant and block."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from scanfab.base.note import Note, joined
+from scanfab.base.spelling import counted
+from scanfab.base.typing import FloatArray, IntArray
+from scanfab.fabric.blocks import jackknife_errors, ratio_jackknife
+from scanfab.fabric.contact import axial_error, contact_fabric
+from scanfab.fabric.homogeneity import homogeneity_of
+from scanfab.fabric.tensor import FabricTensor, axial, tensor_values
+from scanfab.packing.packing import Packing
+from scanfab.packing.sample import VARIANTS, Sample, Variant
+from scanfab.pipeline.frame import FrameResult, as_sample, frame_values
+from scanfab.pipeline.frames import Readable
+from scanfab.pipeline.map_measurement import MapMeasurement, measure_map
+from scanfab.pipeline.map_surface import cut_by_hull, cut_by_window, volumes_inside
+from scanfab.pipeline.plan import Plan
+from scanfab.pipeline.variant_columns import channels_text, edge_of, left_out_of, left_out_text
+from scanfab.scan.blocks import Blocks
+from scanfab.scan.edges import ENDS, START
+from scanfab.table.map_columns import map_row
+
+__all__ = ["HOMOGENEITY", "MapResult", "map_frame"]
+
+HOMOGENEITY = "homogeneity"
+"""The code of a note: whether the blocks of a variant scatter more than their errors."""
+# the chance below which a sample is said not to be homogeneous
+UNLIKELY = 0.01
+# parts of a block, less one
+FREEDOM = 7.0
+
+
+@dataclass(frozen=True, eq=False)
+class MapResult(FrameResult):
+    """The rows of one frame of a map, and where its blocks lie."""
+
+    blocks: tuple[Blocks, Blocks] | None = None
+    """Of the whole sample and of the RV; None without grains."""
+
+
+def map_frame(
+    frame: Packing | Sample | Readable, plan: Plan, *, number: int = 0, source: str = ""
+) -> MapResult:
+    """
+    Map one frame of a series.
+
+    Parameters
+    ----------
+    frame, plan, number, source
+        As for :func:`scanfab.pipeline.frame.compute_frame`.
+
+    Returns
+    -------
+    MapResult
+        With rows without numbers if the frame has no grains.
+
+    Raises
+    ------
+    ScanfabError
+        If the frame cannot be read or measured.
+    """
+    assert plan.map_settings is not None
+    sample = as_sample(frame, plan)
+    known = frame_values(sample, plan, number, source)
+    columns = plan.map_settings.columns
+    if not sample.grains.any():
+        nothing = {**known, "grains": 0, "rattlers": 0, "contacts": 0}
+        rows = [
+            map_row(columns, {**nothing, "variant": variant, "block": block})
+            for variant in plan.variants
+            for block in range(plan.map_settings.blocks)
+        ]
+        return MapResult(source, number, sample, None, rows)
+    measurement = measure_map(sample, plan.in_frame(sample), f"frame {number}")
+    variants = [BlocksOfVariant(measurement, VARIANTS[name]) for name in plan.variants]
+    rows = [
+        map_row(columns, {**known, "variant": one.variant.name, **values})
+        for one in variants
+        for values in one.rows()
+    ]
+    notes = [
+        *sample.doubts_of_escaped(),
+        *measurement.notes,
+        *joined(note for one in variants for note in one.notes()),
+    ]
+    return MapResult(source, number, sample, None, rows, tuple(notes), measurement.blocks)
+
+
+class BlocksOfVariant:
+    """All blocks of one variant."""
+
+    def __init__(self, measurement: MapMeasurement, variant: Variant) -> None:
+        self.measurement = measurement
+        self.variant = variant
+        self.sample, self.plan = measurement.sample, measurement.plan
+        self.blocks = measurement.blocks[variant.in_window]
+        self.splits = measurement.splits[variant.in_window]
+        self.fabrics = measurement.sums.fabrics[variant.name]
+        self.parts = measurement.parts[variant.name]
+        self.axis = np.asarray(self.plan.axis)
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """The values of each block by their columns."""
+        count = len(self.blocks)
+        middles = self.blocks.middles
+        arrays: dict[str, Any] = {
+            "block": np.arange(count),
+            **dict(zip("xyz", middles.T, strict=True)),
+            **self._grains,
+            **self._void(),
+            **self._solid_fraction(),
+            "segments": self.fabrics.segments.sum(axis=0).astype(np.int64),
+            "at_surface": self.at_surface.astype(np.int64),
+        }
+        if self.blocks.edges is not None:
+            arrays |= dict(zip(("r_inner", "r_outer"), self.blocks.radii.T, strict=True))
+        scan = self.measurement.sums.scan
+        same = {
+            "directions": len(self.plan.rule),
+            "replicates": scan.replicates,
+            "spacing": self.plan.spacing / math.sqrt(scan.replicates),
+            "cutoff": self.plan.cutoff,
+            "edge": edge_of(self.variant, self.plan, self.measurement.solids),
+        }
+        tensors, contacts = self.fabrics.tensors, self._contacts_by_block()
+        for block in range(count):
+            values = {name: _known(array[block]) for name, array in arrays.items()}
+            tensor = FabricTensor(tensors[block]) if self.fabrics.exists[block] else None
+            values |= tensor_values("gvs", tensor)
+            values["alpha_vs"] = tensor.alpha if tensor else None
+            yield {**same, **values, **contacts[block]}
+
+    def _void(self) -> dict[str, FloatArray]:
+        """Columns of the void fabric and its errors; NaN where there is none."""
+        fabrics, without = self.fabrics, self.parts.without
+        exists = fabrics.exists
+        found = {
+            "mean_length": fabrics.mean_length,
+            "alpha_vs_axial": axial(fabrics.tensors, self.axis),
+            "alpha_vs_axial_se": fabrics.axial_errors(self.axis),
+            "alpha_vs_axial_sample_se": jackknife_errors(without.axial, without.is_met),
+            "mean_length_se": jackknife_errors(without.mean_length, without.is_met),
+        }
+        return {name: np.where(exists, values, np.nan) for name, values in found.items()}
+
+    @cached_property
+    def at_surface(self) -> Any:
+        """Which blocks lose segments, shape (B,)."""
+        plan, inner = self.plan, self.measurement.solids.inner
+        mean = float(self.sample.packing.radius[self.sample.gathered].mean())
+        if self.variant.in_window:
+            window = plan.window
+            assert window is not None
+            if plan.edge == START:
+                # it follows segments beyond the RV, and gives each end to the block it is in
+                return np.zeros(len(self.blocks), bool)
+            return cut_by_window(self.blocks, window.shape, window.center, mean)
+        if plan.edge == ENDS and inner is not None:
+            center = inner.center + self.measurement.solids.origin
+            return cut_by_window(self.blocks, inner.shape, center, mean)
+        return cut_by_hull(self.blocks, self.sample)
+
+    def _solid_fraction(self) -> dict[str, FloatArray]:
+        """1 - void with its middle in the block / volume of the block in the window."""
+        window = self.plan.window if self.variant.in_window else None
+        shape, center = (None, np.zeros(3)) if window is None else (window.shape, window.center)
+        volumes = volumes_inside(self.blocks, self.splits, shape, center)
+        void, every = self.parts.void, volumes.sum(axis=1)
+        known = every > 0
+        # beyond an open sample nobody knows what is void
+        known &= True if self.variant.in_window else ~self.at_surface
+        share = void.sum(axis=2).mean(axis=0) / np.where(known, every, 1.0)
+        parts = volumes > 0
+        rest = np.where(parts, every[:, None] - volumes, 1.0)
+        without = 1.0 - (void.sum(axis=2, keepdims=True) - void) / np.where(rest > 0, rest, 1.0)
+        errors = jackknife_errors(without, parts & (rest > 0))
+        return {
+            "solid_fraction": np.where(known, 1.0 - share, np.nan),
+            "solid_fraction_se": np.where(known, errors, np.nan),
+        }
+
+    @cached_property
+    def _grains(self) -> dict[str, Any]:
+        """Columns of grains; coordination is NaN without any."""
+        counted = self.sample.counted(self.variant, self.plan.window)
+        removed = self.sample.removed(self.variant)
+        numbers = (
+            self.sample.contact_numbers_without_rattlers
+            if self.variant.without_rattlers
+            else self.sample.contact_numbers
+        )
+        rows = np.flatnonzero(counted)
+        block, part = self._places(self.sample.packing.position[rows])
+        solid = ~removed[rows]
+        grains = self._sum(block, part, solid)
+        contacts = self._sum(block, part, solid * numbers[rows])
+        total = grains.sum(axis=1)
+        mean = contacts.sum(axis=1) / np.where(total > 0, total, 1.0)
+        rattlers = self._sum(block, part, self.sample.rattlers[rows]).sum(axis=1)
+        return {
+            "grains": total.astype(np.int64),
+            "rattlers": rattlers.astype(np.int64),
+            "coordination": np.where(total > 0, mean, np.nan),
+            "coordination_se": ratio_jackknife(contacts, grains),
+        }
+
+    def _contacts_by_block(self) -> list[dict[str, Any]]:
+        """Columns of the contact fabric of each block."""
+        chosen = self.sample.fabric_contacts(self.variant, self.plan.window)
+        contacts = self.sample.contacts
+        normals = np.compress(chosen, contacts.normal, axis=0)
+        block, part = self._places(np.compress(chosen, contacts.point, axis=0))
+        along = 1.5 * (normals @ self.axis) ** 2 - 0.5
+        errors = ratio_jackknife(
+            self._sum(block, part, along), self._sum(block, part, np.ones(len(along)))
+        )
+        order = np.argsort(block, kind="stable")
+        ends = np.searchsorted(block[order], np.arange(len(self.blocks) + 1))
+        found = []
+        for number, error in enumerate(errors):
+            own = normals[order[ends[number] : ends[number + 1]]]
+            tensor = contact_fabric(own)
+            found.append(
+                {
+                    "contacts": len(own),
+                    **tensor_values("gc", tensor),
+                    "alpha_c": tensor.alpha if tensor else None,
+                    "alpha_c_axial": tensor.axial(self.axis) if tensor else None,
+                    "alpha_c_axial_se": axial_error(own, self.axis),
+                    "alpha_c_axial_sample_se": _known(error),
+                }
+            )
+        return found
+
+    def _places(self, points: FloatArray) -> tuple[IntArray, IntArray]:
+        """The block of each place, -1 for none, and which part of it."""
+        if self.variant.in_window:
+            window = self.plan.window
+            assert window is not None
+            points = window.center + window.branches(points, self.sample.packing)
+        finer = self.blocks.finer(self.splits).of(points)
+        block, part = self.blocks.of_finer(self.splits)
+        return np.where(finer < 0, -1, block[finer]), part[finer]
+
+    def _sum(self, block: IntArray, part: IntArray, values: Any) -> FloatArray:
+        """By block and part, shape (B, P)."""
+        shape = len(self.blocks), math.prod(self.splits)
+        inside = block >= 0
+        where = block[inside] * shape[1] + part[inside]
+        weights = np.asarray(values, np.float64)[inside]
+        return np.bincount(where, weights, minlength=math.prod(shape)).reshape(shape)
+
+    def notes(self) -> Iterator[Note]:
+        """Lines and blocks that are doubtful, and whether the sample is homogeneous."""
+        scan, which = self.measurement.sums.scan, "abcd".index(self.variant.name)
+        edge = edge_of(self.variant, self.plan, self.measurement.solids)
+        texts = {
+            "channels": channels_text(scan, which),
+            "left_out": left_out_text(left_out_of(scan, which, edge)),
+            "few_segments": self._too_few(),
+            HOMOGENEITY: self._homogeneity(),
+        }
+        return (Note(code, text, (self.variant.name,)) for code, text in texts.items() if text)
+
+    def _too_few(self) -> str:
+        fabrics = self.fabrics
+        lacking = int((~fabrics.exists).sum())
+        if not lacking:
+            return ""
+        empty = int((~fabrics.is_met).sum())
+        found = f"{lacking} of {counted(len(self.blocks), 'block')} have no void fabric"
+        if empty == lacking:
+            return f"{found}: no void segment has its middle there"
+        return (
+            f"{found}: {empty} hold no void segment at all, the others none in more than 5 % of "
+            f"the directions: choose fewer blocks, closer lines (`spacing`, `tolerance`) or a "
+            f"shorter `cutoff`"
+        )
+
+    def _homogeneity(self) -> str:
+        """What the test says, in words."""
+        found = self._void()
+        inner = self.fabrics.exists & ~self.at_surface
+        values = np.where(inner, found["alpha_vs_axial"], np.nan)
+        variances = found["alpha_vs_axial_sample_se"] ** 2
+        variances = variances + np.nan_to_num(found["alpha_vs_axial_se"]) ** 2
+        weights = self.fabrics.segments.sum(axis=0)
+        test = homogeneity_of(values, variances, weights, FREEDOM)
+        if test is None:
+            if not self.at_surface.any():
+                return "too few blocks to tell whether the sample is homogeneous"
+            better = "" if self.plan.edge == START else ", or of the RV by `edge=start`"
+            return (
+                f"whether the sample is homogeneous cannot be told: all blocks but "
+                f"{int(inner.sum())} are at a surface: choose blocks that are smaller{better}"
+            )
+        chance = "p < 0.0001" if test.chance < 1e-4 else f"p = {test.chance:.2g}"
+        scatter = (
+            f"alpha_vs_axial of {test.blocks} blocks scatters {test.ratio:.2g} times as much as "
+            f"their errors explain ({chance})"
+        )
+        if test.chance < UNLIKELY:
+            return f"{scatter}: the sample is not homogeneous"
+        return f"{scatter}: no sign that the sample is not homogeneous"
+
+
+def _known(value: Any) -> Any:
+    """As a row has it: None for NaN."""
+    if isinstance(value, np.floating):
+        return float(value) if np.isfinite(value) else None
+    return value.item() if isinstance(value, np.generic) else value
