@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from scanfab.packing.window import Window
     from scanfab.pipeline.calibration import Calibration, calibrate
     from scanfab.pipeline.compute import compute
+    from scanfab.pipeline.map import fabric_map
     from scanfab.pipeline.samples import samples
     from scanfab.pipeline.settings import Settings
     from scanfab.pipeline.solids import solids_of
@@ -92,6 +93,7 @@ _HOME = {
     "cylinder": "base.shapes",
     "direction_rule": "scan.directions",
     "ellipsoid": "base.shapes",
+    "fabric_map": "pipeline.map",
     "find_contacts": "packing.search",
     "load": "table.table",
     "make_report": "viz.report.report",
@@ -148,6 +150,7 @@ __all__ = [
     "cylinder",
     "direction_rule",
     "ellipsoid",
+    "fabric_map",
     "find_contacts",
     "load",
     "make_report",

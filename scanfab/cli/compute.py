@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from scanfab.cli.options import check_plot, options, sources_argument, usage_errors
-from scanfab.cli.settings_file import fill_from_file
-from scanfab.cli.sources import SourceCommand, open_series, reading_arguments
-from scanfab.cli.talk import talk_options, tell_inputs, working
+from scanfab.cli.options import check_plot, options, sources_argument
+from scanfab.cli.sources import SourceCommand
+from scanfab.cli.talk import talk_options
 from scanfab.pipeline.options import OPTIONS, OUTPUT_OPTIONS
 
 if TYPE_CHECKING:
     from scanfab.io.series import Series
-    from scanfab.pipeline.compute import Observer
     from scanfab.pipeline.job import Job
-    from scanfab.pipeline.settings import Settings
-    from scanfab.table.writing import Excerpt
 
 __all__ = ["OF_THE_LINE", "compute"]
 
@@ -65,52 +59,24 @@ def compute(
     Variants: a whole sample; b whole sample, rattlers removed; c representative volume (RV); d RV,
     rattlers removed. Lengths are in the dump's own units.
     """
-    from scanfab.cli.console import announce_compiling, reported_warnings
-    from scanfab.pipeline.job import Job
+    from scanfab.cli.console import reported_warnings
+    from scanfab.cli.rows import finished_job
     from scanfab.pipeline.settings import Settings
-    from scanfab.table.columns import table_columns
-    from scanfab.table.result_file import ResultFile
-    from scanfab.table.writing import Excerpt
 
-    if resume and output is None:
-        raise click.UsageError("--resume goes with -o FILE")
     _check_figure(plot, figure)
-    with reported_warnings() as told:
-        chosen, settings_file = fill_from_file(ctx, sources, chosen)
+
+    def check(series: list[Series], chosen: dict[str, Any]) -> None:
         if plot is not None and chosen.get("cutoffs"):
             raise click.UsageError("--plot is of one cut-off: leave out --cutoffs")
-        with settings_file.named_errors():
-            reading = reading_arguments(chosen)
-            fields, digits = chosen.pop("fields"), int(chosen.pop("digits"))
-            settings = Settings(**chosen)
-            columns = table_columns(settings.more_columns)
-            excerpt = Excerpt.make(columns, fields, digits)
-            result = None if output is None else ResultFile(output, columns, excerpt)
-        series = open_series(sources, reading)
         if figure is not None and _is_of_frames(figure) and len(series) > 1:
             raise click.UsageError(f"--figure {figure} draws one series: name one source")
-        tell_inputs(series, settings.workers)
-        announce_compiling()
-        with usage_errors():
-            job = Job(
-                series,
-                settings,
-                result,
-                sources=sources,
-                reading=reading,
-                resume=resume,
-                manifest_path=manifest,
-                observers=_observers(vtk, series, settings, resume),
-                told=told,
-                keep=plot is not None,
-            )
-        with ExitStack() as stack:
-            with usage_errors():
-                stack.enter_context(job.begun())
-                if plot is not None and job.table is not None:
-                    job.table.check_columns(_columns_drawn(figure))
-            _write_or_say(job, excerpt)
-        job.save_manifests(settings_file.asked())
+
+    with reported_warnings() as told:
+        job = finished_job(
+            ctx, sources, chosen, Settings, told,
+            output=output, resume=resume, manifest=manifest, vtk=vtk, check=check,
+            drawn=None if plot is None else _columns_drawn(figure),
+        )  # fmt: skip
         if plot is not None:
             _draw(plot, figure, job)
     return 0 if job.found_void_fabric and not job.has_skipped else 1
@@ -136,17 +102,6 @@ def _columns_drawn(figure: str | None) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for one in asked for name in one.columns))
 
 
-def _observers(
-    folder: Path | None, series: list[Series], settings: Settings, resume: bool
-) -> Sequence[Observer]:
-    """What writes the ParaView files of each series."""
-    if folder is None:
-        return ()
-    from scanfab.viz.paraview import vtk_folders
-
-    return vtk_folders(folder, len(series), settings, resume)
-
-
 def _draw(plot: Path, figure: str | None, job: Job) -> None:
     from scanfab.table.compare import compare_tables
     from scanfab.viz.figures.page import make_figures, save_figures
@@ -160,59 +115,3 @@ def _draw(plot: Path, figure: str | None, job: Job) -> None:
     else:
         comparison = compare_tables(job.kept)
         save_figures(plot, make_figures(job.kept, "table", figure, comparison=comparison))
-
-
-def _write_or_say(job: Job, excerpt: Excerpt) -> None:
-    """Write the rows; where that is interrupted or fails, say how far it is and how to go on."""
-    from scanfab.base.errors import ScanfabError
-    from scanfab.cli.console import is_readable
-    from scanfab.cli.signals import telling
-
-    # asked for now, as a signal comes at any moment
-    printed = not is_readable()
-
-    def standing() -> str:
-        return _standing(job, printed)
-
-    try:
-        with telling(standing):
-            _write(job, excerpt)
-    except (ScanfabError, OSError):
-        if job.result is not None and (job.is_over or 0 < job.done < job.frames()):
-            click.echo(f"scanfab: stopped {standing()}", err=True)
-        raise
-
-
-def _standing(job: Job, printed: bool) -> str:
-    """How far a job is, and how to go on."""
-    if not job.done and job.table is not None:
-        return (
-            f"before the first new frame was finished: {job.table.path} is as it was; the same "
-            f"command goes on"
-        )
-    if not job.done:
-        return "before the first frame was finished: nothing is kept"
-    done = f"after {job.done} of {job.frames()} frames"
-    if job.is_over:
-        done = "after the last frame, before the table was complete"
-    if job.result is None:
-        kept = "the rows printed so far are all" if printed else "nothing is kept"
-        return f"{done}; {kept}: with -o FILE, --resume could go on"
-    again = "the same command" if job.resume else "the same command with --resume"
-    return f"{done}; {again} goes on"
-
-
-def _write(job: Job, excerpt: Excerpt) -> None:
-    """Write the rows as they come; on a terminal, all of them as a table."""
-    from scanfab.cli.console import is_readable, print_csv, print_table
-    from scanfab.table.columns import table_columns
-
-    with working(job.frames, job.done) as advance:
-        if job.result is not None:
-            job.write(advance)
-            return
-        if not is_readable():
-            print_csv(job.rows(advance), excerpt, table_columns(job.settings.more_columns))
-            return
-        rows = list(job.rows(advance))
-    print_table(rows, excerpt)

@@ -33,6 +33,7 @@ __all__ = [
 # most telling first
 KEYS = {
     "frame": "frame",
+    "block": "block",
     "strain": "strain",
     "variant": "variant",
     "grains": "grains",
@@ -42,17 +43,24 @@ KEYS = {
     "alpha_c_axial": "α_c axial",
 }
 MORE = {
+    "at_surface": "at surface",
     "alpha_vs_axial_se": "± scan",
     "alpha_vs_axial_sample_se": "± sample",
     "alpha_vs": "α_vs",
     "mean_length": "mean length",
     "coordination": "coordination",
     "solid_fraction": "solid fraction",
+    "r_inner": "from r",
+    "r_outer": "to r",
+    "x": "x",
+    "y": "y",
+    "z": "z",
 }
 ORDER = (
-    "frame", "strain", "variant", "grains", "contacts", "coordination", "solid_fraction",
+    "frame", "strain", "block", "x", "y", "z", "r_inner", "r_outer", "variant",
+    "grains", "contacts", "coordination", "solid_fraction",
     "mean_length", "alpha_vs", "alpha_vs_axial", "total", "alpha_vs_axial_se",
-    "alpha_vs_axial_sample_se", "alpha_c_axial",
+    "alpha_vs_axial_sample_se", "alpha_c_axial", "at_surface",
 )  # fmt: skip
 
 
@@ -128,5 +136,7 @@ def print_table(rows: Iterable[Row], excerpt: Excerpt) -> None:
         [
             Column(titles[name], [spelt(row[name], digits) for row in values], ranks.get(name, 0))
             for name in excerpt.fields or ORDER
+            # only maps have blocks
+            if excerpt.fields or not values or name in values[0]
         ]
     )

@@ -17,6 +17,7 @@ COMMANDS = {
     "calibrate": "how many lines are enough: ladders of settings, and those it recommends",
     "report": "one file to hand on: settings, tables, figures, a view that can be turned",
     "view": "a frame in 3D",
+    "map": "fabric by place: a grid, slices or shells of blocks",
     "formats": "every reader and writer, its extensions, and the package it comes from",
 }
 
@@ -24,7 +25,9 @@ COMMANDS = {
 # bytes of addresses that the libraries need before anything is read
 LEAST_SPACE = 1_000_000_000
 # to compile the scan with four workers took 1.4e9; VTK's pictures took 1.8e9
-LEAST_OF_COMMAND = dict.fromkeys(("compute", "calibrate", "inspect", "report"), 1_500_000_000)
+LEAST_OF_COMMAND = dict.fromkeys(
+    ("compute", "calibrate", "inspect", "report", "map"), 1_500_000_000
+)
 LEAST_OF_COMMAND["view"] = 2_000_000_000
 
 

@@ -128,11 +128,14 @@ def _complete_fields(
     from scanfab.pipeline.calibration_ladders import StepRow
     from scanfab.table.columns import MORE_COLUMNS, columns_of
     from scanfab.table.comparison_rows import FrameRow, SummaryRow
+    from scanfab.table.map_columns import map_columns
     from scanfab.table.row import Row
 
     of_compare = SummaryRow if ctx.params.get("summary") else FrameRow
     kind: type = {"calibrate": StepRow, "compare": of_compare}.get(str(ctx.command.name), Row)
     columns = (*columns_of(kind), *(MORE_COLUMNS if kind is Row else ()))
+    if ctx.command.name == "map":
+        columns = map_columns(("edge",), shells=True)
     before, comma, last = text.rpartition(",")
     names = [one.name for one in columns if one.name not in before.split(",")]
     return [CompletionItem(before + comma + name) for name in names if name.startswith(last)]
@@ -170,12 +173,13 @@ def click_option(option: Option, **changes: Any) -> Callable[[Command], Command]
     return click.option(option.flag, option.name, show_default=shown, **attributes)
 
 
-def options(*names: str, **changes: Any) -> Callable[[Command], Command]:
-    """Declared options of a command, in this order."""
+def options(*chosen: str | Option, **changes: Any) -> Callable[[Command], Command]:
+    """Declared options of a command, by name or themselves, in this order."""
 
     def add(command: Command) -> Command:
-        for name in reversed(names):
-            command = click_option(DECLARED[name], **changes)(command)
+        for one in reversed(chosen):
+            declared = DECLARED[one] if isinstance(one, str) else one
+            command = click_option(declared, **changes)(command)
         return command
 
     return add

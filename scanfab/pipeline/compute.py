@@ -179,8 +179,8 @@ class _FrameJob:
     def _computed(self, plan: Plan) -> _Computed:
         begun = time.perf_counter()
         try:
-            words = {"number": self.number, "source": self.source}
-            found = (map_frame if plan.map_settings else compute_frame)(self.frame, plan, **words)
+            compute_one = map_frame if plan.map_settings else compute_frame
+            found = compute_one(self.frame, plan, number=self.number, source=self.source)
         except (PackingError, ReadError) as error:
             if not self.skips_damaged:
                 raise

@@ -85,5 +85,3 @@ class EachVariant:
 
 
 EACH_VARIANT = EachVariant()
-
-

@@ -134,11 +134,13 @@ def _open_axes(settings: MapSettings) -> FloatArray:
     """Along which blocks lie where nothing repeats; slices have the loading axis as the last."""
     if settings.slices is None:
         return np.eye(3)
-    return line_triads(np.array([settings.axis], dtype=np.float64))[0]
+    triad: FloatArray = line_triads(np.array([settings.axis], dtype=np.float64))[0]
+    return triad
 
 
 def _vectors(cell: Cell | None) -> FloatArray:
-    return np.eye(3) if cell is None else cell.vectors
+    vectors: FloatArray = np.eye(3) if cell is None else cell.vectors
+    return vectors
 
 
 def _axes(cell: Cell | None, open_axes: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:

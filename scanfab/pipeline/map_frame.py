@@ -257,7 +257,8 @@ class BlocksOfVariant:
         inside = block >= 0
         where = block[inside] * shape[1] + part[inside]
         weights = np.asarray(values, np.float64)[inside]
-        return np.bincount(where, weights, minlength=math.prod(shape)).reshape(shape)
+        sums = np.bincount(where, weights, minlength=math.prod(shape))
+        return np.asarray(sums.reshape(shape), np.float64)
 
     def notes(self) -> Iterator[Note]:
         """Lines and blocks that are doubtful, and whether the sample is homogeneous."""

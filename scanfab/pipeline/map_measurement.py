@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scanfab.base.note import Note
-from scanfab.base.typing import FloatArray
+from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.blocks import BlockFabrics, WithoutParts
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.goal import Errors
@@ -187,10 +187,10 @@ def _part_sums(
     }
 
 
-def _order(blocks: Blocks, splits: tuple[int, int, int]) -> FloatArray:
+def _order(blocks: Blocks, splits: tuple[int, int, int]) -> IntArray:
     """The finer blocks in the order of their blocks, and of the parts of these."""
     block, part = blocks.of_finer(splits)
-    return np.lexsort((part, block))
+    return np.asarray(np.lexsort((part, block)), np.int64)
 
 
 def _part_spacing(solids: Solids, rule: DirectionRule, plan: Plan) -> float:

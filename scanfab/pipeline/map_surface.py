@@ -55,7 +55,7 @@ def cut_by_window(blocks: Blocks, window: Convex, center: FloatArray, mean: floa
     for unit in sphere_points()[0][::SOME]:
         moved = outline + DEPTH * mean * unit
         inside &= window.contains(moved.reshape(-1, 3)).reshape(inside.shape)
-    return ~inside.all(axis=1)
+    return np.asarray(~inside.all(axis=1))
 
 
 def volumes_inside(

@@ -9,9 +9,10 @@ from scanfab.base.column import DEFAULT_DIGITS
 from scanfab.base.errors import SettingsError
 from scanfab.base.option import Option, options_of
 from scanfab.io.options import READING_OPTIONS
+from scanfab.pipeline.map_settings import MapSettings
 from scanfab.pipeline.settings import Settings
 
-__all__ = ["DECLARED", "MEANINGS", "OPTIONS", "OUTPUT_OPTIONS", "as_options"]
+__all__ = ["DECLARED", "MAP_OPTIONS", "MEANINGS", "OPTIONS", "OUTPUT_OPTIONS", "as_options"]
 
 
 def _figures() -> list[str]:
@@ -121,14 +122,22 @@ VIEWING_OPTIONS = (
 OPTIONS = {one.name: one for one in (*READING_OPTIONS, *options_of(Settings), *OUTPUT_OPTIONS)}
 """The options of compute by name."""
 
+MAP_OPTIONS = {
+    one.name: one
+    for one in (*READING_OPTIONS, *options_of(MapSettings), *OUTPUT_OPTIONS)
+    if one.name not in ("cutoffs", "figure")
+}
+"""Those of map."""
+
 MEANINGS = {name: one.meaning for name, one in OPTIONS.items() if one.meaning}
 """What each option means that decides a result, in the words of the report."""
 
 DECLARED = {
+    **MAP_OPTIONS,
     **OPTIONS,
     **{one.name: one for one in (*COMPARING_OPTIONS, *VIEWING_OPTIONS)},
 }
-"""Those of ``compare`` and ``view`` too."""
+"""Those of ``map``, ``compare`` and ``view`` too."""
 NAMES = "|".join(DECLARED)
 
 

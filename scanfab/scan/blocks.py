@@ -116,13 +116,13 @@ class Blocks:
         >>> halves.of(np.array([[0.5, 0.5, 0.5], [1.5, 0.5, 0.5], [2.5, 0.5, 0.5]]))
         array([ 0,  1, -1])
         """
-        matrix = np.linalg.inv(edges).T
+        matrix = np.asarray(np.linalg.inv(edges).T, np.float64)
         first, second, third = (bool(one) for one in np.asarray(repeats))
         return cls(matrix, -matrix @ corner, parts, (first, second, third))
 
     def with_shells(self, number: int, radius: float) -> Blocks:
         """So many shells about the middle of the parallelepiped, up to a radius, in its place."""
-        edges = np.linalg.inv(self.matrix.T) / radius
+        edges = np.asarray(np.linalg.inv(self.matrix.T) / radius, np.float64)
         return replace(self, parts=(1, 1, 1), edges=edges, shells=number)
 
     def moved(self, origin: FloatArray) -> Blocks:
@@ -179,7 +179,7 @@ class Blocks:
     @property
     def corner_edges(self) -> tuple[FloatArray, FloatArray]:
         """The corner and the edges, as rows, of the parallelepiped; shapes (3,), (3, 3)."""
-        edges = np.linalg.inv(self.matrix.T)
+        edges = np.asarray(np.linalg.inv(self.matrix.T), np.float64)
         return -self.shift @ edges, edges
 
     @property

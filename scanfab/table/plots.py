@@ -29,7 +29,7 @@ def installed_figures() -> dict[str, Any]:
 
 
 def figures_of(kind: str) -> dict[str, Any]:
-    """Those of a kind of data: ``table``, ``frames`` or ``calibration``."""
+    """Those of a kind of data: ``table``, ``frames``, ``calibration`` or ``map``."""
     return {name: one for name, one in installed_figures().items() if one.kind == kind}
 
 

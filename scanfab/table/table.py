@@ -131,7 +131,7 @@ class Table(Sequence[Row]):
     @property
     def plot(self) -> Plots:
         """The figures that are installed: ``table.plot.evolution(ax=ax)`` draws one on its Axes."""
-        return Plots(self, "table")
+        return Plots(self, "map" if "block" in self.names else "table")
 
     def select(self, **wanted: Any) -> Table:
         """

@@ -16,9 +16,9 @@ from scanfab.io.options import take_reading
 from scanfab.io.series import Series
 from scanfab.pipeline.frames import of_whole
 from scanfab.pipeline.job import Job
+from scanfab.pipeline.map_settings import BLOCK_OPTIONS, MapSettings, is_map
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.told import recorded
-from scanfab.table.columns import table_columns
 from scanfab.table.result_file import ResultFile
 from scanfab.table.table import Table, load
 from scanfab.table.writing import Excerpt
@@ -71,7 +71,8 @@ def compute_file(
     progress : callable, optional
         Called after each frame with the number of finished frames, and about how many there are.
     **options
-        Those of :func:`scanfab.compute`; for paths those of :func:`scanfab.read_series` too.
+        Those of :func:`scanfab.compute`, or with `grid`, `slices` or `shells` those of
+        :func:`scanfab.fabric_map`; for paths those of :func:`scanfab.read_series` too.
 
     Returns
     -------
@@ -105,18 +106,20 @@ def compute_file(
     >>> [row.step for row in table]
     [30000, 60000]
     """
-    known = [*READING, *(one.name for one in options_of(Settings))]
+    kind = MapSettings if is_map(options) else Settings
+    known = [*READING, *(one.name for one in options_of(MapSettings))]
     refuse_unknown("compute_file", options, known)
+    if not is_map(options):
+        options = {name: one for name, one in options.items() if name not in BLOCK_OPTIONS}
     with recorded() as told:
         series, sources, reading = _opened(source, options)
-        series, settings = _whole(series, Settings(**options))
-        columns = table_columns(settings.more_columns)
-        excerpt = Excerpt.make(columns, fields, digits)
+        series, settings = _whole(series, kind(**options))
+        excerpt = Excerpt.make(settings.columns, fields, digits)
         folders = () if vtk is None else vtk_folders(Path(vtk), len(series), settings, go_on=resume)
         job = Job(
             series,
             settings,
-            ResultFile(Path(output), columns, excerpt),
+            ResultFile(Path(output), settings.columns, excerpt),
             sources=sources,
             reading=reading,
             resume=resume,

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from threading import Lock
 from typing import Any
 
 import numpy as np
 
 from scanfab.base.errors import SettingsError
-from scanfab.base.files import check_folder
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.distribution import mean_length_function, sphere_points
 from scanfab.fabric.tensor import COMPONENTS
 from scanfab.packing.sample import VARIANTS
 from scanfab.pipeline.frame import FrameResult
+from scanfab.pipeline.map_frame import MapResult
+from scanfab.pipeline.map_settings import MapSettings
 from scanfab.pipeline.settings import Settings, Vector
 from scanfab.scan.lines import line_triads
 from scanfab.scan.segments import Segments, sample_segments
@@ -24,14 +24,14 @@ from scanfab.table.table import Row
 from scanfab.viz import vtk_files as vtk
 from scanfab.viz.scene import contact_lines, grains_of
 
-__all__ = ["VtkFolder", "scan_line_sample", "vtk_folders"]
+__all__ = ["MapFolder", "VtkFolder", "scan_line_sample", "vtk_folders"]
 
 
 LINES = 120
-TEXT_FIELDS = ("source", "variant", "contacts_from")
+TEXT_FIELDS = ("source", "variant", "contacts_from", "edge")
 
 
-class VtkFolder:
+class VtkFolder(vtk.Folder):
     """
     A folder of ParaView files, to be called with each computed frame of one series.
 
@@ -51,21 +51,12 @@ class VtkFolder:
     """
 
     def __init__(self, folder: Path, axis: Vector, go_on: bool = False) -> None:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise SettingsError(f"vtk: {folder} cannot be made: {error.strerror}") from None
-        check_folder(folder / "grains.pvd")
-        self.folder = folder
+        super().__init__(folder, go_on)
         self.axis = axis
-        self.go_on = go_on
-        self._collections: dict[str, vtk.Collection] = {}
-        # frames come from several threads, and VTK is not made for that
-        self._lock = Lock()
 
     def __call__(self, result: FrameResult) -> None:
         """Write all files of a frame."""
-        with self._lock:
+        with self.lock:
             window = None if result.measurement is None else result.measurement.plan.window
             fields = _fields(result.rows)
             self._save("grains", vtk.grain_mesh(grains_of(result.sample, window)), result, fields)
@@ -101,15 +92,12 @@ class VtkFolder:
             self._save(f"tensors-{row.variant}", mesh, result, fields)
 
     def _save(self, kind: str, mesh: Any, result: FrameResult, fields: Mapping[str, Any]) -> None:
-        file = f"{kind}_{result.number:06d}.vtp"
-        vtk.save_mesh(mesh, self.folder / file, fields)
-        if kind not in self._collections:
-            path = self.folder / f"{kind}.pvd"
-            self._collections[kind] = vtk.Collection(path, self.go_on)
-        self._collections[kind].add(file, _time(result))
+        self.save(kind, mesh, result.number, time_of(result), fields)
 
 
-def vtk_folders(folder: Path, count: int, settings: Settings, go_on: bool) -> list[VtkFolder]:
+def vtk_folders(
+    folder: Path, count: int, settings: Settings, go_on: bool
+) -> Sequence[VtkFolder | MapFolder]:
     """
     The folders of so many series; if there are several, each has its own in the one.
 
@@ -121,7 +109,10 @@ def vtk_folders(folder: Path, count: int, settings: Settings, go_on: bool) -> li
     if settings.cutoffs:
         raise SettingsError("vtk: files for ParaView are of one cut-off: leave out `cutoffs`")
     own = [folder / f"series-{number}" for number in range(1, count + 1)]
-    return [VtkFolder(one, settings.axis, go_on) for one in (own if count > 1 else [folder])]
+    chosen = own if count > 1 else [folder]
+    if isinstance(settings, MapSettings):
+        return [MapFolder(one, go_on) for one in chosen]
+    return [VtkFolder(one, settings.axis, go_on) for one in chosen]
 
 
 def scan_line_sample(
@@ -136,7 +127,24 @@ def scan_line_sample(
     return replace(found, ends=found.ends + result.scanned.solids.origin)
 
 
-def _time(result: FrameResult) -> float:
+class MapFolder(vtk.Folder):
+    """A folder of ParaView files, to be called with each frame of a map."""
+
+    def __call__(self, result: FrameResult) -> None:
+        """The blocks of each variant as cells with all columns."""
+        if not isinstance(result, MapResult) or result.blocks is None:
+            return
+        with self.lock:
+            for variant in dict.fromkeys(row.variant for row in result.rows):
+                rows = [row for row in result.rows if row.variant == variant]
+                values = _fields(rows)
+                # what is the same in all blocks is no value of a cell
+                fields = {name: values.pop(name)[:1] for name in TEXT_FIELDS if name in values}
+                mesh = vtk.block_mesh(result.blocks[variant in "cd"], values)
+                self.save(f"map-{variant}", mesh, result.number, time_of(result), fields)
+
+
+def time_of(result: FrameResult) -> float:
     """Time of the dump, else its step, else the frame's number."""
     packing = result.sample.packing
     known = [value for value in (packing.time, packing.step) if value is not None]

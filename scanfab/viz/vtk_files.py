@@ -5,19 +5,24 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.convex import Convex
-from scanfab.base.files import whole_file
+from scanfab.base.errors import SettingsError
+from scanfab.base.files import check_folder, whole_file
 from scanfab.base.typing import FloatArray
+from scanfab.scan.blocks import Blocks
 from scanfab.scan.segments import Segments
 from scanfab.viz.scene import ContactLines, Grains
 
 __all__ = [
     "Collection",
+    "Folder",
+    "block_mesh",
     "contact_mesh",
     "distribution_mesh",
     "ellipsoid_mesh",
@@ -30,6 +35,8 @@ __all__ = [
 
 
 SOLID, DROPPED, KEPT = 0, 1, 2
+# cells of a shell, around the axis and from pole to pole
+AZIMUTHS, POLAR = 36, 18
 
 
 def grain_mesh(grains: Grains) -> Any:
@@ -154,6 +161,41 @@ def tensor_points(tensors: Mapping[str, FloatArray], center: FloatArray) -> Any:
     return mesh
 
 
+def block_mesh(blocks: Blocks, values: Mapping[str, npt.ArrayLike]) -> Any:
+    """The blocks of a map as hexahedra; a shell is many, each with the shell's values."""
+    import pyvista
+
+    if blocks.edges is None:
+        parts = blocks.parts
+        corner, edges = blocks.corner_edges
+        at = corner + _lattice(*(np.linspace(0.0, 1.0, n + 1) for n in parts)) @ edges
+        block = np.arange(len(blocks))
+    else:
+        parts = (AZIMUTHS, POLAR, blocks.shells)
+        azimuth, polar, radius = _lattice(
+            np.linspace(0.0, 2.0 * np.pi, AZIMUTHS + 1),
+            np.linspace(0.0, np.pi, POLAR + 1),
+            np.append(blocks.radii[:, 0], blocks.radius),
+        ).T
+        unit = [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)]
+        at = blocks.middles[0] + radius[:, None] * np.column_stack(unit)
+        block = np.repeat(np.arange(blocks.shells), AZIMUTHS * POLAR)
+    first, second, third = _lattice(*(np.arange(float(n)) for n in parts)).astype(np.int64).T
+    line, layer = parts[0] + 1, (parts[0] + 1) * (parts[1] + 1)
+    start = first + line * second + layer * third
+    around = np.array([0, 1, line + 1, line])
+    cells = start[:, None] + np.concatenate([around, around + layer])
+    mesh = pyvista.UnstructuredGrid({pyvista.CellType.HEXAHEDRON: cells}, at)
+    _add(mesh.cell_data, {name: np.asarray(one)[block] for name, one in values.items()})
+    return mesh
+
+
+def _lattice(first: FloatArray, second: FloatArray, third: FloatArray) -> FloatArray:
+    """All places with these coordinates, the first fastest, shape (N, 3)."""
+    z, y, x = np.meshgrid(third, second, first, indexing="ij")
+    return np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+
+
 def save_mesh(mesh: Any, path: Path, fields: Mapping[str, Any]) -> None:
     """
     Write a mesh with field data; the file is complete or untouched.
@@ -170,15 +212,58 @@ def save_mesh(mesh: Any, path: Path, fields: Mapping[str, Any]) -> None:
 
 def _xml(mesh: Any) -> str:
     """The file's content: VTK writes it to memory, as its writer crashes on a full disk."""
-    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
 
-    writer = vtkXMLPolyDataWriter()
+    kinds = {"PolyData": vtkXMLPolyDataWriter, "UnstructuredGrid": vtkXMLUnstructuredGridWriter}
+    writer = kinds[type(mesh).__name__]()
     writer.SetInputData(mesh)
     writer.SetDataModeToBinary()
     writer.WriteToOutputStringOn()
     writer.Write()
     text: str = writer.GetOutputString()
     return text
+
+
+class Folder:
+    """
+    A folder of such files of one series.
+
+    Parameters
+    ----------
+    folder : Path
+        Is made if it does not exist.
+    go_on : bool, optional
+        Keep the frames of an earlier run in the collections.
+
+    Raises
+    ------
+    SettingsError
+        If the folder cannot be made or written to.
+    """
+
+    def __init__(self, folder: Path, go_on: bool = False) -> None:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise SettingsError(f"vtk: {folder} cannot be made: {error.strerror}") from None
+        check_folder(folder / "grains.pvd")
+        self.folder = folder
+        self.go_on = go_on
+        self._collections: dict[str, Collection] = {}
+        # frames come from several threads, and VTK is not made for that
+        self.lock = Lock()
+
+    def save(
+        self, kind: str, mesh: Any, number: int, time: float, fields: Mapping[str, Any]
+    ) -> None:
+        """The file of a kind and frame, and its place in the collection of the kind."""
+        suffix = {"PolyData": "vtp", "UnstructuredGrid": "vtu"}[type(mesh).__name__]
+        file = f"{kind}_{number:06d}.{suffix}"
+        save_mesh(mesh, self.folder / file, fields)
+        if kind not in self._collections:
+            path = self.folder / f"{kind}.pvd"
+            self._collections[kind] = Collection(path, self.go_on)
+        self._collections[kind].add(file, time)
 
 
 class Collection:

@@ -88,8 +88,8 @@ class Bins(NamedTuple):
         to_block, parts, repeats, form, halves = self.partition
         to_block = to_block[::-1].copy()
         to_block[:, :, 3] += to_block[:, :, :3] @ center
-        numbers = (one[::-1].copy() for one in (parts, repeats, form))
-        partition = Partition(to_block, *numbers, halves)
+        parts, repeats, form = parts[::-1].copy(), repeats[::-1].copy(), form[::-1].copy()
+        partition = Partition(to_block, parts, repeats, form, halves)
         return self._replace(partition=partition, sums=np.zeros_like(self.sums))
 
 

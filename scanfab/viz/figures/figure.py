@@ -48,8 +48,8 @@ class Figure:
     [3, 1]
     """
 
-    kind: ClassVar[Literal["table", "frames", "calibration"]] = "table"
-    """What it is drawn of: a fabric table, scanned frames, or the steps of a calibration."""
+    kind: ClassVar[Literal["table", "frames", "calibration", "map"]] = "table"
+    """What it is drawn of: a fabric table, scanned frames, the steps of a calibration, a map."""
     order: ClassVar[int] = 100
     """Where it stands among the others, on a page and in lists; of equals, by name."""
     columns: ClassVar[tuple[str, ...]] = ()
