@@ -24,7 +24,7 @@ from scanfab.pipeline.frames import Readable
 from scanfab.pipeline.map_measurement import MapMeasurement, measure_map
 from scanfab.pipeline.map_surface import cut_by_hull, cut_by_window, volumes_inside
 from scanfab.pipeline.plan import Plan
-from scanfab.pipeline.variant_columns import channels_text, edge_of, left_out_of, left_out_text
+from scanfab.pipeline.variant_columns import edge_of, left_out_text
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.edges import ENDS, START
 from scanfab.table.map_columns import map_row
@@ -262,15 +262,22 @@ class BlocksOfVariant:
 
     def notes(self) -> Iterator[Note]:
         """Lines and blocks that are doubtful, and whether the sample is homogeneous."""
-        scan, which = self.measurement.sums.scan, "abcd".index(self.variant.name)
         edge = edge_of(self.variant, self.plan, self.measurement.solids)
         texts = {
-            "channels": channels_text(scan, which),
-            "left_out": left_out_text(left_out_of(scan, which, edge)),
+            "left_out": left_out_text(self._left_out(edge)),
             "few_segments": self._too_few(),
             HOMOGENEITY: self._homogeneity(),
         }
         return (Note(code, text, (self.variant.name,)) for code, text in texts.items() if text)
+
+    def _left_out(self, edge: str | None) -> float | None:
+        """Share of the segments that leave the sample, and so are not counted."""
+        if edge != START:
+            return None
+        scan, which = self.measurement.sums.scan, "abcd".index(self.variant.name)
+        left = float(scan.left_out[:, which].sum())
+        every = left + float(self.fabrics.segments.sum())
+        return left / every if every else None
 
     def _too_few(self) -> str:
         fabrics = self.fabrics

@@ -20,15 +20,12 @@ from scanfab.packing.sample import Variant
 from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.plan import Plan
 from scanfab.scan.edges import CLIP, ENDS, START
-from scanfab.scan.scan import ScanSums
 from scanfab.scan.solids import Solids
 from scanfab.table.columns import installed_fabrics, table_columns
 
 __all__ = [
     "VariantColumns",
-    "channels_text",
     "edge_of",
-    "left_out_of",
     "left_out_text",
     "no_columns",
 ]
@@ -130,7 +127,11 @@ class VariantColumns:
     @cached_property
     def left_out(self) -> float | None:
         """Share of the segments that leave the sample, and so are not counted."""
-        return left_out_of(self.sums, self.which, self.edge)
+        if self.edge != START:
+            return None
+        left = float(self.sums.left_out[:, self.which].sum())
+        every = left + float(self.sums.segments[:, self.which].sum())
+        return left / every if every else None
 
     def _solid_fraction(self) -> float | None:
         """1 - void length / line length in the window, weighted like the directions."""
@@ -189,11 +190,16 @@ class VariantColumns:
     def notes(self) -> Iterator[Note]:
         """Whether there is no void fabric, or a doubtful one, or lines without a grain."""
         texts = {
-            "channels": channels_text(self.sums, self.which),
+            "channels": self._channels(),
             "left_out": left_out_text(self.left_out),
         }
         texts |= self._of_void_fabric()
         return (Note(code, text, (self.variant.name,)) for code, text in texts.items() if text)
+
+    def _channels(self) -> str:
+        channels = int(self.sums.channels[:, self.which].sum())
+        lines = channels + int(self.sums.lines[:, self.which].sum())
+        return f"{channels} of {lines} lines stay in a channel and meet no grain" * bool(channels)
 
     def _of_void_fabric(self) -> dict[str, str]:
         void = self.measured.void
@@ -228,22 +234,6 @@ def edge_of(variant: Variant, plan: Plan, solids: Solids) -> str | None:
     if solids.medium is not None:
         return None
     return ENDS if plan.edge == ENDS else CLIP
-
-
-def left_out_of(sums: ScanSums, which: int, edge: str | None) -> float | None:
-    """Share of a variant's segments that leave the sample, and so are not counted."""
-    if edge != START:
-        return None
-    left = float(sums.left_out[:, which].sum())
-    every = left + float(sums.segments[:, which].sum())
-    return left / every if every else None
-
-
-def channels_text(sums: ScanSums, which: int) -> str:
-    """Whether lines of a variant meet no grain, however far they go."""
-    channels = int(sums.channels[:, which].sum())
-    lines = channels + int(sums.lines[:, which].sum())
-    return f"{channels} of {lines} lines stay in a channel and meet no grain" * bool(channels)
 
 
 def left_out_text(left_out: float | None) -> str:

@@ -177,13 +177,23 @@ def void_segments(position, radius, triad, offset, spacing, clip):
 
 
 def block(place, blocks):
-    """The block of a place, from its definition."""
-    number, before = 0, 1
+    """The block of a place, from its definition; -1 for none."""
+    number, before, coordinates = 0, 1, []
     for axis, parts in enumerate(blocks.parts):
-        along = (blocks.matrix[axis] @ place + blocks.shift[axis]) % 1.0
+        along = blocks.matrix[axis] @ place + blocks.shift[axis]
+        if blocks.repeats[axis]:
+            along %= 1.0
+        elif not 0 <= along <= 1:
+            return -1
         number += before * min(int(along * parts), parts - 1)
         before *= parts
-    return number
+        coordinates.append(along - 0.5)
+    if blocks.edges is None:
+        return number
+    distance = np.linalg.norm(np.array(coordinates) @ blocks.edges)
+    if distance > 1:
+        return -1
+    return number + before * min(int(distance * blocks.shells), blocks.shells - 1)
 
 
 def octant(place, center):
@@ -314,12 +324,18 @@ def periodic_gaps(position, radius, vectors, periods, foot, direction, measured,
 
     With a measured length, those that start in it; else all between the first and last solid.
     """
+    words = position, radius, vectors, periods, foot, direction, measured, longest
+    return [one.length for one in periodic_segments(*words)]
+
+
+def periodic_segments(position, radius, vectors, periods, foot, direction, measured, longest=150.0):
+    """These gaps with the places of their middles."""
     if len(radius) == 0:
         return []
     low, high = (-3.0, max(measured, 1.0) + longest) if measured else (-60.0, 60.0)
     solids = periodic_solids(position, radius, vectors, periods, foot, direction, low, high)
     return [
-        after[0] - before[1]
+        Segment(after[0] - before[1], foot + 0.5 * (before[1] + after[0]) * direction)
         for before, after in pairwise(solids)
         if not measured or 0 <= before[1] < measured
     ]

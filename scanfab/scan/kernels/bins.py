@@ -12,7 +12,7 @@ import numpy as np
 
 from scanfab.base.jit import Flag, inner
 from scanfab.base.typing import FloatArray
-from scanfab.scan.kernels.edges import ends_inside, listed_to
+from scanfab.scan.kernels.edges import listed_to
 from scanfab.scan.kernels.strips import FAR, Edge
 from scanfab.scan.kernels.sweep import Measured
 
@@ -38,10 +38,10 @@ NUMBER, LENGTH, SQUARE = range(3)
 OF_WHOLE, OF_WINDOW = 0, 1
 # of a list of gaps its rows: the line's place along u; where the gap starts in the whole and,
 # behind that, in the window; likewise where it ends, its length if it counts, its bin. By the rules
-# that weigh segments half the number of its ends in the window, and, where it is followed beyond,
-# its full length
+# that weigh segments a half for its beginning if that is in the window, then for its end; and where
+# it is followed beyond, its full length
 LINE_U, GAP_LOW, GAP_HIGH, COUNTED, PLACE = 0, 1, 3, 5, 7
-WEIGHT, FULL = 9, 10
+LOW_END, HIGH_END, FULL = 9, 10, 11
 
 
 class Partition(NamedTuple):
@@ -119,7 +119,7 @@ def bins_along(bins: Bins, triad: FloatArray, axis: int) -> Bins:
 def room_for_gaps(count: int) -> FloatArray:
     """So many gaps, for :func:`list_gap` and :func:`add_gaps`."""
     # rows that lie a power of two apart would drive one another out of the processor's first cache
-    return np.empty((11, count + 24))
+    return np.empty((12, count + 24))
 
 
 @inner(forceinline=True)
@@ -148,7 +148,8 @@ def list_gap(
         gaps[GAP_LOW + OF_WINDOW, k] = low if low > enters else enters
         gaps[GAP_HIGH + OF_WINDOW, k] = high if high < leaves else leaves
         if window.ends is not None or window.start is not None:
-            gaps[WEIGHT, k] = ends_inside(low, high, enters, leaves)
+            gaps[LOW_END, k] = 0.5 if low > enters else 0.0
+            gaps[HIGH_END, k] = 0.5 if high < leaves else 0.0
         if window.start is not None:
             # those that begin beyond the listed solids are followed
             known = (low > enters - listed_to(window)) & (low < leaves) & (high > enters)
@@ -179,8 +180,14 @@ def find_bins(
     kind: int,
     v: float,
     window: Edge | None,
+    low_row: np.uint64,
+    high_row: np.uint64,
 ) -> None:
-    """Of gaps on a row of lines, the lengths, 0 where they do not count, and the bins."""
+    """
+    Of gaps on a row of lines, the lengths, 0 where they do not count, and the bins.
+
+    By the middle between what stands in two rows of their list: their ends, or one of these twice.
+    """
     cutoffs, of = bins.cutoffs, bins.partition
     to_block, parts, repeats, form = (
         of.to_block[kind],
@@ -196,7 +203,7 @@ def find_bins(
     in_x, in_y, in_z, shells = parts[0], parts[1], parts[2], parts[3]
     by_x, by_y, by_z = repeats[0], repeats[1], repeats[2]
     xx, yy, zz, xy, xz, yz = form[0], form[1], form[2], form[3], form[4], form[5]
-    lows, highs = gaps[GAP_LOW + kind], gaps[GAP_HIGH + kind]
+    lows, highs = gaps[low_row], gaps[high_row]
     lengths, places = gaps[COUNTED + kind], gaps[PLACE + kind]
     for k in range(count):
         u, low, high = gaps[LINE_U, k], lows[k], highs[k]
@@ -227,6 +234,36 @@ def find_bins(
 
 
 @inner(error_model="numpy")
+def add_ends(
+    bins: Bins,
+    gaps: FloatArray,
+    count: np.uint64,
+    sign: float,
+    which: int,
+    v: float,
+    window: Edge | None,
+) -> None:
+    """
+    Add the first gaps of a list half to the block of each end that is in the window.
+
+    By the rule ``start`` a segment counts by its ends; dealt by the middle of what is inside of it,
+    long ones would go to the blocks at the window's surface.
+    """
+    sums, of, kind = bins.sums, np.uint64(which), np.uint64(OF_WINDOW)
+    for end in range(2):
+        row = np.uint64(GAP_LOW + OF_WINDOW if end == 0 else GAP_HIGH + OF_WINDOW)
+        weights = gaps[np.uint64(LOW_END + end)]
+        find_bins(bins, gaps, count, kind, v, window, row, row)
+        for k in range(count):
+            length = gaps[np.uint64(COUNTED) + kind, k]
+            place = np.uint64(gaps[np.uint64(PLACE) + kind, k])
+            number = sign * weights[k] if length > 0.0 else 0.0
+            sums[kind, of, place, NUMBER] += number
+            sums[kind, of, place, LENGTH] += number * length
+            sums[kind, of, place, SQUARE] += number * length * length
+
+
+@inner(error_model="numpy")
 def add_gaps(
     bins: Bins,
     gaps: FloatArray,
@@ -238,9 +275,13 @@ def add_gaps(
     window: Edge | None,
 ) -> None:
     """Add the first gaps of a list, all on one row of lines, where they count; or take them off."""
+    if window is not None and window.start is not None and bins.partition.halves is None:
+        add_ends(bins, gaps, count, sign, which, v, window)
+        return
     kinds = np.uint64(OF_WINDOW if whole is None else OF_WHOLE), np.uint64(1 + (window is not None))
     for kind in range(kinds[0], kinds[1]):
-        find_bins(bins, gaps, count, kind, v, window)
+        rows = np.uint64(GAP_LOW) + kind, np.uint64(GAP_HIGH) + kind
+        find_bins(bins, gaps, count, kind, v, window, rows[0], rows[1])
     sums, of = bins.sums, np.uint64(which)
     for k in range(count):
         # both in turns, as a gap has to wait for the one before it if they share a bin
@@ -250,11 +291,12 @@ def add_gaps(
             number = sign if length > 0.0 else 0.0
             weighted, counted = number, number * length * length
             if window is not None and window.start is not None:
-                number *= gaps[WEIGHT, k]
+                number *= gaps[LOW_END, k] + gaps[HIGH_END, k]
                 weighted, counted = number, number * length * length
             if window is not None and window.ends is not None:
                 # squares of what is inside say nothing: in their place all that are kept
-                weighted, counted = number * gaps[WEIGHT, k], number
+                weight = gaps[LOW_END, k] + gaps[HIGH_END, k]
+                weighted, counted = number * weight, number
             sums[kind, of, place, NUMBER] += weighted
             sums[kind, of, place, LENGTH] += number * length
             sums[kind, of, place, SQUARE] += counted

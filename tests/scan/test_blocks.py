@@ -1,0 +1,208 @@
+"""Blocks of every kind: a place's block, and the segments with their middle in each."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from scanfab import Cell, direction_rule, scan_lines
+from scanfab.base.convex import sphere
+from scanfab.scan.blocks import Blocks
+from scanfab.scan.edges import START
+from scanfab.scan.following import Following
+from scanfab.scan.gaps import _BinnedLines, scan_blocks
+from scanfab.scan.solids import Solids
+from tests.helpers import naive
+from tests.helpers.lattices import poisson_spheres, rotation
+from tests.helpers.scanning import solids_of
+from tests.helpers.uncompiled import run_uncompiled
+from tests.helpers.windows import random_window
+from tests.scan.kernels.test_periodic import lines_of, random_medium
+from tests.scan.test_edges import open_solids
+
+RULE = direction_rule("lebedev:5")
+TILTED = np.array([[5.0, 0, 0], [1.3, 4.0, 0], [-0.7, 0.9, 4.5]])
+LEAST = np.array([0.02, 0.4])
+
+
+def some_blocks(random, repeats=(False, False, False)):
+    """A grid, slices and shells of a parallelepiped that holds part of a sample."""
+    edges = TILTED @ rotation(random).T if random.random() < 0.7 else np.diag([4.0, 5.0, 3.5])
+    corner = -0.5 * edges.sum(axis=0) + random.uniform(-0.5, 0.5, 3)
+    grid = Blocks.of_edges(edges, corner, (3, 2, 4), repeats)
+    slices = Blocks.of_edges(edges, corner, (1, 5, 1), repeats)
+    radius = random.uniform(0.8, 1.0) * 0.5 * grid.heights @ np.array([0, 2, 0])
+    return grid, slices, grid.with_shells(3, radius), slices.finer((2, 1, 3))
+
+
+def kept_in(segments, blocks):
+    """Number, length and square of segments by block and cut-off, shape (B, C, 3)."""
+    sums = np.zeros((len(blocks), len(LEAST), 3))
+    for length, middle, *weight in segments:
+        block = naive.block(middle, blocks)
+        for place, least in enumerate(LEAST):
+            if block >= 0 and length >= least:
+                number = weight[0] if weight else 1.0
+                sums[block, place] += number, number * length, number * length**2
+    return sums
+
+
+def fast_sums(solids, blocks, triad, offset, spacing, variants="abcd"):
+    words = solids, spacing, LEAST, (blocks, blocks), variants, Following(np.inf)
+    return _BinnedLines(*words).sums(triad[None], offset[None])[0][0]
+
+
+@pytest.mark.parametrize(
+    "repeats", [(False, False, False), (True, True, True), (True, False, True)]
+)
+def test_blocks_are_those_of_the_naive_twin(repeats):
+    random = np.random.default_rng(1)
+    places = random.uniform(-4, 4, (400, 3))
+    for _ in range(5):
+        for blocks in some_blocks(random, repeats):
+            found = blocks.of(places)
+            assert found.tolist() == [naive.block(place, blocks) for place in places]
+            assert -1 <= found.min() < found.max() < len(blocks)
+            if all(repeats) and blocks.edges is None:
+                assert found.min() == 0
+
+
+def test_a_finer_block_is_of_the_block_that_holds_it():
+    random = np.random.default_rng(2)
+    places = random.uniform(-3, 3, (500, 3))
+    for blocks in some_blocks(random):
+        for splits in [(2, 2, 2), (1, 4, 2), (8, 1, 1)]:
+            finer = blocks.finer(splits).of(places)
+            block, part = blocks.of_finer(splits)
+            inside = finer >= 0
+            assert np.array_equal(block[finer[inside]], blocks.of(places)[inside])
+            # each block has each of its parts once
+            assert len(set(zip(block, part, strict=True))) == len(block) == 8 * len(blocks)
+
+
+def test_volumes_middles_and_corners_are_those_of_the_places_inside():
+    random = np.random.default_rng(3)
+    for blocks in some_blocks(random):
+        low, high = -6.0, 6.0
+        found = blocks.of(random.uniform(low, high, (400_000, 3)))
+        counted = np.bincount(found[found >= 0], minlength=len(blocks)) / 400_000
+        np.testing.assert_allclose(counted * (high - low) ** 3, blocks.volumes, rtol=0.2)
+        filled = [blocks.filled(block) for block in range(len(blocks))]
+        for block, (places, volumes) in enumerate(filled):
+            assert set(blocks.of(places)) == {block}
+            assert volumes.sum() == pytest.approx(blocks.volumes[block])
+            np.testing.assert_allclose(volumes @ places / volumes.sum(), blocks.middles[block])
+        if blocks.edges is None:
+            np.testing.assert_allclose(blocks.corners.mean(axis=1), blocks.middles)
+
+
+def check_window_and_whole(random):
+    """Every segment of an overlapping packing is in the block of its middle, or in none."""
+    spheres = poisson_spheres(random, 0.15, 2.5)
+    window, removed = random_window(random), random.random(len(spheres.radius)) < 0.2
+    triad, offset, spacing = rotation(random), random.random(2), 0.5
+    solids = solids_of(spheres, window, removed)
+    for blocks in some_blocks(random):
+        fast = fast_sums(solids, blocks, triad, offset, spacing)
+        for which, solid in enumerate([removed < 2, ~removed]):
+            chosen = spheres.position[solid], spheres.radius[solid]
+            found = naive.void_segments(*chosen, triad, offset, spacing, window)
+            for kind, segments in enumerate(found):
+                slow = kept_in(segments, blocks)
+                np.testing.assert_allclose(fast[2 * kind + which], slow, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_segments_are_in_the_block_of_their_middle(seed):
+    check_window_and_whole(np.random.default_rng([seed, 3]))
+
+
+def check_periodic_whole(random, periods):
+    """The same of a periodic medium, of which middles lie in any image."""
+    medium, offset, spacing = random_medium(random, periods), random.random(2), 0.4
+    normal = rotation(random)[0]
+    feet, measured = lines_of(medium, normal, offset, spacing)
+    segments = []
+    for foot in feet:
+        words = medium.position, medium.radius, medium.vectors, medium.periodic, foot, normal
+        segments += naive.periodic_segments(*words, measured)
+    cell = Cell(medium.vectors, tuple(map(bool, periods)))
+    solids = Solids(np.zeros((0, 3)), np.zeros(0), np.zeros(0, bool), None, medium)
+    triad = np.stack([*np.zeros((2, 3)), normal])
+    corner = random.uniform(-1, 1, 3)
+    grid = Blocks.of_edges(cell.vectors, corner, (2, 3, 4), cell.periodic)
+    shells = grid.with_shells(3, 0.5 * float(cell.heights.min()))
+    for blocks in (grid, shells):
+        fast = fast_sums(solids, blocks, triad, offset, spacing, "a")[0]
+        np.testing.assert_allclose(fast, kept_in(segments, blocks), rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("periods", [(1, 1, 1), (1, 0, 1), (0, 0, 1)])
+def test_segments_of_a_periodic_whole_are_in_the_block_of_their_middle(periods):
+    for seed in range(3):
+        check_periodic_whole(np.random.default_rng([seed, 5]), periods)
+
+
+def check_start(random):
+    """By the rule start, half of a segment is in the block of each end that is in the window."""
+    spheres, window = poisson_spheres(random, 0.12, 4.0), sphere(1.8)
+    triad, offset, spacing = rotation(random), random.random(2), 0.4
+    solids = open_solids(*spheres, spheres.radius < 0, window, START)
+    segments = []
+    for i in range(-6, 7):
+        for j in range(-6, 7):
+            foot = (i + offset[0]) * spacing * triad[0] + (j + offset[1]) * spacing * triad[1]
+            enters, leaves = naive.within(window, foot, triad[2])
+            ends = naive.union(naive.chords(*spheres, foot, triad[2]))
+            for (_, low), (high, _) in pairwise(ends):
+                segments += [
+                    (high - low, foot + place * triad[2], 0.5)
+                    for place in (low, high)
+                    if enters < place < leaves
+                ]
+    for blocks in some_blocks(random):
+        fast = fast_sums(solids, blocks, triad, offset, spacing, "c")[2]
+        np.testing.assert_allclose(fast, kept_in(segments, blocks), rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_by_the_rule_start_each_end_is_in_its_own_block(seed):
+    check_start(np.random.default_rng([seed, 4]))
+
+
+def test_segments_are_in_the_block_of_their_middle_uncompiled():
+    run_uncompiled(
+        "import numpy as np\n"
+        "from tests.scan import test_blocks as here\n"
+        "np.seterr(invalid='ignore')\n"
+        "here.check_window_and_whole(np.random.default_rng([0, 3]))\n"
+        "here.check_start(np.random.default_rng([0, 4]))\n"
+    )
+
+
+@pytest.mark.parametrize("edge", ["clip", "start", "ends"])
+def test_all_blocks_together_are_the_scan_of_the_same_lines(edge):
+    random = np.random.default_rng(6)
+    spheres = poisson_spheres(random, 0.15, 4.0)
+    solids = open_solids(*spheres, random.random(len(spheres.radius)) < 0.2, sphere(2.0), edge)
+    blocks = Blocks.of_edges(14.0 * rotation(random), np.zeros(3), (5, 6, 3))
+    blocks = blocks.moved(blocks.lattice(0.5).mean(axis=0))
+    words = {"spacing": 0.3, "replicates": range(3), "variants": "abcd"}
+    found = scan_blocks(solids, RULE, cutoffs=[0.1, 0.5], blocks=(blocks, blocks), **words)
+    for place, cutoff in enumerate([0.1, 0.5]):
+        sums = scan_lines(solids, RULE, cutoff=cutoff, **words)
+        for variant in "abcd":
+            length, number = (one.sum(axis=2) for one in found.kept(variant, place))
+            np.testing.assert_allclose(number, sums.kept(variant)[1], rtol=1e-12)
+            np.testing.assert_allclose(length, sums.kept(variant)[0], rtol=1e-9)
+    assert np.all(found.scan.chords > 0)
+
+
+def test_lines_of_a_map_are_kept_in_any_number_of_threads():
+    random = np.random.default_rng(7)
+    solids = solids_of(poisson_spheres(random, 0.15, 3.0), 2.0)
+    blocks = some_blocks(random)[0]
+    words = {"spacing": 0.2, "cutoffs": [0.1], "blocks": (blocks, blocks), "variants": "ac"}
+    one, three = (scan_blocks(solids, RULE, workers=n, **words) for n in (1, 3))
+    assert np.array_equal(one.length, three.length)
+    assert np.array_equal(one.scan.chords, three.scan.chords)
