@@ -12,6 +12,7 @@ from scanfab.pipeline.calibration_ladders import StepRow
 from scanfab.pipeline.inspection import FrameReport
 from scanfab.table.columns import MORE_COLUMNS, OWN_COLUMNS
 from scanfab.table.comparison_rows import DifferenceRow, FrameRow, SummaryRow
+from scanfab.table.map_columns import map_columns
 
 PAGE = Path(__file__).parent / "command-line.md"
 
@@ -48,6 +49,7 @@ series that has grains.
 TABLES = {
     "scanfab compute": OWN_COLUMNS,
     "scanfab compute, where the options ask for more than the default": MORE_COLUMNS,
+    "scanfab map": map_columns(("edge",), shells=True),
     "scanfab compare": columns_of_fields(FrameRow),
     "scanfab compare --summary": columns_of_fields(SummaryRow),
     "scanfab compare --differences": columns_of_fields(DifferenceRow),

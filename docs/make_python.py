@@ -15,7 +15,9 @@ BEGIN, END = "<!-- names -->", "<!-- end of names -->"
 GROUPS = {
     "Reading": ("read", "read_series", "Series", "Frame"),
     "Packings from anywhere": ("Packing", "Cell", "ContactList", "Contacts", "find_contacts"),
-    "Computing": ("compute", "compute_file", "Settings", "calibrate", "Calibration"),
+    "Computing": (
+        "compute", "compute_file", "fabric_map", "Settings", "calibrate", "Calibration",
+    ),
     "Tables": (
         "Table", "Row", "load", "read_rows", "compare_tables", "Comparison", "COLUMNS", "Column",
     ),

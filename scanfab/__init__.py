@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from scanfab.packing.window import Window
     from scanfab.pipeline.calibration import Calibration, calibrate
     from scanfab.pipeline.compute import compute
-    from scanfab.pipeline.map import fabric_map
+    from scanfab.pipeline.maps.fabric_map import fabric_map
     from scanfab.pipeline.samples import samples
     from scanfab.pipeline.settings import Settings
     from scanfab.pipeline.solids import solids_of
@@ -93,7 +93,7 @@ _HOME = {
     "cylinder": "base.shapes",
     "direction_rule": "scan.directions",
     "ellipsoid": "base.shapes",
-    "fabric_map": "pipeline.map",
+    "fabric_map": "pipeline.maps.fabric_map",
     "find_contacts": "packing.search",
     "load": "table.table",
     "make_report": "viz.report.report",

@@ -52,7 +52,7 @@ def map(
     """
     from scanfab.cli.console import reported_warnings
     from scanfab.cli.rows import finished_job
-    from scanfab.pipeline.map_settings import MapSettings
+    from scanfab.pipeline.maps.settings import MapSettings
 
     check_plot(plot, None, "map")
     with reported_warnings() as told:

@@ -21,7 +21,7 @@ from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.frame import FrameResult, compute_frame
 from scanfab.pipeline.frames import Frames, Readable, Source
-from scanfab.pipeline.map_frame import map_frame
+from scanfab.pipeline.maps.frame import map_frame
 from scanfab.pipeline.plan import Plan, make_plan, plan_without_grains
 from scanfab.pipeline.settings import MAX_CHORDS, Settings
 from scanfab.pipeline.strain import Flips, Strains

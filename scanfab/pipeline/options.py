@@ -9,7 +9,7 @@ from scanfab.base.column import DEFAULT_DIGITS
 from scanfab.base.errors import SettingsError
 from scanfab.base.option import Option, options_of
 from scanfab.io.options import READING_OPTIONS
-from scanfab.pipeline.map_settings import MapSettings
+from scanfab.pipeline.maps.settings import MapSettings
 from scanfab.pipeline.settings import Settings
 
 __all__ = ["DECLARED", "MAP_OPTIONS", "MEANINGS", "OPTIONS", "OUTPUT_OPTIONS", "as_options"]

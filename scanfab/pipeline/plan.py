@@ -13,8 +13,8 @@ from scanfab.packing.doubts import refuse_impossible
 from scanfab.packing.sample import Sample, SampleRule
 from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.frames import sample_rule
-from scanfab.pipeline.map_blocks import MapBlocks, map_blocks
-from scanfab.pipeline.map_settings import MapSettings
+from scanfab.pipeline.maps.blocks import MapBlocks, map_blocks
+from scanfab.pipeline.maps.settings import MapSettings
 from scanfab.pipeline.rv import Deformation, doubts_of_rv, rv_of
 from scanfab.pipeline.settings import AUTO_RULE, Settings, Vector
 from scanfab.pipeline.strain import Strains

@@ -16,7 +16,7 @@ from scanfab.io.options import take_reading
 from scanfab.io.series import Series
 from scanfab.pipeline.frames import of_whole
 from scanfab.pipeline.job import Job
-from scanfab.pipeline.map_settings import BLOCK_OPTIONS, MapSettings, is_map
+from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings, is_map
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.told import recorded
 from scanfab.table.result_file import ResultFile

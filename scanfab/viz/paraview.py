@@ -15,8 +15,8 @@ from scanfab.fabric.distribution import mean_length_function, sphere_points
 from scanfab.fabric.tensor import COMPONENTS
 from scanfab.packing.sample import VARIANTS
 from scanfab.pipeline.frame import FrameResult
-from scanfab.pipeline.map_frame import MapResult
-from scanfab.pipeline.map_settings import MapSettings
+from scanfab.pipeline.maps.frame import MapResult
+from scanfab.pipeline.maps.settings import MapSettings
 from scanfab.pipeline.settings import Settings, Vector
 from scanfab.scan.lines import line_triads
 from scanfab.scan.segments import Segments, sample_segments

@@ -177,7 +177,7 @@ def find_bins(
     bins: Bins,
     gaps: FloatArray,
     count: np.uint64,
-    kind: int,
+    kind: int | np.uint64,
     v: float,
     window: Edge | None,
     low_row: np.uint64,

@@ -9,7 +9,7 @@ from typing import Any
 from scanfab.base.option import options_of, refuse_unknown
 from scanfab.pipeline.compute import compute_rows
 from scanfab.pipeline.frames import Source
-from scanfab.pipeline.map_settings import MapSettings
+from scanfab.pipeline.maps.settings import MapSettings
 from scanfab.table.table import Table
 
 __all__ = ["fabric_map"]

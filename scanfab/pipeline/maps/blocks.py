@@ -13,7 +13,7 @@ from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import Window
-from scanfab.pipeline.map_settings import MapSettings
+from scanfab.pipeline.maps.settings import MapSettings
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.lines import line_triads
 

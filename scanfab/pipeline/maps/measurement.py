@@ -13,7 +13,7 @@ from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.blocks import BlockFabrics, WithoutParts
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.goal import Errors
-from scanfab.pipeline.map_blocks import splits_of
+from scanfab.pipeline.maps.blocks import splits_of
 from scanfab.pipeline.plan import CLOSE, Plan
 from scanfab.pipeline.solids import solids_of
 from scanfab.pipeline.tolerance import scan_to_tolerance

@@ -21,8 +21,8 @@ from scanfab.packing.packing import Packing
 from scanfab.packing.sample import VARIANTS, Sample, Variant
 from scanfab.pipeline.frame import FrameResult, as_sample, frame_values
 from scanfab.pipeline.frames import Readable
-from scanfab.pipeline.map_measurement import MapMeasurement, measure_map
-from scanfab.pipeline.map_surface import cut_by_hull, cut_by_window, volumes_inside
+from scanfab.pipeline.maps.measurement import MapMeasurement, measure_map
+from scanfab.pipeline.maps.surface import cut_by_hull, cut_by_window, volumes_inside
 from scanfab.pipeline.plan import Plan
 from scanfab.pipeline.variant_columns import edge_of, left_out_text
 from scanfab.scan.blocks import Blocks

@@ -1,0 +1,1 @@
+"""Maps: the fabric block by block."""
