@@ -28,6 +28,7 @@ OTHER_TABLES = {
     ("slope", "slope_origin"): "the summary of scanfab compare",
     ("variants", "difference"): "the differences of scanfab compare",
     ("ladder", "value"): "a table of scanfab calibrate",
+    ("block", "at_surface"): "a table of scanfab map",
     ("radius_min", "contacts_from"): "the frames of scanfab inspect",
 }
 # cut-offs that agree in three digits, as they are printed for people, are the same

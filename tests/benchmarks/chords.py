@@ -14,8 +14,10 @@ import numpy as np
 from numba import njit
 
 from scanfab.base.convex import sphere
+from scanfab.scan.blocks import Blocks
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.edges import EDGES, START
+from scanfab.scan.gaps import scan_blocks
 from scanfab.scan.lines import line_triads
 from scanfab.scan.scan import scan_lines
 from scanfab.scan.solids import CellGrains, Solids
@@ -215,7 +217,7 @@ def embree(projected: Projected, folder: Path):
 
 
 def run(repeats: int) -> dict[str, str]:
-    """The sections ``chords``, ``variants``, ``edges`` and ``threads``."""
+    """The sections ``chords``, ``variants``, ``edges``, ``maps`` and ``threads``."""
     solids = rv_solids()
     projected = Projected(solids)
     count = projected.floor()[1]
@@ -224,6 +226,7 @@ def run(repeats: int) -> dict[str, str]:
             "chords": _chords(solids, projected, count, Path(name), repeats),
             "variants": _variants(solids, repeats),
             "edges": _edges(solids, repeats),
+            "maps": _maps(repeats),
             "threads": _threads(solids, projected, repeats),
         }
 
@@ -301,6 +304,33 @@ def _edges(solids, repeats):
             for edge, value in seconds.items()
         ]
     return table(["variant c", "of `clip`"], rows)
+
+
+def _maps(repeats):
+    """Blocks of all grains beside the same lines without any."""
+    position, radius = dense(PAPER)
+    solids = Solids(position, radius, np.zeros(PAPER, bool))
+    reach = float(np.abs(position).max() + radius.max())
+    box = Blocks.of_edges(2 * reach * np.eye(3), np.full(3, -reach), (10, 10, 10))
+    kinds = {
+        "octants": Blocks.about(np.zeros(3), 2 * reach),
+        "a grid of 1,000 blocks": box,
+        "10 shells": box.with_shells(10, reach),
+    }
+    rows = []
+    for spacing, directions in ((0.3, 16), (1.0, 100)):
+        words = {"spacing": spacing, "variants": "a", "replicates": range(directions)}
+        ways = {"none": lambda w=words: scan_lines(solids, RULE, cutoff=CUTOFF, **w)}
+        for name, one in kinds.items():
+            ways[name] = lambda b=one, w=words: scan_blocks(
+                solids, RULE, cutoffs=[CUTOFF], blocks=(b, b), **w
+            )
+        seconds = interleaved(ways, repeats, clock=time.process_time)
+        rows += [
+            (f"{name}, lines {spacing:g} mean radii apart", f"{value / seconds['none']:.2f}")
+            for name, value in seconds.items()
+        ]
+    return table(["blocks", "of none"], rows)
 
 
 def _threads(solids, projected, repeats):

@@ -1,0 +1,241 @@
+"""Maps: what a row holds, what is refused, and that layers are told apart."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab import Cell, Packing, ScanfabWarning, SettingsError, compute, fabric_map
+from scanfab.pipeline.maps.settings import MapSettings
+from tests.helpers.lattices import shaken_cubic, simple_cubic
+
+LINES = {"directions": "lebedev:11", "spacing": 0.1}
+
+
+def mapped(packing, **options):
+    """A map, and what was told."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        table = fabric_map(packing, **{**LINES, **options})
+    return table, [str(one.message) for one in caught]
+
+
+@pytest.fixture(scope="module")
+def packing():
+    position, radius = shaken_cubic(np.random.default_rng(0), 9, overlap=1.0)
+    return scanfab.find_contacts(Packing(position, radius, cell=Cell([9.0] * 3)))
+
+
+@pytest.fixture(scope="module")
+def grid(packing):
+    return mapped(packing, grid=(3, 2, 1), variants="ab")[0]
+
+
+def test_a_row_for_each_variant_and_block_x_fastest(grid):
+    assert grid["variant"].tolist() == ["a"] * 6 + ["b"] * 6
+    assert grid["block"].tolist() == [*range(6), *range(6)]
+    assert grid["x"][:6].tolist() == pytest.approx([1.5, 4.5, 7.5] * 2)
+    assert grid["y"][:6].tolist() == pytest.approx([2.25] * 3 + [6.75] * 3)
+    assert not grid["at_surface"].any()
+
+
+def test_blocks_together_are_the_row_of_compute(packing, grid):
+    row = compute(packing, variants="ab", **LINES)
+    for variant in "ab":
+        blocks, whole = grid.select(variant=variant), row.select(variant=variant)[0]
+        assert blocks["segments"].sum() == whole.segments
+        assert blocks["grains"].sum() == whole.grains
+        assert blocks["rattlers"].sum() == whole.rattlers
+        assert blocks["contacts"].sum() == whole.contacts
+        # blocks are of one volume here
+        assert blocks["solid_fraction"].mean() == pytest.approx(whole.solid_fraction, abs=3e-3)
+        weighed = blocks["coordination"] @ blocks["grains"] / whole.grains
+        assert weighed == pytest.approx(whole.coordination)
+        mean = np.average(blocks["mean_length"], weights=blocks["segments"])
+        assert mean == pytest.approx(whole.mean_length, rel=1e-3)
+        gc = np.average(blocks.tensor("gc"), axis=0, weights=blocks["contacts"])
+        np.testing.assert_allclose(gc, row.select(variant=variant).tensor("gc")[0], atol=1e-12)
+
+
+def test_one_block_is_the_whole(packing):
+    """But for the scan of its parts, the row of compute."""
+    row = compute(packing, variants="a", **LINES)[0]
+    for one in ({"grid": (1, 1, 1)}, {"slices": 1}):
+        block = mapped(packing, **one)[0][0]
+        for name in ("mean_length", "gvs_zz", "gvs_xy", "alpha_vs", "alpha_vs_axial_se"):
+            assert block[name] == pytest.approx(row[name], rel=1e-9), name
+        for name in ("segments", "grains", "contacts", "alpha_c_axial_se", "spacing", "cutoff"):
+            assert block[name] == row[name], name
+
+
+def layers(random, flat):
+    """A cell of two layers: spheres in the lower half, in the upper disks of overlapping ones."""
+    position, radius = simple_cubic(10)
+    position = position + random.uniform(-0.2, 0.2, position.shape)
+    upper = position[:, 2] > 5
+    # grains of three spheres beside one another along x and y: voids are longer along z
+    bars = [position[upper] + flat * np.array(step) for step in ((0.5, 0, 0), (0, 0.5, 0))]
+    position = np.concatenate([position, *bars])
+    radius = np.concatenate([0.42 * np.ones(1000), 0.42 * np.ones(2 * upper.sum())])
+    return scanfab.find_contacts(Packing(position, radius, cell=Cell([10.0] * 3)))
+
+
+def test_slices_tell_two_layers_of_known_fabric_apart():
+    table, told = mapped(layers(np.random.default_rng(1), 1.0), slices=4, cutoff=0.2)
+    lower, upper = table["alpha_vs_axial"][:2], table["alpha_vs_axial"][2:]
+    errors = np.hypot(table["alpha_vs_axial_se"], table["alpha_vs_axial_sample_se"])
+    assert upper.min() - lower.max() > 6 * errors.max()
+    assert any("the sample is not homogeneous" in one and "no sign" not in one for one in told)
+
+
+def test_blocks_of_a_homogeneous_medium_agree_with_the_whole():
+    random = np.random.default_rng(3)
+    count = random.poisson(0.15 * 20**3)
+    position, radius = random.uniform(0, 20, (count, 3)), random.uniform(0.5, 1.5, count)
+    packing = Packing(position, radius, cell=Cell([20.0] * 3))
+    beta = 0.15 * np.pi * 13 / 12
+    for kind in ({"grid": (2, 2, 2)}, {"slices": 4}, {"shells": 2}):
+        table, told = mapped(packing, spacing=0.3, **kind)
+        errors = np.hypot(table["alpha_vs_axial_se"], table["alpha_vs_axial_sample_se"])
+        assert np.all(np.abs(table["alpha_vs_axial"]) < 4 * errors)
+        off = table["mean_length"] - (0.5 + 1 / beta)
+        # the errors of eight parts are uncertain, and this sample's density is off by chance
+        assert np.all(np.abs(off) < 6 * table["mean_length_se"])
+        solid = 1 - np.exp(-0.15 * 4 / 3 * np.pi * 1.25)
+        assert np.all(np.abs(table["solid_fraction"] - solid) < 6 * table["solid_fraction_se"])
+        assert not any("the sample is not homogeneous" in one for one in told if "no s" not in one)
+
+
+@pytest.mark.parametrize("kind", [{"grid": (4, 4, 4)}, {"shells": 4}])
+def test_solid_fraction_is_that_of_a_lattice_and_empty_at_an_open_surface(kind):
+    position, radius = simple_cubic(16)
+    table, _ = mapped(Packing(position, radius * 0.98), contact_tolerance=0.05, **kind)
+    outer = table["at_surface"] == 1
+    assert outer.any()
+    assert not outer.all()
+    assert np.isnan(table["solid_fraction"][outer]).all()
+    expected = np.pi / 6 * 0.98**3
+    # shells cut a lattice's cells
+    within = 0.01 if "grid" in kind else 0.03
+    np.testing.assert_allclose(table["solid_fraction"][~outer], expected, atol=within)
+
+
+def test_blocks_in_the_middle_of_an_open_sample_lose_no_segments():
+    """Overlapping spheres: their mean length is known, and lower where segments leave."""
+    random = np.random.default_rng(4)
+    count = random.poisson(0.25 * 24**3)
+    packing = Packing(random.uniform(0, 24, (count, 3)), random.uniform(0.5, 1.5, count))
+    table, _ = mapped(packing, spacing=0.4, grid=(5, 5, 5), cutoff=0.5)
+    outer = table["at_surface"] == 1
+    expected = 0.5 + 1 / (0.25 * np.pi * 13 / 12)
+    inner = table["mean_length"][~outer]
+    assert len(inner) == 27
+    error = inner.std(ddof=1) / np.sqrt(27)
+    assert abs(inner.mean() - expected) < 4 * error
+    assert table["mean_length"][outer].mean() < expected - 4 * error
+
+
+def test_the_rv_and_its_rules(packing):
+    """The window's blocks hold what the window holds, by each rule at its surface."""
+    for edge in ("clip", "start", "ends"):
+        words = {"variants": "c", "edge": edge, "rv": 0.9}
+        table, _ = mapped(packing, grid=(2, 2, 2), **words)
+        row = compute(packing, **LINES, **words)[0]
+        assert table["segments"].sum() == pytest.approx(row.segments, abs=4)
+        assert table["grains"].sum() == row.grains
+        assert table["contacts"].sum() == row.contacts
+        assert table["solid_fraction"].mean() == pytest.approx(row.solid_fraction, abs=0.01)
+        assert table["at_surface"].all() == (edge != "start")
+        assert ("edge" in table.names) == (edge != "clip")
+
+
+def test_the_median_block_meets_the_tolerance(packing):
+    words = {"directions": "auto", "spacing": "auto", "tolerance": 4e-3}
+    table, _ = mapped(packing, grid=(3, 3, 3), **words)
+    assert np.median(table["alpha_vs_axial_se"]) <= 4e-3
+    assert table["alpha_vs_axial_se"].max() > 4e-3 / 3
+    _, told = mapped(packing, grid=(3, 3, 3), **{**words, "tolerance": 1e-5}, max_chords=1e6)
+    assert any("before the tolerance 1e-05 was met" in one for one in told)
+
+
+def test_blocks_follow_a_cell_that_deforms():
+    """Each holds the same grains, whose positions move with the cell."""
+    position, radius = simple_cubic(8)
+    frames = [
+        Packing(position * squeeze, radius * 0.9, cell=Cell(8.0 * squeeze))
+        for squeeze in (np.ones(3), np.array([1.05, 1.05, 0.9]))
+    ]
+    table, _ = mapped(frames, slices=2, contact_tolerance=0.2)
+    assert table["grains"].tolist() == [256] * 4
+    assert table["z"].tolist() == pytest.approx([2.0, 6.0, 1.8, 5.4])
+
+
+def test_blocks_of_an_open_sample_stay_where_they_were():
+    position, radius = simple_cubic(8)
+    frames = [Packing(position, radius), Packing(position * [1, 1, 0.8], radius)]
+    table, _ = mapped(frames, slices=2, contact_tolerance=1e-4)
+    assert table["z"].tolist() == pytest.approx([2.0, 6.0] * 2)
+    assert table["grains"].tolist() == [256, 256, 320, 192]
+
+
+def test_frames_without_grains_have_empty_rows():
+    empty = Packing(np.zeros((0, 3)), np.zeros(0))
+    position, radius = simple_cubic(8)
+    table, _ = mapped([empty, Packing(position, radius * 0.98)], slices=2)
+    assert table["grains"].tolist()[:2] == [0, 0]
+    assert table[0].alpha_vs_axial is None
+    assert table[3].alpha_vs_axial is not None
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({}, "just one of `grid`, `slices` and `shells`, found none"),
+        ({"grid": "2,2,2", "slices": 3}, "found `grid` and `slices`"),
+        ({"grid": "2,2"}, "grid: expected three numbers"),
+        ({"grid": (2, 0, 2)}, "grid: expected three numbers"),
+        ({"slices": 0}, "slices: expected 1 or more"),
+        ({"shells": 2.5}, "shells: expected 1 or more"),
+        ({"slices": 2, "cutoffs": "0,1"}, "cutoffs: a map is of one cut-off"),
+    ],
+)
+def test_what_is_no_map_is_refused(options, message):
+    with pytest.raises(SettingsError, match=message):
+        MapSettings(**options)
+
+
+def test_blocks_smaller_than_a_grain_are_refused_and_thin_ones_doubted(packing):
+    with pytest.raises(SettingsError, match=r"grid: makes blocks 0.45 thick.*choose fewer"):
+        fabric_map(packing, grid=(20, 1, 1))
+    _, told = mapped(packing, slices=6)
+    assert any("`slices` makes blocks 1.5 thick" in one for one in told)
+    with pytest.raises(SettingsError, match="45 degrees off the axis"):
+        fabric_map(packing, slices=2, axis=(1, 0, 1))
+
+
+def test_an_option_that_does_not_exist_is_named():
+    with pytest.raises(TypeError, match="no option 'slice': did you mean 'slices'"):
+        fabric_map(Packing(np.zeros((1, 3)), 1.0), slice=3)
+
+
+def test_blocks_without_segments_are_empty_and_said():
+    position, radius = simple_cubic(10)
+    kept = position[:, 2] < 5
+    lower, cell = position[kept], Cell([10.0] * 3, (True, True, False))
+    frames = [
+        Packing(lower, 0.49 * radius[kept] / 0.5, cell=cell),
+        Packing(lower * [1, 1, 0.5], 0.24 * radius[kept] / 0.5, cell=cell),
+    ]
+    table, told = mapped(frames, slices=2, cutoff=0.05)
+    assert table[3].alpha_vs_axial is None
+    assert table[3].grains == 0
+    assert any("1 of 2 blocks have no void fabric" in one for one in told)
+
+
+def test_threads_and_the_same_seed_give_the_same_bytes(packing):
+    one, two = (mapped(packing, grid=(2, 2, 1), workers=n)[0] for n in (1, 2))
+    assert one == two
+    with pytest.warns(ScanfabWarning):
+        other = fabric_map(packing, grid=(2, 2, 1), seed=1, **LINES)
+    assert other["alpha_vs_axial"][0] != one["alpha_vs_axial"][0]
