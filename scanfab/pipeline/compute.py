@@ -60,6 +60,7 @@ def compute(
     rattlers: str = "count",
     contact_tolerance: float = 0.0,
     axis: str | Sequence[float] = "z",
+    with_: str | Sequence[str] | None = None,
     strain: str | Path = "auto",
     frames: str | int | slice | None = None,
     seed: int = 0,
