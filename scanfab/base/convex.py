@@ -134,6 +134,18 @@ class Convex:
             inside &= points @ plane[:3] < plane[3]
         return np.asarray(inside)
 
+    def surely_holds(self, points: FloatArray, radius: FloatArray) -> BoolArray:
+        """Which spheres about points lie inside as a whole; of an ellipsoid not all of them."""
+        isotropic, deviator, level = self.quadric
+        form = isotropic * np.eye(3) + deviator
+        # √(x·form·x) is a norm: that of a sphere's places is at most that of both parts
+        most = math.sqrt(max(float(np.linalg.eigvalsh(form)[-1]), 0.0))
+        middle = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", points, form, points), 0.0))
+        inside = middle + most * radius < math.sqrt(level)
+        for plane in self.planes:
+            inside &= points @ plane[:3] + radius < plane[3]
+        return np.asarray(inside)
+
     def share(self, start: FloatArray, branch: FloatArray) -> FloatArray:
         """
         Which part of each straight piece lies inside.

@@ -210,9 +210,10 @@ def lenses(places: FloatArray, radius: FloatArray, ball: Convex) -> FloatArray:
 def cut_volumes(places: FloatArray, radius: FloatArray, shape: Convex) -> FloatArray:
     """Volumes that spheres share with a region, by points that fill each evenly, shape (N,)."""
     points = _points_in_ball()
-    found = np.zeros(len(radius))
-    for first in range(0, len(radius), CHUNK):
-        rows = slice(first, first + CHUNK)
+    found = shape.surely_holds(places, radius).astype(np.float64)
+    cut = np.flatnonzero(found == 0.0)
+    for first in range(0, len(cut), CHUNK):
+        rows = cut[first : first + CHUNK]
         spread = places[rows, None] + radius[rows, None, None] * points
         inside = shape.contains(spread.reshape(-1, 3)).reshape(-1, len(points))
         found[rows] = inside.mean(axis=1)
