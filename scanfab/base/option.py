@@ -17,6 +17,7 @@ __all__ = [
     "GROUPS",
     "Option",
     "as_given",
+    "flag_of",
     "number",
     "one_of",
     "option",
@@ -92,7 +93,20 @@ class Option:
     @property
     def flag(self) -> str:
         """As the command line spells it."""
-        return self.spelling or f"--{self.name.replace('_', '-')}"
+        return self.spelling or flag_of(self.name)
+
+
+def flag_of(name: str) -> str:
+    """
+    An argument as the command line spells it; an underscore behind keeps it from being a keyword.
+
+    Examples
+    --------
+    >>> from scanfab.base.option import flag_of
+    >>> flag_of("rv_radius"), flag_of("with_")
+    ('--rv-radius', '--with')
+    """
+    return f"--{name.rstrip('_').replace('_', '-')}"
 
 
 def option(**declaration: Any) -> Any:

@@ -312,7 +312,6 @@ class Settings:
         meaning="groups of further columns",
         takes="str or sequence of str",
         metavar="GROUP,...",
-        spelling="--with",
         choices=lambda: GROUP_NAMES,
     )
     strain: str = option(
