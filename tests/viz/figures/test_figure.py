@@ -27,7 +27,7 @@ from tests.helpers.tables import curve
 
 pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.base.errors.ScanfabNote")
 OWN = (
-    "evolution", "normalised", "correlation", "rose", "projection", "histogram", "cutoffs",
+    "evolution", "normalised", "correlation", "columns", "rose", "projection", "histogram", "cutoffs",
     "calibration",
 )  # fmt: skip
 FAST = ["--boundary", "mask=3", "--tolerance", "3e-3", "--variants", "c", "--frames", "::6"]
@@ -65,8 +65,8 @@ def table(tmp_path):
 
 def test_the_figures_of_the_package_stand_first_and_in_their_order(made_up):
     assert tuple(installed_figures()) == (*OWN, "heights", "made_up")
-    assert [*figures_of("table")] == [*OWN[:3], "made_up"]
-    assert [*figures_of("frames")] == [*OWN[3:7], "heights"]
+    assert [*figures_of("table")] == [*OWN[:4], "made_up"]
+    assert [*figures_of("frames")] == [*OWN[4:8], "heights"]
 
 
 @pytest.mark.parametrize(
