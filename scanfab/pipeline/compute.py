@@ -47,6 +47,7 @@ def compute(
     rv_size: str | Sequence[float] | None = None,
     rv_axis: str | Sequence[float] | None = None,
     rv_follows: str = "none",
+    edge: str = "clip",
     boundary: str | Sequence[str] = (),
     cutoff: str | float = "1rmin",
     cutoffs: str | float | Iterable[str | float] | None = None,

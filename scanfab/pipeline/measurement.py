@@ -98,7 +98,7 @@ class Measurement:
 
 def measure(sample: Sample, plan: Plan, where: str = "the frame") -> Measurement:
     """Scan one frame that has grains; ``where`` names it where progress is told."""
-    solids = solids_of(sample, plan.window, variants=plan.variants)
+    solids = solids_of(sample, plan.window, variants=plan.variants, edge=plan.edge)
     sums, plan, notes = scan_to_tolerance(solids, plan, where)
     blocks = _blocks(sample, plan)
     placed = _about(solids.origin, blocks)

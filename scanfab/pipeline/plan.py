@@ -75,6 +75,8 @@ class Plan:
     """What the scan may add to meet the tolerance: ``""``, ``replicates`` or ``directions``."""
     rule_is_asked_for: bool
     """Then an auto scan keeps it."""
+    edge: str
+    """What counts at the window's surface, see :mod:`scanfab.scan.edges`."""
     lists_gaps: bool
     """Whether sums for one cut-off do not suffice."""
     notes: tuple[Note, ...] = ()
@@ -219,6 +221,7 @@ def _without_lengths(settings: Settings, strains: Strains) -> Plan:
         replicates=0,
         auto="",
         rule_is_asked_for=settings.directions is not None,
+        edge=settings.edge,
         lists_gaps=settings.lists_gaps,
     )
 

@@ -23,6 +23,7 @@ from scanfab.pipeline.values import (
     Length,
     Vector,
     as_written,
+    check_moment,
     check_window,
     parse_axis,
     parse_boundary,
@@ -41,6 +42,8 @@ from scanfab.pipeline.values import (
     parse_workers,
     rattler_rules,
 )
+from scanfab.scan.columns import EDGE_COLUMNS
+from scanfab.scan.edges import CLIP, EDGES
 
 if TYPE_CHECKING:
     from scanfab.packing.boundary import BoundaryRule
@@ -166,6 +169,17 @@ class Settings:
         meaning="none: the RV keeps its shape; strain: it deforms with the sample",
         metavar="none|strain",
         choices=lambda: ("none", "strain"),
+    )
+    edge: str = option(
+        default=CLIP,
+        parse=one_of(*EDGES),
+        group="window",
+        help="What counts at the surface of the RV: clip cuts the void segments there; start takes "
+        "their full length if they begin or end inside, ends their ends inside.",
+        meaning="clip: void segments are cut at the RV's surface; start: those that begin or end "
+        "in it count with their full length; ends: by their ends in it, in the whole, too",
+        metavar="|".join(EDGES),
+        choices=lambda: EDGES,
     )
     boundary: tuple[BoundaryRule, ...] = option(
         default=(),
@@ -351,12 +365,14 @@ class Settings:
             value = one.parse(one.name, options.get(one.name, one.default))
             object.__setattr__(self, one.name, value)
         check_window(self)
+        check_moment(self)
 
     @property
     def more_columns(self) -> tuple[str, ...]:
         """Columns that the table has because these settings ask for more than the default."""
         shaped = self.rv_shape != "sphere" or self.rv_follows != "none"
-        return ("window_alpha_vs_axial",) if shaped and self.needs_window else ()
+        columns = ("window_alpha_vs_axial",) if shaped and self.needs_window else ()
+        return columns if self.edge == CLIP else (*columns, *(one.name for one in EDGE_COLUMNS))
 
     def __repr__(self) -> str:
         usual = Settings()

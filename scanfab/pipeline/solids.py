@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
+from scanfab.base.typing import FloatArray
+from scanfab.packing.inner import inner_ellipsoid
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import Window
-from scanfab.scan.solids import CellGrains, Solids
+from scanfab.scan.edges import CLIP, ENDS, START
+from scanfab.scan.solids import CellGrains, Inner, Solids, margin_of
 
 __all__ = ["solids_of"]
 
 
-def solids_of(sample: Sample, window: Window | None = None, *, variants: str = "abcd") -> Solids:
+def solids_of(
+    sample: Sample, window: Window | None = None, *, variants: str = "abcd", edge: str = CLIP
+) -> Solids:
     """
     The spheres that scan lines may meet.
 
@@ -25,6 +30,8 @@ def solids_of(sample: Sample, window: Window | None = None, *, variants: str = "
     variants : str, optional
         Which of a, b, c, d are to be scanned. Without a and b, grains outside the window are left
         out, and of a periodic packing the whole.
+    edge : {"clip", "start", "ends"}, optional
+        What counts at the window's surface.
 
     Returns
     -------
@@ -63,18 +70,32 @@ def solids_of(sample: Sample, window: Window | None = None, *, variants: str = "
     position, radius = packing.position[sample.grains], packing.radius[sample.grains]
     removed = sample.rattlers[sample.grains]
     origin = position.mean(axis=0) if window is None else window.center
-    position = position - origin
+    position = np.ascontiguousarray(position - origin)
     shape = None if window is None else window.shape
     reach = 0.0 if shape is None else shape.reach
+    every = CellGrains(position, radius, removed, np.eye(3), np.zeros(3, bool))
     if packing.cell is not None and packing.is_periodic:
-        medium: CellGrains | None = None
-        if whole:
-            vectors, periodic = packing.cell.short_vectors, np.array(packing.cell.periodic)
-            position = np.ascontiguousarray(position)
-            medium = CellGrains(position, radius, removed, vectors, periodic)
-        images, row = packing.cell.images_near_origin(position, radius + reach)
-        return Solids(images, radius[row], removed[row], shape, medium, origin)
+        vectors, periodic = packing.cell.short_vectors, np.array(packing.cell.periodic)
+        every = every._replace(vectors=vectors, periodic=periodic)
+    around = every if edge == START and shape is not None else None
+    margin = 0.0 if around is None else margin_of(around)
+    if packing.cell is not None and packing.is_periodic:
+        medium = every if whole else None
+        images, row = packing.cell.images_near_origin(position, radius + reach + margin)
+        return Solids(
+            images, radius[row], removed[row], shape, medium, origin, edge=edge, around=around
+        )
     if shape is not None and not whole:
-        near = shape.may_meet(position, radius)
+        near = shape.may_meet(position, radius + margin)
         position, radius, removed = position[near], radius[near], removed[near]
-    return Solids(position, radius, removed, shape, None, origin)
+    inner = _inner(sample, origin) if edge == ENDS and whole else None
+    return Solids(
+        position, radius, removed, shape, None, origin, edge=edge, around=around, inner=inner
+    )
+
+
+def _inner(sample: Sample, origin: FloatArray) -> Inner | None:
+    """Where all grains of an open sample are known."""
+    packing, grains = sample.packing, sample.gathered
+    found = inner_ellipsoid(packing.position[grains], float(packing.radius[grains].max()))
+    return None if found is None else Inner(found.shape, found.center - origin)

@@ -16,7 +16,8 @@ from scanfab.base.spelling import spelt_apart, spelt_time
 from scanfab.fabric.void import void_fabric
 from scanfab.pipeline.plan import CLOSE, GROWTH_WITH_SPACING, Plan
 from scanfab.scan.directions import design_of, direction_rule
-from scanfab.scan.scan import FollowedTooFarError, ScanSums, scan_lines
+from scanfab.scan.following import FollowedTooFarError
+from scanfab.scan.scan import ScanSums, scan_lines
 from scanfab.scan.solids import Solids, is_affordable, most_lines
 
 __all__ = ["TOLERANCE_MISSED", "missing_work", "scan_to_tolerance"]

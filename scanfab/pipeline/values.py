@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 from scanfab.base.errors import SettingsError
 from scanfab.base.option import number, one_of, unusable, whole
 from scanfab.base.spelling import shortest
+from scanfab.scan.edges import ENDS
 
 if TYPE_CHECKING:
     # their modules need numpy, for which the help of a command does not wait
@@ -27,6 +28,7 @@ __all__ = [
     "Axis",
     "Length",
     "Vector",
+    "check_moment",
     "check_window",
     "parse_axis",
     "parse_boundary",
@@ -243,6 +245,15 @@ def parse_shape(name: str, value: Any) -> str:
         words = f"{', '.join(SHAPES)} or a closed convex surface that exists ({' '.join(SUFFIXES)})"
         raise unusable(name, words, str(value))
     return str(value)
+
+
+def check_moment(chosen: Settings) -> None:
+    """Whether the rule at the window's surface knows the moment."""
+    if chosen.edge == ENDS and chosen.moment != 1:
+        raise SettingsError(
+            "moment: from what lies inside the window alone, as `edge=ends` takes it, the second "
+            "moment of the full lengths is not known: choose `edge=start`, or `moment=1`"
+        )
 
 
 def check_window(chosen: Settings) -> None:

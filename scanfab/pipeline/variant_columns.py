@@ -18,6 +18,7 @@ from scanfab.fabric.window import WINDOW_ALPHA, window_alpha
 from scanfab.packing.columns import sample_values
 from scanfab.packing.sample import Variant
 from scanfab.pipeline.measurement import Measurement
+from scanfab.scan.edges import CLIP, ENDS, START
 from scanfab.table.columns import installed_fabrics, table_columns
 
 __all__ = ["VariantColumns", "no_columns"]
@@ -25,6 +26,12 @@ __all__ = ["VariantColumns", "no_columns"]
 
 # in smallest radii: a cut-off that nobody means
 ABSURD = 100.0
+# of the segments: so many may leave the sample
+MOST_LEFT_OUT = 0.01
+NO_INNER_WINDOW = (
+    "the sample is flat or too small: by the rule `edge=ends` the whole is measured in the "
+    "ellipsoid that lies a largest radius within the hull of its centres, and there is none"
+)
 
 
 class VariantColumns:
@@ -45,7 +52,8 @@ class VariantColumns:
             found |= fabric.values(self.measured)
         for name, fabric in installed_fabrics().items():
             found |= checked_values(name, fabric, self.measured)
-        return {**found, **self._window()}
+        asked = {**self._window(), **self._edge()}
+        return {**found, **{name: asked[name] for name in self.plan.more_columns}}
 
     @cached_property
     def measured(self) -> Measured:
@@ -100,6 +108,28 @@ class VariantColumns:
             "cutoff": self.plan.cutoffs[self.place],
         }
 
+    def _edge(self) -> dict[str, Any]:
+        """The rule at the window's surface, and what leaves the sample by it."""
+        return {"edge": self.edge, "left_out": self.left_out}
+
+    @property
+    def edge(self) -> str | None:
+        """The rule of this variant; a whole that repeats has no edge."""
+        if self.variant.in_window:
+            return self.plan.edge
+        if self.measurement.solids.medium is not None:
+            return None
+        return ENDS if self.plan.edge == ENDS else CLIP
+
+    @cached_property
+    def left_out(self) -> float | None:
+        """Share of the segments that leave the sample, and so are not counted."""
+        if self.edge != START:
+            return None
+        left = float(self.sums.left_out[:, self.which].sum())
+        every = left + float(self.sums.segments[:, self.which].sum())
+        return left / every if every else None
+
     def _solid_fraction(self) -> float | None:
         """1 - void length / line length in the window, weighted like the directions."""
         cell = self.sample.packing.cell
@@ -126,6 +156,9 @@ class VariantColumns:
         name, window, fabric = WINDOW_ALPHA.name, self.plan.window, self.measured.void
         if name not in self.plan.more_columns:
             return {}
+        if self.plan.edge != CLIP and self.variant.in_window:
+            # by the other rules no window has one
+            return {name: 0.0 if fabric else None}
         value: float | None = None
         if self.variant.in_window and window is not None and fabric and self.plan.moment == 1:
             cutoff = self.plan.cutoffs[self.place]
@@ -153,7 +186,8 @@ class VariantColumns:
 
     def notes(self) -> Iterator[Note]:
         """Whether there is no void fabric, or a doubtful one, or lines without a grain."""
-        texts = {"channels": self._channels(), **self._of_void_fabric()}
+        texts = {"channels": self._channels(), "left_out": self._left_out()}
+        texts |= self._of_void_fabric()
         return (Note(code, text, (self.variant.name,)) for code, text in texts.items() if text)
 
     def _channels(self) -> str:
@@ -161,10 +195,22 @@ class VariantColumns:
         lines = channels + int(self.sums.lines[:, self.which].sum())
         return f"{channels} of {lines} lines stay in a channel and meet no grain" * bool(channels)
 
+    def _left_out(self) -> str:
+        if (self.left_out or 0.0) <= MOST_LEFT_OUT:
+            return ""
+        return (
+            f"{self.left_out:.1%} of the void segments of the RV leave the sample and are left "
+            f"out: they are the long ones, so the mean length is too small: choose a smaller `rv`, "
+            f"or `edge=ends`, which needs nothing from outside"
+        )
+
     def _of_void_fabric(self) -> dict[str, str]:
         void = self.measured.void
         if self._no_solid:
             return {"no_solid": self._no_solid}
+        is_inner = self.edge == ENDS and not self.variant.in_window
+        if is_inner and self.measurement.solids.inner is None:
+            return {"no_inner_window": NO_INNER_WINDOW}
         if self.segments == 0:
             return {"cutoff_too_long": self._too_long(self.plan.cutoffs[self.place])}
         if void is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from scanfab.base.column import LENGTH, Column
 
-__all__ = ["SCAN_COLUMNS"]
+__all__ = ["EDGE_COLUMNS", "SCAN_COLUMNS"]
 
 SCAN_COLUMNS = (
     Column(
@@ -24,4 +24,19 @@ SCAN_COLUMNS = (
         "distance between neighbouring lines of one direction, all replicates together",
     ),
     Column("cutoff", float, LENGTH, "shortest void segment kept"),
+)
+
+EDGE_COLUMNS = (
+    Column(
+        "edge",
+        str,
+        "",
+        "what counts at the window's surface: clip, start or ends; empty where there is none",
+    ),
+    Column(
+        "left_out",
+        float,
+        "",
+        "share of the segments that leave the sample, and so are left out by the rule start",
+    ),
 )

@@ -17,10 +17,13 @@ import numpy.typing as npt
 from scanfab.base.jit import Flag
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.scan.directions import DirectionRule
+from scanfab.scan.edges import ENDS
+from scanfab.scan.following import MOST_STEPS, Following
 from scanfab.scan.kernels.bins import Bins
 from scanfab.scan.lines import drawn_lines, line_triads
-from scanfab.scan.scan import MOST_STEPS, Following, in_parts, tally_triads
+from scanfab.scan.scan import in_parts
 from scanfab.scan.solids import Solids, shortest_gap
+from scanfab.scan.tallies import tally_triads
 
 __all__ = ["Blocks", "GapSums", "scan_gaps"]
 
@@ -202,4 +205,10 @@ def scan_gaps(
     # what reaches a cut-off reaches all below it
     sums = np.flip(np.cumsum(np.flip(sums, axis=4), axis=4), axis=4)
     number, length, square = np.moveaxis(np.swapaxes(sums, 1, 2), -1, 0)
+    if solids.edge == ENDS:
+        weighed = slice(None) if solids.medium is None else slice(2, None)
+        # the third sum is the number of the kept, see kernels/bins
+        length, square = length.copy(), square.copy()
+        length[:, weighed] -= least * (square - number)[:, weighed]
+        square[:, weighed] = np.nan
     return GapSums(triads[:, :, 2], least, number, length, square)

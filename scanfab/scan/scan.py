@@ -2,42 +2,26 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 
 import numpy as np
 
-from scanfab.base.errors import SettingsError
-from scanfab.base.jit import Flag
 from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.directions import DirectionRule
+from scanfab.scan.edges import CLIP
+from scanfab.scan.following import MOST_STEPS, Following
 from scanfab.scan.kernels import sweep
-from scanfab.scan.kernels.axes import scan_axes, scan_cell
-from scanfab.scan.kernels.bins import Bins, no_bins
 from scanfab.scan.lines import drawn_lines
-from scanfab.scan.solids import CellGrains, Solids, check_spacing, clip_of, shortest_gap
+from scanfab.scan.solids import Solids, check_spacing
+from scanfab.scan.tallies import tally_triads
 
-__all__ = [
-    "MOST_STEPS",
-    "FollowedTooFarError",
-    "Following",
-    "ScanSums",
-    "in_parts",
-    "scan_lines",
-    "sums_of",
-    "tally_triads",
-]
+__all__ = ["ScanSums", "in_parts", "scan_lines", "sums_of"]
 
 
 JOBS_A_THREAD, MOST_AXES = 4, 16
-# steps of following lines through a periodic medium: more take minutes
-MOST_STEPS = 1e10
-# of the spacing and for each variant: spheres of such a radius are scanned as fast row by row as
-# over lists of chords; for the more variants the lists serve, the sooner they pay
-FEW_LINES = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,8 +38,10 @@ class ScanSums:
         Unit vectors, shape (R, D, 3).
     length : ndarray
         Sum of the lengths of the kept segments, shape (R, 4, D).
-    segments : ndarray of int
-        Number of the kept segments, shape (R, 4, D).
+    segments : ndarray
+        Number of the kept segments, shape (R, 4, D). By the rules ``start`` and ``ends`` half the
+        number of their ends in the window; then ``length`` is weighted, too, so that the ratio of
+        the two is the mean length.
     lines : ndarray of int
         Lines that meet the window (for the whole: any solid), shape (R, 4, D).
     void : ndarray
@@ -72,6 +58,9 @@ class ScanSums:
         Steps of following lines through a periodic medium, beyond what is listed of it, shape (R,).
         A line makes one for each grain of each cell that it crosses; a step costs about as much as
         a chord.
+    left_out : ndarray
+        Number of segments that leave the sample, and so are not counted, shape (R, 4, D): by the
+        rule ``start``, each by half the number of its ends in the window; else 0.
 
     Examples
     --------
@@ -85,17 +74,20 @@ class ScanSums:
 
     axes: FloatArray
     length: FloatArray
-    segments: IntArray
+    segments: FloatArray | IntArray
     lines: IntArray
     void: FloatArray
     line_length: FloatArray
     chords: IntArray
     channels: IntArray
     steps: IntArray
+    left_out: FloatArray
 
     def __repr__(self) -> str:
         sums = zip("abcd", self.segments.sum((0, 2)), self.lines.sum((0, 2)), strict=True)
-        told = [f"{name} {kept} on {counted(lines, 'line')}" for name, kept, lines in sums if lines]
+        told = [
+            f"{name} {kept:g} on {counted(lines, 'line')}" for name, kept, lines in sums if lines
+        ]
         axes = counted(self.axes.shape[1], "axis", "axes")
         head = f"ScanSums: {counted(self.replicates, 'replicate')} of {axes}"
         return f"{head}; segments kept: {', '.join(told) or 'none'}"
@@ -110,7 +102,7 @@ class ScanSums:
         """Number of replicates R."""
         return len(self.axes)
 
-    def kept(self, variant: str) -> tuple[FloatArray, IntArray]:
+    def kept(self, variant: str) -> tuple[FloatArray, FloatArray | IntArray]:
         """
         What is kept of one variant, as :func:`scanfab.void_fabric` takes it.
 
@@ -123,7 +115,7 @@ class ScanSums:
         -------
         length : ndarray, shape (R, D)
             Sum of the lengths of the kept segments, dump's length unit.
-        segments : ndarray of int, shape (R, D)
+        segments : ndarray, shape (R, D)
             Number of the kept segments.
         """
         which = "abcd".index(variant)
@@ -150,48 +142,6 @@ class ScanSums:
                 for field in fields(cls)
             )
         )
-
-
-class FollowedTooFarError(SettingsError):
-    """To follow the lines of a scan through a periodic medium takes more steps than allowed."""
-
-
-class Following:
-    """
-    The steps that following the lines of a scan has taken, of all its threads together.
-
-    Whether they are too many does not depend on the threads: no part of a scan takes any back.
-    """
-
-    def __init__(self, most: float) -> None:
-        self.most = most
-        self._taken = 0.0
-        self._lock = threading.Lock()
-
-    @property
-    def left(self) -> float:
-        """How many more are allowed."""
-        return self.most - self._taken
-
-    def add(self, steps: float) -> None:
-        """
-        Count the steps of a part of the scan.
-
-        Raises
-        ------
-        FollowedTooFarError
-            If they are too many.
-        """
-        with self._lock:
-            self._taken += steps
-        if self._taken >= self.most:
-            raise FollowedTooFarError(
-                f"void segments that leave the cell are long: following them through its images "
-                f"takes more than {self.most:.2g} steps. Much of the cell is empty, or a variant "
-                f"keeps few grains: check the cell's size (`cell`) and its periodic axes "
-                f"(`periodic`), choose a wider `spacing` or other `variants`, or allow more "
-                f"(`max_chords`)"
-            )
 
 
 def scan_lines(
@@ -263,7 +213,7 @@ def scan_lines(
     def some(triads: FloatArray, offsets: FloatArray) -> FloatArray:
         return tally_triads(solids, triads, offsets, spacing, cutoff, variants, following=following)
 
-    return sums_of(triads, in_parts(some, triads, offsets, workers), variants)
+    return sums_of(triads, in_parts(some, triads, offsets, workers), variants, solids.edge)
 
 
 def in_parts(
@@ -295,83 +245,7 @@ def in_parts(
     return sums.reshape(*offsets.shape[:2], *sums.shape[1:])
 
 
-def tally_triads(
-    solids: Solids,
-    triads: FloatArray,
-    offsets: FloatArray,
-    spacing: float,
-    cutoff: float,
-    variants: str,
-    bins: Bins | None = None,
-    following: Following | None = None,
-) -> FloatArray:
-    """
-    Scan along given line triads (D, 3, 3) with given shifts (D, 2).
-
-    Returns the tallies of each axis and set of solids, shape (D, 2, TALLY_SIZE); where there are
-    bins, the gaps go there instead. ``following`` counts the steps of this and of other parts.
-
-    Raises
-    ------
-    FollowedTooFarError
-        If these are too many.
-    """
-    first, second = ("a" in variants or "c" in variants), ("b" in variants or "d" in variants)
-    whole, window = ("a" in variants or "b" in variants), ("c" in variants or "d" in variants)
-    tallies = np.zeros((len(triads), 2, sweep.TALLY_SIZE))
-    cutoff = max(cutoff, shortest_gap(solids))
-    bins = no_bins(len(triads)) if bins is None else bins
-    following = Following(MOST_STEPS) if following is None else following
-    both: Flag = True if first and second else None
-    if solids.medium is not None and whole:
-        # without a or c, the solids of b and d are the only ones
-        medium = solids.medium if first else _without_removed(solids.medium)
-        if len(medium.radius):
-            axes = np.ascontiguousarray(triads[:, 2])
-            by_lists = _few_lines(medium.radius, spacing, 1 + (both is not None))
-            scan_cell(
-                medium, axes, offsets, spacing, cutoff, clip_of(None), tallies,
-                by_lists, both, bins, following.left,
-            )  # fmt: skip
-            following.add(float(tallies[:, 0, sweep.STEPS].sum()))
-        whole = False
-    if whole or window:
-        solid = slice(None) if first else ~solids.removed
-        scan_axes(
-            np.ascontiguousarray(solids.position[solid]),
-            solids.radius[solid],
-            solids.removed[solid],
-            np.ascontiguousarray(triads),
-            offsets,
-            spacing,
-            cutoff,
-            clip_of(solids.window),
-            tallies,
-            _few_lines(solids.radius[solid], spacing, (1 + (both is not None)) * (whole + window)),
-            both,
-            True if whole else None,
-            True if window else None,
-            bins,
-        )
-    if first:
-        return tallies
-    bins.sums[:] = bins.sums[:, :, ::-1].copy()
-    return tallies[:, ::-1]
-
-
-def _few_lines(radius: FloatArray, spacing: float, variants: int) -> bool:
-    """Whether most chords are of spheres that meet but few lines."""
-    return bool(np.sum(radius**2) < FEW_LINES * variants * spacing * np.sum(radius))
-
-
-def _without_removed(medium: CellGrains) -> CellGrains:
-    solid = ~medium.removed
-    return medium._replace(
-        position=medium.position[solid], radius=medium.radius[solid], removed=medium.removed[solid]
-    )
-
-
-def sums_of(triads: FloatArray, tallies: FloatArray, variants: str) -> ScanSums:
+def sums_of(triads: FloatArray, tallies: FloatArray, variants: str, edge: str = CLIP) -> ScanSums:
     """The sums of replicates from their line triads and tallies, shape (R, D, 2, TALLY_SIZE)."""
     wanted = np.array([variant in variants for variant in "abcd"])[:, None]
     # replicate, set of solids, axis
@@ -384,14 +258,17 @@ def sums_of(triads: FloatArray, tallies: FloatArray, variants: str) -> ScanSums:
     def both(number: int) -> FloatArray:
         return of(sweep.WHOLE + number, sweep.WINDOW + number)
 
+    segments = both(sweep.KEPT)
+    left = np.concatenate([0.0 * entries[0], entries[sweep.LEFT]], axis=1)
     return ScanSums(
         axes=triads[:, :, 2],
         length=both(sweep.LENGTH),
-        segments=both(sweep.KEPT).astype(np.int64),
+        segments=segments.astype(np.int64) if edge == CLIP else segments,
         lines=both(sweep.LINES).astype(np.int64),
         void=both(sweep.VOID),
         line_length=both(sweep.LINE_LENGTH),
         chords=entries[sweep.CHORDS].sum(axis=(1, 2)).astype(np.int64),
         channels=of(sweep.CHANNELS).astype(np.int64),
         steps=entries[sweep.STEPS].sum(axis=(1, 2)).astype(np.int64),
+        left_out=np.where(wanted, left, 0.0),
     )

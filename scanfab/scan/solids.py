@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -12,16 +13,21 @@ from scanfab.base.convex import Convex
 from scanfab.base.errors import PackingError, SettingsError
 from scanfab.base.spelling import counted
 from scanfab.base.typing import BoolArray, FloatArray
+from scanfab.scan.cells import cells_of
+from scanfab.scan.edges import CLIP
+from scanfab.scan.kernels.cells import Cells
 from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.kernels.windows import Clip
 
 __all__ = [
     "MAX_LINES",
     "CellGrains",
+    "Inner",
     "Solids",
     "check_spacing",
     "clip_of",
     "is_affordable",
+    "margin_of",
     "most_lines",
     "shortest_gap",
 ]
@@ -30,6 +36,16 @@ __all__ = [
 MAX_LINES = 50_000_000
 # Of the smallest radius: what lies between surfaces that coincide but for rounding is no gap.
 SHORTEST = 1e-9
+# of the mean radius: the wider, the more chords are swept, and the fewer segments followed alone
+MARGIN = 4.5
+
+
+class Inner(NamedTuple):
+    """A window of its own for the whole."""
+
+    shape: Convex
+    center: FloatArray
+    """In the coordinates of the solids, shape (3,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +69,13 @@ class Solids:
         The grains of a periodic packing, each once, if its whole is scanned, which has no edge.
     origin : array_like, optional
         Where the origin of these positions lies in the dump's coordinates, shape (3,).
+    edge : {"clip", "start", "ends"}, optional
+        What counts at the window's surface, see :mod:`scanfab.scan.edges`.
+    around : CellGrains, optional
+        For the rule ``start`` all grains, each once, with the vectors by which they repeat, if any;
+        ``position`` then has all that come within the margin of the window.
+    inner : Inner, optional
+        For the rule ``ends`` the window of an open whole, in which all grains are known.
 
     Raises
     ------
@@ -72,6 +95,9 @@ class Solids:
     window: Convex | None = None
     medium: CellGrains | None = None
     origin: FloatArray = field(default_factory=lambda: np.zeros(3))
+    edge: str = CLIP
+    around: CellGrains | None = None
+    inner: Inner | None = None
 
     def __post_init__(self) -> None:
         """Cast without a copy; PackingError if the shapes do not fit."""
@@ -96,6 +122,29 @@ class Solids:
             what.append(f"a periodic whole of {counted(len(self.medium.radius), 'grain')}")
         what.append("no window" if self.window is None else f"window of {self.window}")
         return f"Solids: {', '.join(what)}"
+
+    @cached_property
+    def cells(self) -> Cells:
+        """The grains around the window, sorted into cells."""
+        assert self.around is not None
+        return cells_of(self.around)
+
+    @cached_property
+    def near_window(self) -> BoolArray:
+        """Which spheres come within the margin of the window, shape (N,)."""
+        assert self.window is not None
+        return self.window.may_meet(self.position, self.radius + self.margin)
+
+    @cached_property
+    def near_inner(self) -> BoolArray:
+        """Which spheres reach into the whole's own window, shape (N,)."""
+        assert self.inner is not None
+        return self.inner.shape.may_meet(self.position - self.inner.center, self.radius)
+
+    @property
+    def margin(self) -> float:
+        """How far beyond the window solids are listed, for the rule ``start``."""
+        return 0.0 if self.around is None else margin_of(self.around)
 
     @property
     def reach(self) -> float:
@@ -124,6 +173,11 @@ def clip_of(window: Convex | None) -> Clip:
         return Clip(np.zeros((0, 4)), 1.0, np.zeros((3, 3)), -1.0, 0.0)
     isotropic, deviator, level = window.quadric
     return Clip(window.planes, isotropic, deviator, level, window.reach)
+
+
+def margin_of(grains: CellGrains) -> float:
+    """How far beyond a window grains are listed, dump's length unit."""
+    return MARGIN * float(grains.radius.mean()) if len(grains.radius) else 0.0
 
 
 def shortest_gap(solids: Solids) -> float:

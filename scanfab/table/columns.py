@@ -11,7 +11,7 @@ from scanfab.base.column import Column, columns_of_fields, no_column
 from scanfab.fabric.registry import OWN_FABRICS, Fabric, load_fabrics
 from scanfab.fabric.window import WINDOW_ALPHA
 from scanfab.packing.columns import SAMPLE_COLUMNS
-from scanfab.scan.columns import SCAN_COLUMNS
+from scanfab.scan.columns import EDGE_COLUMNS, SCAN_COLUMNS
 from scanfab.table.row import Row
 
 __all__ = [
@@ -61,7 +61,7 @@ COLUMNS: tuple[str, ...] = tuple(one.name for one in OWN_COLUMNS)
 """Their names."""
 
 
-MORE_COLUMNS = (WINDOW_ALPHA,)
+MORE_COLUMNS = (WINDOW_ALPHA, *EDGE_COLUMNS)
 """Those of tables of which more is asked than the default."""
 
 

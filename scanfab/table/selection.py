@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.base.errors import ScanfabWarning, SettingsError
-from scanfab.table.columns import OWN_COLUMNS
+from scanfab.table.columns import MORE_COLUMNS, OWN_COLUMNS
 from scanfab.table.reading import is_number
 
 __all__ = ["NEEDED", "check_rows", "choose_rows"]
@@ -21,7 +21,7 @@ Rows = list[dict[str, Any]]
 
 NEEDED = ("source", "frame", "strain", "variant", "alpha_vs_axial", "alpha_c_axial")
 NAMES = ("source", "variant")
-NUMBERS = tuple(column.name for column in OWN_COLUMNS if column.kind is not str)
+NUMBERS = tuple(one.name for one in (*OWN_COLUMNS, *MORE_COLUMNS) if one.kind is not str)
 # columns that no fabric table has, and the table that they give away
 OTHER_TABLES = {
     ("alpha_vs_axial_norm", "alpha_c_axial_norm"): "a table of scanfab compare",

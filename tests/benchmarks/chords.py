@@ -15,9 +15,10 @@ from numba import njit
 
 from scanfab.base.convex import sphere
 from scanfab.scan.directions import DirectionRule
+from scanfab.scan.edges import EDGES, START
 from scanfab.scan.lines import line_triads
 from scanfab.scan.scan import scan_lines
-from scanfab.scan.solids import Solids
+from scanfab.scan.solids import CellGrains, Solids
 from tests.benchmarks.packings import PAPER, dense
 from tests.benchmarks.timing import interleaved, table
 
@@ -41,12 +42,12 @@ def rv_solids() -> Solids:
     return Solids(position[near], radius[near], removed, sphere(float(window)))
 
 
-def sweep(solids, variants="c", directions=1, workers=1):
+def sweep(solids, variants="c", directions=1, workers=1, spacing=SPACING):
     """One replicate a direction."""
     return scan_lines(
         solids,
         RULE,
-        spacing=SPACING,
+        spacing=spacing,
         cutoff=CUTOFF,
         variants=variants,
         replicates=range(directions),
@@ -214,7 +215,7 @@ def embree(projected: Projected, folder: Path):
 
 
 def run(repeats: int) -> dict[str, str]:
-    """The sections ``chords``, ``variants`` and ``threads``."""
+    """The sections ``chords``, ``variants``, ``edges`` and ``threads``."""
     solids = rv_solids()
     projected = Projected(solids)
     count = projected.floor()[1]
@@ -222,6 +223,7 @@ def run(repeats: int) -> dict[str, str]:
         return {
             "chords": _chords(solids, projected, count, Path(name), repeats),
             "variants": _variants(solids, repeats),
+            "edges": _edges(solids, repeats),
             "threads": _threads(solids, projected, repeats),
         }
 
@@ -268,6 +270,37 @@ def _variants(solids, repeats):
     )
     rows = [(name, f"{value / seconds['a']:.2f}") for name, value in seconds.items()]
     return table(["variants in one pass", "time of a alone"], rows)
+
+
+def _edges(solids, repeats):
+    """The rules at the window's surface, of which one needs the grains beyond it, too."""
+    position, radius = dense(PAPER)
+    removed = np.zeros(PAPER, bool)
+    around = CellGrains(position, radius, removed, np.eye(3), np.zeros(3, bool))
+    ways = {
+        edge: Solids(
+            *(position, radius, removed)
+            if edge == START
+            else (solids.position, solids.radius, solids.removed),
+            solids.window,
+            edge=edge,
+            around=around if edge == START else None,
+        )
+        for edge in EDGES
+    }
+    rows = []
+    for spacing, directions in ((SPACING, 1), (1.5, 200)):
+        words = {"spacing": spacing, "directions": directions}
+        seconds = interleaved(
+            {edge: lambda s=of, w=words: sweep(s, **w) for edge, of in ways.items()},
+            repeats,
+            clock=time.process_time,
+        )
+        rows += [
+            (f"`{edge}`, lines {spacing:g} mean radii apart", f"{value / seconds['clip']:.2f}")
+            for edge, value in seconds.items()
+        ]
+    return table(["variant c", "of `clip`"], rows)
 
 
 def _threads(solids, projected, repeats):

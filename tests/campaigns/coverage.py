@@ -3,7 +3,7 @@ How often the scan's standard error covers the truth: 68 of 100 times if it is r
 
 Usage, from the root of the repository (1600 seeds take half an hour on two cores)::
 
-    python -m tests.campaigns.coverage [--seeds N] [--workers N]
+    python -m tests.campaigns.coverage [--seeds N] [--workers N] [--edge clip|start|ends]
 
 The last frames of two series of sample_data, all variants. The truth is a scan with an error ten
 times smaller or more, with other random numbers. Each seed is a scan of its own: the default
@@ -25,6 +25,7 @@ from pathlib import Path
 import numpy as np
 
 import scanfab
+from scanfab.scan.edges import EDGES
 
 DATA = Path(__file__).parents[2] / "sample_data"
 FRAMES = {
@@ -81,16 +82,21 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
     parser.add_argument("--seeds", type=int, default=1600)
     parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--edge", choices=EDGES, default=EDGES[0])
+    parser.add_argument("--only", nargs="+", choices=[*SCANS, "calibrate"], help="kinds of scan")
     asked = parser.parse_args()
     warnings.simplefilter("ignore", scanfab.ScanfabWarning)
     outside = 0
     for name, options in FRAMES.items():
+        options = {**options, "edge": asked.edge}
         table = scanfab.compute(last_frame(name), workers=asked.workers, **options, **TRUTH)
         truth = table["alpha_vs_axial"]
         print(f"{name} truth: {truth.round(6)} ± {table['alpha_vs_axial_se'].round(6)}", flush=True)
         words = {"variants": VARIANTS, "workers": asked.workers, **options}
-        found = scanfab.calibrate(last_frame(name), **words)
-        for kind, scan in {**SCANS, "calibrate": found.options}.items():
+        kinds = {kind: SCANS[kind] for kind in SCANS if kind in (asked.only or SCANS)}
+        if "calibrate" in (asked.only or ["calibrate"]):
+            kinds["calibrate"] = scanfab.calibrate(last_frame(name), **words).options
+        for kind, scan in kinds.items():
             right = coverage(name, kind, options, scan, asked.seeds, truth, asked.workers)
             outside += not right
     return outside

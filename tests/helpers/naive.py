@@ -135,6 +135,31 @@ def scan(position, radius, triad, offset, spacing, clip):
     return Gaps(whole, whole_lines, window, window_lines, line_length)
 
 
+def edge_sums(solids, enters, leaves, cutoff, rule):
+    """
+    Length, number, and number of those left out, of one line's segments, by a rule at the edge.
+
+    ``solids`` is the union of all solids on the line, also of those beyond the window.
+    """
+    length = number = left = 0.0
+    bounds = [-np.inf, *(place for solid in solids for place in solid), np.inf]
+    for low, high in zip(bounds[::2], bounds[1::2], strict=True):
+        inside = min(high, leaves) - max(low, enters)
+        ends = sum(1 for place in (low, high) if enters < place < leaves)
+        if inside <= 0:
+            continue
+        if rule == "clip" and inside >= cutoff:
+            length, number = length + inside, number + 1
+        if rule == "ends" and inside >= cutoff:
+            # c + Σ (I - c) / Σ e/2, as one ratio
+            length, number = length + inside - cutoff + cutoff * ends / 2, number + ends / 2
+        if rule == "start" and not np.isfinite(high - low):
+            left += ends / 2
+        elif rule == "start" and high - low >= cutoff:
+            length, number = length + (high - low) * ends / 2, number + ends / 2
+    return np.array([length, number, left])
+
+
 def void_segments(position, radius, triad, offset, spacing, clip):
     """The void segments on a grid of lines: those of the whole sample, those of the window."""
     u, v, direction = triad

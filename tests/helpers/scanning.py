@@ -8,8 +8,9 @@ from scanfab.base.convex import Convex, sphere
 from scanfab.fabric.void import void_fabric
 from scanfab.scan.directions import direction_rule
 from scanfab.scan.lines import line_triads
-from scanfab.scan.scan import ScanSums, scan_lines, sums_of, tally_triads
+from scanfab.scan.scan import ScanSums, scan_lines, sums_of
 from scanfab.scan.solids import Solids
+from scanfab.scan.tallies import tally_triads
 
 Z = np.array([[0.0, 0.0, 1.0]])
 
@@ -37,7 +38,7 @@ def solids_of(spheres, window=0.0, removed=None):
 def scan_triads(solids, triads, offsets, spacing, cutoff, variants="abcd"):
     """Scan along given line triads, with given shifts of the lines, as one replicate."""
     tallies = tally_triads(solids, triads, offsets, spacing, cutoff, variants)
-    return sums_of(triads[None], tallies[None], variants)
+    return sums_of(triads[None], tallies[None], variants, solids.edge)
 
 
 def scan_along(solids, axes, spacing, cutoff=0.0, replicates=16, seed=0):

@@ -347,6 +347,7 @@ def test_compute_hands_every_option_to_the_settings(monkeypatch):
     monkeypatch.setattr("scanfab.pipeline.compute.compute_rows", rows)
     given = {
         "variants": "cd", "rv": 0.6, "rv_radius": 2.0, "rv_center": (1.0, 2.0, 3.0),
+            "edge": "start",
         "boundary": ("type=2",), "cutoff": "2rmin", "cutoffs": "1,2", "moment": 2,
         "spacing": "1rmean", "directions": direction_rule("9"), "tolerance": 1e-3,
         "max_chords": 1e5, "min_contacts": 3, "rattlers": "recursive",

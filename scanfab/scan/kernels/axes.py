@@ -6,7 +6,9 @@ import numpy as np
 
 from scanfab.base.jit import LANES, ZERO, Flag, inner, kernel
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
+from scanfab.scan.kernels.beyond import Beyond, follow_beyond
 from scanfab.scan.kernels.bins import Bins, bins_along
+from scanfab.scan.kernels.cells import Cells
 from scanfab.scan.kernels.follow import follow
 from scanfab.scan.kernels.grid import Grid, bounds, open_grid, part_of, strip_of
 from scanfab.scan.kernels.lines import solve_closed
@@ -24,6 +26,7 @@ from scanfab.scan.kernels.projection import Spheres, project, sort_into_strips, 
 from scanfab.scan.kernels.strips import (
     MOST_LINES,
     STATE_SIZE,
+    Edge,
     Strip,
     begin,
     measure_from,
@@ -48,7 +51,7 @@ def visit_all(
     tally: FloatArray,
     second: Flag,
     whole: Flag,
-    window: Flag,
+    window: Edge | None,
     measured: Measured | None,
 ) -> None:
     """Visit the chosen spheres, and do for each only what it can change."""
@@ -76,7 +79,7 @@ def visit_listed(
     bins: Bins,
     second: Flag,
     whole: Flag,
-    window: Flag,
+    window: Edge | None,
     measured: Measured | None,
 ) -> None:
     """List the chords of the chosen spheres, and sweep the lists when one is full and at last."""
@@ -106,11 +109,12 @@ def scan_strips(
     lists: Lists,
     second: Flag,
     whole: Flag,
-    window: Flag,
+    window: Edge | None,
     measured: Measured | None,
     medium: tuple[CellGrains, Prism] | None,
     most_steps: float,
     bins: Bins,
+    beyond: Beyond | None,
 ) -> None:
     """Scan a grid strip by strip, so that the lines' state stays in cache."""
     least = max(cutoff, SMALLEST)
@@ -121,7 +125,7 @@ def scan_strips(
     for number in range(start.size - 1):
         strip = strip_of(grid, number, rows, pitch)
         met = chosen[start[number] : start[number + 1]]
-        begin(lines, strip, section, second, whole)
+        begin(lines, strip, section, second, whole, window)
         if medium is not None:
             measure_from(lines, strip, medium[1].rise_u, medium[1].rise_v)
         flags = second, whole, window, measured
@@ -153,6 +157,8 @@ def scan_strips(
                 follow(
                     lines, strip, which, medium[0], medium[1], least, most_steps, tally, bins,
                 )  # fmt: skip
+            if beyond is not None and window is not None:
+                follow_beyond(lines, strip, which, window, beyond, least, tally, bins)
 
 
 @kernel
@@ -169,8 +175,11 @@ def scan_axes(
     by_lists: bool,
     second: Flag,
     whole: Flag,
-    window: Flag,
+    window: Edge | None,
     bins: Bins,
+    cells: Cells | None,
+    without_removed: bool,
+    most_steps: float,
 ) -> None:
     """
     Scan a packing along several axes.
@@ -192,11 +201,21 @@ def scan_axes(
     by_lists : bool
         Whether to list the chords of each line first, see :mod:`scanfab.scan.kernels.lists`: faster
         where a sphere meets few lines. For bins they are listed anyhow.
-    second, whole, window : True or None
+    second, whole : True or None
         What is counted, see :mod:`scanfab.scan.kernels.sweep`.
+    window : Edge or None
+        Likewise, and by which rule.
     bins : Bins
         Where every gap is added, instead of to the tallies, if there are any.
+    cells : Cells or None
+        What lies beyond the window, for a rule that follows segments there.
+    without_removed : bool
+        Whether that is without the removed grains in both sets of solids.
+    most_steps : float
+        Of following segments, all directions together; then the scan ends, and its tallies are
+        worth nothing.
     """
+    left = most_steps
     lines = np.empty(STATE_SIZE)
     lists = room_for_lists(by_lists or bins.cutoffs.size > 0)
     # a row of lines has to fit a strip
@@ -207,6 +226,11 @@ def scan_axes(
         grid = open_grid(extent, triad, offsets[axis], spacing, clip.reach, whole is not None)
         spheres = project(position, radius, removed, triad, grid)
         section = section_along(clip, triad)
+        beyond = None
+        if cells is not None:
+            if left <= 0.0:
+                return
+            beyond = Beyond(cells, triad, without_removed, left)
         for first in range(0, grid.columns, most):
             scan_strips(
                 lines,
@@ -223,7 +247,9 @@ def scan_axes(
                 None,
                 np.inf,
                 bins_along(bins, triad, axis),
+                beyond,
             )
+        left -= tallies[axis, 0, STEPS]
 
 
 @kernel
@@ -266,11 +292,11 @@ def scan_cell(
                 medium = grains, prism
                 scan_strips(
                     lines, spheres, part, section, cutoff, tally, lists, second, True, None,
-                    measured, medium, left, here,
+                    measured, medium, left, here, None,
                 )  # fmt: skip
             else:
                 scan_strips(
                     lines, spheres, part, section, cutoff, tally, lists, second, True, None, None,
-                    None, np.inf, here,
+                    None, np.inf, here, None,
                 )  # fmt: skip
         left -= tally[0, STEPS]

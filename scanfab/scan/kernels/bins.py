@@ -12,12 +12,15 @@ import numpy as np
 
 from scanfab.base.jit import Flag, inner
 from scanfab.base.typing import FloatArray
-from scanfab.scan.kernels.strips import FAR
+from scanfab.scan.kernels.edges import ends_inside, listed_to
+from scanfab.scan.kernels.strips import FAR, Edge
 from scanfab.scan.kernels.sweep import Measured
 
 __all__ = [
     "LENGTH",
     "NUMBER",
+    "OF_WHOLE",
+    "OF_WINDOW",
     "SQUARE",
     "Bins",
     "add_gaps",
@@ -33,8 +36,11 @@ NUMBER, LENGTH, SQUARE = range(3)
 # whose gaps they are
 OF_WHOLE, OF_WINDOW = 0, 1
 # of a list of gaps its rows: the line's place along u; where the gap starts in the whole and,
-# behind that, in the window; likewise where it ends, its length if it counts, its bin
+# behind that, in the window; likewise where it ends, its length if it counts, its bin. By the rules
+# that weigh segments half the number of its ends in the window, and, where it is followed beyond,
+# its full length
 LINE_U, GAP_LOW, GAP_HIGH, COUNTED, PLACE = 0, 1, 3, 5, 7
+WEIGHT, FULL = 9, 10
 
 
 class Bins(NamedTuple):
@@ -60,8 +66,18 @@ class Bins(NamedTuple):
     """
     Number, length, squared length, shape (D, 2, 2, B * C, 3) with B blocks.
 
-    For each axis, whole or window, and set of solids; without D those of one axis.
+    Weighted by the rule at the window's surface; of ``ends`` half the number of ends, the length
+    inside, and the number of those that are kept. For each axis, whole or window, and set of
+    solids; without D those of one axis.
     """
+
+    def of_whole(self, center: FloatArray) -> Bins:
+        """Empty bins by the whole's blocks for what lies in a window about a centre."""
+        to_block = self.to_block[::-1].copy()
+        to_block[:, :, 3] += to_block[:, :, :3] @ center
+        return self._replace(
+            to_block=to_block, parts=self.parts[::-1].copy(), sums=np.zeros_like(self.sums)
+        )
 
 
 def no_bins(axes: int) -> Bins:
@@ -87,7 +103,7 @@ def bins_along(bins: Bins, triad: FloatArray, axis: int) -> Bins:
 def room_for_gaps(count: int) -> FloatArray:
     """So many gaps, for :func:`list_gap` and :func:`add_gaps`."""
     # rows that lie a power of two apart would drive one another out of the processor's first cache
-    return np.empty((9, count + 24))
+    return np.empty((11, count + 24))
 
 
 @inner(forceinline=True)
@@ -100,7 +116,7 @@ def list_gap(
     enters: float,
     leaves: float,
     whole: Flag,
-    window: Flag,
+    window: Edge | None,
     measured: Measured | None,
 ) -> None:
     """List a gap as number k, as it is and clipped to the window; NaN where it does not count."""
@@ -115,6 +131,12 @@ def list_gap(
     if window is not None:
         gaps[GAP_LOW + OF_WINDOW, k] = low if low > enters else enters
         gaps[GAP_HIGH + OF_WINDOW, k] = high if high < leaves else leaves
+        if window.ends is not None or window.start is not None:
+            gaps[WEIGHT, k] = ends_inside(low, high, enters, leaves)
+        if window.start is not None:
+            # those that begin beyond the listed solids are followed
+            known = (low > enters - listed_to(window)) & (low < leaves) & (high > enters)
+            gaps[FULL, k] = high - low if known else 0.0
 
 
 @inner(inline="always")
@@ -135,6 +157,7 @@ def find_bins(
     count: np.uint64,
     kind: int,
     v: float,
+    window: Edge | None,
 ) -> None:
     """Of gaps on a row of lines, the lengths, 0 where they do not count, and the bins."""
     cutoffs, to_block = bins.cutoffs, bins.to_block[kind]
@@ -157,6 +180,8 @@ def find_bins(
         block = part_of_period(x, in_x, bins.halves)
         block += in_x * part_of_period(y, in_y, bins.halves)
         block += in_xy * part_of_period(z, in_z, bins.halves)
+        if window is not None and window.start is not None:
+            length = gaps[FULL, k]
         is_kept = (length > 0.0) & (length >= cutoffs[0]) & (length < 0.5 * FAR)
         lengths[k] = length if is_kept else 0.0
         places[k] = block * cutoffs.size
@@ -174,12 +199,12 @@ def add_gaps(
     which: int,
     v: float,
     whole: Flag,
-    window: Flag,
+    window: Edge | None,
 ) -> None:
     """Add the first gaps of a list, all on one row of lines, where they count; or take them off."""
     kinds = np.uint64(OF_WINDOW if whole is None else OF_WHOLE), np.uint64(1 + (window is not None))
     for kind in range(kinds[0], kinds[1]):
-        find_bins(bins, gaps, count, kind, v)
+        find_bins(bins, gaps, count, kind, v, window)
     sums, of = bins.sums, np.uint64(which)
     for k in range(count):
         # both in turns, as a gap has to wait for the one before it if they share a bin
@@ -187,6 +212,13 @@ def add_gaps(
             length = gaps[np.uint64(COUNTED) + kind, k]
             place = np.uint64(gaps[np.uint64(PLACE) + kind, k])
             number = sign if length > 0.0 else 0.0
-            sums[kind, of, place, NUMBER] += number
+            weighted, counted = number, number * length * length
+            if window is not None and window.start is not None:
+                number *= gaps[WEIGHT, k]
+                weighted, counted = number, number * length * length
+            if window is not None and window.ends is not None:
+                # squares of what is inside say nothing: in their place all that are kept
+                weighted, counted = number * gaps[WEIGHT, k], number
+            sums[kind, of, place, NUMBER] += weighted
             sums[kind, of, place, LENGTH] += number * length
-            sums[kind, of, place, SQUARE] += number * length * length
+            sums[kind, of, place, SQUARE] += counted

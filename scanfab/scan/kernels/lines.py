@@ -7,9 +7,22 @@ import numpy as np
 from scanfab.base.jit import ZERO, Flag, inner
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.kernels.bins import Bins, add_gaps, list_gap, room_for_gaps
+from scanfab.scan.kernels.edges import cut_at_entry
 from scanfab.scan.kernels.projection import Spheres, number_from, sort_by, sphere_at
-from scanfab.scan.kernels.strips import END, ENTRY, EXIT, FAR, SET, Strip, span
-from scanfab.scan.kernels.sweep import Measured, add, counted, moved
+from scanfab.scan.kernels.strips import (
+    END,
+    ENTRY,
+    EXIT,
+    FAR,
+    FIRST,
+    GAP_END,
+    GAP_START,
+    SET,
+    Edge,
+    Strip,
+    span,
+)
+from scanfab.scan.kernels.sweep import Measured, add, counted, is_listed, moved
 
 __all__ = ["solve_closed"]
 
@@ -115,7 +128,9 @@ def gaps_of(
     chords: FloatArray,
     order: IntArray,
     enters: float,
+    leaves: float,
     whole: Flag,
+    window: Edge | None,
     measured: Measured | None,
     ends: FloatArray,
 ) -> tuple[int, float]:
@@ -129,10 +144,12 @@ def gaps_of(
     end, low, high = -FAR, -FAR, -FAR
     if whole is None:
         end = enters
+        if window is not None:
+            end = enters - window.margin
     count = 0
     for k in order:
         start, stop = chords[0, k], chords[1, k]
-        if measured is not None and start - enters >= measured.known:
+        if not is_listed(start, enters, leaves, window, measured):
             continue
         if start > end:
             ends[0, count], ends[1, count] = low, high
@@ -158,7 +175,7 @@ def tally_line(
     tally: FloatArray,
     which: int,
     whole: Flag,
-    window: Flag,
+    window: Edge | None,
     measured: Measured | None,
     bins: Bins,
 ) -> None:
@@ -189,7 +206,7 @@ def solve_closed(
     least: float,
     tally: FloatArray,
     whole: Flag,
-    window: Flag,
+    window: Edge | None,
     measured: Measured | None,
     bins: Bins,
 ) -> None:
@@ -214,12 +231,18 @@ def solve_closed(
         enters, leaves = lines[place + ENTRY], lines[place + EXIT]
         order = np.empty(first[line + 1] - first[line], np.int64)
         number_from(first[line], order)
-        end = 0.0
+        end, count = 0.0, ZERO
         for sign in (-1.0, 1.0):
-            count, end = gaps_of(chords, order, enters, whole, measured, ends)
+            count, end = gaps_of(chords, order, enters, leaves, whole, window, measured, ends)
             tally_line(
                 ends, count, sign, u, v, enters, leaves, least, tally, which, whole, window,
                 measured, bins,
             )  # fmt: skip
             sort_by(chords[0], order)
-        lines[place + SET * np.uint64(which) + END] = end
+        state = place + SET * np.uint64(which)
+        lines[state + END] = end
+        if window is not None and window.start is not None:
+            lines[state + FIRST] = lines[state + GAP_START] = lines[state + GAP_END] = -FAR
+            for k in range(count):
+                if cut_at_entry(ends[0, k], ends[1, k], enters, leaves, window):
+                    lines[state + FIRST] = ends[1, k]

@@ -21,19 +21,22 @@ from scanfab.scan.kernels.bins import (
     list_gap,
     room_for_gaps,
 )
+from scanfab.scan.kernels.edges import cut_at_entry
 from scanfab.scan.kernels.projection import Spheres, sphere_at
 from scanfab.scan.kernels.strips import (
     END,
     ENTRY,
     EXIT,
     FAR,
+    FIRST,
     GAP_END,
     GAP_START,
     SET,
+    Edge,
     Strip,
     span,
 )
-from scanfab.scan.kernels.sweep import CHORDS, Measured, add, both, meet, moved
+from scanfab.scan.kernels.sweep import CHORDS, Measured, add, both, is_listed, meet, moved
 
 __all__ = [
     "LISTED_LINES",
@@ -145,7 +148,7 @@ def sweep_abreast(
     tally: FloatArray,
     second: Flag,
     whole: Flag,
-    window: Flag,
+    window: Edge | None,
     measured: Measured | None,
 ) -> None:
     """Let so many vectors of lines from the first on meet one chord each."""
@@ -157,9 +160,8 @@ def sweep_abreast(
         half_chord = half_chord if np.int64(k) < lists.stop[i] else np.nan
         start, stop = depth - half_chord, depth + half_chord
         enters, leaves = lines[i + ENTRY], lines[i + EXIT]
-        if measured is not None:
-            stop = stop if start - enters < measured.known else np.nan
-            start = start if start - enters < measured.known else np.nan
+        known = is_listed(start, enters, leaves, window, measured)
+        start, stop = start if known else np.nan, stop if known else np.nan
         found = meet(lines, i, start, stop, least, enters, leaves, whole, window, measured)
         sums = both(sums, found)
         if second is not None:
@@ -183,7 +185,7 @@ def sweep_lists(
     tally: FloatArray,
     second: Flag,
     whole: Flag,
-    window: Flag,
+    window: Edge | None,
     measured: Measured | None,
 ) -> None:
     """Sweep the lines of a strip over their lists, tally the gaps, and empty the lists."""
@@ -227,7 +229,7 @@ def bin_lists(
     bins: Bins,
     second: Flag,
     whole: Flag,
-    window: Flag,
+    window: Edge | None,
     measured: Measured | None,
 ) -> None:
     """Sweep the lines of a strip over their lists, put the gaps in bins, and empty the lists."""
@@ -247,8 +249,11 @@ def bin_lists(
                 depth, reach2 = chords[np.uint64(place)], chords[np.uint64(place + ABREAST)]
                 half_chord = np.sqrt(abs(reach2))
                 start, stop = depth - half_chord, depth + half_chord
-                if measured is not None and not start - enters < measured.known:
+                if not is_listed(start, enters, leaves, window, measured):
                     continue
+                if window is not None and window.start is not None:
+                    cut = cut_at_entry(low, high, enters, leaves, window)
+                    lines[i + FIRST] = high if cut and start > end else lines[i + FIRST]
                 # listed anyhow, as chords are
                 list_gap(gaps, count, u, low, high, enters, leaves, whole, window, measured)
                 count += np.uint64((start > end) & (high - low >= least))
@@ -256,6 +261,9 @@ def bin_lists(
                 if second is not None:
                     start = start if reach2 > 0.0 else np.nan
                     stop = stop if reach2 > 0.0 else np.nan
+                    if window is not None and window.start is not None:
+                        cut = cut_at_entry(low2, high2, enters, leaves, window)
+                        lines[i2 + FIRST] = high2 if cut and start > end2 else lines[i2 + FIRST]
                     list_gap(gaps2, count2, u, low2, high2, enters, leaves, whole, window, measured)
                     count2 += np.uint64((start > end2) & (high2 - low2 >= least))
                     end2, low2, high2 = moved(start, stop, end2, low2, high2)
@@ -276,7 +284,7 @@ def bin_last_gaps(
     which: int,
     bins: Bins,
     whole: Flag,
-    window: Flag,
+    window: Edge | None,
     measured: Measured | None,
 ) -> float:
     """

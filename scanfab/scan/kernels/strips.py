@@ -21,11 +21,13 @@ __all__ = [
     "ENTRY",
     "EXIT",
     "FAR",
+    "FIRST",
     "GAP_END",
     "GAP_START",
     "MOST_LINES",
     "SET",
     "STATE_SIZE",
+    "Edge",
     "Sphere",
     "Strip",
     "begin",
@@ -47,11 +49,28 @@ PLANE = np.uint64(MOST_LINES + 24)
 END, GAP_START, GAP_END = np.uint64(0), PLANE, np.uint64(2) * PLANE
 SET = np.uint64(3) * PLANE
 ENTRY, EXIT = np.uint64(6) * PLANE, np.uint64(7) * PLANE
-STATE_SIZE = int(8 * PLANE)
+# Of lines that are followed beyond the window: where their first gap ends, if it begins further
+# before the window than solids are listed. The second set's plane is SET behind, and those between
+# are never touched.
+FIRST = np.uint64(8) * PLANE
+STATE_SIZE = int(12 * PLANE)
 ONE = np.uint64(1)
 # a sphere that is no more lines wide is visited as a square: to find where its chords begin and end
 # in each row would take longer than the corners
 NARROW = 12
+
+
+class Edge(NamedTuple):
+    """
+    A rule of what counts at the window's surface, see :mod:`scanfab.scan.kernels.edges`.
+
+    For each of them kernels are compiled with nothing else in them.
+    """
+
+    ends: Flag
+    start: Flag
+    margin: float
+    """Of ``start``: how far beyond the window solids are listed; else 0."""
 
 
 class Strip(NamedTuple):
@@ -82,12 +101,22 @@ class Sphere(NamedTuple):
 
 
 @inner(fastmath={"contract"}, error_model="numpy")
-def begin(lines: FloatArray, strip: Strip, section: Section, second: Flag, whole: Flag) -> None:
+def begin(
+    lines: FloatArray,
+    strip: Strip,
+    section: Section,
+    second: Flag,
+    whole: Flag,
+    window: Edge | None,
+) -> None:
     """
     Lines that have met nothing yet, and where they enter and leave the window.
 
     Rows lose the lines at their ends that miss its planes, if these serve the window alone.
     """
+    before = 0.0
+    if window is not None:
+        before = window.margin
     a, rise_u = section.a, section.rise_u
     chosen = np.empty(section.planes.shape[0], np.int64)
     for row in range(strip.rows):
@@ -101,7 +130,7 @@ def begin(lines: FloatArray, strip: Strip, section: Section, second: Flag, whole
             half = np.sqrt(rest - (aslant + a * u) * u)
             middle = aside + rise_u * u
             enters = middle - half
-            end = -FAR if whole is not None else enters
+            end = -FAR if whole is not None else enters - before
             lines[i + ENTRY] = enters
             lines[i + EXIT] = middle + half
             lines[i + END] = end
@@ -111,8 +140,12 @@ def begin(lines: FloatArray, strip: Strip, section: Section, second: Flag, whole
                 lines[i + SET + END] = end
                 lines[i + SET + GAP_START] = -FAR
                 lines[i + SET + GAP_END] = -FAR
+            if window is not None and window.start is not None:
+                lines[i + FIRST] = -FAR
+                if second is not None:
+                    lines[i + SET + FIRST] = -FAR
         if section.planes.shape[0] > 0:
-            cut_row(lines, strip, section.planes, chosen, row, whole)
+            cut_row(lines, strip, section.planes, chosen, row, whole, before)
         no_lines(lines, at, np.uint64(0), np.uint64(strip.low[row]))
         no_lines(lines, at, np.uint64(strip.high[row]), np.uint64(strip.pitch))
 
@@ -148,7 +181,13 @@ def cutting(planes: FloatArray, chosen: IntArray, first: float, last: float, v: 
 
 @inner(fastmath={"contract"}, error_model="numpy")
 def cut_row(
-    lines: FloatArray, strip: Strip, planes: FloatArray, chosen: IntArray, row: int, whole: Flag
+    lines: FloatArray,
+    strip: Strip,
+    planes: FloatArray,
+    chosen: IntArray,
+    row: int,
+    whole: Flag,
+    before: float,
 ) -> None:
     """Let the lines of a row enter and leave the window between its planes, too."""
     v = strip.first_v + row * strip.spacing
@@ -179,8 +218,8 @@ def cut_row(
         lines[i + ENTRY] = enters
         lines[i + EXIT] = leaves if enters < leaves else np.nan
         if whole is None:
-            lines[i + END] = enters
-            lines[i + SET + END] = enters
+            lines[i + END] = enters - before
+            lines[i + SET + END] = enters - before
     if whole is None:
         # lines that miss the window at either end of the row need not be visited
         while low < high and np.isnan(lines[at + low + ENTRY]):
@@ -224,7 +263,7 @@ def spans(clip: Clip, triad: FloatArray, points: FloatArray, ends: FloatArray) -
         # a line that misses the window is taken out of its row
         low[0], high[0] = 0, 1
         strip = Strip(1.0, 1.0, points[k, 0], points[k, 1], 1, 1, 1 + LANES, low, high)
-        begin(lines, strip, section, None, None)
+        begin(lines, strip, section, None, None, None)
         ends[k, 0], ends[k, 1] = lines[ENTRY], lines[EXIT]
 
 

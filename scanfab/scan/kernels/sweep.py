@@ -13,8 +13,8 @@ choice the compiler makes a loop with nothing else in it:
 
 ``whole``     gaps as they are, between the first and the last solid of the line
 ``measured``  with ``whole``: only gaps that start in the line's measured length
-``window``    gaps clipped to the window, from where the line enters it to where it leaves it;
-              lines that miss it carry NaN
+``window``    gaps in the window, from where the line enters it to where it leaves it, by one of
+              the rules of :mod:`scanfab.scan.kernels.edges`; lines that miss it carry NaN
 ``second``    all this again for a second set of solids, from which some spheres are removed
 
 A gap that reaches FAR never counts in the whole.
@@ -28,14 +28,17 @@ import numpy as np
 
 from scanfab.base.jit import LANES, REORDERED, Flag, inner
 from scanfab.base.typing import FloatArray
+from scanfab.scan.kernels.edges import cut_at_entry, window_gap
 from scanfab.scan.kernels.strips import (
     END,
     ENTRY,
     EXIT,
     FAR,
+    FIRST,
     GAP_END,
     GAP_START,
     SET,
+    Edge,
     Sphere,
     Strip,
     columns_of_row,
@@ -46,6 +49,7 @@ __all__ = [
     "CHANNELS",
     "CHORDS",
     "KEPT",
+    "LEFT",
     "LENGTH",
     "LINES",
     "LINE_LENGTH",
@@ -57,6 +61,7 @@ __all__ = [
     "WINDOW",
     "Measured",
     "counted",
+    "is_listed",
     "moved",
     "settle",
     "visit",
@@ -68,10 +73,11 @@ Sums = tuple[float, float, float, float, float, float]
 # the compiler leaves out what adds it: unlike 0, it changes no number, not even -0
 NOTHING = -0.0
 # entries of a tally, of the whole and, behind them, of the window; and the chords of all solids;
-# and the lines that stay in a channel of a periodic medium, and the steps of following lines there
+# and the lines that stay in a channel of a periodic medium, the steps of following lines, and the
+# number of segments that leave the sample
 LENGTH, KEPT, VOID, LINES, LINE_LENGTH = range(5)
-WHOLE, WINDOW, CHORDS, CHANNELS, STEPS = 0, 5, 10, 11, 12
-TALLY_SIZE = 13
+WHOLE, WINDOW, CHORDS, CHANNELS, STEPS, LEFT = 0, 5, 10, 11, 12, 13
+TALLY_SIZE = 14
 
 
 class Measured(NamedTuple):
@@ -105,17 +111,16 @@ def whole_gap(
 
 
 @inner(forceinline=True, error_model="numpy")
-def window_gap(
-    low: float, high: float, least: float, enters: float, leaves: float, whole: Flag
-) -> tuple[float, float, float]:
-    """Length and number of a gap's part in the window if it is kept, and its length anyhow."""
-    high = high if high < leaves else leaves
-    if whole is not None:
-        # else no line begins before the window
-        low = low if low > enters else enters
-    gap = high - low
-    kept = gap >= least
-    return gap if kept else 0.0, 1.0 if kept else 0.0, gap if gap > 0.0 else 0.0
+def is_listed(
+    start: float, enters: float, leaves: float, window: Edge | None, measured: Measured | None
+) -> bool:
+    """Whether a chord begins where all of them are listed; others are left out."""
+    known = True
+    if measured is not None:
+        known = start - enters < measured.known
+    if window is not None and window.start is not None:
+        known = start < leaves + window.margin
+    return known
 
 
 @inner(forceinline=True, error_model="numpy")
@@ -127,7 +132,7 @@ def counted(
     enters: float,
     leaves: float,
     whole: Flag,
-    window: Flag,
+    window: Edge | None,
     measured: Measured | None,
 ) -> Sums:
     """What a gap adds to the tallies of the whole and of the window, if it is settled."""
@@ -140,7 +145,7 @@ def counted(
         if measured is not None:
             void = gap if settles else 0.0
     if window is not None:
-        inside, inside_kept, gap = window_gap(low, high, least, enters, leaves, whole)
+        inside, inside_kept, gap = window_gap(low, high, least, enters, leaves, whole, window)
         inside_void = gap if settles else 0.0
     return length, kept, void, inside, inside_kept, inside_void
 
@@ -170,7 +175,7 @@ def meet(
     enters: float,
     leaves: float,
     whole: Flag,
-    window: Flag,
+    window: Edge | None,
     measured: Measured | None,
 ) -> Sums:
     """
@@ -180,6 +185,9 @@ def meet(
     """
     end, low, high = lines[i + END], lines[i + GAP_START], lines[i + GAP_END]
     sums = counted(start > end, low, high, least, enters, leaves, whole, window, measured)
+    if window is not None and window.start is not None:
+        cut = (start > end) & cut_at_entry(low, high, enters, leaves, window)
+        lines[i + FIRST] = high if cut else lines[i + FIRST]
     end, low, high = moved(start, stop, end, low, high)
     lines[i + END], lines[i + GAP_START], lines[i + GAP_END] = end, low, high
     return sums
@@ -208,7 +216,7 @@ def visit(
     tally: FloatArray,
     second: Flag,
     whole: Flag,
-    window: Flag,
+    window: Edge | None,
     measured: Measured | None,
 ) -> None:
     """
@@ -241,9 +249,8 @@ def visit(
             start = sphere.depth - half_chord
             stop = sphere.depth + half_chord
             enters, leaves = lines[i + ENTRY], lines[i + EXIT]
-            if measured is not None:
-                stop = stop if start - enters < measured.known else np.nan
-                start = start if start - enters < measured.known else np.nan
+            known = is_listed(start, enters, leaves, window, measured)
+            start, stop = start if known else np.nan, stop if known else np.nan
             found = meet(lines, i, start, stop, least, enters, leaves, whole, window, measured)
             sums = both(sums, found)
             if second is not None:
@@ -277,7 +284,7 @@ def settle(
     least: float,
     tally: FloatArray,
     whole: Flag,
-    window: Flag,
+    window: Edge | None,
     measured: Measured | None,
 ) -> float:
     """
@@ -299,7 +306,7 @@ def settle(
         d, e, f = d + sums[3], e + sums[4], f + sums[5]
         if window is not None:
             start = end if end < FAR else leaves
-            behind = window_gap(start, FAR, least, enters, leaves, whole)
+            behind = window_gap(start, FAR, least, enters, leaves, whole, window)
             d, e, f = d + behind[0], e + behind[1], f + behind[2]
             crossing += np.int64(leaves > enters)
             length += leaves - enters if leaves > enters else 0.0

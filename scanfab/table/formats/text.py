@@ -12,12 +12,12 @@ from typing import IO, Any
 from scanfab.base.column import Column
 from scanfab.base.errors import ReadError
 from scanfab.base.files import named_errors
-from scanfab.table.columns import OWN_COLUMNS
+from scanfab.table.columns import MORE_COLUMNS, OWN_COLUMNS
 
 __all__ = ["SeparatedText", "TextWriter", "named_after", "text_of"]
 
 # words that may look like numbers: a source may be called 2024
-TEXT_COLUMNS = {column.name for column in OWN_COLUMNS if column.kind is str}
+TEXT_COLUMNS = {one.name for one in (*OWN_COLUMNS, *MORE_COLUMNS) if one.kind is str}
 
 
 @dataclass

@@ -10,6 +10,7 @@ from scanfab.base.convex import Convex, sphere
 from scanfab.base.jit import LANES
 from scanfab.scan.kernels import axes, lists, strips, sweep
 from scanfab.scan.kernels.bins import no_bins
+from scanfab.scan.kernels.edges import CLIPPED
 from scanfab.scan.kernels.grid import cover, strip_of
 from scanfab.scan.kernels.projection import order_of, project, range_of
 from scanfab.scan.kernels.windows import section_along
@@ -126,8 +127,11 @@ def fast_tallies(
         by_lists,
         second or None,
         whole or None,
-        clipped or None,
+        CLIPPED if clipped else None,
         no_bins(1),
+        None,
+        False,
+        np.inf,
     )
     return named(tallies[0, 0]), named(tallies[0, 1])
 
@@ -197,10 +201,10 @@ def closed_lines(position, radius, triad, grid, clip):
     state, tally = np.empty(strips.STATE_SIZE), np.zeros((2, sweep.TALLY_SIZE))
     every = np.arange(projected.u.size)
     section = section_along(clip, triad)
-    strips.begin(state, strip, section, None, True)
+    strips.begin(state, strip, section, None, True, CLIPPED)
     reach = section.reach
-    axes.visit_all(state, strip, projected, every, reach, 1e-300, tally, None, True, True, None)
-    return sweep.settle(state, strip, 0, 1e-300, tally, True, True, None)
+    axes.visit_all(state, strip, projected, every, reach, 1e-300, tally, None, True, CLIPPED, None)
+    return sweep.settle(state, strip, 0, 1e-300, tally, True, CLIPPED, None)
 
 
 @njit

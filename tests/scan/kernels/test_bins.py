@@ -6,6 +6,7 @@ import pytest
 from scanfab.scan.gaps import Blocks
 from scanfab.scan.kernels import axes, sweep
 from scanfab.scan.kernels.bins import Bins
+from scanfab.scan.kernels.edges import CLIPPED
 from scanfab.scan.lines import line_triads
 from scanfab.scan.solids import clip_of
 from tests.helpers import naive
@@ -30,8 +31,12 @@ def fast_sums(
         clip_of(region(window)),
         np.zeros((1, 2, sweep.TALLY_SIZE)),
         True,
-        *(True if flag else None for flag in flags),
+        *(True if flag else None for flag in flags[:2]),
+        CLIPPED if flags[2] else None,
         Bins(blocks, np.full((2, 3), 2.0), halves or None, np.array(cutoffs), sums),
+        None,
+        False,
+        np.inf,
     )
     return sums.reshape(2, 2, 8, len(cutoffs), 3)
 

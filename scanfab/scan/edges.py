@@ -1,0 +1,12 @@
+"""
+The rules of what counts at a window's surface, by name.
+
+What a segment counts by each of them stands in :mod:`scanfab.scan.kernels.edges`, their theory in
+docs/method.md.
+"""
+
+from __future__ import annotations
+
+__all__ = ["CLIP", "EDGES", "ENDS", "START"]
+
+CLIP, START, ENDS = EDGES = ("clip", "start", "ends")

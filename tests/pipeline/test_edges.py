@@ -1,0 +1,133 @@
+"""The option ``edge`` from the settings to the table."""
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab import Cell, Packing, ScanfabWarning, SettingsError, compute, load
+from tests.helpers.lattices import ball_points
+
+OPTIONS = {"spacing": "0.5rmin", "directions": "lebedev:5", "workers": 1, "cutoff": "0.5rmin"}
+
+
+@pytest.fixture(scope="module")
+def ball():
+    """Overlapping grains in a ball: the RV keeps far from its surface."""
+    random = np.random.default_rng(0)
+    return Packing(ball_points(random, 1500, 8.0), random.uniform(0.5, 0.7, 1500))
+
+
+def columns(table, *names):
+    return [[row.get(name) for name in names] for row in table]
+
+
+def test_by_default_no_table_has_its_columns(ball):
+    table = compute(ball, variants="c", **OPTIONS)
+    assert not {"edge", "left_out"} & set(table.names)
+    assert list(table.names) == list(scanfab.COLUMNS)
+    clip = compute(ball, variants="c", edge="clip", **OPTIONS)
+    assert [dict(row) for row in clip] == [dict(row) for row in table]
+
+
+def test_rows_say_by_which_rule_they_are(ball):
+    start = compute(ball, edge="start", rv=0.35, **OPTIONS)
+    assert list(start.names) == [*scanfab.COLUMNS, "edge", "left_out"]
+    assert [row.edge for row in start] == ["clip", "clip", "start", "start"]
+    assert [row.left_out is None for row in start] == [True, True, False, False]
+    ends = compute(ball, edge="ends", rv=0.35, **OPTIONS)
+    assert columns(ends, "edge", "left_out") == [["ends", None]] * 4
+    # the whole changes by ends alone, and its grains and contacts never
+    clip = compute(ball, rv=0.35, **OPTIONS)
+    assert [row.mean_length for row in start[:2]] == [row.mean_length for row in clip[:2]]
+    assert all(e.mean_length != c.mean_length for e, c in zip(ends, clip, strict=True))
+    for name in ("grains", "contacts", "alpha_c"):
+        assert columns(ends, name) == columns(clip, name)
+
+
+def test_periodic_wholes_have_no_edge():
+    random = np.random.default_rng(1)
+    cell = Cell([6.0, 6.0, 6.0])
+    packing = Packing(6 * random.random((150, 3)), np.full(150, 0.6), cell=cell)
+    clip, start, ends = (
+        compute(packing, edge=edge, rv=0.8, **OPTIONS) for edge in ("clip", "start", "ends")
+    )
+    for table in (start, ends):
+        assert [row.edge for row in table[:2]] == [None, None]
+        assert [row.mean_length for row in table[:2]] == [row.mean_length for row in clip[:2]]
+        # what is cut is short
+        assert all(a.mean_length > b.mean_length for a, b in zip(table[2:], clip[2:], strict=True))
+    assert [row.left_out for row in start[2:]] == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("edge", ["start", "ends"])
+def test_every_cut_off_has_its_row_and_all_errors(ball, edge):
+    table = compute(ball, variants="ac", edge=edge, rv=0.35, cutoffs="0.3,0.6", **OPTIONS)
+    assert len(table) == 4
+    for row in table:
+        cutoff = {**OPTIONS, "cutoff": row.cutoff}
+        same = compute(ball, variants="ac", edge=edge, rv=0.35, **cutoff)
+        single = same[row.variant == "c"]
+        assert row.mean_length == pytest.approx(single.mean_length, rel=1e-9)
+        assert row.segments == single.segments
+        assert row.alpha_vs_axial_se > 0
+        assert row.alpha_vs_axial_sample_se is None or row.alpha_vs_axial_sample_se > 0
+
+
+def test_second_moment_is_that_of_full_lengths_or_refused(ball):
+    first, second = (
+        compute(ball, variants="c", edge="start", moment=moment, rv=0.35, **OPTIONS)[0]
+        for moment in (1, 2)
+    )
+    assert second.mean_length > first.mean_length
+    with pytest.raises(SettingsError, match="moment: from what lies inside the window alone"):
+        scanfab.Settings(edge="ends", moment=2)
+
+
+def test_an_rv_from_which_segments_leave_the_sample_is_told(ball):
+    with pytest.warns(ScanfabWarning, match="of the void segments of the RV leave the sample"):
+        table = compute(ball, variants="c", edge="start", rv=0.98, **OPTIONS)
+    assert table[0].left_out > 0.01
+
+
+def test_a_whole_without_an_ellipsoid_has_no_void_fabric():
+    packing = Packing([[0.0, 0, 0], [1.1, 0, 0], [0, 1.1, 0]], 0.5)
+    with pytest.warns(ScanfabWarning, match="flat or too small: by the rule `edge=ends`"):
+        table = compute(packing, variants="a", edge="ends", **OPTIONS)
+    assert table[0].mean_length is None
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".json", ".jsonl", ".parquet"])
+def test_its_columns_are_written_read_back_and_resumed(ball, suffix, tmp_path):
+    table = compute(ball, variants="ac", edge="start", rv=0.35, **OPTIONS)
+    path = tmp_path / f"table{suffix}"
+    table.save(path)
+    again = load(path)
+    assert list(again.names) == list(table.names)
+    assert columns(again, "edge", "left_out") == columns(table, "edge", "left_out")
+
+
+def test_another_word_is_refused():
+    with pytest.raises(SettingsError, match="edge"):
+        scanfab.Settings(edge="cut")
+
+
+@pytest.mark.parametrize("shape", ["box", "cylinder", "ellipsoid"])
+def test_a_window_of_any_shape_has_no_anisotropy_of_its_own_without_bias(shape):
+    """Of an isotropic medium, by a window twice as high as wide."""
+    random = np.random.default_rng(3)
+    cell = Cell([24.0, 24.0, 24.0])
+    packing = Packing(24 * random.random((2800, 3)), random.uniform(0.5, 1.5, 2800), cell=cell)
+    size = {"box": "7,7,14", "cylinder": "3.5,14", "ellipsoid": "4,4,8"}[shape]
+    words = {"rv_shape": shape, "rv_size": size, "variants": "c", "cutoff": 0.5}
+    scan = {"spacing": 1.0, "directions": "lebedev:11", "workers": 1}
+    clip, start, ends = (
+        compute(packing, edge=edge, **words, **scan)[0] for edge in ("clip", "start", "ends")
+    )
+    assert abs(clip.window_alpha_vs_axial) > 3e-3
+    assert start.window_alpha_vs_axial == ends.window_alpha_vs_axial == 0.0
+    # the sample's own scatter is in all three
+    assert clip.alpha_vs_axial - start.alpha_vs_axial == pytest.approx(
+        clip.window_alpha_vs_axial, abs=4e-3
+    )
+    assert start.alpha_vs_axial == pytest.approx(ends.alpha_vs_axial, abs=5e-3)
+    assert clip.mean_length < start.mean_length
