@@ -15,6 +15,7 @@ from scanfab.base.option import (
     refuse_unknown,
     whole,
 )
+from scanfab.packing.columns import RV_COLUMN
 from scanfab.pipeline.values import (
     AXES,
     SHAPES,
@@ -30,6 +31,7 @@ from scanfab.pipeline.values import (
     parse_cutoff,
     parse_cutoffs,
     parse_directions,
+    parse_fractions,
     parse_frames,
     parse_rattlers,
     parse_shape,
@@ -98,19 +100,20 @@ class Settings:
         choices=lambda: ("abcd", "ab", "cd", "ac", *"abcd"),
         first=True,
     )
-    rv: float = option(
+    rv: float | tuple[float, ...] = option(
         default=0.7,
-        parse=number("a fraction above 0", lambda value: 0 < value < math.inf),
+        parse=parse_fractions,
         group="window",
         help="Size of the RV: radius of the sphere as a fraction of half the smallest extent of "
-        "the grains; sizes of other shapes, of half the extents.",
+        "the grains; sizes of other shapes, of half the extents. Several: a row for each, from "
+        "the same lines.",
         meaning="radius of the RV over half the smallest extent of the grains; of other shapes "
         "their sizes over half the extents",
-        takes="float",
-        kind=float,
-        metavar="FRACTION",
+        takes="float, str or sequence of float",
+        metavar="FRACTION[,FRACTION...]",
         first=True,
     )
+    """Several in ascending order."""
     rv_radius: float | None = option(
         parse=optional(number("a length above 0", lambda value: 0 < value < math.inf)),
         group="window",
@@ -371,8 +374,10 @@ class Settings:
     def more_columns(self) -> tuple[str, ...]:
         """Columns that the table has because these settings ask for more than the default."""
         shaped = self.rv_shape != "sphere" or self.rv_follows != "none"
-        columns = ("window_alpha_vs_axial",) if shaped and self.needs_window else ()
-        return columns if self.edge == CLIP else (*columns, *(one.name for one in EDGE_COLUMNS))
+        several = len(self.rvs) > 1
+        of_window = {RV_COLUMN.name: several, "window_alpha_vs_axial": shaped}
+        columns = [name for name, asked in of_window.items() if asked and self.needs_window]
+        return (*columns, *(one.name for one in EDGE_COLUMNS if self.edge != CLIP))
 
     def __repr__(self) -> str:
         usual = Settings()
@@ -389,9 +394,15 @@ class Settings:
         return bool(self.cutoffs) or self.moment != 1
 
     @property
+    def rvs(self) -> tuple[float, ...]:
+        """The sizes of the RVs, one or several."""
+        return self.rv if isinstance(self.rv, tuple) else (self.rv,)
+
+    @property
     def rows_per_frame(self) -> int:
-        """Rows of each frame: one for each variant and cut-off."""
-        return len(self.variants) * max(len(self.cutoffs), 1)
+        """Rows of each frame: one for each variant, RV and cut-off."""
+        windows = sum(len(self.rvs) if variant in "cd" else 1 for variant in self.variants)
+        return windows * max(len(self.cutoffs), 1)
 
     @property
     def needs_window(self) -> bool:

@@ -35,6 +35,7 @@ __all__ = [
     "parse_cutoff",
     "parse_cutoffs",
     "parse_directions",
+    "parse_fractions",
     "parse_frames",
     "parse_length",
     "parse_lengths",
@@ -234,6 +235,28 @@ def parse_sizes(name: str, values: Any) -> tuple[float, ...]:
     return sizes
 
 
+def parse_fractions(name: str, value: Any) -> float | tuple[float, ...]:
+    """
+    Sizes of RVs: one as a number; several, each once, in ascending order.
+
+    Examples
+    --------
+    >>> from scanfab.pipeline.values import parse_fractions
+    >>> parse_fractions("rv", "0.7"), parse_fractions("rv", "0.7,0.4")
+    (0.7, (0.4, 0.7))
+    """
+    try:
+        several = isinstance(value, str | tuple | list)
+        found = sorted(map(float, _words(value))) if several else [float(value)]
+    except (TypeError, ValueError):
+        found = []
+    if not found or not all(0 < one < math.inf for one in found):
+        raise unusable(name, "a fraction above 0, or several such as 0.4,0.5,0.6", value)
+    if len(set(found)) < len(found):
+        raise unusable(name, "fractions that differ", value)
+    return found[0] if len(found) == 1 else tuple(found)
+
+
 def parse_shape(name: str, value: Any) -> str:
     """The shape of a window: a word, or a file with its surface that exists."""
     if str(value) in SHAPES:
@@ -256,10 +279,28 @@ def check_moment(chosen: Settings) -> None:
         )
 
 
+def _check_several(chosen: Settings) -> None:
+    """SettingsError if what is said of the RV holds for one size alone."""
+    of_file = chosen.rv_shape not in SHAPES
+    for name, is_given in (
+        ("rv_radius", chosen.rv_radius is not None),
+        ("rv_size", bool(chosen.rv_size)),
+        ("rv_shape", of_file),
+    ):
+        if is_given:
+            what = "the file of a surface has" if name == "rv_shape" else "it gives the RV"
+            raise SettingsError(
+                f"{name}: {what} one size, but `rv` asks for {len(chosen.rvs)}: leave out one of "
+                f"the two"
+            )
+
+
 def check_window(chosen: Settings) -> None:
     """SettingsError if what is said of the RV does not go together."""
     shape, sizes = chosen.rv_shape, chosen.rv_size
     takes = SHAPES.get(shape, "")
+    if len(chosen.rvs) > 1:
+        _check_several(chosen)
     if sizes and not takes:
         hint = "choose `rv_radius`" if shape == "sphere" else "its file says how large it is"
         raise SettingsError(f"rv_size: the shape {shape} takes none: {hint}")
