@@ -10,7 +10,6 @@ from scanfab.base.option import (
     number,
     one_of,
     option,
-    optional,
     options_of,
     refuse_unknown,
     whole,
@@ -18,34 +17,29 @@ from scanfab.base.option import (
 from scanfab.packing.columns import RV_COLUMN
 from scanfab.pipeline.values import (
     AXES,
-    SHAPES,
     STRAIN_MODES,
     Axis,
     Length,
     Vector,
     as_written,
     check_moment,
-    check_window,
     parse_axis,
     parse_boundary,
     parse_cutoff,
     parse_cutoffs,
     parse_directions,
-    parse_fractions,
     parse_frames,
     parse_rattlers,
-    parse_shape,
-    parse_sizes,
     parse_spacing,
     parse_strain,
     parse_tolerance,
     parse_variants,
-    parse_vector,
     parse_workers,
     rattler_rules,
 )
+from scanfab.pipeline.window_settings import WindowSettings, check_window
 from scanfab.scan.columns import EDGE_COLUMNS
-from scanfab.scan.edges import CLIP, EDGES
+from scanfab.scan.edges import CLIP
 
 if TYPE_CHECKING:
     from scanfab.packing.boundary import BoundaryRule
@@ -64,7 +58,7 @@ RULE_NAMES = (
 
 
 @dataclass(frozen=True, init=False)
-class Settings:
+class Settings(WindowSettings):
     """
     What to compute, and how.
 
@@ -99,90 +93,6 @@ class Settings:
         metavar="LETTERS",
         choices=lambda: ("abcd", "ab", "cd", "ac", *"abcd"),
         first=True,
-    )
-    rv: float | tuple[float, ...] = option(
-        default=0.7,
-        parse=parse_fractions,
-        group="window",
-        help="Size of the RV: radius of the sphere as a fraction of half the smallest extent of "
-        "the grains; sizes of other shapes, of half the extents. Several: a row for each, from "
-        "the same lines.",
-        meaning="radius of the RV over half the smallest extent of the grains; of other shapes "
-        "their sizes over half the extents",
-        takes="float, str or sequence of float",
-        metavar="FRACTION[,FRACTION...]",
-        first=True,
-    )
-    """Several in ascending order."""
-    rv_radius: float | None = option(
-        parse=optional(number("a length above 0", lambda value: 0 < value < math.inf)),
-        group="window",
-        help="Radius of the sphere RV in the dump's units, instead of `rv`.",
-        meaning="radius of the RV instead, dump's unit",
-        takes="float",
-        kind=float,
-        metavar="L",
-    )
-    rv_center: Vector | None = option(
-        parse=optional(parse_vector),
-        group="window",
-        help="Centre of the RV (default: middle).",
-        meaning="centre of the RV, dump's unit; not given: the middle of the sample",
-        takes="str or three floats",
-        metavar="X Y Z",
-    )
-    rv_shape: str = option(
-        default="sphere",
-        parse=parse_shape,
-        group="window",
-        help="Shape of the RV; FILE is a closed convex surface in the dump's units (.stl .vtp .ply "
-        ".obj).",
-        meaning="shape of the RV: sphere, box, cylinder, ellipsoid, or the file of its surface",
-        takes="str or path",
-        metavar="sphere|box|cylinder|ellipsoid|FILE",
-        choices=lambda: SHAPES,
-        files=True,
-    )
-    rv_size: tuple[float, ...] = option(
-        parse=parse_sizes,
-        group="window",
-        help="In the dump's units, instead of `rv`: edges of the box, radius and height of the "
-        "cylinder, semi-axes of the ellipsoid.",
-        meaning="edges of the box, radius and height of the cylinder or semi-axes of the ellipsoid "
-        "instead, dump's unit",
-        takes="str or sequence of float",
-        metavar="A,B,C",
-    )
-    """None given: empty."""
-    rv_axis: Axis | None = option(
-        parse=optional(lambda name, value: parse_axis(value, name)),
-        group="window",
-        help="Axis of the cylinder (default: `axis`).",
-        meaning="axis of the cylinder; not given: the loading axis",
-        takes="str or three floats",
-        metavar="x|y|z|X,Y,Z",
-        choices=lambda: AXES,
-    )
-    rv_follows: str = option(
-        default="none",
-        parse=one_of("none", "strain"),
-        group="window",
-        help="The RV keeps its shape, or deforms with what `strain` is measured by: with the cell, "
-        "or by the extents of boundary or grains along x, y, z.",
-        meaning="none: the RV keeps its shape; strain: it deforms with the sample",
-        metavar="none|strain",
-        choices=lambda: ("none", "strain"),
-    )
-    edge: str = option(
-        default=CLIP,
-        parse=one_of(*EDGES),
-        group="window",
-        help="What counts at the surface of the RV: clip cuts the void segments there; start takes "
-        "their full length if they begin or end inside, ends their ends inside.",
-        meaning="clip: void segments are cut at the RV's surface; start: those that begin or end "
-        "in it count with their full length; ends: by their ends in it, in the whole, too",
-        metavar="|".join(EDGES),
-        choices=lambda: EDGES,
     )
     boundary: tuple[BoundaryRule, ...] = option(
         default=(),
@@ -392,11 +302,6 @@ class Settings:
     def lists_gaps(self) -> bool:
         """Whether sums for one cut-off do not suffice."""
         return bool(self.cutoffs) or self.moment != 1
-
-    @property
-    def rvs(self) -> tuple[float, ...]:
-        """The sizes of the RVs, one or several."""
-        return self.rv if isinstance(self.rv, tuple) else (self.rv,)
 
     @property
     def rows_per_frame(self) -> int:
