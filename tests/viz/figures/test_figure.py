@@ -27,8 +27,8 @@ from tests.helpers.tables import curve
 
 pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.base.errors.ScanfabNote")
 OWN = (
-    "evolution", "normalised", "correlation", "columns", "rose", "projection", "histogram", "cutoffs",
-    "calibration",
+    "evolution", "normalised", "correlation", "columns", "rose", "projection", "histogram",
+    "cutoffs", "calibration",
 )  # fmt: skip
 FAST = ["--boundary", "mask=3", "--tolerance", "3e-3", "--variants", "c", "--frames", "::6"]
 
