@@ -59,11 +59,13 @@ class Sample:
     packing : Packing
         Its contacts tell the rattlers.
     boundary : ndarray of bool, shape (N,)
-        Particles that are boundary, not grains.
+        Particles that are boundary, not grains. A clump is boundary if one of its spheres is.
     min_contacts : int, optional
-        A grain with fewer contacts is a rattler.
+        A grain with fewer neighbours is a rattler.
     rattler_rule : callable, optional
         Tells them by their contacts; by default every grain on its own, in one pass.
+    min_force : float, optional
+        For the rule ``force``, relative to the mean normal force.
 
     Raises
     ------
@@ -86,6 +88,7 @@ class Sample:
     boundary: BoolArray
     min_contacts: int = 2
     rattler_rule: RattlerRule = count
+    min_force: float = 0.0
 
     def __post_init__(self) -> None:
         """PackingError if the boundary is no truth value for each particle."""
@@ -95,16 +98,19 @@ class Sample:
                 f"boundary: expected a truth value for each of {len(self.packing)} particles, such "
                 f'as packing.columns["type"] == 2, found {boundary.dtype} of shape {boundary.shape}'
             )
+        if self.packing.bodies is not None:
+            object.__setattr__(self, "boundary", self.packing.bodies.whole(boundary))
 
     def __repr__(self) -> str:
-        what = f"Sample: {counted(int(self.grains.sum()), 'grain')}"
+        what = f"Sample: {counted(self.number(self.grains), 'grain')}"
         if self.packing.contacts is not None:
-            rattlers = counted(int(self.rattlers.sum()), "rattler")
-            rule = f"fewer than {counted(self.min_contacts, 'contact')}"
+            rattlers = counted(self.number(self.rattlers), "rattler")
+            of = "contact" if self.packing.bodies is None else "neighbour"
+            rule = f"fewer than {counted(self.min_contacts, of)}"
             if self.rattler_rule is not count:
                 rule = f"by {getattr(self.rattler_rule, '__name__', 'a rule')} of {rule}"
             what += f", {rattlers} ({rule})"
-        boundary = int(self.boundary.sum())
+        boundary = self.number(self.boundary)
         return what + (f"; {counted(boundary, 'boundary particle')}" if boundary else "")
 
     @property
@@ -118,8 +124,30 @@ class Sample:
 
     @property
     def grains(self) -> BoolArray:
-        """Particles that are not boundary, shape (N,)."""
+        """Particles that are not boundary, shape (N,): of clumps, each of the spheres."""
         return ~self.boundary
+
+    def number(self, chosen: BoolArray) -> int:
+        """
+        How many grains some spheres are: a clump is one.
+
+        Parameters
+        ----------
+        chosen : ndarray of bool, shape (N,)
+            Spheres.
+
+        Returns
+        -------
+        int
+        """
+        bodies = self.packing.bodies
+        return int(np.count_nonzero(chosen)) if bodies is None else bodies.count(chosen)
+
+    @property
+    def clumps(self) -> int:
+        """How many grains are bodies of several spheres."""
+        bodies = self.packing.bodies
+        return 0 if bodies is None else bodies.count(self.grains & bodies.has_many)
 
     @cached_property
     def escaped(self) -> Escaped:
@@ -174,21 +202,39 @@ class Sample:
         """Grains that are rattlers by the rule, shape (N,)."""
         told = self.rattler_rule(self._touching)
         found: BoolArray = cast("rattlers", told, np.bool_, (len(self.packing),))
+        if self.packing.bodies is not None:
+            found = found[self.packing.bodies.head]
         return self.grains & found
 
     @property
     def _touching(self) -> Touching:
-        return Touching(self.contacts, self.contact_numbers, self.grains, self.min_contacts)
+        return Touching(
+            self.contacts,
+            self.contact_numbers,
+            self.grains,
+            self.min_contacts,
+            self.packing.bodies,
+            self.min_force,
+        )
 
     @cached_property
     def contact_numbers(self) -> IntArray:
-        """Number of contacts of each particle, those with walls included, shape (N,)."""
-        ends = np.bincount(self.contacts.pairs.ravel(), minlength=len(self.packing))
-        return ends + self.packing.wall_contacts
+        """
+        Number of neighbours of each particle, contacts with walls included, shape (N,).
+
+        Spheres have one neighbour a contact; each sphere of a clump has those of the clump.
+        """
+        bodies, walls = self.packing.bodies, self.packing.wall_contacts
+        pairs = self.contacts.neighbours(bodies)
+        ends = np.bincount(pairs.ravel(), minlength=len(self.packing))
+        if bodies is None:
+            return ends + walls
+        np.add.at(ends, bodies.head, walls)
+        return ends[bodies.head]
 
     @cached_property
     def contact_numbers_without_rattlers(self) -> IntArray:
-        """The same without contacts that a rattler has part in."""
+        """The same without rattlers as neighbours."""
         return self._touching.numbers_without(~self.contacts_without(self.rattlers))
 
     def removed(self, variant: Variant) -> BoolArray:
@@ -210,6 +256,9 @@ class Sample:
         """
         Grains whose centre lies in the variant's window, rattlers included.
 
+        The centre of a clump is its place, the mean of its spheres' centres by their volumes; with
+        it all its spheres are counted, wherever they are.
+
         Parameters
         ----------
         variant : Variant
@@ -224,7 +273,9 @@ class Sample:
         if not variant.in_window:
             return self.grains
         assert window is not None
-        return self.grains & window.contains(self.packing.position, self.packing)
+        bodies = self.packing.bodies
+        places = self.packing.position if bodies is None else bodies.place
+        return self.grains & window.contains(places, self.packing)
 
     def solids(self, variant: Variant, window: Window | None) -> BoolArray:
         """
@@ -288,9 +339,9 @@ class Sample:
 
     def coordination(self, variant: Variant, window: Window | None) -> float | None:
         """
-        Mean number of contacts of the variant's grains, boundary's included.
+        Mean number of contacts of the variant's grains, boundary's included; of clumps, neighbours.
 
-        Contacts with removed grains are left out.
+        Those with removed grains are left out.
 
         Parameters
         ----------
@@ -305,6 +356,8 @@ class Sample:
             None if there is no grain.
         """
         counted = self.counted(variant, window) & ~self.removed(variant)
+        if self.packing.bodies is not None:
+            counted &= self.packing.bodies.is_head
         if not counted.any():
             return None
         numbers = (
@@ -322,9 +375,11 @@ class SampleRule:
     boundary: tuple[BoundaryRule, ...] = ()
     """Particles that fit one of them are boundary."""
     min_contacts: int = 2
-    """A grain with fewer contacts is a rattler."""
+    """A grain with fewer neighbours is a rattler."""
     rattlers: str = "count"
     """By which of the installed rules."""
+    min_force: float = 0.0
+    """For the rule ``force``, relative to the mean normal force."""
     contact_tolerance: float = 0.0
     """Of contacts by geometry, where no file lists them; relative to the sum of the radii."""
 
@@ -340,4 +395,5 @@ class SampleRule:
         if packing.contacts is None:
             packing = find_contacts(packing, self.contact_tolerance)
         boundary = select_boundary(packing, self.boundary)
-        return Sample(packing, boundary, self.min_contacts, installed_rules()[self.rattlers])
+        rule = installed_rules()[self.rattlers]
+        return Sample(packing, boundary, self.min_contacts, rule, self.min_force)

@@ -21,6 +21,7 @@ from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.frame import FrameResult, compute_frame
 from scanfab.pipeline.frames import Frames, Readable, Source
+from scanfab.pipeline.groupings import Grouping, Groupings, grouping_of
 from scanfab.pipeline.plan import Plan, make_plan, plan_without_grains
 from scanfab.pipeline.settings import MAX_CHORDS, Settings
 from scanfab.pipeline.strain import Flips, Strains
@@ -58,6 +59,7 @@ def compute(
     max_chords: float = MAX_CHORDS,
     min_contacts: int = 2,
     rattlers: str = "count",
+    min_force: float = 0.0,
     contact_tolerance: float = 0.0,
     axis: str | Sequence[float] = "z",
     strain: str | Path = "auto",
@@ -148,6 +150,8 @@ class _Computed:
     notes: tuple[Note, ...] = ()
     cell: Cell | None = None
     """None also if the frame has no grains."""
+    grouping: Grouping | None = None
+    """None also if each sphere is a grain."""
     heard: tuple[Warning, ...] = ()
     """Warnings of another process, where nobody hears them."""
 
@@ -183,12 +187,14 @@ class _FrameJob:
             if not self.skips_damaged:
                 raise
             return _Computed(self.number, notes=(Note(SKIPPED, str(error)),))
-        seconds, grains = time.perf_counter() - begun, int(found.sample.grains.sum())
+        seconds = time.perf_counter() - begun
+        grains = found.sample.number(found.sample.grains)
         LOGGER.info("%s: frame %d: %d grains in %.2g s", self.source, self.number, grains, seconds)
         if self.observe is not None:
             self.observe(found)
-        cell = found.sample.packing.cell if grains else None
-        return _Computed(self.number, found.rows, found.notes, cell)
+        packing = found.sample.packing
+        cell = packing.cell if grains else None
+        return _Computed(self.number, found.rows, found.notes, cell, grouping_of(packing))
 
 
 class _Run:
@@ -203,6 +209,7 @@ class _Run:
         self.frames = frames
         self.has_grains = False
         self._flips = Flips(frames.settings.frames.step)
+        self._groupings = Groupings()
 
     def jobs(self, done: Container[int], observe: Observer | None) -> Iterator[_FrameJob]:
         """The chosen frames that are not done."""
@@ -233,6 +240,8 @@ class _Run:
             warnings.warn(warning, stacklevel=3)
         tell(computed.notes, f"frame {computed.number}")
         tell(self._flips.notes(computed.number, computed.cell))
+        grouping = self._groupings.notes(computed.number, computed.grouping)
+        tell(grouping, f"frame {computed.number}")
 
 
 class _Pool:

@@ -271,8 +271,8 @@ class Settings:
         default=2,
         parse=whole("0 or more", lambda count: count >= 0),
         group="sample",
-        help="A grain with fewer contacts is a rattler.",
-        meaning="a grain with fewer contacts is a rattler",
+        help="A grain with fewer contacts (a clump: with fewer neighbours) is a rattler.",
+        meaning="a grain with fewer contacts (a clump: with fewer neighbours) is a rattler",
         takes="int",
         kind=int,
         metavar="N",
@@ -282,11 +282,23 @@ class Settings:
         parse=parse_rattlers,
         group="sample",
         help="Rule for rattlers: count is one pass over all contacts; recursive repeats it without "
-        "those of rattlers, until there is no new one.",
+        "those of rattlers, until there is no new one; force is one pass over contacts whose "
+        "normal force is above `min_force`.",
         meaning="rule for rattlers; count: one pass over all contacts; recursive: again without "
-        "those of rattlers, until there is no new one",
+        "those of rattlers, until there is no new one; force: one pass over contacts that press",
         metavar="RULE",
         choices=rattler_rules,
+    )
+    min_force: float = option(
+        default=0.0,
+        parse=number("0 or more", lambda value: 0 <= value < math.inf),
+        group="sample",
+        help="For the rule force: a contact counts if its normal force is above this, relative to "
+        "the mean normal force.",
+        meaning="for the rule force: normal force above which a contact counts, over the mean",
+        takes="float",
+        kind=float,
+        metavar="X",
     )
     contact_tolerance: float = option(
         default=0.0,
