@@ -36,6 +36,9 @@ class ContactList(NamedTuple):
         Force on the second grain, dump's force unit.
     source : str, optional
         Where the list comes from: ``file`` or ``geometric``.
+    force_n : array_like, shape (M,) or (M, 3), optional
+        Normal force, dump's force unit: compression positive, or the vector on the second grain.
+        For sources that have no more of the force: else it follows from that.
 
     Examples
     --------
@@ -51,9 +54,12 @@ class ContactList(NamedTuple):
     image: npt.ArrayLike | None = None
     force: npt.ArrayLike | None = None
     source: ContactSource = "file"
+    force_n: npt.ArrayLike | None = None
 
     def __repr__(self) -> str:
         named = {"images": self.image, "forces": self.force}
+        if self.force is None:
+            named["normal forces"] = self.force_n
         has = [f"with {name}" for name, values in named.items() if values is not None]
         number = counted(len(np.asarray(self.pairs)), "contact")
         return f"ContactList: {', '.join([f'{number} from {self.source}', *has])}"
@@ -82,6 +88,9 @@ class Contacts:
         Force on the second grain, shape (M, 3), dump's force unit; None if the dump has none.
     source : str
         ``file`` or ``geometric``.
+    force_n : ndarray or None
+        Normal force f·n, shape (M,), dump's force unit: above 0 the grains push each other
+        apart (compression). None if the dump has none.
 
     Examples
     --------
@@ -99,6 +108,7 @@ class Contacts:
     point: FloatArray
     force: FloatArray | None
     source: ContactSource
+    force_n: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.pairs)
@@ -115,7 +125,8 @@ class Contacts:
         str
         """
         whence = "from file" if self.source == "file" else "by geometry"
-        forces = "" if self.force is None else " with forces"
+        forces = "" if self.force_n is None else " with normal forces"
+        forces = forces if self.force is None else " with forces"
         return f"{counted(len(self), 'contact')} {whence}{forces}"
 
     def chosen(self, some: BoolArray) -> Contacts:
@@ -192,9 +203,7 @@ def resolve_contacts(listed: ContactList, spheres: Spheres) -> Contacts:
             f"contact {wrong} names the rows {pairs[wrong].tolist()}, "
             f"but there are {count} grains (rows from 0)"
         )
-    force = None
-    if listed.force is not None:
-        force = cast("force", listed.force, np.float64, (len(pairs), 3))
+    force, force_n = _forces(listed, len(pairs))
     image = _images(listed, pairs, spheres)
     if spheres.bodies is not None:
         outer = spheres.bodies.between(pairs, image)
@@ -217,8 +226,21 @@ def resolve_contacts(listed: ContactList, spheres: Spheres) -> Contacts:
     radius = spheres.radius[pairs]
     middle = 0.5 * (length + radius[:, 0] - radius[:, 1])
     point = spheres.position[pairs[:, 0]] + middle[:, None] * normal
-    force = None if force is None else force[keep]
-    return Contacts(pairs, image, normal, point, force, listed.source)
+    force, force_n = (None if one is None else one[keep] for one in (force, force_n))
+    if force_n is not None and force_n.ndim == 2:
+        force_n = np.einsum("ci,ci->c", force_n, normal)
+    return Contacts(pairs, image, normal, point, force, listed.source, force_n)
+
+
+def _forces(listed: ContactList, count: int) -> tuple[FloatArray | None, FloatArray | None]:
+    """The force on each second grain, and the normal force, as a vector or signed."""
+    if listed.force is not None:
+        force: FloatArray = cast("force", listed.force, np.float64, (count, 3))
+        return force, force
+    if listed.force_n is None:
+        return None, None
+    force_n = cast("force_n", listed.force_n, np.float64, (count, ...))
+    return None, force_n if force_n.ndim == 1 else cast("force_n", force_n, np.float64, (count, 3))
 
 
 def _images(listed: ContactList, pairs: IntArray, spheres: Spheres) -> IntArray:
