@@ -208,7 +208,7 @@ def resolve_contacts(listed: ContactList, spheres: Spheres) -> Contacts:
     if spheres.bodies is not None:
         outer = spheres.bodies.between(pairs, image)
         pairs, image = pairs[outer], image[outer]
-        force = None if force is None else force[outer]
+        force, force_n = (None if one is None else one[outer] for one in (force, force_n))
     branch = spheres.position[pairs[:, 1]] - spheres.position[pairs[:, 0]]
     if spheres.cell is not None:
         branch = branch + image @ spheres.cell.vectors

@@ -110,15 +110,14 @@ def force(touching: Touching) -> BoolArray:
         If the contacts have no forces.
     """
     contacts = touching.contacts
-    if contacts.force is None:
+    if contacts.force_n is None:
         raise ReadError(
             'the rule `rattlers="force"` needs the forces of the contacts, which are '
             f"{'not in the file' if contacts.source == 'file' else 'found by geometry'}: choose "
             '`rattlers="count"`, or name a contact file with forces (`contacts`)'
         )
-    normal = np.einsum("ij,ij->i", contacts.force, contacts.normal)
-    mean = normal.mean() if len(normal) else 0.0
-    pressing = normal > touching.min_force * mean
+    mean = contacts.force_n.mean() if len(contacts) else 0.0
+    pressing = contacts.force_n > touching.min_force * mean
     found = touching.numbers_without(~pressing) < touching.min_contacts
     return np.asarray(touching.grains & found)
 

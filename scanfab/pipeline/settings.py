@@ -17,6 +17,7 @@ from scanfab.base.option import (
 )
 from scanfab.pipeline.values import (
     AXES,
+    RULE_NAMES,
     SHAPES,
     STRAIN_MODES,
     Axis,
@@ -56,9 +57,6 @@ AUTO_RULE = "icosahedral:9"
 # of an auto scan of one frame: one to two minutes of one processor, some hundred times what dense
 # packings need for the default tolerance
 MAX_CHORDS = 1e10
-RULE_NAMES = (
-    "lebedev", "design", "icosahedral", "product", "fibonacci", "equal-angle", "equal-angle-full",
-)  # fmt: skip
 
 
 @dataclass(frozen=True, init=False)
@@ -107,7 +105,6 @@ class Settings:
         meaning="radius of the RV over half the smallest extent of the grains; of other shapes "
         "their sizes over half the extents",
         takes="float",
-        kind=float,
         metavar="FRACTION",
         first=True,
     )
@@ -117,7 +114,6 @@ class Settings:
         help="Radius of the sphere RV in the dump's units, instead of `rv`.",
         meaning="radius of the RV instead, dump's unit",
         takes="float",
-        kind=float,
         metavar="L",
     )
     rv_center: Vector | None = option(
@@ -218,7 +214,6 @@ class Settings:
         help="Mean length of the void segments (1), or mean of the squares over the mean (2).",
         meaning="1: mean length of the void segments; 2: mean of their squares over that",
         takes="int",
-        kind=int,
         metavar="1|2",
         choices=lambda: ("1", "2"),
     )
@@ -252,7 +247,6 @@ class Settings:
         help="Target standard error of alpha_vs_axial, for every variant, when something is auto.",
         meaning="wanted standard error of the scan, where spacing or directions are auto",
         takes="float",
-        kind=float,
         metavar="X",
         first=True,
     )
@@ -264,7 +258,6 @@ class Settings:
         "by default after one or two minutes of one processor (lines count like chords).",
         meaning="an auto scan stops before it cuts more chords from grains in a frame",
         takes="float",
-        kind=float,
         metavar="N",
     )
     min_contacts: int = option(
@@ -274,7 +267,6 @@ class Settings:
         help="A grain with fewer contacts (a clump: with fewer neighbours) is a rattler.",
         meaning="a grain with fewer contacts (a clump: with fewer neighbours) is a rattler",
         takes="int",
-        kind=int,
         metavar="N",
     )
     rattlers: str = option(
@@ -282,10 +274,9 @@ class Settings:
         parse=parse_rattlers,
         group="sample",
         help="Rule for rattlers: count is one pass over all contacts; recursive repeats it without "
-        "those of rattlers, until there is no new one; force is one pass over contacts whose "
-        "normal force is above `min_force`.",
+        "those of rattlers, until none is new; force is one pass over those above `min_force`.",
         meaning="rule for rattlers; count: one pass over all contacts; recursive: again without "
-        "those of rattlers, until there is no new one; force: one pass over contacts that press",
+        "those of rattlers, until none is new; force: one pass over contacts that press",
         metavar="RULE",
         choices=rattler_rules,
     )
@@ -293,11 +284,9 @@ class Settings:
         default=0.0,
         parse=number("0 or more", lambda value: 0 <= value < math.inf),
         group="sample",
-        help="For the rule force: a contact counts if its normal force is above this, relative to "
-        "the mean normal force.",
-        meaning="for the rule force: normal force above which a contact counts, over the mean",
+        help="By the rule force contacts count whose normal force is above this, over the mean.",
+        meaning="by the rule force contacts count whose normal force is above this, over the mean",
         takes="float",
-        kind=float,
         metavar="X",
     )
     contact_tolerance: float = option(
@@ -307,7 +296,6 @@ class Settings:
         help="Of contacts by geometry, relative: contact if distance < (r1 + r2)(1 + X).",
         meaning="relative tolerance of contacts by geometry",
         takes="float",
-        kind=float,
         metavar="X",
     )
     axis: Axis = option(
@@ -347,7 +335,6 @@ class Settings:
         help="Seed of the random numbers.",
         meaning="of the random numbers; the same seed repeats the same numbers",
         takes="int",
-        kind=int,
         metavar="N",
     )
     workers: int = option(
@@ -355,7 +342,6 @@ class Settings:
         group="scan",
         help="Parallel workers (default: all cores).",
         takes="int",
-        kind=int,
         metavar="N",
         first=True,
     )

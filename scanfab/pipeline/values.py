@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AXES",
+    "RULE_NAMES",
     "SHAPES",
     "STRAIN_MODES",
     "Axis",
@@ -53,6 +54,9 @@ __all__ = [
 Vector = tuple[float, float, float]
 STRAIN_MODES = ("auto", "cell", "boundary", "grains")
 # of windows, with the sizes that each takes
+RULE_NAMES = (
+    "lebedev", "design", "icosahedral", "product", "fibonacci", "equal-angle", "equal-angle-full",
+)  # fmt: skip
 SHAPES = {
     "sphere": "",
     "box": "A,B,C, full edges",
