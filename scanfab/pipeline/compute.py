@@ -62,6 +62,7 @@ def compute(
     min_force: float = 0.0,
     contact_tolerance: float = 0.0,
     axis: str | Sequence[float] = "z",
+    with_: str | Sequence[str] | None = None,
     strain: str | Path = "auto",
     frames: str | int | slice | None = None,
     seed: int = 0,

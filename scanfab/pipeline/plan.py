@@ -13,6 +13,7 @@ from scanfab.packing.doubts import refuse_impossible
 from scanfab.packing.sample import Sample, SampleRule
 from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.frames import sample_rule
+from scanfab.pipeline.more_columns import more_columns
 from scanfab.pipeline.rv import Deformation, doubts_of_rv, rv_of
 from scanfab.pipeline.settings import AUTO_RULE, Settings, Vector
 from scanfab.pipeline.strain import Strains
@@ -62,6 +63,8 @@ class Plan:
     """What the window follows."""
     more_columns: tuple[str, ...]
     """Of the table, behind those that it always has."""
+    groups: tuple[str, ...]
+    """Of further columns, see :data:`scanfab.fabric.registry.GROUPS`."""
     cutoff: float
     """Of the scan that is to meet the tolerance."""
     cutoffs: tuple[float, ...]
@@ -213,7 +216,8 @@ def _without_lengths(settings: Settings, strains: Strains) -> Plan:
         max_chords=settings.max_chords,
         window=None,
         deformation=None,
-        more_columns=settings.more_columns,
+        more_columns=more_columns(settings),
+        groups=settings.with_,
         cutoff=math.nan,
         cutoffs=(math.nan,) * max(len(settings.cutoffs), 1),
         rule=settings.directions or direction_rule(AUTO_RULE),

@@ -14,9 +14,10 @@ from scanfab.base.option import (
     options_of,
     refuse_unknown,
     whole,
-)
+)  # fmt: skip
 from scanfab.pipeline.values import (
     AXES,
+    GROUP_NAMES,
     RULE_NAMES,
     SHAPES,
     STRAIN_MODES,
@@ -32,6 +33,7 @@ from scanfab.pipeline.values import (
     parse_cutoffs,
     parse_directions,
     parse_frames,
+    parse_groups,
     parse_rattlers,
     parse_shape,
     parse_sizes,
@@ -43,7 +45,6 @@ from scanfab.pipeline.values import (
     parse_workers,
     rattler_rules,
 )
-from scanfab.scan.columns import EDGE_COLUMNS
 from scanfab.scan.edges import CLIP, EDGES
 
 if TYPE_CHECKING:
@@ -54,8 +55,7 @@ __all__ = ["AUTO_RULE", "AXES", "MAX_CHORDS", "STRAIN_MODES", "Length", "Setting
 
 # equal weights and few axes: the random turns of the replicates do the rest
 AUTO_RULE = "icosahedral:9"
-# of an auto scan of one frame: one to two minutes of one processor, some hundred times what dense
-# packings need for the default tolerance
+# one to two minutes of a processor, some hundred times what a frame needs for the default tolerance
 MAX_CHORDS = 1e10
 
 
@@ -206,7 +206,6 @@ class Settings:
         takes="str or sequence of str or float",
         metavar="FROM:TO:STEP|L,L,...",
     )
-    """Several instead of the one, each with its rows."""
     moment: int = option(
         default=1,
         parse=whole("1 or 2", lambda moment: moment in (1, 2)),
@@ -308,6 +307,16 @@ class Settings:
         metavar="x|y|z|X,Y,Z",
         choices=lambda: AXES,
     )
+    with_: tuple[str, ...] = option(
+        parse=parse_groups,
+        group="fabric",
+        help="More columns: forces, state (void ratio, stress), invariants, harmonics, or several.",
+        meaning="groups of further columns",
+        takes="str or sequence of str",
+        metavar="GROUP,...",
+        spelling="--with",
+        choices=lambda: GROUP_NAMES,
+    )
     strain: str = option(
         default="auto",
         parse=parse_strain,
@@ -364,13 +373,6 @@ class Settings:
             object.__setattr__(self, one.name, value)
         check_window(self)
         check_moment(self)
-
-    @property
-    def more_columns(self) -> tuple[str, ...]:
-        """Columns that the table has because these settings ask for more than the default."""
-        shaped = self.rv_shape != "sphere" or self.rv_follows != "none"
-        columns = ("window_alpha_vs_axial",) if shaped and self.needs_window else ()
-        return columns if self.edge == CLIP else (*columns, *(one.name for one in EDGE_COLUMNS))
 
     def __repr__(self) -> str:
         usual = Settings()
