@@ -143,6 +143,11 @@ class Sample:
         bodies = self.packing.bodies
         return int(np.count_nonzero(chosen)) if bodies is None else bodies.count(chosen)
 
+    def once(self, chosen: BoolArray) -> BoolArray:
+        """Of grains all of whose spheres are chosen, shape (N,), one sphere each."""
+        bodies = self.packing.bodies
+        return chosen if bodies is None else np.asarray(chosen & bodies.is_head)
+
     @property
     def clumps(self) -> int:
         """How many grains are bodies of several spheres."""
@@ -355,9 +360,7 @@ class Sample:
         float or None
             None if there is no grain.
         """
-        counted = self.counted(variant, window) & ~self.removed(variant)
-        if self.packing.bodies is not None:
-            counted &= self.packing.bodies.is_head
+        counted = self.once(self.counted(variant, window) & ~self.removed(variant))
         if not counted.any():
             return None
         numbers = (

@@ -56,9 +56,6 @@ __all__ = [
 Vector = tuple[float, float, float]
 STRAIN_MODES = ("auto", "cell", "boundary", "grains")
 # of windows, with the sizes that each takes
-RULE_NAMES = (
-    "lebedev", "design", "icosahedral", "product", "fibonacci", "equal-angle", "equal-angle-full",
-)  # fmt: skip
 SHAPES = {
     "sphere": "",
     "box": "A,B,C, full edges",
