@@ -14,7 +14,7 @@ from scanfab.fabric.state import SampleState, love_weber
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample, Variant
 from scanfab.packing.window import Window
-from scanfab.pipeline.clump_volumes import own_shares
+from scanfab.pipeline.clump_volumes import lens_volumes, own_shares
 
 __all__ = ["contact_forces", "doubts_of_state", "refuse_without_forces", "sample_state"]
 
@@ -176,7 +176,9 @@ def _void_ratio(sample: Sample, window: Window | None) -> float | None:
         return None
     position, radius = packing.position[sample.grains], packing.radius[sample.grains]
     # in a clump what several spheres share is there once
-    share = own_shares(packing, _points_in_ball())[sample.grains]
+    share = np.ones_like(radius)
+    if packing.bodies is not None:
+        share = own_shares(packing, _points_in_ball())[sample.grains]
     if window is None:
         solid = float(np.sum(4.0 / 3.0 * math.pi * radius**3 * share))
     else:
@@ -211,14 +213,7 @@ def _volume_inside(
 
 def lenses(places: FloatArray, radius: FloatArray, ball: Convex) -> FloatArray:
     """Volumes that spheres share with a ball about the origin, shape (N,)."""
-    apart, reach = np.linalg.norm(places, axis=1), ball.reach
-    smaller = 4.0 / 3.0 * math.pi * np.minimum(radius, reach) ** 3
-    is_inside = apart <= np.abs(reach - radius)
-    distance = np.where(is_inside, 1.0, apart)
-    deep = np.maximum(reach + radius - apart, 0.0)
-    lens = math.pi * deep**2 / (12.0 * distance)
-    lens *= distance**2 + 2.0 * distance * (radius + reach) - 3.0 * (radius - reach) ** 2
-    return np.where(is_inside, smaller, lens)
+    return lens_volumes(np.linalg.norm(places, axis=1), radius, ball.reach)
 
 
 def cut_volumes(places: FloatArray, radius: FloatArray, shape: Convex) -> FloatArray:

@@ -24,15 +24,25 @@ def test_what_two_spheres_of_a_clump_share_counts_once():
         lens = np.pi * (2 - d) ** 2 * (d * d + 4 * d) / (12 * d)
         found = shares([[0, 0, 0], [d, 0, 0], [9, 9, 9]], 1.0, [2, 2, -1])
         assert found[[0, 2]].tolist() == [1.0, 1.0]
-        assert found[1] == pytest.approx(1 - lens / BALL, abs=5e-3)
+        assert found[1] == pytest.approx(1 - lens / BALL, rel=1e-12)
 
 
 def test_a_sphere_in_a_sphere_and_many_at_one_place_are_the_largest():
-    assert shares([[0, 0, 0], [0.2, 0, 0]], [1.0, 0.5], [1, 1]).tolist() == [1, 0]
-    assert shares(np.zeros((10, 3)), 1.0, np.ones(10, int)).sum() == 1.0
+    assert shares([[0, 0, 0], [0.2, 0, 0]], [1.0, 0.5], [1, 1]) == pytest.approx([1, 0])
+    assert shares(np.zeros((10, 3)), 1.0, np.ones(10, int)).sum() == pytest.approx(1.0)
     # the inner one comes first: all of it counts, and of the outer one the rest
     found = shares([[0.2, 0, 0], [0, 0, 0]], [0.5, 1.0], [1, 1])
-    assert found @ [0.125, 1.0] == pytest.approx(1.0, abs=5e-3)
+    assert found @ [0.125, 1.0] == pytest.approx(1.0, rel=1e-12)
+
+
+def test_what_three_spheres_share_counts_once():
+    """In one another's middle: by points at random in their box."""
+    position, radius = np.array([[0, 0, 0], [1, 0, 0], [0.5, 0.8, 0.1]]), np.array([1.0, 0.9, 0.8])
+    points = np.random.default_rng(0).uniform([-1, -1, -1], [2, 1.7, 1], (400_000, 3))
+    inside = (np.linalg.norm(points[:, None] - position, axis=2) < radius).any(axis=1)
+    union = inside.mean() * 3.0 * 2.7 * 2.0
+    found = shares(position, radius, [1, 1, 1])
+    assert BALL * found @ radius**3 == pytest.approx(union, rel=4e-3)
 
 
 def test_spheres_of_different_clumps_cover_nothing():
