@@ -65,17 +65,24 @@ def escaped_grains(packing: Packing, grains: BoolArray) -> Escaped:
     ([125], 15.0)
     """
     left = grains.copy()
-    most = max(SHARE * np.count_nonzero(grains), 1.0)
+    most = max(SHARE * _number(packing, np.flatnonzero(grains)), 1.0)
     flown: list[int] = []
     if np.count_nonzero(grains) >= FEWEST:
         far = _far(packing, grains)
         for axis, sign in product(_open_axes(packing), (-1.0, 1.0)):
-            while len(flown) <= most and (group := _group_at_end(packing, left, axis, sign, far)):
+            while _number(packing, flown) <= most and (
+                group := _group_at_end(packing, left, axis, sign, far)
+            ):
                 left[group] = False
                 flown += group
     rest = np.flatnonzero(left)
     gap = min((float(_gaps(packing, row, rest).min()) for row in flown), default=0.0)
-    return Escaped(grains & ~left, gap, len(flown) > most)
+    return Escaped(grains & ~left, gap, _number(packing, flown) > most)
+
+
+def _number(packing: Packing, rows: IntArray | list[int]) -> int:
+    """How many grains some spheres are, by their rows."""
+    return len(rows) if packing.bodies is None else len(np.unique(packing.bodies.head[rows]))
 
 
 def _far(packing: Packing, grains: BoolArray) -> float:
@@ -108,7 +115,7 @@ def _group_at_end(
         rows = np.flatnonzero(left & (np.abs(along - along[member]) <= layer))
         near = rows[_gaps(packing, member, rows) <= far]
         group += [row for row in near.tolist() if row not in group]
-        if len(group) > min(TOGETHER, int(np.count_nonzero(left)) // 2):
+        if _number(packing, group) > min(TOGETHER, int(np.count_nonzero(left)) // 2):
             return []
     return group
 

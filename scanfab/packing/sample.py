@@ -179,7 +179,8 @@ class Sample:
     def _escaped(self, rows: IntArray) -> str:
         first, packing = rows[0], self.packing
         place = ", ".join(f"{x:g}" for x in packing.position[first])
-        others = f" and {len(rows) - 1} more" if len(rows) > 1 else ""
+        more = self.number(self.escaped.grains) - 1
+        others = f" and {more} more" if more else ""
         found = (
             f"grain {packing.id[first]} at ({place}){others}: {self.escaped.gap:g} away from all "
             f"others"
