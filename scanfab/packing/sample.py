@@ -144,7 +144,18 @@ class Sample:
         return int(np.count_nonzero(chosen)) if bodies is None else bodies.count(chosen)
 
     def once(self, chosen: BoolArray) -> BoolArray:
-        """Of grains all of whose spheres are chosen, shape (N,), one sphere each."""
+        """
+        One sphere each of grains all of whose spheres are chosen.
+
+        Parameters
+        ----------
+        chosen : ndarray of bool, shape (N,)
+            Spheres.
+
+        Returns
+        -------
+        ndarray of bool, shape (N,)
+        """
         bodies = self.packing.bodies
         return chosen if bodies is None else np.asarray(chosen & bodies.is_head)
 
@@ -214,14 +225,8 @@ class Sample:
 
     @property
     def _touching(self) -> Touching:
-        return Touching(
-            self.contacts,
-            self.contact_numbers,
-            self.grains,
-            self.min_contacts,
-            self.packing.bodies,
-            self.min_force,
-        )
+        options = self.min_contacts, self.packing.bodies, self.min_force
+        return Touching(self.contacts, self.contact_numbers, self.grains, *options)
 
     @cached_property
     def contact_numbers(self) -> IntArray:

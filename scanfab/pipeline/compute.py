@@ -18,10 +18,10 @@ from scanfab.base.note import SKIPPED, Note, tell
 from scanfab.base.option import options_of, takes_options, unusable
 from scanfab.base.threads import in_order
 from scanfab.packing.cell import Cell
+from scanfab.packing.groupings import Grouping, Groupings, grouping_of
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.frame import FrameResult, compute_frame
 from scanfab.pipeline.frames import Frames, Readable, Source
-from scanfab.pipeline.groupings import Grouping, Groupings, grouping_of
 from scanfab.pipeline.plan import Plan, make_plan, plan_without_grains
 from scanfab.pipeline.settings import MAX_CHORDS, Settings
 from scanfab.pipeline.strain import Flips, Strains

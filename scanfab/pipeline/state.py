@@ -11,10 +11,10 @@ from scanfab.base.errors import PackingError
 from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.fabric.forces import ContactForces
 from scanfab.fabric.state import SampleState, love_weber
+from scanfab.packing.clump_volumes import lens_volumes, own_shares
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample, Variant
 from scanfab.packing.window import Window
-from scanfab.pipeline.clump_volumes import lens_volumes, own_shares
 
 __all__ = ["contact_forces", "doubts_of_state", "refuse_without_forces", "sample_state"]
 

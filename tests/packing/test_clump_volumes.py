@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from scanfab import Cell, ContactList, Packing
+from scanfab.packing.clump_volumes import own_shares
 from scanfab.packing.sample import VARIANTS, Sample
-from scanfab.pipeline.clump_volumes import own_shares
 from scanfab.pipeline.state import _points_in_ball, contact_forces, sample_state
 
 POINTS = _points_in_ball()
