@@ -135,7 +135,20 @@ class Convex:
         return np.asarray(inside)
 
     def surely_holds(self, points: FloatArray, radius: FloatArray) -> BoolArray:
-        """Which spheres about points lie inside as a whole; of an ellipsoid not all of them."""
+        """
+        Which spheres lie inside as a whole; of a quadric that is no sphere not all of them.
+
+        Parameters
+        ----------
+        points : ndarray, shape (N, 3)
+            Their centres, from the origin of the region.
+        radius : ndarray, shape (N,)
+            Their radii.
+
+        Returns
+        -------
+        ndarray of bool, shape (N,)
+        """
         isotropic, deviator, level = self.quadric
         form = isotropic * np.eye(3) + deviator
         # √(x·form·x) is a norm: that of a sphere's places is at most that of both parts

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from scanfab.base.column import Column
 from scanfab.fabric.registry import GROUPS
 from scanfab.fabric.window import WINDOW_ALPHA
+from scanfab.packing.columns import RV_COLUMN
 from scanfab.pipeline.settings import Settings
 from scanfab.scan.columns import EDGE_COLUMNS
 from scanfab.scan.edges import CLIP
@@ -22,8 +24,11 @@ def more_columns(settings: Settings) -> tuple[str, ...]:
     >>> more_columns(Settings(edge="ends", variants="a"))
     ('edge', 'left_out')
     """
-    shaped = settings.rv_shape != "sphere" or settings.rv_follows != "none"
-    columns = [WINDOW_ALPHA] if shaped and settings.needs_window else []
+    columns: list[Column] = []
+    if settings.needs_window:
+        shaped = settings.rv_shape != "sphere" or settings.rv_follows != "none"
+        columns += [RV_COLUMN] if len(settings.rvs) > 1 else []
+        columns += [WINDOW_ALPHA] if shaped else []
     columns += EDGE_COLUMNS if settings.edge != CLIP else ()
     for group in settings.with_:
         columns += GROUPS[group].columns
