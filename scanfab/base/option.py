@@ -47,6 +47,10 @@ def as_given(name: str, value: Any) -> Any:
     return value
 
 
+# what a shell is told of options that take numbers and nothing else
+KINDS: dict[str, type] = {"int": int, "float": float}
+
+
 @dataclass(frozen=True)
 class Option:
     """
@@ -111,6 +115,7 @@ def flag_of(name: str) -> str:
 
 def option(**declaration: Any) -> Any:
     """A field of a dataclass that declares an option, of the field's name."""
+    declaration.setdefault("kind", KINDS.get(declaration.get("takes", ""), str))
     declared = Option(**declaration)
     return field(default=declared.default, metadata={"option": declared})
 

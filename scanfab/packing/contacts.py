@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from dataclasses import dataclass, fields, replace
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +12,8 @@ import numpy.typing as npt
 from scanfab.base.arrays import cast, grains_named
 from scanfab.base.errors import PackingError, ScanfabWarning
 from scanfab.base.spelling import counted
-from scanfab.base.typing import FloatArray, IntArray
+from scanfab.base.typing import BoolArray, FloatArray, IntArray
+from scanfab.packing.bodies import Bodies
 from scanfab.packing.cell import Cell
 
 __all__ = ["ContactList", "Contacts", "Spheres", "resolve_contacts", "warn_of_same_centre"]
@@ -128,6 +129,46 @@ class Contacts:
         forces = forces if self.force is None else " with forces"
         return f"{counted(len(self), 'contact')} {whence}{forces}"
 
+    def chosen(self, some: BoolArray) -> Contacts:
+        """
+        Some of them.
+
+        Parameters
+        ----------
+        some : ndarray of bool, shape (M,)
+            Which.
+
+        Returns
+        -------
+        Contacts
+        """
+        values = ((one.name, getattr(self, one.name)) for one in fields(self))
+        chosen: dict[str, Any] = {
+            name: array[some] for name, array in values if isinstance(array, np.ndarray)
+        }
+        return replace(self, **chosen)
+
+    def neighbours(self, bodies: Bodies | None) -> IntArray:
+        """
+        The pairs of grains that touch, each once, in however many points.
+
+        Grains that touch through two images are two pairs, as they are neighbours twice.
+
+        Parameters
+        ----------
+        bodies : Bodies or None
+            Of the packing; without them, grains are spheres, and every contact is a pair.
+
+        Returns
+        -------
+        ndarray of int, shape (K, 2)
+            Rows of the grains' first spheres.
+        """
+        if bodies is None:
+            return self.pairs
+        heads = bodies.head[self.pairs]
+        return heads[_first_of_each(heads, bodies.image(self.pairs, self.image))]
+
 
 class Spheres(NamedTuple):
     """What the geometry of contacts follows from."""
@@ -141,6 +182,8 @@ class Spheres(NamedTuple):
     cell: Cell | None
     turns: IntArray | None = None
     """Shape (N, 3): lattice vectors to where each grain was given; None: where it is."""
+    bodies: Bodies | None = None
+    """A contact between two spheres of one body is none."""
 
 
 def resolve_contacts(listed: ContactList, spheres: Spheres) -> Contacts:
@@ -162,6 +205,10 @@ def resolve_contacts(listed: ContactList, spheres: Spheres) -> Contacts:
         )
     force, force_n = _forces(listed, len(pairs))
     image = _images(listed, pairs, spheres)
+    if spheres.bodies is not None:
+        outer = spheres.bodies.between(pairs, image)
+        pairs, image = pairs[outer], image[outer]
+        force, force_n = (None if one is None else one[outer] for one in (force, force_n))
     branch = spheres.position[pairs[:, 1]] - spheres.position[pairs[:, 0]]
     if spheres.cell is not None:
         branch = branch + image @ spheres.cell.vectors

@@ -176,9 +176,10 @@ class _Calibrator:
         with_fabric = {row.variant for row in cutoffs if row.alpha_vs_axial is not None}
         for variant in self.settings.variants:
             if variant not in with_fabric:
+                grains = self.sample.number(self.sample.grains)
                 raise SettingsError(
                     f"frame {self.number}: no cut-off leaves a void fabric in variant {variant}: "
-                    f"the sample ({int(self.sample.grains.sum())} grains) is too small for it, "
+                    f"the sample ({grains} grains) is too small for it, "
                     f"there is no void, or all its grains are rattlers"
                 )
         ladders = {

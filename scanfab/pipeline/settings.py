@@ -133,7 +133,6 @@ class Settings(WindowSettings):
         help="Mean length of the void segments (1), or mean of the squares over the mean (2).",
         meaning="1: mean length of the void segments; 2: mean of their squares over that",
         takes="int",
-        kind=int,
         metavar="1|2",
         choices=lambda: ("1", "2"),
     )
@@ -167,7 +166,6 @@ class Settings(WindowSettings):
         help="Target standard error of alpha_vs_axial, for every variant, when something is auto.",
         meaning="wanted standard error of the scan, where spacing or directions are auto",
         takes="float",
-        kind=float,
         metavar="X",
         first=True,
     )
@@ -179,17 +177,15 @@ class Settings(WindowSettings):
         "by default after one or two minutes of one processor (lines count like chords).",
         meaning="an auto scan stops before it cuts more chords from grains in a frame",
         takes="float",
-        kind=float,
         metavar="N",
     )
     min_contacts: int = option(
         default=2,
         parse=whole("0 or more", lambda count: count >= 0),
         group="sample",
-        help="A grain with fewer contacts is a rattler.",
-        meaning="a grain with fewer contacts is a rattler",
+        help="A grain with fewer contacts (a clump: with fewer neighbours) is a rattler.",
+        meaning="a grain with fewer contacts (a clump: with fewer neighbours) is a rattler",
         takes="int",
-        kind=int,
         metavar="N",
     )
     rattlers: str = option(
@@ -197,11 +193,20 @@ class Settings(WindowSettings):
         parse=parse_rattlers,
         group="sample",
         help="Rule for rattlers: count is one pass over all contacts; recursive repeats it without "
-        "those of rattlers, until there is no new one.",
+        "those of rattlers, until none is new; force is one pass over those above `min_force`.",
         meaning="rule for rattlers; count: one pass over all contacts; recursive: again without "
-        "those of rattlers, until there is no new one",
+        "those of rattlers, until none is new; force: one pass over contacts that press",
         metavar="RULE",
         choices=rattler_rules,
+    )
+    min_force: float = option(
+        default=0.0,
+        parse=number("0 or more", lambda value: 0 <= value < math.inf),
+        group="sample",
+        help="By the rule force contacts count whose normal force is above this, over the mean.",
+        meaning="by the rule force contacts count whose normal force is above this, over the mean",
+        takes="float",
+        metavar="X",
     )
     contact_tolerance: float = option(
         default=0.0,
@@ -210,7 +215,6 @@ class Settings(WindowSettings):
         help="Of contacts by geometry, relative: contact if distance < (r1 + r2)(1 + X).",
         meaning="relative tolerance of contacts by geometry",
         takes="float",
-        kind=float,
         metavar="X",
     )
     axis: Axis = option(
@@ -260,7 +264,6 @@ class Settings(WindowSettings):
         help="Seed of the random numbers.",
         meaning="of the random numbers; the same seed repeats the same numbers",
         takes="int",
-        kind=int,
         metavar="N",
     )
     workers: int = option(
@@ -268,7 +271,6 @@ class Settings(WindowSettings):
         group="scan",
         help="Parallel workers (default: all cores).",
         takes="int",
-        kind=int,
         metavar="N",
         first=True,
     )

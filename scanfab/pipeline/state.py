@@ -11,6 +11,7 @@ from scanfab.base.errors import PackingError
 from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.fabric.forces import ContactForces
 from scanfab.fabric.state import SampleState, love_weber
+from scanfab.packing.clump_volumes import lens_volumes, own_shares
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample, Variant
 from scanfab.packing.window import Window
@@ -66,7 +67,7 @@ def sample_state(sample: Sample, variant: Variant, window: Window | None) -> Sam
     variant's grains.
     """
     region = window if variant.in_window else None
-    counted = sample.counted(variant, region) & ~sample.removed(variant)
+    counted = sample.once(sample.counted(variant, region) & ~sample.removed(variant))
     numbers = (
         sample.contact_numbers_without_rattlers
         if variant.without_rattlers
@@ -116,12 +117,18 @@ def _volume(packing: Packing, window: Window | None) -> float | None:
     return float(abs(np.linalg.det(cell.vectors)))
 
 
+def _places(packing: Packing) -> FloatArray:
+    """The place of each sphere's grain, next to the sphere, shape (N, 3): that of a clump."""
+    bodies, position = packing.bodies, packing.position
+    return position if bodies is None else position + bodies.to_place(position, packing.cell)
+
+
 def _branches(packing: Packing) -> FloatArray:
-    """From the first grain's centre to the second's, shape (M, 3)."""
-    contacts = packing.contacts
+    """From the first grain's place to the second's, shape (M, 3)."""
+    contacts, places = packing.contacts, _places(packing)
     assert contacts is not None
     one, two = contacts.pairs.T
-    branch: FloatArray = packing.position[two] - packing.position[one]
+    branch: FloatArray = places[two] - places[one]
     if packing.cell is not None:
         branch = branch + contacts.image @ packing.cell.vectors
     return branch
@@ -134,7 +141,7 @@ def _stress(sample: Sample, window: Window | None) -> FloatArray | None:
     if contacts.force is None or volume is None:
         return None
     one, two = contacts.pairs.T
-    start, branch = packing.position[one], _branches(packing)
+    start, branch = _places(packing)[one], _branches(packing)
     end = start + branch
     # boundary is a wall: the branch of such a contact ends where the grain does
     start = np.where(sample.boundary[one][:, None], contacts.point, start)
@@ -168,17 +175,25 @@ def _void_ratio(sample: Sample, window: Window | None) -> float | None:
     if volume is None:
         return None
     position, radius = packing.position[sample.grains], packing.radius[sample.grains]
+    # in a clump what several spheres share is there once
+    share = np.ones_like(radius)
+    if packing.bodies is not None:
+        share = own_shares(packing, _points_in_ball())[sample.grains]
     if window is None:
-        solid = float(np.sum(4.0 / 3.0 * math.pi * radius**3))
+        solid = float(np.sum(4.0 / 3.0 * math.pi * radius**3 * share))
     else:
-        solid = _volume_inside(position, radius, window, packing)
+        solid = _volume_inside(position, radius, share, window, packing)
     return None if solid == 0.0 else (volume - solid) / solid
 
 
 def _volume_inside(
-    position: FloatArray, radius: FloatArray, window: Window, packing: Packing
+    position: FloatArray, radius: FloatArray, share: FloatArray, window: Window, packing: Packing
 ) -> float:
-    """What of the volumes of spheres lies in a window, through periodic faces too."""
+    """
+    What of the volumes of spheres lies in a window, through periodic faces too.
+
+    Of the volume of each, ``share`` counts, shape (N,).
+    """
     shape, origin = window.shape, position - window.center
     shifts = np.zeros((1, 3))
     if packing.cell is not None and packing.is_periodic:
@@ -191,20 +206,14 @@ def _volume_inside(
         places = origin + shift
         near = shape.may_meet(places, radius)
         part = lenses if shape.is_sphere else cut_volumes
-        total += float(part(places[near], radius[near], shape).sum())
+        inside = part(places[near], radius[near], shape)
+        total += float((inside * share[near]).sum())
     return total
 
 
 def lenses(places: FloatArray, radius: FloatArray, ball: Convex) -> FloatArray:
     """Volumes that spheres share with a ball about the origin, shape (N,)."""
-    apart, reach = np.linalg.norm(places, axis=1), ball.reach
-    smaller = 4.0 / 3.0 * math.pi * np.minimum(radius, reach) ** 3
-    is_inside = apart <= np.abs(reach - radius)
-    distance = np.where(is_inside, 1.0, apart)
-    deep = np.maximum(reach + radius - apart, 0.0)
-    lens = math.pi * deep**2 / (12.0 * distance)
-    lens *= distance**2 + 2.0 * distance * (radius + reach) - 3.0 * (radius - reach) ** 2
-    return np.where(is_inside, smaller, lens)
+    return lens_volumes(np.linalg.norm(places, axis=1), radius, ball.reach)
 
 
 def cut_volumes(places: FloatArray, radius: FloatArray, shape: Convex) -> FloatArray:

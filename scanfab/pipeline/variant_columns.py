@@ -102,7 +102,8 @@ class VariantColumns:
         window = self.plan.window
         if self.sample.solids(self.variant, window).any():
             return ""
-        rattlers = self.sample.solids(replace(self.variant, without_rattlers=False), window).sum()
+        with_rattlers = replace(self.variant, without_rattlers=False)
+        rattlers = self.sample.number(self.sample.solids(with_rattlers, window))
         if rattlers:
             there = " that reach into the RV" if self.variant.in_window else ""
             return f"no grain is left, all {rattlers}{there} are rattlers"
