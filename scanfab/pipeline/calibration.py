@@ -192,6 +192,11 @@ class _Calibrator:
         target = max(self.settings.tolerance, OF_SAMPLE * (sample or 0.0))
         best, options = self._recommended(ladders["spacing"], ladders["directions"], target)
         findings = [sentence(ladder, rows) for ladder, rows in ladders.items() if rows]
+        if self.settings.needs_window and not self._rv_has_sizes:
+            findings.append(
+                f"RV: its size is left out, as {self.settings.rv_shape} draws it: to try others, "
+                f"scale that surface"
+            )
         findings.append(sentence_of_recommended(best, target, sample))
         rows = [row for ladder in ladders.values() for row in ladder]
         return Calibration((*rows, *best), tuple(findings), options)
