@@ -131,7 +131,18 @@ class Solids:
         return cells_of(self.around)
 
     def near_window(self, margin: float) -> BoolArray:
-        """Which spheres come so near to the window, shape (N,)."""
+        """
+        Which spheres come near to the window.
+
+        Parameters
+        ----------
+        margin : float
+            How near, dump's length unit.
+
+        Returns
+        -------
+        ndarray of bool, shape (N,)
+        """
         assert self.window is not None
         if margin not in self._near:
             self._near[margin] = self.window.may_meet(self.position, self.radius + margin)
