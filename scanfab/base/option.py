@@ -18,6 +18,7 @@ __all__ = [
     "Option",
     "as_given",
     "changed",
+    "flag_of",
     "number",
     "one_of",
     "option",
@@ -45,6 +46,10 @@ def unusable(name: str, expected: str, found: object) -> SettingsError:
 def as_given(name: str, value: Any) -> Any:
     """For values that are checked where they are used."""
     return value
+
+
+# what a shell is told of options that take numbers and nothing else
+KINDS: dict[str, type] = {"int": int, "float": float}
 
 
 @dataclass(frozen=True)
@@ -93,11 +98,25 @@ class Option:
     @property
     def flag(self) -> str:
         """As the command line spells it."""
-        return self.spelling or f"--{self.name.replace('_', '-')}"
+        return self.spelling or flag_of(self.name)
+
+
+def flag_of(name: str) -> str:
+    """
+    An argument as the command line spells it; an underscore behind keeps it from being a keyword.
+
+    Examples
+    --------
+    >>> from scanfab.base.option import flag_of
+    >>> flag_of("rv_radius"), flag_of("with_")
+    ('--rv-radius', '--with')
+    """
+    return f"--{name.rstrip('_').replace('_', '-')}"
 
 
 def option(**declaration: Any) -> Any:
     """A field of a dataclass that declares an option, of the field's name."""
+    declaration.setdefault("kind", KINDS.get(declaration.get("takes", ""), str))
     declared = Option(**declaration)
     return field(default=declared.default, metadata={"option": declared})
 
@@ -133,7 +152,7 @@ def takes_options(options: Sequence[Option]) -> Callable[[Callable[P, R]], Calla
     A decorator for functions with options in their signature.
 
     It refuses names that are none of them, with the nearest that is one, and puts what the options
-    mean in place of ``{options}`` into the docstring.
+    mean, in the order of the signature, in place of ``{options}`` into the docstring.
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
@@ -145,7 +164,8 @@ def takes_options(options: Sequence[Option]) -> Callable[[Callable[P, R]], Calla
             return function(*args, **kwargs)
 
         text = inspect.cleandoc(function.__doc__ or "")
-        call.__doc__ = text.replace("{options}", "\n".join(map(_documented, options)))
+        ordered = sorted(options, key=lambda option: known.index(option.name))
+        call.__doc__ = text.replace("{options}", "\n".join(map(_documented, ordered)))
         return call
 
     return decorate

@@ -83,9 +83,9 @@ OUTPUT_OPTIONS = (
     Option(
         name="figure",
         group="output",
-        help="Which figure: of the table evolution, normalised or correlation (default: all on "
-        "one page); of the first and last frame rose (or rose:30,60,90 for these polar angles), "
-        "projection, histogram or cutoffs.",
+        help="Which figure: of the table evolution, normalised, correlation or columns:NAME,NAME "
+        "(default: all on one page); of the first and last frame rose (or rose:30,60,90 for these "
+        "polar angles), projection, histogram or cutoffs.",
         metavar="NAME",
         choices=_figures,
     ),
@@ -125,7 +125,7 @@ OPTIONS = {one.name: one for one in (*READING_OPTIONS, *options_of(Settings), *O
 MAP_OPTIONS = {
     one.name: one
     for one in (*READING_OPTIONS, *options_of(MapSettings), *OUTPUT_OPTIONS)
-    if one.name not in ("cutoffs", "figure")
+    if one.name not in ("cutoffs", "figure", "with_")
 }
 """Those of map."""
 

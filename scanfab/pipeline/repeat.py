@@ -9,10 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.base.errors import ReadError, SettingsError
+from scanfab.base.option import flag_of
 from scanfab.base.spelling import shortest
 from scanfab.io.opening import READING, open_sources
 from scanfab.io.series import Series
 from scanfab.pipeline.manifest import asked_for
+from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings, is_map
 from scanfab.pipeline.settings import Settings
 
 __all__ = [
@@ -63,30 +65,34 @@ def repeat_command(
     asked: Mapping[str, Any], output: str | None = None, named: Collection[str] = ()
 ) -> str:
     """
-    The command line that repeats a computation, quoted for a shell.
+        The command line that repeats a computation, quoted for a shell.
 
-    Parameters
-    ----------
-    asked : mapping
-        The ``settings`` of a manifest.
-    output : str, optional
-        The table.
-    named : collection of str, optional
-        Options to name even with their usual value: those for which a settings file beside the
-        dumps has another.
+        Parameters
+        ----------
+        asked : mapping
+            The ``settings`` of a manifest.
+        output : str, optional
+            The table.
+        named : collection of str, optional
+            Options to name even with their usual value: those for which a settings file beside the
+            dumps has another.
 
-    Examples
-    --------
-    >>> from scanfab.pipeline.manifest import asked_for
-    >>> from scanfab.pipeline.repeat import repeat_command
-    >>> from scanfab.pipeline.settings import Settings
-    >>> repeat_command(asked_for(["dumps"], {}, Settings(boundary="type=2", seed=3)))
-    'scanfab compute dumps --boundary type=2 --seed 3'
+        Examples
+        --------
+        >>> from scanfab.pipeline.manifest import asked_for
+        >>> from scanfab.pipeline.repeat import repeat_command
+        >>> from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings, is_map
+    from scanfab.pipeline.settings import Settings
+        >>> repeat_command(asked_for(["dumps"], {}, Settings(boundary="type=2", seed=3)))
+        'scanfab compute dumps --boundary type=2 --seed 3'
     """
-    usual = spelt_settings(asked_for((), {"contacts": "auto"}, Settings()))
-    words = ["scanfab", "compute", *map(str, asked["sources"])]
+    settings = MapSettings(slices=1) if is_map(asked) else Settings()
+    usual = spelt_settings(asked_for((), {"contacts": "auto"}, settings))
+    # those that make it a map have no usual value
+    usual |= dict.fromkeys(BLOCK_OPTIONS)
+    words = ["scanfab", "map" if is_map(asked) else "compute", *map(str, asked["sources"])]
     for name, value in spelt_settings(asked).items():
-        option = f"--{name.replace('_', '-')}"
+        option = flag_of(name)
         if usual.get(name) != value or option[2:] in named:
             words += _words(option, name, value)
     if output is not None:
@@ -152,6 +158,8 @@ def _spell(name: str, value: Any) -> Any:
         raise TypeError
     if name == "axis" and isinstance(value, list):
         return ",".join(map(shortest, value))
+    if name in ("rv", "grid") and isinstance(value, list):
+        return ",".join(map(shortest, value))
     if name == "cutoffs" and isinstance(value, list):
         return ",".join(_length(one) for one in value)
     if isinstance(value, dict) and {"value", "unit"} <= set(value):
@@ -175,6 +183,8 @@ def _words(option: str, name: str, value: Any) -> list[str]:
         return [option, ",".join(f"{key}={column}" for key, column in value.items())]
     if isinstance(value, bool):
         return [option] if value else []
+    if name == "with_":
+        return [option, ",".join(value)]
     if name == "boundary":
         return [word for rule in value for word in (option, rule)]
     if isinstance(value, tuple):

@@ -12,19 +12,23 @@ import numpy as np
 
 from scanfab.base.note import Note
 from scanfab.base.typing import FloatArray, IntArray
+from scanfab.fabric.forces import doubts_of_forces
 from scanfab.fabric.jackknife import BLOCKS, BlockedSums
-from scanfab.fabric.registry import OWN_FABRICS, Measured, checked_values
+from scanfab.fabric.registry import GROUPS, OWN_FABRICS, Measured, checked_values
+from scanfab.fabric.state import SampleState
 from scanfab.fabric.window import WINDOW_ALPHA, window_alpha
-from scanfab.packing.columns import sample_values
+from scanfab.packing.columns import RV_COLUMN, sample_values
 from scanfab.packing.sample import Variant
 from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.plan import Plan
+from scanfab.pipeline.state import contact_forces, doubts_of_state, sample_state
 from scanfab.scan.edges import CLIP, ENDS, START
 from scanfab.scan.solids import Solids
 from scanfab.table.columns import installed_fabrics, table_columns
 
 __all__ = [
     "VariantColumns",
+    "channels_text",
     "edge_of",
     "left_out_text",
     "no_columns",
@@ -59,8 +63,16 @@ class VariantColumns:
             found |= fabric.values(self.measured)
         for name, fabric in installed_fabrics().items():
             found |= checked_values(name, fabric, self.measured)
-        asked = {**self._window(), **self._edge()}
-        return {**found, **{name: asked[name] for name in self.plan.more_columns}}
+        asked = {RV_COLUMN.name: self.rv, **self._window(), **self._edge()}
+        for group in self.plan.groups:
+            asked |= GROUPS[group].values(self.measured)
+        # the strain of the frame is not known here
+        return found | {name: asked[name] for name in self.plan.more_columns if name in asked}
+
+    @property
+    def rv(self) -> float | None:
+        """The size of the variant's RV, where there are several."""
+        return self.plan.rvs_of(self.variant.name)[0].fraction
 
     @cached_property
     def measured(self) -> Measured:
@@ -81,7 +93,16 @@ class VariantColumns:
             normals=np.compress(chosen, contacts.normal, axis=0),
             points=points,
             blocks=self._blocks_of(points),
+            segment_count=self.segments,
+            forces=contact_forces(self.sample, chosen) if "forces" in self.plan.groups else None,
+            state=self._state,
         )
+
+    @property
+    def _state(self) -> SampleState | None:
+        if "state" not in self.plan.groups:
+            return None
+        return sample_state(self.sample, self.variant, self.plan.window)
 
     @cached_property
     def _no_solid(self) -> str:
@@ -89,7 +110,8 @@ class VariantColumns:
         window = self.plan.window
         if self.sample.solids(self.variant, window).any():
             return ""
-        rattlers = self.sample.solids(replace(self.variant, without_rattlers=False), window).sum()
+        with_rattlers = replace(self.variant, without_rattlers=False)
+        rattlers = self.sample.number(self.sample.solids(with_rattlers, window))
         if rattlers:
             there = " that reach into the RV" if self.variant.in_window else ""
             return f"no grain is left, all {rattlers}{there} are rattlers"
@@ -189,17 +211,25 @@ class VariantColumns:
 
     def notes(self) -> Iterator[Note]:
         """Whether there is no void fabric, or a doubtful one, or lines without a grain."""
-        texts = {
-            "channels": self._channels(),
-            "left_out": left_out_text(self.left_out),
-        }
-        texts |= self._of_void_fabric()
-        return (Note(code, text, (self.variant.name,)) for code, text in texts.items() if text)
+        texts = {"channels": self._channels(), "left_out": left_out_text(self.left_out)}
+        texts |= self._of_void_fabric() | self._of_groups()
+        about = self.variant.name if self.rv is None else f"{self.variant.name} (RV {self.rv:g})"
+        return (Note(code, text, (about,)) for code, text in texts.items() if text)
+
+    def _of_groups(self) -> dict[str, str]:
+        """Why columns that were asked for are empty."""
+        found: dict[str, str] = {}
+        if "state" in self.plan.groups:
+            found |= doubts_of_state(self.sample, self.variant, self.plan.window)
+        if "forces" in self.plan.groups:
+            found |= doubts_of_forces(self.measured)
+        return found
 
     def _channels(self) -> str:
-        channels = int(self.sums.channels[:, self.which].sum())
-        lines = channels + int(self.sums.lines[:, self.which].sum())
-        return f"{channels} of {lines} lines stay in a channel and meet no grain" * bool(channels)
+        of = self.sums
+        return channels_text(
+            int(of.channels[:, self.which].sum()), int(of.lines[:, self.which].sum())
+        )
 
     def _of_void_fabric(self) -> dict[str, str]:
         void = self.measured.void
@@ -234,6 +264,12 @@ def edge_of(variant: Variant, plan: Plan, solids: Solids) -> str | None:
     if solids.medium is not None:
         return None
     return ENDS if plan.edge == ENDS else CLIP
+
+
+def channels_text(channels: int, others: int) -> str:
+    """What a note says of lines that stay in a channel, beside so many that meet grains."""
+    text = f"{channels} of {channels + others} lines stay in a channel and meet no grain"
+    return text * bool(channels)
 
 
 def left_out_text(left_out: float | None) -> str:

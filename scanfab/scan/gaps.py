@@ -105,7 +105,9 @@ def scan_gaps(
     triads, offsets = drawn_lines(rule, seed, replicates)
     least = np.maximum(np.array(cutoffs, dtype=np.float64), shortest_gap(solids))
     lines = _BinnedLines(solids, spacing, least, blocks, variants, Following(most_steps))
-    sums = in_parts(lambda *some: lines.sums(*some)[0], triads, offsets, workers)
+    asked = in_parts(lambda *some: lines.sums(*some)[0], triads, offsets, workers)
+    sums = np.zeros((*asked.shape[:2], 4, *asked.shape[3:]))
+    sums[:, :, lines.rows] = asked
     number, length, square = np.moveaxis(np.swapaxes(sums, 1, 2), -1, 0)
     return GapSums(triads[:, :, 2], least, number, length, square)
 
@@ -166,10 +168,9 @@ def scan_blocks(
 
     def some(triads: FloatArray, offsets: FloatArray) -> FloatArray:
         sums, tallies = lines.sums(triads, offsets)
-        wanted = sums[:, ["abcd".index(variant) for variant in variants]]
         # one array of both, as the parts of a scan come together
         return np.concatenate(
-            [wanted.reshape(len(triads), -1), tallies.reshape(len(triads), -1)], axis=1
+            [sums.reshape(len(triads), -1), tallies.reshape(len(triads), -1)], axis=1
         )
 
     found = in_parts(some, triads, offsets, workers)
@@ -192,15 +193,20 @@ class _BinnedLines(NamedTuple):
     following: Following
 
     @property
+    def rows(self) -> list[int]:
+        """Of the variants among all four: of the whole a, b, of the window c, d."""
+        return ["abcd".index(variant) for variant in self.variants]
+
+    @property
     def blocks_kept(self) -> int:
         """For the whole and for the window the same number."""
         return max(map(len, self.blocks))
 
     def sums(self, triads: FloatArray, offsets: FloatArray) -> tuple[FloatArray, FloatArray]:
         """
-        Number, length and square along some axes, shape (A, 4, B, C, 3), and the tallies.
+        Number, length and square of the variants along some axes, and the tallies.
 
-        Of variants that are not asked for, zeros.
+        The first has the shape (A, V, B, C, 3).
         """
         solids, least = self.solids, self.least
         room = np.zeros((len(triads), 2, 2, self.blocks_kept * len(least), 3))
@@ -208,14 +214,13 @@ class _BinnedLines(NamedTuple):
         tallies = tally_triads(
             solids, triads, offsets, self.spacing, least[0], self.variants, bins, self.following
         )
-        # variants: whole (a, b) and window (c, d)
-        sums = bins.sums.reshape(len(triads), 4, self.blocks_kept, len(least), 3)
-        sums[:, [variant not in self.variants for variant in "abcd"]] = 0.0
-        # what reaches a cut-off reaches all below it
-        sums = np.flip(np.cumsum(np.flip(sums, axis=3), axis=3), axis=3)
+        sums = bins.sums.reshape(len(triads), 4, self.blocks_kept, len(least), 3)[:, self.rows]
+        if len(least) > 1:
+            # what reaches a cut-off reaches all below it
+            sums = np.flip(np.cumsum(np.flip(sums, axis=3), axis=3), axis=3)
         if solids.edge == ENDS:
             number, length, square = np.moveaxis(sums, -1, 0)
-            weighed = slice(None) if solids.medium is None else slice(2, None)
+            weighed = [solids.medium is None or variant in "cd" for variant in self.variants]
             # the third sum is the number of the kept, see kernels/bins
             length[:, weighed] -= least * (square - number)[:, weighed]
             square[:, weighed] = np.nan

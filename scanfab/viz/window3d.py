@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.convex import Convex
 from scanfab.base.errors import ScanfabError
 from scanfab.base.files import whole_file
 from scanfab.base.typing import BoolArray, FloatArray
@@ -23,6 +25,8 @@ from scanfab.viz.vtk_files import window_mesh
 __all__ = ["check_screen", "show_scene"]
 
 
+# of a colour: in these, clumps that are numbered one after the other are told apart
+SHADES = (1.0, 0.8, 0.62)
 ADVICE = (
     "install one of them: on Debian or Ubuntu apt-get install libegl1 libgl1 libosmesa6, or "
     "apt-get install xvfb and run the command under xvfb-run"
@@ -86,8 +90,9 @@ def _show(scene: Scene, up: FloatArray, title: str, screenshot: Path | None) -> 
     look = toward if scene.lines is not None else toward + 0.45 * np.cross(up, toward) + 0.35 * up
     drawn = _drawn(scene, toward, look)
     _add_grains(plotter, scene, drawn, toward)
-    if scene.window is not None:
-        _add_window(plotter, scene, toward)
+    for window in (scene.window, *scene.smaller):
+        if window is not None:
+            _add_window(plotter, scene, window, toward)
     if scene.lines is not None:
         _add_lines(plotter, scene)
     _framing(scene, drawn, up, look).aim(plotter)
@@ -141,6 +146,21 @@ def classes(grains: Grains, has_window: bool) -> dict[str, tuple[str, BoolArray]
     return {name: value for name, value in found.items() if value[1].any()}
 
 
+def shades(
+    grains: Grains, kinds: dict[str, tuple[str, BoolArray]]
+) -> Iterator[tuple[str, BoolArray]]:
+    """The colours of these classes, each in some shades that tell neighbouring clumps apart."""
+    from pyvista import Color
+
+    for colour, kind in kinds.values():
+        if grains.body is None:
+            yield colour, kind
+            continue
+        for number, shade in enumerate(SHADES):
+            mixed = Color([part * shade for part in Color(colour).float_rgb])
+            yield mixed.hex_rgb, kind & (np.maximum(grains.body, 0) % len(SHADES) == number)
+
+
 def _drawn(scene: Scene, toward: FloatArray, look: FloatArray) -> BoolArray:
     """
     Which grains are drawn.
@@ -153,7 +173,7 @@ def _drawn(scene: Scene, toward: FloatArray, look: FloatArray) -> BoolArray:
     if scene.lines is not None:
         shown = branch @ toward < grains.radius
     elif scene.window is not None:
-        shown = grains.in_window | (branch @ look <= 0.0)
+        shown = grains.in_window | ((grains.places - scene.center) @ look <= 0.0)
     else:
         shown = np.ones(len(branch), bool)
     return np.asarray(shown & ~grains.boundary)
@@ -172,7 +192,7 @@ def _add_grains(plotter: Any, scene: Scene, drawn: BoolArray, toward: FloatArray
     """Balls; if the scene has lines, cut by the plane through the centre."""
     grains = scene.grains
     height = (grains.position - scene.center) @ toward
-    for colour, kind in classes(grains, scene.window is not None).values():
+    for colour, kind in shades(grains, classes(grains, scene.window is not None)):
         chosen = kind & drawn
         if not chosen.any():
             continue
@@ -217,12 +237,11 @@ def _add_section(
     plotter.add_mesh(disks, color=pale.tolist(), lighting=False)
 
 
-def _add_window(plotter: Any, scene: Scene, toward: FloatArray) -> None:
-    """The RV's surface; in a section its outline."""
+def _add_window(plotter: Any, scene: Scene, window: Convex, toward: FloatArray) -> None:
+    """An RV's surface; in a section its outline."""
     import pyvista
 
-    center, window = tuple(scene.center), scene.window
-    assert window is not None
+    center = tuple(scene.center)
     if scene.lines is None:
         surface = window_mesh(scene.center, window, nsub=5)
         smooth = not len(window.planes)

@@ -60,7 +60,7 @@ def test_help_imports_no_heavy_package() -> None:
         (["--periodic", "abc"], "--periodic: expected letters out of xyz"),
         (["--columns", "radius"], "--columns: expected NAME=COLUMN"),
         (["-o", "table.docx"], "results can be written as .csv"),
-        (["--edge", "share"], "No such option"),
+        (["--edge", "share"], "--edge: expected clip, start or ends, found 'share'"),
         (
             ["--rv-shape", "cone"],
             "--rv-shape: expected sphere, box, cylinder, ellipsoid",

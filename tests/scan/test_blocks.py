@@ -161,7 +161,7 @@ def check_start(random):
                     if enters < place < leaves
                 ]
     for blocks in some_blocks(random):
-        fast = fast_sums(solids, blocks, triad, offset, spacing, "c")[2]
+        fast = fast_sums(solids, blocks, triad, offset, spacing, "c")[0]
         np.testing.assert_allclose(fast, kept_in(segments, blocks), rtol=1e-9, atol=1e-9)
 
 

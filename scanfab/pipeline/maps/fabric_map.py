@@ -46,7 +46,8 @@ def fabric_map(
     executor : concurrent.futures.Executor, optional
         As for :func:`scanfab.compute`.
     **options
-        Those of :func:`scanfab.compute` but `cutoffs`; `variants` is ``"a"`` by default.
+        Those of :func:`scanfab.compute` but `cutoffs` and `with_`; `variants` is ``"a"`` by
+        default.
 
     Returns
     -------
@@ -64,14 +65,12 @@ def fabric_map(
     Examples
     --------
     >>> import numpy as np
-    >>> from scanfab import Packing, fabric_map
-    >>> grid = np.stack(np.meshgrid(*3 * [np.arange(9.0)]), axis=-1).reshape(-1, 3)
-    >>> table = fabric_map(
-    ...     Packing(grid, 0.5), slices=2, contact_tolerance=1e-4, directions="lebedev:11",
-    ...     spacing=0.1,
-    ... )
-    >>> table["grains"].tolist()
-    [324, 405]
+    >>> from scanfab import Cell, Packing, fabric_map, find_contacts
+    >>> place = np.random.default_rng(0).uniform(0, 12, (400, 3))
+    >>> packing = find_contacts(Packing(place, 0.7, cell=Cell([12.0] * 3)))
+    >>> table = fabric_map(packing, slices=2, directions="lebedev:11", spacing=0.5)
+    >>> table["z"].tolist(), table["grains"].sum()
+    ([3.0, 9.0], 400)
     """
     given = {**options, "grid": grid, "slices": slices, "shells": shells}
     refuse_unknown("fabric_map", given, [one.name for one in options_of(MapSettings)])

@@ -24,7 +24,7 @@ from scanfab.pipeline.frames import Readable
 from scanfab.pipeline.maps.measurement import MapMeasurement, measure_map
 from scanfab.pipeline.maps.surface import cut_by_hull, cut_by_window, volumes_inside
 from scanfab.pipeline.plan import Plan
-from scanfab.pipeline.variant_columns import edge_of, left_out_text
+from scanfab.pipeline.variant_columns import channels_text, edge_of, left_out_text
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.edges import ENDS, START
 from scanfab.table.map_columns import map_row
@@ -79,7 +79,7 @@ def map_frame(
             for variant in plan.variants
             for block in range(plan.map_settings.blocks)
         ]
-        return MapResult(source, number, sample, None, rows)
+        return MapResult(source, number, sample, (), rows)
     measurement = measure_map(sample, plan.in_frame(sample), f"frame {number}")
     variants = [BlocksOfVariant(measurement, VARIANTS[name]) for name in plan.variants]
     rows = [
@@ -92,7 +92,7 @@ def map_frame(
         *measurement.notes,
         *joined(note for one in variants for note in one.notes()),
     ]
-    return MapResult(source, number, sample, None, rows, tuple(notes), measurement.blocks)
+    return MapResult(source, number, sample, (), rows, tuple(notes), measurement.blocks)
 
 
 class BlocksOfVariant:
@@ -198,8 +198,11 @@ class BlocksOfVariant:
             if self.variant.without_rattlers
             else self.sample.contact_numbers
         )
-        rows = np.flatnonzero(counted)
-        block, part = self._places(self.sample.packing.position[rows])
+        bodies = self.sample.packing.bodies
+        places = self.sample.packing.position if bodies is None else bodies.place
+        # a clump is one grain, where its middle is
+        rows = np.flatnonzero(self.sample.once(counted))
+        block, part = self._places(places[rows])
         solid = ~removed[rows]
         grains = self._sum(block, part, solid)
         contacts = self._sum(block, part, solid * numbers[rows])
@@ -264,6 +267,7 @@ class BlocksOfVariant:
         """Lines and blocks that are doubtful, and whether the sample is homogeneous."""
         edge = edge_of(self.variant, self.plan, self.measurement.solids)
         texts = {
+            "channels": self._channels(),
             "left_out": left_out_text(self._left_out(edge)),
             "few_segments": self._too_few(),
             HOMOGENEITY: self._homogeneity(),
@@ -278,6 +282,10 @@ class BlocksOfVariant:
         left = float(scan.left_out[:, which].sum())
         every = left + float(self.fabrics.segments.sum())
         return left / every if every else None
+
+    def _channels(self) -> str:
+        scan, which = self.measurement.sums.scan, "abcd".index(self.variant.name)
+        return channels_text(int(scan.channels[:, which].sum()), int(scan.lines[:, which].sum()))
 
     def _too_few(self) -> str:
         fabrics = self.fabrics
@@ -307,9 +315,11 @@ class BlocksOfVariant:
             if not self.at_surface.any():
                 return "too few blocks to tell whether the sample is homogeneous"
             better = "" if self.plan.edge == START else ", or of the RV by `edge=start`"
+            few = int(inner.sum())
             return (
-                f"whether the sample is homogeneous cannot be told: all blocks but "
-                f"{int(inner.sum())} are at a surface: choose blocks that are smaller{better}"
+                f"whether the sample is homogeneous cannot be told: all blocks"
+                f"{f' but {few}' * bool(few)} are at a surface or empty: choose blocks that are "
+                f"smaller{better}"
             )
         chance = "p < 0.0001" if test.chance < 1e-4 else f"p = {test.chance:.2g}"
         scatter = (

@@ -12,11 +12,10 @@ from scanfab.base.note import Note
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.blocks import BlockFabrics, WithoutParts
 from scanfab.packing.sample import Sample
-from scanfab.pipeline.goal import Errors
 from scanfab.pipeline.maps.blocks import splits_of
 from scanfab.pipeline.plan import CLOSE, Plan
 from scanfab.pipeline.solids import solids_of
-from scanfab.pipeline.tolerance import scan_to_tolerance
+from scanfab.pipeline.tolerance import Errors, scan_to_tolerance
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.directions import DirectionRule, design_of
 from scanfab.scan.edges import CLIP, START
@@ -144,7 +143,7 @@ def measure_map(sample: Sample, plan: Plan, where: str = "the frame") -> MapMeas
     placed = whole.moved(solids.origin), window.moved(solids.origin)
     sums, plan, notes = scan_to_tolerance(solids, plan, where, MedianBlock(placed))
     splits = splits_of(whole), splits_of(window)
-    parts = _part_sums(solids, plan, placed, splits)
+    parts = _part_sums(solids, plan, placed, splits, sums.scan)
     return MapMeasurement(sample, plan, (whole, window), splits, sums, parts, solids, tuple(notes))
 
 
@@ -153,11 +152,12 @@ def _part_sums(
     plan: Plan,
     blocks: tuple[Blocks, Blocks],
     splits: tuple[tuple[int, int, int], tuple[int, int, int]],
+    before: ScanSums,
 ) -> dict[str, PartSums]:
     """Along fewer lines, each block in eight parts, for the sample's scatter and for its void."""
     finer = blocks[0].finer(splits[0]), blocks[1].finer(splits[1])
     rule = design_of(PART_AXES)
-    spacing = _part_spacing(solids, rule, plan)
+    spacing = _part_spacing(solids, rule, plan, before)
     found: dict[str, list[PartSums]] = {name: [] for name in plan.variants}
     # by the rule start, segments count with what is outside the window, too
     clipped = replace(solids, edge=CLIP) if solids.edge == START else None
@@ -193,13 +193,15 @@ def _order(blocks: Blocks, splits: tuple[int, int, int]) -> IntArray:
     return np.asarray(np.lexsort((part, block)), np.int64)
 
 
-def _part_spacing(solids: Solids, rule: DirectionRule, plan: Plan) -> float:
+def _part_spacing(solids: Solids, rule: DirectionRule, plan: Plan, before: ScanSums) -> float:
     """As close as is of use, but no closer than can be waited for."""
     if not len(solids.grain_radius):
         return plan.spacing
     spacing = CLOSE * float(solids.grain_radius.mean())
+    # what following lines through a periodic medium takes is known from the scan before
+    steps = float(before.steps.mean()) / len(plan.rule) * (plan.spacing / spacing) ** 2
     # a line costs as much as a chord, also if it meets nothing
-    chords = solids.cross_section / spacing**2 + most_lines(solids, spacing)
+    chords = solids.cross_section / spacing**2 + most_lines(solids, spacing) + steps
     chords *= PART_REPLICATES * len(rule)
     return spacing * math.sqrt(max(chords / min(MOST_CHORDS, plan.max_chords), 1.0))
 

@@ -95,6 +95,16 @@ class MapSettings(Settings):
             raise SettingsError(
                 "cutoffs: a map is of one cut-off: name it as `cutoff`, and make a map for each"
             )
+        if len(self.rvs) > 1:
+            raise SettingsError(
+                f"rv: expected one size, as a map is of one RV, found {len(self.rvs)}: make a map "
+                f"for each"
+            )
+        if self.with_:
+            raise SettingsError(
+                f"with_: a map has no further columns, found {', '.join(self.with_)}: `compute` "
+                f"has them, of the whole sample and of RVs wherever `rv_center` is"
+            )
 
     @property
     def blocks(self) -> int:

@@ -151,8 +151,8 @@ def list_gap(
             gaps[LOW_END, k] = 0.5 if low > enters else 0.0
             gaps[HIGH_END, k] = 0.5 if high < leaves else 0.0
         if window.start is not None:
-            # those that begin beyond the listed solids are followed
-            known = (low > enters - listed_to(window)) & (low < leaves) & (high > enters)
+            # those that end beyond the listed solids are followed
+            known = (high < leaves + listed_to(window)) & (low < leaves) & (high > enters)
             gaps[FULL, k] = high - low if known else 0.0
 
 

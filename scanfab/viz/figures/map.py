@@ -226,6 +226,8 @@ class Map(Figure):
         axes.set_title(f"{AXES[axis]} = {place:.3g}", loc="left")
         axes.set(xlabel=AXES[across[0]], ylabel=AXES[across[1]], aspect="equal")
         axes.locator_params(nbins=4)
+        # a narrow panel has no room for many digits
+        axes.ticklabel_format(style="sci", scilimits=(-1, 3))
         return drawn
 
 

@@ -74,12 +74,12 @@ def _facts(look: Look, settings: Settings) -> list[tuple[str, str]]:
     first, plan = look.first, look.plan
     if first is None:
         return []
-    radii = first.packing.radius[first.grains]
+    radii, boundary = first.packing.radius[first.grains], first.number(first.boundary)
     smallest = float(radii.min())
     facts = [
-        ("grains", f"{int(first.grains.sum())} in the first frame that has grains"),
+        ("grains", f"{first.number(first.grains)} in the first frame that has grains"),
         ("radii", f"smallest {smallest:.4g}, mean {radii.mean():.4g}, largest {radii.max():.4g}"),
-        ("boundary", f"{int(first.boundary.sum())} particles" if first.boundary.any() else "none"),
+        ("boundary", f"{boundary} particles" if boundary else "none"),
         ("cell", _cell(look)),
         ("loading axis", _axis(settings)),
     ]
@@ -87,17 +87,14 @@ def _facts(look: Look, settings: Settings) -> list[tuple[str, str]]:
         return facts
     facts.append(("cut-off", f"{plan.cutoff:.4g}, {plan.cutoff / smallest:.3g} smallest radii"))
     if plan.window is not None:
-        radius = plan.window.radius
         facts.append(("centre of the RV", ", ".join(f"{one:.4g}" for one in plan.window.center)))
-        if not plan.window.shape.is_sphere:
-            return [*facts, ("shape of the RV", str(plan.window.shape))]
-        facts += [
-            (
-                "radius of the RV",
-                f"{radius:.4g}, {_part_of_sample(first, look, radius)}, "
-                f"{radius / radii.mean():.3g} mean radii",
-            ),
-        ]
+    for window in plan.windows:
+        radius = window.radius
+        if not window.shape.is_sphere:
+            facts.append(("shape of the RV", str(window.shape)))
+            continue
+        size = f"{radius:.4g}, {_part_of_sample(first, look, radius)}"
+        facts.append(("radius of the RV", f"{size}, {radius / radii.mean():.3g} mean radii"))
     return facts
 
 

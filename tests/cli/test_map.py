@@ -1,0 +1,140 @@
+"""scanfab map: its table, manifest, resume, ParaView files and figure; wrong words are told."""
+
+from __future__ import annotations
+
+import json
+import shlex
+
+import pytest
+
+import scanfab
+from scanfab.cli.main import run
+from scanfab.pipeline.repeat import repeat_command
+from scanfab.table.formats.text import TextWriter
+from tests.helpers.interruptions import interrupted_at_row, write_series
+
+FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--workers", "1")
+OPTIONS = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin", "workers": 1}
+GRID = ("--grid", "2,1,1")
+
+
+@pytest.fixture(scope="module")
+def series(tmp_path_factory):
+    return write_series(tmp_path_factory.mktemp("map") / "series", 3)
+
+
+@pytest.fixture(scope="module")
+def table(series, tmp_path_factory):
+    output = tmp_path_factory.mktemp("tables") / "map.csv"
+    drawn = ("--vtk", str(output.with_name("vtk")), "--plot", str(output.with_name("map.png")))
+    assert run(["map", str(series), *FAST, *GRID, "-o", str(output), *drawn]) == 0
+    return output
+
+
+def test_the_table_is_that_of_the_library(series, table):
+    with pytest.warns(scanfab.ScanfabWarning, match="whether the sample is homogeneous"):
+        computed = scanfab.fabric_map(scanfab.read_series(series), grid=(2, 1, 1), **OPTIONS)
+    assert scanfab.load(table) == computed
+    assert [(row.frame, row.block) for row in computed] == [
+        (frame, block) for frame in range(3) for block in range(2)
+    ]
+
+
+def test_a_file_from_python_is_that_of_the_command(series, table, tmp_path):
+    output = tmp_path / "map.csv"
+    with pytest.warns(scanfab.ScanfabWarning, match="whether the sample is homogeneous"):
+        scanfab.compute_file(series, output, grid="2,1,1", **OPTIONS)
+    assert output.read_bytes() == table.read_bytes()
+
+
+def test_it_is_drawn_and_written_for_paraview(table):
+    pyvista = pytest.importorskip("pyvista")
+    assert table.with_name("map.png").stat().st_size > 10_000
+    collection = table.with_name("vtk") / "map-a.pvd"
+    assert collection.read_text().count("map-a_00000") == 3
+    mesh = pyvista.read(collection.with_name("map-a_000001.vtu"))
+    rows = scanfab.load(table)[2:4]
+    assert mesh.n_cells == 2
+    assert mesh.cell_data["alpha_vs_axial"].tolist() == pytest.approx(
+        [row.alpha_vs_axial for row in rows]
+    )
+    # blocks are where their rows say they are
+    assert mesh.cell_centers().points[:, 0].tolist() == pytest.approx([row.x for row in rows])
+
+
+def test_the_manifest_repeats_it(table):
+    asked = json.loads(table.with_name("map.csv.manifest.json").read_text())["settings"]
+    assert asked["grid"] == [2, 1, 1]
+    words = shlex.split(repeat_command(asked, str(table.with_name("again.csv"))))
+    assert words[:2] == ["scanfab", "map"]
+    assert run(words[1:]) == 0
+    assert table.with_name("again.csv").read_bytes() == table.read_bytes()
+
+
+def test_a_run_that_was_stopped_goes_on(series, table, tmp_path, monkeypatch):
+    """In the middle of a frame, which has two rows."""
+    output = tmp_path / "map.csv"
+    command = ["map", str(series), *FAST, *GRID, "-o", str(output)]
+    with interrupted_at_row(monkeypatch, 4, TextWriter) as rows:
+        assert run(command) == 130
+    assert len(rows) == 4
+    assert run([*command, "--resume"]) == 0
+    assert output.read_bytes() == table.read_bytes()
+
+
+def test_other_blocks_do_not_go_on(series, tmp_path, capsys):
+    output = tmp_path / "map.csv"
+    assert run(["map", str(series), *FAST, *GRID, "--frames", ":1", "-o", str(output)]) == 0
+    before = output.read_bytes()
+    words = ["--grid", "1,2,1", "-o", str(output), "--resume"]
+    assert run(["map", str(series), *FAST, *words]) == 2
+    assert "grid" in capsys.readouterr().err
+    assert output.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "just one of --grid, --slices and --shells, found none"),
+        (["--slices", "2", "--shells", "2"], "found --slices and --shells"),
+        (["--grid", "2,2"], "expected three numbers of blocks, such as 4,4,8, found '2,2'"),
+        (["--grid", "0,2,2"], "found '0,2,2'"),
+        (["--slices", "-1"], "--slices: expected 1 or more, found"),
+        (["--shells", "0"], "--shells: expected 1 or more, found"),
+        (["--slices", "two"], "two"),
+        (["--slices", "2", "--variants", "cd", "--rv", "0.4,0.6"], "--rv: expected one size"),
+        (["--slices", "2", "--with", "state"], "No such option '--with'"),
+        (["--slices", "2", "--cutoffs", "1,2"], "No such option '--cutoffs'"),
+    ],
+)
+def test_what_is_no_map_is_told(series, words, message, capsys):
+    assert run(["map", str(series), *FAST, *words]) == 2
+    told = capsys.readouterr().err
+    assert message in " ".join(told.split())
+    assert "Traceback" not in told
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--grid", "100,100,100"], "choose fewer, so that they are at least 4 mean radii thick"),
+        (["--slices", "1000000"], "--slices: makes blocks 4.329e-06 thick"),
+        (["--slices", "2", "--variants", "cd", "--rv", "1e-3"], "holds no grain"),
+    ],
+)
+def test_blocks_that_do_not_fit_the_sample_are_told(series, words, message, capsys):
+    assert run(["map", str(series), *FAST, *words]) == 1
+    told = capsys.readouterr().err
+    assert message in " ".join(told.split())
+    assert "Traceback" not in told
+
+
+def test_blocks_without_grains_have_rows_and_are_said(series, capsys):
+    """The RV reaches beyond the sample's corner: of its box some blocks hold no grain at all."""
+    words = ["--variants", "c", "--rv", "0.9", "--rv-center", "3", "3", "3"]
+    command = ["map", str(series), *FAST, "--grid", "3,3,3", *words, "--frames", ":1"]
+    assert run([*command, "--cutoff", "0.1rmin"]) == 0
+    printed = capsys.readouterr()
+    assert len(printed.out.splitlines()) == 28
+    assert "27 blocks have no void fabric" in printed.err
+    assert "Traceback" not in printed.err
