@@ -319,7 +319,7 @@ def _maps(repeats):
         "10 shells": box.with_shells(10, reach),
     }
     rows = []
-    for spacing, directions in ((0.3, 16), (1.0, 100)):
+    for spacing, directions in ((0.3, 16), (1.0, 100), (1.5, 200)):
         words = {"spacing": spacing, "variants": "a", "replicates": range(directions)}
         ways = {"none": lambda w=words: scan_lines(solids, RULE, cutoff=CUTOFF, **w)}
         for name, one in kinds.items():

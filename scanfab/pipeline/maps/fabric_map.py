@@ -64,12 +64,17 @@ def fabric_map(
 
     Examples
     --------
+    >>> import warnings
     >>> import numpy as np
     >>> from scanfab import Cell, Packing, fabric_map, find_contacts
     >>> place = np.random.default_rng(0).uniform(0, 12, (400, 3))
     >>> packing = find_contacts(Packing(place, 0.7, cell=Cell([12.0] * 3)))
-    >>> table = fabric_map(packing, slices=2, directions="lebedev:11", spacing=0.5)
-    >>> table["z"].tolist(), table["grains"].sum()
+    >>> with warnings.catch_warnings(record=True) as told:
+    ...     warnings.simplefilter("always")
+    ...     table = fabric_map(packing, slices=2, directions="lebedev:11", spacing=0.5)
+    >>> str(told[-1].message)
+    'frame 0, variant a: too few blocks to tell whether the sample is homogeneous'
+    >>> table["z"].tolist(), int(table["grains"].sum())
     ([3.0, 9.0], 400)
     """
     given = {**options, "grid": grid, "slices": slices, "shells": shells}
