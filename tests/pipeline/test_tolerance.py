@@ -18,7 +18,6 @@ from scanfab import (
     void_fabric,
 )
 from scanfab.packing.sample import Sample
-from scanfab.pipeline import goal
 from scanfab.pipeline import tolerance as adaptive
 from scanfab.pipeline.plan import REPLICATES, make_plan
 from scanfab.pipeline.settings import AUTO_RULE
@@ -216,7 +215,7 @@ def test_following_lines_through_an_empty_cell_counts_in_the_budget(
         work.append(int(sums.work.sum()))
         return sums
 
-    monkeypatch.setattr(goal, "scan_lines", scan)
+    monkeypatch.setattr(adaptive, "scan_lines", scan)
     row = compute(nearly_empty, tolerance=1e-5, variants=variants, max_chords=3e7)[0]
     assert row.alpha_vs_axial_se > 1e-5
     assert 3e6 < sum(work) < 6e7
