@@ -67,7 +67,6 @@ def compute(
     """
     from scanfab.cli.console import announce_compiling, reported_warnings
     from scanfab.pipeline.job import Job
-    from scanfab.pipeline.more_columns import more_columns
     from scanfab.pipeline.settings import Settings
     from scanfab.table.columns import table_columns
     from scanfab.table.result_file import ResultFile
@@ -84,7 +83,7 @@ def compute(
             reading = reading_arguments(chosen)
             fields, digits = chosen.pop("fields"), int(chosen.pop("digits"))
             settings = Settings(**chosen)
-            columns = table_columns(more_columns(settings))
+            columns = table_columns(settings.more_columns)
             excerpt = Excerpt.make(columns, fields, digits)
             result = None if output is None else ResultFile(output, columns, excerpt)
         series = open_series(sources, reading)
@@ -206,7 +205,6 @@ def _standing(job: Job, printed: bool) -> str:
 def _write(job: Job, excerpt: Excerpt) -> None:
     """Write the rows as they come; on a terminal, all of them as a table."""
     from scanfab.cli.console import is_readable, print_csv, print_table
-    from scanfab.pipeline.more_columns import more_columns
     from scanfab.table.columns import table_columns
 
     with working(job.frames, job.done) as advance:
@@ -214,7 +212,7 @@ def _write(job: Job, excerpt: Excerpt) -> None:
             job.write(advance)
             return
         if not is_readable():
-            print_csv(job.rows(advance), excerpt, table_columns(more_columns(job.settings)))
+            print_csv(job.rows(advance), excerpt, table_columns(job.settings.more_columns))
             return
         rows = list(job.rows(advance))
     print_table(rows, excerpt)

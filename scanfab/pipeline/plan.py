@@ -14,7 +14,6 @@ from scanfab.packing.doubts import refuse_impossible
 from scanfab.packing.sample import VARIANTS, Sample, SampleRule
 from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.frames import sample_rule
-from scanfab.pipeline.more_columns import more_columns
 from scanfab.pipeline.rv import RV, Deformation, doubts_of_rv, sizes_of, windows_of
 from scanfab.pipeline.settings import AUTO_RULE, Settings, Vector
 from scanfab.pipeline.strain import Strains
@@ -253,7 +252,7 @@ def _without_lengths(settings: Settings, strains: Strains) -> Plan:
         max_chords=settings.max_chords,
         rvs=sizes_of(settings),
         deformation=None,
-        more_columns=more_columns(settings),
+        more_columns=settings.more_columns,
         groups=settings.with_,
         cutoff=math.nan,
         cutoffs=(math.nan,) * max(len(settings.cutoffs), 1),

@@ -13,7 +13,6 @@ from scanfab.base.errors import SettingsError
 from scanfab.io.series import Series
 from scanfab.pipeline.frames import chosen_frames
 from scanfab.pipeline.manifest import Inputs, default_settings, strain_file, surface_file
-from scanfab.pipeline.more_columns import more_columns
 from scanfab.pipeline.repeat import read_manifest
 from scanfab.pipeline.settings import Settings
 from scanfab.table.columns import complete_row, table_columns
@@ -229,7 +228,7 @@ def _by_frame(
     for (source, frame), group in groupby(rows, key=lambda row: (row["source"], row["frame"])):
         if source not in found:
             raise _refused(path, f"its source {source} is not named now")
-        own = [_row(row, more_columns(settings)) for row in group]
+        own = [_row(row, settings.more_columns) for row in group]
         if len(own) == settings.rows_per_frame:
             found[source][frame] = own
     return found

@@ -14,10 +14,10 @@ from scanfab.base.option import (
     refuse_unknown,
     whole,
 )
+from scanfab.packing.columns import RV_COLUMN
 from scanfab.pipeline.values import (
     AXES,
     GROUP_NAMES,
-    RULE_NAMES,
     STRAIN_MODES,
     Axis,
     Length,
@@ -40,6 +40,8 @@ from scanfab.pipeline.values import (
     rattler_rules,
 )
 from scanfab.pipeline.window_settings import WindowSettings, check_window
+from scanfab.scan.columns import EDGE_COLUMNS
+from scanfab.scan.edges import CLIP
 
 if TYPE_CHECKING:
     from scanfab.packing.boundary import BoundaryRule
@@ -49,8 +51,12 @@ __all__ = ["AUTO_RULE", "AXES", "MAX_CHORDS", "STRAIN_MODES", "Length", "Setting
 
 # equal weights and few axes: the random turns of the replicates do the rest
 AUTO_RULE = "icosahedral:9"
-# one to two minutes of a processor, some hundred times what a frame needs for the default tolerance
+# of an auto scan of one frame: one to two minutes of one processor, some hundred times what dense
+# packings need for the default tolerance
 MAX_CHORDS = 1e10
+RULE_NAMES = (
+    "lebedev", "design", "icosahedral", "product", "fibonacci", "equal-angle", "equal-angle-full",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, init=False)
@@ -119,6 +125,7 @@ class Settings(WindowSettings):
         takes="str or sequence of str or float",
         metavar="FROM:TO:STEP|L,L,...",
     )
+    """Several instead of the one, each with its rows."""
     moment: int = option(
         default=1,
         parse=whole("1 or 2", lambda moment: moment in (1, 2)),
@@ -223,7 +230,8 @@ class Settings(WindowSettings):
     with_: tuple[str, ...] = option(
         parse=parse_groups,
         group="fabric",
-        help="More columns: forces, state (void ratio, stress), invariants, harmonics, or several.",
+        help="More columns: forces (with branches, strong and weak contacts), state (void ratio, "
+        "stress, fabric against stress), invariants, harmonics; several: forces,state.",
         meaning="groups of further columns",
         takes="str or sequence of str",
         metavar="GROUP,...",
@@ -285,6 +293,19 @@ class Settings(WindowSettings):
             object.__setattr__(self, one.name, value)
         check_window(self)
         check_moment(self)
+
+    @property
+    def more_columns(self) -> tuple[str, ...]:
+        """Columns that the table has because these settings ask for more than the default."""
+        # to print the help of a command needs no fabric
+        from scanfab.fabric.registry import GROUPS
+
+        shaped = self.rv_shape != "sphere" or self.rv_follows != "none"
+        several = len(self.rvs) > 1
+        of_window = {RV_COLUMN.name: several, "window_alpha_vs_axial": shaped}
+        columns = [name for name, asked in of_window.items() if asked and self.needs_window]
+        columns += [one.name for one in EDGE_COLUMNS if self.edge != CLIP]
+        return (*columns, *(one.name for group in self.with_ for one in GROUPS[group].columns))
 
     def __repr__(self) -> str:
         usual = Settings()

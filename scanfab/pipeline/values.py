@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 __all__ = [
     "AXES",
     "GROUP_NAMES",
-    "RULE_NAMES",
     "STRAIN_MODES",
     "Axis",
     "Length",
@@ -53,9 +52,6 @@ __all__ = [
 Vector = tuple[float, float, float]
 STRAIN_MODES = ("auto", "cell", "boundary", "grains")
 MOST_CUTOFFS = 1000
-RULE_NAMES = (
-    "lebedev", "design", "icosahedral", "product", "fibonacci", "equal-angle", "equal-angle-full",
-)  # fmt: skip
 # of further columns, in their order in the table
 GROUP_NAMES = ("invariants", "state", "forces", "harmonics")
 

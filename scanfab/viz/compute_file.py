@@ -16,7 +16,6 @@ from scanfab.io.options import take_reading
 from scanfab.io.series import Series
 from scanfab.pipeline.frames import of_whole
 from scanfab.pipeline.job import Job
-from scanfab.pipeline.more_columns import more_columns
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.told import recorded
 from scanfab.table.columns import table_columns
@@ -111,7 +110,7 @@ def compute_file(
     with recorded() as told:
         series, sources, reading = _opened(source, options)
         series, settings = _whole(series, Settings(**options))
-        columns = table_columns(more_columns(settings))
+        columns = table_columns(settings.more_columns)
         excerpt = Excerpt.make(columns, fields, digits)
         folders = () if vtk is None else vtk_folders(Path(vtk), len(series), settings, go_on=resume)
         job = Job(

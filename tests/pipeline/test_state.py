@@ -288,7 +288,9 @@ def test_one_state_written_by_each_program_has_the_same_tensors():
 
 def test_stress_force_and_fabric_go_together(lammps):
     """q/p is 0.4 (a_c + a_n + 1.5 a_t + a_b) to first order (Ouadfel and Rothenburg 2001)."""
-    row = table(lammps[1])[0]
-    along = 7.5 * row.alpha_c_axial + row.alpha_fn_axial + row.alpha_bn_axial
-    expected = 0.4 * (along + 1.5 * row.alpha_ft_axial)
-    assert row.q / row.p == pytest.approx(expected, rel=0.1)
+    for packing in (lammps[1], scanfab.read(YADE / "forces.xml.bz2")):
+        row = table(packing)[0]
+        along = 7.5 * row.alpha_c_axial + row.alpha_fn_axial + row.alpha_bn_axial
+        expected = 0.4 * (along + 1.5 * row.alpha_ft_axial)
+        assert row.q / row.p > 0.6
+        assert row.q / row.p == pytest.approx(expected, rel=0.05)
