@@ -125,7 +125,7 @@ def takes_options(options: Sequence[Option]) -> Callable[[Callable[P, R]], Calla
     A decorator for functions with options in their signature.
 
     It refuses names that are none of them, with the nearest that is one, and puts what the options
-    mean in place of ``{options}`` into the docstring.
+    mean, in the order of the signature, in place of ``{options}`` into the docstring.
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
@@ -137,7 +137,8 @@ def takes_options(options: Sequence[Option]) -> Callable[[Callable[P, R]], Calla
             return function(*args, **kwargs)
 
         text = inspect.cleandoc(function.__doc__ or "")
-        call.__doc__ = text.replace("{options}", "\n".join(map(_documented, options)))
+        ordered = sorted(options, key=lambda option: known.index(option.name))
+        call.__doc__ = text.replace("{options}", "\n".join(map(_documented, ordered)))
         return call
 
     return decorate

@@ -152,6 +152,8 @@ def _spell(name: str, value: Any) -> Any:
         raise TypeError
     if name == "axis" and isinstance(value, list):
         return ",".join(map(shortest, value))
+    if name == "rv" and isinstance(value, list):
+        return ",".join(map(shortest, value))
     if name == "cutoffs" and isinstance(value, list):
         return ",".join(_length(one) for one in value)
     if isinstance(value, dict) and {"value", "unit"} <= set(value):

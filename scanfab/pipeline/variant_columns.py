@@ -15,7 +15,7 @@ from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.jackknife import BLOCKS, BlockedSums
 from scanfab.fabric.registry import OWN_FABRICS, Measured, checked_values
 from scanfab.fabric.window import WINDOW_ALPHA, window_alpha
-from scanfab.packing.columns import sample_values
+from scanfab.packing.columns import RV_COLUMN, sample_values
 from scanfab.packing.sample import Variant
 from scanfab.pipeline.measurement import Measurement
 from scanfab.scan.edges import CLIP, ENDS, START
@@ -52,8 +52,13 @@ class VariantColumns:
             found |= fabric.values(self.measured)
         for name, fabric in installed_fabrics().items():
             found |= checked_values(name, fabric, self.measured)
-        asked = {**self._window(), **self._edge()}
+        asked = {RV_COLUMN.name: self.rv, **self._window(), **self._edge()}
         return {**found, **{name: asked[name] for name in self.plan.more_columns}}
+
+    @property
+    def rv(self) -> float | None:
+        """The size of the variant's RV, where there are several."""
+        return self.plan.rvs_of(self.variant.name)[0].fraction
 
     @cached_property
     def measured(self) -> Measured:
@@ -188,7 +193,8 @@ class VariantColumns:
         """Whether there is no void fabric, or a doubtful one, or lines without a grain."""
         texts = {"channels": self._channels(), "left_out": self._left_out()}
         texts |= self._of_void_fabric()
-        return (Note(code, text, (self.variant.name,)) for code, text in texts.items() if text)
+        about = self.variant.name if self.rv is None else f"{self.variant.name} (RV {self.rv:g})"
+        return (Note(code, text, (about,)) for code, text in texts.items() if text)
 
     def _channels(self) -> str:
         channels = int(self.sums.channels[:, self.which].sum())

@@ -11,7 +11,7 @@ import numpy as np
 
 from scanfab.base.typing import FloatArray
 from scanfab.table.abscissa import STRAINS, strain_column
-from scanfab.table.reading import number_of, total_error
+from scanfab.table.reading import number_of, total_error, variant_of
 
 __all__ = [
     "Curve",
@@ -39,6 +39,7 @@ class Curve:
 
     source: str
     variant: str
+    """With the size of its RV, where there are several."""
     x: FloatArray
     """Strain in per cent, or the number of the frame."""
     void: FloatArray
@@ -68,7 +69,7 @@ def curves_of(rows: Iterable[Mapping[str, Any]]) -> list[Curve]:
     abscissa = strain_column(rows)
     groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for row in rows:
-        groups.setdefault((row["source"], row["variant"]), []).append(row)
+        groups.setdefault((row["source"], variant_of(row)), []).append(row)
     names = short_names(source for source, _ in groups)
     return [
         _curve(names[source], variant, group, abscissa)

@@ -73,7 +73,7 @@ def test_a_section_cuts_periodic_images_too():
 
 
 def test_a_section_without_window_or_grains_is_no_error(sample):
-    assert section_lines(scene_of(sample, None), (0, 0, 1)).line.ndim == 1
+    assert section_lines(scene_of(sample), (0, 0, 1)).line.ndim == 1
     nothing = Sample(scanfab.Packing(np.zeros((0, 3)), 1.0, contacts=[]), np.zeros(0, bool))
     empty = Scene(grains_of(nothing, None), np.zeros(3), None)
     assert len(section_lines(empty, (0, 0, 1)).length) == 0
