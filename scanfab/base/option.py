@@ -164,7 +164,8 @@ def takes_options(options: Sequence[Option]) -> Callable[[Callable[P, R]], Calla
             return function(*args, **kwargs)
 
         text = inspect.cleandoc(function.__doc__ or "")
-        ordered = sorted(options, key=lambda option: known.index(option.name))
+        places = {name: place for place, name in enumerate(known)}
+        ordered = sorted(options, key=lambda option: places.get(option.name, len(places)))
         call.__doc__ = text.replace("{options}", "\n".join(map(_documented, ordered)))
         return call
 
