@@ -8,11 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.base.bodies import BALL, Body
+from scanfab.base.bodies import BALL, DISC, SQUARE, Body
 from scanfab.base.option import number
+from scanfab.base.space import Space
 from scanfab.base.typing import BoolArray, FloatArray
 
-__all__ = ["EVERYWHERE", "Convex", "Quadric", "image_of", "sphere"]
+__all__ = ["EVERYWHERE", "Convex", "Quadric", "circle", "image_of", "sphere"]
 
 # steps towards the nearest place of a region, and what of a distance is rounding
 STEPS, ROUNDING = 200, 1e-12
@@ -93,18 +94,26 @@ class Convex:
 
     @property
     def is_sphere(self) -> bool:
-        """Whether all its diameters are equal."""
+        """Whether all its diameters are equal; that of a plane is a circle."""
         return not len(self.planes) and not self.quadric.deviator.any()
 
     @property
+    def is_flat(self) -> bool:
+        """Whether it is one of a plane, the normal of which is the third column of the frame."""
+        return self.body in (DISC, SQUARE)
+
+    @property
     def volume(self) -> float:
-        """Dump's length unit, cubed."""
+        """Dump's length unit, cubed; of a plane the area."""
         return float(self.body.volume * abs(np.linalg.det(self.frame)))
 
     @property
     def mean_shadow(self) -> float:
-        """Projected area in the mean of all directions, to some per cent."""
+        """Projected area in the mean of all directions, to some per cent; of a plane a length."""
         axes = BALL.outline[:: len(BALL.outline) // AXES]
+        if self.is_flat:
+            sides = np.linalg.qr(self.frame[:, :2])[0]
+            axes = DISC.outline @ np.column_stack([sides, np.zeros(3)]).T
         return float(self.overlap(axes, 0.0)[1].mean())
 
     @property
@@ -317,13 +326,45 @@ def sphere(radius: float) -> Convex:
     array([ True, False])
     """
     radius = number("a length above 0", lambda value: 0 < value < math.inf)("radius", radius)
+    return _round(BALL, radius, radius * np.eye(3), np.full(3, radius))
+
+
+def circle(radius: float, plane: Space) -> Convex:
+    """
+    A circle about the origin, of some coordinate plane.
+
+    In the plane it holds what the sphere holds; its volume is an area.
+
+    Parameters
+    ----------
+    radius : float
+        Dump's length unit, above 0.
+    plane : Space
+        In which it lies.
+
+    Returns
+    -------
+    Convex
+
+    Examples
+    --------
+    >>> from scanfab.base.convex import circle
+    >>> from scanfab.base.space import Space
+    >>> round(circle(2.0, Space(2)).volume, 3)
+    12.566
+    """
+    frame = np.array([radius, radius, 1.0]) * plane.basis.T
+    return _round(DISC, radius, frame, radius * (1.0 - plane.normal))
+
+
+def _round(body: Body, radius: float, frame: FloatArray, high: FloatArray) -> Convex:
     return Convex(
         planes=np.zeros((0, 4)),
         quadric=Quadric(1.0, np.zeros((3, 3)), radius * radius),
-        low=np.full(3, -radius),
-        high=np.full(3, radius),
+        low=-high,
+        high=high,
         reach=radius,
         size=f"radius {radius:g}",
-        body=BALL,
-        frame=radius * np.eye(3),
+        body=body,
+        frame=frame,
     )

@@ -84,6 +84,7 @@ def read_series(
     radius: float | None = None,
     cell: tuple[float, ...] | PathLike | None = None,
     periodic: str | None = None,
+    dim: str | int = "auto",
 ) -> Series:
     """
     Open a series of frames: a folder, a file, or several files.
@@ -111,6 +112,9 @@ def read_series(
         of each frame: columns ``step`` or ``frame``, ``lx ly lz``, and ``xy xz yz`` if tilted.
     periodic : str, optional
         Letters out of xyz.
+    dim : {"auto", 2, 3}, optional
+        2: discs, whose centres share one coordinate. ``auto``: 2 if those of the first frame that
+        has any do so, at least ten, and share no second one; with a note. One for all frames.
 
     Returns
     -------
@@ -156,7 +160,9 @@ def read_series(
 
     def series(files: Sequence[Family], contacts_from: ContactsFrom) -> Series:
         whole = tuple(family.check() for family in files)
-        return Series(name, grains, whole, contacts_from, options, cells, sources, reading)
+        return Series(
+            name, grains, whole, contacts_from, options, cells, sources, reading, dim=checked["dim"]
+        )
 
     if contacts == "geometric":
         return series((), "geometric")

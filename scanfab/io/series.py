@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import warnings
 from collections import deque
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 from typing import Any, Literal, SupportsIndex, overload
 
-from scanfab.base.errors import NoFrameError, ReadError, SettingsError
+from scanfab.base.errors import NoFrameError, ReadError, ScanfabNote, SettingsError
+from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import counted
+from scanfab.base.typing import FloatArray
 from scanfab.io.families import Family
 from scanfab.io.frame import Frame
 from scanfab.io.frame_csv import FrameFile
 from scanfab.io.reader import ReadOptions, Snapshot
+from scanfab.packing.plane import flat_space, space_of, spelt_plane
 
 __all__ = ["ENDLESS", "ContactsFrom", "Series"]
 
@@ -60,6 +65,8 @@ class Series:
         Its options, as a manifest lists them.
     numbers : range
         Which frames of the whole series these are; there may be fewer.
+    dim : str or int
+        2 of discs, 3, or ``auto``: as the first frame that has particles has them.
 
     Examples
     --------
@@ -80,6 +87,7 @@ class Series:
     sources: tuple[str, ...] = field(default=(), repr=False, compare=False)
     reading: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
     numbers: range = range(ENDLESS)
+    dim: str | int = "auto"
     # a file that holds the contacts of many frames is indexed once
     _contact_snapshots: dict[Path, list[Snapshot]] = field(
         default_factory=dict, init=False, repr=False, compare=False
@@ -88,6 +96,8 @@ class Series:
         default_factory=dict, init=False, repr=False, compare=False
     )
     """The frames of the grain files that were looked into, and how these files were then."""
+    _spaces: list[Space] = field(default_factory=list, init=False, repr=False, compare=False)
+    """One, once it is known."""
 
     def __getstate__(self) -> dict[str, Any]:
         # another process that computes a frame need not know where all others are
@@ -173,6 +183,44 @@ class Series:
         if any(bound is not None and bound < 0 for bound in bounds):
             return self.numbers[: len(self)][frames]
         return self.numbers[frames]
+
+    def space_of(self, number: int, position: FloatArray) -> Space:
+        """
+        In which space the particles of all frames lie, when those of one are known.
+
+        Parameters
+        ----------
+        number : int
+            Of that frame, in the whole series.
+        position : ndarray, shape (N, 3)
+            Its centres, dump's length unit.
+
+        Returns
+        -------
+        Space
+            That of the first frame that has particles.
+
+        Raises
+        ------
+        PackingError
+            If discs are asked for, and these are none.
+        """
+        if self.dim == 3:
+            return SPACE
+        if not self._spaces:
+            first = next(filter(len, self._centres_before(number)), position)
+            if not len(first):
+                return SPACE
+            self._spaces.append(space_of(first) if self.dim == "auto" else flat_space(first))
+            if self.dim == "auto" and self._spaces[0].is_plane:
+                _tell_plane(self.name, first, self._spaces[0])
+        return self._spaces[0]
+
+    def _centres_before(self, number: int) -> Iterator[FloatArray]:
+        """Of the frames before one, as far as they can be read."""
+        for frame in islice(self._every(), number):
+            with suppress(ReadError):
+                yield frame.centres()
 
     @property
     def whole(self) -> Series:
@@ -348,3 +396,12 @@ def _stamp(path: Path) -> _Stamp:
     except OSError:
         return None
     return found.st_size, found.st_mtime_ns
+
+
+def _tell_plane(name: str, position: FloatArray, plane: Space) -> None:
+    warnings.warn(
+        f"{name}: all centres lie in {plane} ({spelt_plane(position, plane)}): they are read as "
+        f"discs, in 2D; `dim=3` reads them as spheres",
+        ScanfabNote,
+        stacklevel=4,
+    )

@@ -13,10 +13,12 @@ import numpy.typing as npt
 from scanfab.base.arrays import cast, grains_named
 from scanfab.base.errors import PackingError
 from scanfab.base.lengths import LEAST, MOST, all_within
+from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import counted, spelt_range
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import ContactList, Contacts, Spheres, resolve_contacts
+from scanfab.packing.plane import cell_in_plane, flat_space, place_of, refuse_outside
 
 __all__ = [
     "ContactList",
@@ -105,8 +107,9 @@ class Packing:
 
     Parameters
     ----------
-    position : array_like, shape (N, 3)
-        Centres, dump's length unit. Wrapped into the cell along its periodic vectors.
+    position : array_like, shape (N, 3) or (N, 2)
+        Centres, dump's length unit. Wrapped into the cell along its periodic vectors. Two
+        coordinates are those of discs in the x-y plane, with z = 0.
     radius : array_like, shape (N,) or float
         Radii, dump's length unit.
     id : array_like of int, shape (N,), optional
@@ -121,12 +124,17 @@ class Packing:
         The (periodic) cell.
     step, time : int, float, optional
         Of the dump.
+    dim : {2, 3}, optional
+        2: discs, whose centres share one coordinate; by default 3, but 2 of positions that have
+        two. What the cell says of the direction across the plane is ignored. A series, whose
+        plane is that of its first frame, names the space itself.
 
     Raises
     ------
     PackingError
         If a shape is wrong, a number is not finite or above 1e100, a radius is not positive or
-        below 1e-100, an id occurs twice, or a contact names a row that does not exist.
+        below 1e-100, an id occurs twice, a contact names a row that does not exist, or discs do
+        not lie in one coordinate plane.
 
     Examples
     --------
@@ -148,10 +156,11 @@ class Packing:
         cell: Cell | None = None,
         step: int | None = None,
         time: float | None = None,
+        dim: int | Space | None = None,
     ) -> None:
         if not isinstance(cell, Cell | None):
             raise PackingError(f"cell: expected a Cell, such as Cell([1, 1, 1]), found {cell!r}")
-        centres = cast("position", position, np.float64, (None, 3))
+        centres = _centres(position, dim)
         count = len(centres)
         radii = np.asarray(radius)
         self.radius: FloatArray = cast(
@@ -160,6 +169,9 @@ class Packing:
         self.id: IntArray = cast("id", np.arange(count) if id is None else id, np.int64, (count,))
         check_lengths(centres, self.radius, self.id)
         _check_ids(self.id)
+        self.space: Space = _space_of(centres, dim or np.shape(position)[1])
+        if cell is not None and self.space.is_plane:
+            cell = cell_in_plane(cell, self.space, self.radius)
         turns: IntArray | None = None
         self.position: FloatArray = centres
         if cell is not None and not lies_within(cell, centres, 0.0, 1.0):
@@ -185,9 +197,20 @@ class Packing:
         if len(self):
             radii = f" of radius {spelt_range(self.radius.min(), self.radius.max())}"
         what = [counted(len(self), "particle") + radii]
+        what += [f"2D in {self.space}"] if self.space.is_plane else []
         what.append("contacts not known" if self.contacts is None else self.contacts.in_words())
         what += [] if self.step is None else [f"step {self.step}"]
         return f"Packing: {', '.join(what)}" + ("" if self.cell is None else f"\n  {self.cell!r}")
+
+    @property
+    def dimension(self) -> int:
+        """3, or 2 of discs in a plane."""
+        return self.space.dimension
+
+    @property
+    def place_across(self) -> float:
+        """Of discs the coordinate that all their centres share, dump's length unit."""
+        return place_of(self.position, self.space) if len(self) else 0.0
 
     @property
     def is_periodic(self) -> bool:
@@ -222,6 +245,26 @@ class Packing:
 
     def _spheres(self, turns: IntArray | None) -> Spheres:
         return Spheres(self.position, self.radius, self.id, self.cell, turns)
+
+
+def _space_of(position: FloatArray, dim: int | Space) -> Space:
+    """In which positions lie."""
+    if isinstance(dim, Space):
+        refuse_outside(position, dim)
+        return dim
+    return flat_space(position) if dim == 2 else SPACE
+
+
+def _centres(position: npt.ArrayLike, dim: int | Space | None) -> FloatArray:
+    """Positions of three coordinates, from those of three or of two."""
+    if dim not in (None, 2, 3) and not isinstance(dim, Space):
+        raise PackingError(f"dim: expected 2 or 3, found {dim!r}")
+    if np.ndim(position) != 2 or np.shape(position)[1] != 2:
+        return cast("position", position, np.float64, (None, 3))
+    if dim == 3:
+        raise PackingError("dim: expected 2, as the positions have two coordinates, found 3")
+    flat: FloatArray = cast("position", position, np.float64, (None, 2))
+    return np.column_stack([flat, np.zeros(len(flat))])
 
 
 def _wall_contacts(values: npt.ArrayLike | None, count: int) -> IntArray:

@@ -59,7 +59,7 @@ def compute(
     min_contacts: int = 2,
     rattlers: str = "count",
     contact_tolerance: float = 0.0,
-    axis: str | Sequence[float] = "z",
+    axis: str | Sequence[float] | None = None,
     strain: str | Path = "auto",
     frames: str | int | slice | None = None,
     seed: int = 0,

@@ -7,19 +7,21 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from scanfab.base.convex import Convex
+from scanfab.base.convex import Convex, circle
 from scanfab.base.errors import SettingsError
 from scanfab.base.note import Note
+from scanfab.base.space import SPACE, Space
 from scanfab.packing.doubts import refuse_impossible
 from scanfab.packing.sample import VARIANTS, Sample, SampleRule
 from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.frames import sample_rule
+from scanfab.pipeline.in_plane import settings_in
 from scanfab.pipeline.rv import RV, Deformation, doubts_of_rv, sizes_of, windows_of
-from scanfab.pipeline.settings import AUTO_RULE, Settings, Vector
+from scanfab.pipeline.settings import Settings, Vector
 from scanfab.pipeline.strain import Strains
-from scanfab.scan.directions import DirectionRule, direction_rule
+from scanfab.scan.directions import DirectionRule, usual_rule
 
-__all__ = ["CLOSE", "GROWTH_WITH_SPACING", "Plan", "make_plan", "plan_without_grains"]
+__all__ = ["CLOSE", "NOISE", "Plan", "make_plan", "plan_without_grains"]
 
 # replicates of a fixed scan, and at least of an auto scan
 REPLICATES = 16
@@ -27,9 +29,10 @@ REPLICATES = 16
 MOST_REPLICATES = 64
 # lines of one axis below which a replicate's mean lengths are too uncertain to be of use
 FEWEST_LINES = 30
-# segments for a standard error of 1, at a spacing of the mean radius, and the power of the spacing
-# that they grow with: measured in dense packings of radii that are equal, or in the ratio 3 or 10
-SEGMENTS_PER_VARIANCE, GROWTH_WITH_SPACING = 0.068, 0.75
+# By dimension: segments for a standard error of 1, at a spacing of the mean radius, and the power of
+# the spacing that they grow with: measured in dense packings of radii that are equal, or in the
+# ratio 3 or 10.
+NOISE = {3: (0.068, 0.75), 2: (0.068, 0.75)}
 # of what is scanned: far closer lines than anyone could wait for
 CLOSEST = 1e-9
 # of the mean radius: lines so far apart know nothing of one another
@@ -81,6 +84,8 @@ class Plan:
     """What counts at the window's surface, see :mod:`scanfab.scan.edges`."""
     lists_gaps: bool
     """Whether sums for one cut-off do not suffice."""
+    space: Space = SPACE
+    """The plane in which all grains of the series lie, if they are discs."""
     notes: tuple[Note, ...] = ()
     """What is doubtful about the settings, for a user who has chosen them."""
 
@@ -136,6 +141,8 @@ def make_plan(settings: Settings, sample: Sample, strains: Strains | None = None
         If the packing cannot be measured.
     """
     refuse_impossible(sample)
+    space = sample.packing.space
+    settings = settings_in(settings, space)
     grains = sample.grains
     radii = sample.packing.radius[grains]
     lengths = {
@@ -144,7 +151,8 @@ def make_plan(settings: Settings, sample: Sample, strains: Strains | None = None
         "rmax": float(radii.max()),
     }
     box = SurfaceBox.of(sample.packing, sample.gathered)
-    plan = _without_lengths(settings, strains or Strains.of(settings))
+    strains = replace(strains or Strains.of(settings), axis=settings.axis)
+    plan = _without_lengths(settings, strains, space)
     notes: list[Note] = []
     windows = windows_of(sample, settings) if settings.needs_window else []
     for window in windows:
@@ -191,17 +199,21 @@ class _Scanned(NamedTuple):
 
     reach: float
     area: float
-    """That lines of one direction pierce, in the mean of all."""
+    """That lines of one direction pierce, in the mean of all; in a plane a length."""
     depth: float
-    """Radius of the sphere in which lines are as long in the mean."""
+    """Three quarters of the mean length of the lines in it: of a sphere the radius."""
+    space: Space
 
 
 def _scanned(box: SurfaceBox, window: Convex | None) -> _Scanned:
-    if window is None or window.is_sphere:
+    space = box.space
+    if space.is_plane:
+        window = window or circle(0.5 * box.smallest_extent, space)
+    elif window is None or window.is_sphere:
         reach = 0.5 * box.smallest_extent if window is None else window.reach
-        return _Scanned(reach, math.pi * reach**2, reach)
+        return _Scanned(reach, math.pi * reach**2, reach, space)
     area = window.mean_shadow
-    return _Scanned(window.reach, area, 0.75 * window.volume / area)
+    return _Scanned(window.reach, area, 0.75 * window.volume / area, space)
 
 
 def _lines(
@@ -224,11 +236,12 @@ def _lines(
             f"spacing: {asked:g} between lines is less than {CLOSEST:g} of the radius of what they "
             f"scan ({reach:g}): choose a wider spacing"
         )
-    lines = scanned.area / asked**2
+    lines = scanned.space.lines(scanned.area, asked)
     auto = "directions" if settings.directions is None else ""
     fewest, most = (REPLICATES, MOST_REPLICATES) if auto else (1, REPLICATES)
     replicates = int(min(max(lines / FEWEST_LINES, fewest), most))
-    return {"spacing": asked * math.sqrt(replicates), "replicates": replicates, "auto": auto}
+    spacing = asked * scanned.space.apart(replicates)
+    return {"spacing": spacing, "replicates": replicates, "auto": auto}
 
 
 def plan_without_grains(settings: Settings) -> Plan:
@@ -236,7 +249,7 @@ def plan_without_grains(settings: Settings) -> Plan:
     return _without_lengths(settings, Strains.of(settings))
 
 
-def _without_lengths(settings: Settings, strains: Strains) -> Plan:
+def _without_lengths(settings: Settings, strains: Strains, space: Space = SPACE) -> Plan:
     """What settings say by themselves."""
     return Plan(
         samples=sample_rule(settings),
@@ -253,13 +266,14 @@ def _without_lengths(settings: Settings, strains: Strains) -> Plan:
         more_columns=settings.more_columns,
         cutoff=math.nan,
         cutoffs=(math.nan,) * max(len(settings.cutoffs), 1),
-        rule=settings.directions or direction_rule(AUTO_RULE),
+        rule=settings.directions or usual_rule(space),
         spacing=math.nan,
         replicates=0,
         auto="",
         rule_is_asked_for=settings.directions is not None,
         edge=settings.edge,
         lists_gaps=settings.lists_gaps,
+        space=space,
     )
 
 
@@ -271,13 +285,14 @@ def _auto_spacing(
 
     Never so wide that lines get too few, nor closer than is of use: more directions are added then.
     """
-    area, radius = scanned.area, lengths["rmean"]
+    area, radius, space = scanned.area, lengths["rmean"], scanned.space
+    variance, growth = NOISE[space.dimension]
     segments_per_line = max(scanned.depth / (3.0 * radius), 1.0)
     # lines * segments_per_line = segments, and lines are so many axes' area / spacing²
-    lines = SEGMENTS_PER_VARIANCE / settings.tolerance**2 / (REPLICATES * axes * segments_per_line)
-    apart = area / lines / radius**2
+    lines = variance / settings.tolerance**2 / (REPLICATES * axes * segments_per_line)
+    apart = area / lines / radius ** (space.dimension - 1)
     spacing = radius * max(
-        min(math.pow(apart, 1.0 / (2.0 + GROWTH_WITH_SPACING)), WIDE),
-        math.sqrt(apart / WIDE**GROWTH_WITH_SPACING),
+        min(math.pow(apart, 1.0 / (space.dimension - 1.0 + growth)), WIDE),
+        space.apart(apart / WIDE**growth),
     )
-    return min(max(spacing, CLOSE * radius), math.sqrt(area / (4 * FEWEST_LINES)))
+    return min(max(spacing, CLOSE * radius), space.apart(area / (4 * FEWEST_LINES)))

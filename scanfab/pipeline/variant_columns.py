@@ -12,7 +12,7 @@ import numpy as np
 
 from scanfab.base.note import Note
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.fabric.jackknife import BLOCKS, BlockedSums
+from scanfab.fabric.jackknife import BlockedSums, blocks_of
 from scanfab.fabric.registry import OWN_FABRICS, Measured, checked_values
 from scanfab.fabric.window import WINDOW_ALPHA, window_alpha
 from scanfab.packing.columns import RV_COLUMN, sample_values
@@ -79,6 +79,7 @@ class VariantColumns:
             normals=np.compress(chosen, contacts.normal, axis=0),
             points=points,
             blocks=self._blocks_of(points),
+            space=self.plan.space,
         )
 
     @cached_property
@@ -138,7 +139,7 @@ class VariantColumns:
     def _solid_fraction(self) -> float | None:
         """1 - void length / line length in the window, weighted like the directions."""
         cell = self.sample.packing.cell
-        if not self.variant.in_window and not (cell is not None and all(cell.periodic)):
+        if not self.variant.in_window and not (cell is not None and cell.is_endless):
             return None
         weights = self.plan.rule.weights
         length = float(weights @ self.sums.line_length[:, self.which].sum(axis=0))
@@ -153,7 +154,7 @@ class VariantColumns:
             gaps.axes,
             self.measurement.block_rule.weights,
             gaps.kept(*words),
-            [gaps.kept(*words, without=block) for block in range(BLOCKS)],
+            [gaps.kept(*words, without=block) for block in range(blocks_of(self.plan.space))],
         )
 
     def _window(self) -> dict[str, Any]:

@@ -23,7 +23,7 @@ from scanfab.scan.edges import CLIP, EDGES
 if TYPE_CHECKING:
     from scanfab.pipeline.settings import Settings
 
-__all__ = ["SHAPES", "WindowSettings", "check_window"]
+__all__ = ["SHAPES", "WindowSettings", "check_sizes", "check_window"]
 
 # of windows, with the sizes that each takes
 SHAPES = {
@@ -133,7 +133,7 @@ class WindowSettings:
         parse=parse_sizes,
         group="window",
         help="In the dump's units, instead of `rv`: edges of the box, radius and height of the "
-        "cylinder, semi-axes of the ellipsoid.",
+        "cylinder, semi-axes of the ellipsoid; of discs two.",
         meaning="edges of the box, radius and height of the cylinder or semi-axes of the ellipsoid "
         "instead, dump's unit",
         takes="str or sequence of float",
@@ -186,9 +186,8 @@ def check_window(chosen: Settings) -> None:
     if sizes and not takes:
         hint = "choose `rv_radius`" if shape == "sphere" else "its file says how large it is"
         raise SettingsError(f"rv_size: the shape {shape} takes none: {hint}")
-    if sizes and len(sizes) != 2 + (shape != "cylinder"):
-        found = ",".join(f"{size:g}" for size in sizes)
-        raise SettingsError(f"rv_size: expected {takes} (`rv_shape` is {shape}), found {found}")
+    if shape == "cylinder":
+        check_sizes(chosen, 3)
     if chosen.rv_radius is not None and shape != "sphere":
         hint = f"choose `rv_size` ({takes})" if takes else "its file says how large it is"
         raise SettingsError(f"rv_radius: is that of a sphere, but `rv_shape` is {shape}: {hint}")
@@ -202,6 +201,19 @@ def check_window(chosen: Settings) -> None:
             f"rv_follows: a file of strains ({chosen.strain}) does not say how the sample "
             f"deforms along all axes: choose another `strain`, or leave out `rv_follows`"
         )
+
+
+def check_sizes(chosen: Settings, dimension: int) -> None:
+    """SettingsError if the RV has too many sizes, or too few."""
+    shape, sizes = chosen.rv_shape, chosen.rv_size
+    if not sizes or shape not in SHAPES:
+        return
+    takes = SHAPES[shape]
+    if len(sizes) != (2 if shape == "cylinder" else dimension):
+        found = ",".join(f"{size:g}" for size in sizes)
+        if dimension == 2:
+            takes = f"two, {takes.replace(',C', '')}, in the plane of the discs"
+        raise SettingsError(f"rv_size: expected {takes} (`rv_shape` is {shape}), found {found}")
 
 
 def _check_several(chosen: Settings) -> None:
