@@ -67,12 +67,16 @@ class Space:
     @property
     def basis(self) -> FloatArray:
         """Unit vectors along these coordinates, of a plane with its normal last, shape (3, 3)."""
-        return np.eye(3)[[*self.along, *([] if self.across is None else [self.across])]]
+        basis: FloatArray = np.eye(3)[
+            [*self.along, *([] if self.across is None else [self.across])]
+        ]
+        return basis
 
     @property
     def normal(self) -> FloatArray:
         """Of a plane, a unit vector, shape (3,)."""
-        return self.basis[2]
+        normal: FloatArray = self.basis[2]
+        return normal
 
     def axial(self, cosine2: Any) -> Any:
         """

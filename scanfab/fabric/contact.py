@@ -56,9 +56,7 @@ def contact_fabric(normals: npt.ArrayLike, space: Space = SPACE) -> FabricTensor
     return FabricTensor(vectors.T @ vectors / len(vectors), space)
 
 
-def axial_error(
-    normals: npt.ArrayLike, axis: npt.ArrayLike, space: Space = SPACE
-) -> float | None:
+def axial_error(normals: npt.ArrayLike, axis: npt.ArrayLike, space: Space = SPACE) -> float | None:
     """
     Standard error of the contact fabric's axial anisotropy, dimensionless.
 

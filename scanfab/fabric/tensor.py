@@ -25,9 +25,7 @@ __all__ = [
 COMPONENTS = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 
 
-def axial(
-    tensor: npt.NDArray[np.float64], axis: npt.ArrayLike, space: Space = SPACE
-) -> FloatArray:
+def axial(tensor: npt.NDArray[np.float64], axis: npt.ArrayLike, space: Space = SPACE) -> FloatArray:
     """
     Signed anisotropy along an axis: a·G·a - (1 - a·G·a)/2, in a plane a·G·a - b·G·b.
 

@@ -120,7 +120,8 @@ class Cell:
         if self.space.across is None:
             return self.vectors
         inside = self.vectors[:, self.space.across] == 0.0
-        return self.vectors[inside][:, list(self.space.along)]
+        own: FloatArray = self.vectors[inside][:, list(self.space.along)]
+        return own
 
     @property
     def volume(self) -> float:

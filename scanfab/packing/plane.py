@@ -37,7 +37,7 @@ def space_of(position: FloatArray) -> Space:
     >>> space_of(np.column_stack([line, line**2, np.ones(12)]))
     Space: the plane x-y
     """
-    shared = np.flatnonzero(_shared(position)) if len(position) >= FEWEST else ()
+    shared = np.flatnonzero(_shared(position)) if len(position) >= FEWEST else np.arange(0)
     return Space(int(shared[0])) if len(shared) == 1 else SPACE
 
 

@@ -26,9 +26,9 @@ from scanfab.pipeline.calibration_ladders import (
 )
 from scanfab.pipeline.frame import OTHER_CUTOFFS, compute_frame
 from scanfab.pipeline.frames import Frames, Source
+from scanfab.pipeline.in_plane import settings_in
 from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.plan import Plan, make_plan
-from scanfab.pipeline.in_plane import settings_in
 from scanfab.pipeline.settings import Length, Settings
 from scanfab.pipeline.tolerance import TOLERANCE_MISSED, missing_work
 from scanfab.pipeline.values import parse_frames

@@ -14,7 +14,7 @@ from scanfab.base.convex import Convex, sphere
 from scanfab.base.note import Note
 from scanfab.base.typing import FloatArray
 from scanfab.packing.sample import Sample, Variant
-from scanfab.pipeline.plan import CLOSE, Plan
+from scanfab.pipeline.plan import NOISE, Plan
 from scanfab.pipeline.solids import solids_of
 from scanfab.pipeline.tolerance import scan_to_tolerance
 from scanfab.scan.directions import DirectionRule, design_of, usual_rule
@@ -191,7 +191,7 @@ def _block_spacing(solids: Solids, rule: DirectionRule, sums: ScanSums, plan: Pl
     """As close as is of use, but no closer than the sample's scatter is worth."""
     if not len(solids.grain_radius):
         return solids.reach
-    spacing = CLOSE * float(solids.grain_radius.mean())
+    spacing = NOISE[solids.space.dimension].close * float(solids.grain_radius.mean())
     axes = BLOCK_REPLICATES * len(rule)
     steps = plan.space.lines(float(sums.steps.mean()) / len(plan.rule), spacing / plan.spacing)
     # a line costs as much as a chord, also if it meets nothing

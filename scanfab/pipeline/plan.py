@@ -21,7 +21,7 @@ from scanfab.pipeline.settings import Settings, Vector
 from scanfab.pipeline.strain import Strains
 from scanfab.scan.directions import DirectionRule, usual_rule
 
-__all__ = ["CLOSE", "NOISE", "Plan", "make_plan", "plan_without_grains"]
+__all__ = ["NOISE", "Plan", "make_plan", "plan_without_grains"]
 
 # replicates of a fixed scan, and at least of an auto scan
 REPLICATES = 16
@@ -29,16 +29,28 @@ REPLICATES = 16
 MOST_REPLICATES = 64
 # lines of one axis below which a replicate's mean lengths are too uncertain to be of use
 FEWEST_LINES = 30
-# By dimension: segments for a standard error of 1, at a spacing of the mean radius, and the power of
-# the spacing that they grow with: measured in dense packings of radii that are equal, or in the
-# ratio 3 or 10.
-NOISE = {3: (0.068, 0.75), 2: (0.068, 0.75)}
 # of what is scanned: far closer lines than anyone could wait for
 CLOSEST = 1e-9
 # of the mean radius: lines so far apart know nothing of one another
 WIDE = 3.0
-# of the mean radius: closer lines say little more, as all that remains is the choice of directions
-CLOSE = 0.3
+
+
+class Noise(NamedTuple):
+    """What the error of a scan costs, as it was measured."""
+
+    segments: float
+    """For a standard error of 1, at a spacing of the mean radius."""
+    growth: float
+    """The power of the spacing that they grow with."""
+    close: float
+    """Of the mean radius: closer lines say little more than those between which they lie."""
+
+
+# By dimension. In dense packings of spheres whose radii are equal, or in the ratio 3 or 10, the
+# choice of directions is all that remains of the noise at a third of a radius. In dense packings of
+# discs, in the ratio 1.9 (sample_data/lammps_biaxial), it takes 0.025 to 0.039 segments at one
+# radius, 0.011 to 0.016 at 0.3 and 0.004 to 0.006 at 0.1, before shear and after.
+NOISE = {3: Noise(0.068, 0.75, 0.3), 2: Noise(0.032, 0.8, 0.1)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,13 +298,13 @@ def _auto_spacing(
     Never so wide that lines get too few, nor closer than is of use: more directions are added then.
     """
     area, radius, space = scanned.area, lengths["rmean"], scanned.space
-    variance, growth = NOISE[space.dimension]
+    noise = NOISE[space.dimension]
     segments_per_line = max(scanned.depth / (3.0 * radius), 1.0)
     # lines * segments_per_line = segments, and lines are so many axes' area / spacing²
-    lines = variance / settings.tolerance**2 / (REPLICATES * axes * segments_per_line)
+    lines = noise.segments / settings.tolerance**2 / (REPLICATES * axes * segments_per_line)
     apart = area / lines / radius ** (space.dimension - 1)
     spacing = radius * max(
-        min(math.pow(apart, 1.0 / (space.dimension - 1.0 + growth)), WIDE),
-        space.apart(apart / WIDE**growth),
+        min(math.pow(apart, 1.0 / (space.dimension - 1.0 + noise.growth)), WIDE),
+        space.apart(apart / WIDE**noise.growth),
     )
-    return min(max(spacing, CLOSE * radius), space.apart(area / (4 * FEWEST_LINES)))
+    return min(max(spacing, noise.close * radius), space.apart(area / (4 * FEWEST_LINES)))

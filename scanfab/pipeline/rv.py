@@ -83,7 +83,7 @@ def _window(sample: Sample, settings: Settings, fraction: float, surfaces: Surfa
 
 
 def _in_plane(place: float, sample: Sample) -> float:
-    """The coordinate of the discs' plane, for an RV that may have been put beside it by rounding."""
+    """The coordinate of the discs' plane, for an RV that lies beside it by rounding."""
     packing = sample.packing
     if abs(place - packing.place_across) > packing.radius.max():
         raise SettingsError(

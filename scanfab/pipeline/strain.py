@@ -100,10 +100,9 @@ def shear_strain(cell: Cell | None, first: Cell | None) -> float | None:
     Returns
     -------
     float or None
-        √(2/3 e:e) of the deviator e of the logarithmic strain, in a plane √(1/2 e:e), dimensionless,
-        never negative: of a compression along an axis, with the same strain across it, what does
-        work on the deviator stress. None unless both cells repeat along all vectors. Each vector is
-        taken for the one that it was in the first frame.
+        √(2/3 e:e) of the deviator e of the logarithmic strain, in a plane √(1/2 e:e):
+        dimensionless, never negative, and what the deviator stress works on. None unless both cells
+        repeat along all vectors. Each vector is taken for the one that it was in the first frame.
 
     Examples
     --------

@@ -14,7 +14,7 @@ from scanfab.base.errors import SettingsError
 from scanfab.base.note import Note
 from scanfab.base.spelling import spelt_apart, spelt_time
 from scanfab.fabric.void import void_fabric
-from scanfab.pipeline.plan import CLOSE, NOISE, Plan
+from scanfab.pipeline.plan import NOISE, Plan
 from scanfab.scan.directions import design_of, rule_of
 from scanfab.scan.following import FollowedTooFarError
 from scanfab.scan.scan import ScanSums, scan_lines
@@ -183,8 +183,9 @@ def _with_more_axes(plan: Plan, missing: float) -> Plan:
 
 def _with_closer_lines(plan: Plan, missing: float, solids: Solids) -> Plan:
     """The plan with lines as close as is of use, and a finer rule for what is missing then."""
-    power = plan.space.dimension - 1.0 + NOISE[plan.space.dimension][1]
-    closest = min(CLOSE * float(solids.grain_radius.mean()), plan.spacing)
+    noise = NOISE[plan.space.dimension]
+    power = plan.space.dimension - 1.0 + noise.growth
+    closest = min(noise.close * float(solids.grain_radius.mean()), plan.spacing)
     spacing = max(plan.spacing / missing ** (1.0 / power), closest)
     missing /= (plan.spacing / spacing) ** power
     plan = replace(plan, spacing=spacing)
@@ -243,7 +244,7 @@ def _counted_variants(sums: ScanSums, plan: Plan, solids: Solids, left: float) -
         if missing[name] > HELD_BACK * usual or (usual < math.inf and _too_few_lines(sums, name))
     }
     # closer lines tell more than more of them; and early estimates of the error are uncertain
-    growth = 1.0 + NOISE[plan.space.dimension][1] / (plan.space.dimension - 1)
+    growth = 1.0 + NOISE[plan.space.dimension].growth / (plan.space.dimension - 1)
     reach = GROWTH * (1.0 + left / sums.replicates) ** growth
     near = "".join(n for n in missing if n not in held_back and missing[n] <= reach)
     return near or plan.variants

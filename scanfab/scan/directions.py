@@ -230,7 +230,7 @@ def plane_rule(count: int, plane: Space) -> DirectionRule:
 
 
 def usual_rule(space: Space) -> DirectionRule:
-    """The rule of a scan that chooses its directions itself, before it has seen how far off it is."""
+    """The first rule of a scan that chooses its directions itself."""
     return plane_rule(AUTO_STEPS, space) if space.is_plane else direction_rule(AUTO_RULE)
 
 

@@ -275,8 +275,7 @@ def _slope_error(group: Sequence[Mapping[str, Any]], strain_max: float | None) -
 
 def _blocks(group: Sequence[Mapping[str, Any]]) -> int:
     """How many blocks the rows were parted into: those of samples in a plane have no upper half."""
-    upper = range(BLOCKS // 2 + 1, BLOCKS + 1)
-    names = [f"{name}_without_{block}" for name in ("alpha_c_axial", "alpha_vs_axial") for block in upper]
+    names = [f"alpha_c_axial_without_{block}" for block in range(BLOCKS // 2 + 1, BLOCKS + 1)]
     has_upper = any(row.get(name) is not None for row in group for name in names)
     return BLOCKS if has_upper else BLOCKS // 2
 
