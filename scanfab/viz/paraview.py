@@ -13,13 +13,13 @@ import numpy as np
 from scanfab.base.errors import SettingsError
 from scanfab.base.files import check_folder
 from scanfab.base.typing import FloatArray
-from scanfab.fabric.distribution import mean_length_function, sphere_points
+from scanfab.fabric.distribution import direction_points, mean_length_function
 from scanfab.fabric.tensor import COMPONENTS
 from scanfab.packing.sample import VARIANTS
 from scanfab.packing.window import Window
 from scanfab.pipeline.frame import FrameResult
 from scanfab.pipeline.measurement import Measurement
-from scanfab.pipeline.settings import Settings, Vector
+from scanfab.pipeline.settings import Settings
 from scanfab.scan.lines import line_triads
 from scanfab.scan.segments import Segments, sample_segments
 from scanfab.table.reading import number_of
@@ -42,8 +42,6 @@ class VtkFolder:
     ----------
     folder : Path
         Is made if it does not exist.
-    axis : tuple of float
-        Loading axis, along which half of the scan lines run.
     go_on : bool, optional
         Keep the frames of an earlier run in the collections.
 
@@ -53,14 +51,13 @@ class VtkFolder:
         If the folder cannot be made or written to.
     """
 
-    def __init__(self, folder: Path, axis: Vector, go_on: bool = False) -> None:
+    def __init__(self, folder: Path, go_on: bool = False) -> None:
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise SettingsError(f"vtk: {folder} cannot be made: {error.strerror}") from None
         check_folder(folder / "grains.pvd")
         self.folder = folder
-        self.axis = axis
         self.go_on = go_on
         self._collections: dict[str, vtk.Collection] = {}
         # frames come from several threads, and VTK is not made for that
@@ -89,18 +86,20 @@ class VtkFolder:
         rv = number_of(row, "rv")
         measured, name = result.measured(row.variant, rv), _name(row.variant, rv)
         center = measured.solids.origin
-        lines = scan_line_sample(measured, row.variant, self.axis)
+        lines = scan_line_sample(measured, row.variant)
         mesh = vtk.line_mesh(lines, measured.plan.cutoff)
         self._save(f"lines-{name}", mesh, result, fields)
-        function = mean_length_function(measured.sums.axes, *measured.kept(row.variant))
+        space = measured.plan.space
+        kept = measured.kept(row.variant)
+        function = mean_length_function(measured.sums.axes, *kept, space)
         if function is not None and row.alpha_vs is not None:
-            points, weights = sphere_points()
-            surface = vtk.distribution_mesh(points, function(points), weights)
+            points, weights = direction_points(space)
+            surface = vtk.distribution_mesh(points, function(points), weights, space)
             self._save(f"distribution-{name}", surface, result, fields)
         tensors = _tensors(row)
         if tensors:
             size = 0.3 * _reach(result)
-            mesh = vtk.ellipsoid_mesh(tensors, center, size)
+            mesh = vtk.ellipsoid_mesh(tensors, center, size, space)
             self._save(f"ellipsoids-{name}", mesh, result, fields)
             mesh = vtk.tensor_points(tensors, center)
             self._save(f"tensors-{name}", mesh, result, fields)
@@ -126,7 +125,7 @@ def vtk_folders(folder: Path, count: int, settings: Settings, go_on: bool) -> li
     if settings.cutoffs:
         raise SettingsError("vtk: files for ParaView are of one cut-off: leave out `cutoffs`")
     own = [folder / f"series-{number}" for number in range(1, count + 1)]
-    return [VtkFolder(one, settings.axis, go_on) for one in (own if count > 1 else [folder])]
+    return [VtkFolder(one, go_on) for one in (own if count > 1 else [folder])]
 
 
 def _windows(result: FrameResult) -> Iterator[tuple[float | None, Window]]:
@@ -142,15 +141,15 @@ def _name(kind: str, rv: float | None) -> str:
     return kind if rv is None else f"{kind}-rv{rv:g}"
 
 
-def scan_line_sample(
-    measured: Measurement, variant: str, axis: Vector, lines: int = LINES
-) -> Segments:
+def scan_line_sample(measured: Measurement, variant: str, lines: int = LINES) -> Segments:
     """A few scan lines along the loading axis and across it, in the dump's coordinates."""
+    axis = measured.plan.axis
     position, radius, window = measured.spheres_of(VARIANTS[variant])
-    frame = line_triads(np.array([axis]))[0]
+    space = measured.plan.space
+    frame = line_triads(np.array([axis]), space)[0]
     # along the axis, and along the first direction across it
-    frames = np.stack([frame, np.roll(frame, -1, axis=0)])
-    found = sample_segments(position, radius, frames, lines, window)
+    across = line_triads(frame[:1], space)[0] if space.is_plane else np.roll(frame, -1, axis=0)
+    found = sample_segments(position, radius, np.stack([frame, across]), lines, window, space)
     return replace(found, ends=found.ends + measured.solids.origin)
 
 

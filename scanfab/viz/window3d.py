@@ -18,7 +18,7 @@ from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.base.vtk_log import quiet_vtk
 from scanfab.viz.figures.style import COLOURS
 from scanfab.viz.overlay import SIZE, Framing, add_scale, add_words
-from scanfab.viz.scene import Grains, Scene
+from scanfab.viz.scene import Grains, Scene, towards_viewer
 from scanfab.viz.vtk_files import window_mesh
 
 __all__ = ["check_screen", "show_scene"]
@@ -82,9 +82,9 @@ def _show(scene: Scene, up: FloatArray, title: str, screenshot: Path | None) -> 
     plotter: Any = pyvista.Plotter(
         off_screen=screenshot is not None, window_size=list(SIZE), title=title or "scanfab"
     )
-    toward = np.cross(np.eye(3)[np.argmin(np.abs(up))], up)
-    toward /= np.linalg.norm(toward)
-    look = toward if scene.lines is not None else toward + 0.45 * np.cross(up, toward) + 0.35 * up
+    toward = towards_viewer(up, scene.space)
+    is_section = scene.lines is not None or scene.space.is_plane
+    look = toward if is_section else toward + 0.45 * np.cross(up, toward) + 0.35 * up
     drawn = _drawn(scene, toward, look)
     _add_grains(plotter, scene, drawn, toward)
     for window in (scene.window, *scene.smaller):
@@ -152,7 +152,7 @@ def _drawn(scene: Scene, toward: FloatArray, look: FloatArray) -> BoolArray:
     """
     grains = scene.grains
     branch = grains.position - scene.center
-    if scene.lines is not None:
+    if scene.lines is not None or scene.space.is_plane:
         shown = branch @ toward < grains.radius
     elif scene.window is not None:
         shown = grains.in_window | (branch @ look <= 0.0)
@@ -174,16 +174,20 @@ def _add_grains(plotter: Any, scene: Scene, drawn: BoolArray, toward: FloatArray
     """Balls; if the scene has lines, cut by the plane through the centre."""
     grains = scene.grains
     height = (grains.position - scene.center) @ toward
+    is_section = scene.lines is not None or scene.space.is_plane
     for colour, kind in classes(grains, scene.window is not None).values():
         chosen = kind & drawn
         if not chosen.any():
             continue
-        balls = _balls(grains.position[chosen], grains.radius[chosen])
-        if scene.lines is not None:
-            balls = balls.clip(normal=toward, origin=scene.center)
+        if is_section:
             _add_section(
                 plotter, grains, chosen & (height > -grains.radius), height, toward, colour
             )
+        if scene.space.is_plane:
+            continue
+        balls = _balls(grains.position[chosen], grains.radius[chosen])
+        if is_section:
+            balls = balls.clip(normal=toward, origin=scene.center)
         plotter.add_mesh(balls, color=colour, smooth_shading=True, ambient=0.2, specular=0.2)
 
 
@@ -224,7 +228,7 @@ def _add_window(plotter: Any, scene: Scene, window: Convex, toward: FloatArray) 
     import pyvista
 
     center = tuple(scene.center)
-    if scene.lines is None:
+    if scene.lines is None and not window.is_flat:
         surface = window_mesh(scene.center, window, nsub=5)
         smooth = not len(window.planes)
         plotter.add_mesh(surface, color=COLOURS["blue"], opacity=0.12, smooth_shading=smooth)
@@ -235,7 +239,8 @@ def _add_window(plotter: Any, scene: Scene, window: Convex, toward: FloatArray) 
             center=center, inner=radius, outer=1.008 * radius, normal=toward, c_res=180
         )
     else:
-        cut = window_mesh(scene.center, window).slice(normal=toward, origin=center)
+        mesh = window_mesh(scene.center, window)
+        cut = mesh if window.is_flat else mesh.slice(normal=toward, origin=center)
         outline = cut.tube(radius=0.004 * window.reach)
     plotter.add_mesh(outline, color=COLOURS["blue"], lighting=False)
 

@@ -17,8 +17,8 @@ from scanfab import (
 )
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.plan import (
-    NOISE,
     FEWEST_LINES,
+    NOISE,
     REPLICATES,
     WIDE,
     make_plan,
