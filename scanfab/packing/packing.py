@@ -160,7 +160,7 @@ class Packing:
     ) -> None:
         if not isinstance(cell, Cell | None):
             raise PackingError(f"cell: expected a Cell, such as Cell([1, 1, 1]), found {cell!r}")
-        centres = _centres(position, dim)
+        centres, dim = _centres(position, dim)
         count = len(centres)
         radii = np.asarray(radius)
         self.radius: FloatArray = cast(
@@ -169,9 +169,9 @@ class Packing:
         self.id: IntArray = cast("id", np.arange(count) if id is None else id, np.int64, (count,))
         check_lengths(centres, self.radius, self.id)
         _check_ids(self.id)
-        self.space: Space = _space_of(centres, dim or np.shape(position)[1])
+        self.space: Space = _space_of(centres, dim)
         if cell is not None and self.space.is_plane:
-            cell = cell_in_plane(cell, self.space, self.radius)
+            cell = cell_in_plane(cell, self.space)
         turns: IntArray | None = None
         self.position: FloatArray = centres
         if cell is not None and not lies_within(cell, centres, 0.0, 1.0):
@@ -255,16 +255,26 @@ def _space_of(position: FloatArray, dim: int | Space) -> Space:
     return flat_space(position) if dim == 2 else SPACE
 
 
-def _centres(position: npt.ArrayLike, dim: int | Space | None) -> FloatArray:
-    """Positions of three coordinates, from those of three or of two."""
+def _centres(position: npt.ArrayLike, dim: int | Space | None) -> tuple[FloatArray, int | Space]:
+    """Positions of three coordinates, from those of three or of two, and their dimension."""
     if dim not in (None, 2, 3) and not isinstance(dim, Space):
         raise PackingError(f"dim: expected 2 or 3, found {dim!r}")
-    if np.ndim(position) != 2 or np.shape(position)[1] != 2:
-        return cast("position", position, np.float64, (None, 3))
+    if not _are_flat(position):
+        return cast("position", position, np.float64, (None, 3)), dim or 3
     if dim == 3:
         raise PackingError("dim: expected 2, as the positions have two coordinates, found 3")
     flat: FloatArray = cast("position", position, np.float64, (None, 2))
-    return np.column_stack([flat, np.zeros(len(flat))])
+    return np.column_stack([flat, np.zeros(len(flat))]), dim or 2
+
+
+def _are_flat(position: npt.ArrayLike) -> bool:
+    """Whether positions have two coordinates."""
+    try:
+        shape = np.shape(position)
+    except ValueError:
+        # rows of different lengths
+        return False
+    return len(shape) == 2 and shape[1] == 2
 
 
 def _wall_contacts(values: npt.ArrayLike | None, count: int) -> IntArray:

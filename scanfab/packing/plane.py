@@ -100,12 +100,11 @@ def _shared(position: FloatArray) -> BoolArray:
     return np.asarray(np.all(position == position[0], axis=0))
 
 
-def cell_in_plane(cell: Cell, space: Space, radius: FloatArray) -> Cell:
+def cell_in_plane(cell: Cell, space: Space) -> Cell:
     """
     The cell of discs: it does not repeat across their plane.
 
-    There it has one vector, along the normal and as long as the widest disc. Its other vectors lie
-    in the plane.
+    There it has one vector, along the normal. Its other vectors lie in the plane.
 
     Raises
     ------
@@ -120,6 +119,6 @@ def cell_in_plane(cell: Cell, space: Space, radius: FloatArray) -> Cell:
         )
     out = int(leaving[0])
     vectors = cell.vectors.copy()
-    vectors[out] = 2.0 * float(radius.max(initial=0.0) or 1.0) * space.normal
+    vectors[out] *= space.normal
     one, two, three = (repeats and k != out for k, repeats in enumerate(cell.periodic))
     return Cell(vectors, (one, two, three), cell.origin, space)

@@ -81,9 +81,11 @@ def solids_of(
     if packing.cell is not None and packing.is_periodic:
         vectors, periodic = packing.cell.short_vectors, np.array(packing.cell.periodic)
         if space.across is not None:
-            # the one across the plane comes last
+            # the one across the plane comes last, as long as discs are wide: then what is expected
+            # of mean free paths in space holds here, too
             order = np.argsort(vectors[:, space.across] != 0.0, kind="stable")
             vectors, periodic = vectors[order], periodic[order]
+            vectors[2] = 2.0 * float(radius.mean()) * space.normal
         every = every._replace(vectors=vectors, periodic=periodic)
     around = every if edge == START and shape is not None else None
     margin = 0.0 if around is None else margin_of(around)

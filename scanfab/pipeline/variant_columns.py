@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterator
 from dataclasses import replace
 from functools import cached_property
@@ -110,7 +109,7 @@ class VariantColumns:
             "lines": int(self.sums.lines[:, self.which].sum()),
             "segments": self.segments,
             # of all replicates together, as a fixed scan is asked for
-            "spacing": self.plan.spacing / math.sqrt(self.sums.replicates),
+            "spacing": self.plan.spacing / self.plan.space.apart(self.sums.replicates),
             "cutoff": self.plan.cutoffs[self.place],
         }
 

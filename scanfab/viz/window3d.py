@@ -181,7 +181,12 @@ def _add_grains(plotter: Any, scene: Scene, drawn: BoolArray, toward: FloatArray
             continue
         if is_section:
             _add_section(
-                plotter, grains, chosen & (height > -grains.radius), height, toward, colour
+                plotter,
+                grains,
+                chosen & (height > -grains.radius),
+                height,
+                toward,
+                colour if scene.space.is_plane and scene.lines is None else _pale(colour),
             )
         if scene.space.is_plane:
             continue
@@ -189,6 +194,14 @@ def _add_grains(plotter: Any, scene: Scene, drawn: BoolArray, toward: FloatArray
         if is_section:
             balls = balls.clip(normal=toward, origin=scene.center)
         plotter.add_mesh(balls, color=colour, smooth_shading=True, ambient=0.2, specular=0.2)
+
+
+def _pale(colour: str) -> str:
+    """Of a section, paler than the balls behind it."""
+    import pyvista
+
+    light = 0.45 * np.array(pyvista.Color(colour).float_rgb) + 0.55
+    return str(pyvista.Color(light.tolist()).hex_rgb)
 
 
 def _balls(position: FloatArray, radius: FloatArray) -> Any:
@@ -210,7 +223,7 @@ def _add_section(
     toward: FloatArray,
     colour: str,
 ) -> None:
-    """The disks in which the plane cuts grains, paler than the balls behind."""
+    """The disks in which a plane cuts grains; of discs themselves."""
     import pyvista
 
     if not chosen.any():
@@ -219,8 +232,7 @@ def _add_section(
     cloud.point_data["diameter"] = 2.0 * np.sqrt(grains.radius[chosen] ** 2 - height[chosen] ** 2)
     disk = pyvista.Disc(inner=0.0, outer=0.5, normal=toward, c_res=48)
     disks = cloud.glyph(geom=disk, scale="diameter", orient=False)
-    pale = 0.45 * np.array(pyvista.Color(colour).float_rgb) + 0.55
-    plotter.add_mesh(disks, color=pale.tolist(), lighting=False)
+    plotter.add_mesh(disks, color=colour, lighting=False)
 
 
 def _add_window(plotter: Any, scene: Scene, window: Convex, toward: FloatArray) -> None:
