@@ -13,6 +13,7 @@ import numpy as np
 
 from scanfab.base.errors import PackingError, ReadError, ScanfabNote, ScanfabWarning
 from scanfab.base.typing import FloatArray
+from scanfab.io.bodies import body_numbers
 from scanfab.io.families import Family, nearest
 from scanfab.io.reader import (
     Carries,
@@ -112,6 +113,7 @@ class Frame:
                 grains.radius,
                 id=grains.id,
                 columns=grains.columns,
+                bodies=body_numbers(self.snapshot.path, grains, options.bodies),
                 contacts=listed[0] if listed else None,
                 wall_contacts=_wall_contacts(grains, joined, with_own),
                 cell=grains.cell,

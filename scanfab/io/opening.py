@@ -84,6 +84,7 @@ def read_series(
     radius: float | None = None,
     cell: tuple[float, ...] | PathLike | None = None,
     periodic: str | None = None,
+    bodies: str | None = None,
     dim: str | int = "auto",
 ) -> Series:
     """
@@ -112,6 +113,10 @@ def read_series(
         of each frame: columns ``step`` or ``frame``, ``lx ly lz``, and ``xy xz yz`` if tilted.
     periodic : str, optional
         Letters out of xyz.
+    bodies : str, optional
+        Column that says which clump a sphere belongs to: whole numbers, negative for a sphere that
+        is a grain of its own. By default ``id_multisphere``, ``clumpId``, ``clump_id`` or
+        ``clump``, if there is one; ``id`` makes each sphere a grain.
     dim : {"auto", 2, 3}, optional
         2: discs, whose centres share one coordinate. ``auto``: 2 if those of the first frame that
         has any do so, at least ten, and share no second one; with a note. One for all frames.
@@ -148,7 +153,7 @@ def read_series(
     one_cell = named_cell if isinstance(named_cell, tuple) else None
     cells = None if named_cell is None or one_cell is not None else _cell_file(named_cell)
     options = ReadOptions(
-        checked["columns"] or {}, contact_columns, checked["radius"], one_cell, periodic
+        checked["columns"] or {}, contact_columns, checked["radius"], one_cell, periodic, bodies
     )
     families = sort_into_families([file for path in paths for file in files_of(path)], format)
     grains = choose_grains(paths, families, radius is not None).check()

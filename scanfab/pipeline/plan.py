@@ -79,6 +79,8 @@ class Plan:
     """What the windows follow."""
     more_columns: tuple[str, ...]
     """Of the table, behind those that it always has."""
+    groups: tuple[str, ...]
+    """Of further columns, see :data:`scanfab.fabric.registry.GROUPS`."""
     cutoff: float
     """Of the scan that is to meet the tolerance."""
     cutoffs: tuple[float, ...]
@@ -276,6 +278,7 @@ def _without_lengths(settings: Settings, strains: Strains, space: Space = SPACE)
         rvs=sizes_of(settings),
         deformation=None,
         more_columns=settings.more_columns,
+        groups=settings.with_,
         cutoff=math.nan,
         cutoffs=(math.nan,) * max(len(settings.cutoffs), 1),
         rule=settings.directions or usual_rule(space),
