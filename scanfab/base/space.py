@@ -87,9 +87,30 @@ class Space:
         return self.dimension / (self.dimension - 1.0) * cosine2 - 1.0 / (self.dimension - 1.0)
 
     @property
+    def identity(self) -> FloatArray:
+        """The unit tensor; 0 across a plane, shape (3, 3)."""
+        return np.diag([1.0 if k in self.along else 0.0 for k in range(3)])
+
+    @property
+    def second_order(self) -> float:
+        """F = 15/2 (G - I/3) is the second order of a density of directions; 4 (G - I/2)."""
+        return 7.5 if self.across is None else 4.0
+
+    @property
+    def intensity(self) -> float:
+        """a = √(3/2 F:F), in a plane √(1/2 F:F)."""
+        return 1.5 if self.across is None else 0.5
+
+    @property
     def ball(self) -> float:
         """The volume of a ball of radius 1, of a disc the area."""
         return 4.0 / 3.0 * np.pi if self.across is None else np.pi
+
+    def volume(self, radius: FloatArray, share: FloatArray | float = 1.0) -> FloatArray:
+        """Of balls, or a share of each; of discs the area."""
+        if self.across is None:
+            return np.asarray(share * 4.0 / 3.0 * np.pi * radius**3)
+        return np.asarray(share * np.pi * radius**2)
 
     @property
     def unit_shadow(self) -> float:

@@ -189,7 +189,7 @@ class Packing:
         self.bodies: Bodies | None = None
         if bodies is not None:
             numbers = cast("bodies", bodies, np.int64, (count,))
-            self.bodies = bodies_of(numbers, self.position, self.radius, cell)
+            self.bodies = bodies_of(numbers, self.position, self.radius, cell, self.space)
         self.wall_contacts: IntArray = _wall_contacts(wall_contacts, count)
         self.cell = cell
         self.step = None if step is None else int(step)

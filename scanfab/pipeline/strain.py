@@ -148,9 +148,9 @@ def volumetric_strain(cell: Cell | None, first: Cell | None) -> float | None:
     >>> round(volumetric_strain(Cell([1, 1, 0.9]), Cell([1, 1, 1])), 4)
     0.1054
     """
-    if cell is None or first is None or not all(cell.periodic + first.periodic):
+    if cell is None or first is None or not (cell.is_endless and first.is_endless):
         return None
-    now, before = (np.linalg.det(one.vectors) for one in (cell, first))
+    now, before = (np.linalg.det(one.own_vectors) for one in (cell, first))
     # no -0.0 of a cell that is as it was
     return float(np.log(abs(before / now)))
 
