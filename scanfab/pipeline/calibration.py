@@ -190,7 +190,7 @@ class _Calibrator:
             "spacing": judged(self._spacings()),
             "directions": judged(self._directions()),
             "cutoff": cutoffs,
-            "rv": judged(self._rvs()) if self._rv_has_sizes else [],
+            "rv": judged(self._rvs(), self.space.dimension) if self._rv_has_sizes else [],
         }
         sample = largest(cutoffs, "alpha_vs_axial_sample_se", self._default_cutoff())
         target = max(self.settings.tolerance, OF_SAMPLE * (sample or 0.0))

@@ -216,7 +216,8 @@ class Deformation:
                 'sample deforms: choose `strain="grains"`, or leave out `rv_follows`'
             )
         origin, edges = _edges(sample, mode)
-        if abs(np.linalg.det(edges / max(float(np.abs(edges).max()), 1e-300))) < 1e-9:
+        own = _own_edges(edges, sample.packing.space)
+        if abs(np.linalg.det(own / max(float(np.abs(own).max()), 1e-300))) < 1e-9:
             raise SettingsError(f"rv_follows: the {mode} it is to follow has no volume")
         return cls(mode, origin, edges)
 
@@ -230,6 +231,13 @@ class Deformation:
             Window(origin + gradient @ (one.center - self.origin), one.shape.deformed(gradient))
             for one in windows
         ]
+
+
+def _own_edges(edges: FloatArray, space: Space) -> FloatArray:
+    """Those that lie in the space: of a plane two, there."""
+    if space.across is None:
+        return edges
+    return edges[list(space.along)][:, edges[space.across] == 0.0]
 
 
 def _edges(sample: Sample, mode: str) -> tuple[FloatArray, FloatArray]:

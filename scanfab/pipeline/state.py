@@ -233,7 +233,7 @@ def cut_volumes(
     return space.volume(radius, found)
 
 
-def _points_in_ball(space: Space) -> FloatArray:
+def _points_in_ball(space: Space = SPACE) -> FloatArray:
     """Points that fill the unit ball, or disc, evenly, each with its opposite, shape (P, 3)."""
     from scipy.stats import qmc
 

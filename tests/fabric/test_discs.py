@@ -73,9 +73,7 @@ def test_forces_of_second_order():
         (normal_force_fabric(normals, force_n, Y, XY), 0.04),
         (tangential_force_fabric(normals, force, Y, XY), 0.015),
     ):
-        np.testing.assert_allclose(
-            found.matrix, np.diag([-expected, expected, 0.0]), atol=1e-5
-        )
+        np.testing.assert_allclose(found.matrix, np.diag([-expected, expected, 0.0]), atol=1e-5)
         assert found.axial == pytest.approx(2 * expected, abs=1e-5)
     stress = force.T @ (branch[:, None] * normals)
     ratio = (stress[1, 1] - stress[0, 0]) / (stress[0, 0] + stress[1, 1])

@@ -234,3 +234,24 @@ def test_several_rvs_and_cutoffs(discs):
     table = compute(Packing(*discs), variants="cd", rv="0.4,0.7", cutoffs="0.3,0.6", **FAST)
     assert [row.rv for row in table] == [0.4, 0.4, 0.7, 0.7] * 2
     assert {row.cutoff for row in table} == {0.3, 0.6}
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1e7])
+def test_the_unit_of_length_does_not_matter(discs, scale):
+    position, radius = discs
+    options = {"variants": "c", "rv_follows": "strain", "rv_shape": "ellipsoid", "edge": "start"}
+    one, other = (
+        compute(
+            [
+                Packing(position * f * s, radius * s, cell=Cell([14 * f[0] * s, 14 * f[1] * s, s]))
+                for f in (np.ones(2), np.array([1.05, 0.95]))
+            ],
+            **FAST,
+            **options,
+        )
+        for s in (1.0, scale)
+    )
+    for mine, theirs in zip(one, other, strict=True):
+        assert theirs.alpha_vs_axial == pytest.approx(mine.alpha_vs_axial, abs=1e-9)
+        assert theirs.segments == mine.segments
+        assert theirs.mean_length == pytest.approx(mine.mean_length * scale)
