@@ -10,10 +10,9 @@ import numpy as np
 
 from scanfab.base.bodies import BALL, DISC, SQUARE, Body
 from scanfab.base.option import number
-from scanfab.base.space import Space
 from scanfab.base.typing import BoolArray, FloatArray
 
-__all__ = ["EVERYWHERE", "Convex", "Quadric", "circle", "image_of", "sphere"]
+__all__ = ["EVERYWHERE", "Convex", "Quadric", "image_of", "sphere"]
 
 # steps towards the nearest place of a region, and what of a distance is rounding
 STEPS, ROUNDING = 200, 1e-12
@@ -23,9 +22,7 @@ AXES = 200
 
 class Quadric(NamedTuple):
     """
-    The places x with x·(m I + D) x below a level.
-
-    A sphere has D = 0, and so the same numbers however its axes are turned.
+    The places x with x·(m I + D) x below a level; of a sphere D = 0, however its axes are turned.
     """
 
     isotropic: float
@@ -99,7 +96,7 @@ class Convex:
 
     @property
     def is_flat(self) -> bool:
-        """Whether it is one of a plane, the normal of which is the third column of the frame."""
+        """Whether it is one of a plane, across which the third column of the frame stands."""
         return self.body in (DISC, SQUARE)
 
     @property
@@ -112,8 +109,7 @@ class Convex:
         """Projected area in the mean of all directions, to some per cent; of a plane a length."""
         axes = BALL.outline[:: len(BALL.outline) // AXES]
         if self.is_flat:
-            sides = np.linalg.qr(self.frame[:, :2])[0]
-            axes = DISC.outline @ np.column_stack([sides, np.zeros(3)]).T
+            axes = DISC.outline[:, :2] @ np.linalg.qr(self.frame[:, :2])[0].T
         return float(self.overlap(axes, 0.0)[1].mean())
 
     @property
@@ -391,45 +387,13 @@ def sphere(radius: float) -> Convex:
     array([ True, False])
     """
     radius = number("a length above 0", lambda value: 0 < value < math.inf)("radius", radius)
-    return _round(BALL, radius, radius * np.eye(3), np.full(3, radius))
-
-
-def circle(radius: float, plane: Space) -> Convex:
-    """
-    A circle about the origin, of some coordinate plane.
-
-    In the plane it holds what the sphere holds; its volume is an area.
-
-    Parameters
-    ----------
-    radius : float
-        Dump's length unit, above 0.
-    plane : Space
-        In which it lies.
-
-    Returns
-    -------
-    Convex
-
-    Examples
-    --------
-    >>> from scanfab.base.convex import circle
-    >>> from scanfab.base.space import Space
-    >>> round(circle(2.0, Space(2)).volume, 3)
-    12.566
-    """
-    frame = np.array([radius, radius, 1.0]) * plane.basis.T
-    return _round(DISC, radius, frame, radius * (1.0 - plane.normal))
-
-
-def _round(body: Body, radius: float, frame: FloatArray, high: FloatArray) -> Convex:
     return Convex(
         planes=np.zeros((0, 4)),
         quadric=Quadric(1.0, np.zeros((3, 3)), radius * radius),
-        low=-high,
-        high=high,
+        low=np.full(3, -radius),
+        high=np.full(3, radius),
         reach=radius,
         size=f"radius {radius:g}",
-        body=body,
-        frame=frame,
+        body=BALL,
+        frame=radius * np.eye(3),
     )

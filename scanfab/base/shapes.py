@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.bodies import BALL, BLOCK, COLUMN, DISC, SQUARE, Hull
-from scanfab.base.convex import Convex, image_of
+from scanfab.base.convex import Convex, image_of, sphere
 from scanfab.base.errors import SettingsError
 from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray, IntArray
 
-__all__ = ["box", "cylinder", "ellipse", "ellipsoid", "polyhedron", "rectangle", "turned_ellipse"]
+__all__ = [
+    "box",
+    "circle",
+    "cylinder",
+    "ellipse",
+    "ellipsoid",
+    "polyhedron",
+    "rectangle",
+    "turned_ellipse",
+]
 
 # Of the size of a surface, or of its distance from the origin, whichever is larger: what 4 bytes a
 # number, as STL has them, cannot tell apart.
@@ -72,6 +82,35 @@ def ellipsoid(semi_axes: Sequence[float] | FloatArray, turn: npt.ArrayLike | Non
     """
     size = "ellipsoid of semi-axes {:g}, {:g}, {:g}".format(*semi_axes)
     return image_of(BALL, _turned(np.asarray(semi_axes, dtype=float), turn), size)
+
+
+def circle(radius: float, plane: Space) -> Convex:
+    """
+    A circle about the origin, of some coordinate plane.
+
+    In the plane it holds what the sphere holds; its volume is an area.
+
+    Parameters
+    ----------
+    radius : float
+        Dump's length unit, above 0.
+    plane : Space
+        In which it lies.
+
+    Returns
+    -------
+    Convex
+
+    Examples
+    --------
+    >>> from scanfab.base.shapes import circle
+    >>> from scanfab.base.space import Space
+    >>> round(circle(2.0, Space(2)).volume, 3)
+    12.566
+    """
+    high = radius * (1.0 - plane.normal)
+    frame = np.array([radius, radius, 1.0]) * plane.basis.T
+    return replace(sphere(radius), low=-high, high=high, body=DISC, frame=frame)
 
 
 def rectangle(edges: Sequence[float] | FloatArray, plane: Space) -> Convex:

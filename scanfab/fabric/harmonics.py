@@ -154,19 +154,18 @@ class Harmonics:
         """All None of a fabric that does not exist."""
         found: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
         if measured.void is not None:
-            found |= _of_voids(measured.void, measured.axis)
+            found |= _of_voids(measured.void, measured.axis, measured.space)
         if len(measured.normals):
             found |= _of_contacts(measured.normals, measured.axis, measured.space)
         return found
 
 
-def _of_voids(void: VoidFabric, axis: FloatArray) -> dict[str, Any]:
+def _of_voids(void: VoidFabric, axis: FloatArray, space: Space) -> dict[str, Any]:
     """Of each replicate, then their mean; the error from their scatter, as that of the tensor."""
     weights = void.weights * void.mean_lengths
     weights = weights / weights.sum(axis=1, keepdims=True)
     found: dict[str, Any] = {}
     for order in ORDERS:
-        space = void.tensor.space
         means = np.sum(weights * harmonic(order, void.axes @ axis, space), axis=1)
         values = harmonics_of(order, space) * means
         found[f"vs_a{order}"] = float(values.mean())

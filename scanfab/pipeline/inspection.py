@@ -17,9 +17,9 @@ from scanfab.packing.doubts import cell_doubt, cell_hint, doubts_of, refuse_impo
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.frames import Frames, boundary_hints
-from scanfab.pipeline.in_plane import settings_in
 from scanfab.pipeline.rv import windows_of
 from scanfab.pipeline.settings import Settings
+from scanfab.pipeline.window_settings import settings_in
 from scanfab.table.row import Record
 
 __all__ = ["FrameReport", "inspect_series"]

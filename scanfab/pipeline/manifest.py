@@ -155,7 +155,7 @@ def surface_file(asked: Mapping[str, Any]) -> Path | None:
 def _plain(value: Any) -> Any:
     """A value in the types of JSON."""
     if isinstance(value, DirectionRule):
-        return value.text
+        return value.asked_as
     if isinstance(value, UsualAxis):
         # which axis that is, the grains decide
         return None

@@ -7,18 +7,19 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from scanfab.base.convex import Convex, circle
+from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
 from scanfab.base.note import Note
+from scanfab.base.shapes import circle
 from scanfab.base.space import SPACE, Space
 from scanfab.packing.doubts import refuse_impossible
 from scanfab.packing.sample import VARIANTS, Sample, SampleRule
 from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.frames import sample_rule
-from scanfab.pipeline.in_plane import settings_in
 from scanfab.pipeline.rv import RV, Deformation, doubts_of_rv, sizes_of, windows_of
 from scanfab.pipeline.settings import Settings, Vector
 from scanfab.pipeline.strain import Strains
+from scanfab.pipeline.window_settings import settings_in
 from scanfab.scan.directions import DirectionRule, usual_rule
 
 __all__ = ["NOISE", "Plan", "make_plan", "plan_without_grains"]

@@ -103,8 +103,8 @@ class DirectionRule:
         return f"DirectionRule {self.name}: {counted(len(self), 'axis', 'axes')}, {degree}{bias}"
 
     @property
-    def text(self) -> str:
-        """As users write it."""
+    def asked_as(self) -> str:
+        """What asks for it: its name, or the number of axes that was asked for."""
         return self.name if self.asked is None else str(self.asked)
 
     @cached_property

@@ -188,7 +188,18 @@ class Solids:
         return self.space.unit_shadow * (float(np.sum(self.radius**power)) + of_medium)
 
     def chords(self, spacing: float) -> float:
-        """About how many chords the spheres cut from the lines of one axis."""
+        """
+        About how many chords the spheres cut from the lines of one axis.
+
+        Parameters
+        ----------
+        spacing : float
+            Of the lines, dump's length unit.
+
+        Returns
+        -------
+        float
+        """
         return self.space.lines(self.shadow, spacing)
 
 

@@ -15,10 +15,10 @@ from scanfab.base.note import Note, tell
 from scanfab.io.series import Series
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.frames import Frames
-from scanfab.pipeline.in_plane import settings_in
 from scanfab.pipeline.plan import Plan, make_plan
 from scanfab.pipeline.settings import STRAIN_MODES, Settings, Vector
 from scanfab.pipeline.strain import StrainFile, axial_length, shear_strain
+from scanfab.pipeline.window_settings import settings_in
 from scanfab.table.abscissa import frame_strain_column, is_ambiguous
 from scanfab.viz.scene import Scene, about_window, scene_of
 

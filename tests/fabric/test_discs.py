@@ -123,19 +123,19 @@ def test_every_group_has_its_columns_for_discs():
 
 @pytest.fixture(scope="module")
 def biaxial():
-    with pytest.warns(scanfab.ScanfabNote):
-        series = scanfab.read_series(
-            [BIAXIAL / f"discs.{step}.lammpstrj.gz" for step in range(0, 120_000, 20_000)],
-            contacts=BIAXIAL / "pairs.*.local.gz",
-            contact_columns=(
-                "id1=c_ids[1],id2=c_ids[2],fx=c_pair[3],fy=c_pair[4],fz=c_pair[5],"
-                "tx=c_pair[6],ty=c_pair[7],tz=c_pair[8]"
-            ),
-        )
-        return compute(
-            series, variants="ac", with_="forces,state,invariants", directions=16,
-            spacing="0.1rmin", workers=1,
-        )  # fmt: skip
+    series = scanfab.read_series(
+        [BIAXIAL / f"discs.{step}.lammpstrj.gz" for step in range(0, 120_000, 20_000)],
+        contacts=BIAXIAL / "pairs.*.local.gz",
+        contact_columns=(
+            "id1=c_ids[1],id2=c_ids[2],fx=c_pair[3],fy=c_pair[4],fz=c_pair[5],"
+            "tx=c_pair[6],ty=c_pair[7],tz=c_pair[8]"
+        ),
+        dim=2,
+    )
+    return compute(
+        series, variants="ac", with_="forces,state,invariants", directions=16, spacing="0.1rmin",
+        workers=1,
+    )  # fmt: skip
 
 
 def test_contact_fabric_is_that_of_lammps(biaxial):

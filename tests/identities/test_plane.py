@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from scanfab import Cell, Packing, Sample, Window, compute, find_contacts
-from scanfab.base.convex import circle
-from scanfab.base.shapes import ellipse, rectangle
+from scanfab.base.shapes import circle, ellipse, rectangle
 from scanfab.base.space import Space
 from scanfab.fabric.void import void_fabric
 from scanfab.pipeline.solids import solids_of

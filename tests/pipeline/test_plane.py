@@ -8,11 +8,11 @@ from scanfab import Cell, Packing, PackingError, SettingsError, compute, find_co
 from scanfab.base.space import SPACE, Space
 from scanfab.fabric.void import void_fabric
 from scanfab.packing.sample import Sample
-from scanfab.pipeline.in_plane import settings_in
 from scanfab.pipeline.plan import NOISE
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.solids import solids_of
 from scanfab.pipeline.strain import shear_strain
+from scanfab.pipeline.window_settings import settings_in
 from scanfab.scan.directions import plane_rule
 from scanfab.scan.scan import scan_lines
 from tests.helpers.dumps import dump_text
@@ -138,7 +138,7 @@ def test_spheres_take_three_sizes():
     random = np.random.default_rng(0)
     packing = Packing(random.random((300, 3)) * 7, 0.4)
     for shape, sizes in (("box", "1,2"), ("ellipsoid", "1,2")):
-        with pytest.raises(SettingsError, match="rv_size: expected A,B,C.*found 1,2"):
+        with pytest.raises(SettingsError, match=r"rv_size: expected A,B,C.*found 1,2"):
             compute(packing, rv_shape=shape, rv_size=sizes)
 
 
