@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
@@ -11,15 +10,15 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, Literal, SupportsIndex, overload
 
-from scanfab.base.errors import NoFrameError, ReadError, ScanfabNote, SettingsError
+from scanfab.base.errors import NoFrameError, ReadError, SettingsError
 from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray
+from scanfab.io.dimension import decided_space
 from scanfab.io.families import Family
 from scanfab.io.frame import Frame
 from scanfab.io.frame_csv import FrameFile
 from scanfab.io.reader import ReadOptions, Snapshot
-from scanfab.packing.plane import flat_space, space_of, spelt_plane
 
 __all__ = ["ENDLESS", "ContactsFrom", "Series"]
 
@@ -211,9 +210,7 @@ class Series:
             first = next(filter(len, self._centres_before(number)), position)
             if not len(first):
                 return SPACE
-            self._spaces.append(space_of(first) if self.dim == "auto" else flat_space(first))
-            if self.dim == "auto" and self._spaces[0].is_plane:
-                _tell_plane(self.name, first, self._spaces[0])
+            self._spaces.append(decided_space(self.name, first, self.dim))
         return self._spaces[0]
 
     def _centres_before(self, number: int) -> Iterator[FloatArray]:
@@ -396,12 +393,3 @@ def _stamp(path: Path) -> _Stamp:
     except OSError:
         return None
     return found.st_size, found.st_mtime_ns
-
-
-def _tell_plane(name: str, position: FloatArray, plane: Space) -> None:
-    warnings.warn(
-        f"{name}: all centres lie in {plane} ({spelt_plane(position, plane)}): they are read as "
-        f"discs, in 2D; `dim=3` reads them as spheres",
-        ScanfabNote,
-        stacklevel=4,
-    )
