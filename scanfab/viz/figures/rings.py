@@ -48,6 +48,8 @@ class Rings:
     title: str
     voids: Sequence[Ring]
     contacts: Sequence[Ring]
+    space: Space = SPACE
+    """The plane of the frame, if its grains are discs."""
 
 
 def rings_of(frame: ScannedFrame, angles: Sequence[float]) -> Rings:
@@ -62,7 +64,7 @@ def rings_of(frame: ScannedFrame, angles: Sequence[float]) -> Rings:
         voids.append(_around(phi, theta, value[here], error[here]))
     normals = frame.normals
     contacts = [contact_ring(normals, phi, space) for phi in angles] if len(normals) else []
-    return Rings(frame.title, voids, contacts)
+    return Rings(frame.title, voids, contacts, space)
 
 
 def _azimuths(phi: float) -> FloatArray:

@@ -117,24 +117,18 @@ class Rose(FrameFigure):
     @cached_property
     def rings(self) -> list[Rings]:
         """What is drawn of each frame."""
-        return [rings_of(one, self.drawn_angles) for one in self.chosen(self.data.frames)]
+        frames = self.chosen(self.data.frames)
+        return [rings_of(one, _angles_in(one.space, self.angles)) for one in frames]
 
     @property
     def space(self) -> Space:
         """The plane of the frames, if their grains are discs."""
-        return self.chosen(self.data.frames)[0].space
+        return self.rings[0].space
 
     @property
     def drawn_angles(self) -> tuple[float, ...]:
         """Of discs one ring, in their plane."""
-        if not self.space.is_plane:
-            return self.angles
-        if self.angles not in (POLAR_ANGLES, EQUATOR):
-            raise SettingsError(
-                f"figure: discs in {self.space} have no polar angles, found "
-                f"{','.join(f'{one:g}' for one in self.angles)}: choose `figure=rose`"
-            )
-        return EQUATOR
+        return _angles_in(self.space, self.angles)
 
     @property
     def size(self) -> tuple[float, float]:
@@ -168,6 +162,18 @@ class Rose(FrameFigure):
     def panels(self, part: Page | SubFigure) -> list[Axes]:
         """A row for each frame, a column for each of both."""
         return draw_roses(part, self.rings, self.drawn_angles, self.of, self.space)
+
+
+def _angles_in(space: Space, angles: tuple[float, ...]) -> tuple[float, ...]:
+    """The polar angles to draw; of discs none but that of their plane."""
+    if not space.is_plane:
+        return angles
+    if angles not in (POLAR_ANGLES, EQUATOR):
+        raise SettingsError(
+            f"figure: discs in {space} have no polar angles, found "
+            f"{','.join(f'{one:g}' for one in angles)}: choose `figure=rose`"
+        )
+    return EQUATOR
 
 
 def draw_roses(
