@@ -4,6 +4,9 @@ The bodies that windows are images of: a ball, a column, a block, and the hull o
 A linear map makes every ellipsoid of the ball of radius 1, every cylinder of the column of radius
 1 between z = -1 and 1, every box of the block from -1 to 1. What is known of the body in closed
 form, the map carries over: a window that deforms with its sample needs no formula of its own.
+
+A disc and a square are the bodies of windows in a plane, spanned by the map's first two columns;
+its third is the unit normal. Volumes are areas there, and areas are lengths.
 """
 
 from __future__ import annotations
@@ -18,7 +21,20 @@ import numpy as np
 
 from scanfab.base.typing import FloatArray
 
-__all__ = ["BALL", "BLOCK", "COLUMN", "Ball", "Block", "Body", "Column", "Hull"]
+__all__ = [
+    "BALL",
+    "BLOCK",
+    "COLUMN",
+    "DISC",
+    "SQUARE",
+    "Ball",
+    "Block",
+    "Body",
+    "Column",
+    "Disc",
+    "Hull",
+    "Square",
+]
 
 # of a curved surface that is to be looked at
 POINTS, POINTS_OF_A_RIM = 2000, 128
@@ -233,4 +249,66 @@ class Hull:
         return float(np.sum(long - length * step) / chords.sum()), len(long) / len(chords)
 
 
-BALL, COLUMN, BLOCK = Ball(), Column(), Block()
+class Disc:
+    """Of radius 1, in a plane; what lies above and below it counts as inside."""
+
+    planes = np.zeros((0, 4))
+    form = np.array([1.0, 1.0, 0.0])
+    volume = math.pi
+    is_symmetric = True
+
+    @cached_property
+    def outline(self) -> FloatArray:
+        """A rim."""
+        turn = np.arange(POINTS_OF_A_RIM) * 2.0 * np.pi / POINTS_OF_A_RIM
+        return np.column_stack([np.cos(turn), np.sin(turn), np.zeros(POINTS_OF_A_RIM)])
+
+    def support(self, along: FloatArray) -> FloatArray:
+        """The end of a radius."""
+        flat = along * [1.0, 1.0, 0.0]
+        length = np.linalg.norm(flat, axis=1, keepdims=True)
+        unit: FloatArray = flat / np.where(length > 0.0, length, 1.0)
+        return unit
+
+    def reach(self, frame: FloatArray) -> float:
+        """The larger semi-axis."""
+        return float(np.linalg.svd(frame[:, :2], compute_uv=False)[0])
+
+    def overlap(self, shift: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
+        """The lens of two circles."""
+        step = np.linalg.norm(shift[:, :2], axis=1)
+        u = np.minimum(length * step, 2.0)
+        chord = np.sqrt(4.0 - u**2)
+        return 2.0 * np.arccos(0.5 * u) - 0.5 * u * chord, step * chord
+
+
+class Square:
+    """From -1 to 1, in a plane; what lies above and below it counts as inside."""
+
+    planes = np.column_stack([np.concatenate([np.eye(3)[:2], -np.eye(3)[:2]]), np.ones(4)])
+    form = np.zeros(3)
+    volume = 4.0
+    is_symmetric = True
+
+    @cached_property
+    def outline(self) -> FloatArray:
+        """Its corners, one after the other."""
+        return np.array([(-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (1.0, 1.0, 0.0), (-1.0, 1.0, 0.0)])
+
+    def support(self, along: FloatArray) -> FloatArray:
+        """A corner."""
+        return np.where(along < 0.0, -1.0, 1.0) * [1.0, 1.0, 0.0]
+
+    def reach(self, frame: FloatArray) -> float:
+        """Distance of the furthest corner."""
+        return float(np.linalg.norm(self.outline @ frame.T, axis=1).max())
+
+    def overlap(self, shift: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
+        """A smaller rectangle."""
+        step = np.abs(shift[:, :2])
+        edge = np.maximum(2.0 - length * step, 0.0)
+        slope = step[:, 0] * edge[:, 1] + step[:, 1] * edge[:, 0]
+        return edge.prod(axis=1), np.where(np.all(edge > 0.0, axis=1), slope, 0.0)
+
+
+BALL, COLUMN, BLOCK, DISC, SQUARE = Ball(), Column(), Block(), Disc(), Square()

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.base.bodies import BALL, Body
+from scanfab.base.bodies import BALL, DISC, SQUARE, Body
 from scanfab.base.option import number
 from scanfab.base.typing import BoolArray, FloatArray
 
@@ -22,9 +22,7 @@ AXES = 200
 
 class Quadric(NamedTuple):
     """
-    The places x with x·(m I + D) x below a level.
-
-    A sphere has D = 0, and so the same numbers however its axes are turned.
+    The places x with x·(m I + D) x below a level; of a sphere D = 0, however its axes are turned.
     """
 
     isotropic: float
@@ -93,18 +91,25 @@ class Convex:
 
     @property
     def is_sphere(self) -> bool:
-        """Whether all its diameters are equal."""
+        """Whether all its diameters are equal; that of a plane is a circle."""
         return not len(self.planes) and not self.quadric.deviator.any()
 
     @property
+    def is_flat(self) -> bool:
+        """Whether it is one of a plane, across which the third column of the frame stands."""
+        return self.body in (DISC, SQUARE)
+
+    @property
     def volume(self) -> float:
-        """Dump's length unit, cubed."""
+        """Dump's length unit, cubed; of a plane the area."""
         return float(self.body.volume * abs(np.linalg.det(self.frame)))
 
     @property
     def mean_shadow(self) -> float:
-        """Projected area in the mean of all directions, to some per cent."""
+        """Projected area in the mean of all directions, to some per cent; of a plane a length."""
         axes = BALL.outline[:: len(BALL.outline) // AXES]
+        if self.is_flat:
+            axes = DISC.outline[:, :2] @ np.linalg.qr(self.frame[:, :2])[0].T
         return float(self.overlap(axes, 0.0)[1].mean())
 
     @property

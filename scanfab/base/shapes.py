@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.bodies import BALL, BLOCK, COLUMN, Hull
-from scanfab.base.convex import Convex, image_of
+from scanfab.base.bodies import BALL, BLOCK, COLUMN, DISC, SQUARE, Hull
+from scanfab.base.convex import Convex, image_of, sphere
 from scanfab.base.errors import SettingsError
+from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray, IntArray
 
-__all__ = ["box", "cylinder", "ellipsoid", "polyhedron"]
+__all__ = [
+    "box",
+    "circle",
+    "cylinder",
+    "ellipse",
+    "ellipsoid",
+    "polyhedron",
+    "rectangle",
+    "turned_ellipse",
+]
 
 # Of the size of a surface, or of its distance from the origin, whichever is larger: what 4 bytes a
 # number, as STL has them, cannot tell apart.
@@ -71,6 +82,94 @@ def ellipsoid(semi_axes: Sequence[float] | FloatArray, turn: npt.ArrayLike | Non
     """
     size = "ellipsoid of semi-axes {:g}, {:g}, {:g}".format(*semi_axes)
     return image_of(BALL, _turned(np.asarray(semi_axes, dtype=float), turn), size)
+
+
+def circle(radius: float, plane: Space) -> Convex:
+    """
+    A circle about the origin, of some coordinate plane.
+
+    In the plane it holds what the sphere holds; its volume is an area.
+
+    Parameters
+    ----------
+    radius : float
+        Dump's length unit, above 0.
+    plane : Space
+        In which it lies.
+
+    Returns
+    -------
+    Convex
+
+    Examples
+    --------
+    >>> from scanfab.base.shapes import circle
+    >>> from scanfab.base.space import Space
+    >>> round(circle(2.0, Space(2)).volume, 3)
+    12.566
+    """
+    high = radius * (1.0 - plane.normal)
+    frame = np.array([radius, radius, 1.0]) * plane.basis.T
+    return replace(sphere(radius), low=-high, high=high, body=DISC, frame=frame)
+
+
+def rectangle(edges: Sequence[float] | FloatArray, plane: Space) -> Convex:
+    """
+    A rectangle about the origin, of some coordinate plane.
+
+    Parameters
+    ----------
+    edges : sequence of 2 floats
+        Full lengths along the plane's coordinates, in the order of the alphabet.
+    plane : Space
+        In which it lies.
+
+    Returns
+    -------
+    Convex
+
+    Examples
+    --------
+    >>> from scanfab.base.shapes import rectangle
+    >>> from scanfab.base.space import Space
+    >>> rectangle([2.0, 3.0], Space(2)).high
+    array([1. , 1.5, 0. ])
+    """
+    half = 0.5 * np.asarray(edges, dtype=float)[:, None] * np.eye(3)[sorted(plane.along)]
+    frame = np.column_stack([*half, plane.normal])
+    return image_of(SQUARE, frame, "box {:g} x {:g}".format(*edges))
+
+
+def ellipse(semi_axes: Sequence[float] | FloatArray, plane: Space) -> Convex:
+    """
+    An ellipse about the origin, of some coordinate plane.
+
+    Parameters
+    ----------
+    semi_axes : sequence of 2 floats
+        Half of its diameters along the plane's coordinates, in the order of the alphabet.
+    plane : Space
+        In which it lies.
+
+    Returns
+    -------
+    Convex
+
+    Examples
+    --------
+    >>> from scanfab.base.shapes import ellipse
+    >>> from scanfab.base.space import Space
+    >>> ellipse([2.0, 3.0], Space(2)).high
+    array([2., 3., 0.])
+    """
+    lengths = np.asarray(semi_axes, dtype=float)
+    return turned_ellipse(lengths, np.eye(3)[sorted(plane.along)], plane)
+
+
+def turned_ellipse(semi_axes: FloatArray, turn: FloatArray, plane: Space) -> Convex:
+    """The same with its semi-axes along unit vectors of the plane, the rows of shape (2, 3)."""
+    frame = np.column_stack([*(semi_axes[:, None] * turn), plane.normal])
+    return image_of(DISC, frame, "ellipse of semi-axes {:g}, {:g}".format(*semi_axes))
 
 
 def cylinder(radius: float, height: float, axis: npt.ArrayLike = (0.0, 0.0, 1.0)) -> Convex:

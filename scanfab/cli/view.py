@@ -102,9 +102,9 @@ def _show(
     look = look_at(series, settings, frame)
     scene = look.scene
     if cut:
-        scene = replace(scene, lines=section_lines(scene, settings.axis))
+        scene = replace(scene, lines=section_lines(scene, look.axis))
     strain = spelt_strain(look.strains, look.strain_column)
     none = "" if look.sample.grains.any() else "no grains"
     source = middle_out(series.name, LONGEST_SOURCE)
     title = ", ".join(filter(None, [source, f"frame {look.number}", strain, none]))
-    show_scene(scene, settings.axis, title, screenshot)
+    show_scene(scene, look.axis, title, screenshot)

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.column import Column
+from scanfab.base.space import SPACE, Space
 from scanfab.fabric.tensor import FabricTensor, tensor_columns, tensor_values
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 __all__ = ["Contact", "axial_error", "contact_fabric"]
 
 
-def contact_fabric(normals: npt.ArrayLike) -> FabricTensor | None:
+def contact_fabric(normals: npt.ArrayLike, space: Space = SPACE) -> FabricTensor | None:
     """
     The fabric tensor of contact normals: G_c = (1/N_c) Σ n⊗n.
 
@@ -29,6 +30,8 @@ def contact_fabric(normals: npt.ArrayLike) -> FabricTensor | None:
     ----------
     normals : array_like, shape (M, 3)
         Unit normals, dimensionless; their signs do not matter.
+    space : Space, optional
+        The plane in which they lie, if the grains are discs.
 
     Returns
     -------
@@ -50,20 +53,20 @@ def contact_fabric(normals: npt.ArrayLike) -> FabricTensor | None:
     vectors = np.asarray(normals, dtype=np.float64)
     if len(vectors) == 0:
         return None
-    return FabricTensor(vectors.T @ vectors / len(vectors))
+    return FabricTensor(vectors.T @ vectors / len(vectors), space)
 
 
-def axial_error(normals: npt.ArrayLike, axis: npt.ArrayLike) -> float | None:
+def axial_error(normals: npt.ArrayLike, axis: npt.ArrayLike, space: Space = SPACE) -> float | None:
     """
     Standard error of the contact fabric's axial anisotropy, dimensionless.
 
-    The standard deviation of (3(a·n)² - 1)/2 over the contacts, divided by √N_c; None for fewer
-    than two contacts.
+    The standard deviation of (3(a·n)² - 1)/2 over the contacts, in a plane of 2(a·n)² - 1, divided
+    by √N_c; None for fewer than two contacts.
     """
     cosine = np.asarray(normals, dtype=np.float64) @ np.asarray(axis, dtype=np.float64)
     if len(cosine) < 2:
         return None
-    return float(np.std(1.5 * cosine**2 - 0.5, ddof=1) / np.sqrt(len(cosine)))
+    return float(np.std(space.axial(cosine**2), ddof=1) / np.sqrt(len(cosine)))
 
 
 class Contact:
@@ -96,5 +99,5 @@ class Contact:
             **tensor_values("gc", tensor),
             "alpha_c": tensor.alpha if tensor else None,
             "alpha_c_axial": tensor.axial(axis) if tensor else None,
-            "alpha_c_axial_se": axial_error(measured.normals, axis),
+            "alpha_c_axial_se": axial_error(measured.normals, axis, measured.space),
         }

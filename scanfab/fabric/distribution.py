@@ -1,6 +1,8 @@
 """
 The directional distribution of a scan: an even function on the sphere fitted to the mean lengths.
 
+Of discs it is one on the circle of their plane.
+
 On the unit sphere the homogeneous polynomials of an even degree are exactly the sums of the even
 harmonics up to that degree, so monomials are all that is needed.
 """
@@ -13,13 +15,23 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.directions import direction_rule
 
-__all__ = ["EvenFunction", "fit_even", "mean_length_function", "sphere_points"]
+__all__ = [
+    "EvenFunction",
+    "direction_points",
+    "fit_even",
+    "harmonics_of",
+    "mean_length_function",
+    "sphere_points",
+]
 
 
 HIGHEST_DEGREE = 6
+# around a circle
+POINTS = 180
 # how unevenly directions may cover the sphere for a fit: the ratio of largest to smallest
 # singular value, 1 for even coverage
 WORST_COVERAGE = 5.0
@@ -32,14 +44,19 @@ class EvenFunction:
     degree: int
     coefficients: FloatArray
     """Of functions that are orthonormal on the sphere, the mean of whose squares is 1."""
+    space: Space = SPACE
+    """The plane in whose circle the directions lie, if they do."""
 
     def __call__(self, directions: npt.ArrayLike) -> FloatArray:
         """Values at unit vectors, shape (..., 3) to (...)."""
-        values: FloatArray = _basis(np.asarray(directions), self.degree) @ self.coefficients
+        basis = _basis(np.asarray(directions), self.degree, self.space)
+        values: FloatArray = basis @ self.coefficients
         return values
 
 
-def fit_even(axes: FloatArray, values: FloatArray, weights: FloatArray) -> EvenFunction:
+def fit_even(
+    axes: FloatArray, values: FloatArray, weights: FloatArray, space: Space = SPACE
+) -> EvenFunction:
     """
     Weighted least-squares fit of an even function.
 
@@ -51,6 +68,8 @@ def fit_even(axes: FloatArray, values: FloatArray, weights: FloatArray) -> EvenF
         In any unit.
     weights : ndarray, shape (M,)
         Proportional to the inverse variance of each value.
+    space : Space, optional
+        The plane in which the axes lie, if they do.
 
     Returns
     -------
@@ -68,20 +87,23 @@ def fit_even(axes: FloatArray, values: FloatArray, weights: FloatArray) -> EvenF
     """
     root = np.sqrt(weights / weights.sum())
     degree = HIGHEST_DEGREE
-    while degree and not _is_covered(axes, root, degree):
+    while degree and not _is_covered(axes, root, degree, space):
         degree -= 2
-    matrix = _basis(axes, degree) * root[:, None]
-    return EvenFunction(degree, np.linalg.lstsq(matrix, values * root, rcond=None)[0])
+    matrix = _basis(axes, degree, space) * root[:, None]
+    return EvenFunction(degree, np.linalg.lstsq(matrix, values * root, rcond=None)[0], space)
 
 
-def _is_covered(axes: FloatArray, root: FloatArray, degree: int) -> bool:
+def _is_covered(axes: FloatArray, root: FloatArray, degree: int, space: Space) -> bool:
     """Whether the axes are enough, and even enough, for a fit of this degree."""
-    matrix = _basis(axes, degree) * root[:, None]
+    matrix = _basis(axes, degree, space) * root[:, None]
     return len(matrix) >= matrix.shape[1] and bool(np.linalg.cond(matrix) < WORST_COVERAGE)
 
 
 def mean_length_function(
-    axes: FloatArray, length: FloatArray, segments: IntArray | FloatArray
+    axes: FloatArray,
+    length: FloatArray,
+    segments: IntArray | FloatArray,
+    space: Space = SPACE,
 ) -> EvenFunction | None:
     """
     ℓ(n), fitted to the sums of a scan.
@@ -93,6 +115,8 @@ def mean_length_function(
     length, segments : ndarray, shape (R, D)
         Sum of the lengths (dump's unit) and number of one variant's kept segments. For the second
         moment, sums of squared lengths and of lengths take the places of these two.
+    space : Space, optional
+        The plane in which the axes lie, if they do.
 
     Returns
     -------
@@ -103,7 +127,7 @@ def mean_length_function(
     if not kept.any():
         return None
     number = segments[kept].astype(np.float64)
-    return fit_even(axes[kept], length[kept] / number, number)
+    return fit_even(axes[kept], length[kept] / number, number, space)
 
 
 @cache
@@ -113,22 +137,39 @@ def sphere_points() -> tuple[FloatArray, FloatArray]:
     return np.concatenate([rule.axes, -rule.axes]), np.tile(0.5 * rule.weights, 2)
 
 
-def _basis(directions: FloatArray, degree: int) -> FloatArray:
+def direction_points(space: Space) -> tuple[FloatArray, FloatArray]:
+    """The same for a space: of a plane points all around its circle."""
+    if not space.is_plane:
+        return sphere_points()
+    angle = 2.0 * np.pi * np.arange(POINTS) / POINTS
+    first, second = (np.eye(3)[k] for k in sorted(space.along))
+    points = np.cos(angle)[:, None] * first + np.sin(angle)[:, None] * second
+    return points, np.full(POINTS, 1.0 / POINTS)
+
+
+def harmonics_of(degree: int, space: Space) -> int:
+    """How many independent harmonics of a degree there are; of degree 2 those of a tensor."""
+    return 2 if space.is_plane else 2 * degree + 1
+
+
+def _basis(directions: FloatArray, degree: int, space: Space) -> FloatArray:
     """Orthonormal even functions up to a degree, shape (..., 3) to (..., functions)."""
-    values: FloatArray = _monomials(directions, degree) @ _orthonormal(degree)
+    values: FloatArray = _monomials(directions, degree, space) @ _orthonormal(degree, space)
     return values
 
 
-def _monomials(directions: FloatArray, degree: int) -> FloatArray:
+def _monomials(directions: FloatArray, degree: int, space: Space) -> FloatArray:
     powers = [(i, j, degree - i - j) for i in range(degree + 1) for j in range(degree + 1 - i)]
+    powers = [one for one in powers if space.across is None or one[space.across] == 0]
     values: FloatArray = np.prod(directions[..., None, :] ** np.array(powers), axis=-1)
     return values
 
 
 @cache
-def _orthonormal(degree: int) -> FloatArray:
+def _orthonormal(degree: int, space: Space) -> FloatArray:
     """The matrix that makes the monomials orthonormal on the sphere."""
-    points, weights = sphere_points()
-    triangle = np.linalg.qr(_monomials(points, degree) * np.sqrt(weights)[:, None], mode="r")
+    points, weights = direction_points(space)
+    monomials = _monomials(points, degree, space)
+    triangle = np.linalg.qr(monomials * np.sqrt(weights)[:, None], mode="r")
     inverse: FloatArray = np.linalg.inv(triangle)
     return inverse

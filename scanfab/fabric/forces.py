@@ -11,7 +11,8 @@ alike,
     fn = 15/2 (<f_n n⊗n> / f0 - I/3),  f0 = tr <f_n n⊗n>,
     ft = 5 dev sym <f_t⊗n> / f0,
 
-with the branch length b, the normal force f_n and the vector f_t of the tangential force. The
+with the branch length b, the normal force f_n and the vector f_t of the tangential force. Of discs
+all three factors are 4, with I/2 in the place of I/3. The
 strong contacts, whose normal force is above the mean, and the weak ones have fabric tensors of
 their own (Radjai et al. 1998, doi:10.1103/PhysRevLett.80.61).
 """
@@ -25,6 +26,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.column import Column
+from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.contact import axial_error, contact_fabric
 from scanfab.fabric.tensor import COMPONENTS, FabricTensor
@@ -78,7 +80,7 @@ class DirectionalMean:
 
 
 def branch_fabric(
-    normals: npt.ArrayLike, branch: npt.ArrayLike, axis: npt.ArrayLike
+    normals: npt.ArrayLike, branch: npt.ArrayLike, axis: npt.ArrayLike, space: Space = SPACE
 ) -> DirectionalMean | None:
     """
     Anisotropy of the branch length: 15/2 (<b n⊗n>/b0 - I/3).
@@ -111,11 +113,11 @@ def branch_fabric(
     1.875
     """
     vectors = np.asarray(branch, dtype=np.float64)[:, None] * np.asarray(normals)
-    return _mean_by_direction(normals, vectors, np.asarray(branch), 7.5, axis)
+    return _mean_by_direction(normals, vectors, np.asarray(branch), space.second_order, axis, space)
 
 
 def normal_force_fabric(
-    normals: npt.ArrayLike, force_n: npt.ArrayLike, axis: npt.ArrayLike
+    normals: npt.ArrayLike, force_n: npt.ArrayLike, axis: npt.ArrayLike, space: Space = SPACE
 ) -> DirectionalMean | None:
     """
     Anisotropy of the normal force: 15/2 (<f_n n⊗n>/f0 - I/3).
@@ -146,11 +148,12 @@ def normal_force_fabric(
     1.875
     """
     vectors = np.asarray(force_n, dtype=np.float64)[:, None] * np.asarray(normals)
-    return _mean_by_direction(normals, vectors, np.asarray(force_n), 7.5, axis)
+    size = np.asarray(force_n)
+    return _mean_by_direction(normals, vectors, size, space.second_order, axis, space)
 
 
 def tangential_force_fabric(
-    normals: npt.ArrayLike, force: npt.ArrayLike, axis: npt.ArrayLike
+    normals: npt.ArrayLike, force: npt.ArrayLike, axis: npt.ArrayLike, space: Space = SPACE
 ) -> DirectionalMean | None:
     """
     Anisotropy of the tangential force: 5 dev sym <f_t⊗n> / f0.
@@ -184,7 +187,8 @@ def tangential_force_fabric(
     """
     n, f = np.asarray(normals, dtype=np.float64), np.asarray(force, dtype=np.float64)
     force_n = np.einsum("ci,ci->c", f, n)
-    return _mean_by_direction(n, f - force_n[:, None] * n, force_n, 5.0, axis)
+    factor = 4.0 if space.is_plane else 5.0
+    return _mean_by_direction(n, f - force_n[:, None] * n, force_n, factor, axis, space)
 
 
 def _mean_by_direction(
@@ -193,10 +197,11 @@ def _mean_by_direction(
     size: FloatArray,
     factor: float,
     axis: npt.ArrayLike,
+    space: Space,
 ) -> DirectionalMean | None:
     """``factor`` dev sym <v⊗n> / <size>, and its axial value with the error of that."""
     n, a = np.asarray(normals, dtype=np.float64), np.asarray(axis, dtype=np.float64)
-    weights = _weights(n)
+    weights, dimension = _weights(n, space), float(space.dimension)
     if weights is None:
         return None
     count = len(n)
@@ -205,26 +210,31 @@ def _mean_by_direction(
         return None
     product = (weights[:, None] * vectors).T @ n / count
     product = 0.5 * (product + product.T)
-    matrix = factor / scale * (product - np.trace(product) / 3.0 * np.eye(3))
-    # 3/2 a·T·a of a tensor without trace: its value along the axis less that across it
-    along = (vectors @ a) * (n @ a) - np.einsum("ci,ci->c", vectors, n) / 3.0
+    matrix = factor / scale * (product - np.trace(product) / dimension * space.identity)
+    # 3/2 a·T·a of a tensor without trace: its value along the axis less that across it; 2 a·T·a
+    along = (vectors @ a) * (n @ a) - np.einsum("ci,ci->c", vectors, n) / dimension
+    less = dimension / (dimension - 1.0)
     ratio = float(weights @ along) / count / scale
-    influence = _influence(n, weights, along - ratio * size)
-    error = 1.5 * factor / scale * np.std(influence, ddof=1) / np.sqrt(count) if count > 1 else None
-    return DirectionalMean(matrix, 1.5 * factor * ratio, None if error is None else float(error))
+    influence = _influence(n, weights, along - ratio * size, space)
+    error = (
+        less * factor / scale * np.std(influence, ddof=1) / np.sqrt(count) if count > 1 else None
+    )
+    return DirectionalMean(matrix, less * factor * ratio, None if error is None else float(error))
 
 
-def _weights(normals: FloatArray) -> FloatArray | None:
+def _weights(normals: FloatArray, space: Space) -> FloatArray | None:
     """1 / (1 + n·C·n) of each contact; None where that is not above 0."""
-    fabric = contact_fabric(normals)
+    fabric = contact_fabric(normals, space)
     if fabric is None:
         return None
-    deviator = 7.5 * (fabric.matrix - np.eye(3) / 3.0)
+    deviator = space.second_order * (fabric.matrix - space.identity / space.dimension)
     density = 1.0 + np.einsum("ci,ij,cj->c", normals, deviator, normals)
     return None if density.min() <= 0.0 else 1.0 / density
 
 
-def _influence(normals: FloatArray, weights: FloatArray, values: FloatArray) -> FloatArray:
+def _influence(
+    normals: FloatArray, weights: FloatArray, values: FloatArray, space: Space
+) -> FloatArray:
     """
     By how much each contact moves the mean of weights times values, times their number.
 
@@ -232,7 +242,7 @@ def _influence(normals: FloatArray, weights: FloatArray, values: FloatArray) -> 
     the error would be several times too large.
     """
     count = len(normals)
-    through = 7.5 * ((weights**2 * values)[:, None] * normals).T @ normals / count
+    through = space.second_order * ((weights**2 * values)[:, None] * normals).T @ normals / count
     moved: FloatArray = weights * values
     moved -= np.einsum("ci,ij,cj->c", normals, through, normals)
     return moved
@@ -252,16 +262,16 @@ def _axial_columns(name: str, what: str) -> tuple[Column, ...]:
 
 
 TENSORS = {
-    "bn": "the tensor of branch lengths, 15/2 (<b n n>/b0 - I/3)",
-    "fn": "the tensor of normal forces, 15/2 (<f_n n n>/f0 - I/3)",
-    "ft": "the tensor of tangential forces, 5 dev sym <f_t n>/f0",
+    "bn": "the tensor of branch lengths, 15/2 (<b n n>/b0 - I/3), of discs 4 (... - I/2)",
+    "fn": "the tensor of normal forces, 15/2 (<f_n n n>/f0 - I/3), of discs 4 (... - I/2)",
+    "ft": "the tensor of tangential forces, 5 dev sym <f_t n>/f0, of discs 4 dev sym <f_t n>/f0",
     "gc_strong": "the fabric tensor of contacts whose normal force is above the mean, trace 1",
     "gc_weak": "the fabric tensor of the other contacts, trace 1",
 }
 AXIAL = {
-    "bn": "anisotropy of branch lengths, 3/2 a·bn·a",
-    "fn": "anisotropy of normal forces, 3/2 a·fn·a",
-    "ft": "anisotropy of tangential forces, 3/2 a·ft·a",
+    "bn": "anisotropy of branch lengths, 3/2 a·bn·a, of discs 2 a·bn·a",
+    "fn": "anisotropy of normal forces, 3/2 a·fn·a, of discs 2 a·fn·a",
+    "ft": "anisotropy of tangential forces, 3/2 a·ft·a, of discs 2 a·ft·a",
     "gc_strong": "anisotropy of the strong contacts",
     "gc_weak": "anisotropy of the weak contacts",
 }
@@ -279,16 +289,18 @@ class Forces:
         """All None without contacts."""
         found: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
         normals, axis, forces = measured.normals, measured.axis, measured.forces
+        space = measured.space
         if forces is None:
             return found
-        found |= _mean_values("bn", branch_fabric(normals, forces.branch, axis))
-        found |= _mean_values("fn", normal_force_fabric(normals, forces.force_n, axis))
+        found |= _mean_values("bn", branch_fabric(normals, forces.branch, axis, space))
+        found |= _mean_values("fn", normal_force_fabric(normals, forces.force_n, axis, space))
         if forces.force is not None:
-            found |= _mean_values("ft", tangential_force_fabric(normals, forces.force, axis))
+            mean = tangential_force_fabric(normals, forces.force, axis, space)
+            found |= _mean_values("ft", mean)
         if len(normals):
             strong = forces.force_n > forces.force_n.mean()
-            found |= _contact_values("gc_strong", normals[strong], axis)
-            found |= _contact_values("gc_weak", normals[~strong], axis)
+            found |= _contact_values("gc_strong", normals[strong], axis, space)
+            found |= _contact_values("gc_weak", normals[~strong], axis, space)
         return found
 
 
@@ -303,14 +315,16 @@ def _mean_values(name: str, mean: DirectionalMean | None) -> dict[str, float | N
     }
 
 
-def _contact_values(name: str, normals: FloatArray, axis: FloatArray) -> dict[str, float | None]:
-    tensor: FabricTensor | None = contact_fabric(normals)
+def _contact_values(
+    name: str, normals: FloatArray, axis: FloatArray, space: Space
+) -> dict[str, float | None]:
+    tensor: FabricTensor | None = contact_fabric(normals, space)
     if tensor is None:
         return {}
     return {
         **{f"{name}_{one}": value for one, value in tensor.components().items()},
         f"alpha_{name}_axial": tensor.axial(axis),
-        f"alpha_{name}_axial_se": axial_error(normals, axis),
+        f"alpha_{name}_axial_se": axial_error(normals, axis, space),
     }
 
 
@@ -327,7 +341,7 @@ def doubts_of_forces(measured: Measured) -> dict[str, str]:
     if forces is None or not len(measured.normals):
         return {}
     texts = {}
-    if _weights(measured.normals) is None:
+    if _weights(measured.normals, measured.space) is None:
         texts["few_contacts"] = (
             "the contacts are so few, or so anisotropic, that 1 + n·C·n is not above 0 in "
             "some direction: bn, fn and ft are empty"

@@ -2,7 +2,8 @@
 Order 2 and 4 of the void lengths and of the contact normals, and fourth-order tensors.
 
 a_l = (2l + 1) <P_l(a·n)> about the loading axis a, with the Legendre polynomials P_l: the
-coefficients of the distribution E(n) = 1/4π (1 + a_2 P_2 + a_4 P_4 + ...). For contacts the mean
+coefficients of the distribution E(n) = 1/4π (1 + a_2 P_2 + a_4 P_4 + ...). Of discs, at the angle θ
+to the axis, a_l = 2 <cos lθ>, of E = 1/2π (1 + a_2 cos 2θ + ...). For contacts the mean
 is over them, for voids it is weighted with ℓ(n). Kanatani (1984),
 doi:10.1016/0020-7225(84)90090-9, has the tensors of any order.
 """
@@ -15,13 +16,15 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.column import Column
+from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
+from scanfab.fabric.distribution import harmonics_of
 
 if TYPE_CHECKING:
     from scanfab.fabric.measured import Measured
     from scanfab.fabric.void import VoidFabric
 
-__all__ = ["Harmonics", "legendre", "tensor4"]
+__all__ = ["Harmonics", "harmonic", "legendre", "tensor4"]
 
 ORDERS = (2, 4)
 
@@ -52,6 +55,37 @@ def legendre(order: int, cosine: npt.ArrayLike) -> FloatArray:
     if order == 2:
         return np.asarray(1.5 * square - 0.5)
     return np.asarray((35.0 * square**2 - 30.0 * square + 3.0) / 8.0)
+
+
+def harmonic(order: int, cosine: npt.ArrayLike, space: Space = SPACE) -> FloatArray:
+    """
+    What a_l has the mean of: P_l, of discs cos lθ.
+
+    Parameters
+    ----------
+    order : int
+        l, 2 or 4.
+    cosine : array_like
+        Of the angle to the axis.
+    space : Space, optional
+        The plane in which the directions lie, if they do.
+
+    Returns
+    -------
+    ndarray
+        Of the same shape.
+
+    Examples
+    --------
+    >>> from scanfab.base.space import Space
+    >>> from scanfab.fabric.harmonics import harmonic
+    >>> float(harmonic(2, 1.0)), float(harmonic(2, 1.0, Space(2)))
+    (1.0, 1.0)
+    """
+    if not space.is_plane:
+        return legendre(order, cosine)
+    double = 2.0 * np.asarray(cosine, dtype=np.float64) ** 2 - 1.0
+    return np.asarray(double if order == 2 else 2.0 * double**2 - 1.0)
 
 
 def tensor4(vectors: npt.ArrayLike, weights: npt.ArrayLike) -> FloatArray:
@@ -120,31 +154,31 @@ class Harmonics:
         """All None of a fabric that does not exist."""
         found: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
         if measured.void is not None:
-            found |= _of_voids(measured.void, measured.axis)
+            found |= _of_voids(measured.void, measured.axis, measured.space)
         if len(measured.normals):
-            found |= _of_contacts(measured.normals, measured.axis)
+            found |= _of_contacts(measured.normals, measured.axis, measured.space)
         return found
 
 
-def _of_voids(void: VoidFabric, axis: FloatArray) -> dict[str, Any]:
+def _of_voids(void: VoidFabric, axis: FloatArray, space: Space) -> dict[str, Any]:
     """Of each replicate, then their mean; the error from their scatter, as that of the tensor."""
     weights = void.weights * void.mean_lengths
     weights = weights / weights.sum(axis=1, keepdims=True)
     found: dict[str, Any] = {}
     for order in ORDERS:
-        means = np.sum(weights * legendre(order, void.axes @ axis), axis=1)
-        values = (2 * order + 1) * means
+        means = np.sum(weights * harmonic(order, void.axes @ axis, space), axis=1)
+        values = harmonics_of(order, space) * means
         found[f"vs_a{order}"] = float(values.mean())
         found[f"vs_a{order}_se"] = _error(values)
     tensor = tensor4(void.axes.reshape(-1, 3), weights.ravel())
     return {**found, "vs_tensor4": tensor.ravel().tolist()}
 
 
-def _of_contacts(normals: FloatArray, axis: FloatArray) -> dict[str, Any]:
+def _of_contacts(normals: FloatArray, axis: FloatArray, space: Space) -> dict[str, Any]:
     """The error is that of a mean over independent contacts."""
     found: dict[str, Any] = {}
     for order in ORDERS:
-        values = (2 * order + 1) * legendre(order, normals @ axis)
+        values = harmonics_of(order, space) * harmonic(order, normals @ axis, space)
         found[f"c_a{order}"] = float(values.mean())
         found[f"c_a{order}_se"] = _error(values)
     return {**found, "c_tensor4": tensor4(normals, np.ones(len(normals))).ravel().tolist()}

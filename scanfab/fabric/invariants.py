@@ -1,6 +1,8 @@
 """
 Invariants of the fabric tensors: F = 15/2 (G - I/3), a = √(3/2 F:F), principal values, b.
 
+Of discs F = 4 (G - I/2), a = √(1/2 F:F), and there is no b.
+
 Kanatani (1984), doi:10.1016/0020-7225(84)90090-9: F is the second order of the distribution of
 directions 1/4π (1 + n·F·n). a is never negative: in an isotropic sample it is what the scatter of
 its few contacts or segments makes it, and the columns ``_bias`` say how much that is.
@@ -14,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from scanfab.base.column import Column
+from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.tensor import FabricTensor
 
@@ -22,25 +25,36 @@ if TYPE_CHECKING:
 
 __all__ = ["Invariants", "fabric_deviator", "intensity"]
 
-# a tensor's deviator has five components of equal variance in an isotropic sample: a is
-# √(3/2) · 15/2 times the root of the sum of their squares, which in the mean is 2.1277 standard
-# deviations, the mean of chi with five degrees of freedom
-MEAN_CHI5 = math.sqrt(2.0) * math.gamma(3.0) / math.gamma(2.5)
-BIAS = math.sqrt(1.5) * 7.5 * MEAN_CHI5
-# variance of one such component of n⊗n, of a unit vector n that has any direction alike
-CONTACT_VARIANCE = 2.0 / 15.0
+# By dimension: components of a tensor's deviator, and the variance of each of n⊗n, of a unit vector
+# n that has any direction alike.
+COMPONENTS_OF_DEVIATOR = {3: 5, 2: 2}
+CONTACT_VARIANCE = {3: 2.0 / 15.0, 2: 0.25}
 # b says nothing where largest and smallest principal value differ by less, over √N
 LEAST_ALPHA = 3.0
 
 
-def fabric_deviator(matrix: FloatArray) -> FloatArray:
+def bias_of(space: Space) -> float:
     """
-    F = 15/2 (G - I/3).
+    What components of a standard deviation of 1 make of a in an isotropic sample.
+
+    They are of equal variance, so that a is √(3/2) · 15/2 times the root of the sum of their
+    squares, which is the mean of chi with five degrees of freedom, 2.1277; in a plane with two.
+    """
+    freedom = COMPONENTS_OF_DEVIATOR[space.dimension]
+    mean_chi = math.sqrt(2.0) * math.gamma(0.5 * (freedom + 1)) / math.gamma(0.5 * freedom)
+    return math.sqrt(space.intensity) * space.second_order * mean_chi
+
+
+def fabric_deviator(matrix: FloatArray, space: Space = SPACE) -> FloatArray:
+    """
+    F = 15/2 (G - I/3), of discs 4 (G - I/2).
 
     Parameters
     ----------
     matrix : ndarray, shape (..., 3, 3)
         Fabric tensors of trace 1.
+    space : Space, optional
+        The plane that they are of, if they are.
 
     Returns
     -------
@@ -57,17 +71,21 @@ def fabric_deviator(matrix: FloatArray) -> FloatArray:
     >>> np.round(np.diag(fabric_deviator(np.diag([0.3, 0.3, 0.4]))), 9)
     array([-0.25, -0.25,  0.5 ])
     """
-    return 7.5 * (matrix - np.eye(3) / 3.0)
+    return space.second_order * (matrix - space.identity / space.dimension)
 
 
-def intensity(matrix: FloatArray) -> float:
+def intensity(matrix: FloatArray, space: Space = SPACE) -> float:
     """
     a = √(3/2 F:F), which is 7.5 |alpha_axial| for transverse isotropy about the axis.
+
+    Of discs a = √(1/2 F:F), which is 2 alpha.
 
     Parameters
     ----------
     matrix : ndarray, shape (3, 3)
         Fabric tensor of trace 1.
+    space : Space, optional
+        The plane that it is of, if it is.
 
     Returns
     -------
@@ -81,7 +99,7 @@ def intensity(matrix: FloatArray) -> float:
     >>> round(intensity(np.diag([0.3, 0.3, 0.4])), 9)
     0.75
     """
-    return float(math.sqrt(1.5) * np.linalg.norm(fabric_deviator(matrix)))
+    return float(math.sqrt(space.intensity) * np.linalg.norm(fabric_deviator(matrix, space)))
 
 
 def _columns() -> tuple[Column, ...]:
@@ -89,7 +107,13 @@ def _columns() -> tuple[Column, ...]:
     of = {"vs": "of the scan", "c": "if contacts were independent"}
     bias = {"vs": "the noise of this scan", "c": "as many independent contacts"}
     main = [
-        Column(f"f_{one}", float, "", f"a = √(3/2 F:F) of the {what}, F = 15/2 (G - I/3)")
+        Column(
+            f"f_{one}",
+            float,
+            "",
+            f"a = √(3/2 F:F) of the {what}, F = 15/2 (G - I/3); of discs √(1/2 F:F), "
+            "F = 4 (G - I/2)",
+        )
         for one, what in names.items()
     ]
     main += [
@@ -106,7 +130,8 @@ def _columns() -> tuple[Column, ...]:
             f"b_{one}",
             float,
             "",
-            f"(G2 - G3)/(G1 - G3) of the {what}, 0 to 1; empty where G1 - G3 is below 3/√N",
+            f"(G2 - G3)/(G1 - G3) of the {what}, 0 to 1; empty where G1 - G3 is below 3/√N, and of "
+            "discs",
         )
         for one, what in names.items()
     ]
@@ -129,12 +154,13 @@ class Invariants:
         if measured.void is not None:
             tensors = measured.void.replicates
             found |= _values("vs", measured.void.tensor, measured.segment_count)
-            found["f_vs_bias"] = _scan_bias(tensors)
+            found["f_vs_bias"] = _scan_bias(tensors, measured.space)
             found |= _errors("vs", measured.void.tensor, lambda form: _scatter(tensors, form))
         if measured.contact is not None:
             count = len(measured.normals)
             found |= _values("c", measured.contact, count)
-            found["f_c_bias"] = BIAS * math.sqrt(CONTACT_VARIANCE / count)
+            variance = CONTACT_VARIANCE[measured.space.dimension]
+            found["f_c_bias"] = bias_of(measured.space) * math.sqrt(variance / count)
             n = measured.normals
             pairs = np.einsum("ci,cj->cij", n, n)
             found |= _errors("c", measured.contact, lambda form: _scatter(pairs, form))
@@ -144,9 +170,9 @@ class Invariants:
 def _values(name: str, tensor: FabricTensor, count: int) -> dict[str, float | None]:
     largest, middle, smallest = (float(one) for one in tensor.principal_values)
     alpha = largest - smallest
-    known = count > 0 and alpha >= LEAST_ALPHA / math.sqrt(count)
+    known = count > 0 and not tensor.space.is_plane and alpha >= LEAST_ALPHA / math.sqrt(count)
     return {
-        f"f_{name}": intensity(tensor.matrix),
+        f"f_{name}": intensity(tensor.matrix, tensor.space),
         f"g{name}_1": largest,
         f"g{name}_2": middle,
         f"g{name}_3": smallest,
@@ -154,14 +180,15 @@ def _values(name: str, tensor: FabricTensor, count: int) -> dict[str, float | No
     }
 
 
-def _scan_bias(tensors: FloatArray) -> float | None:
+def _scan_bias(tensors: FloatArray, space: Space) -> float | None:
     """What the scatter of replicates, shape (R, 3, 3), gives a of their mean; None for one."""
     count = len(tensors)
     if count < 2:
         return None
-    # all are of trace 1, so the five components of the deviator share what there is of variance
-    variance = float(np.sum(np.var(tensors, axis=0, ddof=1))) / 5.0 / count
-    return BIAS * math.sqrt(variance)
+    # all are of trace 1, so the components of the deviator share what there is of variance
+    freedom = COMPONENTS_OF_DEVIATOR[space.dimension]
+    variance = float(np.sum(np.var(tensors, axis=0, ddof=1))) / freedom / count
+    return bias_of(space) * math.sqrt(variance)
 
 
 def _scatter(tensors: FloatArray, form: FloatArray) -> float | None:
@@ -175,11 +202,14 @@ def _scatter(tensors: FloatArray, form: FloatArray) -> float | None:
 
 def _errors(name: str, tensor: FabricTensor, scatter: Any) -> dict[str, float | None]:
     """Of a and of the principal values: to first order each is linear in G."""
-    deviator = fabric_deviator(tensor.matrix)
+    space = tensor.space
+    deviator = fabric_deviator(tensor.matrix, space)
     size = float(np.linalg.norm(deviator))
     found: dict[str, float | None] = {}
     if size > 0.0:
-        found[f"f_{name}_se"] = scatter(math.sqrt(1.5) * 7.5 * deviator / size)
+        found[f"f_{name}_se"] = scatter(
+            math.sqrt(space.intensity) * space.second_order * deviator / size
+        )
     for k, axis in enumerate(tensor.principal_axes, start=1):
         found[f"g{name}_{k}_se"] = scatter(np.outer(axis, axis))
     return found

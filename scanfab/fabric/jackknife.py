@@ -2,19 +2,22 @@
 The sample's own scatter: delete-one jackknife over blocks of the sample.
 
 Leaving out one of eight blocks in turn, and asking how much the anisotropy moves, says how far
-another sample of the same material would differ; the error of the scan says nothing of that.
+another sample of the same material would differ; the error of the scan says nothing of that. In a
+plane there are four.
 Efron and Stein (1981), doi:10.1214/aos/1176345462.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.column import Column
+from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.tensor import axial
 from scanfab.fabric.void import void_fabric
@@ -28,6 +31,7 @@ __all__ = [
     "Halves",
     "Jackknife",
     "Scatter",
+    "blocks_of",
     "contact_jackknife",
     "jackknife_error",
     "variance_without_noise",
@@ -35,7 +39,7 @@ __all__ = [
 ]
 
 
-# octants
+# octants, and columns of the table; in a plane the first four, which are quadrants
 BLOCKS = 8
 ORDER = (
     " (-x, -y, -z; x counts fastest; for an oblique loading axis the octants are turned so that "
@@ -58,24 +62,29 @@ class BlockedSums(NamedTuple):
     full: Sums
     """Of all blocks; the lengths in the dump's length unit."""
     without: list[Sums]
-    """Of all but one block, for each of the eight."""
+    """Of all but one block, for each of them."""
 
 
 class Jackknife(NamedTuple):
     """An axial anisotropy without each of the blocks."""
 
     shift: FloatArray
-    """By how much leaving out a block moves the anisotropy, shape (8,), dimensionless."""
+    """By how much leaving out each block moves the anisotropy, dimensionless."""
     error: float | None
     """The standard error that follows, dimensionless; None if the scan's noise hides it."""
     half: FloatArray
     """
-    How far the first replicate's value lies above the mean of all, shape (8,): of two replicates
-    half their difference.
+    How far the first replicate's value lies above the mean of all, without each block: of two
+    replicates half their difference.
 
     From these the noise of the scan is known in whatever is made of several frames, such as a
     slope. 0 for contacts, which are counted.
     """
+
+
+def blocks_of(space: Space) -> int:
+    """How many blocks the sample is parted into: octants, or quadrants."""
+    return int(2**space.dimension)
 
 
 def jackknife_error(values: FloatArray) -> float:
@@ -102,7 +111,7 @@ def _variance(values: FloatArray) -> FloatArray:
 
 
 def contact_jackknife(
-    normals: npt.ArrayLike, blocks: npt.ArrayLike, axis: npt.ArrayLike
+    normals: npt.ArrayLike, blocks: npt.ArrayLike, axis: npt.ArrayLike, space: Space = SPACE
 ) -> Jackknife | None:
     """
     The contact fabric's axial anisotropy without the contacts of each block.
@@ -115,22 +124,26 @@ def contact_jackknife(
         The block of each contact's point, from 0.
     axis : array_like, shape (3,)
         Loading axis, a unit vector.
+    space : Space, optional
+        The plane in which they lie, if the grains are discs.
 
     Returns
     -------
     Jackknife or None
         None if one block holds all contacts.
     """
-    along = 1.5 * (np.asarray(normals, dtype=np.float64) @ np.asarray(axis)) ** 2 - 0.5
-    places = np.asarray(blocks, dtype=np.int64)
-    number = np.bincount(places, minlength=BLOCKS)
+    along = space.axial((np.asarray(normals, dtype=np.float64) @ np.asarray(axis)) ** 2)
+    places, count = np.asarray(blocks, dtype=np.int64), blocks_of(space)
+    number = np.bincount(places, minlength=count)
     if np.any(number == len(along)):
         return None
-    rest = (along.sum() - np.bincount(places, along, minlength=BLOCKS)) / (len(along) - number)
-    return Jackknife(rest - along.mean(), jackknife_error(rest), np.zeros(BLOCKS))
+    rest = (along.sum() - np.bincount(places, along, minlength=count)) / (len(along) - number)
+    return Jackknife(rest - along.mean(), jackknife_error(rest), np.zeros(count))
 
 
-def void_jackknife(sums: BlockedSums, axis: npt.ArrayLike) -> Jackknife | None:
+def void_jackknife(
+    sums: BlockedSums, axis: npt.ArrayLike, space: Space = SPACE
+) -> Jackknife | None:
     """
     The void fabric's axial anisotropy without the segments of each block.
 
@@ -140,6 +153,8 @@ def void_jackknife(sums: BlockedSums, axis: npt.ArrayLike) -> Jackknife | None:
         Of a scan.
     axis : array_like, shape (3,)
         Loading axis, a unit vector.
+    space : Space, optional
+        The plane in which all lies, if the grains are discs.
 
     Returns
     -------
@@ -149,10 +164,11 @@ def void_jackknife(sums: BlockedSums, axis: npt.ArrayLike) -> Jackknife | None:
         is left, the error is None: too few lines to see it, which is no proof that there is none.
     """
     every = (sums.full, *sums.without)
-    fabrics = [void_fabric(sums.axes, sums.weights, *one) for one in every]
-    if any(fabric is None for fabric in fabrics):
+    fabrics = [void_fabric(sums.axes, sums.weights, *one, space) for one in every]
+    found = [axial(fabric.replicates, axis, space) for fabric in fabrics if fabric is not None]
+    if len(found) < len(every):
         return None
-    values = np.array([axial(fabric.replicates, axis) for fabric in fabrics if fabric is not None])
+    values = np.array(found)
     means = values.mean(axis=1)
     variance = variance_without_noise(values[1:])
     error = math.sqrt(variance) if variance > 0 else None
@@ -192,7 +208,8 @@ class Scatter:
                 f"{name}_sample_se",
                 float,
                 "",
-                f"the sample's own scatter of {name}, by a jackknife over eight octants",
+                f"the sample's own scatter of {name}, by a jackknife over eight octants, in a "
+                f"plane four quadrants",
             )
             for name in (VOID, CONTACT)
         ),
@@ -222,14 +239,17 @@ class Scatter:
 def _scatter_values(
     name: str, value: float | None, scatter: Jackknife | None
 ) -> dict[str, float | None]:
-    without = [
-        None if value is None or scatter is None else value + float(scatter.shift[block])
-        for block in range(BLOCKS)
-    ]
+    known = [] if value is None or scatter is None else [value + float(x) for x in scatter.shift]
     return {
         f"{name}_sample_se": None if scatter is None else scatter.error,
-        **{f"{name}_without_{block}": one for block, one in enumerate(without, start=1)},
+        **_by_block(f"{name}_without", known),
     }
+
+
+def _by_block(name: str, known: Sequence[float]) -> dict[str, float | None]:
+    """A column for each block; those of blocks that there are not are empty."""
+    values = [*known, *[None] * (BLOCKS - len(known))]
+    return {f"{name}_{block}": one for block, one in enumerate(values, start=1)}
 
 
 class Halves:
@@ -249,5 +269,4 @@ class Halves:
     def values(self, measured: Measured) -> dict[str, Any]:
         """All None where there is no void fabric, or none without some block."""
         scatter = measured.void_scatter
-        halves = [None] * BLOCKS if scatter is None else scatter.half.tolist()
-        return {f"{VOID}_half_{block}": half for block, half in enumerate(halves, start=1)}
+        return _by_block(f"{VOID}_half", [] if scatter is None else scatter.half.tolist())

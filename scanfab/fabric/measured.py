@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.contact import contact_fabric
 from scanfab.fabric.forces import ContactForces
@@ -48,6 +49,8 @@ class Measured:
     """Where these contacts are, shape (M, 3), dump's length unit."""
     blocks: IntArray
     """In which block of the sample each of these contacts is, from 0, shape (M,)."""
+    space: Space = SPACE
+    """The plane in which all lies, if the grains are discs."""
     segment_count: int = 0
     """Number of the kept void segments of all replicates."""
     forces: ContactForces | None = None
@@ -60,21 +63,21 @@ class Measured:
         """The void fabric; None if there is none."""
         if not self.meets_solids:
             return None
-        return void_fabric(self.axes, self.weights, self.length, self.segments)
+        return void_fabric(self.axes, self.weights, self.length, self.segments, self.space)
 
     @cached_property
     def contact(self) -> FabricTensor | None:
         """The contact fabric; None without a contact."""
-        return contact_fabric(self.normals)
+        return contact_fabric(self.normals, self.space)
 
     @cached_property
     def void_scatter(self) -> Jackknife | None:
         """The void fabric's anisotropy without each block."""
-        return None if self.void is None else void_jackknife(self.blocked, self.axis)
+        return None if self.void is None else void_jackknife(self.blocked, self.axis, self.space)
 
     @cached_property
     def contact_scatter(self) -> Jackknife | None:
         """The contact fabric's anisotropy without each block."""
         if self.contact is None:
             return None
-        return contact_jackknife(self.normals, self.blocks, self.axis)
+        return contact_jackknife(self.normals, self.blocks, self.axis, self.space)

@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.column import Column
+from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.invariants import fabric_deviator
 from scanfab.fabric.tensor import COMPONENTS, FabricTensor
@@ -76,21 +77,24 @@ class SampleState:
     """Mean number of contacts of the grains that have two or more."""
     stress: FloatArray | None
     """Shape (3, 3), compression positive; None without forces, or without a volume."""
+    space: Space = SPACE
+    """The plane of the sample, if its grains are discs: stress is a force over a length there."""
 
     @cached_property
     def mean_stress(self) -> float:
         """The pressure p."""
         assert self.stress is not None
-        return float(np.trace(self.stress)) / 3.0
+        return float(np.trace(self.stress)) / self.space.dimension
 
     @cached_property
     def direction(self) -> FloatArray | None:
         """The stress deviator over its norm; None for a stress that is nearly isotropic."""
         if self.stress is None:
             return None
-        deviator = self.stress - self.mean_stress * np.eye(3)
+        deviator = self.stress - self.mean_stress * self.space.identity
         size = float(np.linalg.norm(deviator))
-        if self.mean_stress <= 0.0 or math.sqrt(1.5) * size < LEAST_RATIO * self.mean_stress:
+        deviatoric = math.sqrt(self.space.dimension / (self.space.dimension - 1.0)) * size
+        if self.mean_stress <= 0.0 or deviatoric < LEAST_RATIO * self.mean_stress:
             return None
         return deviator / size
 
@@ -116,7 +120,7 @@ class State:
             Column(f"stress_{one}", float, STRESS, f"{one} of the stress, compression positive")
             for one in COMPONENTS
         ),
-        Column("p", float, STRESS, "mean stress, a third of the trace"),
+        Column("p", float, STRESS, "mean stress, a third of the trace, of discs half of it"),
         Column("q", float, STRESS, "stress along the loading axis less the mean across it"),
         VOLUMETRIC_STRAIN,
         Column(
@@ -164,8 +168,9 @@ class State:
         if state.stress is None:
             return found
         along = float(measured.axis @ state.stress @ measured.axis)
+        less = state.space.dimension / (state.space.dimension - 1.0)
         found |= {f"stress_{one}": float(state.stress[at]) for one, at in COMPONENTS.items()}
-        found |= {"p": state.mean_stress, "q": 1.5 * (along - state.mean_stress)}
+        found |= {"p": state.mean_stress, "q": less * (along - state.mean_stress)}
         return found | _against_stress(measured, state)
 
 
@@ -175,14 +180,15 @@ def _against_stress(measured: Measured, state: SampleState) -> dict[str, float |
     if direction is None:
         return {}
     assert state.stress is not None
-    stress = FabricTensor(state.stress / np.trace(state.stress))
+    space = state.space
+    stress = FabricTensor(state.stress / np.trace(state.stress), space)
     found: dict[str, float | None] = {}
     if measured.void is not None:
-        each = np.einsum("rij,ij->r", fabric_deviator(measured.void.replicates), direction)
+        each = np.einsum("rij,ij->r", fabric_deviator(measured.void.replicates, space), direction)
         found |= _values("vs", measured.void.tensor, direction, stress, each)
     if measured.contact is not None:
         n = measured.normals
-        each = 7.5 * np.einsum("ci,ij,cj->c", n, direction, n)
+        each = space.second_order * np.einsum("ci,ij,cj->c", n, direction, n)
         found |= _values("c", measured.contact, direction, stress, each)
     return found
 
@@ -193,7 +199,7 @@ def _values(
     count = len(each)
     error = float(np.std(each, ddof=1) / math.sqrt(count)) if count > 1 else None
     return {
-        f"acst_{name}": float(np.sum(fabric_deviator(fabric.matrix) * direction)),
+        f"acst_{name}": float(np.sum(fabric_deviator(fabric.matrix, fabric.space) * direction)),
         f"angle_{name}_stress": fabric.angle_to(stress),
         f"acst_{name}_se": error,
     }

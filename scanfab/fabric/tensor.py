@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.column import Column
+from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import spelt_place
 from scanfab.base.typing import FloatArray
 
@@ -24,12 +25,12 @@ __all__ = [
 COMPONENTS = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 
 
-def axial(tensor: npt.NDArray[np.float64], axis: npt.ArrayLike) -> FloatArray:
+def axial(tensor: npt.NDArray[np.float64], axis: npt.ArrayLike, space: Space = SPACE) -> FloatArray:
     """
-    Signed anisotropy along an axis: a·G·a - (1 - a·G·a)/2.
+    Signed anisotropy along an axis: a·G·a - (1 - a·G·a)/2, in a plane a·G·a - b·G·b.
 
     Linear in G, so nearly unbiased where α is small: the quantity to plot and to correlate. It is
-    not the intensity when the principal axes turn.
+    not the intensity when the principal axes turn. In a plane b lies in it, across a.
 
     Parameters
     ----------
@@ -37,6 +38,8 @@ def axial(tensor: npt.NDArray[np.float64], axis: npt.ArrayLike) -> FloatArray:
         Fabric tensors of trace 1, dimensionless.
     axis : array_like, shape (3,)
         Unit vector.
+    space : Space, optional
+        The plane that the tensors are of, if they are.
 
     Returns
     -------
@@ -50,8 +53,8 @@ def axial(tensor: npt.NDArray[np.float64], axis: npt.ArrayLike) -> FloatArray:
     0.25
     """
     unit = np.asarray(axis, dtype=np.float64)
-    along: FloatArray = np.asarray(tensor @ unit @ unit)
-    return 1.5 * along - 0.5
+    along: FloatArray = np.asarray(space.axial(np.asarray(tensor @ unit @ unit)))
+    return along
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +66,8 @@ class FabricTensor:
     ----------
     matrix : ndarray, shape (3, 3)
         Trace 1.
+    space : Space, optional
+        The plane that it is of, if it is: all components across it are 0.
 
     Examples
     --------
@@ -73,9 +78,10 @@ class FabricTensor:
     """
 
     matrix: FloatArray
+    space: Space = SPACE
 
     def __repr__(self) -> str:
-        values = ", ".join(f"{value:.4g}" for value in self.principal_values)
+        values = ", ".join(f"{x:.4g}" for x in self.principal_values[: self.space.dimension])
         return (
             f"FabricTensor: alpha {self.alpha:.3g}, principal values {values}, major axis "
             f"{spelt_place(np.round(self.major_axis, 4))}"
@@ -88,7 +94,7 @@ class FabricTensor:
 
     @property
     def principal_values(self) -> FloatArray:
-        """Principal values, largest first, shape (3,)."""
+        """Principal values, largest first, shape (3,); in a plane the last is 0."""
         return self._eigen[0]
 
     @property
@@ -123,12 +129,16 @@ class FabricTensor:
 
     @property
     def alpha(self) -> float:
-        """α: largest minus smallest principal value; never negative, so noise raises it."""
-        return float(self.principal_values[0] - self.principal_values[2])
+        """
+        α: largest minus smallest principal value; never negative, so noise raises it.
+
+        In a plane the smaller of its two.
+        """
+        return float(self.principal_values[0] - self.principal_values[self.space.dimension - 1])
 
     def axial(self, axis: npt.ArrayLike) -> float:
         """
-        Signed anisotropy along an axis: a·G·a - (1 - a·G·a)/2.
+        Signed anisotropy along an axis: a·G·a - (1 - a·G·a)/2, in a plane a·G·a - b·G·b.
 
         Linear in G, so nearly unbiased where α is small: the quantity to plot and to correlate.
 
@@ -141,7 +151,7 @@ class FabricTensor:
         -------
         float
         """
-        return float(axial(self.matrix, axis))
+        return float(axial(self.matrix, axis, self.space))
 
     def components(self) -> dict[str, float]:
         """

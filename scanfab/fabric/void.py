@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.column import LENGTH, Column
+from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.tensor import FabricTensor, axial, tensor_columns, tensor_values
@@ -94,7 +95,8 @@ class VoidFabric:
         count = len(self.replicates)
         if count < 2:
             return None
-        return float(np.std(axial(self.replicates, axis), ddof=1) / np.sqrt(count))
+        along = axial(self.replicates, axis, self.tensor.space)
+        return float(np.std(along, ddof=1) / np.sqrt(count))
 
     def expected_error(self, axis: npt.ArrayLike, degree: int | None = None) -> float | None:
         """
@@ -118,7 +120,10 @@ class VoidFabric:
         """
         count, number = self.mean_lengths.shape
         even = min(max((degree or 0) // 2 * 2 - 2, 4), 8)
+        space = self.tensor.space
         powers = [(i, j, even - i - j) for i in range(even + 1) for j in range(even + 1 - i)]
+        # in a plane those without its third coordinate
+        powers = [one for one in powers if space.across is None or one[space.across] == 0]
         if count * number < 3 * len(powers):
             return None
         i, j, k = np.array(powers).T
@@ -129,14 +134,18 @@ class VoidFabric:
         fit = np.linalg.lstsq(design.T @ design, design.T @ lengths, rcond=None)[0]
         variance = np.sum((lengths - design @ fit) ** 2) / (len(lengths) - len(powers))
         # by how much a mean length moves the axial anisotropy, a ratio of sums over the axes
-        along = 1.5 * (self.axes @ np.asarray(axis, dtype=float)) ** 2 - 0.5
+        along = space.axial((self.axes @ np.asarray(axis, dtype=float)) ** 2)
         slope = self.weights * (along - self.tensor.axial(axis))
         slope /= (self.mean_lengths @ self.weights)[:, None]
         return float(np.sqrt(variance * np.sum(slope**2)) / count)
 
 
 def void_fabric(
-    axes: FloatArray, weights: FloatArray, length: FloatArray, segments: FloatArray | IntArray
+    axes: FloatArray,
+    weights: FloatArray,
+    length: FloatArray,
+    segments: FloatArray | IntArray,
+    space: Space = SPACE,
 ) -> VoidFabric | None:
     """
     The void fabric from the sums of a scan.
@@ -155,6 +164,8 @@ def void_fabric(
     segments : ndarray, shape (R, D)
         Number of the kept segments. For the second moment, sums of squared lengths and of lengths
         take the places of these two.
+    space : Space, optional
+        The plane in which the axes lie, if the grains are discs.
 
     Returns
     -------
@@ -189,7 +200,7 @@ def void_fabric(
     tensors = np.einsum("rd,rdi,rdj->rij", weighted, axes, axes)
     tensors /= weighted.sum(axis=1)[:, None, None]
     return VoidFabric(
-        tensor=FabricTensor(tensors.mean(axis=0)),
+        tensor=FabricTensor(tensors.mean(axis=0), space),
         mean_length=float((weights @ total_length) / (weights @ total_segments)),
         replicates=tensors,
         axes=axes,

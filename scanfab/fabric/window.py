@@ -8,7 +8,7 @@ the mean length c + 1/β above a cut-off c; clipped to W
 
     ℓ(n) = c + A₁ / (A₀ + β A₁),    A₁ = g(c; n),    A₀ = -dg/dz(c; n),
 
-with g(z; n) the volume that W has in common with itself moved by z n.
+with g(z; n) the volume that W has in common with itself moved by z n; in a plane the area.
 """
 
 from __future__ import annotations
@@ -72,4 +72,4 @@ def window_alpha(
     lengths = fabric.weights * (cutoff + shared / number)
     tensors = np.einsum("rd,rdi,rdj->rij", lengths, fabric.axes, fabric.axes)
     tensors /= lengths.sum(axis=1)[:, None, None]
-    return float(np.mean(axial(tensors, axis)))
+    return float(np.mean(axial(tensors, axis, fabric.tensor.space)))

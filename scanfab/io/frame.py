@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from scanfab.base.errors import PackingError, ReadError, ScanfabNote, ScanfabWarning
+from scanfab.base.typing import FloatArray
 from scanfab.io.bodies import body_numbers
 from scanfab.io.families import Family, nearest
 from scanfab.io.reader import (
@@ -118,7 +119,26 @@ class Frame:
                 cell=grains.cell,
                 step=self.step,
                 time=self.snapshot.time,
+                dim=self.series.space_of(self.number, grains.position),
             )
+
+    def centres(self) -> FloatArray:
+        """
+        The centres of its particles alone.
+
+        Returns
+        -------
+        ndarray, shape (N, 3)
+            Dump's length unit.
+
+        Raises
+        ------
+        ReadError
+            If the file is not as it should be.
+        """
+        if self.problem is not None:
+            raise self.problem
+        return self.reader.read_grains(self.snapshot, self._options()).position
 
     def _joined_contacts(self, grains: GrainTable, options: ReadOptions) -> list[JoinedContacts]:
         """The contact files of the frame, joined to its grains; one of them lists grain pairs."""

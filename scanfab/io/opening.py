@@ -85,6 +85,7 @@ def read_series(
     cell: tuple[float, ...] | PathLike | None = None,
     periodic: str | None = None,
     bodies: str | None = None,
+    dim: str | int = "auto",
 ) -> Series:
     """
     Open a series of frames: a folder, a file, or several files.
@@ -116,6 +117,9 @@ def read_series(
         Column that says which clump a sphere belongs to: whole numbers, negative for a sphere that
         is a grain of its own. By default ``id_multisphere``, ``clumpId``, ``clump_id`` or
         ``clump``, if there is one; ``id`` makes each sphere a grain.
+    dim : {"auto", 2, 3}, optional
+        2: discs, whose centres share one coordinate. ``auto``: 2 if those of the first frame that
+        has any do so, at least ten, and share no second one; with a note. One for all frames.
 
     Returns
     -------
@@ -161,7 +165,9 @@ def read_series(
 
     def series(files: Sequence[Family], contacts_from: ContactsFrom) -> Series:
         whole = tuple(family.check() for family in files)
-        return Series(name, grains, whole, contacts_from, options, cells, sources, reading)
+        return Series(
+            name, grains, whole, contacts_from, options, cells, sources, reading, dim=checked["dim"]
+        )
 
     if contacts == "geometric":
         return series((), "geometric")

@@ -80,6 +80,13 @@ def parse_periodic(name: str, value: Any) -> str | None:
     return value
 
 
+def parse_dim(name: str, value: Any) -> str | int:
+    """``auto``, or a number of dimensions."""
+    if value is None or str(value) not in ("auto", "2", "3"):
+        raise unusable(name, "auto, 2 or 3", value)
+    return "auto" if value == "auto" else int(value)
+
+
 parse_radius = optional(number("a length above 0", lambda value: 0 < value < math.inf))
 
 READING_OPTIONS = (
@@ -159,6 +166,18 @@ READING_OPTIONS = (
         metavar="PATH|file|geometric",
         choices=lambda: ("file", "geometric"),
         files=True,
+    ),
+    Option(
+        name="dim",
+        default="auto",
+        parse=parse_dim,
+        group="reading",
+        help="2: discs in a coordinate plane; auto: 2 if all centres of the first frame with any, "
+        "ten at least, share exactly one coordinate, for the whole series.",
+        meaning="3: spheres; 2: discs in a coordinate plane; auto: as the first frame has them",
+        takes="str or int",
+        metavar="auto|2|3",
+        choices=lambda: ("auto", "2", "3"),
     ),
 )
 

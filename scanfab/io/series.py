@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 from typing import Any, Literal, SupportsIndex, overload
 
 from scanfab.base.errors import NoFrameError, ReadError, SettingsError
+from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import counted
+from scanfab.base.typing import FloatArray
+from scanfab.io.dimension import decided_space
 from scanfab.io.families import Family
 from scanfab.io.frame import Frame
 from scanfab.io.frame_csv import FrameFile
@@ -60,6 +64,8 @@ class Series:
         Its options, as a manifest lists them.
     numbers : range
         Which frames of the whole series these are; there may be fewer.
+    dim : str or int
+        2 of discs, 3, or ``auto``: as the first frame that has particles has them.
 
     Examples
     --------
@@ -80,6 +86,7 @@ class Series:
     sources: tuple[str, ...] = field(default=(), repr=False, compare=False)
     reading: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
     numbers: range = range(ENDLESS)
+    dim: str | int = "auto"
     # a file that holds the contacts of many frames is indexed once
     _contact_snapshots: dict[Path, list[Snapshot]] = field(
         default_factory=dict, init=False, repr=False, compare=False
@@ -88,6 +95,8 @@ class Series:
         default_factory=dict, init=False, repr=False, compare=False
     )
     """The frames of the grain files that were looked into, and how these files were then."""
+    _spaces: list[Space] = field(default_factory=list, init=False, repr=False, compare=False)
+    """One, once it is known."""
 
     def __getstate__(self) -> dict[str, Any]:
         # another process that computes a frame need not know where all others are
@@ -173,6 +182,42 @@ class Series:
         if any(bound is not None and bound < 0 for bound in bounds):
             return self.numbers[: len(self)][frames]
         return self.numbers[frames]
+
+    def space_of(self, number: int, position: FloatArray) -> Space:
+        """
+        In which space the particles of all frames lie, when those of one are known.
+
+        Parameters
+        ----------
+        number : int
+            Of that frame, in the whole series.
+        position : ndarray, shape (N, 3)
+            Its centres, dump's length unit.
+
+        Returns
+        -------
+        Space
+            That of the first frame that has particles.
+
+        Raises
+        ------
+        PackingError
+            If discs are asked for, and these are none.
+        """
+        if self.dim == 3:
+            return SPACE
+        if not self._spaces:
+            first = next(filter(len, self._centres_before(number)), position)
+            if not len(first):
+                return SPACE
+            self._spaces.append(decided_space(self.name, first, self.dim))
+        return self._spaces[0]
+
+    def _centres_before(self, number: int) -> Iterator[FloatArray]:
+        """Of the frames before one, as far as they can be read."""
+        for frame in islice(self._every(), number):
+            with suppress(ReadError):
+                yield frame.centres()
 
     @property
     def whole(self) -> Series:

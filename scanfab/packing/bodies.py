@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 
 if TYPE_CHECKING:
@@ -93,7 +94,11 @@ class Bodies:
 
 
 def bodies_of(
-    number: IntArray, position: FloatArray, radius: FloatArray, cell: Cell | None
+    number: IntArray,
+    position: FloatArray,
+    radius: FloatArray,
+    cell: Cell | None,
+    space: Space = SPACE,
 ) -> Bodies | None:
     """
     Put spheres together as bodies; None if each is a body of its own.
@@ -108,6 +113,8 @@ def bodies_of(
         Dump's length unit.
     cell : Cell, optional
         Through its periodic faces each sphere is next to the first one of its body.
+    space : Space, optional
+        The plane of discs, whose places are weighted with their areas.
 
     Examples
     --------
@@ -132,7 +139,7 @@ def bodies_of(
     # over that of the body's largest sphere: the cube of a length may be beyond all numbers
     largest = np.zeros(len(head))
     np.maximum.at(largest, head, radius)
-    volume = (radius / largest[head]) ** 3
+    volume = (radius / largest[head]) ** space.dimension
     weight = np.bincount(head, volume, len(head))[head]
     moment = [np.bincount(head, volume * along, len(head))[head] for along in branch.T]
     place = position[head] + np.column_stack(moment) / weight[:, None]

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import PackingError
+from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import spelt_place
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.lattice import Lattice, reduced_lattice
@@ -39,6 +40,8 @@ class Cell:
         Along which lattice vectors the packing repeats; all by default.
     origin : array_like, shape (3,), optional
         Corner of the cell, in the dump's length unit.
+    space : Space, optional
+        The plane of the discs in it: all vectors lie there but one, which does not repeat.
 
     Raises
     ------
@@ -58,6 +61,7 @@ class Cell:
         vectors: npt.ArrayLike,
         periodic: tuple[bool, bool, bool] = (True, True, True),
         origin: npt.ArrayLike = (0.0, 0.0, 0.0),
+        space: Space = SPACE,
     ) -> None:
         try:
             lattice = np.asarray(vectors, dtype=np.float64)
@@ -69,6 +73,7 @@ class Cell:
             ) from None
         self.vectors: FloatArray = np.diag(lattice) if lattice.shape == (3,) else lattice
         self.periodic = _three_truths(periodic)
+        self.space = space
         if self.vectors.shape != (3, 3) or self.origin.shape != (3,):
             raise PackingError(
                 f"a cell needs vectors of shape (3, 3) and an origin of shape (3,), "
@@ -103,6 +108,25 @@ class Cell:
         """Perpendicular distances between opposite faces, shape (3,), dump's length unit."""
         heights: FloatArray = 1.0 / np.linalg.norm(np.linalg.inv(self.vectors), axis=0)
         return heights
+
+    @property
+    def is_endless(self) -> bool:
+        """Whether the packing repeats along all vectors; in a plane along both that lie in it."""
+        return sum(self.periodic) == self.space.dimension
+
+    @property
+    def own_vectors(self) -> FloatArray:
+        """The vectors, shape (3, 3); in a plane those that lie in it, there, shape (2, 2)."""
+        if self.space.across is None:
+            return self.vectors
+        inside = self.vectors[:, self.space.across] == 0.0
+        own: FloatArray = self.vectors[inside][:, list(self.space.along)]
+        return own
+
+    @property
+    def volume(self) -> float:
+        """Dump's length unit, cubed; in a plane the area."""
+        return abs(float(np.linalg.det(self.own_vectors)))
 
     @property
     def center(self) -> FloatArray:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.packing import Packing
 
 __all__ = ["lens_volumes", "own_shares"]
 
-# the volume of the unit ball
-BALL = 4.0 / 3.0 * np.pi
 # points in pairs of spheres of one clump, all together: a second or two
 MOST_POINTS = 1 << 25
 # of a sphere, where clumps are so many that their errors cancel
@@ -28,7 +27,7 @@ def own_shares(packing: Packing, points: FloatArray) -> FloatArray:
     packing : Packing
         Of spheres that are grains, or parts of clumps.
     points : ndarray, shape (P, 3)
-        That fill the unit ball evenly, the first few as well as all.
+        That fill the unit ball evenly, or the unit disc, the first few as well as all.
 
     Returns
     -------
@@ -57,15 +56,19 @@ def own_shares(packing: Packing, points: FloatArray) -> FloatArray:
         each[part] = inside.mean(axis=1)
     # the volume that two spheres share is known, points have to tell what three or more do
     apart = np.linalg.norm(position[two] - position[one], axis=1)
-    known = lens_volumes(apart, radius[one], radius[two]) / (BALL * radius[two] ** 3) - each
+    space = packing.space
+    lens = lens_volumes(apart, radius[one], radius[two], space)
+    known = lens / space.volume(radius[two]) - each
     share = np.ones(len(radius))
     share[rows] -= covered.mean(axis=1) + np.bincount(row, known, len(rows))
     return share
 
 
-def lens_volumes(apart: FloatArray, one: FloatArray, two: FloatArray | float) -> FloatArray:
+def lens_volumes(
+    apart: FloatArray, one: FloatArray, two: FloatArray | float, space: Space = SPACE
+) -> FloatArray:
     """
-    Volumes that pairs of spheres share.
+    Volumes that pairs of spheres share; of discs areas.
 
     Parameters
     ----------
@@ -73,14 +76,28 @@ def lens_volumes(apart: FloatArray, one: FloatArray, two: FloatArray | float) ->
         Distance of their centres, dump's length unit.
     one, two : ndarray, shape (K,), or float
         Their radii, dump's length unit.
+    space : Space, optional
+        The plane in which they lie, if they are discs.
     """
-    smaller = BALL * np.minimum(one, two) ** 3
+    smaller = space.volume(np.minimum(one, two))
     is_inside = apart <= np.abs(two - one)
     distance = np.where(is_inside, 1.0, apart)
+    if space.is_plane:
+        return np.where(is_inside, smaller, _lens_areas(distance, one, two))
     deep = np.maximum(two + one - apart, 0.0)
     lens = np.pi * deep**2 / (12.0 * distance)
     lens *= distance**2 + 2.0 * distance * (one + two) - 3.0 * (one - two) ** 2
     return np.where(is_inside, smaller, lens)
+
+
+def _lens_areas(apart: FloatArray, one: FloatArray, two: FloatArray | float) -> FloatArray:
+    """Two segments of circles, each a sector less its triangle."""
+    found = np.zeros_like(apart)
+    for r, other in ((one, two), (two, one)):
+        height = (apart**2 + np.square(r) - np.square(other)) / (2.0 * apart)
+        cosine = np.clip(height / r, -1.0, 1.0)
+        found = found + np.square(r) * (np.arccos(cosine) - cosine * np.sqrt(1.0 - cosine**2))
+    return found
 
 
 def _pairs(head: IntArray) -> tuple[IntArray, IntArray]:

@@ -11,13 +11,12 @@ from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.bodies import CLUMP_COLUMNS, MOLECULE_COLUMNS
 from scanfab.packing.packing import Packing
 from scanfab.packing.periodicity import fitting_periods
+from scanfab.packing.plane import FEWEST, space_of, spelt_plane
 from scanfab.packing.sample import Sample
 
 __all__ = ["cell_doubt", "cell_hint", "doubts_of", "refuse_impossible"]
 
 
-# particles below which nothing is said of a sample's form
-FEWEST = 10
 # names of columns that may say which spheres are one body, in lower case
 COLUMNS = (*CLUMP_COLUMNS, *MOLECULE_COLUMNS)
 # a clump is smaller than this part of the sample, or of the period
@@ -45,7 +44,8 @@ def refuse_impossible(sample: Sample) -> None:
     Raises
     ------
     PackingError
-        If all centres lie in one plane, or the solids do not fit into their own box by far.
+        If spheres all have their centres in one plane, or the solids do not fit into their own box
+        by far.
     """
     for text in (_plane(sample.packing), _overfull(sample)):
         if text:
@@ -112,15 +112,12 @@ def cell_hint(sample: Sample, carries: str) -> str:
 
 
 def _plane(packing: Packing) -> str:
-    if len(packing) < FEWEST:
+    plane = space_of(packing.position)
+    if packing.space.is_plane or not plane.is_plane:
         return ""
-    flat = np.ptp(packing.position, axis=0) == 0
-    if flat.sum() != 1:
-        return ""
-    axis = "xyz"[int(np.argmax(flat))]
     return (
-        f"all {len(packing)} centres lie in one plane ({axis} = {packing.position[0, flat][0]:g}): "
-        f"scanfab measures samples in 3D; a 2D sample cannot be measured yet"
+        f"all {len(packing)} centres lie in {plane} ({spelt_plane(packing.position, plane)}), but "
+        f"are taken for spheres in three dimensions: discs are read with `dim=2`"
     )
 
 
@@ -145,11 +142,13 @@ def _overfull(sample: Sample) -> str:
 
 def _solid_fraction(position: FloatArray, radius: FloatArray, packing: Packing) -> float:
     """The volumes of some grains in that of the box of their surfaces, or of the cell."""
-    reach = radius[:, None]
-    box = float(np.prod((position + reach).max(axis=0) - (position - reach).min(axis=0)))
+    reach, space = radius[:, None], packing.space
+    extents = (position + reach).max(axis=0) - (position - reach).min(axis=0)
+    box = float(np.prod(extents[list(space.along)]))
     if packing.cell is not None and packing.is_periodic:
-        box = min(box, abs(float(np.linalg.det(packing.cell.vectors))))
-    return float(4.0 / 3.0 * np.pi * np.sum((radius / np.cbrt(box)) ** 3))
+        box = min(box, packing.cell.volume)
+    scale = np.cbrt(box) if space.dimension == 3 else np.sqrt(box)
+    return float(space.ball * np.sum((radius / scale) ** space.dimension))
 
 
 def _clumps(packing: Packing) -> str:

@@ -136,10 +136,11 @@ def _far(packing: Packing, grains: BoolArray) -> float:
 
 def _open_axes(packing: Packing) -> list[int]:
     """Axes along which nothing repeats: no image of a grain lies elsewhere along them."""
+    along = sorted(packing.space.along)
     if packing.cell is None:
-        return [0, 1, 2]
+        return along
     repeats = packing.cell.vectors[list(np.flatnonzero(packing.cell.periodic))]
-    return np.flatnonzero(~np.any(repeats != 0.0, axis=0)).tolist()
+    return [k for k in along if not np.any(repeats[:, k] != 0.0)]
 
 
 def _group_at_end(

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from scanfab.base.shapes import ellipsoid
+from scanfab.base.shapes import ellipsoid, turned_ellipse
+from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
 from scanfab.packing.window import Window
 
 __all__ = ["inner_ellipsoid"]
 
 
-def inner_ellipsoid(position: FloatArray, largest: float) -> Window | None:
+def inner_ellipsoid(position: FloatArray, largest: float, space: Space = SPACE) -> Window | None:
     """
     The ellipsoid of a sample's shape that lies a largest radius within the hull of its centres.
 
@@ -26,6 +27,8 @@ def inner_ellipsoid(position: FloatArray, largest: float) -> Window | None:
         Centres.
     largest : float
         Radius of the largest grain.
+    space : Space, optional
+        The plane in which the centres lie, if they do: then it is an ellipse there.
 
     Returns
     -------
@@ -47,14 +50,21 @@ def inner_ellipsoid(position: FloatArray, largest: float) -> Window | None:
 
     if not len(position):
         return None
+    along = list(space.along)
     center = position.mean(axis=0)
+    if space.across is not None:
+        center[space.across] = position[0, space.across]
+    branch = (position - center)[:, along]
     try:
-        facets = ConvexHull(position - center).equations
+        facets = ConvexHull(branch).equations
     except (QhullError, ValueError):
         return None
-    variance, axes = np.linalg.eigh(np.cov((position - center).T))
-    normals, distance = facets[:, :3] @ axes, -facets[:, 3]
+    variance, axes = np.linalg.eigh(np.cov(branch.T))
+    normals, distance = facets[:, :-1] @ axes, -facets[:, -1]
     scale = float(np.min((distance - largest) / np.sqrt(normals**2 @ variance)))
     if scale <= 0.0:
         return None
-    return Window(center, ellipsoid(scale * np.sqrt(variance), axes.T))
+    semi_axes = scale * np.sqrt(variance)
+    if space.is_plane:
+        return Window(center, turned_ellipse(semi_axes, axes.T @ space.basis[:2], space))
+    return Window(center, ellipsoid(semi_axes, axes.T))

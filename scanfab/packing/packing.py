@@ -13,11 +13,13 @@ import numpy.typing as npt
 from scanfab.base.arrays import cast, grains_named
 from scanfab.base.errors import PackingError
 from scanfab.base.lengths import LEAST, MOST, all_within
+from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import counted, spelt_range
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.bodies import Bodies, bodies_of
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import ContactList, Contacts, Spheres, resolve_contacts
+from scanfab.packing.plane import cell_in_plane, flat_space, place_of, refuse_outside
 
 __all__ = [
     "ContactList",
@@ -106,8 +108,9 @@ class Packing:
 
     Parameters
     ----------
-    position : array_like, shape (N, 3)
-        Centres, dump's length unit. Wrapped into the cell along its periodic vectors.
+    position : array_like, shape (N, 3) or (N, 2)
+        Centres, dump's length unit. Wrapped into the cell along its periodic vectors. Two
+        coordinates are those of discs in the x-y plane, with z = 0.
     radius : array_like, shape (N,) or float
         Radii, dump's length unit.
     id : array_like of int, shape (N,), optional
@@ -126,12 +129,17 @@ class Packing:
         The (periodic) cell.
     step, time : int, float, optional
         Of the dump.
+    dim : {2, 3}, optional
+        2: discs, whose centres share one coordinate; by default 3, but 2 of positions that have
+        two. What the cell says of the direction across the plane is ignored. A series, whose
+        plane is that of its first frame, names the space itself.
 
     Raises
     ------
     PackingError
         If a shape is wrong, a number is not finite or above 1e100, a radius is not positive or
-        below 1e-100, an id occurs twice, or a contact names a row that does not exist.
+        below 1e-100, an id occurs twice, a contact names a row that does not exist, or discs do
+        not lie in one coordinate plane.
 
     Examples
     --------
@@ -154,10 +162,11 @@ class Packing:
         cell: Cell | None = None,
         step: int | None = None,
         time: float | None = None,
+        dim: int | Space | None = None,
     ) -> None:
         if not isinstance(cell, Cell | None):
             raise PackingError(f"cell: expected a Cell, such as Cell([1, 1, 1]), found {cell!r}")
-        centres = cast("position", position, np.float64, (None, 3))
+        centres, dim = _centres(position, dim)
         count = len(centres)
         radii = np.asarray(radius)
         self.radius: FloatArray = cast(
@@ -166,6 +175,9 @@ class Packing:
         self.id: IntArray = cast("id", np.arange(count) if id is None else id, np.int64, (count,))
         check_lengths(centres, self.radius, self.id)
         _check_ids(self.id)
+        self.space: Space = _space_of(centres, dim)
+        if cell is not None and self.space.is_plane:
+            cell = cell_in_plane(cell, self.space)
         turns: IntArray | None = None
         self.position: FloatArray = centres
         if cell is not None and not lies_within(cell, centres, 0.0, 1.0):
@@ -177,7 +189,7 @@ class Packing:
         self.bodies: Bodies | None = None
         if bodies is not None:
             numbers = cast("bodies", bodies, np.int64, (count,))
-            self.bodies = bodies_of(numbers, self.position, self.radius, cell)
+            self.bodies = bodies_of(numbers, self.position, self.radius, cell, self.space)
         self.wall_contacts: IntArray = _wall_contacts(wall_contacts, count)
         self.cell = cell
         self.step = None if step is None else int(step)
@@ -195,11 +207,22 @@ class Packing:
         if len(self):
             radii = f" of radius {spelt_range(self.radius.min(), self.radius.max())}"
         what = [counted(len(self), "particle") + radii]
+        what += [f"2D in {self.space}"] if self.space.is_plane else []
         if self.bodies is not None:
             what += [f"parts of {counted(self.bodies.count(np.ones(len(self), bool)), 'grain')}"]
         what.append("contacts not known" if self.contacts is None else self.contacts.in_words())
         what += [] if self.step is None else [f"step {self.step}"]
         return f"Packing: {', '.join(what)}" + ("" if self.cell is None else f"\n  {self.cell!r}")
+
+    @property
+    def dimension(self) -> int:
+        """3, or 2 of discs in a plane."""
+        return self.space.dimension
+
+    @property
+    def place_across(self) -> float:
+        """Of discs the coordinate that all their centres share, dump's length unit."""
+        return place_of(self.position, self.space) if len(self) else 0.0
 
     @property
     def is_periodic(self) -> bool:
@@ -234,6 +257,36 @@ class Packing:
 
     def _spheres(self, turns: IntArray | None) -> Spheres:
         return Spheres(self.position, self.radius, self.id, self.cell, turns, self.bodies)
+
+
+def _space_of(position: FloatArray, dim: int | Space) -> Space:
+    """In which positions lie."""
+    if isinstance(dim, Space):
+        refuse_outside(position, dim)
+        return dim
+    return flat_space(position) if dim == 2 else SPACE
+
+
+def _centres(position: npt.ArrayLike, dim: int | Space | None) -> tuple[FloatArray, int | Space]:
+    """Positions of three coordinates, from those of three or of two, and their dimension."""
+    if dim not in (None, 2, 3) and not isinstance(dim, Space):
+        raise PackingError(f"dim: expected 2 or 3, found {dim!r}")
+    if not _are_flat(position):
+        return cast("position", position, np.float64, (None, 3)), dim or 3
+    if dim == 3:
+        raise PackingError("dim: expected 2, as the positions have two coordinates, found 3")
+    flat: FloatArray = cast("position", position, np.float64, (None, 2))
+    return np.column_stack([flat, np.zeros(len(flat))]), dim or 2
+
+
+def _are_flat(position: npt.ArrayLike) -> bool:
+    """Whether positions have two coordinates."""
+    try:
+        shape = np.shape(position)
+    except ValueError:
+        # rows of different lengths
+        return False
+    return len(shape) == 2 and shape[1] == 2
 
 
 def _wall_contacts(values: npt.ArrayLike | None, count: int) -> IntArray:

@@ -9,6 +9,7 @@ import numpy as np
 from scanfab.base.arrays import cast
 from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
+from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import spelt_place
 from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.packing.cell import Cell
@@ -200,6 +201,8 @@ class SurfaceBox:
     """Shape (3,)."""
     high: FloatArray
     cell: Cell | None
+    space: Space = SPACE
+    """The plane in which the grains lie: the box has no extent across it."""
 
     @classmethod
     def of(cls, packing: Packing, grains: BoolArray) -> SurfaceBox:
@@ -209,7 +212,9 @@ class SurfaceBox:
         # one coordinate at a time: that is faster by far for millions of grains
         low = np.array([(along - radius).min() for along in position.T])
         high = np.array([(along + radius).max() for along in position.T])
-        return cls(low, high, packing.cell)
+        if packing.space.across is not None:
+            low[packing.space.across] = high[packing.space.across] = packing.place_across
+        return cls(low, high, packing.cell, packing.space)
 
     @property
     def extents(self) -> FloatArray:
@@ -221,8 +226,8 @@ class SurfaceBox:
 
     @property
     def smallest_extent(self) -> float:
-        """The shortest of the edges."""
-        return float(self.extents.min())
+        """The shortest of the edges; of discs in their plane."""
+        return float(self.extents[list(self.space.along)].min())
 
     @property
     def center(self) -> FloatArray:
@@ -242,4 +247,4 @@ class SurfaceBox:
         nearest = np.minimum(below + window.shape.low, above - window.shape.high)
         if self.cell is not None:
             nearest = np.where(self.cell.periodic, np.inf, nearest)
-        return float(nearest.min())
+        return float(nearest[list(self.space.along)].min())

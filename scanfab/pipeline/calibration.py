@@ -28,11 +28,11 @@ from scanfab.pipeline.frame import OTHER_CUTOFFS, compute_frame
 from scanfab.pipeline.frames import Frames, Source
 from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.plan import Plan, make_plan
-from scanfab.pipeline.settings import AUTO_RULE, Length, Settings
+from scanfab.pipeline.settings import Length, Settings
 from scanfab.pipeline.tolerance import TOLERANCE_MISSED, missing_work
 from scanfab.pipeline.values import parse_frames
-from scanfab.pipeline.window_settings import SHAPES
-from scanfab.scan.directions import direction_rule
+from scanfab.pipeline.window_settings import SHAPES, settings_in
+from scanfab.scan.directions import DirectionRule, direction_rule, rule_of, usual_rule
 from scanfab.table.plots import Plots
 from scanfab.table.table import Row
 
@@ -45,6 +45,8 @@ SPACINGS = (4.0, 2.0, 1.0, 0.5, 0.2, 0.1)
 # of the ladder of directions, in r_min: 16 replicates with lines r_min apart
 FIXED_SPACING = 0.25
 DEGREES = (5, 9, 11, 17, 23, 31, 41)
+# the same in a plane: numbers of equal steps
+STEPS = (3, 5, 8, 16, 32, 64, 128)
 CUTOFFS = tuple(0.25 * k for k in range(13))
 # fractions of half the smallest extent
 RV_FRACTIONS = (0.4, 0.5, 0.6, 0.67, 0.7, 0.8)
@@ -162,13 +164,14 @@ class _Calibrator:
             )
         frames = Frames(source, replace(settings, frames=parse_frames(frame, "frame")))
         self.name = frames.name
-        self.settings = settings
         self.first, self.number, self.sample = _samples(frames)
+        self.space = self.first.packing.space
+        self.settings = settings_in(settings, self.space)
         tell(self.sample.doubts_of_escaped(), f"frame {self.number}")
         radius = self.first.packing.radius[self.first.grains]
         self.r_min = float(radius.min())
         # what it says concerns every step
-        tell(make_plan(settings, self.first).notes)
+        tell(make_plan(self.settings, self.first).notes)
 
     def all(self) -> Calibration:
         """The ladders, what they say, and what follows."""
@@ -186,7 +189,7 @@ class _Calibrator:
             "spacing": judged(self._spacings()),
             "directions": judged(self._directions()),
             "cutoff": cutoffs,
-            "rv": judged(self._rvs()) if self._rv_has_sizes else [],
+            "rv": judged(self._rvs(), self.space.dimension) if self._rv_has_sizes else [],
         }
         sample = largest(cutoffs, "alpha_vs_axial_sample_se", self._default_cutoff())
         target = max(self.settings.tolerance, OF_SAMPLE * (sample or 0.0))
@@ -206,17 +209,21 @@ class _Calibrator:
         return cutoff.value if cutoff.unit == "rmin" else PAPER_CUTOFF
 
     def _spacings(self) -> Iterator[StepRow]:
-        rule = self.settings.directions or direction_rule(AUTO_RULE)
+        rule = self.settings.directions or usual_rule(self.space)
         for value in SPACINGS:
             step = replace(self.settings, spacing=Length(value, "rmin"), directions=rule)
             yield from self._step("spacing", value, step)
 
     def _directions(self) -> Iterator[StepRow]:
         spacing = self.settings.spacing or Length(FIXED_SPACING, "rmin")
-        for degree in DEGREES:
-            rule = direction_rule(f"lebedev:{degree}")
+        for rule in self._ladder_of_rules():
             step = replace(self.settings, spacing=spacing, directions=rule)
             yield from self._step("directions", len(rule), step)
+
+    def _ladder_of_rules(self) -> list[DirectionRule]:
+        if self.space.is_plane:
+            return [rule_of(count, self.space) for count in STEPS]
+        return [direction_rule(f"lebedev:{degree}") for degree in DEGREES]
 
     def _cutoffs(self) -> Iterator[StepRow]:
         cutoffs = tuple(Length(value, "rmin") for value in CUTOFFS)
@@ -260,8 +267,8 @@ class _Calibrator:
 
     def _check_budget(self, ladder: str, plan: Plan) -> None:
         """Refuse a step of fixed lines that would cut more chords than allowed."""
-        area = math.pi * float((self.sample.packing.radius[self.sample.grains] ** 2).sum())
-        chords = area / plan.spacing**2 * plan.replicates * len(plan.rule)
+        shadow = self.space.shadow(self.sample.packing.radius[self.sample.grains])
+        chords = self.space.lines(shadow, plan.spacing) * plan.replicates * len(plan.rule)
         if ladder in ("spacing", "directions") and chords > self.settings.max_chords:
             raise SettingsError(
                 f"it would cut {chords:.2g} chords from the grains, more than `max_chords` "
@@ -314,7 +321,8 @@ class _Calibrator:
         scan with lines of their own must not find a larger error.
         """
         spacing = min(first_steady(spacings) or PAPER_SPACING, FIXED_SPACING)
-        rule = direction_rule(str(int(first_steady(directions) or len(direction_rule(AUTO_RULE)))))
+        steady = first_steady(directions) or len(usual_rule(self.space))
+        rule = rule_of(int(steady), self.space)
         for _ in range(ROUNDS):
             settings = replace(
                 self.settings,
@@ -329,8 +337,8 @@ class _Calibrator:
                 break
             wanted = len(rule) * missing
             if wanted > MOST_DIRECTIONS:
-                spacing = float(f"{spacing * math.sqrt(MOST_DIRECTIONS / wanted):.2g}")
-            rule = direction_rule(str(min(math.ceil(wanted), MOST_DIRECTIONS)))
+                spacing = float(f"{spacing * self.space.apart(MOST_DIRECTIONS / wanted):.2g}")
+            rule = rule_of(min(math.ceil(wanted), MOST_DIRECTIONS), self.space)
         settings = replace(self.settings, spacing=Length(spacing, "rmin"), directions=rule)
         rows = self._measured("recommended", len(rule), settings)[0]
         return rows, {"spacing": f"{spacing:g}rmin", "directions": rule.name}

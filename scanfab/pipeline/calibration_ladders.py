@@ -74,7 +74,7 @@ class StepRow(Record):
     alpha_vs_axial_se: Annotated[float | None, "its standard error from the scan"]
     alpha_vs_axial_sample_se: Annotated[
         float | None,
-        "the sample's own scatter, by a jackknife over eight octants",
+        "the sample's own scatter, by a jackknife over eight octants, of discs four quadrants",
     ]
     steady: Annotated[
         int | None,
@@ -86,14 +86,16 @@ class StepRow(Record):
     note: Annotated[str, "what makes the step doubtful"]
 
 
-def judged(rows: Iterator[StepRow]) -> list[StepRow]:
-    """The rows of a ladder with ``steady`` filled in, variant by variant."""
+def judged(rows: Iterator[StepRow], dimension: int = 3) -> list[StepRow]:
+    """The rows of a ladder with ``steady`` filled in, variant by variant; of discs in 2D."""
     every = list(rows)
     found: list[StepRow] = []
     most = _most_errors([row.variant for row in every])
     for row in reversed(every):
         later = [one for one in found if one.variant == row.variant]
-        steady = _is_sound(row) and all(one.steady and _agree(row, one, most) for one in later)
+        steady = _is_sound(row) and all(
+            one.steady and _agree(row, one, most, dimension) for one in later
+        )
         found.append(replace(row, steady=int(steady)))
     return found[::-1]
 
@@ -111,16 +113,17 @@ def _is_sound(row: StepRow) -> bool:
     return row.alpha_vs_axial is not None and row.alpha_vs_axial_se is not None and not row.note
 
 
-def _agree(one: StepRow, other: StepRow, most: float) -> bool:
+def _agree(one: StepRow, other: StepRow, most: float, dimension: int) -> bool:
     """Whether two values differ by no more than so many standard errors of their difference."""
     if one.alpha_vs_axial is None or other.alpha_vs_axial is None:
         return False
     errors = [row.alpha_vs_axial_se or 0.0 for row in (one, other)]
-    error = math.hypot(*errors, _nested_error(one, other) if one.ladder == "rv" else 0.0)
+    nested = _nested_error(one, other, dimension) if one.ladder == "rv" else 0.0
+    error = math.hypot(*errors, nested)
     return abs(one.alpha_vs_axial - other.alpha_vs_axial) <= most * error
 
 
-def _nested_error(one: StepRow, other: StepRow) -> float:
+def _nested_error(one: StepRow, other: StepRow, dimension: int) -> float:
     """
     The sample's standard error of the difference between two RVs, one inside the other.
 
@@ -129,7 +132,7 @@ def _nested_error(one: StepRow, other: StepRow) -> float:
     both follow from the larger RV's, which is the better known.
     """
     small, large = sorted((one, other), key=lambda row: row.rv_radius or 0.0)
-    more = ((large.rv_radius or 0.0) / (small.rv_radius or 1.0)) ** 3
+    more = ((large.rv_radius or 0.0) / (small.rv_radius or 1.0)) ** dimension
     return (large.alpha_vs_axial_sample_se or 0.0) * math.sqrt(max(more - 1.0, 0.0))
 
 

@@ -62,7 +62,7 @@ def compute(
     rattlers: str = "count",
     min_force: float = 0.0,
     contact_tolerance: float = 0.0,
-    axis: str | Sequence[float] = "z",
+    axis: str | Sequence[float] | None = None,
     with_: str | Sequence[str] | None = None,
     strain: str | Path = "auto",
     frames: str | int | slice | None = None,

@@ -6,11 +6,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from scanfab.base.errors import PackingError
 from scanfab.base.note import Note, joined
 from scanfab.base.spelling import spelt_apart
 from scanfab.fabric.state import VOLUMETRIC_STRAIN
 from scanfab.packing.columns import RV_COLUMN
 from scanfab.packing.packing import Packing
+from scanfab.packing.plane import space_of
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.pipeline.frames import Readable
 from scanfab.pipeline.measurement import Measurement, measure
@@ -80,6 +82,7 @@ def compute_frame(
         If the frame cannot be read or measured.
     """
     frame = as_sample(frame, plan)
+    _check_space(frame, plan)
     known = frame_values(frame, plan, number, source)
     if not frame.grains.any():
         return FrameResult(source, number, frame, (), list(_empty_rows(known, plan)))
@@ -103,6 +106,20 @@ def compute_frame(
         *_large_errors(rows, plan),
     ]
     return FrameResult(source, number, frame, measurements, rows, tuple(notes))
+
+
+def _check_space(sample: Sample, plan: Plan) -> None:
+    """PackingError if the frame lies in another space than the series."""
+    packing = sample.packing
+    if not sample.grains.any():
+        return
+    found = packing.space if packing.space.is_plane else space_of(packing.position)
+    if found != plan.space:
+        raise PackingError(
+            f"all its centres lie in {found}, but the first frame that has grains lies in "
+            f"{plan.space}: the frames of a series are all discs in one plane, or all spheres "
+            f"(`dim`)"
+        )
 
 
 def _empty_rows(known: Mapping[str, Any], plan: Plan) -> Iterator[Row]:

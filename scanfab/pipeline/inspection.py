@@ -19,6 +19,7 @@ from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.frames import Frames, boundary_hints
 from scanfab.pipeline.rv import windows_of
 from scanfab.pipeline.settings import Settings
+from scanfab.pipeline.window_settings import settings_in
 from scanfab.table.row import Record
 
 __all__ = ["FrameReport", "inspect_series"]
@@ -123,7 +124,7 @@ def _rv(frames: Frames, sample: Sample) -> Window | None:
     if not sample.grains.any():
         return None
     tell(frames.check_boundary(sample))
-    return windows_of(sample, frames.settings)[-1]
+    return windows_of(sample, settings_in(frames.settings, sample.packing.space))[-1]
 
 
 def _report(

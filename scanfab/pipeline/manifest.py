@@ -15,6 +15,7 @@ from scanfab.base.files import whole_file
 from scanfab.base.option import options_of
 from scanfab.io.series import Series
 from scanfab.pipeline.settings import STRAIN_MODES, Settings
+from scanfab.pipeline.values import UsualAxis
 from scanfab.pipeline.window_settings import SHAPES
 from scanfab.scan.directions import DirectionRule
 from scanfab.table.writing import ALL, Excerpt
@@ -154,7 +155,10 @@ def surface_file(asked: Mapping[str, Any]) -> Path | None:
 def _plain(value: Any) -> Any:
     """A value in the types of JSON."""
     if isinstance(value, DirectionRule):
-        return value.name
+        return value.asked_as
+    if isinstance(value, UsualAxis):
+        # which axis that is, the grains decide
+        return None
     if isinstance(value, slice):
         return [value.start, value.stop, value.step]
     if isinstance(value, dict):

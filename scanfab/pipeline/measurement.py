@@ -14,12 +14,11 @@ from scanfab.base.convex import Convex, sphere
 from scanfab.base.note import Note
 from scanfab.base.typing import FloatArray
 from scanfab.packing.sample import Sample, Variant
-from scanfab.pipeline.plan import CLOSE, Plan
-from scanfab.pipeline.settings import AUTO_RULE
+from scanfab.pipeline.plan import NOISE, Plan
 from scanfab.pipeline.solids import solids_of
 from scanfab.pipeline.tolerance import scan_to_tolerance
 from scanfab.scan.blocks import Blocks
-from scanfab.scan.directions import DirectionRule, design_of, direction_rule
+from scanfab.scan.directions import DirectionRule, design_of, usual_rule
 from scanfab.scan.gaps import GapSums, scan_gaps
 from scanfab.scan.scan import ScanSums
 from scanfab.scan.solids import Solids, most_lines
@@ -171,30 +170,32 @@ def _blocks(sample: Sample, plan: Plan) -> tuple[Blocks, Blocks]:
     low, high = position.min(axis=0), position.max(axis=0)
     radius = float(packing.radius.max())
     reach = float(np.linalg.norm(high - low)) + radius
-    whole = Blocks.about(0.5 * (low + high), reach, plan.axis)
+    whole = Blocks.about(0.5 * (low + high), reach, plan.axis, plan.space)
     if packing.cell is not None and packing.is_periodic:
         cell = packing.cell
-        whole = Blocks.of_periods(cell.vectors, cell.origin, np.array(cell.periodic), position)
+        periodic = np.array(cell.periodic)
+        whole = Blocks.of_periods(cell.vectors, cell.origin, periodic, position, plan.space)
     if plan.window is None:
         return whole, whole
-    return whole, Blocks.about(plan.window.center, plan.window.radius + radius, plan.axis)
+    reach = plan.window.radius + radius
+    return whole, Blocks.about(plan.window.center, reach, plan.axis, plan.space)
 
 
 def _block_rule(solids: Solids) -> DirectionRule:
     """The directions of an auto scan; more of them for fewer grains."""
-    usual = direction_rule(AUTO_RULE)
+    usual = usual_rule(solids.space)
     axes = AXES_TIMES_GRAINS / max(len(solids.grain_radius), 1)
-    return usual if axes <= len(usual) else design_of(axes)
+    return usual if axes <= len(usual) else design_of(axes, solids.space)
 
 
 def _block_spacing(solids: Solids, rule: DirectionRule, sums: ScanSums, plan: Plan) -> float:
     """As close as is of use, but no closer than the sample's scatter is worth."""
     if not len(solids.grain_radius):
         return solids.reach
-    spacing = CLOSE * float(solids.grain_radius.mean())
+    spacing = NOISE[solids.space.dimension].close * float(solids.grain_radius.mean())
     axes = BLOCK_REPLICATES * len(rule)
-    steps = float(sums.steps.mean()) / len(plan.rule) * (plan.spacing / spacing) ** 2
+    steps = plan.space.lines(float(sums.steps.mean()) / len(plan.rule), spacing / plan.spacing)
     # a line costs as much as a chord, also if it meets nothing
-    chords = axes * (solids.cross_section / spacing**2 + most_lines(solids, spacing) + steps)
+    chords = axes * (solids.chords(spacing) + most_lines(solids, spacing) + steps)
     most = min(max(CHORDS_A_GRAIN * len(solids.grain_radius), FEWEST_CHORDS), MOST_CHORDS)
-    return spacing * math.sqrt(max(chords / most, 1.0))
+    return spacing * plan.space.apart(max(chords / most, 1.0))

@@ -10,6 +10,8 @@ from typing import Any, NamedTuple
 from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
 from scanfab.base.note import Note
+from scanfab.base.shapes import circle
+from scanfab.base.space import SPACE, Space
 from scanfab.packing.doubts import refuse_impossible
 from scanfab.packing.sample import VARIANTS, Sample, SampleRule
 from scanfab.packing.window import SurfaceBox, Window
@@ -17,11 +19,12 @@ from scanfab.pipeline.frames import sample_rule
 from scanfab.pipeline.maps.blocks import MapBlocks, map_blocks
 from scanfab.pipeline.maps.settings import MapSettings
 from scanfab.pipeline.rv import RV, Deformation, doubts_of_rv, sizes_of, windows_of
-from scanfab.pipeline.settings import AUTO_RULE, Settings, Vector
+from scanfab.pipeline.settings import Settings, Vector
 from scanfab.pipeline.strain import Strains
-from scanfab.scan.directions import DirectionRule, direction_rule
+from scanfab.pipeline.window_settings import settings_in
+from scanfab.scan.directions import DirectionRule, usual_rule
 
-__all__ = ["CLOSE", "GROWTH_WITH_SPACING", "Plan", "make_plan", "plan_without_grains"]
+__all__ = ["NOISE", "Plan", "make_plan", "plan_without_grains"]
 
 # replicates of a fixed scan, and at least of an auto scan
 REPLICATES = 16
@@ -29,15 +32,28 @@ REPLICATES = 16
 MOST_REPLICATES = 64
 # lines of one axis below which a replicate's mean lengths are too uncertain to be of use
 FEWEST_LINES = 30
-# segments for a standard error of 1, at a spacing of the mean radius, and the power of the spacing
-# that they grow with: measured in dense packings of radii that are equal, or in the ratio 3 or 10
-SEGMENTS_PER_VARIANCE, GROWTH_WITH_SPACING = 0.068, 0.75
 # of what is scanned: far closer lines than anyone could wait for
 CLOSEST = 1e-9
 # of the mean radius: lines so far apart know nothing of one another
 WIDE = 3.0
-# of the mean radius: closer lines say little more, as all that remains is the choice of directions
-CLOSE = 0.3
+
+
+class Noise(NamedTuple):
+    """What the error of a scan costs, as it was measured."""
+
+    segments: float
+    """For a standard error of 1, at a spacing of the mean radius."""
+    growth: float
+    """The power of the spacing that they grow with."""
+    close: float
+    """Of the mean radius: closer lines say little more than those between which they lie."""
+
+
+# By dimension. In dense packings of spheres whose radii are equal, or in the ratio 3 or 10, the
+# choice of directions is all that remains of the noise at a third of a radius. In dense packings of
+# discs, in the ratio 1.9 (sample_data/lammps_biaxial), it takes 0.025 to 0.039 segments at one
+# radius, 0.011 to 0.016 at 0.3 and 0.004 to 0.006 at 0.1, before shear and after.
+NOISE = {3: Noise(0.068, 0.75, 0.3), 2: Noise(0.032, 0.8, 0.1)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +105,8 @@ class Plan:
     """Of a map; else None."""
     map_blocks: MapBlocks | None = None
     """Of a map whose series has grains: what its blocks tile."""
+    space: Space = SPACE
+    """The plane in which all grains of the series lie, if they are discs."""
     notes: tuple[Note, ...] = ()
     """What is doubtful about the settings, for a user who has chosen them."""
 
@@ -144,6 +162,8 @@ def make_plan(settings: Settings, sample: Sample, strains: Strains | None = None
         If the packing cannot be measured.
     """
     refuse_impossible(sample)
+    space = sample.packing.space
+    settings = settings_in(settings, space)
     grains = sample.grains
     radii = sample.packing.radius[grains]
     lengths = {
@@ -152,7 +172,8 @@ def make_plan(settings: Settings, sample: Sample, strains: Strains | None = None
         "rmax": float(radii.max()),
     }
     box = SurfaceBox.of(sample.packing, sample.gathered)
-    plan = _without_lengths(settings, strains or Strains.of(settings))
+    strains = replace(strains or Strains.of(settings), axis=settings.axis)
+    plan = _without_lengths(settings, strains, space)
     notes: list[Note] = []
     windows = windows_of(sample, settings) if settings.needs_window else []
     for window in windows:
@@ -204,17 +225,21 @@ class _Scanned(NamedTuple):
 
     reach: float
     area: float
-    """That lines of one direction pierce, in the mean of all."""
+    """That lines of one direction pierce, in the mean of all; in a plane a length."""
     depth: float
-    """Radius of the sphere in which lines are as long in the mean."""
+    """Three quarters of the mean length of the lines in it: of a sphere the radius."""
+    space: Space
 
 
 def _scanned(box: SurfaceBox, window: Convex | None) -> _Scanned:
-    if window is None or window.is_sphere:
+    space = box.space
+    if space.is_plane:
+        window = window or circle(0.5 * box.smallest_extent, space)
+    elif window is None or window.is_sphere:
         reach = 0.5 * box.smallest_extent if window is None else window.reach
-        return _Scanned(reach, math.pi * reach**2, reach)
+        return _Scanned(reach, math.pi * reach**2, reach, space)
     area = window.mean_shadow
-    return _Scanned(window.reach, area, 0.75 * window.volume / area)
+    return _Scanned(window.reach, area, 0.75 * window.volume / area, space)
 
 
 def _lines(
@@ -237,11 +262,12 @@ def _lines(
             f"spacing: {asked:g} between lines is less than {CLOSEST:g} of the radius of what they "
             f"scan ({reach:g}): choose a wider spacing"
         )
-    lines = scanned.area / asked**2
+    lines = scanned.space.lines(scanned.area, asked)
     auto = "directions" if settings.directions is None else ""
     fewest, most = (REPLICATES, MOST_REPLICATES) if auto else (1, REPLICATES)
     replicates = int(min(max(lines / FEWEST_LINES, fewest), most))
-    return {"spacing": asked * math.sqrt(replicates), "replicates": replicates, "auto": auto}
+    spacing = asked * scanned.space.apart(replicates)
+    return {"spacing": spacing, "replicates": replicates, "auto": auto}
 
 
 def plan_without_grains(settings: Settings) -> Plan:
@@ -249,7 +275,7 @@ def plan_without_grains(settings: Settings) -> Plan:
     return _without_lengths(settings, Strains.of(settings))
 
 
-def _without_lengths(settings: Settings, strains: Strains) -> Plan:
+def _without_lengths(settings: Settings, strains: Strains, space: Space = SPACE) -> Plan:
     """What settings say by themselves."""
     return Plan(
         samples=sample_rule(settings),
@@ -267,7 +293,7 @@ def _without_lengths(settings: Settings, strains: Strains) -> Plan:
         groups=settings.with_,
         cutoff=math.nan,
         cutoffs=(math.nan,) * max(len(settings.cutoffs), 1),
-        rule=settings.directions or direction_rule(AUTO_RULE),
+        rule=settings.directions or usual_rule(space),
         spacing=math.nan,
         replicates=0,
         auto="",
@@ -275,6 +301,7 @@ def _without_lengths(settings: Settings, strains: Strains) -> Plan:
         edge=settings.edge,
         lists_gaps=settings.lists_gaps,
         map_settings=settings if isinstance(settings, MapSettings) else None,
+        space=space,
     )
 
 
@@ -286,15 +313,16 @@ def _auto_spacing(
 
     Never so wide that lines get too few, nor closer than is of use: more directions are added then.
     """
-    area, radius = scanned.area, lengths["rmean"]
+    area, radius, space = scanned.area, lengths["rmean"], scanned.space
+    noise = NOISE[space.dimension]
     segments_per_line = max(scanned.depth / (3.0 * radius), 1.0)
     # lines * segments_per_line = segments, and lines are so many axes' area / spacing²
-    lines = SEGMENTS_PER_VARIANCE / settings.tolerance**2 / (REPLICATES * axes * segments_per_line)
+    lines = noise.segments / settings.tolerance**2 / (REPLICATES * axes * segments_per_line)
     # of which each block gets its share
     lines *= settings.blocks
-    apart = area / lines / radius**2
+    apart = area / lines / radius ** (space.dimension - 1)
     spacing = radius * max(
-        min(math.pow(apart, 1.0 / (2.0 + GROWTH_WITH_SPACING)), WIDE),
-        math.sqrt(apart / WIDE**GROWTH_WITH_SPACING),
+        min(math.pow(apart, 1.0 / (space.dimension - 1.0 + noise.growth)), WIDE),
+        space.apart(apart / WIDE**noise.growth),
     )
-    return min(max(spacing, CLOSE * radius), math.sqrt(area / (4 * FEWEST_LINES)))
+    return min(max(spacing, noise.close * radius), space.apart(area / (4 * FEWEST_LINES)))

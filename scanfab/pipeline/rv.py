@@ -12,9 +12,11 @@ import numpy as np
 from scanfab.base.convex import Convex, sphere
 from scanfab.base.errors import SettingsError
 from scanfab.base.note import Note
-from scanfab.base.shapes import box, cylinder, ellipsoid, polyhedron
+from scanfab.base.shapes import box, circle, cylinder, ellipse, ellipsoid, polyhedron, rectangle
+from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray
 from scanfab.io.parse.surface import read_surface
+from scanfab.packing.plane import spelt_plane
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import RV_MEANING, SurfaceBox, Window
 from scanfab.pipeline.settings import Settings, Vector
@@ -58,13 +60,19 @@ def windows_of(sample: Sample, settings: Settings) -> list[Window]:
 
 
 def _window(sample: Sample, settings: Settings, fraction: float, surfaces: SurfaceBox) -> Window:
-    shape, center = _shape(settings, 0.5 * surfaces.extents, fraction)
+    space = sample.packing.space
+    if space.is_plane:
+        shape, center = _flat_shape(settings, 0.5 * surfaces.extents, fraction, space), None
+    else:
+        shape, center = _shape(settings, 0.5 * surfaces.extents, fraction)
     if settings.rv_center is not None:
         center = np.array(settings.rv_center, dtype=float)
     elif center is None:
         center = np.array(surfaces.center, dtype=float)
+    if space.across is not None:
+        center[space.across] = _in_plane(center[space.across], sample)
     smallest = float(sample.packing.radius[sample.grains].min())
-    half = 0.5 * float((shape.high - shape.low).min())
+    half = 0.5 * float((shape.high - shape.low)[list(space.along)].min())
     if half < SMALLEST * smallest:
         what = f"a radius of {half:g}" if shape.is_sphere else f"a {shape}"
         raise SettingsError(
@@ -72,6 +80,28 @@ def _window(sample: Sample, settings: Settings, fraction: float, surfaces: Surfa
             f"larger `rv`, `rv_radius` or `rv_size`"
         )
     return Window(center, shape)
+
+
+def _in_plane(place: float, sample: Sample) -> float:
+    """The coordinate of the discs' plane, for an RV that lies beside it by rounding."""
+    packing = sample.packing
+    if abs(place - packing.place_across) > packing.radius.max():
+        raise SettingsError(
+            f"rv_center: lies outside {packing.space} of the discs: expected "
+            f"{spelt_plane(packing.position, packing.space)}, found {place:g}"
+        )
+    return packing.place_across
+
+
+def _flat_shape(settings: Settings, half: FloatArray, fraction: float, plane: Space) -> Convex:
+    """The shape in a plane; the sphere is its circle."""
+    part = fraction * half[sorted(plane.along)]
+    if settings.rv_shape == "sphere":
+        radius = settings.rv_radius
+        return circle(float(part.min()) if radius is None else radius, plane)
+    if settings.rv_shape == "box":
+        return rectangle(settings.rv_size or 2.0 * part, plane)
+    return ellipse(settings.rv_size or part, plane)
 
 
 def _shape(
@@ -186,7 +216,8 @@ class Deformation:
                 'sample deforms: choose `strain="grains"`, or leave out `rv_follows`'
             )
         origin, edges = _edges(sample, mode)
-        if abs(np.linalg.det(edges / max(float(np.abs(edges).max()), 1e-300))) < 1e-9:
+        own = _own_edges(edges, sample.packing.space)
+        if abs(np.linalg.det(own / max(float(np.abs(own).max()), 1e-300))) < 1e-9:
             raise SettingsError(f"rv_follows: the {mode} it is to follow has no volume")
         return cls(mode, origin, edges)
 
@@ -202,16 +233,30 @@ class Deformation:
         ]
 
 
+def _own_edges(edges: FloatArray, space: Space) -> FloatArray:
+    """Those that lie in the space: of a plane two, there."""
+    if space.across is None:
+        return edges
+    return edges[list(space.along)][:, edges[space.across] == 0.0]
+
+
 def _edges(sample: Sample, mode: str) -> tuple[FloatArray, FloatArray]:
     """Origin and edges, as columns, of what is followed."""
     if mode == "cell":
         cell = sample.packing.cell
         if cell is None:
             raise SettingsError("rv_follows: the RV is to follow the cell, but the dump has none")
-        return cell.origin, cell.vectors.T
+        vectors = cell.vectors.copy()
+        if sample.packing.space.across is not None:
+            # nothing changes across the plane
+            vectors[vectors[:, sample.packing.space.across] != 0.0] = sample.packing.space.normal
+        return cell.origin, vectors.T
     chosen = sample.boundary if mode == "boundary" else sample.gathered
     if not chosen.any():
         raise SettingsError(f"rv_follows: the RV is to follow the {mode}, but the frame has none")
     position = sample.packing.position[chosen]
     low, high = position.min(axis=0), position.max(axis=0)
-    return low, np.diag(high - low)
+    edges = np.diag(high - low)
+    if sample.packing.space.across is not None:
+        edges[(sample.packing.space.across,) * 2] = 1.0
+    return low, edges

@@ -48,10 +48,8 @@ if TYPE_CHECKING:
     from scanfab.packing.boundary import BoundaryRule
     from scanfab.scan.directions import DirectionRule
 
-__all__ = ["AUTO_RULE", "AXES", "MAX_CHORDS", "STRAIN_MODES", "Length", "Settings", "Vector"]
+__all__ = ["AXES", "MAX_CHORDS", "STRAIN_MODES", "Length", "Settings", "Vector"]
 
-# equal weights and few axes: the random turns of the replicates do the rest
-AUTO_RULE = "icosahedral:9"
 # of an auto scan of one frame: one to two minutes of one processor, some hundred times what dense
 # packings need for the default tolerance
 MAX_CHORDS = 1e10
@@ -219,11 +217,12 @@ class Settings(WindowSettings):
         metavar="X",
     )
     axis: Axis = option(
-        default="z",
         parse=lambda name, value: parse_axis(value, name),
         group="fabric",
-        help="Loading axis, along which the anisotropies are signed.",
-        meaning="loading axis, along which the anisotropies are signed",
+        help="Loading axis, along which the anisotropies are signed (default: z; of discs the "
+        "second axis of their plane).",
+        meaning="loading axis, along which the anisotropies are signed; not given: z, of discs the "
+        "second axis of their plane",
         takes="str or three floats",
         metavar="x|y|z|X,Y,Z",
         choices=lambda: AXES,

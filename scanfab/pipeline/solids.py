@@ -69,13 +69,23 @@ def solids_of(
     whole = "a" in variants or "b" in variants
     position, radius = packing.position[sample.grains], packing.radius[sample.grains]
     removed = sample.rattlers[sample.grains]
-    origin = position.mean(axis=0) if window is None else window.center
+    origin = position.mean(axis=0) if window is None else window.center.copy()
+    space = packing.space
+    if space.across is not None:
+        # exactly in the plane, as the mean would not be
+        origin[space.across] = packing.place_across
     position = np.ascontiguousarray(position - origin)
     shape = None if window is None else window.shape
     reach = 0.0 if shape is None else shape.reach
     every = CellGrains(position, radius, removed, np.eye(3), np.zeros(3, bool))
     if packing.cell is not None and packing.is_periodic:
         vectors, periodic = packing.cell.short_vectors, np.array(packing.cell.periodic)
+        if space.across is not None:
+            # the one across the plane comes last, as long as discs are wide: then what is expected
+            # of mean free paths in space holds here, too
+            order = np.argsort(vectors[:, space.across] != 0.0, kind="stable")
+            vectors, periodic = vectors[order], periodic[order]
+            vectors[2] = 2.0 * float(radius.mean()) * space.normal
         every = every._replace(vectors=vectors, periodic=periodic)
     around = every if edge == START and shape is not None else None
     margin = 0.0 if around is None else margin_of(around)
@@ -83,19 +93,22 @@ def solids_of(
         medium = every if whole else None
         images, row = packing.cell.images_near_origin(position, radius + reach + margin)
         return Solids(
-            images, radius[row], removed[row], shape, medium, origin, edge=edge, around=around
-        )
+            images, radius[row], removed[row], shape, medium, origin, edge=edge, around=around,
+            space=space,
+        )  # fmt: skip
     if shape is not None and not whole:
         near = shape.may_meet(position, radius + margin)
         position, radius, removed = position[near], radius[near], removed[near]
     inner = _inner(sample, origin) if edge == ENDS and whole else None
     return Solids(
-        position, radius, removed, shape, None, origin, edge=edge, around=around, inner=inner
-    )
+        position, radius, removed, shape, None, origin, edge=edge, around=around, inner=inner,
+        space=space,
+    )  # fmt: skip
 
 
 def _inner(sample: Sample, origin: FloatArray) -> Inner | None:
     """Where all grains of an open sample are known."""
     packing, grains = sample.packing, sample.gathered
-    found = inner_ellipsoid(packing.position[grains], float(packing.radius[grains].max()))
+    largest = float(packing.radius[grains].max())
+    found = inner_ellipsoid(packing.position[grains], largest, packing.space)
     return None if found is None else Inner(found.shape, found.center - origin)

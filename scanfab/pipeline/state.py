@@ -8,6 +8,7 @@ import numpy as np
 
 from scanfab.base.convex import Convex
 from scanfab.base.errors import PackingError
+from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.fabric.forces import ContactForces
 from scanfab.fabric.state import SampleState, love_weber
@@ -78,6 +79,7 @@ def sample_state(sample: Sample, variant: Variant, window: Window | None) -> Sam
         void_ratio=_void_ratio(sample, region),
         coordination_mechanical=float(held.mean()) if len(held) else None,
         stress=_stress(sample, region),
+        space=sample.packing.space,
     )
 
 
@@ -112,9 +114,7 @@ def _volume(packing: Packing, window: Window | None) -> float | None:
     if window is not None:
         return window.shape.volume
     cell = packing.cell
-    if cell is None or not all(cell.periodic):
-        return None
-    return float(abs(np.linalg.det(cell.vectors)))
+    return None if cell is None or not cell.is_endless else cell.volume
 
 
 def _places(packing: Packing) -> FloatArray:
@@ -178,9 +178,9 @@ def _void_ratio(sample: Sample, window: Window | None) -> float | None:
     # in a clump what several spheres share is there once
     share = np.ones_like(radius)
     if packing.bodies is not None:
-        share = own_shares(packing, _points_in_ball())[sample.grains]
+        share = own_shares(packing, _points_in_ball(packing.space))[sample.grains]
     if window is None:
-        solid = float(np.sum(4.0 / 3.0 * math.pi * radius**3 * share))
+        solid = float(np.sum(packing.space.volume(radius) * share))
     else:
         solid = _volume_inside(position, radius, share, window, packing)
     return None if solid == 0.0 else (volume - solid) / solid
@@ -206,19 +206,23 @@ def _volume_inside(
         places = origin + shift
         near = shape.may_meet(places, radius)
         part = lenses if shape.is_sphere else cut_volumes
-        inside = part(places[near], radius[near], shape)
+        inside = part(places[near], radius[near], shape, packing.space)
         total += float((inside * share[near]).sum())
     return total
 
 
-def lenses(places: FloatArray, radius: FloatArray, ball: Convex) -> FloatArray:
+def lenses(
+    places: FloatArray, radius: FloatArray, ball: Convex, space: Space = SPACE
+) -> FloatArray:
     """Volumes that spheres share with a ball about the origin, shape (N,)."""
-    return lens_volumes(np.linalg.norm(places, axis=1), radius, ball.reach)
+    return lens_volumes(np.linalg.norm(places, axis=1), radius, ball.reach, space)
 
 
-def cut_volumes(places: FloatArray, radius: FloatArray, shape: Convex) -> FloatArray:
+def cut_volumes(
+    places: FloatArray, radius: FloatArray, shape: Convex, space: Space = SPACE
+) -> FloatArray:
     """Volumes that spheres share with a region, by points that fill each evenly, shape (N,)."""
-    points = _points_in_ball()
+    points = _points_in_ball(space)
     found = shape.surely_holds(places, radius).astype(np.float64)
     cut = np.flatnonzero(found == 0.0)
     for first in range(0, len(cut), CHUNK):
@@ -226,19 +230,21 @@ def cut_volumes(places: FloatArray, radius: FloatArray, shape: Convex) -> FloatA
         spread = places[rows, None] + radius[rows, None, None] * points
         inside = shape.contains(spread.reshape(-1, 3)).reshape(-1, len(points))
         found[rows] = inside.mean(axis=1)
-    return found * 4.0 / 3.0 * math.pi * radius**3
+    return space.volume(radius, found)
 
 
-def _points_in_ball() -> FloatArray:
-    """Points that fill the unit ball evenly, each with its opposite, shape (P, 3)."""
+def _points_in_ball(space: Space = SPACE) -> FloatArray:
+    """Points that fill the unit ball, or disc, evenly, each with its opposite, shape (P, 3)."""
     from scipy.stats import qmc
 
     # shells of equal volume, directions of equal solid angle
     share, height, turn = qmc.Sobol(3, scramble=False).random(POINTS // 2).T
-    share = (share + 0.5 / len(share)) ** (1.0 / 3.0)
+    share = (share + 0.5 / len(share)) ** (1.0 / space.dimension)
+    if space.is_plane:
+        height = np.full_like(share, 0.5 - 0.5 / len(share))
     cosine = 2.0 * (height + 0.5 / len(height)) - 1.0
     across = np.sqrt(1.0 - cosine**2)
     angle = 2.0 * math.pi * turn
-    unit = np.column_stack([across * np.cos(angle), across * np.sin(angle), cosine])
+    unit = np.column_stack([across * np.cos(angle), across * np.sin(angle), cosine]) @ space.basis
     half = share[:, None] * unit
     return np.concatenate([half, -half])

@@ -101,9 +101,9 @@ def shear_strain(cell: Cell | None, first: Cell | None) -> float | None:
     Returns
     -------
     float or None
-        √(2/3 e:e) of the deviator e of the logarithmic strain, dimensionless, never negative; None
-        unless both cells repeat along all three vectors. Each vector is taken for the one that it
-        was in the first frame.
+        √(2/3 e:e) of the deviator e of the logarithmic strain, in a plane √(1/2 e:e):
+        dimensionless, never negative, and what the deviator stress works on. None unless both cells
+        repeat along all vectors. Each vector is taken for the one that it was in the first frame.
 
     Examples
     --------
@@ -113,15 +113,18 @@ def shear_strain(cell: Cell | None, first: Cell | None) -> float | None:
     >>> round(shear_strain(sheared, Cell([1.0, 1.0, 1.0])), 4)
     0.2857
     """
-    if cell is None or first is None or not all(cell.periodic + first.periodic):
+    if cell is None or first is None or not (cell.is_endless and first.is_endless):
         return None
-    if np.array_equal(cell.vectors, first.vectors):
+    now, before = cell.own_vectors, first.own_vectors
+    if np.array_equal(now, before):
         return 0.0
     # H = F H0 with lattice vectors as columns; here they are rows
-    gradient = np.linalg.solve(first.vectors, cell.vectors)
+    gradient = np.linalg.solve(before, now)
     # ln B has twice the logarithms of the stretches as principal values
     stretch = np.log(np.linalg.svd(gradient, compute_uv=False))
-    return float(np.sqrt(2.0 / 3.0) * np.linalg.norm(stretch - stretch.mean()))
+    dimension = cell.space.dimension
+    of_norm = np.sqrt((dimension - 1.0) / dimension)
+    return float(of_norm * np.linalg.norm(stretch - stretch.mean()))
 
 
 def volumetric_strain(cell: Cell | None, first: Cell | None) -> float | None:
@@ -145,9 +148,9 @@ def volumetric_strain(cell: Cell | None, first: Cell | None) -> float | None:
     >>> round(volumetric_strain(Cell([1, 1, 0.9]), Cell([1, 1, 1])), 4)
     0.1054
     """
-    if cell is None or first is None or not all(cell.periodic + first.periodic):
+    if cell is None or first is None or not (cell.is_endless and first.is_endless):
         return None
-    now, before = (np.linalg.det(one.vectors) for one in (cell, first))
+    now, before = (np.linalg.det(one.own_vectors) for one in (cell, first))
     # no -0.0 of a cell that is as it was
     return float(np.log(abs(before / now)))
 
@@ -159,12 +162,12 @@ def is_flipped(cell: Cell | None, before: Cell | None) -> bool:
     Then whole vectors were added to some, which also brings them nearer to those before, and
     neither cell leans further than where programs flip them.
     """
-    if cell is None or before is None or not all(cell.periodic + before.periodic):
+    if cell is None or before is None or not (cell.is_endless and before.is_endless):
         return False
-    change = np.linalg.solve(cell.vectors.T, before.vectors.T)
+    change = np.linalg.solve(cell.own_vectors.T, before.own_vectors.T)
     whole = np.rint(change)
     return bool(
-        np.any(whole != np.eye(3))
+        np.any(whole != np.eye(len(whole)))
         and round(abs(np.linalg.det(whole))) == 1
         and max(_tilt(cell), _tilt(before)) <= MOST_TILT
     )
@@ -172,9 +175,10 @@ def is_flipped(cell: Cell | None, before: Cell | None) -> bool:
 
 def _tilt(cell: Cell) -> float:
     """By how many lengths of another vector a vector leans, at most."""
-    lengths = np.linalg.norm(cell.vectors, axis=1)
-    leaning = (cell.vectors @ cell.vectors.T) / lengths**2
-    return float(np.abs(leaning[np.tril_indices(3, -1)]).max())
+    vectors = cell.own_vectors
+    lengths = np.linalg.norm(vectors, axis=1)
+    leaning = (vectors @ vectors.T) / lengths**2
+    return float(np.abs(leaning[np.tril_indices(len(vectors), -1)]).max())
 
 
 class StrainFile:

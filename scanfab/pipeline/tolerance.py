@@ -15,8 +15,8 @@ from scanfab.base.errors import SettingsError
 from scanfab.base.note import Note
 from scanfab.base.spelling import spelt_apart, spelt_time
 from scanfab.fabric.void import void_fabric
-from scanfab.pipeline.plan import CLOSE, GROWTH_WITH_SPACING, Plan
-from scanfab.scan.directions import design_of, direction_rule
+from scanfab.pipeline.plan import NOISE, Plan
+from scanfab.scan.directions import design_of, rule_of
 from scanfab.scan.following import FollowedTooFarError
 from scanfab.scan.scan import ScanSums, scan_lines
 from scanfab.scan.solids import Solids, is_affordable, most_lines
@@ -222,7 +222,7 @@ def _better_plan(
         better = replace(plan, spacing=0.5 * plan.spacing)
     elif missing >= AFRESH_FROM and len(solids.grain_radius):
         better = _with_closer_lines(plan, missing, solids)
-    growth = len(better.rule) / len(plan.rule) * (plan.spacing / better.spacing) ** 2
+    growth = plan.space.lines(len(better.rule) / len(plan.rule), better.spacing / plan.spacing)
     affordable = growth * plan.replicates <= left and is_affordable(solids, better.spacing)
     return better if growth > 1.0 and affordable else None
 
@@ -231,30 +231,32 @@ def _with_more_axes(plan: Plan, missing: float) -> Plan:
     """The plan with a rule of so many more axes, up to a limit."""
     if missing <= 1.0 or len(plan.rule) >= MAX_DIRECTIONS:
         return plan
-    return replace(plan, rule=direction_rule(str(math.ceil(min(missing, GROWTH) * len(plan.rule)))))
+    axes = math.ceil(min(missing, GROWTH) * len(plan.rule))
+    return replace(plan, rule=rule_of(axes, plan.space))
 
 
 def _with_closer_lines(plan: Plan, missing: float, solids: Solids) -> Plan:
     """The plan with lines as close as is of use, and a finer rule for what is missing then."""
-    power = 2.0 + GROWTH_WITH_SPACING
-    closest = min(CLOSE * float(solids.grain_radius.mean()), plan.spacing)
+    noise = NOISE[plan.space.dimension]
+    power = plan.space.dimension - 1.0 + noise.growth
+    closest = min(noise.close * float(solids.grain_radius.mean()), plan.spacing)
     spacing = max(plan.spacing / missing ** (1.0 / power), closest)
     missing /= (plan.spacing / spacing) ** power
     plan = replace(plan, spacing=spacing)
     if plan.rule_is_asked_for or missing <= 1.0:
         return plan
     axes = math.ceil(min(missing, FINER_UP_TO) * len(plan.rule))
-    return replace(plan, rule=design_of(axes))
+    return replace(plan, rule=design_of(axes, plan.space))
 
 
 def _within_budget(plan: Plan, solids: Solids) -> Plan:
     """The plan, with wider lines if its first round alone would cut more chords than allowed."""
-    chords = solids.cross_section / plan.spacing**2 + most_lines(solids, plan.spacing)
+    chords = solids.chords(plan.spacing) + most_lines(solids, plan.spacing)
     chords *= len(plan.rule) * plan.replicates
     if chords <= plan.max_chords:
         return plan
     if plan.auto == "replicates":
-        wider = plan.spacing * math.sqrt(chords / plan.max_chords)
+        wider = plan.spacing * plan.space.apart(chords / plan.max_chords)
         if wider > _width(solids):
             raise SettingsError(
                 f"max_chords: {plan.max_chords:g} leave less than one line for each of "
@@ -297,7 +299,8 @@ def _counted_variants(sums: Any, plan: Plan, solids: Solids, left: float, goal: 
         or (usual < math.inf and _too_few_lines(sums, name, goal))
     }
     # closer lines tell more than more of them; and early estimates of the error are uncertain
-    reach = GROWTH * (1.0 + left / sums.replicates) ** (1.0 + 0.5 * GROWTH_WITH_SPACING)
+    growth = 1.0 + NOISE[plan.space.dimension].growth / (plan.space.dimension - 1)
+    reach = GROWTH * (1.0 + left / sums.replicates) ** growth
     near = "".join(n for n in missing if n not in held_back and missing[n] <= reach)
     return near or plan.variants
 

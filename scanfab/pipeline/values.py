@@ -27,6 +27,7 @@ __all__ = [
     "STRAIN_MODES",
     "Axis",
     "Length",
+    "UsualAxis",
     "Vector",
     "check_moment",
     "parse_axis",
@@ -63,6 +64,18 @@ class Axis(NamedTuple):
     y: float
     z: float
 
+    @property
+    def spelt(self) -> str:
+        """As users write it."""
+        named = as_written(self)
+        return named if isinstance(named, str) else ",".join(map(shortest, self))
+
+
+class UsualAxis(Axis):
+    """The loading axis where none is given: z, or in a plane its second axis."""
+
+    __slots__ = ()
+
 
 AXES = {"x": Axis(1.0, 0.0, 0.0), "y": Axis(0.0, 1.0, 0.0), "z": Axis(0.0, 0.0, 1.0)}
 
@@ -94,6 +107,8 @@ def as_written(value: Any) -> Any:
     if isinstance(value, slice):
         parts = [value.start, value.stop, *([] if value.step is None else [value.step])]
         return ":".join("" if part is None else str(part) for part in parts)
+    if isinstance(value, UsualAxis):
+        return None
     if isinstance(value, Axis):
         return next((name for name, axis in AXES.items() if axis == value), tuple(value))
     if isinstance(value, tuple):
@@ -158,8 +173,10 @@ def parse_lengths(name: str, text: str | float | Iterable[str | float]) -> tuple
     return tuple(Length(round(first + k * step, 12), *units) for k in range(count))
 
 
-def parse_axis(text: str | Vector, name: str = "axis") -> Axis:
-    """A unit vector from ``x``, ``y``, ``z`` or three numbers."""
+def parse_axis(text: str | Vector | None, name: str = "axis") -> Axis:
+    """A unit vector from ``x``, ``y``, ``z`` or three numbers; the usual one if none is given."""
+    if text is None:
+        return UsualAxis(*AXES["z"])
     if isinstance(text, Axis):
         return text
     if isinstance(text, str) and text in AXES:

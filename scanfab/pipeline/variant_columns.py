@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterator
 from dataclasses import replace
 from functools import cached_property
@@ -13,7 +12,7 @@ import numpy as np
 from scanfab.base.note import Note
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.forces import doubts_of_forces
-from scanfab.fabric.jackknife import BLOCKS, BlockedSums
+from scanfab.fabric.jackknife import BlockedSums, blocks_of
 from scanfab.fabric.registry import GROUPS, OWN_FABRICS, Measured, checked_values
 from scanfab.fabric.state import SampleState
 from scanfab.fabric.window import WINDOW_ALPHA, window_alpha
@@ -93,6 +92,7 @@ class VariantColumns:
             normals=np.compress(chosen, contacts.normal, axis=0),
             points=points,
             blocks=self._blocks_of(points),
+            space=self.plan.space,
             segment_count=self.segments,
             forces=contact_forces(self.sample, chosen) if "forces" in self.plan.groups else None,
             state=self._state,
@@ -133,7 +133,7 @@ class VariantColumns:
             "lines": int(self.sums.lines[:, self.which].sum()),
             "segments": self.segments,
             # of all replicates together, as a fixed scan is asked for
-            "spacing": self.plan.spacing / math.sqrt(self.sums.replicates),
+            "spacing": self.plan.spacing / self.plan.space.apart(self.sums.replicates),
             "cutoff": self.plan.cutoffs[self.place],
         }
 
@@ -158,7 +158,7 @@ class VariantColumns:
     def _solid_fraction(self) -> float | None:
         """1 - void length / line length in the window, weighted like the directions."""
         cell = self.sample.packing.cell
-        if not self.variant.in_window and not (cell is not None and all(cell.periodic)):
+        if not self.variant.in_window and not (cell is not None and cell.is_endless):
             return None
         weights = self.plan.rule.weights
         length = float(weights @ self.sums.line_length[:, self.which].sum(axis=0))
@@ -173,7 +173,7 @@ class VariantColumns:
             gaps.axes,
             self.measurement.block_rule.weights,
             gaps.kept(*words),
-            [gaps.kept(*words, without=block) for block in range(BLOCKS)],
+            [gaps.kept(*words, without=block) for block in range(blocks_of(self.plan.space))],
         )
 
     def _window(self) -> dict[str, Any]:

@@ -1,9 +1,13 @@
-"""What users say of the RV: its options, declared once, and whether they go together."""
+"""
+What users say of the RV: its options, declared once, and whether they go together.
+
+And what settings mean for discs in a plane, of which nothing is known before a frame is read.
+"""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +17,7 @@ from scanfab.pipeline.values import (
     AXES,
     STRAIN_MODES,
     Axis,
+    UsualAxis,
     Vector,
     parse_axis,
     parse_vector,
@@ -21,10 +26,14 @@ from scanfab.pipeline.values import (
 from scanfab.scan.edges import CLIP, EDGES
 
 if TYPE_CHECKING:
+    from scanfab.base.space import Space
     from scanfab.pipeline.settings import Settings
+    from scanfab.scan.directions import DirectionRule
 
-__all__ = ["SHAPES", "WindowSettings", "check_window"]
+__all__ = ["SHAPES", "WindowSettings", "check_window", "settings_in"]
 
+# of a unit vector: what rounding leaves of a component that is 0
+ROUNDING = 1e-9
 # of windows, with the sizes that each takes
 SHAPES = {
     "sphere": "",
@@ -133,7 +142,7 @@ class WindowSettings:
         parse=parse_sizes,
         group="window",
         help="In the dump's units, instead of `rv`: edges of the box, radius and height of the "
-        "cylinder, semi-axes of the ellipsoid.",
+        "cylinder, semi-axes of the ellipsoid; of discs two.",
         meaning="edges of the box, radius and height of the cylinder or semi-axes of the ellipsoid "
         "instead, dump's unit",
         takes="str or sequence of float",
@@ -186,9 +195,8 @@ def check_window(chosen: Settings) -> None:
     if sizes and not takes:
         hint = "choose `rv_radius`" if shape == "sphere" else "its file says how large it is"
         raise SettingsError(f"rv_size: the shape {shape} takes none: {hint}")
-    if sizes and len(sizes) != 2 + (shape != "cylinder"):
-        found = ",".join(f"{size:g}" for size in sizes)
-        raise SettingsError(f"rv_size: expected {takes} (`rv_shape` is {shape}), found {found}")
+    if shape == "cylinder":
+        check_sizes(chosen, 3)
     if chosen.rv_radius is not None and shape != "sphere":
         hint = f"choose `rv_size` ({takes})" if takes else "its file says how large it is"
         raise SettingsError(f"rv_radius: is that of a sphere, but `rv_shape` is {shape}: {hint}")
@@ -202,6 +210,19 @@ def check_window(chosen: Settings) -> None:
             f"rv_follows: a file of strains ({chosen.strain}) does not say how the sample "
             f"deforms along all axes: choose another `strain`, or leave out `rv_follows`"
         )
+
+
+def check_sizes(chosen: Settings, dimension: int) -> None:
+    """SettingsError if the RV has too many sizes, or too few."""
+    shape, sizes = chosen.rv_shape, chosen.rv_size
+    if not sizes or shape not in SHAPES:
+        return
+    takes = SHAPES[shape]
+    if len(sizes) != (2 if shape == "cylinder" else dimension):
+        found = ",".join(f"{size:g}" for size in sizes)
+        if dimension == 2:
+            takes = f"two, {takes.replace(',C', '')}, in the plane of the discs"
+        raise SettingsError(f"rv_size: expected {takes} (`rv_shape` is {shape}), found {found}")
 
 
 def _check_several(chosen: Settings) -> None:
@@ -218,3 +239,65 @@ def _check_several(chosen: Settings) -> None:
                 f"{name}: {what} one size, but `rv` asks for {len(chosen.rvs)}: leave out one of "
                 f"the two"
             )
+
+
+def settings_in(settings: Settings, space: Space) -> Settings:
+    """
+    The settings for a series whose grains lie in a space; those of all space are what they are.
+
+    Parameters
+    ----------
+    settings : Settings
+        As users made them, or as this function has returned them.
+    space : Space
+        That of the first frame that has grains.
+
+    Raises
+    ------
+    SettingsError
+        If they are of three dimensions and the grains are discs, or the other way round.
+    """
+    check_sizes(settings, space.dimension)
+    if not space.is_plane:
+        return settings
+    shape = settings.rv_shape
+    if shape not in ("sphere", "box", "ellipsoid"):
+        what = "is no window of" if shape == "cylinder" else "is a surface in space, no window of"
+        raise SettingsError(
+            f"rv_shape: {shape} {what} discs in {space}: choose sphere (the circle), box or "
+            f"ellipsoid (the ellipse)"
+        )
+    return replace(settings, axis=_axis(settings.axis, space), directions=_rule(settings, space))
+
+
+def _axis(axis: Axis, space: Space) -> Axis:
+    """Where none was given, the plane's second axis."""
+    assert space.across is not None
+    if isinstance(axis, UsualAxis):
+        return AXES["xyz"[max(space.along)]]
+    if abs(axis[space.across]) > ROUNDING:
+        first, second = ("xyz"[k] for k in sorted(space.along))
+        raise SettingsError(
+            f"axis: the axis {axis.spelt} leads out of {space}, in which all discs lie: choose "
+            f"{first}, {second}, or another axis in the plane"
+        )
+    if axis[space.across] == 0.0:
+        return axis
+    flat = [0.0 if k == space.across else part for k, part in enumerate(axis)]
+    return Axis(*(part / math.hypot(*flat) for part in flat))
+
+
+def _rule(settings: Settings, space: Space) -> DirectionRule | None:
+    """So many equal steps as a number asks for; None for ``auto``."""
+    # its module needs numpy, for which the help of a command does not wait
+    from scanfab.scan.directions import rule_of
+
+    rule = settings.directions
+    if rule is None or rule.space == space:
+        return rule
+    if rule.asked is None:
+        raise SettingsError(
+            f"directions: {rule.name} is a rule of three dimensions, but all discs lie in {space}: "
+            f"choose a number of axes, such as 16"
+        )
+    return rule_of(rule.asked, space)

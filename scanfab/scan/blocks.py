@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.scan.kernels.bins import Partition
 from scanfab.scan.lines import line_triads
@@ -49,25 +50,41 @@ class Blocks:
         return math.prod(self.parts) * self.shells
 
     @classmethod
-    def about(cls, center: FloatArray, reach: float, axis: npt.ArrayLike = (0, 0, 1)) -> Blocks:
+    def about(
+        cls,
+        center: FloatArray,
+        reach: float,
+        axis: npt.ArrayLike = (0, 0, 1),
+        space: Space = SPACE,
+    ) -> Blocks:
         """
         The octants about a centre, of places within a reach of it; dump's length unit.
+
+        In a plane quadrants.
 
         One of the axes that part them is the given one: then they are mirror images of one another
         with respect to it, as they must be in order to differ by chance alone.
         """
         along = np.asarray(axis, dtype=np.float64)
         # about x, y or z the octants are those of the coordinates
-        parting = np.eye(3) if np.count_nonzero(along) == 1 else line_triads(along[None])[0]
+        is_coordinate = np.count_nonzero(along) == 1
+        parting = np.eye(3) if is_coordinate else line_triads(along[None], space)[0]
         matrix = parting / (4.0 * reach)
-        return cls(matrix, 0.5 - matrix @ center)
+        return cls(matrix, 0.5 - matrix @ center, _halves(parting, space))
 
     @classmethod
     def of_periods(
-        cls, vectors: FloatArray, origin: FloatArray, periodic: BoolArray, position: FloatArray
+        cls,
+        vectors: FloatArray,
+        origin: FloatArray,
+        periodic: BoolArray,
+        position: FloatArray,
+        space: Space = SPACE,
     ) -> Blocks:
         """
         Halves of a cell's periods; along its other vectors, of what the positions take.
+
+        In a plane not across it.
 
         Parameters
         ----------
@@ -75,6 +92,8 @@ class Blocks:
             The cell: lattice vectors as rows, its corner, and which vectors repeat.
         position : ndarray, shape (N, 3)
             Of the grains, dump's length unit.
+        space : Space, optional
+            The plane in which they lie, if they do.
         """
         inverse = np.linalg.inv(vectors)
         matrix = inverse.T
@@ -84,7 +103,7 @@ class Blocks:
         # far less than a period, about the middle
         scale = np.where(periodic, 1.0, 0.25 / (1.0 + high - low))
         middle = np.where(periodic, 0.0, 0.5 - scale * 0.5 * (low + high))
-        return cls(scale[:, None] * matrix, scale * shift + middle)
+        return cls(scale[:, None] * matrix, scale * shift + middle, _halves(vectors, space))
 
     @classmethod
     def of_edges(
@@ -281,3 +300,9 @@ def partition_of(whole: Blocks, window: Blocks) -> Partition:
         form=np.array([one.form for one in both]),
         halves=True if octants else None,
     )
+
+
+def _halves(vectors: FloatArray, space: Space) -> tuple[int, int, int]:
+    """Two parts along each of three vectors, but for the one across a plane."""
+    one, two, three = (2 if space.across is None or not v[space.across] else 1 for v in vectors)
+    return one, two, three

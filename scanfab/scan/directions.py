@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.resources import files
 
@@ -13,17 +13,31 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import SettingsError
+from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray
 
-__all__ = ["DirectionRule", "design_of", "direction_rule"]
+__all__ = [
+    "AUTO_RULE",
+    "DirectionRule",
+    "design_of",
+    "direction_rule",
+    "plane_rule",
+    "rule_of",
+    "usual_rule",
+]
 
 
 # SciPy's Lebedev rules of these degrees have negative weights: they would amplify noise
 NEGATIVE_LEBEDEV = (13, 25, 27)
 LARGEST_PRODUCT = 999
+# equal steps of a plane
+MOST_STEPS = 100_000
 # degree of the largest design in designs.csv that is in use
 FINEST = 21
+# Of a scan that chooses its directions itself: equal weights and few axes, as the random turns of
+# the replicates do the rest; in a plane so many equal steps.
+AUTO_RULE, AUTO_STEPS = "icosahedral:9", 16
 LEBEDEV_DEGREES = (*range(3, 32, 2), *range(35, 132, 6))
 
 
@@ -46,6 +60,10 @@ class DirectionRule:
         Exact for polynomials to this degree; None if for no degree worth the name.
     turned : bool, optional
         Whether replicates turn the rule at random; a literal grid is only shifted.
+    space : Space, optional
+        That in which the axes lie: in a plane replicates turn them about its normal.
+    asked : int, optional
+        The number of axes that was asked for, where no rule was named.
 
     Examples
     --------
@@ -62,13 +80,16 @@ class DirectionRule:
     weights: FloatArray
     degree: int | None
     turned: bool = True
+    space: Space = SPACE
+    asked: int | None = None
 
     def __len__(self) -> int:
         return len(self.axes)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, DirectionRule) and (
-            (self.name, self.degree, self.turned) == (other.name, other.degree, other.turned)
+            (self.name, self.degree, self.turned, self.space)
+            == (other.name, other.degree, other.turned, other.space)
             and np.array_equal(self.axes, other.axes)
             and np.array_equal(self.weights, other.weights)
         )
@@ -81,6 +102,11 @@ class DirectionRule:
         bias = f", bias {self.bias:.2g}" if self.bias > 1e-9 else ""
         return f"DirectionRule {self.name}: {counted(len(self), 'axis', 'axes')}, {degree}{bias}"
 
+    @property
+    def asked_as(self) -> str:
+        """What asks for it: its name, or the number of axes that was asked for."""
+        return self.name if self.asked is None else str(self.asked)
+
     @cached_property
     def isotropic_tensor(self) -> FloatArray:
         """The fabric tensor that the rule gives to a mean length equal in all directions."""
@@ -91,12 +117,12 @@ class DirectionRule:
     def bias(self) -> float:
         """α of that tensor, largest minus smallest principal value; 0 for a sound rule."""
         values = np.linalg.eigvalsh(self.isotropic_tensor)
-        return float(values[-1] - values[0])
+        return float(values[-1] - values[-self.space.dimension])
 
     @property
     def is_flat(self) -> bool:
-        """Whether all axes lie in one plane, or along one line."""
-        return bool(np.linalg.eigvalsh(self.isotropic_tensor)[0] < 1e-9)
+        """Whether all axes lie in one plane, or along one line; those of a plane along a line."""
+        return bool(np.linalg.eigvalsh(self.isotropic_tensor)[-self.space.dimension] < 1e-9)
 
 
 def direction_rule(text: str | int) -> DirectionRule:
@@ -147,7 +173,7 @@ def direction_rule(text: str | int) -> DirectionRule:
     """
     text = str(text)
     if re.fullmatch(r"\d+", text):
-        return _at_least(int(text))
+        return replace(_at_least(int(text)), asked=int(text))
     name, _, argument = text.partition(":")
     if name not in RULES:
         raise SettingsError(
@@ -162,6 +188,55 @@ def direction_rule(text: str | int) -> DirectionRule:
             f"directions: expected {name}:{what} with a number, found {text!r}"
         ) from None
     return make(value)
+
+
+def plane_rule(count: int, plane: Space) -> DirectionRule:
+    """
+    So many equal steps over the half circle of a plane.
+
+    Parameters
+    ----------
+    count : int
+        Number N of axes: exact to degree 2 N - 2, so two give an isotropic ℓ an isotropic tensor.
+    plane : Space
+        In which they lie.
+
+    Returns
+    -------
+    DirectionRule
+        Its name is the number, by which users choose it.
+
+    Raises
+    ------
+    SettingsError
+        If these are too few, or far too many.
+
+    Examples
+    --------
+    >>> from scanfab.base.space import Space
+    >>> from scanfab.scan.directions import plane_rule
+    >>> plane_rule(6, Space(2))
+    DirectionRule 6: 6 axes, exact to degree 10
+    """
+    if not 2 <= count <= MOST_STEPS:
+        raise SettingsError(
+            f"directions: in {plane} from 2 to {MOST_STEPS} axes, found {count}: one axis says "
+            f"nothing of what lies across it"
+        )
+    angle = np.pi * (np.arange(count) + 0.5) / count
+    axes = np.column_stack([np.cos(angle), np.sin(angle)]) @ plane.basis[:2]
+    weights = np.full(count, 1.0 / count)
+    return DirectionRule(str(count), axes, weights, 2 * count - 2, space=plane, asked=count)
+
+
+def usual_rule(space: Space) -> DirectionRule:
+    """The first rule of a scan that chooses its directions itself."""
+    return plane_rule(AUTO_STEPS, space) if space.is_plane else direction_rule(AUTO_RULE)
+
+
+def rule_of(count: int, space: Space) -> DirectionRule:
+    """The smallest rule that has so many axes."""
+    return plane_rule(max(count, 2), space) if space.is_plane else direction_rule(count)
 
 
 def _at_least(count: int) -> DirectionRule:
@@ -194,8 +269,10 @@ def lebedev(degree: float) -> DirectionRule:
     return _normalised(f"lebedev:{degrees[0]}", points.T[half], weights[half], degrees[0])
 
 
-def design_of(axes: float) -> DirectionRule:
-    """The spherical design of about so many axes, as far as they go."""
+def design_of(axes: float, space: Space = SPACE) -> DirectionRule:
+    """Equal weights for about so many axes: a spherical design, as far as they go; equal steps."""
+    if space.is_plane:
+        return plane_rule(min(math.ceil(axes), MOST_STEPS), space)
     # a design of odd degree t has about ((t + 1) / 2)² axes
     return direction_rule(f"design:{min(2 * math.ceil(math.sqrt(axes)) - 1, FINEST)}")
 

@@ -7,15 +7,18 @@ from collections.abc import Iterable
 import numpy as np
 
 from scanfab.base.errors import SettingsError
+from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
 from scanfab.scan.directions import DirectionRule
 
 __all__ = ["drawn_lines", "line_triads", "turned_triads"]
 
 
-def line_triads(axes: FloatArray) -> FloatArray:
+def line_triads(axes: FloatArray, space: Space = SPACE) -> FloatArray:
     """
     Orthonormal triads (rows u, v, n) whose third row is each axis, shape (D, 3, 3).
+
+    Axes in a plane have its normal as v: their lines lie side by side along u.
 
     Examples
     --------
@@ -26,6 +29,9 @@ def line_triads(axes: FloatArray) -> FloatArray:
            [0., 1., 0.],
            [0., 0., 1.]])
     """
+    if space.is_plane:
+        v = np.broadcast_to(space.normal, axes.shape)
+        return np.stack([np.cross(v, axes), v, axes], axis=1)
     helper = np.eye(3)[np.argmin(np.abs(axes), axis=1)]
     u = helper - np.sum(helper * axes, axis=1, keepdims=True) * axes
     u /= np.linalg.norm(u, axis=1, keepdims=True)
@@ -35,8 +41,12 @@ def line_triads(axes: FloatArray) -> FloatArray:
 def drawn_lines(
     rule: DirectionRule, seed: int, replicates: Iterable[int]
 ) -> tuple[FloatArray, FloatArray]:
-    """Line triads of all replicates, shape (R, D, 3, 3), and shifts of their grids, (R, D, 2)."""
-    triads = line_triads(rule.axes)
+    """
+    Line triads of all replicates, shape (R, D, 3, 3), and shifts of their grids.
+
+    The latter have the shape (R, D, 2), or (R, D, 1) in a plane.
+    """
+    triads = line_triads(rule.axes, rule.space)
     drawn = [turned_triads(rule, triads, seed, replicate) for replicate in replicates]
     if not drawn:
         raise SettingsError("replicates: expected at least one")
@@ -51,12 +61,23 @@ def turned_triads(
     The lines of one replicate.
 
     Returns the rule's line triads (shape (D, 3, 3)), turned, and the shifts of the grids in units
-    of the spacing (shape (D, 2)).
+    of the spacing (shape (D, 2), or (D, 1) in a plane).
     """
     random = np.random.default_rng([seed, replicate])
-    rotation = _random_rotation(random)
-    offsets = random.random((len(rule), 2))
+    rotation = _random_turn(random, rule.space)
+    offsets = random.random((len(rule), rule.space.dimension - 1))
     return (triads @ rotation.T if rule.turned else triads), offsets
+
+
+def _random_turn(random: np.random.Generator, space: Space) -> FloatArray:
+    """A rotation matrix out of all that leave the space what it is."""
+    if not space.is_plane:
+        return _random_rotation(random)
+    angle = 2.0 * np.pi * random.random()
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    rotation = np.eye(3)
+    rotation[np.ix_(space.along, space.along)] = turn
+    return rotation
 
 
 def _random_rotation(random: np.random.Generator) -> FloatArray:

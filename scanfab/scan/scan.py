@@ -15,7 +15,7 @@ from scanfab.scan.edges import CLIP
 from scanfab.scan.following import MOST_STEPS, Following
 from scanfab.scan.kernels import sweep
 from scanfab.scan.lines import drawn_lines
-from scanfab.scan.solids import Solids, check_spacing
+from scanfab.scan.solids import Solids, check_space, check_spacing
 from scanfab.scan.tallies import tally_triads
 
 __all__ = ["ScanSums", "in_parts", "scan_lines", "sums_of"]
@@ -157,7 +157,7 @@ def scan_lines(
     most_steps: float = MOST_STEPS,
 ) -> ScanSums:
     """
-    Scan with one square grid of lines for each axis and replicate.
+    Scan with one square grid of lines for each axis and replicate; in a plane with one row.
 
     In each replicate the rule is turned at random and the grid of every axis is shifted at random.
     The random numbers depend on the seed and the replicate's number alone.
@@ -191,7 +191,7 @@ def scan_lines(
     ------
     SettingsError
         If the spacing asks for more lines than can be scanned in reasonable time, or following
-        lines takes more steps than allowed.
+        lines takes more steps than allowed, or the axes do not lie in the plane of the solids.
 
     Examples
     --------
@@ -207,6 +207,7 @@ def scan_lines(
     1.87
     """
     check_spacing(solids, spacing)
+    check_space(solids, rule)
     triads, offsets = drawn_lines(rule, seed, replicates)
     following = Following(most_steps)
 
@@ -225,11 +226,11 @@ def in_parts(
     """
     Scan along the axes of all replicates, a few in each job of several threads.
 
-    ``scan`` takes the triads and shifts of some axes, (A, 3, 3) and (A, 2), and returns what it
-    adds up for each, (A, ...); the result has the shape (R, D, ...).
+    ``scan`` takes the triads and shifts of some axes, (A, 3, 3) and (A, 2) or (A, 1), and returns
+    what it adds up for each, (A, ...); the result has the shape (R, D, ...).
     """
     count = offsets.shape[0] * offsets.shape[1]
-    triads, shifts = triads.reshape(count, 3, 3), offsets.reshape(count, 2)
+    triads, shifts = triads.reshape(count, 3, 3), offsets.reshape(count, -1)
     # so many that no thread waits long for the last one, but not many more
     axes = min(max(count // (JOBS_A_THREAD * workers), 1), MOST_AXES)
     parts = [slice(first, first + axes) for first in range(0, count, axes)]

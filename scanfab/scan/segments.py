@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from scanfab.base.convex import Convex
+from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.scan.kernels.strips import spans
 from scanfab.scan.solids import clip_of
@@ -130,8 +131,15 @@ def _cut(
     return pieces[some], is_void[some]
 
 
-def grid_points(reach: float, lines: int) -> FloatArray:
-    """A square grid of about so many points in a circle of this radius, shape (L, 2)."""
+def grid_points(reach: float, lines: int, space: Space = SPACE) -> FloatArray:
+    """
+    A square grid of about so many points in a circle of this radius, shape (L, 2).
+
+    In a plane points along a line.
+    """
+    if space.is_plane:
+        steps = reach * (2.0 * (np.arange(lines) + 0.5) / lines - 1.0)
+        return np.column_stack([steps, np.zeros(lines)])
     spacing = reach * np.sqrt(np.pi / lines)
     steps = np.arange(-np.floor(reach / spacing), np.floor(reach / spacing) + 1) * spacing
     points = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -145,18 +153,19 @@ def sample_segments(
     triads: FloatArray,
     lines: int,
     window: Convex | None = None,
+    space: Space = SPACE,
 ) -> Segments:
     """
     Cut about so many lines, a grid of them for each of several line triads (D, 3, 3).
 
-    Parameters as for :func:`cut_lines`.
+    Parameters as for :func:`cut_lines`; in a plane each triad has its normal as second row.
     """
     reach = 0.0 if window is None else window.reach
     if window is None and len(position):
         reach = float((np.linalg.norm(position, axis=1) + radius).max())
     if reach == 0:
         return Segments.concatenate([])
-    points = grid_points(reach, max(lines // len(triads), 1))
+    points = grid_points(reach, max(lines // len(triads), 1), space)
     return Segments.concatenate(
         cut_lines(position, radius, triad, points, window) for triad in triads
     )

@@ -11,9 +11,11 @@ import numpy.typing as npt
 
 from scanfab.base.convex import Convex
 from scanfab.base.errors import PackingError, SettingsError
+from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import counted
 from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.scan.cells import cells_of
+from scanfab.scan.directions import DirectionRule
 from scanfab.scan.edges import CLIP
 from scanfab.scan.kernels.cells import Cells
 from scanfab.scan.kernels.periodic import CellGrains
@@ -24,6 +26,7 @@ __all__ = [
     "CellGrains",
     "Inner",
     "Solids",
+    "check_space",
     "check_spacing",
     "clip_of",
     "is_affordable",
@@ -76,6 +79,9 @@ class Solids:
         ``position`` then has all that come within the margin of the window.
     inner : Inner, optional
         For the rule ``ends`` the window of an open whole, in which all grains are known.
+    space : Space, optional
+        The plane in which all lies, if it does: then spheres are discs, and all positions are 0
+        across it. The cell's third vector stands across it.
 
     Raises
     ------
@@ -98,6 +104,7 @@ class Solids:
     edge: str = CLIP
     around: CellGrains | None = None
     inner: Inner | None = None
+    space: Space = SPACE
     _near: dict[float, BoolArray] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
@@ -117,7 +124,7 @@ class Solids:
 
     def __repr__(self) -> str:
         removed = int(np.sum(self.removed))
-        what = [counted(len(self.radius), "sphere")]
+        what = [counted(len(self.radius), "disc" if self.space.is_plane else "sphere")]
         what += [f"{removed} of them void in b and d"] if removed else []
         if self.medium is not None:
             what.append(f"a periodic whole of {counted(len(self.medium.radius), 'grain')}")
@@ -174,10 +181,26 @@ class Solids:
         return self.radius if self.medium is None else self.medium.radius
 
     @property
-    def cross_section(self) -> float:
-        """Σ π r² of all spheres that lines may meet: they cut so many chords times spacing²."""
-        of_medium = 0.0 if self.medium is None else float(np.sum(self.medium.radius**2))
-        return np.pi * (float(np.sum(self.radius**2)) + of_medium)
+    def shadow(self) -> float:
+        """That of all spheres together: Σ π r², or Σ 2 r of discs."""
+        power = self.space.dimension - 1
+        of_medium = 0.0 if self.medium is None else float(np.sum(self.medium.radius**power))
+        return self.space.unit_shadow * (float(np.sum(self.radius**power)) + of_medium)
+
+    def chords(self, spacing: float) -> float:
+        """
+        About how many chords the spheres cut from the lines of one axis.
+
+        Parameters
+        ----------
+        spacing : float
+            Of the lines, dump's length unit.
+
+        Returns
+        -------
+        float
+        """
+        return self.space.lines(self.shadow, spacing)
 
 
 def clip_of(window: Convex | None) -> Clip:
@@ -215,7 +238,15 @@ def most_lines(solids: Solids, spacing: float) -> float:
         reach = max(reach, float(edges.max(initial=0.0)), extent if len(edges) < 3 else 0.0)
     if len(solids.position):
         reach = max(reach, float((np.linalg.norm(solids.position, axis=1) + solids.radius).max()))
-    return (2.0 * reach / spacing + 1.0) ** 2
+    return (2.0 * reach / spacing + 1.0) ** (solids.space.dimension - 1)
+
+
+def check_space(solids: Solids, rule: DirectionRule) -> None:
+    """SettingsError if the axes do not lie in the plane of the solids."""
+    if rule.space != solids.space:
+        raise SettingsError(
+            f"directions: the solids lie in {solids.space}, the axes of {rule.name} in {rule.space}"
+        )
 
 
 def check_spacing(solids: Solids, spacing: float) -> None:

@@ -38,7 +38,7 @@ def tally_triads(
     following: Following | None = None,
 ) -> FloatArray:
     """
-    Scan along given line triads (D, 3, 3) with given shifts (D, 2).
+    Scan along given line triads (D, 3, 3) with given shifts (D, 2), or (D, 1) in a plane.
 
     Returns the tallies of each axis and set of solids, shape (D, 2, TALLY_SIZE); where there are
     bins, the gaps go there instead. ``following`` counts the steps of this and of other parts.

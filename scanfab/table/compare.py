@@ -257,7 +257,7 @@ def _slope_error(group: Sequence[Mapping[str, Any]], strain_max: float | None) -
     """
     frames = len(_points(group, strain_max))
     slopes: list[list[float | None]] = []
-    for block in range(1, BLOCKS + 1):
+    for block in range(1, _blocks(group) + 1):
         names = [f"alpha_c_axial_without_{block}", f"alpha_vs_axial_without_{block}"]
         contact, void = _points(group, strain_max, names).T
         halves = _points(group, strain_max, [*names, f"alpha_vs_axial_half_{block}"])[:, 2]
@@ -271,6 +271,13 @@ def _slope_error(group: Sequence[Mapping[str, Any]], strain_max: float | None) -
         return None
     variance = variance_without_noise(values)
     return math.sqrt(variance) if variance >= 0 else None
+
+
+def _blocks(group: Sequence[Mapping[str, Any]]) -> int:
+    """How many blocks the rows were parted into: those of samples in a plane have no upper half."""
+    names = [f"alpha_c_axial_without_{block}" for block in range(BLOCKS // 2 + 1, BLOCKS + 1)]
+    has_upper = any(row.get(name) is not None for row in group for name in names)
+    return BLOCKS if has_upper else BLOCKS // 2
 
 
 def _within(strain: float | None, strain_max: float | None) -> bool:

@@ -12,7 +12,15 @@ from scanfab.base.errors import ReadError
 from scanfab.base.streams import check_file_or_pipe
 from scanfab.table.formats.registry import reading_format
 
-__all__ = ["is_number", "number_of", "numbers_of", "read_rows", "total_error", "variant_of"]
+__all__ = [
+    "is_number",
+    "is_of_discs",
+    "number_of",
+    "numbers_of",
+    "read_rows",
+    "total_error",
+    "variant_of",
+]
 
 
 def read_rows(path: Path | str) -> list[dict[str, Any]]:
@@ -82,6 +90,20 @@ def variant_of(row: Mapping[str, Any]) -> str:
     """
     rv = number_of(row, "rv")
     return str(row["variant"]) if rv is None else f"{row['variant']} RV {rv:g}"
+
+
+def is_of_discs(rows: Iterable[Mapping[str, Any]]) -> bool:
+    """
+    Whether the void fabric has nothing across a coordinate plane: that of discs, in 2D.
+
+    Examples
+    --------
+    >>> from scanfab.table.reading import is_of_discs
+    >>> is_of_discs([{"gvs_xx": 0.49, "gvs_yy": 0.51, "gvs_zz": 0.0}])
+    True
+    """
+    diagonal = ("gvs_xx", "gvs_yy", "gvs_zz")
+    return any(number_of(row, name) == 0.0 for row in rows for name in diagonal)
 
 
 def total_error(row: Mapping[str, Any], name: str) -> float | None:

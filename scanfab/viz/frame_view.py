@@ -16,8 +16,9 @@ from scanfab.io.series import Series
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.frames import Frames
 from scanfab.pipeline.plan import Plan, make_plan
-from scanfab.pipeline.settings import STRAIN_MODES, Settings
+from scanfab.pipeline.settings import STRAIN_MODES, Settings, Vector
 from scanfab.pipeline.strain import StrainFile, axial_length, shear_strain
+from scanfab.pipeline.window_settings import settings_in
 from scanfab.table.abscissa import frame_strain_column, is_ambiguous
 from scanfab.viz.scene import Scene, about_window, scene_of
 
@@ -41,6 +42,8 @@ class Look:
     """None if the settings do not fit the series."""
     strain_column: str | None
     """Which of the strains tells the frames of the series apart."""
+    axis: Vector
+    """Loading axis, a unit vector."""
 
 
 def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
@@ -69,6 +72,8 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
     tell(frames.notes(frame, sample))
     found = frames.first()
     first = None if found is None else found[2]
+    if first is not None:
+        settings = _in_space(settings, first)
     plan = None if first is None else _plan(first, settings)
     if plan is not None and sample.grains.any():
         plan = plan.in_frame(sample)
@@ -77,7 +82,14 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
         scene = about_window(replace(scene, cutoff=plan.cutoff))
     strains = _strains(number, sample, first, settings)
     column = _strain_column(frames, strains, first, settings)
-    return Look(scene, number, sample, strains, first, plan, column)
+    return Look(scene, number, sample, strains, first, plan, column, settings.axis)
+
+
+def _in_space(settings: Settings, first: Sample) -> Settings:
+    """As the plan has them; what makes it impossible is told where the plan is made."""
+    with suppress(SettingsError):
+        return settings_in(settings, first.packing.space)
+    return settings
 
 
 def _plan(first: Sample, settings: Settings) -> Plan | None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from scanfab.base.errors import SettingsError
 from scanfab.base.typing import FloatArray
-from scanfab.fabric.distribution import mean_length_function, sphere_points
+from scanfab.fabric.distribution import direction_points, mean_length_function
 from scanfab.fabric.tensor import COMPONENTS
 from scanfab.packing.sample import VARIANTS
 from scanfab.packing.window import Window
@@ -19,7 +19,7 @@ from scanfab.pipeline.frame import FrameResult
 from scanfab.pipeline.maps.frame import MapResult
 from scanfab.pipeline.maps.settings import MapSettings
 from scanfab.pipeline.measurement import Measurement
-from scanfab.pipeline.settings import Settings, Vector
+from scanfab.pipeline.settings import Settings
 from scanfab.scan.lines import line_triads
 from scanfab.scan.segments import Segments, sample_segments
 from scanfab.table.reading import number_of
@@ -42,8 +42,6 @@ class VtkFolder(vtk.Folder):
     ----------
     folder : Path
         Is made if it does not exist.
-    axis : tuple of float
-        Loading axis, along which half of the scan lines run.
     go_on : bool, optional
         Keep the frames of an earlier run in the collections.
 
@@ -53,9 +51,8 @@ class VtkFolder(vtk.Folder):
         If the folder cannot be made or written to.
     """
 
-    def __init__(self, folder: Path, axis: Vector, go_on: bool = False) -> None:
+    def __init__(self, folder: Path, go_on: bool = False) -> None:
         super().__init__(folder, go_on)
-        self.axis = axis
 
     def __call__(self, result: FrameResult) -> None:
         """Write all files of a frame."""
@@ -80,18 +77,20 @@ class VtkFolder(vtk.Folder):
         rv = number_of(row, "rv")
         measured, name = result.measured(row.variant, rv), _name(row.variant, rv)
         center = measured.solids.origin
-        lines = scan_line_sample(measured, row.variant, self.axis)
+        lines = scan_line_sample(measured, row.variant)
         mesh = vtk.line_mesh(lines, measured.plan.cutoff)
         self._save(f"lines-{name}", mesh, result, fields)
-        function = mean_length_function(measured.sums.axes, *measured.kept(row.variant))
+        space = measured.plan.space
+        kept = measured.kept(row.variant)
+        function = mean_length_function(measured.sums.axes, *kept, space)
         if function is not None and row.alpha_vs is not None:
-            points, weights = sphere_points()
-            surface = vtk.distribution_mesh(points, function(points), weights)
+            points, weights = direction_points(space)
+            surface = vtk.distribution_mesh(points, function(points), weights, space)
             self._save(f"distribution-{name}", surface, result, fields)
         tensors = _tensors(row)
         if tensors:
             size = 0.3 * _reach(result)
-            mesh = vtk.ellipsoid_mesh(tensors, center, size)
+            mesh = vtk.ellipsoid_mesh(tensors, center, size, space)
             self._save(f"ellipsoids-{name}", mesh, result, fields)
             mesh = vtk.tensor_points(tensors, center)
             self._save(f"tensors-{name}", mesh, result, fields)
@@ -117,7 +116,7 @@ def vtk_folders(
     chosen = own if count > 1 else [folder]
     if isinstance(settings, MapSettings):
         return [MapFolder(one, go_on) for one in chosen]
-    return [VtkFolder(one, settings.axis, go_on) for one in chosen]
+    return [VtkFolder(one, go_on) for one in chosen]
 
 
 def _windows(result: FrameResult) -> Iterator[tuple[float | None, Window]]:
@@ -133,15 +132,15 @@ def _name(kind: str, rv: float | None) -> str:
     return kind if rv is None else f"{kind}-rv{rv:g}"
 
 
-def scan_line_sample(
-    measured: Measurement, variant: str, axis: Vector, lines: int = LINES
-) -> Segments:
+def scan_line_sample(measured: Measurement, variant: str, lines: int = LINES) -> Segments:
     """A few scan lines along the loading axis and across it, in the dump's coordinates."""
+    axis = measured.plan.axis
     position, radius, window = measured.spheres_of(VARIANTS[variant])
-    frame = line_triads(np.array([axis]))[0]
+    space = measured.plan.space
+    frame = line_triads(np.array([axis]), space)[0]
     # along the axis, and along the first direction across it
-    frames = np.stack([frame, np.roll(frame, -1, axis=0)])
-    found = sample_segments(position, radius, frames, lines, window)
+    across = line_triads(frame[:1], space)[0] if space.is_plane else np.roll(frame, -1, axis=0)
+    found = sample_segments(position, radius, np.stack([frame, across]), lines, window, space)
     return replace(found, ends=found.ends + measured.solids.origin)
 
 

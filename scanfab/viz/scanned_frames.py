@@ -10,6 +10,7 @@ from typing import Any
 from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
 from scanfab.base.option import options_of, refuse_unknown
+from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray
 from scanfab.io.series import Series
 from scanfab.packing.packing import Packing
@@ -120,6 +121,11 @@ class ScannedFrame:
     def spheres(self) -> tuple[FloatArray, FloatArray, Convex | None]:
         """What a few lines of the variant meet, and the window that clips them."""
         return self.measurement.spheres_of(VARIANTS[self.variant])
+
+    @property
+    def space(self) -> Space:
+        """The plane of the frame, if its grains are discs."""
+        return self.measurement.plan.space
 
     @property
     def normals(self) -> FloatArray:

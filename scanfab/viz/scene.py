@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.convex import Convex
+from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
@@ -24,6 +25,7 @@ __all__ = [
     "grains_of",
     "scene_of",
     "section_lines",
+    "towards_viewer",
 ]
 
 
@@ -87,6 +89,8 @@ class Scene:
     """Void segments that are shorter are dropped, dump's unit."""
     cell: Cell | None = None
     """Of a periodic frame."""
+    space: Space = SPACE
+    """The plane in which all lies, if the grains are discs."""
 
 
 def scene_of(sample: Sample, *windows: Window) -> Scene:
@@ -96,10 +100,13 @@ def scene_of(sample: Sample, *windows: Window) -> Scene:
     center = np.zeros(3) if window is None else window.center
     if window is None and len(sample.packing):
         center = sample.packing.position[chosen].mean(axis=0)
+        if sample.packing.space.across is not None:
+            center[sample.packing.space.across] = sample.packing.place_across
     cell = sample.packing.cell if sample.packing.is_periodic else None
     shape = None if window is None else window.shape
     smaller = tuple(one.shape for one in windows[:-1])
-    return Scene(grains_of(sample, window), center, shape, smaller, cell=cell)
+    space = sample.packing.space
+    return Scene(grains_of(sample, window), center, shape, smaller, cell=cell, space=space)
 
 
 def about_window(scene: Scene) -> Scene:
@@ -136,8 +143,7 @@ def section_lines(scene: Scene, axis: npt.ArrayLike) -> Segments:
     grains = scene.grains
     solid = ~grains.boundary
     up = np.asarray(axis, dtype=np.float64)
-    depth = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
-    depth /= np.linalg.norm(depth)
+    depth = towards_viewer(up, scene.space)
     across = np.cross(depth, up)
     turn = np.radians(LINE_ANGLE)
     along = np.cos(turn) * across + np.sin(turn) * up
@@ -155,6 +161,15 @@ def section_lines(scene: Scene, axis: npt.ArrayLike) -> Segments:
     points = np.column_stack([steps, np.zeros_like(steps)])
     found = cut_lines(position, radius, frame, points, scene.window)
     return replace(found, ends=found.ends + scene.center)
+
+
+def towards_viewer(up: FloatArray, space: Space) -> FloatArray:
+    """A unit vector across the axis that is upright, from a section to who looks at it."""
+    if space.is_plane:
+        # what is upright has the plane's first axis on its right, if it is the second one
+        return space.normal if space.across != 1 else -space.normal
+    toward: FloatArray = np.cross(np.eye(3)[np.argmin(np.abs(up))], up)
+    return toward / np.linalg.norm(toward)
 
 
 def grains_of(sample: Sample, window: Window | None) -> Grains:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
 from scanfab.base.files import check_folder, whole_file
+from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.segments import Segments
@@ -95,18 +96,25 @@ def line_mesh(segments: Segments, cutoff: float) -> Any:
 
 
 def window_mesh(center: FloatArray, window: Convex, nsub: int = 4) -> Any:
-    """The surface of the RV; ``nsub`` says how fine that of a sphere is."""
+    """The surface of the RV, of discs its outline; ``nsub`` says how fine that of a sphere is."""
     import pyvista
 
+    if window.is_flat:
+        return _closed_line(center + window.outline)
     if window.is_sphere:
         return pyvista.Icosphere(radius=window.reach, center=tuple(center), nsub=nsub)
     outline = window.outline
     return pyvista.PolyData.from_regular_faces(center + outline, _triangles(outline))
 
 
-def distribution_mesh(directions: FloatArray, mean_length: FloatArray, weight: FloatArray) -> Any:
+def distribution_mesh(
+    directions: FloatArray,
+    mean_length: FloatArray,
+    weight: FloatArray,
+    space: Space = SPACE,
+) -> Any:
     """
-    ℓ(n) as a closed surface about the origin, at ℓ in each direction n.
+    ℓ(n) as a closed surface about the origin, at ℓ in each direction n; of discs as a closed line.
 
     Parameters
     ----------
@@ -116,11 +124,16 @@ def distribution_mesh(directions: FloatArray, mean_length: FloatArray, weight: F
         ℓ(n), dump's length unit.
     weight : ndarray, shape (P,)
         Quadrature weights of the directions, sum 1.
+    space : Space, optional
+        The plane in which the directions lie, one after the other, if they do.
     """
     import pyvista
 
-    mesh = pyvista.PolyData.from_regular_faces(
-        mean_length[:, None] * directions, _triangles(directions)
+    places = mean_length[:, None] * directions
+    mesh = (
+        _closed_line(places)
+        if space.is_plane
+        else pyvista.PolyData.from_regular_faces(places, _triangles(directions))
     )
     mean = float(weight @ mean_length)
     _add(
@@ -135,19 +148,23 @@ def distribution_mesh(directions: FloatArray, mean_length: FloatArray, weight: F
     return mesh
 
 
-def ellipsoid_mesh(tensors: Mapping[str, FloatArray], center: FloatArray, size: float) -> Any:
+def ellipsoid_mesh(
+    tensors: Mapping[str, FloatArray], center: FloatArray, size: float, space: Space = SPACE
+) -> Any:
     """
     Fabric tensors as ellipsoids side by side along x; isotropy gives spheres of radius ``size``.
 
-    The half axes are 3 size times the principal values; ``kind`` numbers the tensors.
+    The half axes are 3 size times the principal values, of discs 2 size times those of an ellipse;
+    ``kind`` numbers the tensors.
     """
     import pyvista
 
     parts = []
     for kind, matrix in enumerate(tensors.values()):
         ball = pyvista.Icosphere(radius=1.0, nsub=3)
-        place = center + 2.5 * size * (kind - 0.5 * (len(tensors) - 1)) * np.eye(3)[0]
-        ball.points = np.asarray(ball.points) @ (3.0 * size * matrix) + place
+        along = np.eye(3)[min(space.along)]
+        place = center + 2.5 * size * (kind - 0.5 * (len(tensors) - 1)) * along
+        ball.points = np.asarray(ball.points) @ (space.dimension * size * matrix) + place
         ball.point_data["kind"] = np.full(ball.n_points, kind)
         parts.append(ball)
     mesh = pyvista.merge(parts, merge_points=False) if parts else pyvista.PolyData()
@@ -304,6 +321,14 @@ def _lines(ends: FloatArray) -> Any:
     if len(ends) == 0:
         return pyvista.PolyData()
     return pyvista.line_segments_from_points(ends.reshape(-1, 3))
+
+
+def _closed_line(points: FloatArray) -> Any:
+    """From each point to the next, and from the last to the first."""
+    import pyvista
+
+    count = len(points)
+    return pyvista.PolyData(points, lines=[count + 1, *range(count), 0])
 
 
 def _add(data: Any, arrays: Mapping[str, npt.ArrayLike]) -> None:

@@ -19,7 +19,7 @@ from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.base.vtk_log import quiet_vtk
 from scanfab.viz.figures.style import COLOURS
 from scanfab.viz.overlay import SIZE, Framing, add_scale, add_words
-from scanfab.viz.scene import Grains, Scene
+from scanfab.viz.scene import Grains, Scene, towards_viewer
 from scanfab.viz.vtk_files import window_mesh
 
 __all__ = ["check_screen", "show_scene"]
@@ -85,9 +85,9 @@ def _show(scene: Scene, up: FloatArray, title: str, screenshot: Path | None) -> 
     plotter: Any = pyvista.Plotter(
         off_screen=screenshot is not None, window_size=list(SIZE), title=title or "scanfab"
     )
-    toward = np.cross(np.eye(3)[np.argmin(np.abs(up))], up)
-    toward /= np.linalg.norm(toward)
-    look = toward if scene.lines is not None else toward + 0.45 * np.cross(up, toward) + 0.35 * up
+    toward = towards_viewer(up, scene.space)
+    is_section = scene.lines is not None or scene.space.is_plane
+    look = toward if is_section else toward + 0.45 * np.cross(up, toward) + 0.35 * up
     drawn = _drawn(scene, toward, look)
     _add_grains(plotter, scene, drawn, toward)
     for window in (scene.window, *scene.smaller):
@@ -170,7 +170,7 @@ def _drawn(scene: Scene, toward: FloatArray, look: FloatArray) -> BoolArray:
     """
     grains = scene.grains
     branch = grains.position - scene.center
-    if scene.lines is not None:
+    if scene.lines is not None or scene.space.is_plane:
         shown = branch @ toward < grains.radius
     elif scene.window is not None:
         shown = grains.in_window | ((grains.places - scene.center) @ look <= 0.0)
@@ -192,17 +192,34 @@ def _add_grains(plotter: Any, scene: Scene, drawn: BoolArray, toward: FloatArray
     """Balls; if the scene has lines, cut by the plane through the centre."""
     grains = scene.grains
     height = (grains.position - scene.center) @ toward
+    is_section = scene.lines is not None or scene.space.is_plane
     for colour, kind in shades(grains, classes(grains, scene.window is not None)):
         chosen = kind & drawn
         if not chosen.any():
             continue
-        balls = _balls(grains.position[chosen], grains.radius[chosen])
-        if scene.lines is not None:
-            balls = balls.clip(normal=toward, origin=scene.center)
+        if is_section:
             _add_section(
-                plotter, grains, chosen & (height > -grains.radius), height, toward, colour
+                plotter,
+                grains,
+                chosen & (height > -grains.radius),
+                height,
+                toward,
+                colour if scene.space.is_plane and scene.lines is None else _pale(colour),
             )
+        if scene.space.is_plane:
+            continue
+        balls = _balls(grains.position[chosen], grains.radius[chosen])
+        if is_section:
+            balls = balls.clip(normal=toward, origin=scene.center)
         plotter.add_mesh(balls, color=colour, smooth_shading=True, ambient=0.2, specular=0.2)
+
+
+def _pale(colour: str) -> str:
+    """Of a section, paler than the balls behind it."""
+    import pyvista
+
+    light = 0.45 * np.array(pyvista.Color(colour).float_rgb) + 0.55
+    return str(pyvista.Color(light.tolist()).hex_rgb)
 
 
 def _balls(position: FloatArray, radius: FloatArray) -> Any:
@@ -224,7 +241,7 @@ def _add_section(
     toward: FloatArray,
     colour: str,
 ) -> None:
-    """The disks in which the plane cuts grains, paler than the balls behind."""
+    """The disks in which a plane cuts grains; of discs themselves."""
     import pyvista
 
     if not chosen.any():
@@ -233,8 +250,7 @@ def _add_section(
     cloud.point_data["diameter"] = 2.0 * np.sqrt(grains.radius[chosen] ** 2 - height[chosen] ** 2)
     disk = pyvista.Disc(inner=0.0, outer=0.5, normal=toward, c_res=48)
     disks = cloud.glyph(geom=disk, scale="diameter", orient=False)
-    pale = 0.45 * np.array(pyvista.Color(colour).float_rgb) + 0.55
-    plotter.add_mesh(disks, color=pale.tolist(), lighting=False)
+    plotter.add_mesh(disks, color=colour, lighting=False)
 
 
 def _add_window(plotter: Any, scene: Scene, window: Convex, toward: FloatArray) -> None:
@@ -242,7 +258,7 @@ def _add_window(plotter: Any, scene: Scene, window: Convex, toward: FloatArray) 
     import pyvista
 
     center = tuple(scene.center)
-    if scene.lines is None:
+    if scene.lines is None and not window.is_flat:
         surface = window_mesh(scene.center, window, nsub=5)
         smooth = not len(window.planes)
         plotter.add_mesh(surface, color=COLOURS["blue"], opacity=0.12, smooth_shading=smooth)
@@ -253,7 +269,8 @@ def _add_window(plotter: Any, scene: Scene, window: Convex, toward: FloatArray) 
             center=center, inner=radius, outer=1.008 * radius, normal=toward, c_res=180
         )
     else:
-        cut = window_mesh(scene.center, window).slice(normal=toward, origin=center)
+        mesh = window_mesh(scene.center, window)
+        cut = mesh if window.is_flat else mesh.slice(normal=toward, origin=center)
         outline = cut.tube(radius=0.004 * window.reach)
     plotter.add_mesh(outline, color=COLOURS["blue"], lighting=False)
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from scanfab.base.space import SPACE
 from scanfab.fabric.contact import contact_fabric
 
 __all__ = ["measured_of"]
@@ -14,6 +15,7 @@ __all__ = ["measured_of"]
 
 def measured_of(normals: np.ndarray, axis: Any = (0.0, 0.0, 1.0), **more: Any) -> Any:
     """As ``Measured``, of contacts with these normals; no void fabric unless ``void`` is one."""
-    found = {"void": None, "forces": None, "state": None, "segment_count": 0, **more}
+    usual = {"void": None, "forces": None, "state": None, "segment_count": 0, "space": SPACE}
+    found = {**usual, **more}
     contact = contact_fabric(normals)
     return SimpleNamespace(normals=normals, axis=np.asarray(axis), contact=contact, **found)

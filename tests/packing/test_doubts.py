@@ -120,16 +120,24 @@ def test_molecules_that_are_no_clumps_raise_no_doubt(loose, mol):
     assert doubts_of(sample_of(packing)) == []
 
 
-def test_a_sheet_of_discs_is_refused():
-    sample = read(DISCS / "sheet.3000.lammpstrj")
-    with pytest.raises(PackingError, match=r"all 300 centres lie in one plane \(z = 0\).*3D"):
+def test_a_sheet_of_discs_is_refused_as_spheres():
+    sample = read(DISCS / "sheet.3000.lammpstrj", dim=3)
+    words = r"all 300 centres lie in the plane x-y \(z = 0\).*`dim=2`"
+    with pytest.raises(PackingError, match=words):
         refuse_impossible(sample)
-    with pytest.raises(PackingError, match="one plane"), pytest.warns(scanfab.ScanfabWarning):
-        scanfab.compute(scanfab.read_series(DISCS / "sheet.3000.lammpstrj"))
+    with pytest.raises(PackingError, match="x-y"), pytest.warns(scanfab.ScanfabWarning):
+        scanfab.compute(scanfab.read_series(DISCS / "sheet.3000.lammpstrj", dim=3))
+
+
+def test_discs_do_not_touch_their_images_across_the_plane():
+    with pytest.warns(scanfab.ScanfabNote, match=r"lie in the plane x-y \(z = 0\).*`dim=3`"):
+        sample = read(DISCS / "sheet.3000.lammpstrj")
+    refuse_impossible(sample)
+    assert doubts_of(sample) == []
 
 
 def test_grains_that_touch_themselves_are_named():
-    doubts = doubts_of(read(DISCS / "sheet.3000.lammpstrj"))
+    doubts = doubts_of(read(DISCS / "sheet.3000.lammpstrj", dim=3))
     assert [one.code for one in doubts if one.text.startswith("300 grains touch")] == ["own_images"]
 
 

@@ -17,7 +17,7 @@ def in_cell(**arguments):
     return Packing(ROW, 1.0, cell=Cell([5.7, 9, 9], (True, False, False)), **arguments)
 
 
-@pytest.mark.parametrize("position", [[1, 2, 3], [[1, 2]], [[[1, 2, 3]]], 5])
+@pytest.mark.parametrize("position", [[1, 2, 3], [[1, 2, 3, 4]], [[[1, 2, 3]]], 5])
 def test_positions_have_three_columns(position):
     with pytest.raises(PackingError, match=r"position: expected shape \(N, 3\), found"):
         Packing(position, 1.0)

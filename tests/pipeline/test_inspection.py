@@ -80,11 +80,20 @@ def test_a_box_that_may_be_periodic_is_told():
 
 def test_a_sheet_of_discs_is_told_in_full():
     sheet = SAMPLE_DATA / "lammps_discs" / "sheet.3000.lammpstrj"
-    (report,) = inspect_series(scanfab.read_series(sheet), Settings())
+    (report,) = inspect_series(scanfab.read_series(sheet, dim=3), Settings())
     assert [text.partition(",")[0].partition("(")[0].strip() for text in report.warnings] == [
-        "all 300 centres lie in one plane",
+        "all 300 centres lie in the plane x-y",
         "300 grains touch themselves",
     ]
+
+
+def test_a_sheet_of_discs_is_no_doubt():
+    sheet = SAMPLE_DATA / "lammps_discs" / "sheet.3000.lammpstrj"
+    with pytest.warns(scanfab.ScanfabNote, match="read as discs"):
+        (report,) = inspect_series(scanfab.read_series(sheet), Settings())
+    assert report.warnings == []
+    assert (report.periodic, report.low[2], report.high[2]) == ([True, True, False], 0.0, 0.0)
+    assert report.rv_center[2] == 0.0
 
 
 def test_an_empty_frame_has_no_radii(tmp_path):

@@ -17,14 +17,13 @@ from scanfab import (
 )
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.plan import (
-    CLOSE,
     FEWEST_LINES,
-    GROWTH_WITH_SPACING,
+    NOISE,
     REPLICATES,
     WIDE,
     make_plan,
 )
-from scanfab.pipeline.settings import AUTO_RULE
+from scanfab.scan.directions import AUTO_RULE
 from tests.helpers.lattices import shaken_cubic
 
 
@@ -130,7 +129,7 @@ def test_auto_spacing_of_a_small_sample_is_as_close_as_is_of_use():
     random = np.random.default_rng(0)
     packing = Packing(random.random((400, 3)) * 20, random.uniform(0.5, 1.0, 400))
     plan = plan_of(packing, tolerance=1e-5)
-    assert plan.spacing == pytest.approx(CLOSE * packing.radius.mean())
+    assert plan.spacing == pytest.approx(NOISE[3].close * packing.radius.mean())
 
 
 def test_auto_spacing_is_wider_where_less_is_asked_for():
@@ -138,7 +137,7 @@ def test_auto_spacing_is_wider_where_less_is_asked_for():
     packing = Packing(random.random((20_000, 3)) * 60, random.uniform(0.5, 1.0, 20_000))
     wide, close = (plan_of(packing, tolerance=t).spacing for t in (2e-4, 5e-5))
     assert close < wide < WIDE * packing.radius.mean()
-    assert wide / close == pytest.approx(4.0 ** (2.0 / (2.0 + GROWTH_WITH_SPACING)))
+    assert wide / close == pytest.approx(4.0 ** (2.0 / (2.0 + NOISE[3].growth)))
     # lines that know nothing of one another: so many segments, however wide they are apart
     widest, wider = (plan_of(packing, tolerance=t).spacing for t in (6e-4, 5e-4))
     assert WIDE * packing.radius.mean() < wider

@@ -375,10 +375,6 @@ def test_compute_hands_every_option_to_the_settings(monkeypatch):
         ({"rv_shape": "none.stl"}, "rv_shape: expected sphere, .* that exists"),
         ({"rv_size": "1,2,3"}, "rv_size: the shape sphere takes none: choose `rv_radius`"),
         (
-            {"rv_shape": "box", "rv_size": "1,2"},
-            "rv_size: expected A,B,C, full edges .`rv_shape` is box., found 1,2",
-        ),
-        (
             {"rv_shape": "cylinder", "rv_size": "1,2,3"},
             "rv_size: expected R,H, radius and height .* found 1,2,3",
         ),

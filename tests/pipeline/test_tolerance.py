@@ -20,8 +20,7 @@ from scanfab import (
 from scanfab.packing.sample import Sample
 from scanfab.pipeline import tolerance as adaptive
 from scanfab.pipeline.plan import REPLICATES, make_plan
-from scanfab.pipeline.settings import AUTO_RULE
-from scanfab.scan.directions import DirectionRule
+from scanfab.scan.directions import AUTO_RULE, DirectionRule
 from scanfab.scan.solids import CellGrains, Solids
 from tests.helpers.lattices import shaken_cubic
 from tests.helpers.scanning import solids_of

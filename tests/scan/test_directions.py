@@ -8,8 +8,7 @@ import pytest
 from scipy.special import eval_legendre
 
 from scanfab import SettingsError, direction_rule
-from scanfab.pipeline.settings import AUTO_RULE
-from scanfab.scan.directions import LEBEDEV_DEGREES, NEGATIVE_LEBEDEV
+from scanfab.scan.directions import AUTO_RULE, LEBEDEV_DEGREES, NEGATIVE_LEBEDEV
 from tests.helpers.naive import axial
 
 LEBEDEV = [f"lebedev:{degree}" for degree in LEBEDEV_DEGREES if degree not in NEGATIVE_LEBEDEV]

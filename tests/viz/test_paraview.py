@@ -85,7 +85,7 @@ def test_the_surface_gives_back_the_tensor(computed, variant):
 def test_the_surface_has_the_moment_of_the_table(tmp_path):
     packing = scanfab.find_contacts(scanfab.Packing(*shaken_cubic(np.random.default_rng(0), 6)))
     words = {"variants": "c", "tolerance": 2e-3, "moment": 2}
-    (row,) = compute_rows(packing, Settings(**words), observe=VtkFolder(tmp_path, (0, 0, 1)))
+    (row,) = compute_rows(packing, Settings(**words), observe=VtkFolder(tmp_path))
     mesh = pyvista.read(tmp_path / "distribution-c_000000.vtp")
     share = mesh["weight"] * mesh["mean_length"]
     assert share.sum() == pytest.approx(row.mean_length, rel=1e-2)
@@ -164,7 +164,7 @@ def test_files_of_a_cut_off_that_nothing_reaches_have_no_distribution(tmp_path):
     packing = scanfab.Packing(spheres.position, spheres.radius, step=7)
     settings = Settings(variants="c", cutoff=100.0, directions=9, spacing="1rmin")
     with pytest.warns(scanfab.ScanfabWarning, match="no void segment"):
-        list(compute_rows(packing, settings, observe=VtkFolder(tmp_path, settings.axis)))
+        list(compute_rows(packing, settings, observe=VtkFolder(tmp_path)))
     names = {path.name for path in tmp_path.iterdir()}
     assert "grains_000000.vtp" in names
     assert "distribution-c_000000.vtp" not in names
@@ -177,7 +177,7 @@ def test_contacts_without_a_force_or_without_any(tmp_path):
     packing = scanfab.Packing([[0.0, 0, 0], [5, 0, 0]], 1.0, contacts=[])
     settings = Settings(variants="a", directions=3, spacing=0.2, cutoff=0.0)
     with pytest.warns(scanfab.ScanfabWarning):
-        list(compute_rows(packing, settings, observe=VtkFolder(tmp_path, settings.axis)))
+        list(compute_rows(packing, settings, observe=VtkFolder(tmp_path)))
     mesh = pyvista.read(tmp_path / "contacts_000000.vtp")
     assert mesh.n_cells == 0
 
@@ -200,7 +200,7 @@ def test_a_frame_without_grains_and_a_name_beyond_ascii(tmp_path):
     settings = Settings(variants="c", directions=9, spacing="0.5rmin", cutoff="0.2rmin")
     vtk = tmp_path / "vtk"
     series = scanfab.read_series(folder)
-    assert len(list(compute_rows(series, settings, observe=VtkFolder(vtk, settings.axis)))) == 3
+    assert len(list(compute_rows(series, settings, observe=VtkFolder(vtk)))) == 3
     empty = pyvista.read(vtk / "grains_000001.vtp")
     assert empty.n_points == 0
     assert empty.field_data["grains"][0] == 0

@@ -101,8 +101,20 @@ class MapBlocks:
 
 
 def map_blocks(settings: MapSettings, sample: Sample) -> MapBlocks:
-    """What the blocks of a map tile, by the first frame that has grains."""
+    """
+    What the blocks of a map tile, by the first frame that has grains.
+
+    Raises
+    ------
+    SettingsError
+        If the grains are discs in a plane.
+    """
     packing, cell = sample.packing, sample.packing.cell
+    if packing.space.is_plane:
+        raise SettingsError(
+            f"dim: maps are of spheres, but all grains are taken for discs in the plane "
+            f"{packing.space.name}: `dim=3` takes them for spheres"
+        )
     position, radius = packing.position[sample.gathered], packing.radius[sample.gathered]
     open_axes = _open_axes(settings)
     axes, origin, _ = _axes(cell, open_axes)

@@ -13,7 +13,7 @@ from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.blocks import BlockFabrics, WithoutParts
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.maps.blocks import splits_of
-from scanfab.pipeline.plan import CLOSE, Plan
+from scanfab.pipeline.plan import NOISE, Plan
 from scanfab.pipeline.solids import solids_of
 from scanfab.pipeline.tolerance import Errors, scan_to_tolerance
 from scanfab.scan.blocks import Blocks
@@ -197,11 +197,11 @@ def _part_spacing(solids: Solids, rule: DirectionRule, plan: Plan, before: ScanS
     """As close as is of use, but no closer than can be waited for."""
     if not len(solids.grain_radius):
         return plan.spacing
-    spacing = CLOSE * float(solids.grain_radius.mean())
+    spacing = NOISE[solids.space.dimension].close * float(solids.grain_radius.mean())
     # what following lines through a periodic medium takes is known from the scan before
     steps = float(before.steps.mean()) / len(plan.rule) * (plan.spacing / spacing) ** 2
     # a line costs as much as a chord, also if it meets nothing
-    chords = solids.cross_section / spacing**2 + most_lines(solids, spacing) + steps
+    chords = solids.chords(spacing) + most_lines(solids, spacing) + steps
     chords *= PART_REPLICATES * len(rule)
     return spacing * math.sqrt(max(chords / min(MOST_CHORDS, plan.max_chords), 1.0))
 

@@ -226,7 +226,7 @@ def scan_axes(
         Spheres that are not solid in the second set of solids.
     triads : shape (D, 3, 3)
         Orthonormal rows u, v, n of each axis: the lines run along n.
-    offsets : shape (D, 2)
+    offsets : shape (D, 2), or (D, 1) in a plane
         Shift of each axis' grid, in units of the spacing.
     clip : Clip
         The window.

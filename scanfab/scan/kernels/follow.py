@@ -159,8 +159,6 @@ def follow(
     it is worth nothing.
     """
     limits = limits_of(grains, prism, which == 1)
-    # else a line leaves through a face that does not repeat
-    endless = grains.periodic[0] and grains.periodic[1] and grains.periodic[2]
     for row in range(strip.rows):
         v = strip.first_v + row * strip.spacing
         for column in range(strip.columns):
@@ -187,7 +185,8 @@ def follow(
                     elif gap >= least:
                         tally[which, WHOLE + LENGTH] += gap
                         tally[which, WHOLE + KEPT] += 1.0
-            elif endless:
+            elif prism.endless:
+                # else the line leaves through a face that does not repeat
                 tally[which, CHANNELS] += 1.0
                 tally[which, WHOLE + VOID] += (
                     prism.length if is_empty else enters + prism.length - end

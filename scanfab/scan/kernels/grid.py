@@ -1,4 +1,8 @@
-"""The square grid of scan lines along one direction, and the strips that it is cut into."""
+"""
+The square grid of scan lines along one direction, and the strips that it is cut into.
+
+In a plane, whose normal is the grid's v, it is one row at v = 0: its shift is one number, along u.
+"""
 
 from __future__ import annotations
 
@@ -33,16 +37,19 @@ def cover(
 ) -> Grid:
     """The lines ((i + offset_u) * spacing, (j + offset_v) * spacing) that meet a rectangle."""
     column = int(np.ceil(low_u / spacing - offset[0]))
-    row = int(np.ceil(low_v / spacing - offset[1]))
     columns = max(int(np.floor(high_u / spacing - offset[0])) - column + 1, 0)
-    rows = max(int(np.floor(high_v / spacing - offset[1])) - row + 1, 0)
+    row, rows, offset_v = 0, 1, 0.0
+    if offset.size > 1:
+        offset_v = offset[1]
+        row = int(np.ceil(low_v / spacing - offset_v))
+        rows = max(int(np.floor(high_v / spacing - offset_v)) - row + 1, 0)
     low, high = np.empty(rows, np.int64), np.empty(rows, np.int64)
     for row_of in range(rows):
         low[row_of], high[row_of] = 0, columns
     return Grid(
         spacing,
         (column + offset[0]) * spacing,
-        (row + offset[1]) * spacing,
+        (row + offset_v) * spacing,
         columns,
         rows,
         low,

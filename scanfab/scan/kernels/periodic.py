@@ -44,7 +44,7 @@ class CellGrains(NamedTuple):
     radius: FloatArray
     removed: BoolArray
     vectors: FloatArray
-    """Rows: the cell's edges."""
+    """Rows: the cell's edges; in a plane the last one stands across it, and does not repeat."""
     periodic: BoolArray
 
 
@@ -69,6 +69,8 @@ class Prism(NamedTuple):
     length: float
     slope: float
     """By how much the height changes over a length of 1, at most."""
+    endless: bool
+    """Whether lines have no end: all edges repeat, in a plane but the one across it."""
 
 
 @inner()
@@ -88,7 +90,9 @@ def cross(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 @inner()
-def prism_along(normal: FloatArray, vectors: FloatArray, periodic: BoolArray) -> Prism:
+def prism_along(
+    normal: FloatArray, vectors: FloatArray, periodic: BoolArray, in_plane: bool = False
+) -> Prism:
     """The prism of the lines along a direction."""
     third, steepest = 0, -1.0
     for k in range(3):
@@ -97,7 +101,7 @@ def prism_along(normal: FloatArray, vectors: FloatArray, periodic: BoolArray) ->
         if steepness > steepest:
             third, steepest = k, steepness
     first, second = (third + 1) % 3, (third + 2) % 3
-    if periodic[second] and not periodic[first]:
+    if (periodic[second] and not periodic[first]) or (in_plane and first == 2):
         first, second = second, first
     a, b, c = vectors[first], vectors[second], vectors[third]
     triad = np.empty((3, 3))
@@ -113,7 +117,10 @@ def prism_along(normal: FloatArray, vectors: FloatArray, periodic: BoolArray) ->
     rise_v = (dot(b, normal) - rise_u * skew_u) / base_v
     length = abs(dot(c, normal) - rise_u * dot(c, triad[0]) - rise_v * dot(c, triad[1]))
     slope = np.sqrt(1.0 + rise_u * rise_u + rise_v * rise_v) / length
-    return Prism(triad, first, second, third, base_u, skew_u, base_v, rise_u, rise_v, length, slope)
+    endless = periodic[0] and periodic[1] and (periodic[2] or in_plane)
+    return Prism(
+        triad, first, second, third, base_u, skew_u, base_v, rise_u, rise_v, length, slope, endless
+    )
 
 
 @inner(error_model="numpy")
@@ -238,7 +245,7 @@ def cell_grid(
     grains: CellGrains, normal: FloatArray, offset: FloatArray, spacing: float
 ) -> tuple[Prism, Spheres, Grid]:
     """The lines along a direction through a periodic medium, and the images that they may meet."""
-    prism = prism_along(normal, grains.vectors, grains.periodic)
+    prism = prism_along(normal, grains.vectors, grains.periodic, offset.size == 1)
     found, extent = images_in(grains, prism)
     spheres = in_order(found, order_of(found.depth, *range_of(found.depth)))
     skew = prism.skew_u / prism.base_v

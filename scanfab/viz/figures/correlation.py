@@ -12,6 +12,7 @@ from scanfab.base.typing import FloatArray
 from scanfab.table.compare import compare_tables
 from scanfab.table.comparison_rows import Comparison
 from scanfab.table.curves import Curve, is_turned
+from scanfab.table.reading import is_of_discs
 from scanfab.table.row import Row
 from scanfab.table.table import Table
 from scanfab.viz.figures.figure import Figure
@@ -38,7 +39,8 @@ if TYPE_CHECKING:
 __all__ = ["PAPER_SLOPE", "Correlation", "Fit", "fits_of"]
 
 
-PAPER_SLOPE = 0.096
+# as the 2017 paper prints them, of spheres and of discs
+PAPER_SLOPE, PAPER_SLOPE_2D = 0.096, 0.231
 
 
 @dataclass(frozen=True)
@@ -103,6 +105,7 @@ class Correlation(Figure):
         super().__init__(data)
         self.groups = groups_of(data)
         self.turned = is_turned(data)
+        self.in_plane = is_of_discs(data)
         self.fits = fits_of(compare_tables(data) if comparison is None else comparison)
 
     @property
@@ -122,19 +125,24 @@ class Correlation(Figure):
 
     def draw(self, ax: Axes) -> None:
         """With the legend in the panel."""
-        _draw_group(ax, None, group_of(self.groups), self.fits, self.turned)
+        _draw_group(ax, None, group_of(self.groups), self.fits, self.turned, self.in_plane)
 
     def panels(self, part: Page | SubFigure) -> list[Axes]:
         """A panel for each group, beside it the legend, which has the numbers."""
         panels = part.subplots(len(self.groups), 2, squeeze=False, width_ratios=(3, 2))
         for group, (axes, margin) in zip(self.groups, panels, strict=True):
-            _draw_group(axes, margin, group, self.fits, self.turned)
+            _draw_group(axes, margin, group, self.fits, self.turned, self.in_plane)
             axes.set_title(group.title, loc="left")
         return [axes for axes, _ in panels]
 
 
 def _draw_group(
-    axes: Axes, margin: Axes | None, group: Group, fits: Sequence[Fit | None], turned: bool
+    axes: Axes,
+    margin: Axes | None,
+    group: Group,
+    fits: Sequence[Fit | None],
+    turned: bool,
+    in_plane: bool,
 ) -> None:
     """
     The points and lines of one panel.
@@ -145,7 +153,7 @@ def _draw_group(
     fitted = [] if turned else [fits[one.place] for one in group.drawn]
     for one in group.drawn:
         _points(axes, one, None if turned else fits[one.place], legend, turned)
-    _paper(axes, fitted, legend)
+    _paper(axes, fitted, legend, in_plane)
     _errors(group, legend, turned)
     _label(axes, turned)
     title = "intensities" if turned else f"slope of {VOID} on {CONTACT}, axial"
@@ -210,12 +218,13 @@ def _bars(error: FloatArray) -> FloatArray | None:
     return np.nan_to_num(error) if np.isfinite(error).any() else None
 
 
-def _paper(axes: Axes, fits: Sequence[Fit | None], legend: _Legend) -> None:
+def _paper(axes: Axes, fits: Sequence[Fit | None], legend: _Legend, in_plane: bool) -> None:
     """The slope that the paper prints, through the origin, as far as there are contacts."""
     reach = max((fit.contact[1] for fit in fits if fit is not None), default=0.0)
+    slope, of = (PAPER_SLOPE_2D, ", 2D") if in_plane else (PAPER_SLOPE, "")
     if reach > 0:
-        (line,) = axes.plot([0, 1e2 * reach], [0, 1e3 * PAPER_SLOPE * reach], "k:", lw=0.9)
-        legend.add(line, f"2017 paper: {PAPER_SLOPE:.3f}")
+        (line,) = axes.plot([0, 1e2 * reach], [0, 1e3 * slope * reach], "k:", lw=0.9)
+        legend.add(line, f"2017 paper{of}: {slope:.3f}")
 
 
 def _errors(group: Group, legend: _Legend, turned: bool) -> None:

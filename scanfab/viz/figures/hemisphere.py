@@ -7,13 +7,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
-from scanfab.fabric.distribution import mean_length_function, sphere_points
+from scanfab.fabric.distribution import direction_points, mean_length_function
 
 if TYPE_CHECKING:
     from scanfab.viz.scanned_frames import ScannedFrame
 
-__all__ = ["CONCENTRATION", "Hemisphere", "disk", "hemisphere_of", "smoothed_density"]
+__all__ = [
+    "CONCENTRATION",
+    "Hemisphere",
+    "disk",
+    "half_circle",
+    "hemisphere_of",
+    "smoothed_density",
+]
 
 
 # rings and rays of the disk that a hemisphere is projected on
@@ -24,7 +32,11 @@ CONCENTRATION = 6.5
 
 @dataclass(frozen=True, eq=False)
 class Hemisphere:
-    """One frame: deviation from the mean over all directions, per cent, at :func:`disk`."""
+    """
+    One frame: deviation from the mean over all directions, per cent.
+
+    At :func:`disk`, or of discs at :func:`half_circle`.
+    """
 
     title: str
     voids: FloatArray
@@ -53,26 +65,46 @@ def disk() -> tuple[FloatArray, FloatArray]:
     return rho[..., None] * along, directions
 
 
+def half_circle(space: Space) -> tuple[FloatArray, FloatArray]:
+    """
+    Directions of a plane, of which all others are the opposites.
+
+    Returns
+    -------
+    ndarray, shape (181,)
+        Their angles from the first of its coordinates to the second, degrees.
+    ndarray, shape (181, 3)
+        The unit vectors.
+    """
+    angle = np.arange(181.0)
+    first, second = (np.eye(3)[k] for k in sorted(space.along))
+    turn = np.radians(angle)[:, None]
+    return angle, np.cos(turn) * first + np.sin(turn) * second
+
+
 def hemisphere_of(frame: ScannedFrame) -> Hemisphere:
     """The directional distributions of a frame."""
-    _, directions = disk()
+    space = frame.space
+    _, directions = half_circle(space) if space.is_plane else disk()
     measured = frame.measurement
-    mean_length = mean_length_function(measured.sums.axes, *measured.kept(frame.variant))
+    mean_length = mean_length_function(measured.sums.axes, *measured.kept(frame.variant), space)
     assert mean_length is not None
-    points, weights = sphere_points()
+    points, weights = direction_points(space)
     mean = float(weights @ mean_length(points))
     normals = frame.normals
     return Hemisphere(
         frame.title,
         100 * (mean_length(directions) / mean - 1),
-        100 * (smoothed_density(normals, directions) - 1) if len(normals) else None,
+        100 * (smoothed_density(normals, directions, space) - 1) if len(normals) else None,
     )
 
 
-def smoothed_density(normals: FloatArray, directions: FloatArray) -> FloatArray:
+def smoothed_density(
+    normals: FloatArray, directions: FloatArray, space: Space = SPACE
+) -> FloatArray:
     """Density of the normals (n or -n) about each direction, over that of isotropic ones."""
-    points, weights = sphere_points()
-    isotropic = float(weights @ np.exp(CONCENTRATION * points[:, 2] ** 2))
+    points, weights = direction_points(space)
+    isotropic = float(weights @ np.exp(CONCENTRATION * points[:, max(space.along)] ** 2))
     flat = directions.reshape(-1, 3)
     density: FloatArray = np.array(
         [np.exp(CONCENTRATION * (normals @ one) ** 2).mean() for one in flat]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scanfab.base.typing import FloatArray
-from scanfab.fabric.distribution import sphere_points
+from scanfab.fabric.distribution import direction_points
 from scanfab.viz.figures.figure import FrameFigure
 from scanfab.viz.figures.style import COLUMN, FRAME_LOOKS
 
@@ -115,8 +115,9 @@ def _lengths_of(frame: ScannedFrame) -> LengthSample:
     from scanfab.scan.segments import sample_segments
 
     position, radius, window = frame.spheres
-    points, _ = sphere_points()
-    triads = line_triads(points[: len(points) // 2 : 20])
-    found = sample_segments(position, radius, triads, LINES, window)
+    points, _ = direction_points(frame.space)
+    some = points[: len(points) // 2 : 5 if frame.space.is_plane else 20]
+    triads = line_triads(some, frame.space)
+    found = sample_segments(position, radius, triads, LINES, window, frame.space)
     length, cutoff = found.length[found.void], frame.measurement.plan.cutoff
     return LengthSample(frame.title, length / frame.smallest, cutoff / frame.smallest)

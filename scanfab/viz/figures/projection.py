@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray
 from scanfab.viz.figures.figure import FrameFigure, one_of
-from scanfab.viz.figures.hemisphere import Hemisphere, disk, hemisphere_of
+from scanfab.viz.figures.hemisphere import Hemisphere, disk, half_circle, hemisphere_of
 from scanfab.viz.figures.lobe_noise import noise_notes
-from scanfab.viz.figures.style import DIRECTIONAL, WIDTH
+from scanfab.viz.figures.style import COLOURS, DIRECTIONAL, WIDTH
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,6 +31,8 @@ DEVIATION = "deviation from the mean in %"
 class Projection(FrameFigure):
     """
     Mean void length and contact normals over all directions, on an equal-area disk.
+
+    Of discs over the directions of their plane, as curves.
 
     Parameters
     ----------
@@ -61,6 +64,12 @@ class Projection(FrameFigure):
         return [hemisphere_of(one) for one in self.chosen(self.data.frames)]
 
     @property
+    def plane(self) -> Space | None:
+        """That of the discs, if they are some."""
+        space = self.chosen(self.data.frames)[0].space
+        return space if space.is_plane else None
+
+    @property
     def size(self) -> tuple[float, float]:
         """A row for each frame."""
         return WIDTH, 2.5 * len(self.hemispheres) + 0.2
@@ -76,6 +85,10 @@ class Projection(FrameFigure):
         """Of the last frame, unless another one is asked for."""
         one, kind = self.hemispheres[-1], self.of[0]
         value = getattr(one, kind)
+        if self.plane is not None:
+            _curve(ax, value, self.plane, _largest([value]))
+            ax.set_title(f"{DIRECTIONAL[kind]}\n{one.title}")
+            return
         drawn = _disk(ax, value, _largest([value]))
         if drawn is not None:
             ax.figure.colorbar(drawn, ax=ax, shrink=0.8).set_label(DEVIATION)
@@ -89,7 +102,10 @@ class Projection(FrameFigure):
             values = [getattr(one, kind) for one in frames]
             drawn = None
             for axes, one, value in zip(column, frames, values, strict=True):
-                drawn = _disk(axes, value, _largest(values)) or drawn
+                if self.plane is not None:
+                    _curve(axes, value, self.plane, _largest(values))
+                else:
+                    drawn = _disk(axes, value, _largest(values)) or drawn
                 axes.set_title(f"{DIRECTIONAL[kind]}\n{one.title}", loc="left")
             if drawn is not None:
                 bar = part.colorbar(drawn, ax=column, shrink=0.8, pad=0.03, aspect=30)
@@ -102,6 +118,18 @@ def _largest(values: Sequence[FloatArray | None]) -> float:
     """The end of the scale: the largest deviation, and at least a tenth of a per cent."""
     known = [float(np.abs(value).max()) for value in values if value is not None]
     return max(max(known, default=1.0), 0.1)
+
+
+def _curve(axes: Axes, value: FloatArray | None, plane: Space, largest: float) -> None:
+    """Over the directions of a plane."""
+    first, second = ("xyz"[k] for k in sorted(plane.along))
+    axes.set(xlim=(0, 180), ylim=(-1.1 * largest, 1.1 * largest), ylabel=DEVIATION)
+    axes.set(xlabel=f"direction, degrees from {first} to {second}", xticks=range(0, 181, 45))
+    axes.axhline(0, color="0.6", lw=0.6, zorder=0)
+    if value is None:
+        axes.text(90, 0, "no contacts", ha="center")
+    else:
+        axes.plot(half_circle(plane)[0], value, color=COLOURS["blue"])
 
 
 def _disk(axes: Axes, value: FloatArray | None, largest: float) -> Any:

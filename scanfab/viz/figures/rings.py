@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.contact import contact_fabric
 
@@ -47,11 +48,14 @@ class Rings:
     title: str
     voids: Sequence[Ring]
     contacts: Sequence[Ring]
+    space: Space = SPACE
+    """The plane of the frame, if its grains are discs."""
 
 
 def rings_of(frame: ScannedFrame, angles: Sequence[float]) -> Rings:
+    space = frame.space
     rings = {phi: _azimuths(phi) for phi in angles}
-    axes = np.concatenate([_vectors(theta, phi) for phi, theta in rings.items()])
+    axes = np.concatenate([_vectors(theta, phi, space) for phi, theta in rings.items()])
     value, error = _mean_lengths(frame, axes)
     place, voids = 0, []
     for phi, theta in rings.items():
@@ -59,8 +63,8 @@ def rings_of(frame: ScannedFrame, angles: Sequence[float]) -> Rings:
         place += len(theta)
         voids.append(_around(phi, theta, value[here], error[here]))
     normals = frame.normals
-    contacts = [contact_ring(normals, phi) for phi in angles] if len(normals) else []
-    return Rings(frame.title, voids, contacts)
+    contacts = [contact_ring(normals, phi, space) for phi in angles] if len(normals) else []
+    return Rings(frame.title, voids, contacts, space)
 
 
 def _azimuths(phi: float) -> FloatArray:
@@ -75,8 +79,10 @@ def _around(phi: float, theta: FloatArray, value: FloatArray, error: FloatArray)
     return Ring(phi, theta, value, error)
 
 
-def _vectors(theta: FloatArray, phi: float) -> FloatArray:
+def _vectors(theta: FloatArray, phi: float, space: Space) -> FloatArray:
     azimuth, polar = np.radians(theta), np.radians(phi)
+    if space.is_plane:
+        return np.column_stack([np.cos(azimuth), np.sin(azimuth)]) @ _sides(space)
     flat = np.sin(polar)
     return np.column_stack(
         [flat * np.cos(azimuth), flat * np.sin(azimuth), np.full(len(theta), np.cos(polar))]
@@ -92,10 +98,12 @@ def _mean_lengths(frame: ScannedFrame, axes: FloatArray) -> tuple[FloatArray, Fl
     measured, variant, plan = frame.measurement, frame.variant, frame.measurement.plan
     # as many lines as give the wanted number of segments
     found = measured.sums.kept(variant)[1].mean()
-    spacing = plan.spacing * np.sqrt(found * REPLICATES / SEGMENTS)
+    spacing = plan.spacing * plan.space.apart(found * REPLICATES / SEGMENTS)
     rose = scan_gaps(
         measured.solids,
-        DirectionRule("rose", axes, np.full(len(axes), 1 / len(axes)), None, turned=False),
+        DirectionRule(
+            "rose", axes, np.full(len(axes), 1 / len(axes)), None, turned=False, space=plan.space
+        ),
         spacing=float(spacing),
         cutoffs=[plan.cutoff],
         blocks=measured.blocks,
@@ -114,24 +122,39 @@ def _mean_lengths(frame: ScannedFrame, axes: FloatArray) -> tuple[FloatArray, Fl
     return value, scatter / np.sqrt(REPLICATES)
 
 
-def contact_ring(normals: FloatArray, phi: float) -> Ring:
-    """Contact normals near a polar angle by azimuth, over what isotropy would give."""
-    both = np.concatenate([normals, -normals])
+def _sides(space: Space) -> FloatArray:
+    """The coordinates of a plane, from the first of which angles are counted, shape (2, 3)."""
+    sides: FloatArray = np.eye(3)[sorted(space.along)]
+    return sides
+
+
+def _near(both: FloatArray, phi: float, space: Space) -> tuple[FloatArray, float]:
+    """Azimuths of the vectors near a polar angle, and the share of all that isotropy has there."""
+    if space.is_plane:
+        x, y = _sides(space) @ both.T
+        return np.degrees(np.arctan2(y, x)) % 360.0, 1.0
     polar = np.degrees(np.arccos(np.clip(both[:, 2], -1, 1)))
     azimuth = np.degrees(np.arctan2(both[:, 1], both[:, 0])) % 360.0
     low, high = max(phi - 15.0, 0.0), phi + 15.0
-    near = (polar >= low) & (polar < high)
-    edges = np.arange(0.0, 361.0, CONTACT_STEP)
-    count, _ = np.histogram(azimuth[near], edges)
     band = np.cos(np.radians(low)) - np.cos(np.radians(high))
-    expected = len(both) * band / 2 * CONTACT_STEP / 360.0
-    tensor = contact_fabric(normals)
+    return azimuth[(polar >= low) & (polar < high)], band / 2
+
+
+def contact_ring(normals: FloatArray, phi: float, space: Space = SPACE) -> Ring:
+    """Contact normals near a polar angle by azimuth, over what isotropy would give."""
+    both = np.concatenate([normals, -normals])
+    azimuth, share = _near(both, phi, space)
+    edges = np.arange(0.0, 361.0, CONTACT_STEP)
+    count, _ = np.histogram(azimuth, edges)
+    expected = len(both) * share * CONTACT_STEP / 360.0
+    tensor = contact_fabric(normals, space)
     assert tensor is not None
-    deviator = 7.5 * (tensor.matrix - np.eye(3) / 3)
+    isotropic = np.diag([1.0 / space.dimension if k in space.along else 0.0 for k in range(3)])
+    deviator = (4.0 if space.is_plane else 7.5) * (tensor.matrix - isotropic)
 
     def density(theta: FloatArray) -> FloatArray:
         """Second-order density of the contact fabric, after Kanatani (1984)."""
-        directions = _vectors(theta, phi)
+        directions = _vectors(theta, phi, space)
         values: FloatArray = 1 + np.einsum("ni,ij,nj->n", directions, deviator, directions)
         return values
 

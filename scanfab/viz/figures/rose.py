@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from scanfab.base.errors import SettingsError
+from scanfab.base.space import SPACE, Space
 from scanfab.viz.figures.figure import FrameFigure, one_of
 from scanfab.viz.figures.rings import Ring, Rings, rings_of
 from scanfab.viz.figures.style import COLOURS, DIRECTIONAL, WIDTH
@@ -26,6 +27,7 @@ __all__ = ["Rose", "draw_roses"]
 
 
 POLAR_ANGLES = (90.0, 60.0, 30.0)
+EQUATOR = (90.0,)
 RINGS: tuple[dict[str, Any], ...] = (
     {"color": COLOURS["vermilion"], "marker": "^", "ls": "-"},
     {"color": COLOURS["blue"], "marker": "o", "ls": "--"},
@@ -53,6 +55,8 @@ def _no_angles(where: str, example: object, found: object) -> SettingsError:
 class Rose(FrameFigure):
     """
     Mean void length and contact normals over the azimuth, at a few polar angles from z.
+
+    Of discs over the directions of their plane, which has no polar angles.
 
     Parameters
     ----------
@@ -113,12 +117,23 @@ class Rose(FrameFigure):
     @cached_property
     def rings(self) -> list[Rings]:
         """What is drawn of each frame."""
-        return [rings_of(one, self.angles) for one in self.chosen(self.data.frames)]
+        frames = self.chosen(self.data.frames)
+        return [rings_of(one, _angles_in(one.space, self.angles)) for one in frames]
+
+    @property
+    def space(self) -> Space:
+        """The plane of the frames, if their grains are discs."""
+        return self.rings[0].space
+
+    @property
+    def drawn_angles(self) -> tuple[float, ...]:
+        """Of discs one ring, in their plane."""
+        return _angles_in(self.space, self.angles)
 
     @property
     def size(self) -> tuple[float, float]:
         """A row for each frame, and the legend."""
-        entries = -(-len(self.angles) // MOST_COLUMNS)
+        entries = -(-len(self.drawn_angles) // MOST_COLUMNS)
         return WIDTH, 3.0 * len(self.rings) + 0.7 + 0.2 * entries
 
     @property
@@ -131,23 +146,34 @@ class Rose(FrameFigure):
 
     def draw(self, ax: Axes) -> None:
         """Of the last frame, unless another one is asked for."""
-        rings, looks = self.rings[-1], _ring_looks(self.angles)
+        rings, looks = self.rings[-1], _ring_looks(self.drawn_angles)
         shown = getattr(rings, self.of[0])
         reach = max(map(_reach, shown), default=0.02)
         _draw_rings(cast("PolarAxes", ax), shown, reach, looks)
         ax.set_title(f"{DIRECTIONAL[self.of[0]]}\n{rings.title}")
         circles, middle = _named_circles(reach)
         ax.legend(
-            *_entries(looks),
+            *_entries(looks, self.space),
             loc="upper center",
             bbox_to_anchor=(0.5, -0.08),
-            title=f"over the azimuth $\\theta$ from x, relative to isotropy\n"
-            f"circles: {circles} about {middle}",
+            title=f"{_over(self.space)}, relative to isotropy\ncircles: {circles} about {middle}",
         )
 
     def panels(self, part: Page | SubFigure) -> list[Axes]:
         """A row for each frame, a column for each of both."""
-        return draw_roses(part, self.rings, self.angles, self.of)
+        return draw_roses(part, self.rings, self.drawn_angles, self.of, self.space)
+
+
+def _angles_in(space: Space, angles: tuple[float, ...]) -> tuple[float, ...]:
+    """The polar angles to draw; of discs none but that of their plane."""
+    if not space.is_plane:
+        return angles
+    if angles not in (POLAR_ANGLES, EQUATOR):
+        raise SettingsError(
+            f"figure: discs in {space} have no polar angles, found "
+            f"{','.join(f'{one:g}' for one in angles)}: choose `figure=rose`"
+        )
+    return EQUATOR
 
 
 def draw_roses(
@@ -155,6 +181,7 @@ def draw_roses(
     frames: Sequence[Rings],
     angles: Sequence[float],
     of: Sequence[str] = tuple(DIRECTIONAL),
+    space: Space = SPACE,
 ) -> list[Axes]:
     """Rings on an empty Figure or SubFigure; the panels of a column share their scale."""
     looks = _ring_looks(angles)
@@ -166,7 +193,7 @@ def draw_roses(
         for axes, one in zip(panels[:, column], frames, strict=True):
             _draw_rings(axes, getattr(one, kind), reach, looks)
             axes.set_title(f"{DIRECTIONAL[kind]}\n{one.title}", loc="left")
-    _ring_legend(part, looks, dict(zip(of, reaches, strict=True)))
+    _ring_legend(part, looks, dict(zip(of, reaches, strict=True)), space)
     found: list[Axes] = panels.ravel().tolist()
     return found
 
@@ -228,16 +255,29 @@ def _named_circles(reach: float) -> tuple[str, str]:
     return ", ".join(f"{one:g}" for one in circles), f"{middle:.3g}"
 
 
-def _entries(looks: Mapping[float, dict[str, Any]]) -> tuple[list[Any], list[str]]:
+def _over(space: Space) -> str:
+    """What the angle of the panels is."""
+    if not space.is_plane:
+        return "over the azimuth $\\theta$ from x"
+    first, second = ("xyz"[k] for k in sorted(space.along))
+    return f"over the angle from {first} towards {second}"
+
+
+def _entries(looks: Mapping[float, dict[str, Any]], space: Space) -> tuple[list[Any], list[str]]:
     """Handles and labels of the legend."""
     from matplotlib.lines import Line2D
 
     handles = [Line2D([], [], **look) for look in looks.values()]
+    if space.is_plane:
+        return handles, [f"in {space}"]
     return handles, [rf"polar angle $\varphi={phi:g}^\circ$" for phi in looks]
 
 
 def _ring_legend(
-    part: Page | SubFigure, looks: Mapping[float, dict[str, Any]], reaches: Mapping[str, float]
+    part: Page | SubFigure,
+    looks: Mapping[float, dict[str, Any]],
+    reaches: Mapping[str, float],
+    space: Space,
 ) -> None:
     """Below the panels, with what circles and bars are."""
     sides = {"voids": "left", "contacts": "right"} if len(reaches) > 1 else {}
@@ -249,11 +289,11 @@ def _ring_legend(
     ]
     errors = ", ".join(f"{bars[kind]}{beside[kind]}" for kind in reaches)
     note = (
-        "over the azimuth $\\theta$ from x, relative to isotropy\n"
+        f"{_over(space)}, relative to isotropy\n"
         f"circles: {', '.join(scales)}\n"
         f"bars: one standard error, {errors}"
     )
-    handles, labels = _entries(looks)
+    handles, labels = _entries(looks, space)
     part.legend(
         handles,
         labels,

@@ -12,7 +12,7 @@ from scanfab.io.series import Series
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import SurfaceBox
 from scanfab.pipeline.repeat import reopen, restored_settings
-from scanfab.pipeline.settings import Length, Settings
+from scanfab.pipeline.settings import Length, Settings, Vector
 from scanfab.table.reading import number_of
 from scanfab.viz.figures.page import make_figures
 from scanfab.viz.frame_view import Look, look_at
@@ -44,7 +44,7 @@ def show_frames(one: Input) -> Shown:
         settings = replace(settings, cutoffs=(), cutoff=_shown_cutoff(one, settings))
     look = look_at(series, replace(settings, variants="c"), one.last_frame)
     return Shown(
-        view=view_data(look.scene, settings.axis),
+        view=view_data(look.scene, look.axis),
         view_title=_title(one, look.number),
         facts=_facts(look, settings),
         pictures=_pictures(one, series, settings),
@@ -81,7 +81,7 @@ def _facts(look: Look, settings: Settings) -> list[tuple[str, str]]:
         ("radii", f"smallest {smallest:.4g}, mean {radii.mean():.4g}, largest {radii.max():.4g}"),
         ("boundary", f"{boundary} particles" if boundary else "none"),
         ("cell", _cell(look)),
-        ("loading axis", _axis(settings)),
+        ("loading axis", _axis(look.axis)),
     ]
     if plan is None:
         return facts
@@ -121,9 +121,9 @@ def _cell(look: Look) -> str:
     return f"periodic along {along}, vectors ({vectors})"
 
 
-def _axis(settings: Settings) -> str:
-    named = [name for name, part in zip("xyz", settings.axis, strict=True) if part == 1.0]
-    return named[0] if named else ", ".join(f"{part:.4g}" for part in settings.axis)
+def _axis(axis: Vector) -> str:
+    named = [name for name, part in zip("xyz", axis, strict=True) if part == 1.0]
+    return named[0] if named else ", ".join(f"{part:.4g}" for part in axis)
 
 
 def _pictures(one: Input, series: Series, settings: Settings) -> list[Picture]:

@@ -92,7 +92,8 @@
     const pen = canvas.getContext("2d");
     const looks = data.kinds.map((kind) => shaded(kind.colour));
     const shown = data.kinds.map(() => true);
-    const state = { ...START, cut: true };
+    const start = { ...START, ...data.start };
+    const state = { ...start, cut: true };
     let waiting = false;
     // canvas pixels a CSS pixel, and canvas pixels a unit of the data
     let dense = 1, scale = 1, place = null, right = null, up = null;
@@ -240,7 +241,7 @@
     }
 
     function reset() {
-      Object.assign(state, START);
+      Object.assign(state, start);
       redraw();
     }
 

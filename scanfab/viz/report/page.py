@@ -14,9 +14,10 @@ import numpy.typing as npt
 from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
 from scanfab.base.files import check_folder, whole_file
+from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray
 from scanfab.viz.figures.style import COLOURS
-from scanfab.viz.scene import Scene
+from scanfab.viz.scene import Scene, towards_viewer
 
 __all__ = [
     "Content",
@@ -166,7 +167,7 @@ def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
     size = float(reach.max(initial=0.0)) or (scene.window.reach if scene.window else 1.0)
     scale = 1000.0 / size
     up = np.asarray(axis, dtype=np.float64)
-    turn = _upright(up)
+    turn = _upright(up, scene.space)
     kinds = np.where(grains.in_window[shown], 0, 1)
     kinds[grains.rattler[shown]] = 2
     names = ["grains in the RV", "grains outside", "rattlers"]
@@ -190,6 +191,8 @@ def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
         "cutoff": scene.cutoff * scale,
         "size": size,
         "left_out": int(shown.sum() - len(nearest)),
+        # how the view begins; discs are seen from in front
+        **({"start": {"turn": 0, "tilt": 0}} if scene.space.is_plane else {}),
     }
 
 
@@ -206,8 +209,12 @@ def _window_data(window: Convex, turn: FloatArray, scale: float) -> dict[str, An
     }
 
 
-def _upright(axis: FloatArray) -> FloatArray:
+def _upright(axis: FloatArray, space: Space) -> FloatArray:
     """The rotation (rows) after which the axis is z; keeps x, y and z where it can."""
+    if space.is_plane:
+        # y leads away from the viewer
+        away = -towards_viewer(axis, space)
+        return np.stack([np.cross(away, axis), away, axis])
     across = np.eye(3)[np.argmin(np.abs(axis))]
     first = across - (across @ axis) * axis
     first /= np.linalg.norm(first)

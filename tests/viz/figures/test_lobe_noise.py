@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from scanfab.base.space import SPACE
 from scanfab.fabric.contact import axial_error
 from scanfab.fabric.distribution import fit_even, sphere_points
 from scanfab.viz.figures.hemisphere import Hemisphere, disk, smoothed_density
@@ -15,7 +16,7 @@ from scanfab.viz.figures.lobe_noise import contact_noise, noise_notes, void_nois
 
 def frame_of(number=0, **columns):
     """A frame of which nothing but some columns of its row is known."""
-    return SimpleNamespace(row=columns, number=number)
+    return SimpleNamespace(space=SPACE, row=columns, number=number)
 
 
 def unit_vectors(rng, *shape):

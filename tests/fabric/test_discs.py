@@ -1,0 +1,170 @@
+"""Fabric, forces and stress of discs: closed forms of a density of directions in the plane."""
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab import Cell, Packing, compute
+from scanfab.base.space import Space
+from scanfab.fabric.contact import axial_error, contact_fabric
+from scanfab.fabric.forces import (
+    branch_fabric,
+    normal_force_fabric,
+    tangential_force_fabric,
+)
+from scanfab.fabric.harmonics import harmonic
+from scanfab.fabric.invariants import bias_of, fabric_deviator, intensity
+from scanfab.packing.clump_volumes import lens_volumes
+from tests.helpers.truth import SAMPLE_DATA
+
+XY = Space(2)
+BIAXIAL = SAMPLE_DATA / "lammps_biaxial"
+Y = np.array([0.0, 1.0, 0.0])
+
+
+def normals_of(a2, count=20_000):
+    """Unit vectors of the density 1/2π (1 + a2 cos 2θ) about y, at even steps of its integral."""
+    theta = np.linspace(0, 2 * np.pi, 200_001)
+    share = (theta + 0.5 * a2 * np.sin(2 * theta)) / (2 * np.pi)
+    angle = np.interp((np.arange(count) + 0.5) / count, share, theta)
+    return np.column_stack([np.sin(angle), np.cos(angle), 0 * angle]), angle
+
+
+def test_a_density_of_second_order():
+    """F = 4 (G - I/2) is that order: E = 1/2π (1 + n·F·n), a = √(1/2 F:F) = 2 α."""
+    normals, angle = normals_of(0.3)
+    fabric = contact_fabric(normals, XY)
+    assert fabric.alpha == pytest.approx(0.15, abs=1e-6)
+    assert fabric.axial(Y) == pytest.approx(0.15, abs=1e-6)
+    assert intensity(fabric.matrix, XY) == pytest.approx(0.3, abs=1e-6)
+    np.testing.assert_allclose(
+        fabric_deviator(fabric.matrix, XY), np.diag([-0.3, 0.3, 0.0]), atol=1e-6
+    )
+    for order, expected in ((2, 0.3), (4, 0.0)):
+        cosine = harmonic(order, normals @ Y, XY)
+        assert 2 * cosine.mean() == pytest.approx(expected, abs=1e-6)
+        np.testing.assert_allclose(cosine, np.cos(order * angle), atol=1e-9)
+
+
+def test_isotropic_contacts_have_an_intensity_by_chance():
+    """E a = √(π/N), and a² - 4/N is unbiased."""
+    random, count = np.random.default_rng(1), 200
+    found = []
+    for _ in range(4000):
+        angle = random.uniform(0, np.pi, count)
+        normals = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+        found.append(intensity(contact_fabric(normals, XY).matrix, XY))
+    assert np.mean(found) == pytest.approx(np.sqrt(np.pi / count), rel=0.03)
+    assert bias_of(XY) * np.sqrt(0.25 / count) == pytest.approx(np.sqrt(np.pi / count))
+    assert np.mean(np.square(found)) == pytest.approx(4 / count, rel=0.05)
+    assert axial_error(normals, Y, XY) == pytest.approx(np.sqrt(0.5 / count), rel=0.1)
+
+
+def test_forces_of_second_order():
+    """Branch, normal and tangential force after Rothenburg and Bathurst (1989), and q/p."""
+    normals, angle = normals_of(0.02)
+    along = np.cos(2 * angle)
+    branch, force_n = 1 + 0.01 * along, 2 * (1 + 0.04 * along)
+    # along y normal forces are larger; tangential ones lean towards it
+    tangent = np.column_stack([np.cos(angle), -np.sin(angle), 0 * angle])
+    force = force_n[:, None] * normals - (2 * 0.015 * np.sin(2 * angle))[:, None] * tangent
+    for found, expected in (
+        (branch_fabric(normals, branch, Y, XY), 0.01),
+        (normal_force_fabric(normals, force_n, Y, XY), 0.04),
+        (tangential_force_fabric(normals, force, Y, XY), 0.015),
+    ):
+        np.testing.assert_allclose(found.matrix, np.diag([-expected, expected, 0.0]), atol=1e-5)
+        assert found.axial == pytest.approx(2 * expected, abs=1e-5)
+    stress = force.T @ (branch[:, None] * normals)
+    ratio = (stress[1, 1] - stress[0, 0]) / (stress[0, 0] + stress[1, 1])
+    assert ratio == pytest.approx(0.5 * (0.02 + 0.01 + 0.04 + 0.015), abs=5e-4)
+
+
+def test_lenses_of_discs():
+    """Half overlapping discs share 2π/3 - √3/2 of a radius squared; one inside another is all."""
+    apart, one = np.array([1.0, 0.2, 2.0, 0.0]), np.ones(4)
+    two = np.array([1.0, 0.5, 1.0, 1.0])
+    expected = [2 * np.pi / 3 - np.sqrt(3) / 2, 0.25 * np.pi, 0.0, np.pi]
+    np.testing.assert_allclose(lens_volumes(apart, one, two, XY), expected, atol=1e-12)
+
+
+def test_void_ratio_and_stress_of_two_discs():
+    """One contact in a cell of area 12: σ = f b / area, p half its trace."""
+    packing = Packing(
+        [[1.0, 1.0], [1.0, 2.9]],
+        1.0,
+        cell=Cell([4.0, 3.9, 1.0], (True, True, True)),
+        contacts=scanfab.ContactList([[0, 1]], force=[[0.0, 5.0, 0.0]]),
+    )
+    (row,) = compute(packing, variants="a", with_="state", directions=4, spacing=0.01, cutoff=0.1)
+    area = 4.0 * 3.9
+    assert row["void_ratio"] == pytest.approx((area - 2 * np.pi) / (2 * np.pi))
+    assert row["stress_yy"] == pytest.approx(5.0 * 1.9 / area)
+    assert row["p"] == pytest.approx(0.5 * row["stress_yy"])
+    assert row["q"] == pytest.approx(row["stress_yy"])
+    assert row["stress_zz"] == 0.0
+
+
+def test_every_group_has_its_columns_for_discs():
+    packing = Packing(
+        np.random.default_rng(0).random((200, 2)) * 14, 0.5, cell=Cell([14.0, 14.0, 1.0])
+    )
+    with pytest.warns(scanfab.ScanfabWarning, match="no forces"):
+        (row,) = compute(
+            packing, variants="c", with_="state,invariants,harmonics", rv_shape="box",
+            tolerance=0.05,
+        )  # fmt: skip
+    assert row["f_c"] == pytest.approx(2 * row["alpha_c"])
+    assert row["c_a2"] == pytest.approx(2 * row["alpha_c_axial"])
+    assert row["b_c"] is None
+    assert row["gc_3"] == 0.0
+    assert row["void_ratio"] > 0
+
+
+@pytest.fixture(scope="module")
+def biaxial():
+    series = scanfab.read_series(
+        [BIAXIAL / f"discs.{step}.lammpstrj.gz" for step in range(0, 120_000, 20_000)],
+        contacts=BIAXIAL / "pairs.*.local.gz",
+        contact_columns=(
+            "id1=c_ids[1],id2=c_ids[2],fx=c_pair[3],fy=c_pair[4],fz=c_pair[5],"
+            "tx=c_pair[6],ty=c_pair[7],tz=c_pair[8]"
+        ),
+        dim=2,
+    )
+    return compute(
+        series, variants="ac", with_="forces,state,invariants", directions=16, spacing="0.1rmin",
+        workers=1,
+    )  # fmt: skip
+
+
+def test_contact_fabric_is_that_of_lammps(biaxial):
+    """LAMMPS takes 15/2 (G - I/3) in two dimensions, too."""
+    engine = np.loadtxt(BIAXIAL / "engine.txt")
+    rows = [row for row in biaxial if row.variant == "a"]
+    for place, name in enumerate(("xx", "yy", "zz", "xy")):
+        isotropic = 1 / 3 if place < 3 else 0.0
+        expected = engine[:, 1 + place] / 7.5 + isotropic
+        np.testing.assert_allclose([row[f"gc_{name}"] for row in rows], expected, atol=1e-9)
+
+
+def test_stress_is_the_virial_of_lammps(biaxial):
+    """Σ of the stress/atom of all pairs is -σ times the cell's area."""
+    engine = np.loadtxt(BIAXIAL / "engine.txt")
+    rows = [row for row in biaxial if row.variant == "a"]
+    for place, name in ((7, "xx"), (8, "yy"), (9, "xy")):
+        found = np.array([row[f"stress_{name}"] for row in rows])
+        np.testing.assert_allclose(found, -engine[:, place] / engine[:, 10], rtol=0, atol=0.05)
+
+
+def test_anisotropy_grows_with_the_strain(biaxial):
+    """From an isotropic state; as the sum of the anisotropies the stress ratio does."""
+    rows = [row for row in biaxial if row.variant == "a"]
+    assert abs(rows[0].alpha_c_axial) < 0.005
+    assert rows[4].alpha_c_axial > 0.08
+    assert rows[4].alpha_vs_axial > 0.02
+    assert rows[5].shear_strain > rows[4].shear_strain
+    for row in rows[1:5]:
+        parts = sum(row[f"alpha_{name}_axial"] for name in ("bn", "fn", "ft")) / 2
+        expected = 0.5 * (2 * row.alpha_c_axial + parts)
+        assert row["q"] / (2 * row["p"]) == pytest.approx(expected, abs=0.02)

@@ -1,0 +1,299 @@
+"""Discs in a plane: what is known in closed form, the naive twin, and planes that are alike."""
+
+from math import asin, hypot, pi, sqrt
+
+import numpy as np
+import pytest
+
+from scanfab import Cell, Packing, Sample, Window, compute, find_contacts
+from scanfab.base.shapes import circle, ellipse, rectangle
+from scanfab.base.space import Space
+from scanfab.fabric.void import void_fabric
+from scanfab.pipeline.solids import solids_of
+from scanfab.scan.directions import DirectionRule, plane_rule
+from scanfab.scan.lines import drawn_lines, turned_triads
+from scanfab.scan.scan import scan_lines, sums_of
+from scanfab.scan.solids import Solids
+from scanfab.scan.tallies import tally_triads
+from tests.helpers import naive_plane
+
+XY = Space(2)
+WINDOWS = {
+    "circle": (circle(4.0, XY), naive_plane.in_circle(4.0)),
+    "box": (rectangle([7.0, 4.0], XY), naive_plane.in_box(3.5, 2.0)),
+    "ellipse": (ellipse([4.5, 2.5], XY), naive_plane.in_ellipse(4.5, 2.5)),
+}
+ANGLES = (0.1, 0.9, 2.0, 2.7)
+
+
+def flat(discs):
+    """Discs (x, y, r) as solids have them."""
+    x, y, r = np.array(discs, dtype=float).reshape(-1, 3).T
+    return np.column_stack([x, y, 0 * x]), r
+
+
+def solids_in(discs, window=None, removed=False):
+    position, radius = flat(discs)
+    return Solids(position, radius, np.full(len(radius), removed), window=window, space=XY)
+
+
+def along(*angles):
+    """A rule of these angles, which replicates do not turn."""
+    axes = np.array([[np.cos(a), np.sin(a), 0.0] for a in angles])
+    weights = np.full(len(axes), 1 / len(axes))
+    return DirectionRule("these", axes, weights, None, turned=False, space=XY)
+
+
+def mean_lengths(solids, rule, spacing, cutoff, variant, replicates=32):
+    """ℓ of each axis and its standard error over the replicates."""
+    sums = scan_lines(
+        solids, rule, spacing=spacing, cutoff=cutoff, variants=variant, replicates=range(replicates)
+    )
+    length, number = sums.kept(variant)
+    scatter = np.std(length / np.maximum(number, 1), axis=0, ddof=1) / sqrt(replicates)
+    return length.sum(axis=0) / number.sum(axis=0), scatter
+
+
+def agrees(found, expected, within=1e-3):
+    """Within four standard errors, and so good an error that this says something."""
+    value, error = found
+    is_near = np.abs(value - expected) < 4 * error + 1e-12
+    return np.all(is_near) and np.all(error < within * expected)
+
+
+def separate(random, count, reach):
+    """Discs that do not overlap, in a circle."""
+    discs = []
+    while len(discs) < count:
+        x, y = random.uniform(-reach, reach, 2)
+        r = random.uniform(0.3, 1.0)
+        if hypot(x, y) + r < reach and all(hypot(x - a, y - b) > r + s for a, b, s in discs):
+            discs.append((x, y, r))
+    return discs
+
+
+def poisson(random, density, reach):
+    count = random.poisson(density * (2 * reach) ** 2)
+    place = random.uniform(-reach, reach, (count, 2))
+    return np.column_stack([place, random.uniform(0.4, 0.8, count)])
+
+
+@pytest.mark.parametrize("cutoff", [0.0, 0.7, 1.6])
+def test_empty_circle(cutoff):
+    """ℓ = (R²(π/2 - asin(c/2R)) + (c/2)√(R² - c²/4)) / √(R² - c²/4)."""
+    found = mean_lengths(solids_in([], circle(1.0, XY)), along(*ANGLES), 0.005, cutoff, "c")
+    h = sqrt(1 - cutoff**2 / 4)
+    assert agrees(found, (pi / 2 - asin(cutoff / 2) + cutoff / 2 * h) / h)
+
+
+def test_discs_without_overlap_in_a_circle():
+    """ℓ = (πR² - Σπr²)/(2R + Σ2r) in every direction, whatever the arrangement."""
+    discs = separate(np.random.default_rng(3), 30, 8.0)
+    found = mean_lengths(solids_in(discs, circle(8.0, XY)), along(*ANGLES), 0.01, 0.0, "c")
+    r = np.array(discs)[:, 2]
+    assert agrees(found, (pi * 64 - np.sum(pi * r**2)) / (16 + np.sum(2 * r)))
+
+
+@pytest.mark.parametrize(("distance", "cutoff"), [(2.0, 0.0), (2.0, 0.5), (3.0, 0.0), (3.0, 1.8)])
+def test_two_discs_along_their_axis(distance, cutoff):
+    """ℓ = d - (r² asin(h/r) - h√(r²-h²))/(r - √(r²-h²)), with h = min(r, (d - c)/2)."""
+    discs = [(-distance / 2, 0.0, 1.0), (distance / 2, 0.0, 1.0)]
+    found = mean_lengths(solids_in(discs), along(0.0), 0.002, cutoff, "a")
+    h = min(1.0, (distance - cutoff) / 2)
+    # lines at the height y leave d - 2√(r²-y²); those with at least c lie beyond √(r²-h²)
+    root = sqrt(1 - h**2)
+    assert agrees(found, distance - (asin(h) - h * root) / (1 - root))
+    if cutoff == 0:
+        assert np.isclose(distance - (asin(h) - h * root) / (1 - root), distance - pi / 2)
+
+
+@pytest.mark.parametrize("name", WINDOWS)
+def test_an_empty_window_has_the_mean_chord_of_its_shape(name):
+    """ℓ(n) = area / width; at the cut-off c its covariogram: c + g(c)/-g'(c)."""
+    window, _ = WINDOWS[name]
+    rule = along(*ANGLES)
+    for cutoff in (0.0, 1.0):
+        shared, slope = window.overlap(rule.axes, cutoff)
+        found = [fine_length(solids_in([], window), axis, cutoff) for axis in rule_triads(rule)]
+        np.testing.assert_allclose(found, cutoff + shared / slope, rtol=1e-4)
+
+
+def fine_length(solids, triad, cutoff, spacing=0.05, grids=400):
+    """ℓ in a window along one axis, from grids that lie evenly between one another."""
+    offsets = (np.arange(grids)[:, None] + 0.5) / grids
+    triads = np.tile(triad, (grids, 1, 1))
+    tallies = tally_triads(solids, triads, offsets, spacing, cutoff, "c")
+    length, number = sums_of(triads[None], tallies[None], "c").kept("c")
+    return length.sum() / number.sum()
+
+
+@pytest.mark.parametrize("edge", ["clip", "start", "ends"])
+def test_poisson_discs(edge):
+    """ℓ = c + 1/β with β = 2ρ⟨r⟩; clipped to a window c + A1/(A0 + βA1)."""
+    random, density, cutoff, found = np.random.default_rng(11), 0.6, 0.5, []
+    window = circle(5.0, XY)
+    for _ in range(60):
+        position, radius = flat(poisson(random, density, 25.0))
+        packing = Packing(position, radius, dim=2)
+        sample = Sample(find_contacts(packing), np.zeros(len(radius), bool))
+        solids = solids_of(sample, Window(np.zeros(3), window), variants="c", edge=edge)
+        rule = plane_rule(8, XY)
+        sums = scan_lines(
+            solids, rule, spacing=0.2, cutoff=cutoff, variants="c", replicates=range(2)
+        )
+        found.append([one.sum() for one in sums.kept("c")])
+    length, number = np.array(found).T
+    beta = density * 2 * 0.6
+    expected = cutoff + 1 / beta
+    if edge == "clip":
+        shared, slope = window.overlap(np.eye(3)[:1], cutoff)
+        expected = cutoff + shared[0] / (slope[0] + beta * shared[0])
+    value = length.sum() / number.sum()
+    error = np.std(length - value * number, ddof=1) / number.mean() / sqrt(len(number))
+    assert abs(value - expected) < 4 * error
+    assert error < 0.02 * expected
+
+
+def test_a_periodic_poisson_medium():
+    """ℓ = c + 1/β, α about 0, and the solid fraction 1 - exp(-ρπ⟨r²⟩)."""
+    random, density, edge = np.random.default_rng(4), 0.5, 60.0
+    found = []
+    for _ in range(6):
+        count = random.poisson(density * edge**2)
+        position, radius = random.uniform(0, edge, (count, 2)), random.uniform(0.4, 0.8, count)
+        packing = Packing(position, radius, cell=Cell([edge, edge, 1.0]))
+        (row,) = compute(packing, variants="a", cutoff=0.5, spacing=0.3, directions=32, workers=1)
+        found.append([row.mean_length, row.solid_fraction, row.alpha_vs_axial])
+    mean, error = np.mean(found, axis=0), np.std(found, axis=0, ddof=1) / sqrt(len(found))
+    expected = [0.5 + 1 / (density * 1.2), 1 - np.exp(-density * pi * 1.12 / 3), 0.0]
+    assert np.all(np.abs(mean - expected) < 4 * error)
+    assert np.all(error < [0.03, 0.01, 0.005])
+
+
+@pytest.mark.parametrize("name", WINDOWS)
+@pytest.mark.parametrize("cutoff", [0.0, 0.6])
+def test_the_naive_twin_of_open_samples(name, cutoff):
+    """Overlapping discs, by lines row by row and by lists: whole and window, to rounding."""
+    random = np.random.default_rng(5)
+    window, clip = WINDOWS[name]
+    discs = poisson(random, 0.5, 6.0)
+    rule = along(*ANGLES)
+    for spacing in (0.05, 1.1):
+        triads, offsets = turned_triads(rule, rule_triads(rule), 7, 0)
+        solids = solids_in(discs, window)
+        tallies = tally_triads(solids, triads, offsets, spacing, cutoff, "abcd")
+        sums = sums_of(triads[None], tallies[None], "abcd")
+        for d, angle in enumerate(ANGLES):
+            shift = naive_offset(triads[d], angle, offsets[d, 0])
+            words = discs, angle, shift, spacing, cutoff
+            whole = naive_plane.whole_sums(*words, 12.0)
+            inside = naive_plane.window_sums(*words, clip, 12.0)
+            for variant, expected in (("a", whole), ("c", inside)):
+                found = [one[0, d] for one in sums.kept(variant)]
+                np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", WINDOWS)
+@pytest.mark.parametrize("edge", ["start", "ends"])
+@pytest.mark.parametrize("tilt", [0.0, 3.0])
+def test_the_naive_twin_of_edge_rules_in_periodic_cells(name, edge, tilt):
+    """All discs with their images, from a cell that leans, too."""
+    random = np.random.default_rng(6)
+    vectors = np.array([[13.0, 0.0], [tilt, 12.0]])
+    place = random.random((40, 2)) @ vectors
+    discs = np.column_stack([place, random.uniform(0.4, 0.9, 40)])
+    window, clip = WINDOWS[name]
+    cell = Cell([[13.0, 0, 0], [tilt, 12.0, 0], [0, 0, 0.5]])
+    packing = Packing(place, discs[:, 2], cell=cell)
+    sample = Sample(find_contacts(packing), np.zeros(40, bool))
+    middle = np.array([5.0, 6.0, 0.0])
+    solids = solids_of(sample, Window(middle, window), variants="c", edge=edge)
+    rule, spacing, cutoff = along(*ANGLES), 0.4, 0.5
+    triads, offsets = turned_triads(rule, rule_triads(rule), 8, 0)
+    tallies = tally_triads(solids, triads, offsets, spacing, cutoff, "c")
+    sums = sums_of(triads[None], tallies[None], "c", edge)
+    # far enough for the longest segment
+    around = naive_plane.images(discs - [5.0, 6.0, 0.0], vectors, 90.0)
+    for d, angle in enumerate(ANGLES):
+        shift = naive_offset(triads[d], angle, offsets[d, 0])
+        words = around, angle, shift, spacing, cutoff, clip, 6.0, edge
+        expected = naive_plane.window_sums(*words)
+        found = [one[0, d] for one in sums.kept("c")]
+        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+    assert len(sample.contacts) == naive_plane.contacts(discs, vectors)
+
+
+def rule_triads(rule):
+    """The triads of a rule that is not turned."""
+    return drawn_lines(rule, 0, [0])[0][0]
+
+
+def naive_offset(triad, angle, offset):
+    """The shift along the twin's u, which may point the other way."""
+    return offset * round(triad[0] @ [-np.sin(angle), np.cos(angle), 0.0])
+
+
+def test_equal_steps_are_exact():
+    """An isotropic ℓ has the tensor I/2 with two axes, and N serve harmonics to cos 2(N - 2)θ."""
+    for count in (2, 3, 7):
+        rule = plane_rule(count, XY)
+        assert rule.bias < 1e-15
+        assert rule.degree == 2 * count - 2
+    for count, order in ((4, 2), (6, 4)):
+        rule = plane_rule(count, XY)
+        theta = np.arctan2(rule.axes[:, 1], rule.axes[:, 0])
+        length = 1 + 0.3 * np.cos(2 * theta) + 0.2 * np.cos(2 * order * theta)
+        ones = np.ones((1, count))
+        fabric = void_fabric(rule.axes[None], rule.weights, length[None], ones, XY)
+        assert np.isclose(fabric.tensor.axial((1, 0, 0)), 0.15, atol=1e-12)
+        assert np.isclose(fabric.tensor.alpha, 0.15, atol=1e-12)
+
+
+def turned_table(across, **options):
+    """The same discs in another coordinate plane, with the axis turned along with them."""
+    random = np.random.default_rng(9)
+    place = random.random((300, 2)) * [16.0, 14.0]
+    position = np.roll(np.column_stack([place, np.full(300, 0.25)]), across + 1, axis=1)
+    vectors = np.roll(np.diag([16.0, 14.0, 0.7]), (across + 1, across + 1), axis=(0, 1))
+    axis = np.roll([0.6, 0.8, 0.0], across + 1)
+    cell = Cell(vectors) if options.pop("periodic") else None
+    packing = Packing(position, random.uniform(0.3, 0.6, 300), cell=cell, dim=2)
+    assert packing.space == Space(across)
+    return compute(packing, axis=axis, tolerance=0.02, workers=1, **options)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"periodic": True},
+        {"periodic": False, "edge": "ends"},
+        {"periodic": True, "rv_shape": "ellipsoid", "edge": "start", "variants": "c"},
+    ],
+    ids=str,
+)
+def test_all_planes_are_alike(options):
+    """x-y, y-z and z-x give the same numbers after relabelling, but for rounding."""
+    names = {2: ("xx", "yy", "xy"), 0: ("yy", "zz", "yz"), 1: ("zz", "xx", "xz")}
+    tables = {across: turned_table(across, **options) for across in (2, 0, 1)}
+    for across in (0, 1):
+        for one, other in zip(tables[2], tables[across], strict=True):
+            for name, value in one.items():
+                # components and blocks have other names there
+                if not {"gvs", "gc", "without", "half"} & set(name.split("_")):
+                    if isinstance(value, float):
+                        value = pytest.approx(value, rel=1e-9, abs=1e-12)
+                    assert other[name] == value, name
+            for prefix in ("gvs", "gc"):
+                for mine, theirs in zip(names[2], names[across], strict=True):
+                    found = one[f"{prefix}_{mine}"], other[f"{prefix}_{theirs}"]
+                    assert found[0] == pytest.approx(found[1], rel=1e-12, abs=1e-15)
+
+
+def test_what_lies_across_the_plane_is_0():
+    row = turned_table(2, periodic=True, variants="a")[0]
+    for prefix in ("gvs", "gc"):
+        assert [row[f"{prefix}_{name}"] for name in ("zz", "xz", "yz")] == [0.0] * 3
+        assert np.isclose(row[f"{prefix}_xx"] + row[f"{prefix}_yy"], 1.0, atol=1e-12)
+    assert row["alpha_vs_axial_without_4"] is not None
+    assert row["alpha_vs_axial_without_5"] is None
+    assert row["alpha_vs_axial_half_5"] is None

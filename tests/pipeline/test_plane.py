@@ -1,0 +1,257 @@
+"""Discs in a plane: what decides that, what settings mean there, and what is refused."""
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab import Cell, Packing, PackingError, SettingsError, compute, find_contacts
+from scanfab.base.space import SPACE, Space
+from scanfab.fabric.void import void_fabric
+from scanfab.packing.sample import Sample
+from scanfab.pipeline.plan import NOISE
+from scanfab.pipeline.settings import Settings
+from scanfab.pipeline.solids import solids_of
+from scanfab.pipeline.strain import shear_strain
+from scanfab.pipeline.window_settings import settings_in
+from scanfab.scan.directions import plane_rule
+from scanfab.scan.scan import scan_lines
+from tests.helpers.dumps import dump_text
+from tests.helpers.truth import SAMPLE_DATA
+
+XY, YZ, ZX = Space(2), Space(0), Space(1)
+FAST = {"tolerance": 0.05, "workers": 1}
+
+
+def layer(random, count=200, edge=14.0):
+    """Discs at random places of a square."""
+    return random.random((count, 2)) * edge, random.uniform(0.3, 0.6, count)
+
+
+@pytest.fixture
+def discs():
+    return layer(np.random.default_rng(2))
+
+
+def series_of(tmp_path, *heights, **options):
+    """Frames whose grains lie at these heights, on a grid in x and y."""
+    for step, z in enumerate(heights):
+        side = int(np.ceil(np.sqrt(len(z))))
+        place = [(2.0 * (k % side), 2.1 * (k // side)) for k in range(len(z))]
+        rows = [(k + 1, *xy, one, 1.0) for k, (xy, one) in enumerate(zip(place, z, strict=True))]
+        text = dump_text(rows, "id x y z radius", step=step)
+        (tmp_path / f"dump.{step}").write_text(text)
+    return scanfab.read_series(tmp_path, **options)
+
+
+@pytest.mark.parametrize(
+    ("count", "dim", "space"),
+    [(10, "auto", XY), (9, "auto", SPACE), (9, 2, XY), (10, 3, SPACE)],
+)
+def test_the_first_frame_decides(tmp_path, count, dim, space):
+    series = series_of(tmp_path, [0.5] * count, dim=dim)
+    assert series[0].read().space == space
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.ScanfabNote")
+def test_one_frame_decides_for_all_whichever_is_read_first(tmp_path):
+    series = series_of(tmp_path, [], [0.5] * 12, [0.7] * 2)
+    assert series[2].read().space == XY
+    assert series[0].read().space == XY
+    assert len(series[0].read()) == 0
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.ScanfabNote")
+def test_a_frame_that_leaves_the_plane_is_an_error(tmp_path):
+    series = series_of(tmp_path, [0.5] * 16, [*[0.5] * 15, 0.6])
+    with pytest.raises(PackingError, match=r"dump.1: .*z = 0.5 and at z = 0.6: `dim=3`"):
+        series[1].read()
+
+
+def test_discs_that_are_asked_for_must_lie_in_a_plane(tmp_path):
+    series = series_of(tmp_path, [*[0.5] * 15, 0.6], dim=2)
+    with pytest.raises(PackingError, match="do not lie in one coordinate plane"):
+        series[0].read()
+
+
+def test_frames_of_mixed_dimension_are_an_error(discs):
+    position, radius = discs
+    flat = Packing(position, radius)
+    ball = Packing(np.column_stack([position, np.arange(200.0) % 14]), radius)
+    thin = Packing(np.column_stack([position, np.zeros(200)]), radius)
+    for first, second in ((flat, ball), (ball, flat), (ball, thin)):
+        with pytest.raises(PackingError, match="the first frame that has grains lies in"):
+            compute([first, second], variants="a", **FAST)
+
+
+def test_positions_with_two_coordinates_are_discs(discs):
+    position, radius = discs
+    packing = Packing(position, radius)
+    assert (packing.dimension, packing.space, packing.position[:, 2].any()) == (2, XY, False)
+    assert Packing(packing.position, radius).dimension == 3
+    assert Packing(packing.position, radius, dim=2).space == XY
+    with pytest.raises(PackingError, match="dim: expected 2"):
+        Packing(position, radius, dim=3)
+    with pytest.raises(PackingError, match="dim: expected 2 or 3, found 4"):
+        Packing(position, radius, dim=4)
+
+
+def test_the_period_across_the_plane_is_ignored(discs):
+    """Also one that is thinner than a disc, or leans."""
+    position, radius = discs
+    tables = [
+        compute(Packing(position, radius, cell=Cell(vectors)), variants="ac", **FAST)
+        for vectors in ([14, 14, 0.1], [14, 14, 50], [[14, 0, 0], [0, 14, 0], [3, 2, 1.0]])
+    ]
+    assert [dict(row) for row in tables[1]] == [dict(row) for row in tables[0]]
+    assert [dict(row) for row in tables[2]] == [dict(row) for row in tables[0]]
+
+
+def test_a_cell_whose_vectors_leave_the_plane_is_an_error(discs):
+    cell = Cell([[14.0, 0, 1.0], [0, 14, 0], [0, 0, 3]])
+    with pytest.raises(PackingError, match="two of them in the plane"):
+        Packing(*discs, cell=cell)
+
+
+@pytest.mark.parametrize(("space", "axis"), [(XY, "y"), (YZ, "z"), (ZX, "z")])
+def test_the_usual_axis_is_the_second_of_the_plane(space, axis):
+    assert settings_in(Settings(), space).axis == Settings(axis=axis).axis
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"axis": "z"}, "axis: the axis z leads out of the plane x-y.*choose x, y"),
+        ({"axis": (1, 0, 1)}, "axis: .* leads out"),
+        ({"rv_shape": "cylinder"}, "rv_shape: cylinder is no window of discs"),
+        ({"rv_shape": "box", "rv_size": "1,2,3"}, "rv_size: expected two, A,B, full edges"),
+        ({"directions": "lebedev:11"}, "directions: lebedev:11 is a rule of three dim.*such as 16"),
+        ({"rv_center": (7, 7, 3)}, "rv_center: lies outside the plane x-y.*z = 0, found 3"),
+        ({"rv_center": (70, 7, 0)}, "holds no grain"),
+    ],
+)
+def test_what_has_no_meaning_in_a_plane_is_an_error(discs, options, message):
+    with pytest.raises(SettingsError, match=message):
+        compute(Packing(*discs), **FAST, **options)
+
+
+def test_spheres_take_three_sizes():
+    random = np.random.default_rng(0)
+    packing = Packing(random.random((300, 3)) * 7, 0.4)
+    for shape, sizes in (("box", "1,2"), ("ellipsoid", "1,2")):
+        with pytest.raises(SettingsError, match=r"rv_size: expected A,B,C.*found 1,2"):
+            compute(packing, rv_shape=shape, rv_size=sizes)
+
+
+def test_numbers_of_directions_are_equal_steps(discs):
+    (row,) = compute(Packing(*discs), variants="a", directions=7, spacing=0.05, workers=1)
+    assert row.directions == 7
+    (row,) = compute(Packing(*discs), variants="a", **FAST)
+    assert row.directions == 16
+
+
+def test_a_fixed_scan_has_lines_and_spacing_in_total_as_asked(discs):
+    """Lines lie side by side: R replicates are R times as far apart."""
+    (row,) = compute(
+        Packing(*discs), variants="c", rv_radius=5.0, directions=8, spacing=0.02, workers=1
+    )
+    assert row.replicates == 16
+    assert row.spacing == pytest.approx(0.02)
+    assert row.lines == pytest.approx(8 * 10.0 / 0.02, rel=0.02)
+
+
+def test_rv_sizes_and_solid_fraction(discs):
+    """ν of discs without overlap is the sum of their areas over that of the cell."""
+    grid = np.stack(np.meshgrid(np.arange(12.0), np.arange(10.0)), axis=-1).reshape(-1, 2)
+    packing = Packing(grid + 0.5, 0.4, cell=Cell([12, 10, 1]))
+    one, other = compute(
+        packing, variants="ac", rv_shape="box", rv_size="6,4", cutoff=0.1, workers=1,
+        tolerance=5e-3, contact_tolerance=0.3,
+    )  # fmt: skip
+    assert one.solid_fraction == pytest.approx(np.pi * 0.16, rel=2e-3)
+    assert other.grains == 24
+    assert one.coordination == 4.0
+    assert one.gc_xx == pytest.approx(0.5)
+
+
+def test_contact_anisotropy_and_its_error(discs):
+    """α = G1 - G2, axial 2 a·G·a - 1, its error that of 2(a·n)² - 1."""
+    packing = find_contacts(Packing(*discs))
+    (row,) = compute(packing, variants="a", axis="x", **FAST)
+    along = 2 * packing.contacts.normal[:, 0] ** 2 - 1
+    assert row.alpha_c_axial == pytest.approx(along.mean())
+    assert row.alpha_c_axial_se == pytest.approx(np.std(along, ddof=1) / np.sqrt(len(along)))
+    spread = np.hypot(row.gc_xx - row.gc_yy, 2 * row.gc_xy)
+    assert row.alpha_c == pytest.approx(spread)
+
+
+def test_shear_strain_in_the_plane():
+    """Half the difference of the principal strains, as the deviator stress works on it."""
+    sheared = [
+        Packing([[0.5, 0.5]], 0.1, cell=Cell([np.exp(e), np.exp(-e), 1.0])).cell for e in (0, 0.1)
+    ]
+    assert shear_strain(sheared[1], sheared[0]) == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize("follows", ["cell", "grains"])
+def test_the_rv_follows_the_strain(discs, follows):
+    position, radius = discs
+    squeeze = np.array([1.1, 0.9])
+    frames = [
+        Packing(position * f, radius, cell=Cell([*(14 * f), 1.0])) for f in (np.ones(2), squeeze)
+    ]
+    first, last = compute(
+        frames, variants="c", rv_follows="strain", strain=follows, rv_shape="sphere", **FAST
+    )
+    assert last.grains == pytest.approx(first.grains, abs=3)
+    assert last.strain == pytest.approx(0.1, abs=1e-9)
+
+
+@pytest.mark.parametrize("spacing", [0.3, 1.0])
+@pytest.mark.filterwarnings("ignore::scanfab.ScanfabNote")
+def test_the_noise_of_a_scan_is_as_planned(spacing):
+    """Segments times variance, in a dense packing: what chooses the spacing of auto scans."""
+    packing = scanfab.read(
+        SAMPLE_DATA / "lammps_biaxial" / "discs.0.lammpstrj.gz", contacts="geometric"
+    )
+    sample = Sample(find_contacts(packing), np.zeros(len(packing), bool))
+    rule, mean = plane_rule(16, XY), packing.radius.mean()
+    sums = scan_lines(
+        solids_of(sample, variants="a"),
+        rule,
+        spacing=spacing * mean,
+        cutoff=packing.radius.min(),
+        variants="a",
+        replicates=range(100),
+    )
+    fabric = void_fabric(sums.axes, rule.weights, *sums.kept("a"), XY)
+    found = sums.segments[:, 0].sum() * fabric.axial_error((0, 1, 0)) ** 2
+    assert found == pytest.approx(NOISE[2].segments * spacing ** NOISE[2].growth, rel=0.5)
+    expected = fabric.expected_error((0, 1, 0), rule.degree)
+    assert expected == pytest.approx(fabric.axial_error((0, 1, 0)), rel=0.3)
+
+
+def test_several_rvs_and_cutoffs(discs):
+    table = compute(Packing(*discs), variants="cd", rv="0.4,0.7", cutoffs="0.3,0.6", **FAST)
+    assert [row.rv for row in table] == [0.4, 0.4, 0.7, 0.7] * 2
+    assert {row.cutoff for row in table} == {0.3, 0.6}
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1e7])
+def test_the_unit_of_length_does_not_matter(discs, scale):
+    position, radius = discs
+    options = {"variants": "c", "rv_follows": "strain", "rv_shape": "ellipsoid", "edge": "start"}
+    one, other = (
+        compute(
+            [
+                Packing(position * f * s, radius * s, cell=Cell([14 * f[0] * s, 14 * f[1] * s, s]))
+                for f in (np.ones(2), np.array([1.05, 0.95]))
+            ],
+            **FAST,
+            **options,
+        )
+        for s in (1.0, scale)
+    )
+    for mine, theirs in zip(one, other, strict=True):
+        assert theirs.alpha_vs_axial == pytest.approx(mine.alpha_vs_axial, abs=1e-9)
+        assert theirs.segments == mine.segments
+        assert theirs.mean_length == pytest.approx(mine.mean_length * scale)
