@@ -80,7 +80,7 @@ class Map(Figure):
         If there is nothing to draw.
     """
 
-    kind = "map"
+    kind, order = "map", 9
     columns = ("block", "x", "y", "z", "variant", "alpha_vs_axial")
 
     def __init__(self, data: Any, variant: str | None = None, quantity: str | None = None) -> None:

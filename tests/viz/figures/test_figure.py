@@ -28,7 +28,7 @@ from tests.helpers.tables import curve
 pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.base.errors.ScanfabNote")
 OWN = (
     "evolution", "normalised", "correlation", "columns", "rose", "projection", "histogram",
-    "cutoffs", "calibration",
+    "cutoffs", "calibration", "map",
 )  # fmt: skip
 FAST = ["--boundary", "mask=3", "--tolerance", "3e-3", "--variants", "c", "--frames", "::6"]
 
