@@ -22,7 +22,10 @@ DECKS = SAMPLE_DATA / "paper"
 SCAN = {"directions": 9, "spacing": "3rmin", "workers": 1}
 FRAMES = 3
 # the samples are small, and decks and logs lie beside the dumps
-pytestmark = pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
+pytestmark = [
+    pytest.mark.filterwarnings(f"ignore::scanfab.base.errors.{kind}")
+    for kind in ("ScanfabWarning", "ScanfabNote")
+]
 AXES = ([0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2])
 # two steps of strain that take a second, whatever the program
 STEP = 0.002

@@ -183,6 +183,8 @@ def settle():
     calm = 0
     for k in range(20000):
         error = mean_stress() / P0 - 1
+        if k % 100 == 0:
+            say('mean stress over its target', 1 + error, 'unbalanced force', utils.unbalancedForce())
         advance(np.ones(3) * max(-1.0, min(1.0, 3.0 * error)) * state['stretch'])
         calm = calm + 1 if abs(error) < 2e-3 and utils.unbalancedForce() < 2e-3 else 0
         if calm == 40:
@@ -305,19 +307,19 @@ def frame(k, rate):
 
 
 def save():
-    name = where('saved-%04d' % state['done'])
+    name = where('saved/%04d' % state['done'])
     O.save(name + '.yade.gz')
     with open(name + '.part', 'w') as f:
         json.dump({key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in state.items()}, f)
     os.rename(name + '.part', name + '.json')  # the last step: a save without it does not count
-    for other in glob.glob(where('saved-*')):
+    for other in glob.glob(where('saved/*')):
         if not other.startswith(name):
             os.remove(other)
 
 
 def go_on():
     """The state of the last save, if there is one, and engine.csv as it was then."""
-    saves = sorted(glob.glob(where('saved-*.json')))
+    saves = sorted(glob.glob(where('saved/*.json')))
     if not saves:
         return
     with open(saves[-1]) as f:
@@ -361,7 +363,7 @@ def check():
 
 
 STAGES = (grow, compact, isotropic)
-os.makedirs(ask.folder, exist_ok=True)
+os.makedirs(where('saved'), exist_ok=True)
 go_on()
 step = ask.strain / max(ask.frames - 1, 1)
 last = ask.frames - 1 + (round(ask.reversal / step) if ask.reversal else 0)  # frame
