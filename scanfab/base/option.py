@@ -17,6 +17,7 @@ __all__ = [
     "GROUPS",
     "Option",
     "as_given",
+    "flag_of",
     "number",
     "one_of",
     "option",
@@ -44,6 +45,10 @@ def unusable(name: str, expected: str, found: object) -> SettingsError:
 def as_given(name: str, value: Any) -> Any:
     """For values that are checked where they are used."""
     return value
+
+
+# what a shell is told of options that take numbers and nothing else
+KINDS: dict[str, type] = {"int": int, "float": float}
 
 
 @dataclass(frozen=True)
@@ -92,11 +97,25 @@ class Option:
     @property
     def flag(self) -> str:
         """As the command line spells it."""
-        return self.spelling or f"--{self.name.replace('_', '-')}"
+        return self.spelling or flag_of(self.name)
+
+
+def flag_of(name: str) -> str:
+    """
+    An argument as the command line spells it; an underscore behind keeps it from being a keyword.
+
+    Examples
+    --------
+    >>> from scanfab.base.option import flag_of
+    >>> flag_of("rv_radius"), flag_of("with_")
+    ('--rv-radius', '--with')
+    """
+    return f"--{name.rstrip('_').replace('_', '-')}"
 
 
 def option(**declaration: Any) -> Any:
     """A field of a dataclass that declares an option, of the field's name."""
+    declaration.setdefault("kind", KINDS.get(declaration.get("takes", ""), str))
     declared = Option(**declaration)
     return field(default=declared.default, metadata={"option": declared})
 
@@ -137,7 +156,8 @@ def takes_options(options: Sequence[Option]) -> Callable[[Callable[P, R]], Calla
             return function(*args, **kwargs)
 
         text = inspect.cleandoc(function.__doc__ or "")
-        ordered = sorted(options, key=lambda option: known.index(option.name))
+        places = {name: place for place, name in enumerate(known)}
+        ordered = sorted(options, key=lambda option: places.get(option.name, len(places)))
         call.__doc__ = text.replace("{options}", "\n".join(map(_documented, ordered)))
         return call
 

@@ -28,7 +28,9 @@ __all__ = ["compare"]
 @options("cutoff", **OF_SEVERAL)
 @options("labels", "output", *EXCERPT, "plot")
 @options(
-    "figure", help="Which figure: evolution, normalised or correlation (default: all on one page)."
+    "figure",
+    help="Which figure: evolution, normalised, correlation or columns:NAME,NAME (default: all on "
+    "one page).",
 )
 @talk_options
 def compare(

@@ -35,8 +35,10 @@ __all__ = [
 Command = Callable[..., Any]
 Completion = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
 
-READING = ("format", "columns", "contact_columns", "radius", "cell", "periodic", "contacts")
-SAMPLE = ("boundary", "min_contacts", "rattlers", "contact_tolerance")
+READING = (
+    "format", "columns", "contact_columns", "radius", "cell", "periodic", "bodies", "contacts",
+)  # fmt: skip
+SAMPLE = ("boundary", "min_contacts", "rattlers", "min_force", "contact_tolerance")
 WINDOW = ("rv", "rv_radius", "rv_center", "rv_shape", "rv_size", "rv_axis", "rv_follows")
 EXCERPT = ("fields", "digits")
 # the cut-off of commands that take tables

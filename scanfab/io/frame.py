@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from scanfab.base.errors import PackingError, ReadError, ScanfabNote, ScanfabWarning
+from scanfab.io.bodies import body_numbers
 from scanfab.io.families import Family, nearest
 from scanfab.io.reader import (
     Carries,
@@ -111,6 +112,7 @@ class Frame:
                 grains.radius,
                 id=grains.id,
                 columns=grains.columns,
+                bodies=body_numbers(self.snapshot.path, grains, options.bodies),
                 contacts=listed[0] if listed else None,
                 wall_contacts=_wall_contacts(grains, joined, with_own),
                 cell=grains.cell,

@@ -84,6 +84,7 @@ def read_series(
     radius: float | None = None,
     cell: tuple[float, ...] | PathLike | None = None,
     periodic: str | None = None,
+    bodies: str | None = None,
 ) -> Series:
     """
     Open a series of frames: a folder, a file, or several files.
@@ -111,6 +112,10 @@ def read_series(
         of each frame: columns ``step`` or ``frame``, ``lx ly lz``, and ``xy xz yz`` if tilted.
     periodic : str, optional
         Letters out of xyz.
+    bodies : str, optional
+        Column that says which clump a sphere belongs to: whole numbers, negative for a sphere that
+        is a grain of its own. By default ``id_multisphere``, ``clumpId``, ``clump_id`` or
+        ``clump``, if there is one; ``id`` makes each sphere a grain.
 
     Returns
     -------
@@ -144,7 +149,7 @@ def read_series(
     one_cell = named_cell if isinstance(named_cell, tuple) else None
     cells = None if named_cell is None or one_cell is not None else _cell_file(named_cell)
     options = ReadOptions(
-        checked["columns"] or {}, contact_columns, checked["radius"], one_cell, periodic
+        checked["columns"] or {}, contact_columns, checked["radius"], one_cell, periodic, bodies
     )
     families = sort_into_families([file for path in paths for file in files_of(path)], format)
     grains = choose_grains(paths, families, radius is not None).check()

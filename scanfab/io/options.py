@@ -139,6 +139,15 @@ READING_OPTIONS = (
         metavar="xyz",
     ),
     Option(
+        name="bodies",
+        parse=parse_text,
+        group="reading",
+        help="Column that says which clump a sphere belongs to (default: id_multisphere, clumpId, "
+        "clump_id or clump, if there is one; id: each sphere is a grain).",
+        meaning="column that says which clump a sphere belongs to; not given: the format's own",
+        metavar="COLUMN",
+    ),
+    Option(
         name="contacts",
         default="auto",
         parse=parse_contacts,

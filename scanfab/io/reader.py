@@ -52,6 +52,8 @@ class ReadOptions:
     """LX LY LZ, or LX LY LZ XY XZ YZ; dump's length unit."""
     periodic: str | None = None
     """Letters out of xyz."""
+    bodies: str | None = None
+    """Column that says which clump a sphere belongs to; by default that of the format, if any."""
 
     def __post_init__(self) -> None:
         """Raise SettingsError if a value cannot be used."""

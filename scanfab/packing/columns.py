@@ -14,15 +14,16 @@ if TYPE_CHECKING:
 __all__ = ["RV_COLUMN", "SAMPLE_COLUMNS", "sample_values"]
 
 SAMPLE_COLUMNS = (
-    Column("grains", int, "", "solid in this variant, centre in the window"),
-    Column("rattlers", int, "", "grains with too few contacts, centre in the window"),
-    Column("contacts", int, "", "contacts between grains that enter gc_*"),
+    Column("grains", int, "", "solid in this variant, centre in the window; a clump is one"),
+    Column("rattlers", int, "", "grains with too few neighbours, centre in the window"),
+    Column("contacts", int, "", "contacts between grains that enter gc_*; of clumps, each point"),
     Column("contacts_from", str, "", "file or geometric"),
     Column(
         "coordination",
         float,
         "",
-        "mean number of contacts of the grains counted in grains, boundary's included",
+        "mean number of contacts of the grains counted in grains, boundary's included; of clumps, "
+        "neighbours",
     ),
 )
 RV_COLUMN = Column(
@@ -40,8 +41,8 @@ def sample_values(
     """
     counted = sample.counted(variant, window)
     return {
-        "grains": int((counted & ~sample.removed(variant)).sum()),
-        "rattlers": int((counted & sample.rattlers).sum()),
+        "grains": sample.number(counted & ~sample.removed(variant)),
+        "rattlers": sample.number(counted & sample.rattlers),
         "contacts": contacts,
         "coordination": sample.coordination(variant, window),
     }

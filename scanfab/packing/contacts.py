@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from dataclasses import dataclass, fields, replace
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -12,7 +12,8 @@ import numpy.typing as npt
 from scanfab.base.arrays import cast, grains_named
 from scanfab.base.errors import PackingError, ScanfabWarning
 from scanfab.base.spelling import counted
-from scanfab.base.typing import FloatArray, IntArray
+from scanfab.base.typing import BoolArray, FloatArray, IntArray
+from scanfab.packing.bodies import Bodies
 from scanfab.packing.cell import Cell
 
 __all__ = ["ContactList", "Contacts", "Spheres", "resolve_contacts", "warn_of_same_centre"]
@@ -35,6 +36,9 @@ class ContactList(NamedTuple):
         Force on the second grain, dump's force unit.
     source : str, optional
         Where the list comes from: ``file`` or ``geometric``.
+    force_n : array_like, shape (M,) or (M, 3), optional
+        Normal force, dump's force unit: compression positive, or the vector on the second grain.
+        For sources that have no more of the force: else it follows from that.
 
     Examples
     --------
@@ -50,9 +54,12 @@ class ContactList(NamedTuple):
     image: npt.ArrayLike | None = None
     force: npt.ArrayLike | None = None
     source: ContactSource = "file"
+    force_n: npt.ArrayLike | None = None
 
     def __repr__(self) -> str:
         named = {"images": self.image, "forces": self.force}
+        if self.force is None:
+            named["normal forces"] = self.force_n
         has = [f"with {name}" for name, values in named.items() if values is not None]
         number = counted(len(np.asarray(self.pairs)), "contact")
         return f"ContactList: {', '.join([f'{number} from {self.source}', *has])}"
@@ -81,6 +88,9 @@ class Contacts:
         Force on the second grain, shape (M, 3), dump's force unit; None if the dump has none.
     source : str
         ``file`` or ``geometric``.
+    force_n : ndarray or None
+        Normal force f·n, shape (M,), dump's force unit: above 0 the grains push each other
+        apart (compression). None if the dump has none.
 
     Examples
     --------
@@ -98,6 +108,7 @@ class Contacts:
     point: FloatArray
     force: FloatArray | None
     source: ContactSource
+    force_n: FloatArray | None = None
 
     def __len__(self) -> int:
         return len(self.pairs)
@@ -114,8 +125,49 @@ class Contacts:
         str
         """
         whence = "from file" if self.source == "file" else "by geometry"
-        forces = "" if self.force is None else " with forces"
+        forces = "" if self.force_n is None else " with normal forces"
+        forces = forces if self.force is None else " with forces"
         return f"{counted(len(self), 'contact')} {whence}{forces}"
+
+    def chosen(self, some: BoolArray) -> Contacts:
+        """
+        Some of them.
+
+        Parameters
+        ----------
+        some : ndarray of bool, shape (M,)
+            Which.
+
+        Returns
+        -------
+        Contacts
+        """
+        values = ((one.name, getattr(self, one.name)) for one in fields(self))
+        chosen: dict[str, Any] = {
+            name: array[some] for name, array in values if isinstance(array, np.ndarray)
+        }
+        return replace(self, **chosen)
+
+    def neighbours(self, bodies: Bodies | None) -> IntArray:
+        """
+        The pairs of grains that touch, each once, in however many points.
+
+        Grains that touch through two images are two pairs, as they are neighbours twice.
+
+        Parameters
+        ----------
+        bodies : Bodies or None
+            Of the packing; without them, grains are spheres, and every contact is a pair.
+
+        Returns
+        -------
+        ndarray of int, shape (K, 2)
+            Rows of the grains' first spheres.
+        """
+        if bodies is None:
+            return self.pairs
+        heads = bodies.head[self.pairs]
+        return heads[_first_of_each(heads, bodies.image(self.pairs, self.image))]
 
 
 class Spheres(NamedTuple):
@@ -130,6 +182,8 @@ class Spheres(NamedTuple):
     cell: Cell | None
     turns: IntArray | None = None
     """Shape (N, 3): lattice vectors to where each grain was given; None: where it is."""
+    bodies: Bodies | None = None
+    """A contact between two spheres of one body is none."""
 
 
 def resolve_contacts(listed: ContactList, spheres: Spheres) -> Contacts:
@@ -149,10 +203,12 @@ def resolve_contacts(listed: ContactList, spheres: Spheres) -> Contacts:
             f"contact {wrong} names the rows {pairs[wrong].tolist()}, "
             f"but there are {count} grains (rows from 0)"
         )
-    force = None
-    if listed.force is not None:
-        force = cast("force", listed.force, np.float64, (len(pairs), 3))
+    force, force_n = _forces(listed, len(pairs))
     image = _images(listed, pairs, spheres)
+    if spheres.bodies is not None:
+        outer = spheres.bodies.between(pairs, image)
+        pairs, image = pairs[outer], image[outer]
+        force, force_n = (None if one is None else one[outer] for one in (force, force_n))
     branch = spheres.position[pairs[:, 1]] - spheres.position[pairs[:, 0]]
     if spheres.cell is not None:
         branch = branch + image @ spheres.cell.vectors
@@ -170,8 +226,21 @@ def resolve_contacts(listed: ContactList, spheres: Spheres) -> Contacts:
     radius = spheres.radius[pairs]
     middle = 0.5 * (length + radius[:, 0] - radius[:, 1])
     point = spheres.position[pairs[:, 0]] + middle[:, None] * normal
-    force = None if force is None else force[keep]
-    return Contacts(pairs, image, normal, point, force, listed.source)
+    force, force_n = (None if one is None else one[keep] for one in (force, force_n))
+    if force_n is not None and force_n.ndim == 2:
+        force_n = np.einsum("ci,ci->c", force_n, normal)
+    return Contacts(pairs, image, normal, point, force, listed.source, force_n)
+
+
+def _forces(listed: ContactList, count: int) -> tuple[FloatArray | None, FloatArray | None]:
+    """The force on each second grain, and the normal force, as a vector or signed."""
+    if listed.force is not None:
+        force: FloatArray = cast("force", listed.force, np.float64, (count, 3))
+        return force, force
+    if listed.force_n is None:
+        return None, None
+    force_n = cast("force_n", listed.force_n, np.float64, (count, ...))
+    return None, force_n if force_n.ndim == 1 else cast("force_n", force_n, np.float64, (count, 3))
 
 
 def _images(listed: ContactList, pairs: IntArray, spheres: Spheres) -> IntArray:

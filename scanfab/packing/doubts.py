@@ -6,8 +6,9 @@ import numpy as np
 
 from scanfab.base.errors import PackingError
 from scanfab.base.note import Note
-from scanfab.base.typing import FloatArray
-from scanfab.packing.bodies import CLUMP_COLUMNS
+from scanfab.base.spelling import counted
+from scanfab.base.typing import FloatArray, IntArray
+from scanfab.packing.bodies import CLUMP_COLUMNS, MOLECULE_COLUMNS
 from scanfab.packing.packing import Packing
 from scanfab.packing.periodicity import fitting_periods
 from scanfab.packing.sample import Sample
@@ -17,8 +18,13 @@ __all__ = ["cell_doubt", "cell_hint", "doubts_of", "refuse_impossible"]
 
 # particles below which nothing is said of a sample's form
 FEWEST = 10
-# a clump is smaller than this part of the sample
+# names of columns that may say which spheres are one body, in lower case
+COLUMNS = (*CLUMP_COLUMNS, *MOLECULE_COLUMNS)
+# a clump is smaller than this part of the sample, or of the period
 SMALL = 0.5
+# times the median of all: a body that is no longer is like the others
+LONG = 3.0
+TINY = float(np.finfo(float).tiny)
 # contacts a grain that no packing of spheres has
 MANY_CONTACTS = 30
 # solids in the box of their surfaces, in its volume: only clumps of many spheres overlap as much
@@ -63,6 +69,7 @@ def doubts_of(sample: Sample, *, cell_is_named: bool = False) -> list[Note]:
     clumps = _clumps(packing)
     texts = {
         "clumps": clumps,
+        "spread_bodies": _spread_bodies(packing),
         "own_images": _own_images(packing),
         "empty_period": _empty_period(packing) if cell_is_named else "",
         "many_contacts": "" if clumps else _many_contacts(sample),
@@ -121,8 +128,10 @@ def _overfull(sample: Sample) -> str:
     position = sample.packing.position[sample.grains]
     radius = sample.packing.radius[sample.grains]
     contacts = sample.packing.contacts
-    # who lists contacts has them from a program that knew the radii
-    if len(radius) < FEWEST or (contacts is not None and contacts.source == "file"):
+    # who lists contacts has them from a program that knew the radii; in clumps, spheres may lie on
+    # top of one another
+    listed = contacts is not None and contacts.source == "file"
+    if len(radius) < FEWEST or listed or sample.packing.bodies is not None:
         return ""
     solid = _solid_fraction(position, radius, sample.packing)
     if solid < SOLIDS:
@@ -144,17 +153,59 @@ def _solid_fraction(position: FloatArray, radius: FloatArray, packing: Packing) 
 
 
 def _clumps(packing: Packing) -> str:
-    names = [name for name in packing.columns if name.lower() in CLUMP_COLUMNS]
-    for name in names:
-        found = _bodies(packing, name)
+    if packing.bodies is not None:
+        return ""
+    for name in packing.columns:
+        found = _bodies(packing, name) if name.lower() in COLUMNS else None
         if found is not None:
             bodies, members = found
             return (
-                f"the column {name} names {bodies} clumps of {members} spheres: clumps are not "
-                f"read as bodies yet, each sphere counts as a grain; contacts, coordination and "
-                f"rattlers (variants b and d) are those of single spheres"
+                f"the column {name} names {bodies} clumps of {members} spheres, but each sphere "
+                f"counts as a grain in contacts, coordination and rattlers (variants b and d): if "
+                f'the clumps are rigid, `bodies="{name}"` makes each of them one grain'
             )
     return ""
+
+
+def _spread_bodies(packing: Packing) -> str:
+    """Bodies that a periodic face may cut, or whose column may number something else."""
+    bodies, cell = packing.bodies, packing.cell
+    if bodies is None:
+        return ""
+    position, periodic = packing.position, np.zeros(3, np.bool_)
+    if cell is not None and packing.is_periodic:
+        # along the shortest vectors of the cell, in periods where these repeat
+        position = (position + bodies.turns @ cell.vectors) @ np.linalg.inv(cell.short_vectors)
+        periodic = np.array(cell.periodic)
+    rows = np.flatnonzero(bodies.has_many)
+    heads, extents = _extents_of(position[rows], bodies.head[rows])
+    size = np.maximum(np.where(periodic, 1.0, np.ptp(position, axis=0)), TINY)
+    wide = extents > SMALL * size
+    # in a sample of few large clumps all are as long
+    alone = (extents > LONG * np.median(extents, axis=0)) | wide.all(axis=1, keepdims=True)
+    spread = np.flatnonzero((wide & (periodic | alone)).any(axis=1))
+    if spread.size == 0:
+        return ""
+    cure = (
+        "their spheres are put together next to the first of them, which is right for bodies that "
+        "are shorter than half a period"
+        if periodic.any()
+        else "if the sample is periodic, name its cell (`cell`, `periodic`)"
+    )
+    return (
+        f"{counted(len(spread), 'body', 'bodies')} of several spheres, such as number "
+        f"{bodies.number[heads[spread[0]]]}, reach through more than half of the "
+        f"{'cell' if periodic.any() else 'sample'}: {cure}; or are these no bodies (`bodies`)?"
+    )
+
+
+def _extents_of(position: FloatArray, body: IntArray) -> tuple[IntArray, FloatArray]:
+    """The numbers of some bodies, shape (B,), and their extents, shape (B, 3)."""
+    order = np.argsort(body, kind="stable")
+    along, names = position[order], body[order]
+    starts = np.flatnonzero(np.diff(names, prepend=names[0] - 1))
+    extents = np.maximum.reduceat(along, starts) - np.minimum.reduceat(along, starts)
+    return names[starts], extents
 
 
 def _bodies(packing: Packing, name: str) -> tuple[int, int] | None:
@@ -168,14 +219,11 @@ def _bodies(packing: Packing, name: str) -> tuple[int, int] | None:
     if values.ndim != 1 or values.dtype.kind not in "iuf":
         return None
     rows = np.flatnonzero(values > 0)
-    _, body, counts = np.unique(values[rows], return_inverse=True, return_counts=True)
+    _, counts = np.unique(values[rows], return_counts=True)
     several = counts > 1
     if not several.any():
         return None
-    order = np.argsort(body, kind="stable")
-    position = packing.position[rows[order]]
-    starts = np.cumsum(counts) - counts
-    extents = np.maximum.reduceat(position, starts) - np.minimum.reduceat(position, starts)
+    _, extents = _extents_of(packing.position[rows], values[rows])
     small = extents.max(axis=1) < SMALL * _extent(packing.position)
     # a body that a periodic face cuts seems as large as the sample
     if np.count_nonzero(small & several) < 0.5 * np.count_nonzero(several):

@@ -15,6 +15,7 @@ from scanfab.base.errors import PackingError
 from scanfab.base.lengths import LEAST, MOST, all_within
 from scanfab.base.spelling import counted, spelt_range
 from scanfab.base.typing import FloatArray, IntArray
+from scanfab.packing.bodies import Bodies, bodies_of
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import ContactList, Contacts, Spheres, resolve_contacts
 
@@ -112,7 +113,11 @@ class Packing:
     id : array_like of int, shape (N,), optional
         The dump's own numbers of the grains; the row numbers by default.
     columns : mapping of str to array_like, optional
-        What else the dump says of each grain (``type``, ``mask``, ``clump``, ...), N rows each.
+        What else the dump says of each grain (``type``, ``mask``, ...), N rows each.
+    bodies : array_like of int, shape (N,), optional
+        Number of the rigid body that each sphere is a part of: a body is one grain, and has no
+        contacts with itself. Spheres of negative numbers are grains of their own, as all are by
+        default.
     contacts : array_like of int, shape (M, 2), or ContactList, optional
         Pairs of rows. Without it contacts are to be found from geometry.
     wall_contacts : array_like of int, shape (N,), optional
@@ -143,6 +148,7 @@ class Packing:
         *,
         id: npt.ArrayLike | None = None,
         columns: Mapping[str, npt.ArrayLike] | None = None,
+        bodies: npt.ArrayLike | None = None,
         contacts: npt.ArrayLike | ContactList | None = None,
         wall_contacts: npt.ArrayLike | None = None,
         cell: Cell | None = None,
@@ -168,6 +174,10 @@ class Packing:
         self.columns: Mapping[str, npt.NDArray[Any]] = (
             columns if isinstance(columns, LazyColumns) else _cast_columns(columns or {}, count)
         )
+        self.bodies: Bodies | None = None
+        if bodies is not None:
+            numbers = cast("bodies", bodies, np.int64, (count,))
+            self.bodies = bodies_of(numbers, self.position, self.radius, cell)
         self.wall_contacts: IntArray = _wall_contacts(wall_contacts, count)
         self.cell = cell
         self.step = None if step is None else int(step)
@@ -185,6 +195,8 @@ class Packing:
         if len(self):
             radii = f" of radius {spelt_range(self.radius.min(), self.radius.max())}"
         what = [counted(len(self), "particle") + radii]
+        if self.bodies is not None:
+            what += [f"parts of {counted(self.bodies.count(np.ones(len(self), bool)), 'grain')}"]
         what.append("contacts not known" if self.contacts is None else self.contacts.in_words())
         what += [] if self.step is None else [f"step {self.step}"]
         return f"Packing: {', '.join(what)}" + ("" if self.cell is None else f"\n  {self.cell!r}")
@@ -221,7 +233,7 @@ class Packing:
         return other
 
     def _spheres(self, turns: IntArray | None) -> Spheres:
-        return Spheres(self.position, self.radius, self.id, self.cell, turns)
+        return Spheres(self.position, self.radius, self.id, self.cell, turns, self.bodies)
 
 
 def _wall_contacts(values: npt.ArrayLike | None, count: int) -> IntArray:

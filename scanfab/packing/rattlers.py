@@ -1,5 +1,8 @@
 """
-Rattlers, grains that too few contacts hold: the rules that tell them, by name.
+Rattlers, grains that too few neighbours hold: the rules that tell them, by name.
+
+Grains that are single spheres have as many neighbours as contacts. A clump may touch another one in
+several points: that is one neighbour.
 
 A rule is a function of :class:`Touching`. A package offers one under the entry point
 ``scanfab.rattlers``, where those of this file register too.
@@ -13,11 +16,13 @@ from functools import cache
 
 import numpy as np
 
+from scanfab.base.errors import ReadError
 from scanfab.base.plugins import having, load_plugins
 from scanfab.base.typing import BoolArray, IntArray
+from scanfab.packing.bodies import Bodies
 from scanfab.packing.contacts import Contacts
 
-__all__ = ["RattlerRule", "Touching", "count", "installed_rules", "recursive"]
+__all__ = ["RattlerRule", "Touching", "count", "force", "installed_rules", "recursive"]
 
 GROUP = "scanfab.rattlers"
 
@@ -30,53 +35,91 @@ class Touching:
     """Those of all particles, M of them, with their forces where the dump has some."""
     numbers: IntArray
     """
-    Number of contacts of each particle, shape (N,): with grains, boundary particles and walls.
+    Number of neighbours of each particle, shape (N,): grains, boundary particles and wall contacts.
 
-    A grain that touches an image of itself has two of that contact.
+    A grain that touches an image of itself has two by that. Each sphere of a clump has the clump's.
     """
     grains: BoolArray
     """Particles that are not boundary, shape (N,); only these can be rattlers."""
     min_contacts: int = 2
-    """What the option `min_contacts` says: with fewer contacts a grain is not held."""
+    """What the option `min_contacts` says: with fewer neighbours a grain is not held."""
+    bodies: Bodies | None = None
+    """Which spheres are one grain; None if each is one."""
+    min_force: float = 0.0
+    """What the option `min_force` says, relative to the mean normal force."""
 
     def numbers_without(self, left_out: BoolArray) -> IntArray:
-        """The numbers of contacts, shape (N,), if some contacts, shape (M,), do not count."""
-        # np.compress is several times as fast as to index with a mask
-        return self.numbers - _ends(np.compress(left_out, self.contacts.pairs, axis=0), self)
+        """The numbers of neighbours, shape (N,), if some contacts, shape (M,), do not count."""
+        if self.bodies is None:
+            # np.compress is several times as fast as to index with a mask
+            return self.numbers - self.ends(np.compress(left_out, self.contacts.pairs, axis=0))
+        left = self.contacts.chosen(~left_out)
+        lost = self.ends(self.neighbours) - self.ends(left.neighbours(self.bodies))
+        return self.numbers - lost
+
+    @property
+    def neighbours(self) -> IntArray:
+        """Pairs of grains that touch, each once: rows of their first spheres, shape (K, 2)."""
+        return self.contacts.neighbours(self.bodies)
+
+    def ends(self, pairs: IntArray) -> IntArray:
+        """How often each grain stands in some pairs, at each of its spheres, shape (N,)."""
+        numbers = np.bincount(pairs.ravel(), minlength=len(self.grains))
+        return numbers if self.bodies is None else numbers[self.bodies.head]
 
 
 RattlerRule = Callable[[Touching], BoolArray]
-"""Gives the rattlers, shape (N,)."""
+"""Gives the rattlers, shape (N,); of a clump, what it says of the first sphere holds."""
 
 
 def count(touching: Touching) -> BoolArray:
     """
-    Grains with fewer than ``min_contacts`` contacts, in one pass: the rule of the 2017 paper.
+    Grains with fewer than ``min_contacts`` neighbours, in one pass: the rule of the 2017 paper.
 
-    Contacts with other rattlers count.
+    Other rattlers are neighbours, too.
     """
     return np.asarray(touching.grains & (touching.numbers < touching.min_contacts))
 
 
 def recursive(touching: Touching) -> BoolArray:
     """
-    The same over and over, each time without the contacts of the rattlers, until none is new.
+    The same over and over, each time without the rattlers as neighbours, until none is new.
 
     What is left is held by grains that are held themselves, by the boundary and by walls.
     """
-    pairs, numbers = touching.contacts.pairs, touching.numbers
+    pairs, numbers = touching.neighbours, touching.numbers
     while True:
         found: BoolArray = touching.grains & (numbers < touching.min_contacts)
         lost = found[pairs[:, 0]] | found[pairs[:, 1]]
         if not lost.any():
             return found
-        numbers = numbers - _ends(np.compress(lost, pairs, axis=0), touching)
+        numbers = numbers - touching.ends(np.compress(lost, pairs, axis=0))
         pairs = np.compress(~lost, pairs, axis=0)
 
 
-def _ends(pairs: IntArray, touching: Touching) -> IntArray:
-    """How often each particle stands in some pairs, shape (N,)."""
-    return np.bincount(pairs.ravel(), minlength=len(touching.numbers))
+def force(touching: Touching) -> BoolArray:
+    """
+    Grains with fewer than ``min_contacts`` neighbours that press on them, in one pass.
+
+    A contact counts if its normal force is above ``min_force`` times the mean over all contacts,
+    compression positive. Contacts with walls, whose forces are not known, count.
+
+    Raises
+    ------
+    ReadError
+        If the contacts have no forces.
+    """
+    contacts = touching.contacts
+    if contacts.force_n is None:
+        raise ReadError(
+            'the rule `rattlers="force"` needs the forces of the contacts, which are '
+            f"{'not in the file' if contacts.source == 'file' else 'found by geometry'}: choose "
+            '`rattlers="count"`, or name a contact file with forces (`contacts`)'
+        )
+    mean = contacts.force_n.mean() if len(contacts) else 0.0
+    pressing = contacts.force_n > touching.min_force * mean
+    found = touching.numbers_without(~pressing) < touching.min_contacts
+    return np.asarray(touching.grains & found)
 
 
 @cache

@@ -17,17 +17,13 @@ from scanfab.base.note import Note
 from scanfab.base.spelling import counted
 from scanfab.base.typing import BoolArray, IntArray
 from scanfab.packing.boundary import BoundaryRule, select_boundary
-from scanfab.packing.escaped import Escaped, escaped_grains
+from scanfab.packing.escaped import Escaped, escaped_grains, told_of_escaped
 from scanfab.packing.packing import Contacts, Packing
 from scanfab.packing.rattlers import RattlerRule, Touching, count, installed_rules
 from scanfab.packing.search import find_contacts
-from scanfab.packing.window import SurfaceBox, Window
+from scanfab.packing.window import Window
 
 __all__ = ["VARIANTS", "Sample", "SampleRule", "Variant"]
-
-
-# grains that a message names
-MOST_NAMED = 20
 
 
 @dataclass(frozen=True)
@@ -59,11 +55,13 @@ class Sample:
     packing : Packing
         Its contacts tell the rattlers.
     boundary : ndarray of bool, shape (N,)
-        Particles that are boundary, not grains.
+        Particles that are boundary, not grains. A clump is boundary if one of its spheres is.
     min_contacts : int, optional
-        A grain with fewer contacts is a rattler.
+        A grain with fewer neighbours is a rattler.
     rattler_rule : callable, optional
         Tells them by their contacts; by default every grain on its own, in one pass.
+    min_force : float, optional
+        For the rule ``force``, relative to the mean normal force.
 
     Raises
     ------
@@ -86,6 +84,7 @@ class Sample:
     boundary: BoolArray
     min_contacts: int = 2
     rattler_rule: RattlerRule = count
+    min_force: float = 0.0
 
     def __post_init__(self) -> None:
         """PackingError if the boundary is no truth value for each particle."""
@@ -95,16 +94,19 @@ class Sample:
                 f"boundary: expected a truth value for each of {len(self.packing)} particles, such "
                 f'as packing.columns["type"] == 2, found {boundary.dtype} of shape {boundary.shape}'
             )
+        if self.packing.bodies is not None:
+            object.__setattr__(self, "boundary", self.packing.bodies.whole(boundary))
 
     def __repr__(self) -> str:
-        what = f"Sample: {counted(int(self.grains.sum()), 'grain')}"
+        what = f"Sample: {counted(self.number(self.grains), 'grain')}"
         if self.packing.contacts is not None:
-            rattlers = counted(int(self.rattlers.sum()), "rattler")
-            rule = f"fewer than {counted(self.min_contacts, 'contact')}"
+            rattlers = counted(self.number(self.rattlers), "rattler")
+            of = "contact" if self.packing.bodies is None else "neighbour"
+            rule = f"fewer than {counted(self.min_contacts, of)}"
             if self.rattler_rule is not count:
                 rule = f"by {getattr(self.rattler_rule, '__name__', 'a rule')} of {rule}"
             what += f", {rattlers} ({rule})"
-        boundary = int(self.boundary.sum())
+        boundary = self.number(self.boundary)
         return what + (f"; {counted(boundary, 'boundary particle')}" if boundary else "")
 
     @property
@@ -118,8 +120,46 @@ class Sample:
 
     @property
     def grains(self) -> BoolArray:
-        """Particles that are not boundary, shape (N,)."""
+        """Particles that are not boundary, shape (N,): of clumps, each of the spheres."""
         return ~self.boundary
+
+    def number(self, chosen: BoolArray) -> int:
+        """
+        How many grains some spheres are: a clump is one.
+
+        Parameters
+        ----------
+        chosen : ndarray of bool, shape (N,)
+            Spheres.
+
+        Returns
+        -------
+        int
+        """
+        bodies = self.packing.bodies
+        return int(np.count_nonzero(chosen)) if bodies is None else bodies.count(chosen)
+
+    def once(self, chosen: BoolArray) -> BoolArray:
+        """
+        One sphere each of grains all of whose spheres are chosen.
+
+        Parameters
+        ----------
+        chosen : ndarray of bool, shape (N,)
+            Spheres.
+
+        Returns
+        -------
+        ndarray of bool, shape (N,)
+        """
+        bodies = self.packing.bodies
+        return chosen if bodies is None else np.asarray(chosen & bodies.is_head)
+
+    @property
+    def clumps(self) -> int:
+        """How many grains are bodies of several spheres."""
+        bodies = self.packing.bodies
+        return 0 if bodies is None else bodies.count(self.grains & bodies.has_many)
 
     @cached_property
     def escaped(self) -> Escaped:
@@ -140,55 +180,43 @@ class Sample:
         list of Note
             Empty without any.
         """
-        rows = np.flatnonzero(self.escaped.grains)
-        return [Note("escaped", self._escaped(rows))] if len(rows) else []
-
-    def _escaped(self, rows: IntArray) -> str:
-        first, packing = rows[0], self.packing
-        place = ", ".join(f"{x:g}" for x in packing.position[first])
-        others = f" and {len(rows) - 1} more" if len(rows) > 1 else ""
-        found = (
-            f"grain {packing.id[first]} at ({place}){others}: {self.escaped.gap:g} away from all "
-            f"others"
-        )
-        ids = ",".join(str(one) for one in packing.id[rows[:MOST_NAMED]])
-        cure = f'`boundary="id={ids}{",..." if len(rows) > MOST_NAMED else ""}"`'
-        if not self.escaped.are_many:
-            return (
-                f"{found}, so the sample's extents, RV and octants leave out what has flown away; "
-                f"in a and b it is still solid: {cure} takes it out"
-            )
-        boxes = [
-            SurfaceBox.of(packing, chosen)
-            for chosen in (self.grains, self.grains & ~self.escaped.grains)
-        ]
-        wide, narrow = (" x ".join(f"{x:.4g}" for x in box.high - box.low) for box in boxes)
-        return (
-            f"{found}; these are too many to be left out, so they widen the sample's extents, RV "
-            f"and octants: {wide} with them, {narrow} without; if they have flown away, {cure} "
-            f"takes them out"
-        )
+        if not self.escaped.grains.any():
+            return []
+        more = self.number(self.escaped.grains) - 1
+        return [Note("escaped", told_of_escaped(self.packing, self.grains, self.escaped, more))]
 
     @cached_property
     def rattlers(self) -> BoolArray:
         """Grains that are rattlers by the rule, shape (N,)."""
         told = self.rattler_rule(self._touching)
         found: BoolArray = cast("rattlers", told, np.bool_, (len(self.packing),))
+        if self.packing.bodies is not None:
+            found = found[self.packing.bodies.head]
         return self.grains & found
 
     @property
     def _touching(self) -> Touching:
-        return Touching(self.contacts, self.contact_numbers, self.grains, self.min_contacts)
+        options = self.min_contacts, self.packing.bodies, self.min_force
+        return Touching(self.contacts, self.contact_numbers, self.grains, *options)
 
     @cached_property
     def contact_numbers(self) -> IntArray:
-        """Number of contacts of each particle, those with walls included, shape (N,)."""
-        ends = np.bincount(self.contacts.pairs.ravel(), minlength=len(self.packing))
-        return ends + self.packing.wall_contacts
+        """
+        Number of neighbours of each particle, contacts with walls included, shape (N,).
+
+        Spheres have one neighbour a contact; each sphere of a clump has those of the clump.
+        """
+        bodies, walls = self.packing.bodies, self.packing.wall_contacts
+        pairs = self.contacts.neighbours(bodies)
+        ends = np.bincount(pairs.ravel(), minlength=len(self.packing))
+        if bodies is None:
+            return ends + walls
+        np.add.at(ends, bodies.head, walls)
+        return ends[bodies.head]
 
     @cached_property
     def contact_numbers_without_rattlers(self) -> IntArray:
-        """The same without contacts that a rattler has part in."""
+        """The same without rattlers as neighbours."""
         return self._touching.numbers_without(~self.contacts_without(self.rattlers))
 
     def removed(self, variant: Variant) -> BoolArray:
@@ -210,6 +238,9 @@ class Sample:
         """
         Grains whose centre lies in the variant's window, rattlers included.
 
+        The centre of a clump is its place, the mean of its spheres' centres by their volumes; with
+        it all its spheres are counted, wherever they are.
+
         Parameters
         ----------
         variant : Variant
@@ -224,7 +255,9 @@ class Sample:
         if not variant.in_window:
             return self.grains
         assert window is not None
-        return self.grains & window.contains(self.packing.position, self.packing)
+        bodies = self.packing.bodies
+        places = self.packing.position if bodies is None else bodies.place
+        return self.grains & window.contains(places, self.packing)
 
     def solids(self, variant: Variant, window: Window | None) -> BoolArray:
         """
@@ -288,9 +321,9 @@ class Sample:
 
     def coordination(self, variant: Variant, window: Window | None) -> float | None:
         """
-        Mean number of contacts of the variant's grains, boundary's included.
+        Mean number of contacts of the variant's grains, boundary's included; of clumps, neighbours.
 
-        Contacts with removed grains are left out.
+        Those with removed grains are left out.
 
         Parameters
         ----------
@@ -304,7 +337,7 @@ class Sample:
         float or None
             None if there is no grain.
         """
-        counted = self.counted(variant, window) & ~self.removed(variant)
+        counted = self.once(self.counted(variant, window) & ~self.removed(variant))
         if not counted.any():
             return None
         numbers = (
@@ -322,9 +355,11 @@ class SampleRule:
     boundary: tuple[BoundaryRule, ...] = ()
     """Particles that fit one of them are boundary."""
     min_contacts: int = 2
-    """A grain with fewer contacts is a rattler."""
+    """A grain with fewer neighbours is a rattler."""
     rattlers: str = "count"
     """By which of the installed rules."""
+    min_force: float = 0.0
+    """For the rule ``force``, relative to the mean normal force."""
     contact_tolerance: float = 0.0
     """Of contacts by geometry, where no file lists them; relative to the sum of the radii."""
 
@@ -340,4 +375,5 @@ class SampleRule:
         if packing.contacts is None:
             packing = find_contacts(packing, self.contact_tolerance)
         boundary = select_boundary(packing, self.boundary)
-        return Sample(packing, boundary, self.min_contacts, installed_rules()[self.rattlers])
+        rule = installed_rules()[self.rattlers]
+        return Sample(packing, boundary, self.min_contacts, rule, self.min_force)

@@ -45,7 +45,8 @@ def find_contacts(packing: Packing, tolerance: float = 0.0) -> Packing:
     Find the contacts of a packing from positions and radii, in any cell.
 
     Two grains (or a grain and a periodic image, its own included) are in contact if their distance
-    is below (r1 + r2)(1 + tolerance). Each pair counts once for each image that it touches.
+    is below (r1 + r2)(1 + tolerance). Each pair counts once for each image that it touches. Spheres
+    of one body have no contacts with one another.
 
     Parameters
     ----------
@@ -80,6 +81,9 @@ def find_contacts(packing: Packing, tolerance: float = 0.0) -> Packing:
     pairs, image = overlapping_pairs(
         packing.position, packing.radius, 1.0 + tolerance, packing.cell
     )
+    if packing.bodies is not None:
+        outer = packing.bodies.between(pairs, image)
+        pairs, image = pairs[outer], image[outer]
     return packing.with_contacts(_contacts(packing, pairs, image))
 
 

@@ -176,9 +176,10 @@ class _Calibrator:
         with_fabric = {row.variant for row in cutoffs if row.alpha_vs_axial is not None}
         for variant in self.settings.variants:
             if variant not in with_fabric:
+                grains = self.sample.number(self.sample.grains)
                 raise SettingsError(
                     f"frame {self.number}: no cut-off leaves a void fabric in variant {variant}: "
-                    f"the sample ({int(self.sample.grains.sum())} grains) is too small for it, "
+                    f"the sample ({grains} grains) is too small for it, "
                     f"there is no void, or all its grains are rattlers"
                 )
         ladders = {
@@ -191,6 +192,11 @@ class _Calibrator:
         target = max(self.settings.tolerance, OF_SAMPLE * (sample or 0.0))
         best, options = self._recommended(ladders["spacing"], ladders["directions"], target)
         findings = [sentence(ladder, rows) for ladder, rows in ladders.items() if rows]
+        if self.settings.needs_window and not self._rv_has_sizes:
+            findings.append(
+                f"RV: its size is left out, as {self.settings.rv_shape} draws it: to try others, "
+                f"scale that surface"
+            )
         findings.append(sentence_of_recommended(best, target, sample))
         rows = [row for ladder in ladders.values() for row in ladder]
         return Calibration((*rows, *best), tuple(findings), options)

@@ -18,6 +18,7 @@ from scanfab.base.note import SKIPPED, Note, tell
 from scanfab.base.option import options_of, takes_options, unusable
 from scanfab.base.threads import in_order
 from scanfab.packing.cell import Cell
+from scanfab.packing.groupings import Grouping, Groupings, grouping_of
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.frame import FrameResult, compute_frame
 from scanfab.pipeline.frames import Frames, Readable, Source
@@ -58,8 +59,10 @@ def compute(
     max_chords: float = MAX_CHORDS,
     min_contacts: int = 2,
     rattlers: str = "count",
+    min_force: float = 0.0,
     contact_tolerance: float = 0.0,
     axis: str | Sequence[float] = "z",
+    with_: str | Sequence[str] | None = None,
     strain: str | Path = "auto",
     frames: str | int | slice | None = None,
     seed: int = 0,
@@ -148,6 +151,8 @@ class _Computed:
     notes: tuple[Note, ...] = ()
     cell: Cell | None = None
     """None also if the frame has no grains."""
+    grouping: Grouping | None = None
+    """None also if each sphere is a grain."""
     heard: tuple[Warning, ...] = ()
     """Warnings of another process, where nobody hears them."""
 
@@ -183,12 +188,14 @@ class _FrameJob:
             if not self.skips_damaged:
                 raise
             return _Computed(self.number, notes=(Note(SKIPPED, str(error)),))
-        seconds, grains = time.perf_counter() - begun, int(found.sample.grains.sum())
+        seconds = time.perf_counter() - begun
+        grains = found.sample.number(found.sample.grains)
         LOGGER.info("%s: frame %d: %d grains in %.2g s", self.source, self.number, grains, seconds)
         if self.observe is not None:
             self.observe(found)
-        cell = found.sample.packing.cell if grains else None
-        return _Computed(self.number, found.rows, found.notes, cell)
+        packing = found.sample.packing
+        cell = packing.cell if grains else None
+        return _Computed(self.number, found.rows, found.notes, cell, grouping_of(packing))
 
 
 class _Run:
@@ -203,6 +210,7 @@ class _Run:
         self.frames = frames
         self.has_grains = False
         self._flips = Flips(frames.settings.frames.step)
+        self._groupings = Groupings()
 
     def jobs(self, done: Container[int], observe: Observer | None) -> Iterator[_FrameJob]:
         """The chosen frames that are not done."""
@@ -233,6 +241,8 @@ class _Run:
             warnings.warn(warning, stacklevel=3)
         tell(computed.notes, f"frame {computed.number}")
         tell(self._flips.notes(computed.number, computed.cell))
+        grouping = self._groupings.notes(computed.number, computed.grouping)
+        tell(grouping, f"frame {computed.number}")
 
 
 class _Pool:

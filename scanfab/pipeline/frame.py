@@ -8,12 +8,14 @@ from typing import Any
 
 from scanfab.base.note import Note, joined
 from scanfab.base.spelling import spelt_apart
+from scanfab.fabric.state import VOLUMETRIC_STRAIN
 from scanfab.packing.columns import RV_COLUMN
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.pipeline.frames import Readable
 from scanfab.pipeline.measurement import Measurement, measure
 from scanfab.pipeline.plan import Plan
+from scanfab.pipeline.state import refuse_without_forces
 from scanfab.pipeline.variant_columns import VariantColumns, no_columns
 from scanfab.table.columns import complete_row
 from scanfab.table.row import Row
@@ -86,10 +88,15 @@ def compute_frame(
         "step": frame.packing.step,
         "time": frame.packing.time,
         "contacts_from": frame.contacts.source,
-        **plan.strains.at(number, frame),
     }
+    strains = plan.strains.at(number, frame)
+    if VOLUMETRIC_STRAIN.name not in plan.more_columns:
+        del strains[VOLUMETRIC_STRAIN.name]
+    known |= strains
     if not frame.grains.any():
         return FrameResult(source, number, frame, (), list(_empty_rows(known, plan)))
+    if "forces" in plan.groups:
+        refuse_without_forces(frame)
     measurements = measure(frame, plan.in_frame(frame), f"frame {number}")
     columns = [
         VariantColumns(measurement, VARIANTS[variant], place)

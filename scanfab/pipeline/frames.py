@@ -113,8 +113,8 @@ class Frames:
     source : Packing, Series or iterable of Packing
         One frame, or many.
     settings : Settings
-        ``frames``, ``on_error``, ``boundary``, ``min_contacts``, ``rattlers`` and
-        ``contact_tolerance`` count.
+        ``frames``, ``on_error``, ``boundary``, ``min_contacts``, ``rattlers``,
+        ``min_force`` and ``contact_tolerance`` count.
 
     Raises
     ------
@@ -279,7 +279,11 @@ class Frames:
 def sample_rule(settings: Settings) -> SampleRule:
     """What settings say of how particles are told apart."""
     return SampleRule(
-        settings.boundary, settings.min_contacts, settings.rattlers, settings.contact_tolerance
+        settings.boundary,
+        settings.min_contacts,
+        settings.rattlers,
+        settings.min_force,
+        settings.contact_tolerance,
     )
 
 

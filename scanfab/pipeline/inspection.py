@@ -33,7 +33,7 @@ class FrameReport(Record):
     step: Annotated[int | None, "of the dump"]
     time: Annotated[float | None, "of the dump", "time"]
     format: Annotated[str, "the reader"]
-    grains: Annotated[int, "without boundary particles"]
+    grains: Annotated[int, "without boundary particles; a clump is one grain"]
     boundary: Annotated[int, "number of boundary particles"]
     radius_min: Annotated[float | None, "smallest radius of a grain", LENGTH]
     radius_max: Annotated[float | None, "largest radius of a grain", LENGTH]
@@ -42,8 +42,10 @@ class FrameReport(Record):
         "all that are listed or found by geometry, with boundary particles too",
     ]
     contacts_from: Annotated[str, "file or geometric"]
-    rattlers: Annotated[int, "grains with too few contacts"]
-    coordination: Annotated[float | None, "mean number of contacts of a grain"]
+    rattlers: Annotated[int, "grains with too few contacts; of clumps, with too few neighbours"]
+    coordination: Annotated[
+        float | None, "mean number of contacts of a grain; of clumps, neighbours"
+    ]
     cell: Annotated[list[list[float]] | None, "the lattice vectors, by rows", LENGTH]
     periodic: Annotated[list[bool] | None, "whether the sample repeats along each of them"]
     columns: Annotated[
@@ -66,6 +68,8 @@ class FrameReport(Record):
         float | None, "its radius; of a shape that is no sphere, of the ball that holds it", LENGTH
     ]
     rv_shape: Annotated[str | None, "its shape and size in words"]
+    clumps: Annotated[int, "grains that are bodies of several spheres"]
+    spheres: Annotated[int, "that the grains are made of"]
 
 
 def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
@@ -77,8 +81,8 @@ def inspect_series(series: Series, settings: Settings) -> Iterator[FrameReport]:
     series : Series
         The frames.
     settings : Settings
-        ``boundary``, ``frames``, ``min_contacts``, ``rattlers``, ``contact_tolerance`` and the RV
-        count.
+        ``boundary``, ``frames``, ``min_contacts``, ``rattlers``, ``min_force``,
+        ``contact_tolerance`` and the RV count.
 
     Raises
     ------
@@ -140,13 +144,13 @@ def _report(
         step=packing.step,
         time=packing.time,
         format=frame.reader.name,
-        grains=int(grains.sum()),
-        boundary=int(sample.boundary.sum()),
+        grains=sample.number(grains),
+        boundary=sample.number(sample.boundary),
         radius_min=float(radius.min()) if radius.size else None,
         radius_max=float(radius.max()) if radius.size else None,
         contacts=len(sample.contacts),
         contacts_from=sample.contacts.source,
-        rattlers=int(sample.rattlers.sum()),
+        rattlers=sample.number(sample.rattlers),
         coordination=sample.coordination(VARIANTS["a"], None),
         cell=None if cell is None else cell.vectors.tolist(),
         periodic=None if cell is None else list(cell.periodic),
@@ -157,6 +161,8 @@ def _report(
         rv_center=None if window is None else window.center.tolist(),
         rv_radius=None if window is None else window.radius,
         rv_shape=None if window is None else str(window.shape),
+        clumps=sample.clumps,
+        spheres=int(grains.sum()),
     )
 
 

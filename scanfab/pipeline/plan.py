@@ -64,6 +64,8 @@ class Plan:
     """What the windows follow."""
     more_columns: tuple[str, ...]
     """Of the table, behind those that it always has."""
+    groups: tuple[str, ...]
+    """Of further columns, see :data:`scanfab.fabric.registry.GROUPS`."""
     cutoff: float
     """Of the scan that is to meet the tolerance."""
     cutoffs: tuple[float, ...]
@@ -251,6 +253,7 @@ def _without_lengths(settings: Settings, strains: Strains) -> Plan:
         rvs=sizes_of(settings),
         deformation=None,
         more_columns=settings.more_columns,
+        groups=settings.with_,
         cutoff=math.nan,
         cutoffs=(math.nan,) * max(len(settings.cutoffs), 1),
         rule=settings.directions or direction_rule(AUTO_RULE),

@@ -22,7 +22,7 @@ def samples(source: Source, **options: Any) -> Iterator[tuple[int, Sample]]:
         One frame, or many.
     **options
         Those of :func:`scanfab.compute`, of which ``boundary``, ``min_contacts``,
-        ``contact_tolerance``, ``frames`` and ``on_error`` count.
+        ``rattlers``, ``min_force``, ``contact_tolerance``, ``frames`` and ``on_error`` count.
 
     Yields
     ------

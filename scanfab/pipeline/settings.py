@@ -17,6 +17,7 @@ from scanfab.base.option import (
 from scanfab.packing.columns import RV_COLUMN
 from scanfab.pipeline.values import (
     AXES,
+    GROUP_NAMES,
     STRAIN_MODES,
     Axis,
     Length,
@@ -29,6 +30,7 @@ from scanfab.pipeline.values import (
     parse_cutoffs,
     parse_directions,
     parse_frames,
+    parse_groups,
     parse_rattlers,
     parse_spacing,
     parse_strain,
@@ -131,7 +133,6 @@ class Settings(WindowSettings):
         help="Mean length of the void segments (1), or mean of the squares over the mean (2).",
         meaning="1: mean length of the void segments; 2: mean of their squares over that",
         takes="int",
-        kind=int,
         metavar="1|2",
         choices=lambda: ("1", "2"),
     )
@@ -165,7 +166,6 @@ class Settings(WindowSettings):
         help="Target standard error of alpha_vs_axial, for every variant, when something is auto.",
         meaning="wanted standard error of the scan, where spacing or directions are auto",
         takes="float",
-        kind=float,
         metavar="X",
         first=True,
     )
@@ -177,17 +177,15 @@ class Settings(WindowSettings):
         "by default after one or two minutes of one processor (lines count like chords).",
         meaning="an auto scan stops before it cuts more chords from grains in a frame",
         takes="float",
-        kind=float,
         metavar="N",
     )
     min_contacts: int = option(
         default=2,
         parse=whole("0 or more", lambda count: count >= 0),
         group="sample",
-        help="A grain with fewer contacts is a rattler.",
-        meaning="a grain with fewer contacts is a rattler",
+        help="A grain with fewer contacts (a clump: with fewer neighbours) is a rattler.",
+        meaning="a grain with fewer contacts (a clump: with fewer neighbours) is a rattler",
         takes="int",
-        kind=int,
         metavar="N",
     )
     rattlers: str = option(
@@ -195,11 +193,20 @@ class Settings(WindowSettings):
         parse=parse_rattlers,
         group="sample",
         help="Rule for rattlers: count is one pass over all contacts; recursive repeats it without "
-        "those of rattlers, until there is no new one.",
+        "those of rattlers, until none is new; force is one pass over those above `min_force`.",
         meaning="rule for rattlers; count: one pass over all contacts; recursive: again without "
-        "those of rattlers, until there is no new one",
+        "those of rattlers, until none is new; force: one pass over contacts that press",
         metavar="RULE",
         choices=rattler_rules,
+    )
+    min_force: float = option(
+        default=0.0,
+        parse=number("0 or more", lambda value: 0 <= value < math.inf),
+        group="sample",
+        help="By the rule force contacts count whose normal force is above this, over the mean.",
+        meaning="by the rule force contacts count whose normal force is above this, over the mean",
+        takes="float",
+        metavar="X",
     )
     contact_tolerance: float = option(
         default=0.0,
@@ -208,7 +215,6 @@ class Settings(WindowSettings):
         help="Of contacts by geometry, relative: contact if distance < (r1 + r2)(1 + X).",
         meaning="relative tolerance of contacts by geometry",
         takes="float",
-        kind=float,
         metavar="X",
     )
     axis: Axis = option(
@@ -220,6 +226,16 @@ class Settings(WindowSettings):
         takes="str or three floats",
         metavar="x|y|z|X,Y,Z",
         choices=lambda: AXES,
+    )
+    with_: tuple[str, ...] = option(
+        parse=parse_groups,
+        group="fabric",
+        help="More columns: forces (with branches, strong and weak contacts), state (void ratio, "
+        "stress, fabric against stress), invariants, harmonics; several: forces,state.",
+        meaning="groups of further columns",
+        takes="str or sequence of str",
+        metavar="GROUP,...",
+        choices=lambda: GROUP_NAMES,
     )
     strain: str = option(
         default="auto",
@@ -248,7 +264,6 @@ class Settings(WindowSettings):
         help="Seed of the random numbers.",
         meaning="of the random numbers; the same seed repeats the same numbers",
         takes="int",
-        kind=int,
         metavar="N",
     )
     workers: int = option(
@@ -256,7 +271,6 @@ class Settings(WindowSettings):
         group="scan",
         help="Parallel workers (default: all cores).",
         takes="int",
-        kind=int,
         metavar="N",
         first=True,
     )
@@ -283,11 +297,15 @@ class Settings(WindowSettings):
     @property
     def more_columns(self) -> tuple[str, ...]:
         """Columns that the table has because these settings ask for more than the default."""
+        # to print the help of a command needs no fabric
+        from scanfab.fabric.registry import GROUPS
+
         shaped = self.rv_shape != "sphere" or self.rv_follows != "none"
         several = len(self.rvs) > 1
         of_window = {RV_COLUMN.name: several, "window_alpha_vs_axial": shaped}
         columns = [name for name, asked in of_window.items() if asked and self.needs_window]
-        return (*columns, *(one.name for one in EDGE_COLUMNS if self.edge != CLIP))
+        columns += [one.name for one in EDGE_COLUMNS if self.edge != CLIP]
+        return (*columns, *(one.name for group in self.with_ for one in GROUPS[group].columns))
 
     def __repr__(self) -> str:
         usual = Settings()

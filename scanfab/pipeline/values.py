@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AXES",
+    "GROUP_NAMES",
     "STRAIN_MODES",
     "Axis",
     "Length",
@@ -34,6 +35,7 @@ __all__ = [
     "parse_cutoffs",
     "parse_directions",
     "parse_frames",
+    "parse_groups",
     "parse_length",
     "parse_lengths",
     "parse_rattlers",
@@ -50,6 +52,8 @@ __all__ = [
 Vector = tuple[float, float, float]
 STRAIN_MODES = ("auto", "cell", "boundary", "grains")
 MOST_CUTOFFS = 1000
+# of further columns, in their order in the table
+GROUP_NAMES = ("invariants", "state", "forces", "harmonics")
 
 
 class Axis(NamedTuple):
@@ -194,6 +198,16 @@ def parse_variants(name: str, letters: object) -> str:
     if not isinstance(letters, str) or not letters or not set(letters) <= set("abcd"):
         raise unusable(name, "letters out of abcd", letters)
     return "".join(variant for variant in "abcd" if variant in letters)
+
+
+def parse_groups(name: str, groups: Any) -> tuple[str, ...]:
+    """Groups of columns, in a text between commas or blanks; each once, in the table's order."""
+    given = groups.replace(",", " ").split() if isinstance(groups, str) else groups
+    words = tuple(given) if isinstance(given, Iterable) else () if given is None else (given,)
+    for word in words:
+        if word not in GROUP_NAMES:
+            raise unusable(name, f"groups of columns out of {', '.join(GROUP_NAMES)}", word)
+    return tuple(group for group in GROUP_NAMES if group in words)
 
 
 def parse_vector(name: str, values: Any) -> Vector:

@@ -61,6 +61,12 @@ class Curve:
     """alpha_c, dimensionless."""
     angle: FloatArray
     """Between both major axes, degrees."""
+    rows: Rows
+    """What it is made of."""
+
+    def values(self, name: str) -> FloatArray:
+        """Any column; NaN where there is no number."""
+        return _array([number_of(row, name) for row in self.rows])
 
 
 def curves_of(rows: Iterable[Mapping[str, Any]]) -> list[Curve]:
@@ -135,6 +141,7 @@ def _curve(source: str, variant: str, group: Rows, abscissa: str | None) -> Curv
         void_intensity=column("alpha_vs"),
         contact_intensity=column("alpha_c"),
         angle=column("coaxiality_deg"),
+        rows=group,
     )
 
 

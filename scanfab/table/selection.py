@@ -21,7 +21,7 @@ Rows = list[dict[str, Any]]
 
 NEEDED = ("source", "frame", "strain", "variant", "alpha_vs_axial", "alpha_c_axial")
 NAMES = ("source", "variant")
-NUMBERS = tuple(one.name for one in (*OWN_COLUMNS, *MORE_COLUMNS) if one.kind is not str)
+NUMBERS = tuple(one.name for one in (*OWN_COLUMNS, *MORE_COLUMNS) if one.kind in (int, float))
 # columns that no fabric table has, and the table that they give away
 OTHER_TABLES = {
     ("alpha_vs_axial_norm", "alpha_c_axial_norm"): "a table of scanfab compare",

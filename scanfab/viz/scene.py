@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -32,7 +33,7 @@ LINE_ANGLE = 30.0
 
 @dataclass(frozen=True, eq=False)
 class Grains:
-    """All particles of a frame, N rows; lengths in the dump's unit."""
+    """All particles of a frame, N rows (of clumps, each sphere); lengths in the dump's unit."""
 
     position: FloatArray
     radius: FloatArray
@@ -42,7 +43,16 @@ class Grains:
     rattler: BoolArray
     boundary: BoolArray
     in_window: BoolArray
-    """Whether the centre lies in the RV; false for all without an RV."""
+    """Whether the grain's centre lies in the RV; false for all without an RV."""
+    to_place: FloatArray | None = None
+    """From each sphere to the place of its body, shape (N, 3); None if each is one of its own."""
+    body: IntArray | None = None
+    """Number of each sphere's body, negative for one of its own; None if all are."""
+
+    @property
+    def places(self) -> FloatArray:
+        """Where the grains are: for each sphere, the place of the body that it is a part of."""
+        return self.position if self.to_place is None else self.position + self.to_place
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,24 +106,24 @@ def about_window(scene: Scene) -> Scene:
     """
     A periodic frame with every grain at its image next to the RV's centre.
 
-    Else an RV near a face, or in a cell that is sheared, would be seen in pieces. Further images
-    that reach into the RV are there too.
+    Else an RV near a face, or in a cell that is sheared, would be seen in pieces, and so would be a
+    clump. Further images that reach into the RV are there too.
     """
     cell, grains = scene.cell, scene.grains
     if cell is None or scene.window is None:
         return scene
     branch = grains.position - scene.center
-    nearest = branch + cell.nearest_image(branch) @ cell.vectors
+    nearest = branch + cell.nearest_image(grains.places - scene.center) @ cell.vectors
     images, row = cell.images_near_origin(branch, grains.radius + scene.window.reach)
     other = np.linalg.norm(images - nearest[row], axis=1) > 1e-6 * grains.radius[row]
     rows = np.concatenate([np.arange(len(nearest)), row[other]])
     position = np.concatenate([nearest, images[other]]) + scene.center
-    shown = {
-        name: getattr(grains, name)[rows]
-        for name in ("radius", "id", "contacts", "rattler", "boundary", "in_window")
-    }
-    shown["in_window"] = scene.window.contains(position - scene.center)
-    return replace(scene, grains=Grains(position=position, **shown))
+    values = {one.name: getattr(grains, one.name) for one in fields(grains)}
+    shown: dict[str, Any] = {name: of if of is None else of[rows] for name, of in values.items()}
+    shown["position"] = position
+    moved = Grains(**shown)
+    moved.in_window[:] = scene.window.contains(moved.places - scene.center)
+    return replace(scene, grains=moved)
 
 
 def section_lines(scene: Scene, axis: npt.ArrayLike) -> Segments:
@@ -149,7 +159,8 @@ def section_lines(scene: Scene, axis: npt.ArrayLike) -> Segments:
 
 def grains_of(sample: Sample, window: Window | None) -> Grains:
     """The particles of a frame, with what the sample knows of them."""
-    packing = sample.packing
+    packing, bodies = sample.packing, sample.packing.bodies
+    places = packing.position if bodies is None else bodies.place
     return Grains(
         position=packing.position,
         radius=packing.radius,
@@ -157,7 +168,9 @@ def grains_of(sample: Sample, window: Window | None) -> Grains:
         contacts=sample.contact_numbers,
         rattler=sample.rattlers,
         boundary=sample.boundary,
-        in_window=_inside(packing.position, sample, window),
+        in_window=_inside(places, sample, window),
+        to_place=None if bodies is None else bodies.to_place(packing.position, packing.cell),
+        body=None if bodies is None else bodies.number,
     )
 
 

@@ -48,6 +48,8 @@ def grain_mesh(grains: Grains) -> Any:
             "in_window": grains.in_window.astype(np.uint8),
         },
     )
+    if grains.body is not None:
+        _add(mesh.point_data, {"body": grains.body})
     return mesh
 
 

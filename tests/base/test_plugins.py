@@ -51,7 +51,7 @@ def test_one_name_twice_is_an_error_that_names_both_packages(offered):
 @pytest.mark.parametrize(
     ("group", "installed", "rest"),
     [
-        ("scanfab.rattlers", rattlers.installed_rules, ["count", "recursive"]),
+        ("scanfab.rattlers", rattlers.installed_rules, ["count", "force", "recursive"]),
         ("scanfab.table_formats", formats._foreign_formats, []),
         ("scanfab.fabrics", installed_fabrics, []),
     ],

@@ -11,7 +11,8 @@ from tests.helpers.dumps import cubic_rows, dump_text, pairs_text, write
 
 KEYS = (
     "source frame step time format grains boundary radius_min radius_max contacts contacts_from "
-    "rattlers coordination cell periodic columns warnings low high rv_center rv_radius rv_shape"
+    "rattlers coordination cell periodic columns warnings low high rv_center rv_radius rv_shape "
+    "clumps spheres"
 )
 
 

@@ -54,18 +54,54 @@ def test_sound_samples_raise_no_doubt(path):
     assert doubts_of(sample) == []
 
 
-@pytest.mark.parametrize(
-    ("name", "message"),
-    [
-        ("clumps.xml.bz2", "the column clumpId names 30 clumps of 60 spheres"),
-        ("clumps_spheres.0.vtu", "the column clumpId names 30 clumps of 60 spheres"),
-        ("multisphere_2.txt", "the column mol names 40 clumps of 80 spheres"),
-    ],
-)
-def test_clumps_are_named(name, message):
-    (doubt,) = [one.text for one in doubts_of(read(CLUMPS / name)) if one.code == "clumps"]
-    assert doubt.startswith(message)
-    assert "rattlers" in doubt
+@pytest.mark.parametrize("name", ["clumps.xml.bz2", "clumps_spheres.0.vtu", "multisphere_2.txt"])
+def test_clumps_that_are_read_as_bodies_raise_no_doubt(name):
+    codes = [one.code for one in doubts_of(read(CLUMPS / name))]
+    assert "clumps" not in codes
+    assert "spread_bodies" not in codes
+
+
+def test_molecules_that_may_be_clumps_are_named():
+    """They are never taken unasked: a program may number bonded spheres by them."""
+    packing = scanfab.read(CLUMPS / "multisphere_2.txt", bodies="id")
+    doubts = {one.code: one.text for one in doubts_of(sample_of(packing))}
+    assert doubts["clumps"].startswith("the column mol names 40 clumps of 80 spheres, but each ")
+    assert '`bodies="mol"`' in doubts["clumps"]
+
+
+def clumps_in_a_row(count, **options):
+    """Pairs of spheres in a row of 10 diameters and more, the last one through the face."""
+    position = np.zeros((2 * count, 3))
+    position[:, 0] = np.repeat(np.arange(count), 2) * 4.0 + np.tile([0.0, 1.5], count)
+    length = 4.0 * count
+    position[:, 0] = (position[:, 0] + 3.0) % length
+    return Packing(position, 1.0, bodies=np.repeat(np.arange(count), 2), **options)
+
+
+def test_bodies_that_a_periodic_face_cuts_are_told_without_the_cell():
+    whole = clumps_in_a_row(12, cell=Cell([48.0, 10.0, 10.0]))
+    assert "spread_bodies" not in [one.code for one in doubts_of(sample_of(whole))]
+    doubts = {one.code: one.text for one in doubts_of(sample_of(clumps_in_a_row(12)))}
+    text = doubts["spread_bodies"]
+    assert text.startswith("1 body of several spheres, such as number 11, reach")
+    assert "name its cell (`cell`, `periodic`)" in text
+
+
+def test_numbers_that_spheres_all_over_the_sample_share_are_told(loose):
+    for cell in (None, Cell([0.035, 0.035, 0.035])):
+        number = np.arange(len(loose)) % 2
+        packing = Packing(loose.position, loose.radius, bodies=number, cell=cell)
+        doubts = {one.code: one.text for one in doubts_of(sample_of(packing))}
+        assert "2 bodies of several spheres, such as number 0" in doubts["spread_bodies"]
+
+
+def test_bodies_that_span_a_thin_sample_raise_no_doubt():
+    """A layer one clump high."""
+    steps = np.arange(16.0)
+    base = np.column_stack([4 * (steps % 4), 4 * (steps // 4), 0 * steps])
+    position = np.vstack([base, base + np.array([0, 0, 1.5])])
+    packing = Packing(position, 1.0, bodies=np.tile(np.arange(16), 2))
+    assert "spread_bodies" not in [one.code for one in doubts_of(sample_of(packing))]
 
 
 @pytest.mark.parametrize(

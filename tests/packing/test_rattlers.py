@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scanfab import Cell, Packing, PackingError, find_contacts
-from scanfab.packing.rattlers import count, installed_rules, recursive
+from scanfab import Cell, ContactList, Packing, PackingError, ReadError, find_contacts
+from scanfab.packing.rattlers import count, force, installed_rules, recursive
 from scanfab.packing.sample import Sample
 from tests.helpers import naive
 from tests.helpers.lattices import shaken_cubic
@@ -29,7 +29,7 @@ def found(sample):
 
 
 def test_both_are_found_by_name_where_those_of_others_are():
-    assert installed_rules() == {"count": count, "recursive": recursive}
+    assert installed_rules() == {"count": count, "recursive": recursive, "force": force}
 
 
 def test_a_row_falls_apart_from_its_ends():
@@ -113,3 +113,56 @@ def test_a_rule_that_gives_something_else_is_an_error():
     sample = network(row(4), 4, rule=lambda touching: np.array([0, 3]))
     with pytest.raises(PackingError, match=r"rattlers: expected shape \(4\), found \(2,\)"):
         _ = sample.rattlers
+
+
+def pressed(forces, *, least=2, min_force=0.0, walls=None):
+    """Five grains in a row, with these normal forces between them, compression positive."""
+    position = np.zeros((5, 3))
+    position[:, 0] = 1.9 * np.arange(5)
+    listed = ContactList(row(5), force=np.outer(forces, [1.0, 0, 0]))
+    packing = Packing(position, 1.0, contacts=listed, wall_contacts=walls)
+    return found(Sample(packing, np.zeros(5, bool), least, force, min_force))
+
+
+@pytest.mark.parametrize(
+    ("forces", "min_force", "expected"),
+    [
+        ([1, 1, 1, 1], 0.0, [0, 4]),
+        ([1, 0, 1, 1], 0.0, [0, 1, 2, 4]),
+        ([1, 1, -1, 1], 0.0, [0, 2, 3, 4]),
+        ([4, 4, 1, 3], 0.3, [0, 4]),
+        ([4, 4, 1, 3], 1 / 3, [0, 2, 3, 4]),  # the mean is 3: at the limit is not above it
+        ([4, 4, 1, 3], 1.0, [0, 2, 3, 4]),
+        ([0, 0, 0, 0], 0.0, [0, 1, 2, 3, 4]),
+    ],
+)
+def test_by_force_contacts_count_that_press(forces, min_force, expected):
+    assert pressed(forces, min_force=min_force) == expected
+
+
+def test_by_force_walls_count_and_it_is_one_pass():
+    """The grain in the middle stays, though both that hold it go."""
+    assert pressed([0, 1, 1, 0], walls=[1, 0, 0, 0, 2]) == [0, 1, 3]
+
+
+@pytest.mark.parametrize(
+    ("weak", "expected"), [(0, [2, 3, 4]), (1, [2, 3, 4]), (2, [0, 1, 2, 3, 4])]
+)
+def test_by_force_a_clump_has_the_neighbours_that_press_on_any_of_its_spheres(weak, expected):
+    """A clump of two spheres between one of two, which it touches in two points, and a sphere."""
+    position = np.array([[0, 0, 0], [0, 3, 0], [1.9, 0, 0], [1.9, 3, 0], [-1.9, 0, 0]])
+    forces = np.array([[1.0, 0, 0], [1.0, 0, 0], [-1.0, 0, 0]])
+    forces[weak] = 0.0
+    listed = ContactList([[0, 2], [1, 3], [0, 4]], force=forces)
+    packing = Packing(position, 1.0, bodies=[0, 0, 1, 1, 2], contacts=listed)
+    assert found(Sample(packing, np.zeros(5, bool), 2, force)) == expected
+
+
+@pytest.mark.parametrize("contacts", [[[0, 1]], None])
+def test_by_force_contacts_without_forces_are_an_error(contacts):
+    packing = Packing([[0, 0, 0], [1.9, 0, 0]], 1.0, contacts=contacts)
+    packing = packing if contacts else find_contacts(packing)
+    with pytest.raises(
+        ReadError, match=r"needs the forces of the contacts, which are (not in|found)"
+    ):
+        _ = Sample(packing, np.zeros(2, bool), 2, force).rattlers

@@ -254,7 +254,7 @@ def test_one_ladder_is_drawn_on_the_axes_that_it_gets(found):
 
 
 def test_what_looks_wrong_in_the_frame_is_told_here_too(packing):
-    """A grain that flew away, and clumps that are not read as bodies."""
+    """A grain that flew away, and a column that may number clumps."""
     count = len(packing) + 1
     position = np.vstack([packing.position, [90.0, 3.0, 3.0]])
     radius = np.append(packing.radius, 0.5)
@@ -264,7 +264,7 @@ def test_what_looks_wrong_in_the_frame_is_told_here_too(packing):
         calibrate(flown, **{**QUICK, "tolerance": 0.02})
     texts = [str(one.message) for one in told]
     assert any("away from all others" in text for text in texts)
-    assert any("clumps are not read as bodies" in text for text in texts)
+    assert any("but each sphere counts as a grain" in text for text in texts)
 
 
 @pytest.mark.parametrize("many", [list, iter])

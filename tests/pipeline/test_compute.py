@@ -478,8 +478,8 @@ def test_a_boundary_that_a_packing_does_not_have_is_an_error():
         scanfab.compute(packing_of(heap()), boundary="type=3", variants="a", **SCAN)
 
 
-def test_clumps_are_warned_of_once_and_computed(tmp_path):
-    # two grains of a column are one clump
+def test_what_may_be_clumps_is_warned_of_once_and_computed(tmp_path):
+    # two grains of a column are one molecule
     rows = [(*row, 100 * round(row[2]) + 10 * round(row[3]) + round(row[4]) // 2) for row in heap()]
     texts = [dump_text(rows, f"{NAMES} mol", step=k, box=BOX) for k in range(2)]
     series = scanfab.read_series(write(tmp_path / "dump.txt", "".join(texts)))

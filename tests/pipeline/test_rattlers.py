@@ -106,10 +106,12 @@ def test_the_command_line_takes_it_by_name_and_the_manifest_keeps_it(
 
 @pytest.mark.usefixtures("made_up")
 def test_a_rule_that_there_is_not_is_told_with_those_that_there_are():
-    with pytest.raises(SettingsError, match="rattlers: expected count, recursive or untouched, f"):
-        Settings(rattlers="force")
+    with pytest.raises(SettingsError, match="expected count, force, recursive or untouched, f"):
+        Settings(rattlers="pressed")
 
 
 def test_the_made_up_one_is_gone_without_its_package():
-    with pytest.raises(SettingsError, match="expected count or recursive, found 'untouched'"):
+    with pytest.raises(
+        SettingsError, match="expected count, force or recursive, found 'untouched'"
+    ):
         Settings(rattlers="untouched")

@@ -351,7 +351,8 @@ def test_compute_hands_every_option_to_the_settings(monkeypatch):
         "boundary": ("type=2",), "cutoff": "2rmin", "cutoffs": "1,2", "moment": 2,
         "spacing": "1rmean", "directions": direction_rule("9"), "tolerance": 1e-3,
         "max_chords": 1e5, "min_contacts": 3, "rattlers": "recursive",
-        "contact_tolerance": 1e-4, "axis": "x", "strain": "cell",
+        "min_force": 0.1,
+        "contact_tolerance": 1e-4, "axis": "x", "strain": "cell", "with_": "state",
         "frames": "1:2", "seed": 5, "workers": 3, "on_error": "skip",
     }  # fmt: skip
     shaped = {

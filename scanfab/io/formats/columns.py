@@ -13,8 +13,9 @@ import numpy.typing as npt
 from scanfab.base.errors import ReadError
 from scanfab.base.lengths import all_within
 from scanfab.base.typing import FloatArray
+from scanfab.io.formats.superquadrics import refuse_superquadrics
 from scanfab.io.reader import GrainTable, ReadOptions
-from scanfab.packing.bodies import CLUMP_COLUMNS
+from scanfab.packing.bodies import CLUMP_COLUMNS, MOLECULE_COLUMNS
 from scanfab.packing.boundary import CLASS_COLUMNS
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import LazyColumns, lies_within
@@ -67,13 +68,14 @@ def room_for_columns(
         *ID_NAMES,
         *CLASS_COLUMNS,
         *CLUMP_COLUMNS,
+        *MOLECULE_COLUMNS,
     }
     own = options.columns
     id = own.get("id", _first_of(ID_NAMES, names))
     columns: dict[str, npt.NDArray[Any]] = {
         name: np.empty(count, np.int64 if name == id else np.float64)
         for name in names
-        if name.lower() in known or name in own.values()
+        if name.lower() in known or name in own.values() or name == options.bodies
     }
     for system, scaled in POSITION_NAMES:
         found = [_first_of((name,), names) for name in system.split()]
@@ -123,6 +125,7 @@ def grain_table(
     position.flags.writeable = False  # so that the packing need not copy it
     radius = _radius(path, rest, named, len(position), options, where)
     id = named.get("id", _take(rest, ID_NAMES))
+    refuse_superquadrics(path, rest, radius, where)
     return GrainTable(
         position,
         radius,

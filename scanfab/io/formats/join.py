@@ -40,6 +40,7 @@ def join_ids(
     *,
     walls: bool,
     image: IntArray | None = None,
+    force_n: FloatArray | None = None,
 ) -> JoinedContacts:
     """
     Join contacts that name grains by id.
@@ -58,6 +59,8 @@ def join_ids(
         Whether one of the two ids may be a wall's, which is no grain.
     image : ndarray of int, shape (M, 3), optional
         Lattice translation of the second grain, from the positions of the table.
+    force_n : ndarray, shape (M,) or (M, 3), optional
+        Normal force, for files that have no more of the force; see :class:`ContactList`.
 
     Raises
     ------
@@ -69,7 +72,7 @@ def join_ids(
     rows = rows_of_ids(grains, ids)
     return _join(
         path,
-        ContactList(rows, image, force),
+        ContactList(rows, image, force, force_n=force_n),
         walls,
         lambda contact, end: f"names the grain {ids[contact, end]}",
         len(grains.radius),
@@ -77,7 +80,11 @@ def join_ids(
 
 
 def join_positions(
-    path: Path, grains: GrainTable, ends: FloatArray, force: FloatArray | None
+    path: Path,
+    grains: GrainTable,
+    ends: FloatArray,
+    force: FloatArray | None,
+    force_n: FloatArray | None = None,
 ) -> JoinedContacts:
     """
     Join contacts that are lines between centres; an end where no grain is belongs to a wall.
@@ -92,6 +99,8 @@ def join_positions(
         Both centres, dump's length unit.
     force : ndarray, shape (M, 3), optional
         Force on the second grain.
+    force_n : ndarray, shape (M,) or (M, 3), optional
+        Normal force, for files that have no more of the force; see :class:`ContactList`.
 
     Raises
     ------
@@ -111,7 +120,7 @@ def join_positions(
             _refuse_images(path, grains, rows.reshape(-1, 2), ends)
     return _join(
         path,
-        ContactList(rows.reshape(-1, 2), force=force),
+        ContactList(rows.reshape(-1, 2), force=force, force_n=force_n),
         True,
         lambda contact, end: f"ends at {ends[contact, end].tolist()}, where no grain is",
         len(grains.radius),
@@ -192,8 +201,9 @@ def _join(
         )
     both = ~unknown.any(axis=1)
     with_wall = rows[~both].max(axis=1)
-    image, force = (
+    image, force, force_n = (
         None if values is None else np.asarray(values)[both]
-        for values in (listed.image, listed.force)
+        for values in (listed.image, listed.force, listed.force_n)
     )
-    return JoinedContacts(ContactList(rows[both], image, force), count_walls(with_wall, count))
+    kept = ContactList(rows[both], image, force, force_n=force_n)
+    return JoinedContacts(kept, count_walls(with_wall, count))

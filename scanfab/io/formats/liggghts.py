@@ -18,7 +18,7 @@ from scanfab.io.files import first_bytes
 from scanfab.io.formats.dump_grains import dump_kind, read_dump_grains
 from scanfab.io.formats.ids import MOST_ROWS, are_ids, are_whole, refuse_rounded_ids
 from scanfab.io.formats.join import count_walls, join_ids, rows_of_ids
-from scanfab.io.formats.vtk import VtkReader
+from scanfab.io.formats.vtk import VtkReader, vectors
 from scanfab.io.parse.text_dump import DumpBlock, index_dump, read_block, row_word
 from scanfab.io.parse.vtk_mesh import Mesh
 from scanfab.io.reader import (
@@ -60,8 +60,16 @@ class LiggghtsVtkReader(VtkReader):
     walls = False
 
     def force_on_second(self, mesh: Mesh) -> FloatArray | None:
-        """The file has the force on the first grain."""
-        force = mesh.line_arrays.get("force")
+        """The file has the force on the first grain, at times its normal and tangential part."""
+        force = vectors(mesh, "force")
+        normal, tangential = vectors(mesh, "force_normal"), vectors(mesh, "force_tangential")
+        if force is None and normal is not None and tangential is not None:
+            force = normal + tangential
+        return None if force is None else -force
+
+    def normal_force(self, mesh: Mesh) -> FloatArray | None:
+        """The normal part acts on the first grain, too."""
+        force = vectors(mesh, "force_normal")
         return None if force is None else -force
 
 
@@ -127,10 +135,12 @@ class LiggghtsReader:
         if grains.id is None:
             raise ReadError(f"{path}: names grains by id, but the grain file has no ids")
         refuse_rounded_ids(path, block.values, grains)
-        place, force = _given_places(path, options.contact_columns, block)
+        places = _given_places(path, options.contact_columns, block)
+        place = places.get("id")
         if place is None:
             place = _pair_column(block.values, grains)
-            force = None if place is None else _force_column(block.values, place, grains)
+            if place is not None and _pushes(block.values, place, grains):
+                places = {"force": place + 3}
             wall = _wall_column(block.values, grains) if place is None else None
             if wall is not None:
                 return JoinedContacts(None, _wall_contacts(path, block.values[:, wall], grains))
@@ -145,9 +155,8 @@ class LiggghtsReader:
         if not (are_whole(listed) and np.all(np.abs(listed) < 2.0**53)):
             raise ReadError(f"{path}: expected ids in the columns {place + 1} and {place + 2}")
         ids = listed.astype(np.int64)
-        # the file has the force on the first grain
-        on_second = None if force is None else -block.values[:, force : force + 3]
-        return join_ids(path, grains, ids, on_second, walls=False)
+        force, force_n = _forces(block.values, places)
+        return join_ids(path, grains, ids, force, walls=False, force_n=force_n)
 
 
 def _is_text(head: bytes) -> bool:
@@ -156,12 +165,10 @@ def _is_text(head: bytes) -> bool:
     return is_long or row_word(head) is not None
 
 
-def _given_places(
-    path: Path, keywords: str | None, block: DumpBlock
-) -> tuple[int | None, int | None]:
-    """First column of the ids and of the force, from the keywords of the compute."""
+def _given_places(path: Path, keywords: str | None, block: DumpBlock) -> dict[str, int]:
+    """The first column of each keyword of the compute; empty if they are not given."""
     if keywords is None:
-        return None, None
+        return {}
     words = keywords.split()
     sizes = dict(PAIR_VALUES)
     for word in words:
@@ -185,7 +192,20 @@ def _given_places(
             f"{path}: `contact_columns={keywords!r}` makes {place} columns, the file has "
             f"{block.values.shape[1]}"
         )
-    return places["id"], places.get("force")
+    return places
+
+
+def _forces(
+    values: FloatArray, places: dict[str, int]
+) -> tuple[FloatArray | None, FloatArray | None]:
+    """The force on the second grain and its normal part, where the file has those on the first."""
+    force, normal, tangential = (
+        -values[:, places[name] : places[name] + 3] if name in places else None
+        for name in ("force", "force_normal", "force_tangential")
+    )
+    if force is None and normal is not None and tangential is not None:
+        force = normal + tangential
+    return force, normal
 
 
 def _pair_column(values: FloatArray, grains: GrainTable) -> int | None:
@@ -202,18 +222,18 @@ def _pair_column(values: FloatArray, grains: GrainTable) -> int | None:
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def _force_column(values: FloatArray, place: int, grains: GrainTable) -> int | None:
-    """The three columns behind the periodic flag, if they push the first grain off the second."""
+def _pushes(values: FloatArray, place: int, grains: GrainTable) -> bool:
+    """Whether the three columns behind the periodic flag push the first grain off the second."""
     force = values[:, place + 3 : place + 6]
     if force.shape[1] < 3:
-        return None
+        return False
     first, second = rows_of_ids(grains, values[:, place : place + 2]).T
     branch = grains.position[second] - grains.position[first]
     if grains.cell is not None:
         branch = branch + grains.cell.nearest_image(branch) @ grains.cell.vectors
     pushed = np.sum(force * branch, axis=1) < 0
     # damping makes the force of a few contacts attractive
-    return place + 3 if pushed.mean() > 0.9 else None
+    return bool(pushed.mean() > 0.9)
 
 
 @np.errstate(over="ignore", invalid="ignore")

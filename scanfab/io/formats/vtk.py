@@ -27,7 +27,7 @@ from scanfab.io.reader import (
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import ContactList
 
-__all__ = ["VtkReader"]
+__all__ = ["VtkReader", "vectors"]
 
 
 # other kinds of VTK files are grids and indexes of files
@@ -85,20 +85,21 @@ class VtkReader:
         if len(mesh.lines) == 0:
             return grains
         # lines between the grains' own points
-        return grains._replace(contacts=ContactList(mesh.lines, force=self.force_on_second(mesh)))
+        force, force_n = self.force_on_second(mesh), self.normal_force(mesh)
+        return grains._replace(contacts=ContactList(mesh.lines, force=force, force_n=force_n))
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
     ) -> JoinedContacts:
         """Lines; by the arrays id1 and id2 where grains have ids, else by their ends."""
         mesh = read_mesh(snapshot.path)
-        force = self.force_on_second(mesh)
+        force, force_n = self.force_on_second(mesh), self.normal_force(mesh)
         ids = [mesh.line_arrays.get(name) for name in ("id1", "id2")]
         named = [whole_numbers(snapshot.path, values) for values in ids if values is not None]
         if grains.id is not None and len(named) == 2:
             pairs = np.column_stack(named)
-            return join_ids(snapshot.path, grains, pairs, force, walls=self.walls)
-        return join_positions(snapshot.path, grains, mesh.points[mesh.lines], force)
+            return join_ids(snapshot.path, grains, pairs, force, walls=self.walls, force_n=force_n)
+        return join_positions(snapshot.path, grains, mesh.points[mesh.lines], force, force_n)
 
     def carries(self, path: Path) -> Carries:
         """LIGGGHTS writes a box beside its files; VTK itself has no cell."""
@@ -134,6 +135,18 @@ class VtkReader:
     def force_on_second(self, mesh: Mesh) -> FloatArray | None:
         """Force on the second grain, shape (M, 3); None: which one it acts on is not known."""
         return None
+
+    def normal_force(self, mesh: Mesh) -> FloatArray | None:
+        """The normal part: shape (M,), compression positive, or (M, 3), on the second grain."""
+        return None
+
+
+def vectors(mesh: Mesh, name: str) -> FloatArray | None:
+    """An array of the lines that holds a vector for each, shape (M, 3); None without it."""
+    values = mesh.line_arrays.get(name)
+    if values is None or values.shape != (len(mesh.lines), 3):
+        return None
+    return np.asarray(values, dtype=np.float64)
 
 
 def _last_number(path: Path) -> int | None:

@@ -15,7 +15,7 @@ from scanfab.base.lengths import MOST
 from scanfab.base.typing import FloatArray
 from scanfab.io.files import check_memory, first_bytes, plain
 from scanfab.io.formats.columns import grain_table
-from scanfab.io.formats.vtk import VtkReader
+from scanfab.io.formats.vtk import VtkReader, vectors
 from scanfab.io.formats.yade_save import is_binary_save, is_save, read_save, snapshot_of_save
 from scanfab.io.parse.number_rows import rows_of_numbers
 from scanfab.io.parse.vtk_mesh import Mesh
@@ -106,14 +106,18 @@ class YadeReader(VtkReader):
 
     def force_on_second(self, mesh: Mesh) -> FloatArray | None:
         """YADE's forces act on the second body."""
-        arrays = mesh.line_arrays
-        names = ["force"]
-        if "normalForce" in arrays and "shearForce" in arrays:
-            names = ["normalForce", "shearForce"]
-        forces = [arrays.get(name, np.zeros(0)) for name in names]
-        if any(force.shape != (len(mesh.lines), 3) for force in forces):
-            return None
-        return np.asarray(sum(forces), dtype=np.float64)
+        normal, shear = vectors(mesh, "normalForce"), vectors(mesh, "shearForce")
+        if normal is None or shear is None:
+            return vectors(mesh, "force")
+        return normal + shear
+
+    def normal_force(self, mesh: Mesh) -> FloatArray | None:
+        """A vector on the second body, or what VTKRecorder writes beside absolute values."""
+        force = vectors(mesh, "normalForce")
+        if force is not None:
+            return force
+        recorded = mesh.line_arrays.get("forceN")
+        return recorded if recorded is not None and recorded.shape == (len(mesh.lines),) else None
 
 
 def _is_text(path: Path) -> bool:

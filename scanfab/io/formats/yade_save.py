@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -11,7 +12,7 @@ from typing import IO, Any
 
 import numpy as np
 
-from scanfab.base.errors import PackingError, ReadError
+from scanfab.base.errors import PackingError, ReadError, ScanfabWarning
 from scanfab.base.lengths import MOST
 from scanfab.io.files import first_bytes, unpacked
 from scanfab.io.formats.columns import grain_table, whole_numbers
@@ -86,6 +87,13 @@ def read_save(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
     # contacts of walls with walls are not ours
     ours = np.isin(pairs, scene.ids).any(axis=1)
     force = None
+    if 0 < len(scene.forces) < len(pairs):
+        lacking = f"{len(pairs) - len(scene.forces)} of {len(pairs)} contacts"
+        warnings.warn(
+            f"{path}: {lacking} have no normalForce and shearForce: all forces are left out",
+            ScanfabWarning,
+            stacklevel=2,
+        )
     if len(scene.forces) == len(pairs):
         force = np.array(scene.forces, dtype=np.float64).reshape(-1, 3)[ours]
     if grains.cell is None or not grains.cell.is_periodic:

@@ -74,12 +74,12 @@ def _facts(look: Look, settings: Settings) -> list[tuple[str, str]]:
     first, plan = look.first, look.plan
     if first is None:
         return []
-    radii = first.packing.radius[first.grains]
+    radii, boundary = first.packing.radius[first.grains], first.number(first.boundary)
     smallest = float(radii.min())
     facts = [
-        ("grains", f"{int(first.grains.sum())} in the first frame that has grains"),
+        ("grains", f"{first.number(first.grains)} in the first frame that has grains"),
         ("radii", f"smallest {smallest:.4g}, mean {radii.mean():.4g}, largest {radii.max():.4g}"),
-        ("boundary", f"{int(first.boundary.sum())} particles" if first.boundary.any() else "none"),
+        ("boundary", f"{boundary} particles" if boundary else "none"),
         ("cell", _cell(look)),
         ("loading axis", _axis(settings)),
     ]

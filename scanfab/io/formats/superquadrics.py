@@ -1,0 +1,60 @@
+"""Superquadrics in the columns of a dump: refused, as lines would meet their bounding spheres."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.base.errors import ReadError
+from scanfab.base.typing import FloatArray
+
+__all__ = ["refuse_superquadrics"]
+
+# LIGGGHTS' names, the newer and the older: half axes, and exponents
+HALF_AXES = ("shapex", "shapey", "shapez")
+EXPONENTS = ("blockiness1", "blockiness2", "roundness1", "roundness2")
+# a superquadric of these exponents and of equal half axes is a sphere
+ROUND = 2.0
+# relative, of numbers that are written with six digits
+ROUNDING = 1e-5
+
+
+def refuse_superquadrics(
+    path: Path, columns: Mapping[str, npt.NDArray[Any]], radius: FloatArray, where: str = ""
+) -> None:
+    """
+    Make sure that all particles are spheres.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    columns : mapping of str to ndarray
+        All columns by the dump's names, N rows each.
+    radius : ndarray, shape (N,)
+        Of a superquadric that of the sphere around it, dump's length unit.
+    where : str, optional
+        For messages, such as ``", step 100"``.
+
+    Raises
+    ------
+    ReadError
+        If one is not.
+    """
+    names = {name.lower(): name for name in columns}
+    expected = dict.fromkeys(HALF_AXES, radius) | dict.fromkeys(EXPONENTS, ROUND)
+    for known, value in expected.items():
+        if known not in names:
+            continue
+        off = np.abs(columns[names[known]] - value) > ROUNDING * np.abs(value)
+        if off.any():
+            raise ReadError(
+                f"{path}{where}: {np.count_nonzero(off)} of {len(radius)} particles are "
+                f"superquadrics (by the column {names[known]}), whose radius is that of the sphere "
+                f"around them: scanfab measures spheres, and clumps of spheres; fill them with "
+                f"spheres, and say with `bodies` which of these are one particle"
+            )

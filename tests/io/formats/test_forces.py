@@ -1,0 +1,162 @@
+"""Forces in the files of the three programs: their signs, by equilibrium and by other files."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import scanfab
+from tests.helpers.dumps import write, yade_lines, yade_spheres
+from tests.helpers.truth import BOX, CELL, SHEAR, YADE, csv_rows
+
+LAMMPS = (
+    "id1=c_ids[1],id2=c_ids[2],fx=c_pair[3],fy=c_pair[4],fz=c_pair[5],"
+    "tx=c_pair[6],ty=c_pair[7],tz=c_pair[8]"
+)
+
+
+def on_each_grain(packing):
+    """The sum of the contact forces on each grain, shape (N, 3)."""
+    contacts, total = packing.contacts, np.zeros((len(packing), 3))
+    np.add.at(total, contacts.pairs[:, 1], contacts.force)
+    np.add.at(total, contacts.pairs[:, 0], -contacts.force)
+    return total
+
+
+def test_forces_of_liggghts_add_up_to_those_it_dumps():
+    """
+    With the columns fx fy fz, of grains that touch no wall.
+
+    The list is from just before the step whose forces are dumped, so some contacts differ a little.
+    """
+    files = [BOX / f"{name}_120000.txt.gz" for name in ("dump", "contacts", "walls")]
+    packing = scanfab.read_series(files)[0].read()
+    dumped = np.column_stack([packing.columns[f"f{axis}"] for axis in "xyz"])
+    off = np.abs(on_each_grain(packing) - dumped).max(axis=1)[packing.wall_contacts == 0]
+    assert np.median(np.abs(dumped)) > 10 * np.median(off)
+    assert np.mean(off < 1e-6) > 0.6
+    assert off.max() < 0.003 * np.abs(packing.contacts.force).max()
+
+
+def test_a_heap_of_yade_stands_still():
+    """Contacts with grains (saved) and walls (YADE's own list) carry the weight of each grain."""
+    packing = scanfab.read(YADE / "formats.xml.bz2")
+    walls = csv_rows(YADE / "truth_walls.csv")
+    total = on_each_grain(packing)
+    rows = np.searchsorted(packing.id, walls["sphere"])
+    np.add.at(total, rows, np.column_stack([walls[f"f{axis}"] for axis in "xyz"]))
+    np.testing.assert_allclose(total[:, :2], 0.0, atol=1e-10)
+    density = total[:, 2] / (4 / 3 * np.pi * packing.radius**3 * 9.81)
+    nearest = np.where(density < 2000, 1500.0, 2600.0)
+    np.testing.assert_allclose(density, nearest, rtol=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("grains", "options"),
+    [
+        (CELL / "dump_30000.txt.gz", {"contacts": CELL / "contacts_30000.txt.gz"}),
+        (
+            SHEAR / "shear.0.lammpstrj.gz",
+            {"contacts": SHEAR / "pairs.0.local.gz", "contact_columns": LAMMPS},
+        ),
+        (YADE / "periodic.xml.bz2", {}),
+    ],
+)
+def test_grains_at_rest_in_periodic_cells_are_in_equilibrium(grains, options):
+    packing = scanfab.read(grains, **options)
+    crossing = np.any(packing.contacts.image != 0, axis=1)
+    assert crossing.sum() >= 80
+    rest = np.linalg.norm(on_each_grain(packing), axis=1)
+    assert np.median(rest) < 0.02 * np.mean(np.linalg.norm(packing.contacts.force, axis=1))
+    assert np.mean(packing.contacts.force_n > 0) > 0.95
+
+
+@pytest.mark.parametrize("name", ["ascii_intrs.30000.vtp", "zlib_intrs.30000.vtp"])
+def test_the_recorder_of_yade_has_the_normal_force(name):
+    packing = scanfab.read(YADE / "zlib_spheres.30000.vtu", contacts=YADE / name)
+    assert packing.contacts.force is None
+    same_normal_forces(packing, scanfab.read(YADE / "formats.xml.bz2"), 1e-6)
+
+
+def test_a_normal_force_of_yade_alone_is_kept():
+    packing = scanfab.read(
+        YADE / "id-spheres-00000000.vtk.gz", contacts=YADE / "id-intrs-00000000.vtk.gz"
+    )
+    same_normal_forces(packing, scanfab.read(YADE / "formats.xml.bz2"), 1e-5)
+
+
+def same_normal_forces(packing, other, rtol):
+    found, expected = (
+        {
+            tuple(sorted(pair)): force
+            for pair, force in zip(
+                one.id[one.contacts.pairs].tolist(), one.contacts.force_n, strict=True
+            )
+        }
+        for one in (packing, other)
+    )
+    assert found.keys() == expected.keys()
+    scale = np.mean(list(expected.values()))
+    for pair, force in expected.items():
+        assert found[pair] == pytest.approx(force, rel=20 * rtol, abs=rtol * scale)
+
+
+def test_parts_of_the_force_of_liggghts_add_up(tmp_path):
+    grains = write(tmp_path / "dump_0.txt", TWO)
+    local = LOCAL.format(columns=names(9), row="1 2 0 -2 0 0 0 3 1")
+    contacts = scanfab.read(
+        grains,
+        contacts=write(tmp_path / "pairs_0.txt", local),
+        contact_columns="id force_normal force_tangential",
+    ).contacts
+    np.testing.assert_array_equal(contacts.force, [[2, -3, -1]])
+    np.testing.assert_array_equal(contacts.force_n, [2])
+
+
+def test_a_normal_part_of_liggghts_alone_is_kept(tmp_path):
+    grains = write(tmp_path / "dump_0.txt", TWO)
+    local = LOCAL.format(columns=names(6), row="1 2 0 -2 0 0")
+    contacts = scanfab.read(
+        grains,
+        contacts=write(tmp_path / "pairs_0.txt", local),
+        contact_columns="id force_normal",
+    ).contacts
+    assert contacts.force is None
+    np.testing.assert_array_equal(contacts.force_n, [2])
+
+
+TWO = """ITEM: TIMESTEP
+0
+ITEM: NUMBER OF ATOMS
+2
+ITEM: BOX BOUNDS ff ff ff
+0 10
+0 10
+0 10
+ITEM: ATOMS id x y z radius
+1 4 5 5 1
+2 5.9 5 5 1
+"""
+LOCAL = """ITEM: TIMESTEP
+0
+ITEM: NUMBER OF ENTRIES
+1
+ITEM: BOX BOUNDS ff ff ff
+0 10
+0 10
+0 10
+ITEM: ENTRIES {columns}
+{row}
+"""
+
+
+def names(count):
+    return " ".join(f"c_p[{place}]" for place in range(1, count + 1))
+
+
+def test_a_file_with_another_number_of_forces_is_refused(tmp_path):
+    position = [[0, 0, 0], [1.9, 0, 0]]
+    spheres = yade_spheres(tmp_path / "a-spheres-0.vtk", position, [1, 1], id=[5, 6])
+    lines = yade_lines(tmp_path / "a-intrs-0.vtk", [position], {"force": [[2, 0, 0]] * 2})
+    with pytest.raises(scanfab.ScanfabError, match=r"a-intrs-0\.vtk"):
+        scanfab.read(spheres, contacts=lines)

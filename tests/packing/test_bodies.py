@@ -1,0 +1,256 @@
+"""Clumps: which spheres are one grain, what touches it, where it is; a twin that tries it all."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scanfab import Cell, ContactList, Packing, PackingError, find_contacts, sphere
+from scanfab.packing.bodies import bodies_of
+from scanfab.packing.rattlers import recursive
+from scanfab.packing.sample import VARIANTS, Sample
+from scanfab.packing.window import Window
+from tests.helpers import naive
+from tests.helpers.naive_bodies import NaiveBodies
+
+A, B, C, D = (VARIANTS[name] for name in "abcd")
+
+
+def grains(position, number, radius=1.0, *, boundary=(), walls=None, rule=None, **options):
+    """Spheres that are put together, with their contacts by geometry."""
+    packing = Packing(position, radius, bodies=number, wall_contacts=walls, **options)
+    chosen = np.isin(np.arange(len(packing)), boundary)
+    return Sample(
+        find_contacts(packing), chosen, **({} if rule is None else {"rattler_rule": rule})
+    )
+
+
+def row_of(*x):
+    return np.column_stack([x, np.zeros(len(x)), np.zeros(len(x))])
+
+
+def test_bodies_of_one_sphere_each_are_no_bodies():
+    packing = Packing(row_of(0, 1, 2), 1.0, bodies=[7, 3, -1])
+    assert packing.bodies is None
+    assert len(find_contacts(packing).contacts) == 2
+
+
+def test_two_far_spheres_are_one_grain():
+    sample = grains(row_of(0, 10, 1.5, 8.5), [5, 5, -1, -1])
+    assert sample.number(sample.grains) == 3
+    assert sample.contact_numbers.tolist() == [2, 2, 1, 1]
+    assert sample.rattlers.tolist() == [False, False, True, True]
+    assert sample.coordination(A, None) == pytest.approx(4 / 3)
+    assert sample.packing.bodies.place[:, 0].tolist() == [5, 5, 1.5, 8.5]
+
+
+@pytest.mark.filterwarnings("error")
+def test_ten_spheres_at_one_place_are_one_grain_and_no_warning():
+    """Those that touch another grain at ten points are one neighbour of it."""
+    sample = grains(row_of(*[0] * 10, 1.5), [4] * 10 + [-1])
+    assert sample.number(sample.grains) == 2
+    assert len(sample.contacts) == 10
+    assert sample.contact_numbers.tolist() == [1] * 11
+
+
+def test_a_sphere_in_a_sphere_is_one_grain_whose_inner_one_touches_nothing():
+    sample = grains(row_of(0, 0.2, 1.8), [1, 1, 2], [1.0, 0.5, 1.0])
+    assert sample.contacts.pairs.tolist() == [[0, 2]]
+    assert sample.contact_numbers.tolist() == [1, 1, 1]
+    volume = np.array([1.0, 0.125])
+    assert sample.packing.bodies.place[0, 0] == pytest.approx(0.2 * volume[1] / volume.sum())
+
+
+def test_bodies_that_touch_in_three_points_are_neighbours_once():
+    corners = np.array([[0, 0, 0], [3, 0, 0], [0, 3, 0]], dtype=float)
+    sample = grains(np.vstack([corners, corners + np.array([0, 0, 1.9])]), [0, 0, 0, 1, 1, 1])
+    assert len(sample.contacts) == 3
+    assert sample.fabric_contacts(A, None).sum() == 3
+    assert sample.contact_numbers.tolist() == [1] * 6
+    assert sample.coordination(A, None) == 1.0
+    assert sample.rattlers.all()
+    assert sample.number(sample.rattlers) == 2
+
+
+def test_a_contact_with_a_wall_is_a_neighbour():
+    sample = grains(row_of(0, 3, 5), [0, 0, -1], 1.1, walls=[1, 1, 0])
+    assert sample.contact_numbers.tolist() == [3, 3, 1]
+    assert sample.rattlers.tolist() == [False, False, True]
+
+
+def test_a_rattler_goes_whole_with_the_contacts_of_all_its_spheres():
+    """Bodies in a row, each of two spheres: the ends have one neighbour."""
+    sample = grains(row_of(0, 2.5, 4.4, 7, 8.9, 11), [0, 0, 1, 1, 2, 2])
+    assert sample.rattlers.tolist() == [True, True, False, False, True, True]
+    assert sample.fabric_contacts(B, None).sum() == 0
+    assert sample.coordination(B, None) == 0.0
+    assert sample.contact_numbers_without_rattlers[2:4].tolist() == [0, 0]
+
+
+def test_recursion_takes_bodies_off_one_after_the_other():
+    row = [0, 2.5, 4.4, 7, 8.9, 11]
+    assert grains(row_of(*row), [0, 0, 1, 1, 2, 2], rule=recursive).rattlers.all()
+    held = grains(row_of(*row), [0, 0, 1, 1, 2, 2], rule=recursive, walls=[1, 0, 0, 0, 0, 1])
+    assert not held.rattlers.any()
+
+
+def test_a_body_is_boundary_if_one_of_its_spheres_is():
+    sample = grains(row_of(0, 2.5, 4.4), [0, 0, -1], boundary=[1])
+    assert sample.boundary.tolist() == [True, True, False]
+    assert sample.fabric_contacts(A, None).sum() == 0
+    assert sample.contact_numbers.tolist() == [1, 1, 1]
+
+
+def test_the_place_of_a_body_decides_for_the_window():
+    sample = grains(row_of(0, 3, 9), [0, 0, -1])
+    assert sample.counted(C, Window(np.array([1.5, 0, 0]), sphere(0.1))).tolist() == [
+        True, True, False,
+    ]  # fmt: skip
+    assert not sample.counted(C, Window(np.zeros(3), sphere(1.0))).any()
+
+
+def test_contacts_of_a_file_within_a_body_do_not_exist():
+    """The force stays with its contact."""
+    listed = ContactList([[0, 1], [1, 2]], force=[[5, 0, 0], [7, 0, 0]])
+    packing = Packing(row_of(0, 1.5, 3), 1.0, bodies=[3, 3, -1], contacts=listed)
+    assert packing.contacts.pairs.tolist() == [[1, 2]]
+    assert packing.contacts.force.tolist() == [[7, 0, 0]]
+    assert packing.contacts.force_n.tolist() == [7]
+
+
+def test_a_sphere_in_contact_with_itself_stays_an_error():
+    with pytest.raises(PackingError, match="in contact with itself"):
+        Packing(row_of(0, 1.5), 1.0, bodies=[3, 3], contacts=[[0, 0]])
+
+
+def test_a_body_through_a_face_has_its_place_next_to_its_first_sphere():
+    cell = Cell([10.0, 10.0, 10.0])
+    packing = Packing([[9.5, 5, 5], [0.5, 5, 5], [5, 5, 5]], [1, 2, 1], bodies=[1, 1, 2], cell=cell)
+    assert packing.bodies.place[:2, 0] == pytest.approx([9.5 + 8 / 9] * 2)
+    assert packing.bodies.turns.tolist() == [[0, 0, 0], [1, 0, 0], [0, 0, 0]]
+    assert len(find_contacts(packing).contacts) == 0
+
+
+def test_a_body_that_touches_its_own_image_has_two_neighbours():
+    """As a sphere that does; the inner contact of the body is none."""
+    cell = Cell([4.0, 20.0, 20.0])
+    sample = grains([[0.5, 5, 5], [2.2, 5, 5]], [6, 6], 1.2, cell=cell)
+    assert sample.contacts.pairs.tolist() == [[0, 1]]
+    assert sample.contact_numbers.tolist() == [2, 2]
+    assert not sample.rattlers.any()
+
+
+def small_clumps(random, size):
+    """Spheres a few of which, close together, are one body each, shaken all over a cube."""
+    position, radius, number = [], [], []
+    for name in range(size):
+        centre, many = random.random(3) * 6.0, int(random.integers(1, 4))
+        position += list(centre + random.uniform(-0.6, 0.6, (many, 3)))
+        radius += list(random.uniform(0.3, 0.7, many))
+        number += [name if many > 1 else -1] * many
+    turn = random.permutation(len(radius))
+    return np.array(position)[turn], np.array(radius)[turn], np.array(number)[turn]
+
+
+CELLS = {
+    "open": None,
+    "box": np.diag([6.0, 6.5, 7.0]),
+    "tilted": np.array([[6.0, 0, 0], [2.5, 6.5, 0], [-1.5, 2.0, 7.0]]),
+    "thin": np.array([[6.0, 0, 0], [0.0, 6.5, 0], [0.4, 0.2, 2.6]]),
+}
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("name", CELLS)
+def test_counts_rattlers_and_places_are_those_of_the_naive_twin(name, seed):
+    random, vectors = np.random.default_rng(seed), CELLS[name]
+    position, radius, number = small_clumps(random, 20)
+    walls = random.integers(0, 2, len(radius)) * random.integers(0, 2, len(radius))
+    cell = None if vectors is None else Cell(vectors)
+    packing = Packing(position, radius, bodies=number, wall_contacts=walls, cell=cell)
+    sample = Sample(find_contacts(packing), np.zeros(len(radius), bool))
+    twin = NaiveBodies(packing.position, radius, number, vectors)
+    expected = twin.numbers(walls.tolist())
+    assert len(sample.contacts) == twin.contacts
+    assert [int(n) for n in sample.contact_numbers] == [
+        expected[twin.body[row]] for row in range(len(radius))
+    ]
+    assert sample.number(sample.rattlers) == sum(n < 2 for n in expected)
+    assert sample.coordination(A, None) == pytest.approx(np.mean(expected))
+    for row, place in enumerate(packing.bodies.place):
+        off = place - twin.place(row)
+        turns = off if vectors is None else off @ np.linalg.inv(vectors)
+        np.testing.assert_allclose(turns, np.round(turns) * (vectors is not None), atol=1e-9)
+    body_walls = [sum(walls[row] for row in rows) for rows in twin.members]
+    held = naive.held_grains(twin.pairs(), body_walls, [True] * len(twin.members), 3)
+    strict = Sample(sample.packing, sample.boundary, 3, recursive)
+    left = {twin.body[row] for row in np.flatnonzero(~strict.rattlers).tolist()}
+    assert left == held
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_any_bodies_in_an_open_sample_are_those_of_the_naive_twin(seed):
+    """Spheres of one body anywhere: what is one is told by the numbers alone, never by overlap."""
+    random = np.random.default_rng(seed)
+    position, radius = random.random((60, 3)) * 5, random.uniform(0.3, 0.7, 60)
+    number = random.integers(-1, 25, 60)
+    sample = grains(position, number, radius)
+    twin = NaiveBodies(position, radius, number)
+    assert len(sample.contacts) == twin.contacts
+    expected = twin.numbers([0] * 60)
+    assert sample.contact_numbers.tolist() == [expected[twin.body[row]] for row in range(60)]
+
+
+def test_the_order_of_the_spheres_does_not_matter():
+    """Whichever sphere is the first, a body shorter than half the cell is put together one way."""
+    random = np.random.default_rng(4)
+    position, radius, number = small_clumps(random, 30)
+    cell, turn = Cell(CELLS["tilted"]), random.permutation(len(number))
+    one = grains(position, number, radius, cell=cell)
+    two = grains(position[turn], number[turn], radius[turn], cell=cell)
+    assert len(one.contacts) == len(two.contacts)
+    assert one.contact_numbers[turn].tolist() == two.contact_numbers.tolist()
+    off = (one.packing.bodies.place[turn] - two.packing.bodies.place) @ np.linalg.inv(cell.vectors)
+    np.testing.assert_allclose(off, np.round(off), atol=1e-12)
+
+
+def test_shifting_all_of_a_periodic_sample_changes_no_count():
+    random = np.random.default_rng(8)
+    cell = Cell(CELLS["tilted"])
+    position, radius, number = small_clumps(random, 30)
+    found = []
+    for shift in ([0, 0, 0], [1.3, -4.1, 2.2], [55.0, 7.0, -31.0]):
+        sample = grains(position + shift, number, radius, cell=cell)
+        found.append((len(sample.contacts), sample.contact_numbers.tolist()))
+    assert found[0] == found[1] == found[2]
+
+
+@pytest.mark.parametrize("length", [1e-100, 1e100])
+def test_places_do_not_suffer_from_the_unit(length):
+    bodies = bodies_of(np.array([1, 1]), row_of(0, 1) * length, np.array([1.0, 2.0]) * length, None)
+    assert bodies.place[0, 0] / length == pytest.approx(8 / 9)
+
+
+def test_numbers_of_bodies_are_checked():
+    with pytest.raises(PackingError, match=r"bodies: expected shape \(2\)"):
+        Packing(row_of(0, 1), 1.0, bodies=[1])
+    with pytest.raises(PackingError, match="bodies"):
+        Packing(row_of(0, 1), 1.0, bodies=[0.5, 1])
+
+
+def test_a_packing_and_a_sample_say_how_many_grains_they_are():
+    packing = Packing(row_of(0, 1, 5), 1.0, bodies=[1, 1, 2])
+    assert repr(packing).startswith("Packing: 3 particles of radius 1, parts of 2 grains")
+    sample = Sample(find_contacts(packing), np.zeros(3, bool))
+    assert repr(sample) == "Sample: 2 grains, 2 rattlers (fewer than 2 neighbours)"
+
+
+def test_a_clump_of_many_spheres_that_flew_away_is_one_grain_that_did():
+    grid = np.stack(np.meshgrid(*3 * [np.arange(6.0)]), axis=-1).reshape(-1, 3)
+    clump = np.array([30.0, 2.0, 2.0]) + 0.1 * np.random.default_rng(0).random((40, 3))
+    number = np.concatenate([np.full(216, -1), np.full(40, 7)])
+    sample = grains(np.vstack([grid, clump]), number, 0.5)
+    assert not sample.escaped.are_many
+    assert np.flatnonzero(sample.escaped.grains).tolist() == list(range(216, 256))
+    (note,) = sample.doubts_of_escaped()
+    assert "more" not in note.text.partition(":")[0]
