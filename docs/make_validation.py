@@ -217,6 +217,22 @@ def smoothness() -> str:
     return markdown([*head, *(f"{one}, 10 % over 20 %" for one in VARIANTS)], lines)
 
 
+def normalised() -> str:
+    """How far the two curves, each divided by its own largest value, are apart."""
+    lines = []
+    for name in runs():
+        cells = []
+        for variant in VARIANTS:
+            rows = table(f"{name}_default").select(variant=variant)
+            curves = [rows[f"alpha_{kind}_axial"] for kind in ("vs", "c")]
+            void, contact = (curve / abs(curve).max() for curve in curves)
+            early = rows["strain"] <= UP_TO
+            cells += [f"{(void - contact)[part].mean():+.2f}" for part in (early, ~early)]
+        lines.append([f"`{name}`", *cells])
+    head = [f"{one}, {part} 12 %" for one in VARIANTS for part in ("up to", "beyond")]
+    return markdown(["mean of void less contact, normalised", *head], lines)
+
+
 def slopes() -> str:
     lines = []
     for name in runs():
@@ -239,6 +255,7 @@ CHOICES: dict[str, tuple[str, dict[str, Any]]] = {
     "the paper's lines, s = r_min/10": ("paper", {}),
     "defaults": ("default", {}),
     "`--spacing 4rmin`": ("coarse", {}),
+    "`--directions 9`": ("few", {}),
     **{f"cut-off {one} r_min": ("cutoffs", {"cutoff": one}) for one in (0, 0.3, 0.5, 1, 1.5, 2, 3)},
     **{f"RV {one}": ("rvs", {"rv": one}) for one in (0.4, 0.5, 0.6)},
     "`--edge start`": ("start", {}),
@@ -319,6 +336,7 @@ def summaries() -> str:
 PARTS: dict[str, Callable[[], str]] = {
     "experiment": experiment, "counted": counted, "isotropic_start": isotropic_start,
     "off_diagonals": off_diagonals, "rise": rise, "apart": apart, "smoothness": smoothness,
+    "normalised": normalised,
     "slopes": slopes, "choices": choices, "shell_stress": shell_stress, "summaries": summaries,
     "printed_radius": lambda: f"{printed_radius():.1f}",
 }  # fmt: skip

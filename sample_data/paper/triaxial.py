@@ -7,7 +7,7 @@
 # Writes into the folder, for each frame k:
 #     triaxial-spheres-0000000k.vtk.gz, triaxial-intrs-0000000k.vtk.gz   by yade.export.VTKExporter, then compressed
 # and engine.csv, what the simulation itself holds in memory at the moment the files are written.
-# After each stage and frame the simulation is saved. The same command goes on from there, or does nothing if all frames are done;
+# After each stage and frame, and in the long ones, the simulation is saved. The same command goes on from there, or does nothing if all frames are done;
 # with --reversal it goes on beyond the last frame, in the opposite direction.
 # SI units throughout. Stress and strain are positive in compression where the names p, q and strain are used.
 import argparse
@@ -183,9 +183,10 @@ def settle():
     calm = 0
     for k in range(20000):
         error = mean_stress() / P0 - 1
-        if k % 100 == 0:
+        if k % 100 == 99:
             say('mean stress over its target', 1 + error, 'unbalanced force', utils.unbalancedForce())
-        advance(np.ones(3) * max(-1.0, min(1.0, 3.0 * error)) * state['stretch'])
+            save()
+        advance(np.ones(3) * max(-1.0, min(1.0, 15.0 * error)) * state['stretch'])
         calm = calm + 1 if abs(error) < 2e-3 and utils.unbalancedForce() < 2e-3 else 0
         if calm == 40:
             return
@@ -307,7 +308,7 @@ def frame(k, rate):
 
 
 def save():
-    name = where('saved/%04d' % state['done'])
+    name = where('saved/%09d' % O.iter)
     O.save(name + '.yade.gz')
     with open(name + '.part', 'w') as f:
         json.dump({key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in state.items()}, f)

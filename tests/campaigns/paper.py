@@ -81,6 +81,7 @@ MEASURES = {
     "recursive": Measure(("--rattlers", "recursive", "--variants", "bd", *SWEEP), (*CURVES,)),
     "four": Measure(("--min-contacts", "4", "--variants", "bd", *SWEEP), (*CURVES,)),
     "coarse": Measure(("--spacing", "4rmin", "--directions", "lebedev:15"), (*CURVES,)),
+    "few": Measure(("--spacing", "0.4rmin", "--directions", "9"), (*CURVES,)),
     "literal": Measure(
         ("--directions", "equal-angle:10", "--spacing", "0.5rmin"), (*CURVES, "gvs_xz")
     ),
@@ -94,7 +95,7 @@ MEASURES = {
     ),
 }
 SHELL = ("--boundary", "mask=3")
-SWEEPS = ("cutoffs", "rvs", "recursive", "four", "coarse", "literal", "half-sphere")
+SWEEPS = ("cutoffs", "rvs", "recursive", "four", "coarse", "few", "literal", "half-sphere")
 RUNS = {
     "yade_1": Run("yade_1", SHELL, measures=(*Run.measures, *SWEEPS)),
     "yade_2": Run("yade_2", SHELL),
