@@ -41,6 +41,9 @@ SCAN = ["--tolerance", "2e-4"]
 TABLE_FIGURES = ("evolution", "normalised", "correlation")
 FRAME_FIGURES = ("rose", "projection", "histogram", "cutoffs")
 VIEWS: dict[str, list[str]] = {"view": [], "cut": ["--cut"]}
+# those of the paper's experiment in docs/validation.md, once its runs are measured
+PAPER = ROOT / "sample_data" / "paper" / "yade_1_default.csv"
+PAPER_FIGURES = {f"paper-{name}": name for name in TABLE_FIGURES} if PAPER.exists() else {}
 # stored numbers of tests/campaigns/edges.py, in docs/validation.md, too
 STORED = {"rv_size": ROOT / "docs" / "rv_size.csv"}
 # colour and marker of each rule, and how far beside the radius its errors stand
@@ -66,6 +69,10 @@ def made(folder: Path, draw: bool = True) -> dict[str, Content]:
         words = ["-o", folder / "x.csv", "--plot", folder / f"{name}.png", "--figure", name]
         with watched(draw) as found[name]:
             scanfab("compare", table, *words)
+    for picture, name in PAPER_FIGURES.items():
+        words = ["-o", folder / "x.csv", "--plot", folder / f"{picture}.png", "--figure", name]
+        with watched(draw) as found[picture]:
+            scanfab("compare", PAPER, *words)
     for name in FRAME_FIGURES:
         words = ["-o", folder / "x.csv", "--plot", folder / f"{name}.png", "--figure", name]
         with watched(draw) as found[name]:
@@ -252,7 +259,7 @@ def main() -> None:
     PICTURES.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         contents = made(Path(folder))
-        for name in (*TABLE_FIGURES, *FRAME_FIGURES, *VIEWS, *STORED):
+        for name in (*TABLE_FIGURES, *PAPER_FIGURES, *FRAME_FIGURES, *VIEWS, *STORED):
             factor = 0.6 if name in VIEWS else 0.5
             image = Image.open(Path(folder) / f"{name}.png")
             shrink(image, PICTURES / f"{name}.png", contents[name], factor)

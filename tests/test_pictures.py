@@ -30,7 +30,8 @@ def script() -> ModuleType:
 
 pictures = script()
 NAMES = (
-    *pictures.TABLE_FIGURES, *pictures.FRAME_FIGURES, *pictures.VIEWS, *pictures.STORED, "picture",
+    *pictures.TABLE_FIGURES, *pictures.PAPER_FIGURES, *pictures.FRAME_FIGURES, *pictures.VIEWS,
+    *pictures.STORED, "picture",
 )  # fmt: skip
 
 

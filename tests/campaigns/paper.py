@@ -1,0 +1,169 @@
+"""
+The tables of the paper's experiment, from the dumps of its runs.
+
+Usage, from the root of the repository, with the runs of sample_data/paper/README.md in RUNS, each
+in a folder of its name::
+
+    python -m tests.campaigns.paper RUNS [--into FOLDER] [--only RUN ...] [--measures NAME ...]
+                                         [--workers N]
+
+Writes sample_data/paper/RUN_MEASURE.csv, and RUN_engine.csv beside it.
+
+Half an hour to an hour for each run of 13,723 grains on two cores. A table that exists is not
+computed again; an unfinished one goes on. `python docs/make_validation.py` makes the page of them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).parents[2]
+TABLES = ROOT / "sample_data" / "paper"
+BLOCKS = range(1, 9)
+AXES = ("xx", "yy", "zz", "xy", "xz", "yz")
+
+# what scanfab compare needs, with the sample's octants for the interval of a slope
+CURVES = ["source", "frame", "strain", "variant", "alpha_vs_axial", "alpha_vs_axial_se"]
+CURVES += ["alpha_c_axial"]
+OCTANTS = ["alpha_vs_axial_sample_se", "alpha_c_axial_sample_se"]
+OCTANTS += [f"alpha_vs_axial_{kind}_{block}" for kind in ("without", "half") for block in BLOCKS]
+OCTANTS += [f"alpha_c_axial_without_{block}" for block in BLOCKS]
+TENSORS = ["grains", "rattlers", "contacts", "coordination", "segments", "mean_length"]
+TENSORS += [f"{name}_{axes}" for name in ("gvs", "gc") for axes in AXES]
+TENSORS += ["alpha_vs", "alpha_c", "alpha_c_axial_se"]
+DIGITS = 7
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run of a deck, and what there is to measure of it."""
+
+    folder: str
+    options: tuple[str, ...] = ()
+    frames: str = "0:41"
+    measures: tuple[str, ...] = ("paper", "default", "start", "ends", "counts")
+
+    @property
+    def is_shell(self) -> bool:
+        return "--boundary" in self.options
+
+
+@dataclass(frozen=True)
+class Measure:
+    """Options of compute, and the columns that are kept."""
+
+    options: tuple[str, ...]
+    columns: tuple[str, ...] = (*CURVES, *OCTANTS)
+
+
+# the lines of the paper: 16 replicates of 43 axes, in total at a distance of r_min/10
+PAPER = ("--spacing", "0.1rmin", "--directions", "lebedev:15", "--cutoff", "1rmin", "--rv", "0.7")
+# a hundredth of the signal: what the sweeps need to be told apart
+SWEEP = ("--spacing", "0.4rmin", "--directions", "lebedev:15")
+MEASURES = {
+    "paper": Measure(PAPER, (*CURVES, *TENSORS, *OCTANTS)),
+    "default": Measure((), (*CURVES, *TENSORS, *OCTANTS)),
+    "start": Measure(("--edge", "start", "--variants", "cd"), (*CURVES, "left_out", *OCTANTS)),
+    "ends": Measure(("--edge", "ends")),
+    "cutoffs": Measure(
+        ("--cutoffs", "0,0.1rmin,0.3rmin,0.5rmin,0.75rmin,1rmin,1.5rmin,2rmin,3rmin", *SWEEP),
+        (*CURVES, "cutoff"),
+    ),
+    "rvs": Measure(("--rv", "0.4,0.5,0.6", "--variants", "cd", *SWEEP), (*CURVES, "rv")),
+    "recursive": Measure(("--rattlers", "recursive", "--variants", "bd", *SWEEP), (*CURVES,)),
+    "four": Measure(("--min-contacts", "4", "--variants", "bd", *SWEEP), (*CURVES,)),
+    "coarse": Measure(("--spacing", "4rmin", "--directions", "lebedev:15"), (*CURVES,)),
+    "few": Measure(("--spacing", "0.4rmin", "--directions", "9"), (*CURVES,)),
+    "literal": Measure(
+        ("--directions", "equal-angle:10", "--spacing", "0.5rmin"), (*CURVES, "gvs_xz")
+    ),
+    "half-sphere": Measure(
+        ("--directions", "equal-angle-full:10", "--spacing", "0.5rmin"), (*CURVES, "gvs_xz")
+    ),
+    # a rough scan: here only what is counted matters
+    "counts": Measure(
+        ("--directions", "9", "--spacing", "3rmin", "--variants", "ac"),
+        ("frame", "strain", "variant", *TENSORS),
+    ),
+}
+SHELL = ("--boundary", "mask=3")
+SWEEPS = ("cutoffs", "rvs", "recursive", "four", "coarse", "few", "literal", "half-sphere")
+RUNS = {
+    "yade_1": Run("yade_1", SHELL, measures=(*Run.measures, *SWEEPS)),
+    "yade_2": Run("yade_2", SHELL),
+    "yade_dense": Run("yade_dense", SHELL),
+    "yade_reversal": Run("yade_1", SHELL, "40:", ("default", "start")),
+    "periodic_1": Run("periodic_1", measures=("default", "counts", "cutoffs")),
+    "biaxial_1": Run("biaxial_1", measures=("default", "counts", "cutoffs")),
+}
+
+
+def words(runs: Path, run: Run, name: str) -> list[str]:
+    """The command that computes a table, but for the file."""
+    measure, more = MEASURES[name], []
+    if name == "counts" and run.is_shell:
+        radius = np.genfromtxt(runs / run.folder / "engine.csv", delimiter=",", names=True)
+        more = ["--rv-radius", repr(float(radius["rv_radius"][0])), "--rv-center", "0", "0", "0"]
+    elif not run.is_shell and "--variants" not in measure.options:
+        more = ["--variants", "a" if name == "counts" else "abcd"]
+    fields = ",".join(measure.columns)
+    kept = ["--fields", fields, "--digits", str(DIGITS)]
+    return [
+        "compute",
+        run.folder,
+        *run.options,
+        "--frames",
+        run.frames,
+        *measure.options,
+        *more,
+        *kept,
+    ]
+
+
+def compute(runs: Path, table: Path, run: Run, name: str, workers: str) -> None:
+    """One table, in the folder of the runs, so that it says no more of it than the run's name."""
+    program = [sys.executable, "-c", "from scanfab.cli.main import main; main()"]
+    more = ["--workers", workers, "--resume", "--quiet", "-o", str(table)]
+    subprocess.run([*program, *words(runs, run, name), *more], cwd=runs, check=True)
+    table.with_name(table.name + ".manifest.json").unlink(missing_ok=True)
+
+
+def tables(names: list[str], only: list[str]) -> Iterator[tuple[str, Run, str]]:
+    for run_name in names:
+        run = RUNS[run_name]
+        for name in run.measures:
+            if name in only:
+                yield run_name, run, name
+
+
+def main() -> None:
+    """Compute what is missing."""
+    parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
+    parser.add_argument("runs", type=Path)
+    parser.add_argument("--into", type=Path, default=TABLES)
+    parser.add_argument("--only", nargs="+", choices=RUNS, default=[*RUNS])
+    parser.add_argument("--measures", nargs="+", choices=MEASURES, default=[*MEASURES])
+    parser.add_argument("--workers", default="2")
+    asked = parser.parse_args()
+    runs, into = asked.runs.resolve(), asked.into.resolve()
+    for run_name, run, name in tables(asked.only, asked.measures):
+        if not (runs / run.folder / "engine.csv").exists():
+            print(f"{run_name}: no {run.folder}/engine.csv in {runs}, left out", flush=True)
+            continue
+        shutil.copyfile(runs / run.folder / "engine.csv", into / f"{run_name}_engine.csv")
+        table = into / f"{run_name}_{name}.csv"
+        if not table.exists():
+            print(table.name, flush=True)
+            compute(runs, table, run, name, asked.workers)
+
+
+if __name__ == "__main__":
+    main()

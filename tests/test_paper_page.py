@@ -1,0 +1,120 @@
+"""The first part of docs/validation.md: what it says of known tables, and of those here."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import pytest
+
+from tests.campaigns import paper
+from tests.conftest import ROOT
+from tests.test_docs import script
+
+FRAMES = 41
+SLOPE = 0.1
+ENGINE = {
+    "porosity": 0.39, "coordination": 4.7, "rattlers": 100, "overlap": 0.018, "contacts": 9000,
+    "inertial_number": 3.4e-4, "gc_xy": 0.0, "gc_xz": 0.0, "gc_yz": 0.0,
+}  # fmt: skip
+
+
+@pytest.fixture
+def page(tmp_path, monkeypatch):
+    """The script of the page with tables of a line through the origin, at no scatter."""
+    folder = tmp_path / "sample_data" / "paper"
+    folder.mkdir(parents=True)
+    for name, run in paper.RUNS.items():
+        write(folder / f"{name}_engine.csv", engine_rows("biaxial" in name))
+        for measure in run.measures:
+            write(folder / f"{name}_{measure}.csv", table_rows(run, measure))
+    monkeypatch.chdir(tmp_path)
+    made = script("make_validation")
+    monkeypatch.setattr(made, "TABLES", folder)
+    return made
+
+
+def write(path: Path, rows: list[dict]) -> None:
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, rows[0])
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def contact(frame: int) -> float:
+    """The axial anisotropy of the contacts."""
+    return 0.08 * (frame / 40) ** 0.5
+
+
+def tensor(frame: int) -> dict[str, float]:
+    axial = contact(frame)
+    return {"gc_xx": (1 - axial) / 3, "gc_yy": (1 - axial) / 3, "gc_zz": (1 + 2 * axial) / 3}
+
+
+def engine_rows(plane: bool) -> list[dict]:
+    p = 400.0 if plane else 200e3
+    stress = {"p": p, "p_whole": p, "rv_radius": 0.02}
+    rows = [{"strain": 0.005 * k, **ENGINE, **stress, **tensor(k)} for k in range(FRAMES)]
+    return [{**row, "q": 0.7 * p, "q_whole": 0.5 * p} for row in rows]
+
+
+def table_rows(run: paper.Run, measure: str) -> list[dict]:
+    columns = paper.MEASURES[measure].columns
+    several = {
+        "cutoff": [0.5e-3 * one for one in (0, 0.3, 0.5, 1, 1.5, 2, 3)],
+        "rv": [0.4, 0.5, 0.6],
+    }
+    kind = next((one for one in several if one in columns), None)
+    rows = []
+    for frame in range(FRAMES):
+        for variant in "abcd":
+            for value in several.get(kind, [0]):
+                row = dict.fromkeys(columns, 0.0) | {"source": run.folder, "frame": frame}
+                row |= {"strain": 0.005 * frame, "variant": variant, **ENGINE, **tensor(frame)}
+                row |= {name: contact(frame) for name in columns if name.startswith("alpha_c")}
+                row |= {name: SLOPE * contact(frame) for name in columns if is_void(name)}
+                row |= {name: 1e-4 for name in columns if name.endswith("_se")}
+                rows.append({name: row[name] for name in columns} | ({kind: value} if kind else {}))
+    return rows
+
+
+def is_void(name: str) -> bool:
+    return name == "alpha_vs_axial" or name.startswith("alpha_vs_axial_without")
+
+
+def test_known_tables_give_their_slope_everywhere(page) -> None:
+    lines = [line for line in page.slopes().splitlines()[2:] if line]
+    assert len(lines) == 4 * 5 + 3 * (4 + 4)
+    assert all("| 0.100 (0.100 to 0.100) | 0.100 (0.100 to 0.100) | no |" in line for line in lines)
+    choices = page.choices().splitlines()[2:]
+    assert len(choices) == len(page.CHOICES)
+    assert all(" 0.100 | " in line and "nan" not in line for line in choices)
+
+
+def test_counts_that_are_equal_are_said_to_be_equal(page) -> None:
+    lines = page.counted().splitlines()[2:]
+    assert len(lines) == len(page.RUNS)
+    assert all("| 41 of 41 | 41 of 41 | 0e+00 |" in line for line in lines)
+
+
+def test_one_contact_more_is_told(page) -> None:
+    path = page.TABLES / "yade_2_engine.csv"
+    path.write_text(path.read_text("utf-8").replace(",9000,", ",9001,", 1), encoding="utf-8")
+    assert "| `yade_2` | 40 of 41 | 41 of 41 |" in page.counted()
+
+
+def test_every_part_of_the_page_is_filled(page) -> None:
+    text = page.section()
+    assert "{{" not in text
+    assert "nan" not in text
+    assert "$ scanfab compare sample_data/paper/yade_1_default.csv" in text
+
+
+@pytest.mark.skipif(
+    not (paper.TABLES / "yade_1_default.csv").exists(), reason="the runs are not measured yet"
+)
+def test_the_page_is_that_of_the_stored_tables(monkeypatch) -> None:
+    monkeypatch.chdir(ROOT)
+    made = script("make_validation")
+    text = made.PAGE.read_text("utf-8")
+    assert text == made.page(), "run python docs/make_validation.py"
