@@ -25,6 +25,7 @@ __all__ = [
     "COMPRESSED_SUFFIXES",
     "bare_name",
     "check_memory",
+    "file_inside",
     "first_bytes",
     "plain",
     "temporary_copy",
@@ -111,6 +112,28 @@ def unpacked(path: Path) -> Iterator[IO[bytes]]:
     except (OSError, EOFError, lzma.LZMAError, zlib.error) as error:
         verb = "read" if opener is open else "decompressed"
         raise ReadError(f"{path}: cannot be {verb}: {_reason(error)}") from None
+
+
+def file_inside(index: Path, name: str) -> Path:
+    """
+    The file that another one names, which must lie in its folder or below.
+
+    Raises
+    ------
+    ReadError
+        If it lies elsewhere, or is not there: whoever hands on a list of files must not be able to
+        make others read what they like.
+    """
+    folder = os.path.abspath(index.parent)
+    file = os.path.normpath(os.path.join(folder, name.replace("\\", "/")))
+    if "\0" in name or os.path.commonpath([folder, file]) != folder or file == folder:
+        raise ReadError(
+            f"{index}: names {name!r}, which does not lie in its folder: move the files together"
+        )
+    path = index.parent / os.path.relpath(file, folder)
+    if not path.is_file():
+        raise ReadError(f"{index}: names {name!r}, but there is no such file")
+    return path
 
 
 def check_memory(path: Path, needed: float) -> None:

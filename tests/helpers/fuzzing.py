@@ -365,9 +365,7 @@ def _vtk_files(folder: Path) -> list[Path]:
     index = folder / "list.pvd"
     index.write_text(
         '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n<Collection>\n'
-        + "".join(
-            f'<DataSet timestep="{step}" file="{FLOOR}/grains_30000.vtp"/>\n' for step in range(2)
-        )
+        + "".join(f'<DataSet timestep="{step}" file="grid_ascii.vtu"/>\n' for step in range(2))
         + "</Collection>\n</VTKFile>\n"
     )
     return [*files, index]

@@ -65,6 +65,8 @@ class YadeReader(VtkReader):
                 f"{path}: YADE's binary format can be read by the same build of YADE only: load it "
                 f"there, and save it as XML: O.save('name.xml.bz2')"
             )
+        if _lost_lines(path) is not None:
+            return "contacts"  # which its reading refuses
         return "grains" if _is_text(path) or is_save(path) else super().kind(path)
 
     def snapshots(self, path: Path) -> list[Snapshot]:
@@ -162,16 +164,23 @@ def _refuse_lost_lines(path: Path) -> None:
 
     The values then belong to other contacts than those that they stand at.
     """
-    head = first_bytes(path)
-    if b"<VTKFile" not in head or b'Name="forceN"' not in head:
-        return
-    lines, values = _count_lines_and_values(path)
-    if values is not None and values > lines:
+    lost = _lost_lines(path)
+    if lost is not None:
+        lines, values = lost
         raise ReadError(
             f"{path}: {values} values for {lines} contacts: YADE's VTKRecorder loses the contacts "
             f"that cross a periodic cell; export them with export.VTKExporter.exportInteractions, "
             f'or find them by geometry (`contacts="geometric"`)'
         )
+
+
+def _lost_lines(path: Path) -> tuple[int, int] | None:
+    """Lines and values of a file of interactions that has more values than lines, else None."""
+    head = first_bytes(path)
+    if b"<VTKFile" not in head or b'Name="forceN"' not in head:
+        return None
+    lines, values = _count_lines_and_values(path)
+    return None if values is None or values <= lines else (lines, values)
 
 
 def _count_lines_and_values(path: Path) -> tuple[int, int | None]:
