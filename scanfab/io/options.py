@@ -14,6 +14,7 @@ __all__ = [
     "READING_OPTIONS",
     "parse_cell",
     "parse_columns",
+    "parse_frames",
     "parse_periodic",
     "parse_radius",
     "take_reading",
@@ -69,6 +70,25 @@ def parse_cell(name: str, value: Any) -> tuple[float, ...] | str | PathLike[str]
             value,
         )
     return numbers
+
+
+def parse_frames(text: str | int | slice | None, name: str = "frames") -> slice:
+    """A slice from ``A:B:C`` or a single number."""
+    if text is None:
+        return slice(None)
+    if isinstance(text, slice):
+        return text
+    try:
+        numbers = [int(part) if part.strip() else None for part in str(text).split(":")]
+    except ValueError:
+        numbers = []
+    if not 1 <= len(numbers) <= 3 or numbers == [None] or numbers[2:] == [0]:
+        raise unusable(name, "a slice such as 0:10:2, :5 or -1:", text)
+    if len(numbers) > 1:
+        return slice(*numbers)
+    first = numbers[0]
+    assert first is not None
+    return slice(first, first + 1 if first != -1 else None)
 
 
 def parse_periodic(name: str, value: Any) -> str | None:

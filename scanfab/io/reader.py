@@ -15,6 +15,8 @@ from scanfab.packing.cell import Cell
 from scanfab.packing.packing import ContactList
 
 __all__ = [
+    "BODIES",
+    "WALLS",
     "Carries",
     "FileKind",
     "GrainTable",
@@ -24,6 +26,11 @@ __all__ = [
     "Snapshot",
 ]
 
+
+BODIES = "scanfab_bodies"
+"""A column of this name is the number of each sphere's body, whatever other columns say."""
+WALLS = "scanfab_wall_contacts"
+"""A column of this name is the number of contacts with walls of each grain."""
 
 FileKind = Literal["grains", "index", "points", "contacts", "cell", "other"]
 """
@@ -54,6 +61,8 @@ class ReadOptions:
     """Letters out of xyz."""
     bodies: str | None = None
     """Column that says which clump a sphere belongs to; by default that of the format, if any."""
+    beside: Cell | Literal["none"] | None = None
+    """The dump's own cell, where a file beside the dump says which it is, or that it has none."""
 
     def __post_init__(self) -> None:
         """Raise SettingsError if a value cannot be used."""
@@ -91,6 +100,8 @@ class GrainTable(NamedTuple):
     """Contacts that the grain file itself lists."""
     wall_contacts: IntArray | None = None
     """Number of contacts with walls of each grain, shape (N,), if the grain file lists them."""
+    bodies: IntArray | None = None
+    """Number of each sphere's body, shape (N,), if the file says so beyond all doubt."""
 
 
 class JoinedContacts(NamedTuple):

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 from typing import Any, Literal, SupportsIndex, overload
 
 from scanfab.base.errors import NoFrameError, ReadError, SettingsError
 from scanfab.base.spelling import counted
+from scanfab.io.beside import columns_file, frame_file, read_frame
 from scanfab.io.families import Family
 from scanfab.io.frame import Frame
 from scanfab.io.frame_csv import FrameFile
@@ -207,6 +208,9 @@ class Series:
         problem: ReadError | None = None
         try:
             snapshots = self.grains.reader.snapshots(path)
+            told = read_frame(path) if len(snapshots) == 1 else None
+            if told is not None:
+                snapshots = [replace(snapshots[0], step=told.step, time=told.time)]
         except ReadError as error:
             stamp, snapshots, problem = None, [Snapshot(path)], error
         self._met[path] = stamp, snapshots
@@ -280,11 +284,14 @@ class Series:
         list of Path
         """
         listed = self._listed(path) if self.grains.kind == "index" else []
+        told = [file for file in (frame_file(path), columns_file(path)) if file.is_file()]
+        listed += told
         ask = getattr(self.grains.reader, "beside", None)
         named = self.cells is not None or self.options.cell is not None
         if named or ask is None:
             return listed
-        return [*listed, *(file for one in listed or [path] for file in ask(one))]
+        dumps = [one for one in listed if one not in told] or [path]
+        return [*listed, *(file for one in dumps for file in ask(one))]
 
     def _listed(self, index: Path) -> list[Path]:
         """The dumps of an index that are there; a frame that is not has been told of."""

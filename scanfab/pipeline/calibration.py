@@ -30,7 +30,8 @@ from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.plan import Plan, make_plan
 from scanfab.pipeline.settings import AUTO_RULE, Length, Settings
 from scanfab.pipeline.tolerance import TOLERANCE_MISSED, missing_work
-from scanfab.pipeline.values import SHAPES, parse_frames
+from scanfab.io.options import parse_frames
+from scanfab.pipeline.values import SHAPES
 from scanfab.scan.directions import direction_rule
 from scanfab.table.plots import Plots
 from scanfab.table.table import Row

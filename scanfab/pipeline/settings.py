@@ -15,6 +15,7 @@ from scanfab.base.option import (
     refuse_unknown,
     whole,
 )
+from scanfab.io.options import parse_frames
 from scanfab.pipeline.values import (
     AXES,
     RULE_NAMES,
@@ -31,7 +32,6 @@ from scanfab.pipeline.values import (
     parse_cutoff,
     parse_cutoffs,
     parse_directions,
-    parse_frames,
     parse_rattlers,
     parse_shape,
     parse_sizes,

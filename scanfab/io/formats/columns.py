@@ -14,7 +14,7 @@ from scanfab.base.errors import ReadError
 from scanfab.base.lengths import all_within
 from scanfab.base.typing import FloatArray
 from scanfab.io.formats.superquadrics import refuse_superquadrics
-from scanfab.io.reader import GrainTable, ReadOptions
+from scanfab.io.reader import BODIES, WALLS, GrainTable, ReadOptions
 from scanfab.packing.bodies import CLUMP_COLUMNS, MOLECULE_COLUMNS
 from scanfab.packing.boundary import CLASS_COLUMNS
 from scanfab.packing.cell import Cell
@@ -126,17 +126,25 @@ def grain_table(
     radius = _radius(path, rest, named, len(position), options, where)
     id = named.get("id", _take(rest, ID_NAMES))
     refuse_superquadrics(path, rest, radius, where)
+    own = {name: rest.pop(name) for name in (BODIES, WALLS) if name in rest}
+    bodies, walls = (
+        whole_numbers(path, own[name], where) if name in own else None for name in (BODIES, WALLS)
+    )
     return GrainTable(
         position,
         radius,
         None if id is None else whole_numbers(path, id, where),
         rest,
         cell,
+        wall_contacts=walls,
+        bodies=bodies,
     )
 
 
 def user_cell(path: Path, cell: Cell | None, options: ReadOptions) -> Cell | None:
     """The dump's cell with the user's cell and periodic on top."""
+    if options.beside is not None:
+        cell = None if options.beside == "none" else options.beside
     periodic: tuple[bool, bool, bool] | None = None
     if options.periodic is not None:
         periodic = (

@@ -8,6 +8,7 @@ XDMF are left to their libraries, behind a fence.
 from __future__ import annotations
 
 import re
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -23,7 +24,7 @@ from scanfab.io.parse.vtk_hdf import content_of_hdf, form_of_hdf, is_hdf
 from scanfab.io.parse.vtk_legacy import read_legacy
 from scanfab.io.parse.vtk_xml import elements_of, read_xml
 
-__all__ = ["Mesh", "form_of", "listed", "read_bounds", "read_faces", "read_mesh"]
+__all__ = ["Mesh", "elements", "form_of", "listed", "read_bounds", "read_faces", "read_mesh"]
 
 # bytes for each of a file: its text, the words of a part of it, the numbers that they are
 OF_TEXT = 4.0
@@ -97,6 +98,12 @@ def _piece(path: Path) -> Content:
         return _content(path)
 
 
+def elements(path: Path) -> ElementTree.Element:
+    """The elements of an XML file; ReadError if it is none."""
+    with _named_flaws(path):
+        return elements_of(plain(path).read_bytes())
+
+
 def listed(path: Path, tag: str, key: str) -> list[Path]:
     """
     The files that an XML file names, such as ``<Piece Source="...">``, in its order.
@@ -106,9 +113,7 @@ def listed(path: Path, tag: str, key: str) -> list[Path]:
     ReadError
         If one is not below the folder of the file, or not there.
     """
-    with _named_flaws(path):
-        root = elements_of(plain(path).read_bytes())
-    names = [one.attrib[key] for one in root.iter(tag) if key in one.attrib]
+    names = [one.attrib[key] for one in elements(path).iter(tag) if key in one.attrib]
     return [file_inside(path, name) for name in names]
 
 
