@@ -17,6 +17,7 @@ COMMANDS = {
     "calibrate": "how many lines are enough: ladders of settings, and those it recommends",
     "report": "one file to hand on: settings, tables, figures, a view that can be turned",
     "view": "a frame in 3D",
+    "convert": "one frame or a series in another format, with contacts, cell and forces",
     "formats": "every reader and writer, its extensions, and the package it comes from",
 }
 

@@ -1,8 +1,8 @@
 """
 What lies beside a file of grains that cannot hold it: contacts, cell, step and time, columns.
 
-``STEM.contacts.csv``, ``STEM.frame.csv`` and ``STEM.columns.csv``, which belong to the file STEM with
-any ending. They are written by :mod:`scanfab.io.convert`, and found by whoever reads the file.
+``STEM.contacts.csv``, ``STEM.frame.csv`` and ``STEM.columns.csv``, which belong to the file STEM
+with any ending. They are written by :mod:`scanfab.io.convert`, and found by whoever reads the file.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.io.files import bare_name, check_memory, first_bytes, plain
+from scanfab.io.formats.columns import whole_numbers
 from scanfab.io.formats.join import join_ids
-from scanfab.io.reader import GrainTable, JoinedContacts
+from scanfab.io.reader import BODIES, WALLS, GrainTable, JoinedContacts
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 
@@ -44,9 +45,7 @@ FORCE = ("fx2", "fy2", "fz2")
 """Force on the second grain."""
 FORCE_N = ("fn",)
 """Normal force, compression positive."""
-CONTACTS = tuple(
-    ",".join((*IDS, *IMAGE, *force)) for force in ((), FORCE, FORCE_N)
-)
+CONTACTS = tuple(",".join((*IDS, *IMAGE, *force)) for force in ((), FORCE, FORCE_N))
 VECTORS = tuple(f"{vector}{axis}" for vector in "abco" for axis in "xyz")
 FRAME = ",".join(("step", "time", *VECTORS, "periodic"))
 # the first column of columns, which no other file has
@@ -241,10 +240,17 @@ def with_columns(path: Path, grains: GrainTable) -> GrainTable:
             f"or the file was left behind"
         )
     own = {name: _values(words) for name, words in zip(names[1:], listed[1:], strict=True)}
+    bodies, walls = (
+        whole_numbers(file, own.pop(name)) if name in own else None for name in (BODIES, WALLS)
+    )
     columns: Any = grains.columns
     merged = columns.copy() if hasattr(columns, "copy") else dict(columns)
     merged.update(own)
-    return grains._replace(columns=merged)
+    return grains._replace(
+        columns=merged,
+        bodies=grains.bodies if bodies is None else bodies,
+        wall_contacts=grains.wall_contacts if walls is None else walls,
+    )
 
 
 def _values(words: tuple[str, ...]) -> npt.NDArray[Any]:
@@ -256,4 +262,3 @@ def _values(words: tuple[str, ...]) -> npt.NDArray[Any]:
         except (ValueError, OverflowError):
             continue
     return np.array(words, dtype=str)
-

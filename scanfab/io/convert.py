@@ -28,7 +28,7 @@ from scanfab.io.options import parse_frames
 from scanfab.io.registry import installed_writers, writer_for, writer_named
 from scanfab.io.series import Series
 from scanfab.io.writer import Writer
-from scanfab.io.written import flat, own_columns, standard_columns
+from scanfab.io.written import more_columns, own_columns, parts_of
 from scanfab.packing.packing import Packing
 
 __all__ = ["convert", "save_packing"]
@@ -194,7 +194,7 @@ def save_packing(packing: Packing, path: Path, writer: Writer | None = None) -> 
         left = writer.write(packing, part)
         if left.contacts and packing.contacts is not None:
             beside[contacts_file(path)] = contacts_csv(packing)
-        if left.frame and not (packing.cell is packing.step is packing.time is None):
+        if left.frame:
             beside[frame_file(path)] = frame_csv(packing)
         if left.columns:
             beside[columns_file(path)] = columns_csv(packing, _columns(packing, left.columns))
@@ -208,11 +208,9 @@ def save_packing(packing: Packing, path: Path, writer: Writer | None = None) -> 
 def _columns(packing: Packing, names: Iterable[str]) -> dict[str, Any]:
     """Columns by the names that writers give them, split into single ones."""
     own, _ = own_columns(packing)
-    every = {**standard_columns(packing), **own}
-    chosen = {name: every[name] for name in names if name in every}
-    split, _ = flat(chosen)
-    rest, _ = flat(own)
-    return {**split, **{name: rest[name] for name in names if name not in chosen}}
+    split = more_columns(packing)
+    parts = {name: parts_of(name, values) for name, values in own.items()}
+    return {part: split[part] for name in names for part in parts.get(name, [name])}
 
 
 def _remove_others(path: Path, written: set[Path]) -> None:

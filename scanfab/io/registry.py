@@ -1,4 +1,4 @@
-"""The readers and writers that are installed, found through entry points; knows no format itself."""
+"""Readers and writers that are installed, found through entry points; knows no format itself."""
 
 from __future__ import annotations
 

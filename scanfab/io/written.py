@@ -14,7 +14,7 @@ from scanfab.io.reader import BODIES, WALLS
 from scanfab.packing.bodies import bodies_of
 from scanfab.packing.packing import Packing
 
-__all__ = ["flat", "own_columns", "parts_of", "standard_columns"]
+__all__ = ["flat", "more_columns", "own_columns", "parts_of", "standard_columns"]
 
 Columns = dict[str, npt.NDArray[Any]]
 
@@ -48,6 +48,25 @@ def _bodies(packing: Packing) -> npt.NDArray[Any] | None:
     return None if same else number
 
 
+def more_columns(packing: Packing) -> Columns:
+    """
+    All that there is of the grains but id, position and radius, in columns of one value a grain.
+
+    Parameters
+    ----------
+    packing : Packing
+        To be written.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (N,)
+        By names that a reader takes for what they are.
+    """
+    standard = standard_columns(packing)
+    del standard["id"]
+    return {**standard, **flat(own_columns(packing)[0])[0]}
+
+
 def own_columns(packing: Packing) -> tuple[Columns, list[str]]:
     """
     The columns of the source, as numbers and texts, and what is to be said of them.
@@ -66,9 +85,7 @@ def own_columns(packing: Packing) -> tuple[Columns, list[str]]:
             continue
         free = _free_name(name, [*found, *packing.columns])
         if free != name:
-            notes.append(
-                f"the column {name} is called {free}: {name} is what grains are read from"
-            )
+            notes.append(f"the column {name} is called {free}: {name} is what grains are read from")
         found[free] = plain
     return found, notes
 

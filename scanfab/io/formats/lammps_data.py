@@ -13,7 +13,7 @@ from scanfab.base.typing import FloatArray
 from scanfab.io.files import check_memory, plain
 from scanfab.io.formats.columns import grain_table
 from scanfab.io.parse.lammps_box import box_vectors
-from scanfab.io.parse.number_rows import rows_of_numbers
+from scanfab.io.parse.number_rows import exact_column, rows_of_numbers
 from scanfab.io.reader import GrainTable, ReadOptions, Snapshot
 from scanfab.packing.cell import Cell
 
@@ -73,6 +73,7 @@ def read_data_grains(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
     values = _values(path, data, begin, end, _count(path, header))
     names = (*SPHERE, *FLAGS)[: values.shape[1]]
     columns = {name: values[:, place] for place, name in enumerate(names)}
+    columns["id"] = exact_column(values, data[begin:end], names.index("id"))
     return grain_table(path, columns, _cell(path, header), options)
 
 

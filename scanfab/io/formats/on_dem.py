@@ -1,8 +1,8 @@
 """
 ON-DEM's exchange format (VTKHDF with a group ONDEM), read and written.
 
-Of drafts 0.1 and 0.2, which differ in more than names: the normal force is positive in compression in
-the first, and in traction in the second.
+Of drafts 0.1 and 0.2, which differ in more than names: the normal force is positive in compression
+in the first, and in traction in the second.
 """
 
 from __future__ import annotations

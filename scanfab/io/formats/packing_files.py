@@ -1,4 +1,4 @@
-"""What ``scanfab convert`` writes and no other program: ``.npz`` packings, and files beside others."""
+"""What scanfab alone writes: packings as ``.npz``, and what lies beside files of other formats."""
 
 from __future__ import annotations
 
@@ -101,7 +101,9 @@ class PackingReader(NpzWriter):
     ) -> JoinedContacts:
         """Those that lie beside a file of grains."""
         if not is_contacts_file(snapshot.path):
-            raise ReadError(f"{snapshot.path}: expected contacts, found a packing: read it by itself")
+            raise ReadError(
+                f"{snapshot.path}: expected contacts, found a packing: read it by itself"
+            )
         return read_contacts(snapshot.path, grains)
 
 

@@ -162,9 +162,7 @@ class VtkReader:
         table = self.read_grains(Snapshot(grains[0]), options)
         for path in contacts:
             joined = self.read_contacts(Snapshot(path), options, table)
-            table = table._replace(
-                contacts=joined.contacts, wall_contacts=joined.wall_contacts
-            )
+            table = table._replace(contacts=joined.contacts, wall_contacts=joined.wall_contacts)
         return table
 
     def _listed(self, index: Path) -> list[Snapshot]:

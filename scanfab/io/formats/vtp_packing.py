@@ -1,4 +1,4 @@
-"""What only ``scanfab convert`` writes into a VTK file: cell, step, images and forces of contacts."""
+"""What scanfab alone writes into VTK files: cell, step, images and forces of contacts."""
 
 from __future__ import annotations
 

@@ -288,7 +288,9 @@ def _write_rows(stream: Any, columns: dict[str, npt.NDArray[Any]]) -> None:
     for name, values in columns.items():
         table = values.reshape(len(values), int(np.prod(values.shape[1:])))
         for place in range(table.shape[1]):
-            one = np.where(table[:, place], "T", "F") if table.dtype.kind == "b" else table[:, place]
+            one = (
+                np.where(table[:, place], "T", "F") if table.dtype.kind == "b" else table[:, place]
+            )
             parts[f"{name} {place}"] = np.array(one)
     frame = polars.DataFrame(parts)
     frame.write_csv(stream, include_header=False, separator=" ", quote_style="never")

@@ -22,7 +22,7 @@ import numpy.typing as npt
 from scanfab.base.typing import IntArray
 from scanfab.io.parse.vtk_data import Arrays, Cells, Content, FlawError, joined, numbers
 
-__all__ = ["elements_of", "read_xml"]
+__all__ = ["count_rows", "elements_of", "read_xml"]
 
 
 TYPES = {
@@ -98,6 +98,22 @@ def read_xml(data: bytes, room: Callable[[int], None] = lambda needed: None) -> 
     room(sum(one.bytes for one in pieces) + sum(_bytes(one) for one in field))
     content = joined([piece.content() for piece in pieces])
     return content._replace(field_arrays={one.name: file.values(one) for one in field if one.name})
+
+
+def count_rows(data: bytes, section: str, name: str) -> tuple[int, int]:
+    """
+    How many cells of a section a file counts, and how many rows an array of the cells has.
+
+    Raises
+    ------
+    FlawError
+        If the file does not hold what its elements promise.
+    """
+    file = _File(data)
+    pieces = [_Piece(file, piece) for piece in file.root.iter("Piece")]
+    arrays = [one for piece in pieces for one in piece.found.get("CellData", [])]
+    rows = [one.length // one.components for one in arrays if one.name == name]
+    return sum(piece.counts.get(section, 0) for piece in pieces), sum(rows)
 
 
 def elements_of(data: bytes) -> ElementTree.Element:

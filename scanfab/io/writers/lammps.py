@@ -12,7 +12,7 @@ import numpy.typing as npt
 from scanfab.base.typing import FloatArray
 from scanfab.io.parse.lammps_box import box_of_bounds, box_vectors
 from scanfab.io.writer import Left
-from scanfab.io.written import flat, own_columns, standard_columns
+from scanfab.io.written import flat, more_columns, own_columns, standard_columns
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 
@@ -88,19 +88,18 @@ class LammpsDataWriter:
         with open(path, "wb") as stream:
             stream.write(head.encode())
             _write_rows(stream, rows)
-        others = {**columns, **{k: v for k, v in standard_columns(packing).items() if k != "id"}}
         if len(packing) and packing.id.max() >= 2**31:
             notes.append("LAMMPS takes ids above 2147483647 only if it was built for them")
         return Left(
             contacts=True,
             frame=True,
-            columns=tuple(name for name in others if name not in held),
+            columns=tuple(name for name in more_columns(packing) if name not in held),
             notes=(*notes, *more, *box_notes),
         )
 
 
 def _fits(name: str, values: npt.NDArray[Any]) -> bool:
-    """Whether a column is one of numbers that a dump's reader gives back, under a name of a word."""
+    """Whether a dump's reader gives a column back: numbers, under a name of one word."""
     if len(name.split()) != 1 or values.dtype.kind == "U":
         return False
     exact = values.dtype.kind == "f" or bool(np.all(np.abs(values.astype(float)) < MOST_EXACT))
@@ -119,7 +118,7 @@ def _bounds(packing: Packing) -> str:
     cell = packing.cell
     if cell is None:
         low, high = _extent(packing)
-        rows = "".join(f"{a!r} {b!r}\n" for a, b in zip(low.tolist(), high.tolist(), strict=True))
+        rows = _digits(np.column_stack([low, high]))
         return f"ITEM: BOX BOUNDS ff ff ff\n{rows}"
     flags = " ".join("pp" if repeats else "ff" for repeats in cell.periodic)
     bounds = _exact_bounds(cell)
@@ -127,8 +126,13 @@ def _bounds(packing: Packing) -> str:
         table, kind = np.column_stack([cell.vectors, cell.origin]), "abc origin "
     else:
         table, kind = bounds, "xy xz yz " if bounds.shape[1] == 3 else ""
-    rows = "".join(" ".join(map(repr, row)) + "\n" for row in table.tolist())
+    rows = _digits(table)
     return f"ITEM: BOX BOUNDS {kind}{flags}\n{rows}"
+
+
+def _digits(table: FloatArray) -> str:
+    """Rows of numbers with all digits, as LAMMPS writes bounds and nobody else does."""
+    return "".join(" ".join(f"{x:.16e}" for x in row) + "\n" for row in table.tolist())
 
 
 def _exact_bounds(cell: Cell) -> FloatArray | None:
@@ -138,8 +142,8 @@ def _exact_bounds(cell: Cell) -> FloatArray | None:
         return None
     xy, xz, yz = tilt = vectors[[1, 2, 2], [0, 0, 1]]
     high = low + np.diag(vectors)
-    around_low = low + [min(0.0, xy, xz, xy + xz), min(0.0, yz), 0.0]
-    around_high = high + [max(0.0, xy, xz, xy + xz), max(0.0, yz), 0.0]
+    around_low = low + np.array([min(0.0, xy, xz, xy + xz), min(0.0, yz), 0.0])
+    around_high = high + np.array([max(0.0, xy, xz, xy + xz), max(0.0, yz), 0.0])
     bounds = np.column_stack([around_low, around_high, tilt])
     again, origin = box_vectors(*box_of_bounds(bounds))
     if not (np.array_equal(again, vectors) and np.array_equal(origin, low)):
@@ -165,9 +169,10 @@ def _box_lines(packing: Packing) -> tuple[str, list[str]]:
     if cell is not None:
         vectors = cell.vectors
         if np.any(np.triu(vectors, 1)) or np.any(np.diag(vectors) <= 0):
-            corners = cell.origin + np.array(
-                [[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)]
-            ) @ vectors
+            corners = (
+                cell.origin
+                + np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)]) @ vectors
+            )
             low, high = corners.min(axis=0), corners.max(axis=0)
             notes.append(
                 "the box in the file is the one around the cell, which LAMMPS cannot have: its "
@@ -201,5 +206,3 @@ def _positive(values: npt.NDArray[Any] | None, count: int) -> tuple[FloatArray, 
     if values is None or values.dtype.kind not in "iuf" or not np.all(values > 0):
         return np.full(count, DENSITY), False
     return values.astype(np.float64), True
-
-

@@ -17,7 +17,8 @@ class _TableWriter:
         """Columns id, x, y, z, radius, and all others; a table holds nothing else."""
         table, notes = table_of(packing)
         self._put(table, path)
-        return Left(contacts=True, frame=True, notes=tuple(notes))
+        bare = packing.cell is None and packing.step is None and packing.time is None
+        return Left(contacts=True, frame=not bare, notes=tuple(notes))
 
     def _put(self, table: Any, path: Path) -> None:
         raise NotImplementedError

@@ -55,7 +55,7 @@ class VtpWriter:
                 cells["force_n"] = contacts.force_n
         file = _File()
         body = [
-            f'<FieldData>{"".join(_field(packing))}</FieldData>',
+            f"<FieldData>{''.join(_field(packing))}</FieldData>",
             f'<Piece NumberOfPoints="{len(packing)}" NumberOfVerts="0" NumberOfLines="{count}" '
             'NumberOfStrips="0" NumberOfPolys="0">',
             file.section("PointData", points),
