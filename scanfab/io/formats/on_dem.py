@@ -18,7 +18,7 @@ from scanfab.base.typing import FloatArray
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.columns import grain_table, whole_numbers
 from scanfab.io.formats.join import join_ids
-from scanfab.io.parse.vtk_data import Content, FlawError
+from scanfab.io.parse.vtk_data import FlawError, Mesh, mesh_of
 from scanfab.io.parse.vtk_hdf import HdfFile, content_of, is_hdf, read_hdf_file
 from scanfab.io.reader import (
     Carries,
@@ -81,10 +81,10 @@ class OnDemReader:
         path = snapshot.path
         file = read_hdf_file(path)
         try:
-            content = content_of(file)
+            mesh = mesh_of(content_of(file))
         except FlawError as flaw:
             raise ReadError(f"{path}: cannot be read as VTKHDF: {flaw}") from None
-        columns = _bodies(path, file, content)
+        columns = _bodies(path, file, mesh)
         grains = grain_table(path, columns, _cell(path, file), options)
         joined = _contacts(path, file, grains)
         if joined is None:
@@ -108,12 +108,12 @@ class OnDemReader:
         return write_on_dem(packing, path)
 
 
-def _bodies(path: Path, file: HdfFile, content: Content) -> dict[str, npt.NDArray[Any]]:
+def _bodies(path: Path, file: HdfFile, mesh: Mesh) -> dict[str, npt.NDArray[Any]]:
     """The arrays of the points that are spheres: all others have no radius."""
-    arrays = dict(content.point_arrays)
+    arrays = dict(mesh.point_arrays)
     radius = arrays.get("radius")
-    if radius is None:
-        raise ReadError(f"{path}: expected an array radius in PointData, found {list(arrays)}")
+    if radius is None or radius.dtype.kind not in "iuf" or radius.ndim != 1:
+        raise ReadError(f"{path}: expected numbers as radius in PointData, found {list(arrays)}")
     id = arrays.pop("body_id", None)
     if id is not None:
         id = whole_numbers(path, id)
@@ -122,7 +122,7 @@ def _bodies(path: Path, file: HdfFile, content: Content) -> dict[str, npt.NDArra
     # their place again
     arrays.pop("position", None)
     columns = {name: values[spheres] for name, values in arrays.items()}
-    columns["position"] = content.points[spheres]
+    columns["position"] = mesh.points[spheres]
     return columns if id is None else {"id": id[spheres], **columns}
 
 
