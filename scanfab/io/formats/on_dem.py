@@ -29,7 +29,7 @@ from scanfab.io.reader import (
     Snapshot,
 )
 from scanfab.io.writer import Left
-from scanfab.io.writers.on_dem import SCENE, write_on_dem
+from scanfab.io.writers.on_dem import SCENE, STROKE, write_on_dem
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 
@@ -121,7 +121,7 @@ def _bodies(path: Path, file: HdfFile, mesh: Mesh) -> dict[str, npt.NDArray[Any]
     spheres = ~np.isnan(radius.astype(np.float64))
     # their place again
     arrays.pop("position", None)
-    columns = {name: values[spheres] for name, values in arrays.items()}
+    columns = {name.replace(STROKE, "/"): values[spheres] for name, values in arrays.items()}
     columns["position"] = mesh.points[spheres]
     return columns if id is None else {"id": id[spheres], **columns}
 

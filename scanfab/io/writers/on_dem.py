@@ -12,9 +12,11 @@ from scanfab.io.writer import Left
 from scanfab.io.written import own_columns, standard_columns
 from scanfab.packing.packing import Packing
 
-__all__ = ["SCENE", "write_on_dem"]
+__all__ = ["SCENE", "STROKE", "write_on_dem"]
 
 SCENE = "ONDEM/Scene"
+# in the place of / in the names of columns
+STROKE = "\u2215"
 SECTIONS = ("Vertices", "Lines", "Polygons", "Strips")
 
 
@@ -27,7 +29,15 @@ def write_on_dem(packing: Packing, path: Path) -> Left:
         file.attrs["file_format"] = "ON-DEM VTKHDF"
         file.attrs["file_format_version"] = "0.1-draft"
         file.attrs["source_code"] = "scanfab"
-        _write_points(file.create_group("VTKHDF", track_order=True), packing, own)
+        numbers = {name: values for name, values in own.items() if values.dtype.kind != "U"}
+        _write_points(file.create_group("VTKHDF", track_order=True), packing, numbers)
+        texts = {name: values for name, values in own.items() if name not in numbers}
+        if texts:
+            # VTK reads no texts at points
+            group = file.create_group("ONDEM/Bodies/sphere")
+            group["body_id"] = packing.id
+            for name, values in texts.items():
+                _write_column(group, name, values)
         _write_scene(file.create_group(SCENE), packing)
         if packing.contacts is not None:
             _write_contacts(file.create_group("ONDEM/Interactions"), packing)
@@ -60,10 +70,10 @@ def _write_points(group: Any, packing: Packing, own: dict[str, Any]) -> None:
 
 
 def _write_column(group: Any, name: str, values: Any) -> None:
-    """A column; a stroke in its name would be a group."""
+    """A column; with / in its name it would be a group."""
     import h5py
 
-    plain = name.replace("/", "|")
+    plain = name.replace("/", STROKE)
     if values.dtype.kind == "U":
         group.create_dataset(plain, data=values.astype(object), dtype=h5py.string_dtype())
     else:
