@@ -48,6 +48,8 @@ FORCE_N = ("fn",)
 CONTACTS = tuple(",".join((*IDS, *IMAGE, *force)) for force in ((), FORCE, FORCE_N))
 VECTORS = tuple(f"{vector}{axis}" for vector in "abco" for axis in "xyz")
 FRAME = ",".join(("step", "time", *VECTORS, "periodic"))
+# letters by which it is known, also where the rest is missing
+FRAME_WORDS = len("step,time,ax,")
 # the first column of columns, which no other file has
 OF_ID = "scanfab_id"
 # bytes in memory for each of a file
@@ -83,12 +85,12 @@ def columns_file(path: Path) -> Path:
 
 def is_contacts_file(path: Path) -> bool:
     """Whether a file is one of those that :func:`contacts_csv` makes."""
-    return _first_line(path) in CONTACTS
+    return _first_line(path).startswith(CONTACTS[0])
 
 
 def is_frame_file(path: Path) -> bool:
     """Whether a file is one of those that :func:`frame_csv` makes."""
-    return _first_line(path) == FRAME
+    return _first_line(path).startswith(FRAME[:FRAME_WORDS])
 
 
 def is_columns_file(path: Path) -> bool:
@@ -149,6 +151,8 @@ def read_contacts(path: Path, grains: GrainTable) -> JoinedContacts:
     ReadError
         If a line is not as it should be, or names a grain that does not exist.
     """
+    if _first_line(path) not in CONTACTS:
+        raise ReadError(f"{path}: expected one of the lines {'; '.join(CONTACTS)}")
     names = _first_line(path).split(",")
     whole = [*IDS, *IMAGE]
     kinds = np.dtype([(name, np.int64 if name in whole else np.float64) for name in names])
@@ -190,6 +194,8 @@ def read_frame(path: Path) -> FrameData | None:
     text = first_bytes(file, 1 << 14).decode("utf-8", "replace")
     rows = list(csv.reader(text.splitlines()))
     try:
+        if ",".join(rows[0]) != FRAME:
+            raise ValueError(f"expected the line {FRAME}")
         if len(rows) != 2 or len(rows[1]) != len(rows[0]) or not text.endswith("\n"):
             raise ValueError("expected one row")
         words = dict(zip(rows[0], rows[1], strict=True))

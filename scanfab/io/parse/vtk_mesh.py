@@ -19,10 +19,11 @@ from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.files import check_memory, file_inside, first_bytes, plain
 from scanfab.io.parse.fence import fenced
+from scanfab.io.parse.vtk_arrays import elements_of
 from scanfab.io.parse.vtk_data import Cells, Content, FlawError, Mesh, joined, mesh_of
 from scanfab.io.parse.vtk_hdf import content_of_hdf, form_of_hdf, is_hdf
 from scanfab.io.parse.vtk_legacy import read_legacy
-from scanfab.io.parse.vtk_xml import elements_of, read_xml
+from scanfab.io.parse.vtk_xml import read_xml
 
 __all__ = ["Mesh", "elements", "form_of", "listed", "read_bounds", "read_faces", "read_mesh"]
 
