@@ -10,9 +10,9 @@ from pathlib import Path
 from scanfab.base.errors import ReadError, UnknownFormatError
 from scanfab.base.plugins import Offer, having, load_offers
 from scanfab.io.files import bare_name
-from scanfab.io.reader import Reader
+from scanfab.io.reader import Reader, ReadOptions
 
-__all__ = ["installed_readers", "reader_for", "reader_named"]
+__all__ = ["installed_readers", "reader_for", "reader_named", "why_not"]
 
 GROUP = "scanfab.readers"
 
@@ -43,20 +43,26 @@ def load_readers(points: Iterable[EntryPoint]) -> dict[str, Offer]:
     return load_offers(points, "reader", lambda reader: make(reader()))
 
 
-def reader_named(name: str) -> Reader:
+def reader_named(name: str, options: ReadOptions | None = None) -> Reader:
     """The reader that a user names; UnknownFormatError lists those that exist."""
     readers = installed_readers()
     if name not in readers:
         raise UnknownFormatError(
             f"there is no reader called {name!r}; the readers are {', '.join(readers)}"
         )
-    reader: Reader = readers[name].plugin
-    return reader
+    return _told(readers[name].plugin, options)
 
 
-def reader_for(path: Path) -> Reader | None:
+def _told(reader: Reader, options: ReadOptions | None) -> Reader:
+    """The reader, with what users say of its files if it needs that to know what they hold."""
+    tell = getattr(reader, "told", None)
+    told: Reader = reader if tell is None or options is None else tell(options)
+    return told
+
+
+def reader_for(path: Path, options: ReadOptions | None = None) -> Reader | None:
     """The reader that knows a file by its content, else by its extension; None if none does."""
-    readers: list[Reader] = [one.plugin for one in installed_readers().values()]
+    readers = [_told(one.plugin, options) for one in installed_readers().values()]
     # a format that any program may write comes after the programs' own
     readers.sort(key=lambda reader: bool(getattr(reader, "generic", False)))
     for reader in readers:
@@ -71,6 +77,19 @@ def reader_for(path: Path) -> Reader | None:
             ) from error
     name = bare_name(path).lower()
     return next((r for r in readers if name.endswith(r.extensions) and _can_open(r, path)), None)
+
+
+def why_not(path: Path, options: ReadOptions) -> str:
+    """What the last reader of files with such an ending says of one that it cannot read."""
+    reason = ""
+    for one in installed_readers().values():
+        reader = _told(one.plugin, options)
+        if bare_name(path).lower().endswith(reader.extensions):
+            try:
+                reader.kind(path)
+            except ReadError as error:
+                reason = str(error).removeprefix(f"{path}").lstrip(":, ")
+    return reason
 
 
 def _can_open(reader: Reader, path: Path) -> bool:
