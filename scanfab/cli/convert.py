@@ -17,7 +17,7 @@ __all__ = ["convert"]
 
 def _complete(ctx: click.Context, parameter: click.Parameter, text: str) -> list[CompletionItem]:
     """The names of the formats."""
-    from scanfab.io.registry import installed_writers
+    from scanfab.io.writers.registry import installed_writers
 
     return [CompletionItem(name) for name in installed_writers() if name.startswith(text)]
 

@@ -25,9 +25,9 @@ from scanfab.io.beside import (
 )
 from scanfab.io.opening import READING, read_series
 from scanfab.io.options import parse_frames
-from scanfab.io.registry import installed_writers, writer_for, writer_named
 from scanfab.io.series import Series
 from scanfab.io.writer import Writer
+from scanfab.io.writers.registry import installed_writers, writer_for, writer_named
 from scanfab.io.written import more_columns, own_columns, parts_of
 from scanfab.packing.packing import Packing
 

@@ -23,6 +23,7 @@ from scanfab.io.reader import (
     ReadOptions,
     Snapshot,
 )
+from scanfab.io.unpacking import unpacking_up_to
 from scanfab.packing.packing import Packing, check_lengths
 
 if TYPE_CHECKING:
@@ -94,6 +95,10 @@ class Frame:
         if self.problem is not None:
             raise self.problem
         options = self._options()
+        with unpacking_up_to(options.max_unpacked):
+            return self._packing(options)
+
+    def _packing(self, options: ReadOptions) -> Packing:
         grains = with_columns(self.snapshot.path, self.reader.read_grains(self.snapshot, options))
         with_own = self.series.contacts_from in ("auto", "beside", "grains")
         own = grains.contacts if with_own else None

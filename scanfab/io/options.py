@@ -8,15 +8,17 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from scanfab.base.option import Option, number, optional, unusable
+from scanfab.base.option import Option, number, optional, unusable, whole
 
 __all__ = [
     "READING_OPTIONS",
     "parse_cell",
     "parse_columns",
     "parse_frames",
+    "parse_max_unpacked",
     "parse_periodic",
     "parse_radius",
+    "parse_skip",
     "take_reading",
 ]
 
@@ -101,6 +103,8 @@ def parse_periodic(name: str, value: Any) -> str | None:
 
 
 parse_radius = optional(number("a length above 0", lambda value: 0 < value < math.inf))
+parse_skip = whole("how many lines to skip, 0 or more", lambda value: 0 <= value < 2**31)
+parse_max_unpacked = optional(number("a number above 0", lambda value: value > 0))
 
 READING_OPTIONS = (
     Option(
@@ -116,7 +120,8 @@ READING_OPTIONS = (
         name="columns",
         parse=parse_columns,
         group="reading",
-        help='Names of columns that are not the usual ones: "radius=c_rad,x=px".',
+        help='Names of columns that are not the usual ones: "radius=c_rad,x=px"; of tables without '
+        'names their numbers from 1: "x=1,y=2,z=3,diameter=4".',
         meaning="names of columns that are not the usual ones",
         takes="dict",
         metavar="NAMES",
@@ -126,9 +131,20 @@ READING_OPTIONS = (
         parse=parse_text,
         group="reading",
         help='Columns of a dump local: LIGGGHTS keywords "pos id force", or LAMMPS names '
-        '"id1=NAME,id2=NAME".',
+        '"id1=NAME,id2=NAME", which serve tables too.',
         meaning="what the columns of the contact files are",
         metavar="KEYWORDS",
+    ),
+    Option(
+        name="skip",
+        default=0,
+        parse=parse_skip,
+        group="reading",
+        help="Lines before the table, of tables of text.",
+        meaning="lines that are skipped before a table",
+        takes="int",
+        kind=int,
+        metavar="N",
     ),
     Option(
         name="radius",
@@ -166,6 +182,16 @@ READING_OPTIONS = (
         "clump_id or clump, if there is one; id: each sphere is a grain).",
         meaning="column that says which clump a sphere belongs to; not given: the format's own",
         metavar="COLUMN",
+    ),
+    Option(
+        name="max_unpacked",
+        parse=parse_max_unpacked,
+        group="reading",
+        help="Times its size that a packed file may unpack to; given, lines may also be of any "
+        "length (default: 1000, and 16 MiB).",
+        takes="float",
+        kind=float,
+        metavar="TIMES",
     ),
     Option(
         name="contacts",

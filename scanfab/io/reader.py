@@ -10,7 +10,13 @@ from typing import Any, Literal, NamedTuple, Protocol
 import numpy.typing as npt
 
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.io.options import parse_cell, parse_periodic, parse_radius
+from scanfab.io.options import (
+    parse_cell,
+    parse_max_unpacked,
+    parse_periodic,
+    parse_radius,
+    parse_skip,
+)
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import ContactList
 
@@ -61,6 +67,10 @@ class ReadOptions:
     """Letters out of xyz."""
     bodies: str | None = None
     """Column that says which clump a sphere belongs to; by default that of the format, if any."""
+    skip: int = 0
+    """Lines before a table of text."""
+    max_unpacked: float | None = None
+    """Times its size that a packed file may unpack to; None: the usual bound."""
     beside: Cell | Literal["none"] | None = None
     """The dump's own cell, where a file beside the dump says which it is, or that it has none."""
 
@@ -69,6 +79,8 @@ class ReadOptions:
         parse_cell("cell", self.cell)
         parse_periodic("periodic", self.periodic)
         parse_radius("radius", self.radius)
+        parse_skip("skip", self.skip)
+        parse_max_unpacked("max_unpacked", self.max_unpacked)
 
 
 @dataclass(frozen=True)
@@ -123,7 +135,10 @@ class Reader(Protocol):
     whose grain files do not all carry their cell has a method ``carries(path)`` that answers with
     one of :data:`Carries`. One that reads other files together with a file of grains, such as that
     of its cell, has a method ``beside(path)`` that answers with a list of their paths: they are
-    inputs too. It is asked for each file of a series, so it should not open them.
+    inputs too. It is asked for each file of a series, so it should not open them. One that cannot
+    know what a file holds without what users tell of it (the columns of a table) has a method
+    ``told(options)`` that answers with a reader that does know. One of tables that may hold
+    anything says ``is_table = True``: in a folder they count only where there are no dumps.
     """
 
     name: str

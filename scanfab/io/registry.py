@@ -1,4 +1,4 @@
-"""Readers and writers that are installed, found through entry points; knows no format itself."""
+"""The readers that are installed, found through entry points; knows no format itself."""
 
 from __future__ import annotations
 
@@ -11,21 +11,11 @@ from pathlib import Path
 from scanfab.base.errors import ReadError, UnknownFormatError
 from scanfab.base.plugins import Offer, having, load_offers
 from scanfab.io.files import bare_name
-from scanfab.io.reader import Reader
-from scanfab.io.writer import Writer
+from scanfab.io.reader import Reader, ReadOptions
 
-__all__ = [
-    "installed_readers",
-    "installed_writers",
-    "lacking",
-    "reader_for",
-    "reader_named",
-    "writer_for",
-    "writer_named",
-]
+__all__ = ["installed_readers", "lacking", "reader_for", "reader_named", "why_not"]
 
 GROUP = "scanfab.readers"
-WRITERS = "scanfab.writers"
 
 
 @cache
@@ -54,72 +44,35 @@ def load_readers(points: Iterable[EntryPoint]) -> dict[str, Offer]:
     return load_offers(points, "reader", lambda reader: make(reader()))
 
 
-@cache
-def installed_writers() -> dict[str, Offer]:
-    """All writers by name, with the package of each; as :func:`installed_readers`."""
-    return load_writers(entry_points(group=WRITERS))
-
-
-def load_writers(points: Iterable[EntryPoint]) -> dict[str, Offer]:
-    """Load entry points; see :func:`installed_writers`."""
-    make = having(
-        "a class of objects with the members of scanfab.io.writer.Writer",
-        **dict.fromkeys(("name", "description"), str),
-        extensions=tuple,
-        write=Callable,
-    )
-    return load_offers(points, "writer", lambda writer: make(writer()))
-
-
 def lacking(plugin: object) -> str | None:
     """What to install for a plugin whose package is not there; None if nothing lacks."""
     module, words = getattr(plugin, "requires", (None, ""))
     return None if module is None or find_spec(module) is not None else f"pip install {words}"
 
 
-def writer_named(name: str) -> Writer:
-    """The writer that a user names; UnknownFormatError lists those that exist."""
-    writers = installed_writers()
-    if name not in writers:
-        raise UnknownFormatError(
-            f"there is no writer called {name!r}; the writers are {', '.join(writers)}"
-        )
-    writer: Writer = writers[name].plugin
-    advice = lacking(writer)
-    if advice is not None:
-        raise UnknownFormatError(f"{name} needs another package: {advice}")
-    return writer
-
-
-def writer_for(path: Path) -> Writer:
-    """The writer of a suffix; UnknownFormatError lists those that exist."""
-    for name, one in installed_writers().items():
-        if path.name.lower().endswith(one.plugin.extensions):
-            return writer_named(name)
-    known = (ending for one in installed_writers().values() for ending in one.plugin.extensions)
-    raise UnknownFormatError(
-        f"{path}: no format has this suffix: expected one of {' '.join(dict.fromkeys(known))}, or "
-        f"its name as `to`"
-    )
-
-
-def reader_named(name: str) -> Reader:
+def reader_named(name: str, options: ReadOptions | None = None) -> Reader:
     """The reader that a user names; UnknownFormatError lists those that exist."""
     readers = installed_readers()
     if name not in readers:
         raise UnknownFormatError(
             f"there is no reader called {name!r}; the readers are {', '.join(readers)}"
         )
-    reader: Reader = readers[name].plugin
-    advice = lacking(reader)
+    advice = lacking(readers[name].plugin)
     if advice is not None:
         raise UnknownFormatError(f"{name} needs another package: {advice}")
-    return reader
+    return _told(readers[name].plugin, options)
 
 
-def reader_for(path: Path) -> Reader | None:
+def _told(reader: Reader, options: ReadOptions | None) -> Reader:
+    """The reader, with what users say of its files if it needs that to know what they hold."""
+    tell = getattr(reader, "told", None)
+    told: Reader = reader if tell is None or options is None else tell(options)
+    return told
+
+
+def reader_for(path: Path, options: ReadOptions | None = None) -> Reader | None:
     """The reader that knows a file by its content, else by its extension; None if none does."""
-    readers: list[Reader] = [one.plugin for one in installed_readers().values()]
+    readers = [_told(one.plugin, options) for one in installed_readers().values()]
     # a format that any program may write comes after the programs' own
     readers.sort(key=lambda reader: bool(getattr(reader, "generic", False)))
     for reader in readers:
@@ -134,6 +87,19 @@ def reader_for(path: Path) -> Reader | None:
             ) from error
     name = bare_name(path).lower()
     return next((r for r in readers if name.endswith(r.extensions) and _can_open(r, path)), None)
+
+
+def why_not(path: Path, options: ReadOptions) -> str:
+    """What the last reader of files with such an ending says of one that it cannot read."""
+    reason = ""
+    for one in installed_readers().values():
+        reader = _told(one.plugin, options)
+        if bare_name(path).lower().endswith(reader.extensions):
+            try:
+                reader.kind(path)
+            except ReadError as error:
+                reason = str(error).removeprefix(f"{path}").lstrip(":, ")
+    return reason
 
 
 def _can_open(reader: Reader, path: Path) -> bool:

@@ -16,6 +16,7 @@ from scanfab.io.families import Family
 from scanfab.io.frame import Frame
 from scanfab.io.frame_csv import FrameFile
 from scanfab.io.reader import ReadOptions, Snapshot
+from scanfab.io.unpacking import unpacking_up_to
 
 __all__ = ["ENDLESS", "ContactsFrom", "Series"]
 
@@ -207,7 +208,8 @@ class Series:
             return snapshots, None
         problem: ReadError | None = None
         try:
-            snapshots = self.grains.reader.snapshots(path)
+            with unpacking_up_to(self.options.max_unpacked):
+                snapshots = self.grains.reader.snapshots(path)
             told = read_frame(path) if len(snapshots) == 1 else None
             if told is not None:
                 snapshots = [replace(snapshots[0], step=told.step, time=told.time)]
@@ -262,7 +264,8 @@ class Series:
             return None
         if path not in self._contact_snapshots:
             assert family.reader is not None
-            self._contact_snapshots[path] = family.reader.snapshots(path)
+            with unpacking_up_to(self.options.max_unpacked):
+                self._contact_snapshots[path] = family.reader.snapshots(path)
         snapshots = self._contact_snapshots[path]
         if len(snapshots) == 1 and (snapshots[0].step is None or grains.step is None):
             numbered = None not in family.files and step is not None

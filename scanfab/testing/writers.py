@@ -41,7 +41,7 @@ def check_writer(
     --------
     >>> import tempfile
     >>> from pathlib import Path
-    >>> from scanfab.io.registry import writer_named
+    >>> from scanfab.io.writers.registry import writer_named
     >>> from scanfab.testing import check_writer
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     check_writer(writer_named("vtp"), Path(folder))

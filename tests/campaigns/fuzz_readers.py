@@ -47,7 +47,7 @@ def main() -> None:
     if given.process is not None:
         fuzz(given.readers[0], given.runs, given.out, given.process)
         return
-    for reader in given.readers or ("lammps", "liggghts", "vtk", "yade"):
+    for reader in given.readers or ("lammps", "liggghts", "table", "vtk", "yade"):
         supervise(reader, given.runs, given.out / reader)
 
 

@@ -15,7 +15,7 @@ from hypothesis.extra.numpy import arrays
 
 import scanfab
 from scanfab.base.errors import ReadError, ScanfabNote, SettingsError, UnknownFormatError
-from scanfab.io.registry import installed_writers
+from scanfab.io.writers.registry import installed_writers
 from scanfab.testing import differences, made_up_packings
 from tests.helpers.dumps import dump_text, pairs_text, write
 from tests.helpers.truth import SAMPLE_DATA

@@ -13,7 +13,8 @@ PACKAGE = Path(__file__).parents[1] / "packages" / "scanfab-mycode"
 KIT = """
 import sys
 from pathlib import Path
-from scanfab.io.registry import reader_named, writer_named
+from scanfab.io.registry import reader_named
+from scanfab.io.writers.registry import writer_named
 from scanfab.testing import check_reader, check_writer
 
 folder = Path(sys.argv[1])

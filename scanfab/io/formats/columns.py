@@ -21,6 +21,9 @@ from scanfab.packing.cell import Cell
 from scanfab.packing.packing import LazyColumns, lies_within
 
 __all__ = [
+    "DIAMETER_NAMES",
+    "ID_NAMES",
+    "RADIUS_NAMES",
     "grain_table",
     "has_radius",
     "room_for_columns",
@@ -243,6 +246,8 @@ def _radius(
         return np.full(count, options.radius)
     if "radius" in named:
         return _lengths(path, named["radius"], "a radius", where)
+    if "diameter" in options.columns:
+        return 0.5 * _lengths(path, rest.pop("diameter"), "a diameter", where)
     radius = _take(rest, RADIUS_NAMES)
     if radius is not None:
         return _lengths(path, radius, "a radius", where)

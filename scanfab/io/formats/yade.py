@@ -25,6 +25,7 @@ from scanfab.io.reader import (
     ReadOptions,
     Snapshot,
 )
+from scanfab.io.unpacking import check_lines
 from scanfab.packing.cell import Cell
 
 __all__ = ["YadeReader"]
@@ -126,6 +127,7 @@ def _is_text(path: Path) -> bool:
 
 def _numbers(path: Path) -> FloatArray:
     check_memory(path, 6.0 * plain(path).stat().st_size)
+    check_lines(path, plain(path))
     data = plain(path).read_bytes()
     if all(not line.partition(b"#")[0].strip(BLANKS) for line in data.split(b"\n")):
         return np.zeros((0, 0))  # an empty frame

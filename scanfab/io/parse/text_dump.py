@@ -26,6 +26,7 @@ from scanfab.io.parse.lammps_box import dump_cell
 from scanfab.io.parse.number_rows import exact_column, plain_reason
 from scanfab.io.parse.text_table import LARGE, TextTable, read_regular
 from scanfab.io.reader import Snapshot
+from scanfab.io.unpacking import check_lines
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import LazyColumns
 
@@ -82,6 +83,7 @@ def index_dump(path: Path) -> list[Snapshot]:
     file = plain(path)
     if file.stat().st_size == 0:
         raise ReadError(f"{path}: the file is empty")
+    check_lines(path, file)
     # not mapped into memory: where a mapped file is cut meanwhile, the process dies
     with open(file, "rb") as stream:
         starts, size = _starts(stream)
