@@ -42,6 +42,10 @@ class FencedError(Exception):
     """What the process said of the file, or how it ended."""
 
 
+class GoneError(FencedError):
+    """The process did not survive the file."""
+
+
 class _Process:
     """The process behind the fence."""
 
@@ -67,7 +71,7 @@ class _Process:
                 self.process.stdin.flush()
                 return self._answer()
             except (OSError, EOFError, ValueError):
-                raise FencedError("its library crashed, or took too long or too much") from None
+                raise GoneError("its library crashed, or took too long or too much") from None
 
     def _answer(self) -> tuple[Arrays, dict[str, Any]]:
         assert self.process.stdout is not None
@@ -151,7 +155,7 @@ def fenced(reader: str, file: Path, path: Path, **more: Any) -> tuple[Arrays, di
                 at_end(_end)
             return _running[0].ask(request, SECONDS + size / PER_SECOND)
         except FencedError as error:
-            if _running and _running[0].process.poll() is not None:
+            if isinstance(error, GoneError):
                 _end()
             raise ReadError(f"{path}: cannot be read: {error}") from None
         except (OSError, EOFError, ValueError) as error:
