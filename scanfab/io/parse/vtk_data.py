@@ -17,8 +17,9 @@ Arrays = dict[str, npt.NDArray[Any]]
 VTK_VERTEX, VTK_POLY_VERTEX, VTK_LINE = 1, 2, 3
 # bit of vtkGhostType: the point or cell is another piece's
 DUPLICATE = 1
-# bytes of text whose words are in memory at a time
+# bytes of text whose words are in memory at a time, and from which on a faster parser pays
 PART = 4 << 20
+LONG = 1 << 20
 
 
 class FlawError(Exception):
@@ -77,6 +78,8 @@ def numbers(text: bytes, count: int, type: str) -> npt.NDArray[Any]:
         If there are fewer, or a word is no such number.
     """
     is_real = type[0] == "f"
+    if len(text) > LONG and (fast := _fast(text, count, is_real)) is not None:
+        return _stored(fast, type)
     found = np.empty(count, np.float64 if is_real else np.uint64 if type == "u8" else np.int64)
     read: Any = float if is_real else int
     place = filled = 0
@@ -96,9 +99,29 @@ def numbers(text: bytes, count: int, type: str) -> npt.NDArray[Any]:
             what = "numbers" if is_real else "whole numbers"
             raise FlawError(f"expected {what}, found something else") from None
         filled += len(words)
+    return _stored(found, type)
+
+
+def _fast(text: bytes, count: int, is_real: bool) -> npt.NDArray[Any] | None:
+    """The numbers of a long text by polars; None if it cannot, so that others say what is wrong."""
+    import polars
+
+    kind = polars.Float64 if is_real else polars.Int64
+    lines = text.translate(bytes.maketrans(b" \t\r\v\f", b"\n\n\n\n\n"))
+    try:
+        table = polars.read_csv(lines, has_header=False, schema={"0": kind}, quote_char=None)
+    except (polars.exceptions.PolarsError, polars.exceptions.PanicException):
+        return None
+    # between two blanks there is no number
+    found = table["0"].drop_nulls()
+    return found.to_numpy()[:count] if len(found) >= count else None
+
+
+def _stored(found: npt.NDArray[Any], type: str) -> npt.NDArray[Any]:
+    """Numbers as the file's own type; FlawError if it cannot hold a whole one."""
     with np.errstate(over="ignore", invalid="ignore"):
         stored = found.astype(type)
-    if not is_real and not np.array_equal(stored.astype(found.dtype), found):
+    if type[0] != "f" and not np.array_equal(stored.astype(found.dtype), found):
         raise FlawError(f"a whole number is too large for its type ({type})")
     return stored
 
