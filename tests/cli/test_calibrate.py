@@ -148,4 +148,4 @@ def test_an_rv_follows_the_strain_that_is_named(calibrate, tmp_path):
     words = ("--variants", "c", "--max-chords", "1e6")
     assert "--strain grains" in calibrate(TRIAXIAL, *QUICK, *words, *follows)[1]
     picture = tmp_path / "view.png"
-    assert run(["view", TRIAXIAL, *follows, "--screenshot", str(picture)]) == 0
+    assert run(["view", str(TRIAXIAL), *follows, "--screenshot", str(picture)]) == 0
