@@ -6,7 +6,7 @@ import re
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from random import Random
 
@@ -15,11 +15,13 @@ import numpy as np
 import pyvista
 
 from scanfab.base.errors import ScanfabError, ScanfabNote, ScanfabWarning
+from scanfab.io.convert import convert
 from scanfab.io.families import Family
 from scanfab.io.parse.vtk_mesh import read_bounds
 from scanfab.io.reader import GrainTable, ReadOptions
 from scanfab.io.registry import reader_for, reader_named
 from scanfab.io.series import Series
+from scanfab.testing import made_up_packings
 from tests.helpers.dumps import (
     PAIRS,
     ROWS,
@@ -32,7 +34,7 @@ from tests.helpers.dumps import (
 )
 from tests.helpers.truth import FLOOR, PERIODIC, YADE
 
-READERS = ("lammps", "liggghts", "table", "vtk", "yade")
+READERS = ("lammps", "liggghts", "npz", "on-dem", "table", "vtk", "xyz", "yade")
 NAMES = (
     "f_1.txt",
     "f_1.vtk",
@@ -42,6 +44,9 @@ NAMES = (
     "f_1.xdmf",
     "f_1.txt.gz",
     "f_1.xml",
+    "f_1.vtkhdf",
+    "f_1.xyz",
+    "f_1.contacts.csv",
     "f_1.csv",
     "f_1.xyzd",
     "f_1.csv.zst",
@@ -249,13 +254,16 @@ def companion_grains(format: str) -> tuple[GrainTable, Family]:
     path = {
         "lammps": FLOOR / "shuffled.txt",
         "liggghts": FLOOR / "shuffled.txt",
+        "npz": FLOOR / "grains_30000.vtp",
+        "on-dem": FLOOR / "grains_30000.vtp",
         "table": FLOOR / "truth_grains.csv",
+        "xyz": FLOOR / "grains_30000.vtp",
         "vtk": FLOOR / "grains_30000.vtp",
         "yade": YADE / "id-spheres-00000000.vtk.gz",
     }[format]
-    reader = reader_named(format)
+    reader = reader_named("vtk" if path.suffix == ".vtp" else format)
     grains = reader.read_grains(reader.snapshots(path)[0], ReadOptions())
-    return grains, _family(path, format, "grains")
+    return grains, _family(path, reader.name, "grains")
 
 
 def seeds(format: str, folder: Path) -> list[Seed]:
@@ -263,7 +271,10 @@ def seeds(format: str, folder: Path) -> list[Seed]:
     made = {
         "lammps": _lammps_files,
         "liggghts": _liggghts_files,
+        "npz": partial(_packings, (".npz", ".contacts.csv", ".frame.csv", ".columns.csv")),
+        "on-dem": partial(_packings, (".vtkhdf",)),
         "table": _table_files,
+        "xyz": partial(_packings, (".xyz",)),
         "vtk": _vtk_files,
         "yade": _yade_files,
     }[format](folder)
@@ -282,7 +293,7 @@ def seeds(format: str, folder: Path) -> list[Seed]:
 def _is_for(format: str, path: Path) -> bool:
     if format == "vtk":
         return path.name.removesuffix(".gz")[-4:] in (".vtk", ".vtp", ".vtu")
-    if format == "table":
+    if format in ("npz", "on-dem", "table", "xyz"):
         return False
     if format == "lammps":
         return path.suffix == ".txt" and YADE not in path.parents
@@ -372,6 +383,16 @@ def _table_files(folder: Path) -> list[Path]:
     (folder / "a.xyzd").write_bytes(rows.astype("<f8").tobytes())
     more = [folder / name for name in ("wide.csv", "a.npz", "b.npz", "a.parquet", "b.parquet")]
     return [*paths, *more, folder / "a.xyzd"]
+
+
+def _packings(endings: tuple[str, ...], folder: Path) -> list[Path]:
+    """What convert writes, and what it puts beside."""
+    for place, packing in enumerate(made_up_packings().values()):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            for ending in (".data", ".npz", ".vtkhdf", ".xyz"):
+                convert(packing, folder / f"p{place}{ending}")
+    return [path for path in sorted(folder.iterdir()) if path.name.endswith(endings)]
 
 
 def _yade_files(folder: Path) -> list[Path]:

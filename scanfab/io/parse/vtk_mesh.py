@@ -100,9 +100,12 @@ def _piece(path: Path) -> Content:
 
 
 def elements(path: Path) -> ElementTree.Element:
-    """The elements of an XML file; ReadError if it is none."""
-    with _named_flaws(path):
+    """The elements of an XML file that lists others; ReadError if it is none."""
+    check_memory(path, OF_TEXT * plain(path).stat().st_size)
+    try:
         return elements_of(plain(path).read_bytes())
+    except FlawError as flaw:
+        raise ReadError(f"{path}: cannot be read as a list of VTK files: {flaw}") from None
 
 
 def listed(path: Path, tag: str, key: str) -> list[Path]:
