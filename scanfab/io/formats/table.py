@@ -252,7 +252,8 @@ def _needed(found: Mapping[str, str]) -> tuple[list[str], list[str]]:
 
 
 def _may_be_ids(values: npt.NDArray[Any]) -> bool:
-    return bool(np.all(values == np.rint(values))) and len(np.unique(values)) == len(values)
+    is_whole = values.dtype.kind in "iuf" and np.all(values == np.rint(values))
+    return bool(is_whole) and len(np.unique(values)) == len(values)
 
 
 def _named_contacts(path: Path, text: str | None) -> dict[str, str]:
@@ -301,8 +302,8 @@ def _tell_guess(
         return
     columns = " ".join(sorted(found, key=lambda what: int(found[what])))
     warnings.warn(
-        f"the columns of the table have no names and are taken for {columns}, since the grains then "
-        f"touch one another",
+        f"the columns of the table have no names and are taken for {columns}, since the grains "
+        f"then touch one another",
         ScanfabNote,
         stacklevel=2,
     )
