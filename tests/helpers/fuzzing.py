@@ -25,6 +25,7 @@ from scanfab.testing import made_up_packings
 from tests.helpers.dumps import (
     PAIRS,
     ROWS,
+    binary_dump,
     dump_text,
     local_text,
     pairs_text,
@@ -51,6 +52,7 @@ NAMES = (
     "f_1.xyzd",
     "f_1.csv.zst",
     "f_1.csv.lz4",
+    "f_1.bin",
 )
 OPTIONS = (
     ReadOptions(),
@@ -65,6 +67,7 @@ OPTIONS = (
     ReadOptions(contact_columns="id1=c_con[1],id2=c_con[2],fx=c_con[3],fy=c_con[4],fz=c_con[5]"),
     ReadOptions(columns={"x": "2", "y": "3", "z": "4", "diameter": "5"}, skip=1),
     ReadOptions(contact_columns="id1=1,id2=2,fx=3,fy=4,fz=5"),
+    ReadOptions(columns={"id": "1", "x": "3", "y": "4", "z": "5", "radius": "6"}),
 )
 # of the sample files: larger ones make each execution slow
 MOST_BYTES = 17_000
@@ -320,7 +323,10 @@ def _lammps_files(folder: Path) -> list[Path]:
     paths = [folder / name for name in files]
     for path in paths:
         path.write_text(files[path.name])
-    return paths
+    new, old = folder / "new.bin", folder / "old.bin"
+    new.write_bytes(binary_dump(names="id type x y z radius", time=0.5, blocks=2))
+    old.write_bytes(binary_dump() + binary_dump(step=100, tilt=(0.2, 0.1, 0.0)))
+    return [*paths, new, old]
 
 
 def _liggghts_files(folder: Path) -> list[Path]:

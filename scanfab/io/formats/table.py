@@ -252,7 +252,8 @@ def _needed(found: Mapping[str, str]) -> tuple[list[str], list[str]]:
 
 
 def _may_be_ids(values: npt.NDArray[Any]) -> bool:
-    return bool(np.all(values == np.rint(values))) and len(np.unique(values)) == len(values)
+    is_whole = values.dtype.kind in "iuf" and np.all(values == np.rint(values))
+    return bool(is_whole) and len(np.unique(values)) == len(values)
 
 
 def _named_contacts(path: Path, text: str | None) -> dict[str, str]:
