@@ -6,6 +6,7 @@ import os
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, suppress
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -166,11 +167,21 @@ def _packings(source: Any, chosen: slice, reading: dict[str, Any]) -> Iterator[t
     if isinstance(source, Series):
         part = source[chosen]
         return ((frame.number, frame.read()) for frame in part)
-    packings = [source] if isinstance(source, Packing) else list(source)
-    if not all(isinstance(one, Packing) for one in packings):
-        raise SettingsError("source: expected a path, a Series, a Packing or an iterable of those")
-    numbers = range(len(packings))[chosen]
-    return ((number, packings[number]) for number in numbers)
+    packings = [source] if isinstance(source, Packing) else source
+    if not isinstance(packings, Iterable):
+        raise SettingsError(f"source: expected a path, a Series or packings, found {source!r}")
+    bounds = (chosen.start, chosen.stop, chosen.step)
+    if any(bound is not None and bound < 0 for bound in bounds):
+        # counted from the end, which has to come first
+        return iter(list(_numbered(packings))[chosen])
+    return islice(_numbered(packings), *bounds)
+
+
+def _numbered(packings: Iterable[Any]) -> Iterator[tuple[int, Packing]]:
+    for number, packing in enumerate(packings):
+        if not isinstance(packing, Packing):
+            raise SettingsError(f"source: expected packings, found {packing!r} among them")
+        yield number, packing
 
 
 def save_packing(packing: Packing, path: Path, writer: Writer | None = None) -> None:

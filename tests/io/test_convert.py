@@ -132,6 +132,19 @@ def test_packings_without_steps_go_by_their_number(tmp_path):
     assert [path.name for path in files] == ["123456789012.npz", "1.npz"]
 
 
+def test_packings_come_one_by_one(tmp_path):
+    def endless():
+        while True:
+            yield made_up_packings()["plain"]
+
+    files = scanfab.convert(endless(), tmp_path / "{step}.npz", frames="1:4:2")
+    assert [path.name for path in files] == ["1.npz", "3.npz"]
+    (path,) = scanfab.convert([EVERYTHING] * 3, tmp_path / "last.npz", frames=-1)
+    assert scanfab.read(path).step == EVERYTHING.step
+    with pytest.raises(SettingsError, match="expected packings, found 3 among them"):
+        scanfab.convert([3], tmp_path / "a.npz")
+
+
 def test_several_frames_do_not_go_into_one_file(tmp_path):
     (tmp_path / "one.vtp").write_text("mine")
     with pytest.raises(SettingsError, match=r"several frames for one file.*\{step\}.*`frames`"):
