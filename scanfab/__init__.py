@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from scanfab.fabric.contact import contact_fabric
     from scanfab.fabric.tensor import FabricTensor
     from scanfab.fabric.void import VoidFabric, void_fabric
+    from scanfab.io.convert import convert
     from scanfab.io.frame import Frame
     from scanfab.io.opening import read, read_series
     from scanfab.io.series import Series
@@ -89,6 +90,7 @@ _HOME = {
     "compare_tables": "table.compare",
     "compute": "pipeline.compute",
     "compute_file": "viz.compute_file",
+    "convert": "io.convert",
     "contact_fabric": "fabric.contact",
     "cylinder": "base.shapes",
     "direction_rule": "scan.directions",
@@ -147,6 +149,7 @@ __all__ = [
     "compute",
     "compute_file",
     "contact_fabric",
+    "convert",
     "cylinder",
     "direction_rule",
     "ellipsoid",

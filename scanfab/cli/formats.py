@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import click
 
 __all__ = ["formats"]
@@ -12,17 +14,19 @@ def formats() -> None:
     """List every reader and writer, its extensions, and the package it comes from."""
     from scanfab.cli.console import reported_warnings
     from scanfab.io.registry import installed_readers
+    from scanfab.io.writers.registry import installed_writers
     from scanfab.table.formats.registry import known_formats
     from scanfab.viz.figures.style import PLOT_FORMATS
 
     with reported_warnings():
         lines = [
-            ("reader", name, " ".join(one.plugin.extensions), one.package, one.plugin.description)
-            for name, one in installed_readers().items()
+            (kind, name, " ".join(one.plugin.extensions), one.package, _described(one.plugin))
+            for kind, offers in (("reader", installed_readers()), ("writer", installed_writers()))
+            for name, one in offers.items()
         ]
         written = known_formats()
     lines += [
-        ("writer", suffix.lstrip("."), suffix, type(one).__module__.split(".")[0], one.description)
+        ("table", suffix.lstrip("."), suffix, type(one).__module__.split(".")[0], one.description)
         for suffix, one in written.items()
     ]
     lines += [
@@ -38,3 +42,11 @@ def formats() -> None:
     for line in [titles, *lines]:
         padded = [word.ljust(width) for word, width in zip(line, widths, strict=False)]
         click.echo("  ".join([*padded, line[4]]))
+
+
+def _described(plugin: Any) -> str:
+    """What it is, and how to get the package that it needs."""
+    from scanfab.io.registry import lacking
+
+    advice = lacking(plugin)
+    return f"{plugin.description}{'' if advice is None else f' (not installed: {advice})'}"

@@ -18,6 +18,7 @@ COMMANDS = {
     "report": "one file to hand on: settings, tables, figures, a view that can be turned",
     "view": "a frame in 3D",
     "map": "fabric by place: a grid, slices or shells of blocks",
+    "convert": "one frame or a series in another format, with contacts, cell and forces",
     "formats": "every reader and writer, its extensions, and the package it comes from",
 }
 

@@ -36,7 +36,8 @@ Command = Callable[..., Any]
 Completion = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
 
 READING = (
-    "format", "columns", "contact_columns", "radius", "cell", "periodic", "bodies", "contacts",
+    "format", "columns", "contact_columns", "skip", "radius", "cell", "periodic", "bodies",
+    "max_unpacked", "contacts",
 )  # fmt: skip
 SAMPLE = ("boundary", "min_contacts", "rattlers", "min_force", "contact_tolerance")
 WINDOW = ("rv", "rv_radius", "rv_center", "rv_shape", "rv_size", "rv_axis", "rv_follows")

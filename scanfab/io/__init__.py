@@ -5,7 +5,7 @@ These names are what a reader of another package may import; see docs/adding-a-r
 are defined may change.
 """
 
-from scanfab.io.files import plain
+from scanfab.io.files import file_inside, first_bytes, plain
 from scanfab.io.formats.columns import grain_table
 from scanfab.io.formats.join import join_ids, join_positions
 from scanfab.io.reader import (
@@ -17,17 +17,24 @@ from scanfab.io.reader import (
     ReadOptions,
     Snapshot,
 )
+from scanfab.io.writer import Left, Writer
+from scanfab.io.written import more_columns
 
 __all__ = [
     "Carries",
     "FileKind",
     "GrainTable",
     "JoinedContacts",
+    "Left",
     "ReadOptions",
     "Reader",
     "Snapshot",
+    "Writer",
+    "file_inside",
+    "first_bytes",
     "grain_table",
     "join_ids",
     "join_positions",
+    "more_columns",
     "plain",
 ]

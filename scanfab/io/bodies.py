@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import IntArray
 from scanfab.io.reader import GrainTable
 from scanfab.packing.bodies import CLUMP_COLUMNS, MOLECULE_COLUMNS
 
-__all__ = ["body_numbers"]
+__all__ = ["body_numbers", "numbers_in_columns"]
 
 
 def body_numbers(path: Path, grains: GrainTable, named: str | None) -> IntArray | None:
@@ -39,7 +42,9 @@ def body_numbers(path: Path, grains: GrainTable, named: str | None) -> IntArray 
     ReadError
         If there is no such column, or it does not hold whole numbers.
     """
-    name = _clump_column(grains) if named is None else named
+    if named is None and grains.bodies is not None:
+        return grains.bodies
+    name = _clump_column(grains.columns) if named is None else named
     # an empty frame may have lost its columns
     if name is None or len(grains.radius) == 0 or (name == "id" and grains.id is not None):
         return None
@@ -49,7 +54,19 @@ def body_numbers(path: Path, grains: GrainTable, named: str | None) -> IntArray 
             f"{path}: there is no column {name!r} to say which spheres are one body (`bodies`); "
             f"the columns are {known}"
         )
-    values = np.asarray(grains.columns[name])
+    return _numbers(path, name, np.asarray(grains.columns[name]))
+
+
+def numbers_in_columns(columns: Mapping[str, npt.NDArray[Any]]) -> IntArray | None:
+    """The bodies that columns number by themselves; None if none does, or its numbers are none."""
+    name = _clump_column(columns)
+    try:
+        return None if name is None else _numbers(Path(), name, np.asarray(columns[name]))
+    except ReadError:
+        return None
+
+
+def _numbers(path: Path, name: str, values: npt.NDArray[Any]) -> IntArray:
     if values.ndim != 1 or values.dtype.kind not in "biuf":
         raise ReadError(f"{path}: `bodies`: the column {name} does not hold a number a sphere")
     wrong = np.flatnonzero(~(np.abs(values) < 2.0**53) | (values != np.round(values)))
@@ -64,7 +81,7 @@ def body_numbers(path: Path, grains: GrainTable, named: str | None) -> IntArray 
     return numbers
 
 
-def _clump_column(grains: GrainTable) -> str | None:
+def _clump_column(columns: Iterable[str]) -> str | None:
     """The first column whose name says that it numbers clumps."""
-    lower = {name.lower(): name for name in reversed(list(grains.columns))}
+    lower = {name.lower(): name for name in reversed(list(columns))}
     return next((lower[name] for name in CLUMP_COLUMNS if name in lower), None)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 from pathlib import Path
 
 from scanfab.base.errors import ReadError, UnknownFormatError
 from scanfab.io.files import bare_name
-from scanfab.io.reader import FileKind, Reader
+from scanfab.io.reader import FileKind, Reader, ReadOptions
 from scanfab.io.registry import reader_for, reader_named
 
 __all__ = [
@@ -22,11 +22,14 @@ __all__ = [
     "files_in",
     "nearest",
     "own_contacts",
+    "set_tables_aside",
     "sort_into_families",
 ]
 
 # options of the command line, beside the dumps
 SETTINGS_FILE = "scanfab.toml"
+# of a table with the contacts of the grains in the file of the same name without it
+CONTACTS_ENDING = ".contacts."
 # endings of what editors and interrupted programs leave
 LEFTOVERS = ("~", ".part", ".tmp", ".bak")
 NUMBER = re.compile(r"\d+")
@@ -55,7 +58,9 @@ class Family:
         return self
 
 
-def sort_into_families(files: Sequence[Path], format: str | None) -> list[Family]:
+def sort_into_families(
+    files: Sequence[Path], format: str | None, options: ReadOptions | None = None
+) -> list[Family]:
     """
     Sort files into families, and find the reader and kind of each by its largest file.
 
@@ -65,6 +70,8 @@ def sort_into_families(files: Sequence[Path], format: str | None) -> list[Family
         In any order.
     format : str, optional
         Name of the reader to use for all.
+    options : ReadOptions, optional
+        What the user tells of them.
 
     Raises
     ------
@@ -72,7 +79,7 @@ def sort_into_families(files: Sequence[Path], format: str | None) -> list[Family
         If there is no reader of that name.
     """
     return [
-        _family(_by_step(members), members, _glob(members, files), format)
+        _family(_by_step(members), members, _glob(members, files), format, options)
         for members in _groups(files)
     ]
 
@@ -90,7 +97,9 @@ def _by_step(members: list[Path]) -> list[tuple[int | None, Path]]:
     return [(next(iter(_numbers(file)[place:]), None), file) for file in members]
 
 
-def families_beside(grains: Family, format: str | None) -> list[Family]:
+def families_beside(
+    grains: Family, format: str | None, options: ReadOptions | None = None
+) -> list[Family]:
     """
     Other families in the folders of some grain files, with the files of the same steps only.
 
@@ -111,16 +120,63 @@ def families_beside(grains: Family, format: str | None) -> list[Family]:
             if same and not own.keys() & set(group):
                 found[_glob(group, files)] += same
     return [
-        _family(files, [file for _, file in files], pattern, format)
+        _family(files, [file for _, file in files], pattern, format, options)
         for pattern, files in found.items()
     ]
 
 
-def contacts_beside(grains: Family, format: str | None) -> tuple[list[Family], list[Family]]:
+def set_tables_aside(
+    families: Sequence[Family], named: Collection[Path] = (), grains: Family | None = None
+) -> list[Family]:
+    """
+    The families, with ``other`` as the kind of tables that lie beside dumps.
+
+    A table may be anything: results, or what somebody made of the dumps. Beside grains of a
+    program's own format, one counts if users name it, or if it is ``STEM.contacts.csv`` of a file
+    of grains.
+
+    Parameters
+    ----------
+    families : sequence of Family
+        Of one source.
+    named : collection of Path
+        Files that the user names one by one.
+    grains : Family, optional
+        Those that are sure, if the families are others.
+    """
+    sure = [
+        family
+        for family in [*families, *([] if grains is None else [grains])]
+        if family.kind in ("grains", "index") and not _is_table(family)
+    ]
+    if not sure:
+        return list(families)
+    stems = {bare_name(file).rpartition(".")[0] for one in sure for file in one.files.values()}
+    return [
+        family
+        if not _is_table(family)
+        or any(file in named or _belongs(file, stems) for file in family.files.values())
+        else replace(family, kind="other")
+        for family in families
+    ]
+
+
+def _is_table(family: Family) -> bool:
+    return bool(getattr(family.reader, "is_table", False))
+
+
+def _belongs(file: Path, stems: Collection[str]) -> bool:
+    stem, ending, _ = bare_name(file).rpartition(CONTACTS_ENDING)
+    return bool(ending) and stem in stems
+
+
+def contacts_beside(
+    grains: Family, format: str | None, options: ReadOptions | None = None
+) -> tuple[list[Family], list[Family]]:
     """The contact files in the folder of single grain files: their own, and those in doubt."""
     if grains.kind == "index":
         return [], []
-    beside = families_beside(grains, format)
+    beside = set_tables_aside(families_beside(grains, format, options), (), grains)
     rivals = [family for family in beside if family.kind in ("grains", grains.kind)]
     contacts = [family for family in beside if family.kind == "contacts" and family.clash is None]
     return own_contacts(grains, rivals, contacts)
@@ -220,14 +276,18 @@ def _place(group: list[Path]) -> int:
 
 
 def _family(
-    steps: list[tuple[int | None, Path]], members: list[Path], pattern: str, format: str | None
+    steps: list[tuple[int | None, Path]],
+    members: list[Path],
+    pattern: str,
+    format: str | None,
+    options: ReadOptions | None,
 ) -> Family:
     sample = max(members, key=lambda file: file.stat().st_size)
     reader: Reader | None = None
     kind: FileKind = "other"
     problem: str | None = None
     try:
-        reader = reader_for(sample) if format is None else reader_named(format)
+        reader = reader_for(sample, options) if format is None else reader_named(format, options)
         kind = "other" if reader is None else reader.kind(sample)
     except UnknownFormatError:
         raise

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import bz2
-import gzip
-import lzma
+import math
 import os
 import shutil
 import tempfile
-import zlib
 from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -20,23 +17,27 @@ from scanfab.base.ending import at_end
 from scanfab.base.errors import ReadError
 from scanfab.base.memory import free_memory
 from scanfab.base.streams import check_file
+from scanfab.io.unpacking import (
+    COMPRESSED_SUFFIXES,
+    MAGIC_BYTES,
+    Readable,
+    bounded,
+    opener_for,
+    unpacking_errors,
+    unpacking_up_to,
+)
 
 __all__ = [
     "COMPRESSED_SUFFIXES",
     "bare_name",
     "check_memory",
+    "file_inside",
     "first_bytes",
     "plain",
     "temporary_copy",
     "unpacked",
 ]
 
-OPENERS: dict[bytes, Callable[..., Any]] = {
-    b"\x1f\x8b": gzip.open,
-    b"BZh": bz2.open,
-    b"\xfd7zXZ\x00": lzma.open,
-}
-COMPRESSED_SUFFIXES = (".gz", ".bz2", ".xz")
 # decompressed copies of the files used last, for each thread that reads: a frame needs few
 KEPT = 4
 # bytes that are copied at a time, and those that are left to other programs
@@ -44,7 +45,11 @@ PART = 4 << 20
 RESERVE = 1 << 30
 # a copy up to this size is no reason to ask how full the disk is
 SMALL = 64 << 20
-_copies: OrderedDict[tuple[str, int, int], Path] = OrderedDict()
+# path, time and size of a file
+_Key = tuple[str, int, int]
+_copies: OrderedDict[_Key, Path] = OrderedDict()
+# files that were unpacked once, and whose copies may have been removed since
+_sound: set[_Key] = set()
 _threads: set[int] = set()
 _lock = Lock()
 _folder: list[str] = []
@@ -70,11 +75,12 @@ def bare_name(path: Path) -> str:
 
 def first_bytes(path: Path, count: int = 4096) -> bytes:
     """The first bytes of the decompressed file; ReadError if it cannot be opened."""
+    opener = _opener(path)
     try:
-        with _opener(path)(path, "rb") as stream:
+        with opener(path, "rb") as stream:
             head: bytes = stream.read(count)
             return head
-    except (OSError, EOFError, lzma.LZMAError, zlib.error) as error:
+    except unpacking_errors(opener) as error:
         raise ReadError(f"{path}: cannot be read: {_reason(error)}") from None
 
 
@@ -90,8 +96,9 @@ def plain(path: Path) -> Path:
         if key in _copies:
             _copies.move_to_end(key)
             return _copies[key]
-    with unpacked(path) as stream:
+    with unpacking_up_to(math.inf if key in _sound else None), unpacked(path) as stream:
         copy = temporary_copy(stream, bare_name(path))
+    _sound.add(key)
     with _lock:
         _copies[key] = copy
         surplus = max(len(_copies) - KEPT * len(_threads), 0)
@@ -102,15 +109,37 @@ def plain(path: Path) -> Path:
 
 
 @contextmanager
-def unpacked(path: Path) -> Iterator[IO[bytes]]:
+def unpacked(path: Path) -> Iterator[Readable]:
     """The content of a file, as a stream; ReadError if it cannot be read or decompressed."""
     opener = _opener(path)
     try:
         with opener(path, "rb") as stream:
-            yield stream
-    except (OSError, EOFError, lzma.LZMAError, zlib.error) as error:
+            yield stream if opener is open else bounded(path, stream, path.stat().st_size)
+    except unpacking_errors(opener) as error:
         verb = "read" if opener is open else "decompressed"
         raise ReadError(f"{path}: cannot be {verb}: {_reason(error)}") from None
+
+
+def file_inside(index: Path, name: str) -> Path:
+    """
+    The file that another one names, which must lie in its folder or below.
+
+    Raises
+    ------
+    ReadError
+        If it lies elsewhere, or is not there: whoever hands on a list of files must not be able to
+        make others read what they like.
+    """
+    folder = os.path.abspath(index.parent)
+    file = os.path.normpath(os.path.join(folder, name.replace("\\", "/")))
+    if "\0" in name or os.path.commonpath([folder, file]) != folder or file == folder:
+        raise ReadError(
+            f"{index}: names {name!r}, which does not lie in its folder: move the files together"
+        )
+    path = index.parent / os.path.relpath(file, folder)
+    if not path.is_file():
+        raise ReadError(f"{index}: names {name!r}, but there is no such file")
+    return path
 
 
 def check_memory(path: Path, needed: float) -> None:
@@ -123,7 +152,7 @@ def check_memory(path: Path, needed: float) -> None:
         )
 
 
-def temporary_copy(stream: IO[bytes], name: str) -> Path:
+def temporary_copy(stream: Readable, name: str) -> Path:
     """
     What a stream holds, as a file that goes with the process.
 
@@ -210,10 +239,10 @@ def _opener(path: Path) -> Callable[..., Any]:
     check_file(path)
     try:
         with open(path, "rb") as stream:
-            magic = stream.read(6)
+            magic = stream.read(MAGIC_BYTES)
     except OSError as error:
         raise ReadError(f"{path}: cannot be read: {_reason(error)}") from None
-    return next((opener for key, opener in OPENERS.items() if magic.startswith(key)), open)
+    return opener_for(magic)
 
 
 def _reason(error: Exception) -> str:

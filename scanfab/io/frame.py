@@ -13,6 +13,7 @@ import numpy as np
 
 from scanfab.base.errors import PackingError, ReadError, ScanfabNote, ScanfabWarning
 from scanfab.base.typing import FloatArray
+from scanfab.io.beside import frame_file, read_frame, with_columns
 from scanfab.io.bodies import body_numbers
 from scanfab.io.families import Family, nearest
 from scanfab.io.reader import (
@@ -23,6 +24,7 @@ from scanfab.io.reader import (
     ReadOptions,
     Snapshot,
 )
+from scanfab.io.unpacking import unpacking_up_to
 from scanfab.packing.packing import Packing, check_lengths
 
 if TYPE_CHECKING:
@@ -94,7 +96,11 @@ class Frame:
         if self.problem is not None:
             raise self.problem
         options = self._options()
-        grains = self.reader.read_grains(self.snapshot, options)
+        with unpacking_up_to(options.max_unpacked):
+            return self._packing(options)
+
+    def _packing(self, options: ReadOptions) -> Packing:
+        grains = with_columns(self.snapshot.path, self.reader.read_grains(self.snapshot, options))
         with_own = self.series.contacts_from in ("auto", "beside", "grains")
         own = grains.contacts if with_own else None
         beside = self.series.contacts_from == "beside"
@@ -214,6 +220,7 @@ class Frame:
         ask = getattr(self.reader, "carries", None)
         options = self.series.options
         told = self.series.cells or options.cell or options.periodic is not None
+        told = told or frame_file(self.snapshot.path).is_file()
         return "cell" if told or ask is None else ask(self.snapshot.path)
 
     @property
@@ -225,6 +232,9 @@ class Frame:
     def _options(self) -> ReadOptions:
         """How to read this frame, with its cell if a file names those of the frames."""
         options, cells = self.series.options, self.series.cells
+        beside = read_frame(self.snapshot.path)
+        if beside is not None:
+            options = replace(options, beside=beside.cell or "none")
         if cells is None:
             return options
         found = cells.at(self.number, self.step)

@@ -12,7 +12,8 @@ from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning, UnknownF
 from scanfab.base.streams import kind_of
 from scanfab.io.families import Family, contacts_beside, files_in, sort_into_families
 from scanfab.io.files import first_bytes
-from scanfab.io.reader import FileKind
+from scanfab.io.reader import FileKind, ReadOptions
+from scanfab.io.registry import why_not
 
 __all__ = ["PathLike", "choose_grains", "expanded", "files_of", "named_once", "series_below"]
 
@@ -80,7 +81,9 @@ def files_of(path: Path) -> list[Path]:
     return files
 
 
-def choose_grains(paths: Sequence[Path], families: Sequence[Family], has_radius: bool) -> Family:
+def choose_grains(
+    paths: Sequence[Path], families: Sequence[Family], options: ReadOptions
+) -> Family:
     """
     The one family of grain files.
 
@@ -90,8 +93,8 @@ def choose_grains(paths: Sequence[Path], families: Sequence[Family], has_radius:
         As the user named them, for messages.
     families : sequence of Family
         All of their files.
-    has_radius : bool
-        Whether the user gives a radius, as dumps without one need.
+    options : ReadOptions
+        What the user tells: a radius, which dumps without one need.
 
     Raises
     ------
@@ -100,17 +103,17 @@ def choose_grains(paths: Sequence[Path], families: Sequence[Family], has_radius:
     """
     order: list[FileKind] = ["grains", "index", "points"]
     grains: list[Family] = []
-    for kind in ["points", *order] if has_radius else order:
+    for kind in order if options.radius is None else ["points", *order]:
         grains = grains or [family for family in families if family.kind == kind]
     where = ", ".join(str(path) for path in paths[:3]) + (", ..." if len(paths) > 3 else "")
     if len(grains) > 1:
-        raise ReadError(_several(where, families))
+        raise ReadError(_several(where, families, options))
     if not grains:
-        raise _none(where, paths, families)
+        raise _none(where, paths, families, options)
     return grains[0]
 
 
-def _several(where: str, families: Sequence[Family]) -> str:
+def _several(where: str, families: Sequence[Family], options: ReadOptions) -> str:
     """The message for several series: each with what reading it takes."""
     contacts = [family for family in families if family.kind == "contacts"]
     full = [family for family in families if family.kind in ("grains", "index")]
@@ -119,7 +122,7 @@ def _several(where: str, families: Sequence[Family]) -> str:
     doubtful: list[str] = []
     for family in [*full, *bare]:
         # by the rule that reads them, once this one is named
-        own, unclear = contacts_beside(family, None)
+        own, unclear = contacts_beside(family, None, options)
         doubtful += [one.pattern for one in unclear]
         notes = ["it has no radius: `radius=L`"] if family.kind == "points" else []
         if own:
@@ -134,7 +137,9 @@ def _several(where: str, families: Sequence[Family]) -> str:
     return message
 
 
-def _none(where: str, paths: Sequence[Path], families: Sequence[Family]) -> ReadError:
+def _none(
+    where: str, paths: Sequence[Path], families: Sequence[Family], options: ReadOptions
+) -> ReadError:
     """The error for a source without grains."""
     problem = next((family.problem for family in families if family.problem), None)
     if problem is not None:
@@ -154,8 +159,10 @@ def _none(where: str, paths: Sequence[Path], families: Sequence[Family]) -> Read
     below = ", ".join(filter(None, (series_below(path) for path in paths if path.is_dir())))
     if below:
         return ReadError(f"{where}: no reader knows its files, but {below}")
+    reason = why_not(paths[0], options) if len(paths) == 1 and paths[0].is_file() else ""
     return UnknownFormatError(
         f"{where}: no reader knows the format; scanfab formats lists those that exist"
+        + (f"; as a table it cannot be read: {reason}" if reason else "")
     )
 
 

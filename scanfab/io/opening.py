@@ -14,6 +14,7 @@ from scanfab.io.families import (
     SETTINGS_FILE,
     Family,
     contacts_beside,
+    set_tables_aside,
     sort_into_families,
 )
 from scanfab.io.formats.yade_cells import is_cell_file, refuse_as_numbers
@@ -29,6 +30,7 @@ from scanfab.io.grain_files import (
 from scanfab.io.options import READING_OPTIONS, take_reading
 from scanfab.io.reader import ReadOptions
 from scanfab.io.series import ContactsFrom, Series
+from scanfab.io.unpacking import unpacking_up_to
 from scanfab.packing.packing import Packing
 
 __all__ = ["READING", "SETTINGS_FILE", "open_sources", "read", "read_series"]
@@ -81,11 +83,13 @@ def read_series(
     contacts: str | PathLike = "auto",
     columns: dict[str, str] | None = None,
     contact_columns: str | None = None,
+    skip: int = 0,
     radius: float | None = None,
     cell: tuple[float, ...] | PathLike | None = None,
     periodic: str | None = None,
     bodies: str | None = None,
     dim: str | int = "auto",
+    max_unpacked: float | None = None,
 ) -> Series:
     """
     Open a series of frames: a folder, a file, or several files.
@@ -102,10 +106,13 @@ def read_series(
         ``auto``: from contact files if there are any, else by geometry; ``file``; ``geometric``; or
         a file, folder or glob, matched by step.
     columns : dict, optional
-        Standard names to the file's own, such as ``{"radius": "c_rad"}``.
+        Standard names to the file's own, such as ``{"radius": "c_rad"}``; of tables without names
+        their numbers from 1, such as ``{"x": 1, "y": 2, "z": 3, "diameter": 4}``.
     contact_columns : str, optional
         Keywords of LIGGGHTS' ``compute pair/gran/local``, or LAMMPS' columns by their meaning:
-        ``"id1=c_ids[1],id2=c_ids[2]"``.
+        ``"id1=c_ids[1],id2=c_ids[2]"``, which serves tables too.
+    skip : int, optional
+        Lines before the table, of tables of text.
     radius : float, optional
         Radius for dumps without one, dump's length unit.
     cell : tuple of float or path, optional
@@ -120,6 +127,9 @@ def read_series(
     dim : {"auto", 2, 3}, optional
         2: discs, whose centres share one coordinate. ``auto``: 2 if those of the first frame that
         has any do so, at least ten, and share no second one; with a note. One for all frames.
+    max_unpacked : float, optional
+        Times its size that a packed file may unpack to, 1000 by default. Given, lines of text may
+        also be longer than 16 MiB.
 
     Returns
     -------
@@ -147,16 +157,38 @@ def read_series(
     arguments = locals()
     reading = {name: arguments[name] for name in READING}
     checked = take_reading(dict(reading))
-    given = _given(source)
-    paths = [Path(one) for one in named_once(given)]
     named_cell = checked["cell"]
     one_cell = named_cell if isinstance(named_cell, tuple) else None
     cells = None if named_cell is None or one_cell is not None else _cell_file(named_cell)
     options = ReadOptions(
-        checked["columns"] or {}, contact_columns, checked["radius"], one_cell, periodic, bodies
+        checked["columns"] or {},
+        contact_columns,
+        checked["radius"],
+        one_cell,
+        periodic,
+        bodies,
+        checked["skip"],
+        checked["max_unpacked"],
     )
-    families = sort_into_families([file for path in paths for file in files_of(path)], format)
-    grains = choose_grains(paths, families, radius is not None).check()
+    with unpacking_up_to(options.max_unpacked):
+        return _series(_given(source), contacts, options, cells, reading, checked["dim"])
+
+
+def _series(
+    given: Sequence[PathLike],
+    contacts: str | PathLike,
+    options: ReadOptions,
+    cells: FrameFile | None,
+    reading: dict[str, Any],
+    dim: str | int,
+) -> Series:
+    """The series of what is named: its files sorted out."""
+    format, paths = reading["format"], [Path(one) for one in named_once(given)]
+    families = sort_into_families(
+        [file for path in paths for file in files_of(path)], format, options
+    )
+    families = set_tables_aside(families, paths)
+    grains = choose_grains(paths, families, options).check()
     name = _as_text(os.fspath(given[0]) if len(paths) == len(given) == 1 else _common_folder(paths))
     sources = tuple(os.fspath(path) for one in given for path in expanded(one))
     own = [family for family in families if family.kind == "contacts"]
@@ -165,16 +197,14 @@ def read_series(
 
     def series(files: Sequence[Family], contacts_from: ContactsFrom) -> Series:
         whole = tuple(family.check() for family in files)
-        return Series(
-            name, grains, whole, contacts_from, options, cells, sources, reading, dim=checked["dim"]
-        )
+        return Series(name, grains, whole, contacts_from, options, cells, sources, reading, dim=dim)
 
     if contacts == "geometric":
         return series((), "geometric")
     if contacts not in ("auto", "file"):
-        return series(_named_contacts(contacts, format), "path")
+        return series(_named_contacts(contacts, format, options), "path")
     if not own and not any(path.is_dir() for path in paths):
-        own, beside = _contacts_beside(grains, format), True
+        own, beside = _contacts_beside(grains, format, options), True
     else:
         beside = False
     if contacts == "file" and not own:
@@ -231,13 +261,13 @@ def _cell_file(path: PathLike) -> FrameFile:
         raise ReadError(f"{path}: cannot be read: {os.strerror(error.errno or 0)}") from None
 
 
-def _contacts_beside(grains: Family, format: str | None) -> list[Family]:
+def _contacts_beside(grains: Family, format: str | None, options: ReadOptions) -> list[Family]:
     """
     The contact files in the folder of single grain files, as if the folder had been named.
 
     Told by a note; also where it is not clear whose contacts they are, and they are left alone.
     """
-    own, doubtful = contacts_beside(grains, format)
+    own, doubtful = contacts_beside(grains, format, options)
     if len(own) == 1:
         _note(f"contacts are read from {_patterns(own)}, beside the grains")
     elif own:
@@ -282,13 +312,15 @@ def _note_below(paths: Sequence[Path], grains: Family) -> None:
 
 
 def _lack(family: Family) -> str:
+    if getattr(family.reader, "is_table", False):
+        return " (a table beside dumps)"
     return " (no radius: `radius`)" if family.kind == "points" else ""
 
 
-def _named_contacts(contacts: PathLike, format: str | None) -> list[Family]:
+def _named_contacts(contacts: PathLike, format: str | None, options: ReadOptions) -> list[Family]:
     """Contact files from a file, a folder or a glob."""
     files = [file for one in expanded(contacts) for file in files_of(Path(one))]
-    families = sort_into_families(files, format)
+    families = sort_into_families(files, format, options)
     found = [family for family in families if family.kind == "contacts"]
     if not found:
         problem = next((family.problem for family in families if family.problem), None)

@@ -8,14 +8,17 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from scanfab.base.option import Option, number, optional, unusable
+from scanfab.base.option import Option, number, optional, unusable, whole
 
 __all__ = [
     "READING_OPTIONS",
     "parse_cell",
     "parse_columns",
+    "parse_frames",
+    "parse_max_unpacked",
     "parse_periodic",
     "parse_radius",
+    "parse_skip",
     "take_reading",
 ]
 
@@ -71,6 +74,25 @@ def parse_cell(name: str, value: Any) -> tuple[float, ...] | str | PathLike[str]
     return numbers
 
 
+def parse_frames(text: str | int | slice | None, name: str = "frames") -> slice:
+    """A slice from ``A:B:C`` or a single number."""
+    if text is None:
+        return slice(None)
+    if isinstance(text, slice):
+        return text
+    try:
+        numbers = [int(part) if part.strip() else None for part in str(text).split(":")]
+    except ValueError:
+        numbers = []
+    if not 1 <= len(numbers) <= 3 or numbers == [None] or numbers[2:] == [0]:
+        raise unusable(name, "a slice such as 0:10:2, :5 or -1:", text)
+    if len(numbers) > 1:
+        return slice(*numbers)
+    first = numbers[0]
+    assert first is not None
+    return slice(first, first + 1 if first != -1 else None)
+
+
 def parse_periodic(name: str, value: Any) -> str | None:
     """Letters out of xyz."""
     if value is not None and not (
@@ -88,6 +110,8 @@ def parse_dim(name: str, value: Any) -> str | int:
 
 
 parse_radius = optional(number("a length above 0", lambda value: 0 < value < math.inf))
+parse_skip = whole("how many lines to skip, 0 or more", lambda value: 0 <= value < 2**31)
+parse_max_unpacked = optional(number("a number above 0", lambda value: value > 0))
 
 READING_OPTIONS = (
     Option(
@@ -103,7 +127,8 @@ READING_OPTIONS = (
         name="columns",
         parse=parse_columns,
         group="reading",
-        help='Names of columns that are not the usual ones: "radius=c_rad,x=px".',
+        help='Names of columns that are not the usual ones: "radius=c_rad,x=px"; of tables without '
+        'names their numbers from 1: "x=1,y=2,z=3,diameter=4".',
         meaning="names of columns that are not the usual ones",
         takes="dict",
         metavar="NAMES",
@@ -113,9 +138,20 @@ READING_OPTIONS = (
         parse=parse_text,
         group="reading",
         help='Columns of a dump local: LIGGGHTS keywords "pos id force", or LAMMPS names '
-        '"id1=NAME,id2=NAME".',
+        '"id1=NAME,id2=NAME", which serve tables too.',
         meaning="what the columns of the contact files are",
         metavar="KEYWORDS",
+    ),
+    Option(
+        name="skip",
+        default=0,
+        parse=parse_skip,
+        group="reading",
+        help="Lines before the table, of tables of text.",
+        meaning="lines that are skipped before a table",
+        takes="int",
+        kind=int,
+        metavar="N",
     ),
     Option(
         name="radius",
@@ -153,6 +189,16 @@ READING_OPTIONS = (
         "clump_id or clump, if there is one; id: each sphere is a grain).",
         meaning="column that says which clump a sphere belongs to; not given: the format's own",
         metavar="COLUMN",
+    ),
+    Option(
+        name="max_unpacked",
+        parse=parse_max_unpacked,
+        group="reading",
+        help="Times its size that a packed file may unpack to; given, lines may also be of any "
+        "length (default: 1000, and 16 MiB).",
+        takes="float",
+        kind=float,
+        metavar="TIMES",
     ),
     Option(
         name="contacts",

@@ -10,11 +10,19 @@ from typing import Any, Literal, NamedTuple, Protocol
 import numpy.typing as npt
 
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.io.options import parse_cell, parse_periodic, parse_radius
+from scanfab.io.options import (
+    parse_cell,
+    parse_max_unpacked,
+    parse_periodic,
+    parse_radius,
+    parse_skip,
+)
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import ContactList
 
 __all__ = [
+    "BODIES",
+    "WALLS",
     "Carries",
     "FileKind",
     "GrainTable",
@@ -24,6 +32,11 @@ __all__ = [
     "Snapshot",
 ]
 
+
+BODIES = "scanfab_bodies"
+"""A column of this name is the number of each sphere's body, whatever other columns say."""
+WALLS = "scanfab_wall_contacts"
+"""A column of this name is the number of contacts with walls of each grain."""
 
 FileKind = Literal["grains", "index", "points", "contacts", "cell", "other"]
 """
@@ -54,12 +67,20 @@ class ReadOptions:
     """Letters out of xyz."""
     bodies: str | None = None
     """Column that says which clump a sphere belongs to; by default that of the format, if any."""
+    skip: int = 0
+    """Lines before a table of text."""
+    max_unpacked: float | None = None
+    """Times its size that a packed file may unpack to; None: the usual bound."""
+    beside: Cell | Literal["none"] | None = None
+    """The dump's own cell, where a file beside the dump says which it is, or that it has none."""
 
     def __post_init__(self) -> None:
         """Raise SettingsError if a value cannot be used."""
         parse_cell("cell", self.cell)
         parse_periodic("periodic", self.periodic)
         parse_radius("radius", self.radius)
+        parse_skip("skip", self.skip)
+        parse_max_unpacked("max_unpacked", self.max_unpacked)
 
 
 @dataclass(frozen=True)
@@ -91,6 +112,8 @@ class GrainTable(NamedTuple):
     """Contacts that the grain file itself lists."""
     wall_contacts: IntArray | None = None
     """Number of contacts with walls of each grain, shape (N,), if the grain file lists them."""
+    bodies: IntArray | None = None
+    """Number of each sphere's body, shape (N,), if the file says so beyond all doubt."""
 
 
 class JoinedContacts(NamedTuple):
@@ -112,7 +135,10 @@ class Reader(Protocol):
     whose grain files do not all carry their cell has a method ``carries(path)`` that answers with
     one of :data:`Carries`. One that reads other files together with a file of grains, such as that
     of its cell, has a method ``beside(path)`` that answers with a list of their paths: they are
-    inputs too. It is asked for each file of a series, so it should not open them.
+    inputs too. It is asked for each file of a series, so it should not open them. One that cannot
+    know what a file holds without what users tell of it (the columns of a table) has a method
+    ``told(options)`` that answers with a reader that does know. One of tables that may hold
+    anything says ``is_table = True``: in a folder they count only where there are no dumps.
     """
 
     name: str

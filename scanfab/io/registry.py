@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
+from importlib.util import find_spec
 from pathlib import Path
 
 from scanfab.base.errors import ReadError, UnknownFormatError
 from scanfab.base.plugins import Offer, having, load_offers
 from scanfab.io.files import bare_name
-from scanfab.io.reader import Reader
+from scanfab.io.reader import Reader, ReadOptions
 
-__all__ = ["installed_readers", "reader_for", "reader_named"]
+__all__ = ["installed_readers", "lacking", "reader_for", "reader_named", "why_not"]
 
 GROUP = "scanfab.readers"
 
@@ -43,20 +44,35 @@ def load_readers(points: Iterable[EntryPoint]) -> dict[str, Offer]:
     return load_offers(points, "reader", lambda reader: make(reader()))
 
 
-def reader_named(name: str) -> Reader:
+def lacking(plugin: object) -> str | None:
+    """What to install for a plugin whose package is not there; None if nothing lacks."""
+    module, words = getattr(plugin, "requires", (None, ""))
+    return None if module is None or find_spec(module) is not None else f"pip install {words}"
+
+
+def reader_named(name: str, options: ReadOptions | None = None) -> Reader:
     """The reader that a user names; UnknownFormatError lists those that exist."""
     readers = installed_readers()
     if name not in readers:
         raise UnknownFormatError(
             f"there is no reader called {name!r}; the readers are {', '.join(readers)}"
         )
-    reader: Reader = readers[name].plugin
-    return reader
+    advice = lacking(readers[name].plugin)
+    if advice is not None:
+        raise UnknownFormatError(f"{name} needs another package: {advice}")
+    return _told(readers[name].plugin, options)
 
 
-def reader_for(path: Path) -> Reader | None:
+def _told(reader: Reader, options: ReadOptions | None) -> Reader:
+    """The reader, with what users say of its files if it needs that to know what they hold."""
+    tell = getattr(reader, "told", None)
+    told: Reader = reader if tell is None or options is None else tell(options)
+    return told
+
+
+def reader_for(path: Path, options: ReadOptions | None = None) -> Reader | None:
     """The reader that knows a file by its content, else by its extension; None if none does."""
-    readers: list[Reader] = [one.plugin for one in installed_readers().values()]
+    readers = [_told(one.plugin, options) for one in installed_readers().values()]
     # a format that any program may write comes after the programs' own
     readers.sort(key=lambda reader: bool(getattr(reader, "generic", False)))
     for reader in readers:
@@ -71,6 +87,19 @@ def reader_for(path: Path) -> Reader | None:
             ) from error
     name = bare_name(path).lower()
     return next((r for r in readers if name.endswith(r.extensions) and _can_open(r, path)), None)
+
+
+def why_not(path: Path, options: ReadOptions) -> str:
+    """What the last reader of files with such an ending says of one that it cannot read."""
+    reason = ""
+    for one in installed_readers().values():
+        reader = _told(one.plugin, options)
+        if bare_name(path).lower().endswith(reader.extensions):
+            try:
+                reader.kind(path)
+            except ReadError as error:
+                reason = str(error).removeprefix(f"{path}").lstrip(":, ")
+    return reason
 
 
 def _can_open(reader: Reader, path: Path) -> bool:

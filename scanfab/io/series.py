@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from pathlib import Path
 from typing import Any, Literal, SupportsIndex, overload
@@ -14,11 +14,13 @@ from scanfab.base.errors import NoFrameError, ReadError, SettingsError
 from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray
+from scanfab.io.beside import columns_file, frame_file, read_frame
 from scanfab.io.dimension import decided_space
 from scanfab.io.families import Family
 from scanfab.io.frame import Frame
 from scanfab.io.frame_csv import FrameFile
 from scanfab.io.reader import ReadOptions, Snapshot
+from scanfab.io.unpacking import unpacking_up_to
 
 __all__ = ["ENDLESS", "ContactsFrom", "Series"]
 
@@ -251,7 +253,11 @@ class Series:
             return snapshots, None
         problem: ReadError | None = None
         try:
-            snapshots = self.grains.reader.snapshots(path)
+            with unpacking_up_to(self.options.max_unpacked):
+                snapshots = self.grains.reader.snapshots(path)
+            told = read_frame(path) if len(snapshots) == 1 else None
+            if told is not None:
+                snapshots = [replace(snapshots[0], step=told.step, time=told.time)]
         except ReadError as error:
             stamp, snapshots, problem = None, [Snapshot(path)], error
         self._met[path] = stamp, snapshots
@@ -303,7 +309,8 @@ class Series:
             return None
         if path not in self._contact_snapshots:
             assert family.reader is not None
-            self._contact_snapshots[path] = family.reader.snapshots(path)
+            with unpacking_up_to(self.options.max_unpacked):
+                self._contact_snapshots[path] = family.reader.snapshots(path)
         snapshots = self._contact_snapshots[path]
         if len(snapshots) == 1 and (snapshots[0].step is None or grains.step is None):
             numbered = None not in family.files and step is not None
@@ -325,11 +332,14 @@ class Series:
         list of Path
         """
         listed = self._listed(path) if self.grains.kind == "index" else []
+        told = [file for file in (frame_file(path), columns_file(path)) if file.is_file()]
+        listed += told
         ask = getattr(self.grains.reader, "beside", None)
         named = self.cells is not None or self.options.cell is not None
         if named or ask is None:
             return listed
-        return [*listed, *(file for one in listed or [path] for file in ask(one))]
+        dumps = [one for one in listed if one not in told] or [path]
+        return [*listed, *(file for one in dumps for file in ask(one))]
 
     def _listed(self, index: Path) -> list[Path]:
         """The dumps of an index that are there; a frame that is not has been told of."""

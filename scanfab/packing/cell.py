@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import PackingError
+from scanfab.base.lengths import MOST, all_within
 from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import spelt_place
 from scanfab.base.typing import FloatArray, IntArray
@@ -79,8 +80,10 @@ class Cell:
                 f"a cell needs vectors of shape (3, 3) and an origin of shape (3,), "
                 f"not {self.vectors.shape} and {self.origin.shape}"
             )
-        if not np.all(np.isfinite(self.vectors)) or not np.all(np.isfinite(self.origin)):
-            raise PackingError("the cell's vectors and origin must be finite numbers")
+        if not all(all_within(one, -MOST, MOST) for one in (self.vectors, self.origin)):
+            raise PackingError(
+                f"the cell's vectors and origin must be finite numbers, none above {MOST:g}"
+            )
         edges = np.linalg.norm(self.vectors, axis=1)
         if np.any(edges == 0) or abs(np.linalg.det(self.vectors / edges[:, None])) < 1e-6:
             raise PackingError(f"the cell's vectors span no volume: {self.vectors.tolist()}")

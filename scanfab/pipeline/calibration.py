@@ -13,6 +13,7 @@ from scanfab.base.errors import PackingError, SettingsError
 from scanfab.base.note import Note, tell
 from scanfab.base.option import options_of, refuse_unknown
 from scanfab.base.spelling import counted
+from scanfab.io.options import parse_frames
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.calibration_ladders import (
     PAPER_CUTOFF,
@@ -30,7 +31,6 @@ from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.plan import Plan, make_plan
 from scanfab.pipeline.settings import Length, Settings
 from scanfab.pipeline.tolerance import TOLERANCE_MISSED, missing_work
-from scanfab.pipeline.values import parse_frames
 from scanfab.pipeline.window_settings import SHAPES, settings_in
 from scanfab.scan.directions import DirectionRule, direction_rule, rule_of, usual_rule
 from scanfab.table.plots import Plots

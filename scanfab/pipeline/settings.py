@@ -14,6 +14,7 @@ from scanfab.base.option import (
     refuse_unknown,
     whole,
 )
+from scanfab.io.options import parse_frames
 from scanfab.packing.columns import RV_COLUMN
 from scanfab.pipeline.values import (
     AXES,
@@ -29,7 +30,6 @@ from scanfab.pipeline.values import (
     parse_cutoff,
     parse_cutoffs,
     parse_directions,
-    parse_frames,
     parse_groups,
     parse_rattlers,
     parse_spacing,

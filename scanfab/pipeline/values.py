@@ -35,7 +35,6 @@ __all__ = [
     "parse_cutoff",
     "parse_cutoffs",
     "parse_directions",
-    "parse_frames",
     "parse_groups",
     "parse_length",
     "parse_lengths",
@@ -189,25 +188,6 @@ def parse_axis(text: str | Vector | None, name: str = "axis") -> Axis:
     if not (math.isfinite(length) and length > 0):
         raise unusable(name, "x, y, z or three numbers X,Y,Z", text)
     return Axis(x / length, y / length, z / length)
-
-
-def parse_frames(text: str | int | slice | None, name: str = "frames") -> slice:
-    """A slice from ``A:B:C`` or a single number."""
-    if text is None:
-        return slice(None)
-    if isinstance(text, slice):
-        return text
-    try:
-        numbers = [int(part) if part.strip() else None for part in str(text).split(":")]
-    except ValueError:
-        numbers = []
-    if not 1 <= len(numbers) <= 3 or numbers == [None] or numbers[2:] == [0]:
-        raise unusable(name, "a slice such as 0:10:2, :5 or -1:", text)
-    if len(numbers) > 1:
-        return slice(*numbers)
-    first = numbers[0]
-    assert first is not None
-    return slice(first, first + 1 if first != -1 else None)
 
 
 def parse_variants(name: str, letters: object) -> str:

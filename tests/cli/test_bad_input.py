@@ -212,9 +212,9 @@ def test_the_wrong_format_is_refused(tmp_path, refusal, format):
 
 
 def test_a_format_that_does_not_exist_is_wrong_usage(tmp_path, compute):
-    answer = compute(grains(tmp_path), "--format", "pfc")
+    answer = compute(grains(tmp_path), "--format", "rocky")
     assert (answer.code, answer.out) == (2, "")
-    assert "there is no reader called 'pfc'; the readers are " in answer.err
+    assert "there is no reader called 'rocky'; the readers are " in answer.err
 
 
 # contacts

@@ -6,7 +6,7 @@ import re
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from random import Random
 
@@ -14,15 +14,18 @@ import meshio
 import numpy as np
 import pyvista
 
-from scanfab.base.errors import ScanfabError, ScanfabWarning
+from scanfab.base.errors import ScanfabError, ScanfabNote, ScanfabWarning
+from scanfab.io.convert import convert
 from scanfab.io.families import Family
 from scanfab.io.parse.vtk_mesh import read_bounds
 from scanfab.io.reader import GrainTable, ReadOptions
 from scanfab.io.registry import reader_for, reader_named
 from scanfab.io.series import Series
+from scanfab.testing import made_up_packings
 from tests.helpers.dumps import (
     PAIRS,
     ROWS,
+    binary_dump,
     dump_text,
     local_text,
     pairs_text,
@@ -32,8 +35,25 @@ from tests.helpers.dumps import (
 )
 from tests.helpers.truth import FLOOR, PERIODIC, YADE
 
-READERS = ("lammps", "liggghts", "vtk", "yade")
-NAMES = ("f_1.txt", "f_1.vtk", "f_1.vtp", "f_1.vtu", "f_1.pvd", "f_1.xdmf", "f_1.txt.gz", "f_1.xml")
+READERS = ("lammps", "liggghts", "npz", "on-dem", "table", "vtk", "xyz", "yade")
+NAMES = (
+    "f_1.txt",
+    "f_1.vtk",
+    "f_1.vtp",
+    "f_1.vtu",
+    "f_1.pvd",
+    "f_1.xdmf",
+    "f_1.txt.gz",
+    "f_1.xml",
+    "f_1.vtkhdf",
+    "f_1.xyz",
+    "f_1.contacts.csv",
+    "f_1.csv",
+    "f_1.xyzd",
+    "f_1.csv.zst",
+    "f_1.csv.lz4",
+    "f_1.bin",
+)
 OPTIONS = (
     ReadOptions(),
     ReadOptions(radius=0.1),
@@ -45,6 +65,9 @@ OPTIONS = (
     ReadOptions(columns={"x": "y"}, radius=0.1),
     ReadOptions(contact_columns="id1=c_con[1],id2=c_con[2]", periodic="xy"),
     ReadOptions(contact_columns="id1=c_con[1],id2=c_con[2],fx=c_con[3],fy=c_con[4],fz=c_con[5]"),
+    ReadOptions(columns={"x": "2", "y": "3", "z": "4", "diameter": "5"}, skip=1),
+    ReadOptions(contact_columns="id1=1,id2=2,fx=3,fy=4,fz=5"),
+    ReadOptions(columns={"id": "1", "x": "3", "y": "4", "z": "5", "radius": "6"}),
 )
 # of the sample files: larger ones make each execution slow
 MOST_BYTES = 17_000
@@ -194,14 +217,14 @@ def only_scanfabs_warnings() -> Iterator[None]:
         warnings.simplefilter("always")
         yield
     for warning in caught:
-        if not issubclass(warning.category, ScanfabWarning):
+        if not issubclass(warning.category, (ScanfabWarning, ScanfabNote)):
             place = f"{Path(warning.filename).name}:{warning.lineno}"
             raise ForbiddenError(f"{warning.category.__name__} at {place}: {warning.message}")
 
 
 def read_everything(path: Path, format: str, options: ReadOptions) -> None:
     """All that the package does with a file, as grains and as contacts; any result will do."""
-    reader = reader_named(format)
+    reader = reader_named(format, options)
     grains, companion = companion_grains(format)
     with only_scanfabs_warnings():
         with suppress(ScanfabError):
@@ -234,12 +257,16 @@ def companion_grains(format: str) -> tuple[GrainTable, Family]:
     path = {
         "lammps": FLOOR / "shuffled.txt",
         "liggghts": FLOOR / "shuffled.txt",
+        "npz": FLOOR / "grains_30000.vtp",
+        "on-dem": FLOOR / "grains_30000.vtp",
+        "table": FLOOR / "truth_grains.csv",
+        "xyz": FLOOR / "grains_30000.vtp",
         "vtk": FLOOR / "grains_30000.vtp",
         "yade": YADE / "id-spheres-00000000.vtk.gz",
     }[format]
-    reader = reader_named(format)
+    reader = reader_named("vtk" if path.suffix == ".vtp" else format)
     grains = reader.read_grains(reader.snapshots(path)[0], ReadOptions())
-    return grains, _family(path, format, "grains")
+    return grains, _family(path, reader.name, "grains")
 
 
 def seeds(format: str, folder: Path) -> list[Seed]:
@@ -247,6 +274,10 @@ def seeds(format: str, folder: Path) -> list[Seed]:
     made = {
         "lammps": _lammps_files,
         "liggghts": _liggghts_files,
+        "npz": partial(_packings, (".npz", ".contacts.csv", ".frame.csv", ".columns.csv")),
+        "on-dem": partial(_packings, (".vtkhdf",)),
+        "table": _table_files,
+        "xyz": partial(_packings, (".xyz",)),
         "vtk": _vtk_files,
         "yade": _yade_files,
     }[format](folder)
@@ -265,6 +296,8 @@ def seeds(format: str, folder: Path) -> list[Seed]:
 def _is_for(format: str, path: Path) -> bool:
     if format == "vtk":
         return path.name.removesuffix(".gz")[-4:] in (".vtk", ".vtp", ".vtu")
+    if format in ("npz", "on-dem", "table", "xyz"):
+        return False
     if format == "lammps":
         return path.suffix == ".txt" and YADE not in path.parents
     return (YADE in path.parents) == (format == "yade")
@@ -290,7 +323,10 @@ def _lammps_files(folder: Path) -> list[Path]:
     paths = [folder / name for name in files]
     for path in paths:
         path.write_text(files[path.name])
-    return paths
+    new, old = folder / "new.bin", folder / "old.bin"
+    new.write_bytes(binary_dump(names="id type x y z radius", time=0.5, blocks=2))
+    old.write_bytes(binary_dump() + binary_dump(step=100, tilt=(0.2, 0.1, 0.0)))
+    return [*paths, new, old]
 
 
 def _liggghts_files(folder: Path) -> list[Path]:
@@ -314,6 +350,55 @@ def _liggghts_files(folder: Path) -> list[Path]:
     pyvista.PolyData(_centres()).save(spheres, binary=False)
     spheres.write_bytes(spheres.read_bytes().replace(b"vtk output", b"Generated by LIGGGHTS"))
     return [*paths, spheres]
+
+
+def _table_files(folder: Path) -> list[Path]:
+    """Grains and contacts in each kind of table."""
+    import pyarrow
+    from pyarrow import parquet
+
+    numbers = np.array(ROWS)[:, [0, 2, 3, 4, 5]]
+    row = np.arange(12.0)
+    columns = {"x": row, "y": 0 * row, "z": 0 * row, "radius": 0.5 + 0 * row}
+    pushes = [(*pair, 0.1, 1.5, 0) for pair in PAIRS]
+
+    def text(rows, sign: str, names: str = "", comma: bool = False) -> str:
+        lines = [sign.join(map(repr, one)) for one in np.asarray(rows).tolist()]
+        body = "\n".join([names.replace(" ", sign)] * bool(names) + lines) + "\n"
+        return body.replace(".", ",") if comma else body
+
+    files = {
+        "named.csv": text(numbers, ",", "id x y z radius"),
+        "comma.csv": text(numbers, ";", "id x y z diameter", comma=True),
+        "tabs.tsv": text(numbers, "\t", "id x y z r"),
+        "guess.txt": text(np.column_stack(list(columns.values())), "  "),
+        "comment.txt": "# x y z r\n" + text(numbers[:, 1:], " "),
+        "quoted.csv": '"id","x","y","z","radius"\n"1","1D0","2","3",.5\n2,3,4,5,"a"\n',
+        "pairs.csv": text(pushes, ",", "id1 id2 fx fy fz"),
+        "kinds.csv": "contact_type,id1,id2,fn,ix,iy,iz\nSS,1,2,.5,0,0,0\nSA,2,1,1,0,0,0\n",
+    }
+    paths = [folder / name for name in files]
+    for path in paths:
+        path.write_text(files[path.name])
+    (folder / "wide.csv").write_bytes(files["named.csv"].encode("utf-16"))
+    np.savez(folder / "a.npz", **columns)
+    np.savez_compressed(folder / "b.npz", position=numbers[:, 1:4], r=numbers[:, 4])
+    parquet.write_table(pyarrow.table(columns), folder / "a.parquet", compression="zstd")
+    parquet.write_table(pyarrow.table(columns), folder / "b.parquet", compression="none")
+    rows = np.column_stack([*list(columns.values())[:3], np.ones(12)])
+    (folder / "a.xyzd").write_bytes(rows.astype("<f8").tobytes())
+    more = [folder / name for name in ("wide.csv", "a.npz", "b.npz", "a.parquet", "b.parquet")]
+    return [*paths, *more, folder / "a.xyzd"]
+
+
+def _packings(endings: tuple[str, ...], folder: Path) -> list[Path]:
+    """What convert writes, and what it puts beside."""
+    for place, packing in enumerate(made_up_packings().values()):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            for ending in (".data", ".npz", ".vtkhdf", ".xyz"):
+                convert(packing, folder / f"p{place}{ending}")
+    return [path for path in sorted(folder.iterdir()) if path.name.endswith(endings)]
 
 
 def _yade_files(folder: Path) -> list[Path]:
@@ -365,9 +450,7 @@ def _vtk_files(folder: Path) -> list[Path]:
     index = folder / "list.pvd"
     index.write_text(
         '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n<Collection>\n'
-        + "".join(
-            f'<DataSet timestep="{step}" file="{FLOOR}/grains_30000.vtp"/>\n' for step in range(2)
-        )
+        + "".join(f'<DataSet timestep="{step}" file="grid_ascii.vtu"/>\n' for step in range(2))
         + "</Collection>\n</VTKFile>\n"
     )
     return [*files, index]

@@ -35,6 +35,12 @@ HEADS = (
     b"\x1f\x8b",
     b"BZh9",
     b"\xfd7zXZ\x00",
+    b"\x28\xb5\x2f\xfd",
+    b"\x04\x22\x4d\x18",
+    b"PAR1",
+    b"PK\x03\x04",
+    b"x,y,z,radius\n",
+    b"\xff\xfe",
 )
 FEW = settings(
     max_examples=150,

@@ -144,5 +144,5 @@ def test_the_named_reader_is_used_for_all(tmp_path):
 
 
 def test_a_reader_that_does_not_exist_is_an_error(tmp_path):
-    with pytest.raises(UnknownFormatError, match="no reader called 'pfc'"):
-        families_of(tmp_path, ["dump_1.txt"], format="pfc")
+    with pytest.raises(UnknownFormatError, match="no reader called 'rocky'"):
+        families_of(tmp_path, ["dump_1.txt"], format="rocky")

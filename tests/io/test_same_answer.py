@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+from functools import partial
 
 import meshio
 import numpy as np
@@ -185,7 +186,73 @@ def grid_of(ending, **options):
     return save
 
 
+def table(folder, source, write_table=None):
+    """Two tables with names, each column under a name that says what it is."""
+    grains = dict(zip(("x", "y", "z"), source.position.T, strict=True))
+    grains = {"radius": source.radius, "id": source.id, **grains}
+    contacts = {"id2": source.id2, "id1": source.id1}
+    write_table(folder / "grains_5", grains)
+    write_table(folder / "pairs_5", contacts)
+    (grains_path,) = folder.glob("grains_5.*")
+    (contacts_path,) = folder.glob("pairs_5.*")
+    return grains_path, {"contacts": contacts_path, **source.cell}
+
+
+def text_table(ending, separator, opener=open):
+    def save(path, columns):
+        rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+        lines = [list(columns), *(map(repr, row) for row in rows)]
+        with opener(f"{path}{ending}", "wt") as stream:
+            stream.writelines(separator.join(line) + "\n" for line in lines)
+
+    return partial(table, write_table=save)
+
+
+def comma_table(folder, source):
+    def save(path, columns):
+        rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+        lines = [";".join(map(repr, row)).replace(".", ",") for row in rows]
+        write(path.with_suffix(".csv"), ";".join(columns) + "\n" + "\n".join(lines))
+
+    return table(folder, source, save)
+
+
+def npz_table(folder, source):
+    return table(folder, source, lambda path, columns: np.savez(f"{path}.npz", **columns))
+
+
+def parquet_table(folder, source):
+    import pyarrow
+    from pyarrow import parquet
+
+    def save(path, columns):
+        parquet.write_table(pyarrow.table(columns), f"{path}.parquet")
+
+    return table(folder, source, save)
+
+
+def numbered_table(folder, source):
+    """Without names: the user says which column is what."""
+    rows = np.column_stack([source.id, 2 * source.radius, source.position])
+    np.savetxt(folder / "grains_5.txt", rows, "%.17g")
+    np.savetxt(folder / "pairs_5.txt", np.column_stack([source.id1, source.id2]), "%d")
+    return folder / "grains_5.txt", {
+        "columns": "id=1,diameter=2,x=3,y=4,z=5",
+        "contacts": folder / "pairs_5.txt",
+        "contact_columns": "id1=1,id2=2",
+        **source.cell,
+    }
+
+
 FORMATS = {
+    "CSV": text_table(".csv", ","),
+    "CSV, gzip": text_table(".csv.gz", ",", gzip.open),
+    "table with tabs": text_table(".tsv", "\t"),
+    "table with blanks": text_table(".txt", "   "),
+    "table with semicolons and decimal commas": comma_table,
+    "NPZ": npz_table,
+    "Parquet": parquet_table,
+    "table without names": numbered_table,
     "LIGGGHTS": liggghts,
     "LIGGGHTS, rows in any order": liggghts_shuffled,
     "LIGGGHTS, several snapshots": liggghts_several_snapshots,

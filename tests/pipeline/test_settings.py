@@ -11,8 +11,9 @@ import pytest
 import scanfab
 from scanfab.base.errors import SettingsError
 from scanfab.base.option import options_of
+from scanfab.io.options import parse_frames
 from scanfab.pipeline.settings import Settings
-from scanfab.pipeline.values import Length, parse_axis, parse_frames, parse_length
+from scanfab.pipeline.values import Length, parse_axis, parse_length
 from scanfab.scan.directions import direction_rule
 from tests.helpers.dumps import write
 

@@ -14,13 +14,16 @@ from scanfab.base.errors import ReadError
 from scanfab.base.lengths import all_within
 from scanfab.base.typing import FloatArray
 from scanfab.io.formats.superquadrics import refuse_superquadrics
-from scanfab.io.reader import GrainTable, ReadOptions
+from scanfab.io.reader import BODIES, WALLS, GrainTable, ReadOptions
 from scanfab.packing.bodies import CLUMP_COLUMNS, MOLECULE_COLUMNS
 from scanfab.packing.boundary import CLASS_COLUMNS
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import LazyColumns, lies_within
 
 __all__ = [
+    "DIAMETER_NAMES",
+    "ID_NAMES",
+    "RADIUS_NAMES",
     "grain_table",
     "has_radius",
     "room_for_columns",
@@ -126,17 +129,25 @@ def grain_table(
     radius = _radius(path, rest, named, len(position), options, where)
     id = named.get("id", _take(rest, ID_NAMES))
     refuse_superquadrics(path, rest, radius, where)
+    own = {name: rest.pop(name) for name in (BODIES, WALLS) if name in rest}
+    bodies, walls = (
+        whole_numbers(path, own[name], where) if name in own else None for name in (BODIES, WALLS)
+    )
     return GrainTable(
         position,
         radius,
         None if id is None else whole_numbers(path, id, where),
         rest,
         cell,
+        wall_contacts=walls,
+        bodies=bodies,
     )
 
 
 def user_cell(path: Path, cell: Cell | None, options: ReadOptions) -> Cell | None:
     """The dump's cell with the user's cell and periodic on top."""
+    if options.beside is not None:
+        cell = None if options.beside == "none" else options.beside
     periodic: tuple[bool, bool, bool] | None = None
     if options.periodic is not None:
         periodic = (
@@ -235,6 +246,8 @@ def _radius(
         return np.full(count, options.radius)
     if "radius" in named:
         return _lengths(path, named["radius"], "a radius", where)
+    if "diameter" in options.columns:
+        return 0.5 * _lengths(path, rest.pop("diameter"), "a diameter", where)
     radius = _take(rest, RADIUS_NAMES)
     if radius is not None:
         return _lengths(path, radius, "a radius", where)

@@ -1,15 +1,18 @@
-"""Grains in the text dumps of LIGGGHTS and LAMMPS, which are the same for both."""
+"""Grains in the dumps of LIGGGHTS and LAMMPS, text and binary, which are the same for both."""
 
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import partial
 
+from scanfab.base.errors import ReadError
 from scanfab.io.formats.columns import grain_table, has_radius, room_for_columns
+from scanfab.io.parse.binary_dump import names_of_binary, read_binary
 from scanfab.io.parse.text_dump import read_columns, row_word
 from scanfab.io.reader import FileKind, GrainTable, ReadOptions, Snapshot
 
-__all__ = ["dump_kind", "read_dump_grains"]
+__all__ = ["binary_kind", "dump_kind", "read_binary_grains", "read_dump_grains"]
 
 
 def dump_kind(head: bytes) -> FileKind:
@@ -25,3 +28,25 @@ def read_dump_grains(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
     """Columns in any order and any subset that suffices; of repeated names the first counts."""
     columns, cell = read_columns(snapshot, partial(room_for_columns, options))
     return grain_table(snapshot.path, columns, cell, options, f", step {snapshot.step}")
+
+
+def binary_kind(head: bytes) -> FileKind:
+    """Grains; without names of columns, which users then give, nobody can tell more."""
+    names = names_of_binary(head)
+    return "points" if isinstance(names, list) and not has_radius(names) else "grains"
+
+
+def read_binary_grains(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+    """Columns by their names; by their numbers from 1 where the file has no names."""
+    path, dump = snapshot.path, read_binary(snapshot)
+    width = dump.values.shape[1]
+    names = dump.names or [f"{place + 1}" for place in range(width)]
+    if dump.names is None and not options.columns:
+        raise ReadError(
+            f"{path}: this binary dump does not name its {width} columns: name them as the deck "
+            f'lists them, by their numbers from 1: `columns="id=1,type=2,x=3,y=4,z=5,radius=6"`'
+        )
+    columns = {name: dump.values[:, names.index(name)] for name in names}
+    numbered = {what: str(own) for what, own in options.columns.items()}
+    options = replace(options, columns=numbered)
+    return grain_table(path, columns, dump.cell, options, f", step {snapshot.step}")

@@ -11,10 +11,16 @@ import numpy.typing as npt
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.files import first_bytes
-from scanfab.io.formats.dump_grains import dump_kind, read_dump_grains
+from scanfab.io.formats.dump_grains import (
+    binary_kind,
+    dump_kind,
+    read_binary_grains,
+    read_dump_grains,
+)
 from scanfab.io.formats.ids import are_ids, are_whole, refuse_rounded_ids
 from scanfab.io.formats.join import join_ids, rows_of_ids
 from scanfab.io.formats.lammps_data import is_data_file, read_data_grains, step_of_data
+from scanfab.io.parse.binary_dump import index_binary, is_binary, names_of_binary
 from scanfab.io.parse.text_dump import DumpBlock, index_dump, read_block, row_word
 from scanfab.io.reader import (
     Carries,
@@ -53,14 +59,20 @@ class LammpsReader:
     """Reader plugin for what LAMMPS dumps."""
 
     name = "lammps"
-    description = "LAMMPS dump custom and dump local (text), write_data of atom_style sphere"
-    extensions = (".lammpstrj", ".lmp", ".data", ".local")
+    description = (
+        "LAMMPS dump custom (text, binary), dump local (text), write_data of atom_style sphere"
+    )
+    extensions = (".lammpstrj", ".lmp", ".data", ".local", ".bin")
 
     def recognises(self, path: Path) -> bool:
         """What LAMMPS writes and LIGGGHTS does not: units, time, bounds with all digits."""
         head = first_bytes(path)
-        return is_data_file(head) or (
-            row_word(head) is not None and LAMMPS_ITEMS.search(head) is not None
+        # the old layout without names is LIGGGHTS' as well
+        is_new = isinstance(names_of_binary(head), list)
+        return (
+            is_new
+            or is_data_file(head)
+            or (row_word(head) is not None and LAMMPS_ITEMS.search(head) is not None)
         )
 
     def kind(self, path: Path) -> FileKind:
@@ -68,6 +80,8 @@ class LammpsReader:
         head = first_bytes(path, 1 << 16)
         if is_data_file(head):
             return "grains"
+        if is_binary(head):
+            return binary_kind(head)
         return "other" if row_word(head) is None else dump_kind(head)
 
     def snapshots(self, path: Path) -> list[Snapshot]:
@@ -75,12 +89,15 @@ class LammpsReader:
         head = first_bytes(path)
         if is_data_file(head):
             return [Snapshot(path, step=step_of_data(head))]
-        return index_dump(path)
+        return index_binary(path) if is_binary(head) else index_dump(path)
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         """Columns by their names; of a data file by the atom style."""
-        if is_data_file(first_bytes(snapshot.path)):
+        head = first_bytes(snapshot.path)
+        if is_data_file(head):
             return read_data_grains(snapshot, options)
+        if is_binary(head):
+            return read_binary_grains(snapshot, options)
         return read_dump_grains(snapshot, options)
 
     def carries(self, path: Path) -> Carries:
@@ -99,6 +116,10 @@ class LammpsReader:
         path = snapshot.path
         if is_data_file(first_bytes(path)):
             raise ReadError(f"{path}: a data file holds no contacts")
+        if is_binary(first_bytes(path)):
+            raise ReadError(
+                f"{path}: contacts are read from text: dump local to a file without .bin"
+            )
         block = read_block(snapshot)
         if len(block.values) == 0:
             return join_ids(path, grains, np.zeros((0, 2), np.int64), None, walls=False)

@@ -13,8 +13,9 @@ from scanfab.base.typing import FloatArray
 from scanfab.io.files import check_memory, plain
 from scanfab.io.formats.columns import grain_table
 from scanfab.io.parse.lammps_box import box_vectors
-from scanfab.io.parse.number_rows import rows_of_numbers
+from scanfab.io.parse.number_rows import exact_column, rows_of_numbers
 from scanfab.io.reader import GrainTable, ReadOptions, Snapshot
+from scanfab.io.unpacking import check_lines
 from scanfab.packing.cell import Cell
 
 __all__ = ["is_data_file", "read_data_grains", "step_of_data"]
@@ -55,6 +56,7 @@ def read_data_grains(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
     """
     path = snapshot.path
     check_memory(path, 6.0 * plain(path).stat().st_size)
+    check_lines(path, plain(path))
     data = plain(path).read_bytes()
     sections = list(SECTION.finditer(data, len(FIRST_LINE.match(data)[0])))  # type: ignore[index]
     atoms = next((place for place, one in enumerate(sections) if one[1] == b"Atoms"), None)
@@ -73,6 +75,7 @@ def read_data_grains(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
     values = _values(path, data, begin, end, _count(path, header))
     names = (*SPHERE, *FLAGS)[: values.shape[1]]
     columns = {name: values[:, place] for place, name in enumerate(names)}
+    columns["id"] = exact_column(values, data[begin:end], names.index("id"))
     return grain_table(path, columns, _cell(path, header), options)
 
 

@@ -15,10 +15,16 @@ import numpy as np
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.files import first_bytes
-from scanfab.io.formats.dump_grains import dump_kind, read_dump_grains
+from scanfab.io.formats.dump_grains import (
+    binary_kind,
+    dump_kind,
+    read_binary_grains,
+    read_dump_grains,
+)
 from scanfab.io.formats.ids import MOST_ROWS, are_ids, are_whole, refuse_rounded_ids
 from scanfab.io.formats.join import count_walls, join_ids, rows_of_ids
 from scanfab.io.formats.vtk import VtkReader, vectors
+from scanfab.io.parse.binary_dump import index_binary, is_binary, names_of_binary
 from scanfab.io.parse.text_dump import DumpBlock, index_dump, read_block, row_word
 from scanfab.io.parse.vtk_mesh import Mesh
 from scanfab.io.reader import (
@@ -77,8 +83,8 @@ class LiggghtsReader:
     """Reader plugin for what LIGGGHTS dumps."""
 
     name = "liggghts"
-    description = "LIGGGHTS dump custom and dump local (text), dump custom/vtk, local/gran/vtk"
-    extensions = (".liggghts", ".dump", ".vtk", ".vtp", ".vtu")
+    description = "LIGGGHTS dump custom (text, binary), dump local, dump custom/vtk, local/gran/vtk"
+    extensions = (".liggghts", ".dump", ".vtk", ".vtp", ".vtu", ".bin")
 
     def __init__(self) -> None:
         self._vtk = LiggghtsVtkReader()
@@ -86,31 +92,42 @@ class LiggghtsReader:
     def recognises(self, path: Path) -> bool:
         """An ``ITEM:`` dump, or a legacy VTK file that names LIGGGHTS."""
         head = first_bytes(path)
-        return _is_text(head) or (
-            head.startswith(b"# vtk DataFile")
-            and b"LIGGGHTS" in head.partition(b"\n")[2].partition(b"\n")[0]
+        return (
+            _is_text(head)
+            or names_of_binary(head) is None
+            or (
+                head.startswith(b"# vtk DataFile")
+                and b"LIGGGHTS" in head.partition(b"\n")[2].partition(b"\n")[0]
+            )
         )
 
     def kind(self, path: Path) -> FileKind:
         """Grains are ATOMS; whatever else a text dump counts are contacts."""
         head = first_bytes(path, 1 << 16)
-        if not _is_text(head):
-            return self._vtk.kind(path)
-        return dump_kind(head)
+        if is_binary(head):
+            return binary_kind(head)
+        return dump_kind(head) if _is_text(head) else self._vtk.kind(path)
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """By ``ITEM: TIMESTEP``; a VTK file is one."""
-        return index_dump(path) if _is_text(first_bytes(path)) else self._vtk.snapshots(path)
+        head = first_bytes(path)
+        if is_binary(head):
+            return index_binary(path)
+        return index_dump(path) if _is_text(head) else self._vtk.snapshots(path)
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         """Columns in any order and any subset that suffices; of repeated names the first counts."""
-        if not _is_text(first_bytes(snapshot.path)):
+        head = first_bytes(snapshot.path)
+        if is_binary(head):
+            return read_binary_grains(snapshot, options)
+        if not _is_text(head):
             return self._vtk.read_grains(snapshot, options)
         return read_dump_grains(snapshot, options)
 
     def carries(self, path: Path) -> Carries:
         """A text dump says which directions are periodic, a VTK file does not."""
-        return "cell" if _is_text(first_bytes(path)) else self._vtk.carries(path)
+        head = first_bytes(path)
+        return "cell" if _is_text(head) or is_binary(head) else self._vtk.carries(path)
 
     def beside(self, path: Path) -> list[Path]:
         """A VTK file has its box beside it."""

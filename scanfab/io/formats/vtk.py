@@ -1,9 +1,8 @@
-"""VTK files: grains as points with a radius, contacts as lines between centres."""
+"""VTK files: grains as points with a radius, contacts as lines; and files that list others."""
 
 from __future__ import annotations
 
 import re
-import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +10,12 @@ import numpy as np
 from scanfab.base.errors import ReadError
 from scanfab.base.lengths import MOST
 from scanfab.base.typing import FloatArray
-from scanfab.io.files import bare_name, plain
+from scanfab.io.files import bare_name, file_inside, first_bytes, plain
 from scanfab.io.formats.columns import grain_table, has_radius, whole_numbers
 from scanfab.io.formats.join import join_ids, join_positions
+from scanfab.io.formats.vtp_packing import cell_of, contacts_of, is_packing, moment_of
 from scanfab.io.formats.yade_cells import cell_beside, cell_file, is_cell_file
-from scanfab.io.parse.vtk_mesh import Mesh, form_of, read_bounds, read_mesh
+from scanfab.io.parse.vtk_mesh import Mesh, elements, form_of, listed, read_bounds, read_mesh
 from scanfab.io.reader import (
     Carries,
     FileKind,
@@ -31,15 +31,38 @@ __all__ = ["VtkReader", "vectors"]
 
 
 # other kinds of VTK files are grids and indexes of files
-HOLDING_POINTS = ("PolyData", "POLYDATA", "UnstructuredGrid", "UNSTRUCTURED_GRID", "Xdmf")
+HOLDING_POINTS = (
+    "PolyData",
+    "POLYDATA",
+    "UnstructuredGrid",
+    "UNSTRUCTURED_GRID",
+    "PPolyData",
+    "PUnstructuredGrid",
+    "MultiBlockDataSet",
+    "PartitionedDataSetCollection",
+    "Xdmf",
+)
+# files that list those of one frame: grains, contacts, boxes
+BLOCKS = ("vtkMultiBlockDataSet", "vtkPartitionedDataSetCollection")
 
 
 class VtkReader:
     """Reader plugin for VTK files of any origin."""
 
     name = "vtk"
-    description = "any VTK point cloud with a radius; contacts as lines (also .pvd series)"
-    extensions: tuple[str, ...] = (".vtk", ".vtp", ".vtu", ".pvd", ".xdmf", ".xmf")
+    description = "any VTK point cloud with a radius; contacts as lines; lists of files (.pvd .vtm)"
+    extensions: tuple[str, ...] = (
+        ".vtk",
+        ".vtp",
+        ".vtu",
+        ".pvtp",
+        ".pvtu",
+        ".vtm",
+        ".pvd",
+        ".vtkhdf",
+        ".xdmf",
+        ".xmf",
+    )
     generic = True
     lists_contacts = True
     # whether one end of a contact may be a wall, which is not in the grain file
@@ -52,7 +75,7 @@ class VtkReader:
     def kind(self, path: Path) -> FileKind:
         """Lines are contacts, points without any other cells are grains."""
         form = form_of(path)
-        if form == "Collection":
+        if form == "Collection" or form in BLOCKS:
             return "index"
         if form not in HOLDING_POINTS:
             return "other"
@@ -69,13 +92,20 @@ class VtkReader:
         return "contacts" if len(mesh.lines) else "points"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
-        """One, and only its name may say which step it is; those that a ``.pvd`` lists."""
-        return self._listed(path) if form_of(path) == "Collection" else [Snapshot(path)]
+        """One, and hardly more than its name says which step it is; those that a ``.pvd`` lists."""
+        if form_of(path) == "Collection":
+            return self._listed(path)
+        return [Snapshot(path, *moment_of(path))]
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         """Points and their arrays, with the box of LIGGGHTS or the cell of YADE beside them."""
+        if form_of(snapshot.path) in BLOCKS:
+            return self._read_blocks(snapshot, options)
         mesh = read_mesh(snapshot.path)
         columns = {**mesh.point_arrays, "position": mesh.points}
+        if is_packing(mesh):
+            own = grain_table(snapshot.path, columns, cell_of(snapshot.path, mesh), options)
+            return own._replace(contacts=contacts_of(snapshot.path, mesh))
         if len(mesh.points) == 0:
             columns["radius"] = np.zeros(0)
         cell = _box_beside(snapshot.path)
@@ -103,6 +133,8 @@ class VtkReader:
 
     def carries(self, path: Path) -> Carries:
         """LIGGGHTS writes a box beside its files; VTK itself has no cell."""
+        if b"scanfab_contacts" in first_bytes(path, 1 << 14):
+            return "cell"
         return "nothing" if _box_beside(path) is None else "box"
 
     def beside(self, path: Path) -> list[Path]:
@@ -110,15 +142,37 @@ class VtkReader:
         found = (_box_file(path), cell_file(path))
         return [file for file in found if file is not None]
 
+    def _blocks(self, index: Path) -> dict[FileKind, list[Path]]:
+        """The files of one frame that a ``.vtm`` lists, by what they hold."""
+        found: dict[FileKind, list[Path]] = {}
+        for path in listed(index, "DataSet", "file"):
+            if form_of(path) not in (*BLOCKS, "Collection"):
+                found.setdefault(self.kind(path), []).append(path)
+        return found
+
+    def _read_blocks(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+        """The grains of the one file that has some, with the contacts of the one that has some."""
+        index, blocks = snapshot.path, self._blocks(snapshot.path)
+        grains, contacts = blocks.get("grains", []), blocks.get("contacts", [])
+        if len(grains) != 1 or len(contacts) > 1:
+            raise ReadError(
+                f"{index}: expected one file of grains and at most one of contacts, found "
+                f"{len(grains)} and {len(contacts)}: name one as the source"
+            )
+        table = self.read_grains(Snapshot(grains[0]), options)
+        for path in contacts:
+            joined = self.read_contacts(Snapshot(path), options, table)
+            table = table._replace(contacts=joined.contacts, wall_contacts=joined.wall_contacts)
+        return table
+
     def _listed(self, index: Path) -> list[Snapshot]:
         """The grain files of a ``.pvd``, in its order."""
         try:
-            root = ElementTree.parse(plain(index)).getroot()
             entries = [
-                (index.parent / entry.attrib["file"], float(entry.attrib["timestep"]))
-                for entry in root.iter("DataSet")
+                (file_inside(index, entry.attrib["file"]), float(entry.attrib["timestep"]))
+                for entry in elements(index).iter("DataSet")
             ]
-        except (ElementTree.ParseError, LookupError, ValueError) as error:
+        except (LookupError, ValueError) as error:
             raise ReadError(f"{index}: cannot be read as a list of VTK files: {error}") from None
         kinds: dict[str, FileKind] = {}
         found = []

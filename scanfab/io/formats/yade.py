@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import base64
 import re
-import struct
-import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +15,8 @@ from scanfab.io.formats.columns import grain_table
 from scanfab.io.formats.vtk import VtkReader, vectors
 from scanfab.io.formats.yade_save import is_binary_save, is_save, read_save, snapshot_of_save
 from scanfab.io.parse.number_rows import rows_of_numbers
-from scanfab.io.parse.vtk_mesh import Mesh
+from scanfab.io.parse.vtk_data import FlawError, Mesh
+from scanfab.io.parse.vtk_xml import count_rows
 from scanfab.io.reader import (
     Carries,
     FileKind,
@@ -27,6 +25,7 @@ from scanfab.io.reader import (
     ReadOptions,
     Snapshot,
 )
+from scanfab.io.unpacking import check_lines
 from scanfab.packing.cell import Cell
 
 __all__ = ["YadeReader"]
@@ -65,6 +64,8 @@ class YadeReader(VtkReader):
                 f"{path}: YADE's binary format can be read by the same build of YADE only: load it "
                 f"there, and save it as XML: O.save('name.xml.bz2')"
             )
+        if _lost_lines(path) is not None:
+            return "contacts"  # which its reading refuses
         return "grains" if _is_text(path) or is_save(path) else super().kind(path)
 
     def snapshots(self, path: Path) -> list[Snapshot]:
@@ -126,6 +127,7 @@ def _is_text(path: Path) -> bool:
 
 def _numbers(path: Path) -> FloatArray:
     check_memory(path, 6.0 * plain(path).stat().st_size)
+    check_lines(path, plain(path))
     data = plain(path).read_bytes()
     if all(not line.partition(b"#")[0].strip(BLANKS) for line in data.split(b"\n")):
         return np.zeros((0, 0))  # an empty frame
@@ -162,11 +164,9 @@ def _refuse_lost_lines(path: Path) -> None:
 
     The values then belong to other contacts than those that they stand at.
     """
-    head = first_bytes(path)
-    if b"<VTKFile" not in head or b'Name="forceN"' not in head:
-        return
-    lines, values = _count_lines_and_values(path)
-    if values is not None and values > lines:
+    lost = _lost_lines(path)
+    if lost is not None:
+        lines, values = lost
         raise ReadError(
             f"{path}: {values} values for {lines} contacts: YADE's VTKRecorder loses the contacts "
             f"that cross a periodic cell; export them with export.VTKExporter.exportInteractions, "
@@ -174,24 +174,13 @@ def _refuse_lost_lines(path: Path) -> None:
         )
 
 
-def _count_lines_and_values(path: Path) -> tuple[int, int | None]:
-    """Lines by the header, and values of forceN by its data; None if packed in another way."""
+def _lost_lines(path: Path) -> tuple[int, int] | None:
+    """Lines and values of a file of interactions that has more values than lines, else None."""
+    head = first_bytes(path)
+    if b"<VTKFile" not in head or b'Name="forceN"' not in head:
+        return None
     try:
-        root = ElementTree.parse(plain(path)).getroot()
-        piece = next(root.iter("Piece"))
-        lines = int(piece.attrib["NumberOfLines"])
-        array = next(a for a in piece.iter("DataArray") if a.attrib.get("Name") == "forceN")
-        if array.attrib["format"] == "ascii":
-            # <InformationKey> children hold numbers too: those behind them are the values
-            text = (array.text or "") + "".join(child.tail or "" for child in array)
-            return lines, len(text.split())
-        appended = root.find("AppendedData")
-        if appended is None or appended.attrib.get("encoding") != "base64":
-            return lines, None
-        offset = int(array.attrib["offset"])
-        data = (appended.text or "").strip().removeprefix("_")[offset : offset + 64]
-        # blocks, bytes of a full block, bytes of the last one if it is not full
-        blocks, full, last = struct.unpack("<3I", base64.b64decode(data[:16]))
-        return lines, (blocks * full if last == 0 else (blocks - 1) * full + last) // 8
-    except (ElementTree.ParseError, StopIteration, LookupError, ValueError, struct.error) as error:
-        raise ReadError(f"{path}: cannot be read as VTKRecorder's file: {error}") from None
+        lines, values = count_rows(plain(path).read_bytes(), "Lines", "forceN")
+    except FlawError:
+        return None  # whoever reads it says what is wrong
+    return (lines, values) if values > lines else None

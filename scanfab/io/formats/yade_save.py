@@ -8,7 +8,7 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from scanfab.io.files import first_bytes, unpacked
 from scanfab.io.formats.columns import grain_table, whole_numbers
 from scanfab.io.formats.join import join_ids
 from scanfab.io.reader import GrainTable, ReadOptions, Snapshot
+from scanfab.io.unpacking import Readable
 from scanfab.packing.cell import Cell
 
 __all__ = ["is_binary_save", "is_save", "read_save", "snapshot_of_save"]
@@ -134,7 +135,7 @@ class _Scene:
                 f"{self.path}: cannot be read as a simulation that YADE saved (O.save): {error}"
             ) from None
 
-    def _walk(self, stream: IO[bytes]) -> None:
+    def _walk(self, stream: Readable) -> None:
         """Parse piece by piece, as long as bodies or contacts come out of it."""
         found = barren = 0
         for inside in self._pieces(stream):
@@ -144,7 +145,7 @@ class _Scene:
             if barren > (BARREN_PART if inside else BARREN):
                 raise ValueError(f"no body and no contact in {barren * PIECE} bytes")
 
-    def _pieces(self, stream: IO[bytes]) -> Iterator[bool]:
+    def _pieces(self, stream: Readable) -> Iterator[bool]:
         """For each piece that was parsed, whether it ends inside a body or a contact."""
         parser: ElementTree.XMLPullParser[Any] = ElementTree.XMLPullParser(("start", "end"))
         above: list[ElementTree.Element] = []

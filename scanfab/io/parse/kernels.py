@@ -1,4 +1,4 @@
-"""White space in a long text: whether a table has just one blank between two words."""
+"""White space in a long text: whether one blank stands between two words, and making it so."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from scanfab.base.jit import kernel
 
-__all__ = ["count_spaces"]
+__all__ = ["count_spaces", "single_blanks"]
 
 # white space is what is not above a blank
 BLANK, LINE_END = 32, 10
@@ -36,3 +36,30 @@ def count_spaces(text: npt.NDArray[np.uint8]) -> tuple[int, int, int]:
         pairs += np.int64(more)
         ends += np.int64(most)
     return int(spaces), int(pairs), int(ends)
+
+
+@kernel
+def single_blanks(text: npt.NDArray[np.uint8], out: npt.NDArray[np.uint8]) -> int:
+    """
+    Copy a text with one blank between two words of a line, and none around them.
+
+    Returns how many bytes that makes; empty lines stay.
+    """
+    size = np.int64(0)
+    waits = False
+    for k in range(text.size):
+        byte = text[k]
+        if byte == LINE_END:
+            out[size] = byte
+            size += 1
+            waits = False
+        elif byte <= BLANK:
+            waits = bool(size > 0 and out[size - 1] != LINE_END)
+        else:
+            if waits:
+                out[size] = BLANK
+                size += 1
+                waits = False
+            out[size] = byte
+            size += 1
+    return int(size)

@@ -5,13 +5,17 @@ from __future__ import annotations
 import io
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
 
-__all__ = ["plain_reason", "rows_of_numbers"]
+__all__ = ["exact_column", "plain_reason", "rows_of_numbers"]
+
+# whole numbers from here on may be rounded as decimals
+ROUNDED = 2.0**53
 
 
 def rows_of_numbers(
@@ -33,6 +37,31 @@ def rows_of_numbers(
         reason, row = plain_reason(str(error))
         raise ReadError(f"{path}{_line_of(data, begin, row)}: {reason}") from None
     return values
+
+
+def exact_column(values: npt.NDArray[np.float64], rows: bytes, place: int) -> npt.NDArray[Any]:
+    """
+    A column of rows that were read as decimals; anew as whole numbers if decimals may round them.
+
+    Parameters
+    ----------
+    values : ndarray, shape (N, columns)
+        As they were read.
+    rows : bytes
+        The text that they were read from, with nothing else but comments.
+    place : int
+        Which column.
+    """
+    column = values[:, place]
+    with np.errstate(invalid="ignore"):
+        if not np.any(np.abs(column) >= ROUNDED) or np.any(column != np.rint(column)):
+            return column
+    try:
+        return np.loadtxt(
+            io.BytesIO(rows), np.int64, ndmin=1, usecols=place, comments="#", encoding="latin1"
+        )
+    except (ValueError, OverflowError):
+        return column  # 1e17 and the like
 
 
 def plain_reason(reason: str) -> tuple[str, int | None]:

@@ -1,9 +1,7 @@
-"""Triangulated surfaces from files, by whichever library reads them: meshio, or VTK its own."""
+"""Triangulated surfaces from files: .vtp read here, all others by meshio."""
 
 from __future__ import annotations
 
-import contextlib
-import io
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +9,7 @@ import numpy as np
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.files import check_memory
+from scanfab.io.parse.fence import fenced
 from scanfab.io.parse.vtk_mesh import read_faces
 
 __all__ = ["SUFFIXES", "read_surface"]
@@ -42,26 +41,6 @@ def read_surface(path: Path) -> tuple[FloatArray, IntArray]:
 
 
 def _from_meshio(path: Path) -> tuple[FloatArray, list[IntArray]]:
-    import meshio
-
     check_memory(path, 20.0 * path.stat().st_size)
-    silence = io.StringIO()
-    try:
-        with (
-            contextlib.redirect_stdout(silence),
-            contextlib.redirect_stderr(silence),
-            # of the number of triangles that a text in place of binary STL seems to name
-            np.errstate(over="ignore"),
-        ):
-            mesh = meshio.read(path, file_format=path.suffix.lower()[1:])
-            faces = [
-                np.asarray(block.data, np.int64)
-                for block in mesh.cells
-                if block.dim == 2 and len(block.data)
-            ]
-            points = np.asarray(mesh.points, np.float64)
-    # meshio raises whatever its parsing meets, and exits for what it does not know
-    except (Exception, SystemExit) as error:
-        reason = (str(error).splitlines() or [type(error).__name__])[0]
-        raise ReadError(f"{path}: cannot be read as a surface: {reason}") from None
-    return points, faces
+    found, _ = fenced("surface", path, path, suffix=path.suffix.lower()[1:])
+    return found.pop("points"), list(found.values())

@@ -23,9 +23,10 @@ from scanfab.base.errors import ReadError, ScanfabWarning
 from scanfab.base.typing import FloatArray
 from scanfab.io.files import check_memory, plain
 from scanfab.io.parse.lammps_box import dump_cell
-from scanfab.io.parse.number_rows import plain_reason
+from scanfab.io.parse.number_rows import exact_column, plain_reason
 from scanfab.io.parse.text_table import LARGE, TextTable, read_regular
 from scanfab.io.reader import Snapshot
+from scanfab.io.unpacking import check_lines
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import LazyColumns
 
@@ -82,6 +83,7 @@ def index_dump(path: Path) -> list[Snapshot]:
     file = plain(path)
     if file.stat().st_size == 0:
         raise ReadError(f"{path}: the file is empty")
+    check_lines(path, file)
     # not mapped into memory: where a mapped file is cut meanwhile, the process dies
     with open(file, "rb") as stream:
         starts, size = _starts(stream)
@@ -145,7 +147,17 @@ def read_columns(
             return LazyColumns([*rest, *ready], ready, load), cell
     values = _tolerant(snapshot, body, count)
     ready = {name: values[:, body.names.index(name)] for name in body.names}
+    if "id" in ready:
+        ready["id"] = _exact_ids(snapshot, body, values)
     return LazyColumns(body.names, ready, load), cell
+
+
+def _exact_ids(snapshot: Snapshot, body: _Body, values: FloatArray) -> npt.NDArray[Any]:
+    with open(plain(snapshot.path), "rb") as stream:
+        stream.seek(snapshot.start + body.start)
+        size = -1 if snapshot.stop is None else snapshot.stop - snapshot.start - body.start
+        place = body.names.index("id")
+        return exact_column(values, stream.read(size), place) if len(values) else values[:, place]
 
 
 def _read_column(snapshot: Snapshot, name: str) -> FloatArray:

@@ -1,43 +1,48 @@
-"""
-Whether a legacy VTK file holds what its headers promise.
-
-VTK fills what is missing with whatever memory holds, takes all the memory that a header asks for,
-and walks off the end of a list of cells. So the file is walked through here before, section by
-section, and nothing is handed on that does not fit.
-"""
+"""Legacy VTK files (``# vtk DataFile``), section by section: PolyData, grids of cells, boxes."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.typing import IntArray
-from scanfab.io.parse.vtk_flaws import FlawError
+from scanfab.base.typing import FloatArray, IntArray
+from scanfab.io.parse.vtk_data import Arrays, Cells, Content, FlawError, numbers
 
-__all__ = ["check_legacy", "count_words"]
+__all__ = ["read_legacy"]
 
 
-# bytes of a value in a binary file
-SIZES = {
-    "bit": 1,  # eight of them in fact
-    "char": 1,
-    "signed_char": 1,
-    "unsigned_char": 1,
-    "short": 2,
-    "unsigned_short": 2,
-    "int": 4,
-    "unsigned_int": 4,
-    "vtkidtype": 4,  # as VTK writes it, whatever it has in memory
-    "float": 4,
-    "long": 8,
-    "unsigned_long": 8,
-    "vtktypeint64": 8,
-    "vtktypeuint64": 8,
-    "double": 8,
+# numpy's types of VTK's; a binary file has the most significant byte first
+TYPES = {
+    "bit": "u1",  # eight to a byte in a binary file
+    "char": "i1",
+    "signed_char": "i1",
+    "unsigned_char": "u1",
+    "short": "i2",
+    "unsigned_short": "u2",
+    "int": "i4",
+    "unsigned_int": "u4",
+    "vtkidtype": "i4",  # as VTK writes it, whatever it has in memory
+    "float": "f4",
+    "long": "i8",
+    "unsigned_long": "u8",
+    "vtktypeint64": "i8",
+    "vtktypeuint64": "u8",
+    "double": "f8",
 }
-CELLS = ("vertices", "lines", "polygons", "triangle_strips", "cells")
+SECTIONS = {
+    "vertices": "Verts",
+    "lines": "Lines",
+    "polygons": "Polys",
+    "triangle_strips": "Strips",
+    "cells": "Cells",
+}
+# the order of the rows of cell arrays, whatever that of the sections
+ORDER = ("Verts", "Lines", "Polys", "Strips", "Cells")
 COORDINATES = {"points": 3, "x_coordinates": 1, "y_coordinates": 1, "z_coordinates": 1}
 # attributes with a fixed number of values for each point or cell
 COMPONENTS = {
@@ -52,12 +57,22 @@ COMPONENTS = {
 HEAD = re.compile(
     rb"# vtk DataFile Version (\d{1,4})\.[^\n]*\n[^\n]*\n\s*(ASCII|BINARY)\s", re.IGNORECASE
 )
+# letters that are looked for words at a time
+PART = 1 << 24
 
 
-def check_legacy(data: bytes) -> int:
-    """Walk through a legacy VTK file; FlawError if something does not fit. The bytes it fills."""
-    _Walk(data).through()
-    return len(data)
+def read_legacy(data: bytes) -> Content:
+    """
+    Read a file; of a box with coordinates along its axes the points are its two corners.
+
+    Raises
+    ------
+    FlawError
+        If it does not hold what its headers promise.
+    """
+    walk = _Walk(data)
+    walk.through()
+    return walk.content()
 
 
 class _Walk:
@@ -75,8 +90,34 @@ class _Walk:
         self.has_offsets = int(head[1]) >= 5
         # where the words of an ASCII file begin
         self.words = _word_starts(data) if self.is_ascii else np.zeros(0, np.int64)
-        # points and cells so far, and values of each attribute
-        self.points = self.cells = self.rows = 0
+        self.points: FloatArray | None = None
+        self.axes: list[FloatArray] = []
+        self.cells: dict[str, Cells] = {}
+        self.types: IntArray | None = None
+        self.point_arrays: Arrays = {}
+        self.cell_arrays: Arrays = {}
+        self.field_arrays: Arrays = {}
+        # where the next attributes belong, and how many rows they have
+        self.arrays, self.rows = self.field_arrays, 0
+
+    @property
+    def point_count(self) -> int:
+        return 0 if self.points is None else len(self.points)
+
+    @property
+    def cell_count(self) -> int:
+        return sum(len(cells.offsets) - 1 for cells in self.cells.values())
+
+    def content(self) -> Content:
+        """What was found."""
+        points = self.points
+        if points is None:
+            points = _corners(self.axes)
+        cells = [self.cells[kind] for kind in ORDER if kind in self.cells]
+        if "Cells" in self.cells:
+            types = np.zeros(0, np.int64) if self.types is None else self.types
+            cells = [self.cells["Cells"]._replace(types=types)]
+        return Content(points, tuple(cells), self.point_arrays, self.cell_arrays, self.field_arrays)
 
     def through(self) -> None:
         """Walk to the end."""
@@ -84,16 +125,16 @@ class _Walk:
             self._section(words[0].lower(), words)
 
     def _section(self, key: str, words: list[str]) -> None:
-        if key in CELLS:
-            self._cells(words)
+        if key in SECTIONS:
+            self._cells(key, words)
         elif key in ("point_data", "cell_data"):
             self._attributes(key, words)
         elif key in COORDINATES:
             self._coordinates(key, words)
         elif key == "cell_types":
-            if _count(words, 1) != self.cells:
-                raise FlawError(f"CELL_TYPES has {words[1]} types for {self.cells} cells")
-            self._numbers(*self._values(words[0], self.cells, "int"), self.cells, "int")
+            if _count(words, 1) != self.cell_count:
+                raise FlawError(f"CELL_TYPES has {words[1]} types for {self.cell_count} cells")
+            self.types = self._values(words[0], self.cell_count, "int").astype(np.int64)
         elif key == "metadata":
             self._metadata()
         elif key == "field":
@@ -103,22 +144,27 @@ class _Walk:
 
     def _coordinates(self, key: str, words: list[str]) -> None:
         count = _count(words, 1)
+        if key == "points" and self.points is not None:
+            raise FlawError("POINTS stand there twice")
+        values = self._values(words[0], COORDINATES[key] * count, _word(words, 2))
         if key == "points":
-            if self.points:
-                raise FlawError("POINTS stand there twice")
-            self.points = count
-        self._values(words[0], COORDINATES[key] * count, _word(words, 2))
+            self.points = values.reshape(-1, 3).astype(np.float64)
+        else:
+            self.axes.append(values.astype(np.float64))
 
     def _attributes(self, key: str, words: list[str]) -> None:
         """The number of rows of the attributes that follow."""
         self.rows = _count(words, 1)
-        if self.rows != (self.points if key == "point_data" else self.cells):
+        is_of_points = key == "point_data"
+        self.arrays = self.point_arrays if is_of_points else self.cell_arrays
+        if self.rows != (self.point_count if is_of_points else self.cell_count):
             raise FlawError(
-                f"{words[0]} has {self.rows} rows for {self.points} points and {self.cells} cells"
+                f"{words[0]} has {self.rows} rows for {self.point_count} points and "
+                f"{self.cell_count} cells"
             )
 
     def _metadata(self) -> None:
-        """Lines of no interest, up to an empty one; but VTK relies on the counts in them."""
+        """Lines of no interest, up to an empty one, whose counts must hold nevertheless."""
         promised = named = 0
         while (line := self._raw_line()) is not None and line.strip():
             words = _words(line)
@@ -133,24 +179,41 @@ class _Walk:
 
     def _attribute(self, key: str, words: list[str]) -> None:
         """Values for each point or cell."""
-        name = words[0]
         if key == "scalars":
             components = _count(words, 3) if len(words) > 3 else 1
             table = self.place
             following = self._line()
             if following is None or following[0].lower() != "lookup_table":
                 self.place = table
-            self._values(name, self.rows * components, _word(words, 2))
+            self._array(words, components, _word(words, 2))
         elif key in COMPONENTS:
-            self._values(name, self.rows * COMPONENTS[key], _word(words, 2))
+            self._array(words, COMPONENTS[key], _word(words, 2))
         elif key == "texture_coordinates":
-            self._values(name, self.rows * _count(words, 2), _word(words, 3))
+            self._array(words, _count(words, 2), _word(words, 3))
         elif key == "color_scalars":
-            self._values(name, self.rows * _count(words, 2), "unsigned_char")
+            self._colours(words)
         elif key == "lookup_table":
-            self._values(name, 4 * _count(words, 2), "unsigned_char")
+            self._values(words[0], 4 * _count(words, 2), "unsigned_char")
         else:
-            raise FlawError(f"expected the keyword of a section, found {name[:40]!r}")
+            raise FlawError(f"expected the keyword of a section, found {words[0][:40]!r}")
+
+    def _array(self, words: list[str], components: int, type: str) -> None:
+        values = self._values(words[0], self.rows * components, type)
+        self._keep(self.arrays, _word(words, 1), values, self.rows, components)
+
+    def _colours(self, words: list[str]) -> None:
+        """From 0 to 1 in a text, from 0 to 255 in a binary file."""
+        components = _count(words, 2)
+        type = "float" if self.is_ascii else "unsigned_char"
+        values = self._values(words[0], self.rows * components, type)
+        self._keep(self.arrays, _word(words, 1), values, self.rows, components)
+
+    def _keep(
+        self, arrays: Arrays, name: str, values: npt.NDArray[Any], rows: int, components: int
+    ) -> None:
+        # names cannot hold blanks: VTK writes them as %20
+        named = unquote(name.encode("latin1").decode("utf-8", "replace"))
+        arrays[named] = values if components == 1 else values.reshape(rows, components)
 
     def _field(self, words: list[str]) -> None:
         """Arrays of any shape, each behind a line NAME COMPONENTS TUPLES TYPE."""
@@ -164,60 +227,60 @@ class _Walk:
             components, tuples = _count(header, 1), _count(header, 2)
             if self.rows and tuples != self.rows:
                 raise FlawError(f"{header[0][:40]!r} has {tuples} of {self.rows} rows")
-            self._values(header[0], components * tuples, _word(header, 3))
+            values = self._values(header[0], components * tuples, _word(header, 3))
+            self._keep(self.arrays, header[0], values, tuples, components)
 
-    def _cells(self, words: list[str]) -> None:
+    def _cells(self, key: str, words: list[str]) -> None:
         """Cells: count and points of each, or since version 5.1 offsets and points."""
-        count, size = _count(words, 1), _count(words, 2)
+        kind, count, size = SECTIONS[key], _count(words, 1), _count(words, 2)
+        if kind in self.cells:
+            raise FlawError(f"{words[0]} stand there twice")
         if not self.has_offsets:
-            start, stop = self._values(words[0], size, "int")
-            if not _is_list_of_cells(self._numbers(start, stop, size, "int"), count):
-                raise FlawError(f"{words[0]}: {size} numbers are not {count} cells")
-            self.cells += count
+            flat = self._whole(words[0], size, "int")
+            self.cells[kind] = _from_list(kind, flat, count, words[0])
             return
-        numbers = []
+        found = []
         for keyword, length in (("OFFSETS", count), ("CONNECTIVITY", size)):
             header = self._line()
             if header is None or header[0].upper() != keyword:
                 raise FlawError(f"{words[0]} has no {keyword}")
-            type = _word(header, 1).lower()
-            start, stop = self._values(words[0], length, type)
-            numbers.append(self._numbers(start, stop, length, type))
-        ends = numbers[0]
-        if count and (ends[0] != 0 or ends[-1] != size or np.any(np.diff(ends) < 0)):
+            found.append(self._whole(words[0], length, _word(header, 1)))
+        ends, points = found
+        if count == 0:
+            ends = np.zeros(1, np.int64)
+        if ends[0] != 0 or ends[-1] != size or np.any(np.diff(ends) < 0):
             raise FlawError(f"{words[0]}: the offsets of the cells are wrong")
-        self.cells += max(count - 1, 0)
+        self.cells[kind] = Cells(kind, ends, points)
 
-    def _values(self, name: str, count: int, type: str) -> tuple[int, int]:
-        """Move behind so many values; where they begin and end."""
-        size = SIZES.get(type.lower())
-        if size is None:
+    def _whole(self, name: str, count: int, type: str) -> IntArray:
+        if TYPES.get(type.lower(), "f")[0] == "f":
+            raise FlawError(f"{name[:40]}: expected whole numbers, found the type {type[:40]!r}")
+        return self._values(name, count, type).astype(np.int64)
+
+    def _values(self, name: str, count: int, type: str) -> npt.NDArray[Any]:
+        """So many values; the place moves behind them."""
+        stored = TYPES.get(type.lower())
+        if stored is None:
             raise FlawError(f"{name[:40]}: there is no type {type[:40]!r}")
-        begin = self.place
-        if self.is_ascii:
-            first = int(np.searchsorted(self.words, begin))
-            found = len(self.words) - first
-            last = first + count
-            stop = int(self.words[last]) if last < len(self.words) else len(self.data)
-        else:
-            found = (len(self.data) - begin) // size
-            bits = type.lower() == "bit"
-            stop = begin + ((count + 7) // 8 if bits else count * size)
-            found = 8 * found if bits else found
-        if found < count:
-            raise FlawError(f"{name[:40]} has {found} of {count} values")
-        self.place = stop
-        return begin, stop
-
-    def _numbers(self, start: int, stop: int, count: int, type: str) -> IntArray:
-        """Whole numbers between two places."""
+        begin, size = self.place, int(stored[1])
         if not self.is_ascii:
-            dtype = f">i{SIZES[type]}"
-            return np.frombuffer(self.data, dtype, count, start).astype(np.int64)
+            bits = type.lower() == "bit"
+            needed = (count + 7) // 8 if bits else count * size
+            if begin + needed > len(self.data):
+                found = (len(self.data) - begin) * 8 // (1 if bits else 8 * size)
+                raise FlawError(f"{name[:40]} has {found} of {count} values")
+            self.place += needed
+            values = np.frombuffer(self.data, f">{stored}", needed // size, begin)
+            return np.unpackbits(values)[:count] if bits else values.astype(stored)
+        first = int(np.searchsorted(self.words, begin))
+        if len(self.words) - first < count:
+            raise FlawError(f"{name[:40]} has {len(self.words) - first} of {count} values")
+        last = first + count
+        self.place = int(self.words[last]) if last < len(self.words) else len(self.data)
         try:
-            return np.fromiter(map(int, self.data[start:stop].split()), np.int64, count)
-        except (ValueError, OverflowError):
-            raise FlawError("expected whole numbers for the points of cells") from None
+            return numbers(self.data[begin : self.place], count, stored)
+        except FlawError as flaw:
+            raise FlawError(f"{name[:40]}: {flaw}") from None
 
     def _line(self) -> list[str] | None:
         """Words of the next line that has any; None at the end."""
@@ -237,34 +300,43 @@ class _Walk:
 
 def _word_starts(data: bytes) -> IntArray:
     """Places of the first letters of all words."""
-    return np.flatnonzero(_begins_word(data))
+    return np.concatenate([np.zeros(0, np.int64), *_word_starts_by_part(data)])
 
 
-def count_words(data: bytes) -> int:
-    """How many words there are between blanks."""
-    return int(np.count_nonzero(_begins_word(data)))
+def _word_starts_by_part(data: bytes) -> Iterator[IntArray]:
+    is_blank = True
+    for start in range(0, len(data), PART):
+        letters = np.frombuffer(data, np.uint8, min(PART, len(data) - start), start)
+        filled = (letters != 32) & ((letters < 9) | (letters > 13))
+        begins = filled.copy()
+        begins[1:] &= ~filled[:-1]
+        begins[0] &= is_blank
+        is_blank = not filled[-1]
+        yield start + np.flatnonzero(begins)
 
 
-def _begins_word(data: bytes) -> npt.NDArray[np.bool_]:
-    letters = np.frombuffer(data, np.uint8)
-    begins: npt.NDArray[np.bool_] = (letters != 32) & ((letters < 9) | (letters > 13))
-    begins[1:] &= ~begins[:-1]
-    return begins
+def _from_list(kind: str, flat: IntArray, count: int, name: str) -> Cells:
+    """Cells from so many times a count and as many points."""
+    width = len(flat) // max(count, 1)
+    if width and width * count == len(flat) and np.all(flat[::width] == width - 1):
+        # nearly always they have as many points each
+        points = flat.reshape(count, width)[:, 1:].ravel()
+        return Cells(kind, (width - 1) * np.arange(count + 1), points)
+    heads: list[int] = []
+    place = 0
+    while place < len(flat) and flat[place] >= 0 and len(heads) <= count:
+        heads.append(place)
+        place += int(flat[place]) + 1
+    if place != len(flat) or len(heads) != count:
+        raise FlawError(f"{name}: {len(flat)} numbers are not {count} cells")
+    return Cells(kind, np.cumsum([0, *flat[heads]]), np.delete(flat, heads))
 
 
-def _is_list_of_cells(numbers: IntArray, count: int) -> bool:
-    """Whether the numbers are so many times a count and as many points."""
-    # nearly always they have as many points each
-    width = len(numbers) // max(count, 1)
-    if width and width * count == len(numbers) and np.all(numbers[::width] == width - 1):
-        return True
-    place = cells = 0
-    while place < len(numbers):
-        if numbers[place] < 0:
-            return False
-        place += int(numbers[place]) + 1
-        cells += 1
-    return place == len(numbers) and cells == count
+def _corners(axes: list[FloatArray]) -> FloatArray:
+    """The low and high corner of a box, shape (2, 3); no points without three axes."""
+    if len(axes) != 3 or any(one.size == 0 for one in axes):
+        return np.zeros((0, 3))
+    return np.array([[one.min() for one in axes], [one.max() for one in axes]])
 
 
 def _words(line: bytes) -> list[str]:

@@ -11,14 +11,14 @@ from scanfab.base.errors import ReadError, SettingsError
 
 __all__ = ["Parquet"]
 
-NEEDS = "Parquet files need the package pyarrow: pip install 'scanfab[parquet]'"
+NEEDS = "Parquet files need the package pyarrow: pip install pyarrow"
 
 
 class Parquet:
     """A file whose columns have the kinds that they are declared with."""
 
     suffix = ".parquet"
-    description = "Apache Parquet (needs pyarrow: pip install 'scanfab[parquet]')"
+    description = "Apache Parquet"
     is_text = False
     appends = False
     holds_lists = True

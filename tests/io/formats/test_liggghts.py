@@ -400,7 +400,7 @@ def test_walls_and_boxes_are_neither_grains_nor_contacts(name):
         scanfab.read(FLOOR / name)
 
 
-@pytest.mark.parametrize("name", ["mesh_30000.stl", "binary_30000.bin", "truth_grains.csv"])
+@pytest.mark.parametrize("name", ["mesh_30000.stl", "binary_30000.bin"])
 def test_files_of_other_programs_are_not_known(name):
     with pytest.raises(UnknownFormatError, match="no reader knows the format"):
         scanfab.read(FLOOR / name)

@@ -1,0 +1,124 @@
+"""The columns of a table, in whatever file: text, Parquet, NPZ or ``.xyzd``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.base.errors import ReadError
+from scanfab.io.files import first_bytes
+from scanfab.io.formats.table_names import unique
+from scanfab.io.formats.xyzd import is_xyzd, read_xyzd_columns
+from scanfab.io.parse.sheet_binary import (
+    IS_NPZ,
+    IS_PARQUET,
+    npz_shapes,
+    parquet_names,
+    read_npz,
+    read_parquet,
+)
+from scanfab.io.parse.sheet_columns import read_columns
+from scanfab.io.parse.sheet_layout import HEAD, Layout, first_rows, layout_of, read_text
+
+__all__ = ["Columns", "has_ids", "names_of", "read_table", "read_unnamed"]
+
+Columns = dict[str, npt.NDArray[Any]]
+
+
+def names_of(path: Path, skip: int) -> tuple[list[str] | None, int]:
+    """The names of the columns, None if there are none, and their number."""
+    head = first_bytes(path, 8)
+    if head.startswith(IS_PARQUET):
+        names = parquet_names(path)
+    elif head.startswith(IS_NPZ):
+        names = [part for name, shape in npz_shapes(path).items() for part in _parts(name, shape)]
+    elif is_xyzd(path):
+        names = ["x", "y", "z", "diameter"]
+    else:
+        layout = layout_of(path, read_text(path, HEAD), skip)
+        return (None if layout.names is None else list(layout.names)), layout.width
+    return names, len(names)
+
+
+def has_ids(path: Path, skip: int, found: Mapping[str, str]) -> bool:
+    """Whether the first rows of a table of text have whole numbers where ids should be."""
+    if first_bytes(path, 8).startswith((IS_PARQUET, IS_NPZ)) or is_xyzd(path):
+        return True
+    data = read_text(path, HEAD)
+    layout = layout_of(path, data, skip)
+    names = _keys(layout)
+    places = [names.index(found[one]) for one in ("id1", "id2")]
+    rows = first_rows(data, layout)
+    return all(row[place].strip().isdigit() for row in rows for place in places)
+
+
+def read_table(path: Path, skip: int, numbers: Sequence[str], whole: Sequence[str]) -> Columns:
+    """All columns by their names, or by their numbers if they have none."""
+    head = first_bytes(path, 8)
+    if head.startswith(IS_PARQUET):
+        return _checked(path, read_parquet(path), numbers)
+    if head.startswith(IS_NPZ):
+        return _checked(path, _unfolded(read_npz(path)), numbers)
+    if is_xyzd(path):
+        return dict(read_xyzd_columns(path))
+    data = read_text(path)
+    layout = layout_of(path, data, skip)
+    names = _keys(layout)
+    places = {name: place for place, name in enumerate(names)}
+    columns = read_columns(
+        path, data, layout, [places[one] for one in numbers], [places[one] for one in whole]
+    )
+    return {
+        name: columns[place]
+        for name, place in places.items()
+        if layout.names is None or layout.names[place] or not _is_empty(columns[place])
+    }
+
+
+def read_unnamed(path: Path, skip: int) -> Columns:
+    """The columns of a table without names; the first may be ids, which stay exact."""
+    data = read_text(path, HEAD)
+    rows = first_rows(data, layout_of(path, data, skip))
+    whole = ["1"] if all(row[0].strip().isdigit() for row in rows) else []
+    return read_table(path, skip, (), whole)
+
+
+def _checked(path: Path, columns: Columns, numbers: Sequence[str]) -> Columns:
+    for name in numbers:
+        if name not in columns or columns[name].dtype.kind not in "biuf":
+            raise ReadError(f"{path}: expected numbers in the column {name}")
+    return columns
+
+
+def _keys(layout: Layout) -> list[str]:
+    """The names of the columns, or their numbers."""
+    return unique(layout.names or [""] * layout.width)
+
+
+def _is_empty(values: npt.NDArray[Any]) -> bool:
+    """Whether a column is what a separator at the end of each row leaves."""
+    return not np.any(values != "" if values.dtype.kind == "U" else ~np.isnan(values))
+
+
+def _parts(name: str, shape: tuple[int, ...]) -> list[str]:
+    if len(shape) == 2 and shape[1] <= 9:
+        if name.lower() in ("position", "positions", "pos", "points", "centers", "centres"):
+            return list("xyz"[: shape[1]])
+        if name.lower() in ("pairs", "contacts", "ids") and shape[1] == 2:
+            return ["id1", "id2"]
+        return [f"{name}_{axis}" for axis in ("xyz" if shape[1] == 3 else range(shape[1]))]
+    return [name] if len(shape) == 1 else []
+
+
+def _unfolded(arrays: Columns) -> Columns:
+    """Arrays as columns, those with as many rows as most have."""
+    columns: Columns = {}
+    for name, values in arrays.items():
+        for place, part in enumerate(_parts(name, values.shape)):
+            columns[part] = values if values.ndim == 1 else values[:, place]
+    rows = len(columns["x"]) if "x" in columns else max(map(len, columns.values()), default=0)
+    return {name: values for name, values in columns.items() if len(values) == rows}

@@ -1,0 +1,173 @@
+"""Which column of a table is what, by the names that programs give them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from scanfab.base.errors import ReadError
+from scanfab.io.formats.columns import DIAMETER_NAMES, ID_NAMES, RADIUS_NAMES
+
+__all__ = ["CONTACTS", "EDEM", "PFC", "TABLE", "Names", "find_columns", "is_contacts", "unique"]
+
+Names = Mapping[str, tuple[str, ...]]
+"""The names that a column may have, by what it is; as :func:`plain_name` has them."""
+
+# what a contact table must have, and what it may
+IDS = ("id1", "id2")
+FORCES = {
+    "fx": ("fx", "force.x", "f.x"),
+    "fy": ("fy", "force.y", "f.y"),
+    "fz": ("fz", "force.z", "f.z"),
+    "fx2": ("fx2",),
+    "fy2": ("fy2",),
+    "fz2": ("fz2",),
+    "fx1": ("fx1",),
+    "fy1": ("fy1",),
+    "fz1": ("fz1",),
+    "fn": ("fn", "force.n", "normal.force"),
+    "ix": ("ix", "image.x"),
+    "iy": ("iy", "image.y"),
+    "iz": ("iz", "image.z"),
+    "kind": ("contact.type", "kind"),
+}
+CONTACTS: Names = {
+    "id1": ("id1", "id.1", "grain1", "particle1", "particle.1", "body1", "geoa", "i"),
+    "id2": ("id2", "id.2", "grain2", "particle2", "particle.2", "body2", "geob", "j"),
+    **FORCES,
+}
+TABLE: Names = {
+    **{
+        axis: (axis, f"pos.{axis}", f"pos{axis}", f"position.{axis}", f"points.{number}")
+        for number, axis in enumerate("xyz")
+    },
+    "radius": (*RADIUS_NAMES, "f.radius"),
+    "diameter": DIAMETER_NAMES,
+    "id": (*ID_NAMES, "particle.id", "body.id"),
+}
+PFC: Names = {
+    **{
+        axis: (f"ball.pos.{axis}", f"pos.{axis}", f"ball.position.{axis}", f"ball.{axis}", axis)
+        for axis in "xyz"
+    },
+    "radius": ("ball.radius", "radius", "rad"),
+    "diameter": ("ball.diameter", "diameter"),
+    "id": ("ball.id", "id"),
+    "id1": ("contact.end1.id", "contact.end1", "end1.id", "end1", "contact.id1", "id1"),
+    "id2": ("contact.end2.id", "contact.end2", "end2.id", "end2", "contact.id2", "id2"),
+    **FORCES,
+    **{
+        f"f{axis}": (f"contact.force.global.{axis}", f"force.global.{axis}", f"force.{axis}")
+        for axis in "xyz"
+    },
+    "fn": ("contact.force.normal", "force.normal"),
+    "kind": ("contact.type", "type"),
+}
+EDEM: Names = {
+    **{axis: (f"particle.position.{axis}", f"position.{axis}") for axis in "xyz"},
+    "radius": ("particle.radius", "radius"),
+    "diameter": ("particle.diameter", "diameter"),
+    "volume": ("particle.volume", "volume"),
+    "id": ("particle.id", "id"),
+    "id1": ("contact.idfirst", "contact.id.first", "contact.first.id"),
+    "id2": ("contact.idsecond", "contact.id.second", "contact.second.id"),
+    **{f"fn{axis}": (f"contact.normal.force.{axis}",) for axis in "xyz"},
+    **{f"ft{axis}": (f"contact.tangential.force.{axis}",) for axis in "xyz"},
+}
+
+# EDEM numbers its queries: "Q05 : Particle Position X:"
+QUERY = re.compile(r"^q[0-9]+[\s:.]+")
+UNIT = re.compile(r"\s*[\[(]\s*([^\])]*)\s*[\])]\s*$")
+
+
+def plain_name(name: str) -> str:
+    """Small letters and digits with one point between words, without number of a query or unit."""
+    text = QUERY.sub("", UNIT.sub("", name.strip()).lower())
+    return re.sub(r"[^a-z0-9]+", ".", text).strip(".")
+
+
+def unique(names: Sequence[str]) -> list[str]:
+    """Names of columns; one that is empty, or there before, is the number of its column."""
+    return [
+        name if name and name not in names[:place] else f"{place + 1}"
+        for place, name in enumerate(names)
+    ]
+
+
+def is_contacts(found: Mapping[str, str]) -> bool:
+    """Whether columns are of a contact table: both ids, and not a grain's place and size."""
+    is_grain = {"x", "y", "z"} <= found.keys() and found.keys() & {"radius", "diameter", "volume"}
+    return set(IDS) <= found.keys() and not is_grain
+
+
+def find_columns(
+    path: Path, names: Sequence[str], known: Names, named: Mapping[str, str], option: str
+) -> dict[str, str]:
+    """
+    The file's own name of each column that is known, as :func:`unique` has it, by what it is.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    names : sequence of str
+        Of all columns.
+    known : mapping
+        The usual names.
+    named : mapping of str to str
+        What the user says; a number from 1 means the column at that place, if none has that name.
+    option : str
+        The argument by which the user says it.
+
+    Raises
+    ------
+    ReadError
+        If the user names a column that is not there, two columns have a name that matters, or
+        lengths have different units.
+    """
+    found: dict[str, str] = {}
+    keys = unique(names)
+    for standard, own in named.items():
+        found[standard] = _column(path, names, str(own), standard, option)
+    plain = [plain_name(name) for name in names]
+    for standard, usual in known.items():
+        if standard in found:
+            continue
+        places = next(
+            (p for one in usual if (p := [k for k, name in enumerate(plain) if name == one])), []
+        )
+        if len(places) > 1:
+            listed = ", ".join(f"{names[place]!r} (column {place + 1})" for place in places)
+            raise ReadError(
+                f"{path}: several columns may be {standard}: {listed}: choose one by its number: "
+                f'`{option}={{"{standard}": {places[0] + 1}}}`'
+            )
+        if places and keys[places[0]] not in found.values():
+            found[standard] = keys[places[0]]
+    _check_units(path, found)
+    return found
+
+
+def _column(path: Path, names: Sequence[str], own: str, standard: str, option: str) -> str:
+    if own in names:
+        if list(names).count(own) > 1:
+            raise ReadError(
+                f"{path}: there are several columns {own!r}: choose one by its number in `{option}`"
+            )
+        return own
+    if re.fullmatch(r"[0-9]{1,6}", own) and 1 <= int(own) <= len(names):
+        return unique(names)[int(own) - 1]
+    raise ReadError(
+        f"{path}: there is no column {own!r} to serve as {standard}; the columns are "
+        f"{', '.join(names)}"
+    )
+
+
+def _check_units(path: Path, found: Mapping[str, str]) -> None:
+    """Lengths of one table have one unit."""
+    lengths = [found[one] for one in ("x", "y", "z", "radius", "diameter") if one in found]
+    units = {name: match[1] for name in lengths if (match := UNIT.search(name))}
+    if len(set(units.values())) > 1:
+        listed = ", ".join(units)
+        raise ReadError(f"{path}: lengths of one unit are expected, found {listed}")

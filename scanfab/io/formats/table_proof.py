@@ -1,0 +1,90 @@
+"""Proof that columns without names are what they are taken for: the grains must touch."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from scanfab.base.lengths import MOST
+from scanfab.base.typing import FloatArray, IntArray
+from scanfab.io.reader import GrainTable
+
+__all__ = ["TOO_FEW", "row_base", "share_of_push", "touch"]
+
+# grains by which nothing can be proved
+TOO_FEW = 10
+# grains that are looked at, and neighbours of each
+LOOKED_AT = 2000
+NEIGHBOURS = 12
+# of r1 + r2: a distance that is a contact's, and one that is no overlap of grains any more
+CONTACT = 0.05
+OVERLAP = 0.75
+# of the grains, which touch another at least, and which overlap another at most
+MOST_TOUCH = 0.5
+FEW_OVERLAP = 0.01
+# of the contacts, which speak for a sign, or for the number of the first row
+NEARLY_ALL = 0.9
+
+
+def touch(position: FloatArray, radius: FloatArray) -> bool:
+    """
+    Whether most grains touch another and hardly any lies in another.
+
+    Columns that are read as others (a diameter or a mass as the radius, a number as a coordinate)
+    give no such packing.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab.io.formats.table_proof import touch
+    >>> row = np.column_stack([np.arange(20.0), np.zeros(20), np.zeros(20)])
+    >>> touch(row, np.full(20, 0.5)), touch(row, np.full(20, 1.0)), touch(row, np.full(20, 0.25))
+    (True, False, False)
+    """
+    from scipy.spatial import KDTree
+
+    sound = np.all(np.abs(position) < MOST) and np.all((radius > 0) & (radius < MOST))
+    if len(radius) < TOO_FEW or not sound:
+        return False
+    chosen = np.unique(np.linspace(0, len(radius) - 1, LOOKED_AT).astype(np.int64))
+    count = min(NEIGHBOURS, len(radius) - 1)
+    distance, other = KDTree(position).query(position[chosen], k=count + 1)
+    ratio = distance / (radius[chosen, None] + radius[other])
+    ratio[other == chosen[:, None]] = np.inf
+    nearest = ratio.min(axis=1)
+    touching = np.mean(np.abs(nearest - 1.0) < CONTACT)
+    return bool(touching >= MOST_TOUCH and np.mean(nearest < OVERLAP) <= FEW_OVERLAP)
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def _branches(grains: GrainTable, rows: IntArray) -> FloatArray:
+    """From the first to the second grain of each pair, to the nearest image."""
+    branch: FloatArray = grains.position[rows[:, 1]] - grains.position[rows[:, 0]]
+    if grains.cell is not None and grains.cell.is_periodic and np.all(np.isfinite(branch)):
+        branch = branch + grains.cell.nearest_image(branch) @ grains.cell.vectors
+    return branch
+
+
+def row_base(grains: GrainTable, ids: IntArray) -> int | None:
+    """
+    Whether contacts number the rows of grains from 0 or from 1; None if that cannot be told.
+
+    By the pairs, which are neighbours under one of both numberings only.
+    """
+    fits = []
+    for base in (0, 1):
+        rows = ids - base
+        if rows.min(initial=0) < 0 or rows.max(initial=0) >= len(grains.radius):
+            continue
+        length = np.linalg.norm(_branches(grains, rows), axis=1)
+        near = length < (1 + 2 * CONTACT) * grains.radius[rows].sum(axis=1)
+        if np.mean(near) > NEARLY_ALL:
+            fits.append(base)
+    return fits[0] if len(fits) == 1 else None
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def share_of_push(grains: GrainTable, rows: IntArray, force: FloatArray) -> float | None:
+    """Of the contacts with a force, those whose force pushes the second grain off the first."""
+    along = np.sum(_branches(grains, rows) * force, axis=1)
+    along = along[along != 0]
+    return float(np.mean(along > 0)) if len(along) else None

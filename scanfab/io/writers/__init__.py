@@ -1,0 +1,1 @@
+"""Writers of packings, a format a file."""

@@ -1,0 +1,263 @@
+"""What every reader of packings must do, tried on files of its format, sound and damaged."""
+
+from __future__ import annotations
+
+import contextlib
+import gzip
+import io
+import re
+import time
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from random import Random
+from typing import Any, get_args
+
+import numpy as np
+
+from scanfab.base.errors import ReadError, ScanfabError, ScanfabWarning
+from scanfab.base.typing import IntArray
+from scanfab.io.reader import FileKind, GrainTable, Reader, ReadOptions, Snapshot
+from scanfab.packing.packing import Packing
+
+__all__ = ["check_reader"]
+
+# seconds that a small file may take
+LONGEST = 10.0
+# damaged files that are made of each
+CUTS, DAMAGES = 40, 150
+FOREIGN = {
+    "empty": b"",
+    "text": b"hello\nworld\n",
+    "numbers": b"1 2 3\n4 5 6\n",
+    "zeros": bytes(500),
+    "bytes": bytes(range(256)) * 4,
+    "xml": b'<?xml version="1.0"?>\n<html><body/></html>\n',
+    "picture": b"\x89PNG\r\n\x1a\n" + bytes(100),
+}
+TOKENS = (b"nan", b"-1", b"1e400", b"9" * 30, b"", b"\xff\xfe", b"99999999999", b"\n", b"x")
+WORD = re.compile(rb"[^\s,;<>=\"]+")
+
+
+def check_reader(
+    reader: Reader,
+    files: Sequence[Path],
+    folder: Path,
+    *,
+    options: ReadOptions | None = None,
+    counts: bool = False,
+) -> None:
+    """
+    Try a reader on files of its format.
+
+    Parameters
+    ----------
+    reader : Reader
+        The plugin.
+    files : sequence of Path
+        Small sound files with grains, of all kinds that the format has.
+    folder : Path
+        An empty folder for damaged files, such as pytest's ``tmp_path``.
+    options : ReadOptions, optional
+        What the files need to be read.
+    counts : bool, optional
+        Whether the format says how many grains there are, or where they end: then no file that is
+        cut off may be read as fewer grains.
+
+    Raises
+    ------
+    AssertionError
+        That says what the reader should have done.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from scanfab.io.registry import reader_named
+    >>> from scanfab.testing import check_reader
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = Path(folder) / "two.xyz"
+    ...     _ = file.write_text("1\\nProperties=pos:R:3:radius:R:1\\n0 0 0 1\\n")
+    ...     check_reader(reader_named("xyz"), [file], Path(folder) / "damaged", counts=True)
+    """
+    options = ReadOptions() if options is None else options
+    folder.mkdir(exist_ok=True)
+    _check_members(reader)
+    for name, data in FOREIGN.items():
+        _check_foreign(reader, _put(folder, f"{name}.bin", data), options)
+    assert files, "expected at least one file to try the reader on"
+    for file in files:
+        _check_sound(reader, file, folder, options)
+        _check_damaged(reader, file, folder, options, counts)
+
+
+def _check_members(reader: Reader) -> None:
+    assert re.fullmatch(r"[a-z0-9][a-z0-9-]*", reader.name), (
+        f"the name {reader.name!r} is typed behind --format: small letters, digits and -"
+    )
+    assert len(reader.description.splitlines()) == 1, "the description is one line"
+    assert isinstance(reader.extensions, tuple), "the extensions are a tuple"
+    assert all(one.startswith(".") for one in reader.extensions), "extensions begin with a dot"
+
+
+def _check_foreign(reader: Reader, path: Path, options: ReadOptions) -> None:
+    with _quiet(path):
+        known = _only_read_errors(path, "recognises", lambda: reader.recognises(path))
+        assert not known, f"{path.name}: recognises() takes it for its own, which it is not"
+        _try_all(reader, path, options)
+
+
+def _check_sound(reader: Reader, file: Path, folder: Path, options: ReadOptions) -> None:
+    before = file.read_bytes()
+    with _quiet(file):
+        if not getattr(reader, "generic", False):
+            assert reader.recognises(file) is True, f"{file.name}: recognises() must be True"
+        kind = reader.kind(file)
+        assert kind in get_args(FileKind), f"{file.name}: kind() is {kind!r}"
+        tables = _grains(reader, file, options)
+        again = _grains(reader, file, options)
+        packed = _put(folder, f"packed_{file.name}.gz", gzip.compress(before))
+        unpacked = [] if _is_packed(before) else _grains(reader, packed, options)
+    assert tables, f"{file.name}: snapshots() found no frame"
+    for one, two in zip(tables, again, strict=True):
+        assert _same(one, two), f"{file.name}: read twice, it gives different grains"
+    for one, two in zip(tables, unpacked, strict=bool(unpacked)):
+        assert _same(one, two), f"{file.name}.gz: gives other grains (use scanfab.io.plain)"
+    assert file.read_bytes() == before, f"{file.name}: was changed by reading it"
+
+
+def _is_packed(data: bytes) -> bool:
+    return data.startswith((b"\x1f\x8b", b"BZh", b"\xfd7zXZ\x00"))
+
+
+def _grains(reader: Reader, path: Path, options: ReadOptions) -> list[GrainTable]:
+    """The grains of each frame, which must make a packing."""
+    found = []
+    for snapshot in reader.snapshots(path):
+        assert isinstance(snapshot, Snapshot), f"{path.name}: snapshots() gives Snapshot objects"
+        assert snapshot.step is None or isinstance(snapshot.step, int), "a step is an int or None"
+        table = reader.read_grains(snapshot, options)
+        assert isinstance(table, GrainTable), f"{path.name}: read_grains() gives a GrainTable"
+        packing = Packing(
+            table.position,
+            table.radius,
+            id=table.id,
+            columns=table.columns,
+            contacts=table.contacts,
+            wall_contacts=table.wall_contacts,
+            cell=table.cell,
+        )
+        assert len(packing) == len(table.radius)
+        found.append(table)
+    return found
+
+
+def _ids(table: GrainTable) -> IntArray:
+    return np.zeros(0, np.int64) if table.id is None else table.id
+
+
+def _same(one: GrainTable, two: GrainTable) -> bool:
+    return (
+        np.array_equal(one.position, two.position)
+        and np.array_equal(one.radius, two.radius)
+        and (one.id is None) == (two.id is None)
+        and np.array_equal(_ids(one), _ids(two))
+        and list(one.columns) == list(two.columns)
+    )
+
+
+def _check_damaged(
+    reader: Reader, file: Path, folder: Path, options: ReadOptions, counts: bool
+) -> None:
+    data, random = file.read_bytes(), Random(0)
+    whole = sum(len(table.radius) for table in _grains(reader, file, options))
+    for place in sorted({random.randrange(len(data)) for _ in range(CUTS)} if data else ()):
+        path = _put(folder, f"cut_{file.name}", data[:place])
+        with _quiet(path):
+            found = _try_all(reader, path, options)
+        # nothing but blanks may be missing without harm
+        if counts and found is not None and data[place:].strip():
+            assert found >= whole, (
+                f"{file.name} cut off after {place} bytes is read as {found} of {whole} grains: a "
+                f"part of a file must be an error"
+            )
+    for _ in range(DAMAGES):
+        path = _put(folder, f"damaged_{file.name}", _damaged(data, random))
+        with _quiet(path):
+            _try_all(reader, path, options)
+
+
+def _damaged(data: bytes, random: Random) -> bytes:
+    """The data with one bit, byte or word changed, or a part left out."""
+    kind, place = random.randrange(4), random.randrange(max(len(data), 1))
+    if kind == 0 and data:
+        changed = bytearray(data)
+        changed[place] ^= 1 << random.randrange(8)
+        return bytes(changed)
+    if kind == 1:
+        return data[:place] + data[place + random.randrange(1, 50) :]
+    if kind == 2:
+        return data[:place] + random.choice(TOKENS) + data[place:]
+    words = list(WORD.finditer(data))
+    if not words:
+        return data
+    word = random.choice(words[:30] if random.random() < 0.5 else words)
+    return data[: word.start()] + random.choice(TOKENS) + data[word.end() :]
+
+
+def _try_all(reader: Reader, path: Path, options: ReadOptions) -> int | None:
+    """Everything that a reader is asked about a file; the number of grains if it can be read."""
+    began = time.monotonic()
+
+    def grains() -> int:
+        return sum(
+            len(reader.read_grains(snapshot, options).radius) for snapshot in reader.snapshots(path)
+        )
+
+    _only_read_errors(path, "recognises", lambda: reader.recognises(path))
+    _only_read_errors(path, "kind", lambda: reader.kind(path))
+    found = _only_read_errors(path, "read_grains", grains)
+    took = time.monotonic() - began
+    assert took < LONGEST, f"{path.name}: took {took:.0f} s"
+    return found if isinstance(found, int) else None
+
+
+def _only_read_errors(path: Path, what: str, call: Callable[[], Any]) -> Any:
+    """What a call gives, None if it raises an error of scanfab's; anything else is wrong."""
+    try:
+        return call()
+    except ReadError as error:
+        if path.name in str(error):
+            return None
+        raise AssertionError(f"{what}(): the error does not name the file: {error}") from error
+    except ScanfabError:
+        return None
+    except BaseException as error:
+        raise AssertionError(
+            f"{path}: {what}() raises {type(error).__name__}: {error}; whatever a file holds, it "
+            f"must raise ReadError and nothing else"
+        ) from error
+
+
+@contextlib.contextmanager
+def _quiet(path: Path) -> Iterator[None]:
+    """Nothing may be printed, and no warnings but scanfab's."""
+    out = io.StringIO()
+    with (
+        warnings.catch_warnings(record=True) as caught,
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(out),
+    ):
+        warnings.simplefilter("always")
+        yield
+    assert not out.getvalue(), f"{path.name}: the reader prints {out.getvalue()[:100]!r}"
+    for one in caught:
+        assert issubclass(one.category, ScanfabWarning), (
+            f"{path.name}: draws a {one.category.__name__}: {one.message}"
+        )
+
+
+def _put(folder: Path, name: str, data: bytes) -> Path:
+    path = folder / name
+    path.write_bytes(data)
+    return path

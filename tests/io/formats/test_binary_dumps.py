@@ -1,0 +1,125 @@
+"""Binary dumps of LAMMPS and LIGGGHTS say what their text does, or what is wrong with them."""
+
+from __future__ import annotations
+
+import shutil
+import struct
+import subprocess
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab.base.errors import ReadError, ScanfabWarning
+from scanfab.io.registry import reader_for
+from tests.helpers.dumps import NAMES, ROWS, binary_dump
+
+COLUMNS = {name: str(place) for place, name in enumerate(NAMES.split(), start=1)}
+
+
+def write(path, data):
+    path.write_bytes(data)
+    return path
+
+
+def assert_right(packing):
+    rows = np.array(ROWS)
+    np.testing.assert_array_equal(packing.id, rows[:, 0])
+    np.testing.assert_array_equal(packing.columns["type"], rows[:, 1])
+    np.testing.assert_array_equal(packing.position, rows[:, 2:5])
+    np.testing.assert_array_equal(packing.radius, rows[:, 5])
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize("blocks", [1, 3, 5])
+def test_the_new_layout_names_its_columns(tmp_path, blocks, order):
+    data = binary_dump(names=NAMES, step=7, time=0.25, blocks=blocks, order=order)
+    path = write(tmp_path / "dump.bin", data)
+    assert reader_for(path).name == "lammps"
+    packing = scanfab.read(path)
+    assert_right(packing)
+    assert (packing.step, packing.time) == (7, 0.25)
+
+
+def test_the_old_layout_is_asked_for_its_columns(tmp_path):
+    path = write(tmp_path / "dump.bin", binary_dump(step=7))
+    assert reader_for(path).name == "liggghts"
+    with pytest.raises(ReadError, match=r'does not name its 6 columns.*`columns="id=1,type=2'):
+        scanfab.read(path)
+    for format in (None, "lammps", "liggghts"):
+        packing = scanfab.read(path, columns=COLUMNS, format=format)
+        assert_right(packing)
+        assert packing.step == 7
+
+
+def test_the_box_repeats_where_both_faces_do(tmp_path):
+    data = binary_dump(names=NAMES, flags=(0, 0, 0, 1, 2, 3), tilt=(0.2, 0.1, -0.05))
+    cell = scanfab.read(write(tmp_path / "dump.bin", data)).cell
+    assert cell.periodic == (True, False, False)
+    # the bounds are those of the box around the tilted one: 1 - (0.3 - 0), 1 - 0.05, 1
+    np.testing.assert_allclose(cell.vectors, [[0.7, 0, 0], [0.2, 0.95, 0], [0.1, -0.05, 1]])
+    np.testing.assert_allclose(cell.origin, [0, 0.05, 0])
+
+
+def test_snapshots_are_frames_and_an_incomplete_last_one_is_left_out(tmp_path):
+    data = binary_dump(names=NAMES, step=20) + binary_dump(names=NAMES, step=10)
+    path = write(tmp_path / "dump.bin", data)
+    assert [frame.step for frame in scanfab.read_series(path)] == [10, 20]
+    for cut in (1, 100, 250):
+        path = write(tmp_path / f"cut{cut}.bin", data[:-cut])
+        with pytest.warns(ScanfabWarning, match="snapshot 2 is damaged or incomplete.*left out"):
+            assert [frame.step for frame in scanfab.read_series(path)] == [20]
+    with pytest.raises(ReadError, match="snapshot 1 is damaged or incomplete"):
+        scanfab.read(write(tmp_path / "one.bin", data[:200]))
+
+
+def test_a_frame_without_grains(tmp_path):
+    data = binary_dump(np.zeros((0, 6)), names=NAMES)
+    assert len(scanfab.read(write(tmp_path / "dump.bin", data))) == 0
+
+
+@pytest.mark.parametrize(
+    ("find", "put"),
+    [
+        (struct.pack("<q", 3), struct.pack("<q", 4)),
+        (struct.pack("<i", 18), struct.pack("<i", 17)),
+        (struct.pack("<i", 18), struct.pack("<i", -18)),
+        (struct.pack("<i", 18), struct.pack("<i", 2**31 - 1)),
+    ],
+)
+def test_counts_that_lie_are_told(tmp_path, find, put):
+    data = binary_dump(names=NAMES)
+    assert find in data
+    with pytest.raises(ReadError, match="snapshot 1 is damaged or incomplete"):
+        scanfab.read(write(tmp_path / "dump.bin", data.replace(find, put, 1)))
+
+
+DECK = """
+units si
+atom_style sphere
+boundary p p f
+newton off
+comm_modify vel yes
+region box block 0 1 0 1 0 1 units box
+create_box 1 box
+create_atoms 1 random 40 7 box
+set group all diameter 0.05
+set group all density 2500
+pair_style gran/hooke 200000.0 NULL 50.0 NULL 0.5 0
+pair_coeff * *
+fix 1 all nve/sphere
+dump text all custom 1 t.*.txt id type x y z radius
+dump bits all custom 1 b.*.bin id type x y z radius
+dump_modify text format float %.17g
+run 0
+"""
+
+
+@pytest.mark.skipif(shutil.which("lmp") is None, reason="LAMMPS is not installed")
+def test_lammps_own_dumps_are_the_same_packing(tmp_path):
+    write(tmp_path / "deck", DECK.encode())
+    subprocess.run(["lmp", "-in", "deck"], cwd=tmp_path, check=True, capture_output=True)
+    text, bits = (scanfab.read(tmp_path / name) for name in ("t.0.txt", "b.0.bin"))
+    np.testing.assert_array_equal(text.position, bits.position)
+    np.testing.assert_array_equal(text.id, bits.id)
+    assert text.cell.periodic == bits.cell.periodic == (True, True, False)

@@ -1,0 +1,202 @@
+"""ON-DEM's VTKHDF: both drafts, their signs, walls, what others read of it, damaged files."""
+
+from __future__ import annotations
+
+import h5py
+import numpy as np
+import pytest
+import pyvista
+
+import scanfab
+from scanfab.base.errors import ReadError
+from scanfab.io.registry import reader_for, reader_named
+from scanfab.testing import check_reader, differences, made_up_packings
+
+POSITION = np.array([[0.0, 0, 0], [1.9, 0, 0], [1.9, 1.9, 0]])
+IDS = np.array([7, 5, 2**60])
+# id 1 is a wall's
+PAIRS = np.array([[7, 5], [5, 2**60], [1, 7], [7, 2**60]])
+NORMAL = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1], [1, 0, 0]])
+COMPRESSION = np.array([3.0, -0.5, 2.0, 9.0])
+SHEAR = np.array([[0.0, 0.25, 0], [0, 0, 0.125], [0, 0, 0], [0, 0, 0]])
+VIRTUAL = np.array([0, 0, 0, 1], np.int8)
+FORCE = COMPRESSION[:2, None] * NORMAL[:2] + SHEAR[:2]
+
+
+def cells(group, count):
+    for section in ("Vertices", "Lines", "Polygons", "Strips"):
+        filled = count if section == "Vertices" else 0
+        one = group.create_group(section)
+        one["NumberOfCells"] = one["NumberOfConnectivityIds"] = np.array([filled])
+        one["Connectivity"], one["Offsets"] = np.arange(filled), np.arange(filled + 1)
+
+
+def interactions(group, sign):
+    group["id1"], group["id2"] = PAIRS.T
+    group["normal"], group["normal_force"] = NORMAL, sign * COMPRESSION
+    group["shear_force"], group["virtual"] = SHEAR, VIRTUAL
+
+
+def draft_1(path, version="0.1-draft"):
+    """As YADE's exporter of the first draft writes it; positive forces push."""
+    with h5py.File(path, "w") as file:
+        file.attrs["file_format_version"] = version
+        group = file.create_group("VTKHDF", track_order=True)
+        group.attrs["Type"], group.attrs["Version"] = np.bytes_("PolyData"), [2, 0]
+        group["NumberOfPoints"], group["Points"] = np.array([3]), POSITION
+        cells(group, 3)
+        data = group.create_group("PointData")
+        data["radius"], data["body_id"], data["clump_id"] = np.ones(3), IDS, np.array([-1, 4, 4])
+        file.create_group("ONDEM/Scene").attrs["time"] = 0.25
+        interactions(file.create_group("ONDEM/Interactions"), 1)
+    return path
+
+
+def draft_2(path):
+    """As the exporter of the second one: blocks, a group for each type, positive forces pull."""
+    with h5py.File(path, "w", track_order=True) as file:
+        file.attrs["file_format_version"] = "0.2-draft"
+        group = file.create_group("VTKHDF", track_order=True)
+        group.attrs["Type"], group.attrs["Version"] = np.bytes_("MultiBlockDataSet"), [2, 5]
+        group.create_group("Assembly")
+        # the wall is a point without a radius
+        blocks = {
+            "grains": (POSITION[:2], IDS[:2], np.ones(2)),
+            "others": (np.vstack([POSITION[2:], [[9, 9, 9]]]), [IDS[2], 1], [1.0, np.nan]),
+        }
+        for name, (points, ids, radius) in blocks.items():
+            block = group.create_group(name, track_order=True)
+            block.attrs["Type"], block.attrs["Version"] = np.bytes_("PolyData"), [2, 5]
+            block["NumberOfPoints"], block["Points"] = np.array([2]), points
+            cells(block, 2)
+            data = block.create_group("PointData")
+            data["radius"], data["body_id"] = np.array(radius), np.array(ids)
+            group["Assembly"][name] = h5py.SoftLink(f"/VTKHDF/{name}")
+        spheres = file.create_group("ONDEM/Bodies/sphere")
+        spheres["body_id"], spheres["clump_id"] = IDS[::-1], np.array([4, 4, -1])
+        file.create_group("ONDEM/Scene").attrs["time"] = 0.25
+        interactions(file.create_group("ONDEM/Interactions/frict_phys"), -1)
+    return path
+
+
+@pytest.mark.parametrize("make", [draft_1, draft_2])
+def test_both_drafts_hold_the_same_packing(tmp_path, make):
+    packing = scanfab.read(make(tmp_path / "a.vtkhdf"))
+    np.testing.assert_array_equal(packing.position, POSITION)
+    np.testing.assert_array_equal(packing.id, IDS)
+    np.testing.assert_array_equal(packing.columns["clump_id"], [-1, 4, 4])
+    assert packing.time == 0.25
+    # the pair of one clump is no contact, the virtual one neither, the wall's is counted
+    np.testing.assert_array_equal(packing.contacts.pairs, [[0, 1]])
+    np.testing.assert_array_equal(packing.wall_contacts, [1, 0, 0])
+    np.testing.assert_array_equal(packing.contacts.force, FORCE[:1])
+    np.testing.assert_array_equal(packing.contacts.force_n, COMPRESSION[:1])
+
+
+@pytest.mark.parametrize("make", [draft_1, draft_2])
+def test_signs_are_those_of_the_draft(tmp_path, make):
+    packing = scanfab.read(make(tmp_path / "a.vtkhdf"), bodies="id")
+    np.testing.assert_array_equal(packing.contacts.force, FORCE)
+    np.testing.assert_array_equal(packing.contacts.force_n, COMPRESSION[:2])
+
+
+def test_a_draft_whose_signs_are_not_known_is_refused(tmp_path):
+    path = draft_1(tmp_path / "a.vtkhdf", "0.3")
+    with pytest.raises(ReadError, match=r"'0.3', expected 0.1 or 0.2.*sign of the normal force"):
+        scanfab.read(path)
+
+
+def test_what_is_written_has_the_names_of_the_draft(tmp_path):
+    packing = made_up_packings()["everything"]
+    (path,) = scanfab.convert(packing, tmp_path / "a.vtkhdf")
+    with h5py.File(path) as file:
+        assert file.attrs["file_format"] == "ON-DEM VTKHDF"
+        own = file["ONDEM/Interactions"]
+        normal = own["normal_force"][:][:, None] * own["normal"][:] + own["shear_force"][:]
+        np.testing.assert_allclose(normal, packing.contacts.force, atol=1e-15)
+        np.testing.assert_array_equal(own["id1"], packing.id[packing.contacts.pairs[:, 0]])
+        np.testing.assert_array_equal(file["VTKHDF/PointData/radius"], packing.radius)
+    mesh = pyvista.read(path)
+    np.testing.assert_array_equal(mesh.points, packing.position)
+    np.testing.assert_array_equal(mesh["body_id"], packing.id)
+    assert mesh.n_verts == len(packing)
+
+
+def test_a_file_without_interactions_knows_no_contacts(tmp_path):
+    (path,) = scanfab.convert(made_up_packings()["plain"], tmp_path / "a.vtkhdf")
+    assert scanfab.read(path).contacts is None
+
+
+def test_vtkhdf_of_other_programs_is_read_as_vtk(tmp_path):
+    with h5py.File(draft_1(tmp_path / "a.vtkhdf"), "a") as file:
+        del file["ONDEM"]
+    assert reader_for(tmp_path / "a.vtkhdf").name == "vtk"
+    packing = scanfab.read(tmp_path / "a.vtkhdf")
+    np.testing.assert_array_equal(packing.id, IDS)
+    assert packing.contacts is None
+
+
+def test_other_hdf5_files_are_nobodys(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["x"] = np.ones(3)
+    assert reader_for(tmp_path / "a.h5") is None
+
+
+def spoilt(file, what):
+    points = file["VTKHDF/Points"]
+    if what == "an external link":
+        file["VTKHDF/PointData/other"] = h5py.ExternalLink("other.h5", "/x")
+    elif what == "data in another file":
+        file.create_dataset("VTKHDF/PointData/z", (3,), "f8", external=[("z.bin", 0, 24)])
+    elif what == "virtual data":
+        layout = h5py.VirtualLayout((3,), "f8")
+        layout[:] = h5py.VirtualSource("other.h5", "x", (3,))
+        file.create_virtual_dataset("VTKHDF/PointData/z", layout)
+    elif what == "a bomb":
+        file.create_dataset("VTKHDF/PointData/z", (1 << 40,), "f8", chunks=(1 << 16,))
+    elif what == "fewer points":
+        file["VTKHDF/NumberOfPoints"][0] = 2
+    elif what == "other rows":
+        del file["VTKHDF/PointData/radius"]
+        file["VTKHDF/PointData/radius"] = np.ones(4)
+    elif what == "a cell that is none":
+        file["VTKHDF/Vertices/Connectivity"][0] = 99
+    elif what == "steps in time":
+        file.create_group("VTKHDF/Steps")
+    elif what == "a foreign grain":
+        file["ONDEM/Interactions/id2"][0] = 7
+    else:
+        assert len(points)
+
+
+@pytest.mark.parametrize(
+    ("what", "reason"),
+    [
+        ("an external link", "stands in another file"),
+        ("data in another file", "stand in another file"),
+        ("virtual data", "stand in another file"),
+        ("a bomb", "fill more than"),
+        ("fewer points", r"NumberOfPoints are \[2\]"),
+        ("other rows", "radius"),
+        ("steps in time", "steps in time"),
+    ],
+)
+def test_what_cannot_be_read_is_told(tmp_path, what, reason):
+    path = draft_1(tmp_path / "a.vtkhdf")
+    (tmp_path / "z.bin").write_bytes(bytes(24))
+    with h5py.File(path, "a") as file:
+        spoilt(file, what)
+    with pytest.raises(ReadError, match=reason):
+        scanfab.read(path)
+
+
+def test_damaged_files_end_nothing(tmp_path):
+    check_reader(
+        reader_named("on-dem"), [draft_1(tmp_path / "a.vtkhdf")], tmp_path / "damaged", counts=True
+    )
+
+
+def test_all_of_a_packing_comes_back(tmp_path):
+    packing = made_up_packings()["everything"]
+    (path,) = scanfab.convert(packing, tmp_path / "a.vtkhdf")
+    assert differences(packing, scanfab.read(path)) == []

@@ -1,0 +1,101 @@
+"""VTK files that list others: pieces of a frame, files of a frame, frames; and who is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import pyvista
+
+import scanfab
+from scanfab.base.errors import ReadError
+from scanfab.io.formats.vtk import VtkReader
+from tests.helpers.dumps import write
+
+POSITION = np.array([[0.0, 0, 0], [1.9, 0, 0], [3.8, 0, 0.25], [5.6, 0.5, 0]])
+
+
+def cloud(path, rows, ghosts=None):
+    path.parent.mkdir(exist_ok=True)
+    mesh = pyvista.PolyData(POSITION[rows])
+    mesh["radius"], mesh["id"] = np.ones(len(rows)), np.array(rows)
+    if ghosts is not None:
+        mesh["vtkGhostType"] = np.array(ghosts, np.uint8)
+    (mesh if path.suffix == ".vtp" else mesh.cast_to_unstructured_grid()).save(path)
+    return path
+
+
+def listing(path, kind, tag, key, names, more=""):
+    entries = "".join(f'<{tag} {key}="{name}" {more}/>' for name in names)
+    return write(path, f'<VTKFile type="{kind}"><{kind}>{entries}</{kind}></VTKFile>')
+
+
+@pytest.mark.parametrize(("kind", "ending"), [("PPolyData", ".vtp"), ("PUnstructuredGrid", ".vtu")])
+def test_pieces_make_one_frame_and_their_ghosts_count_once(tmp_path, kind, ending):
+    cloud(tmp_path / f"parts/0{ending}", [0, 1, 2], [0, 0, 1])
+    cloud(tmp_path / f"parts/1{ending}", [1, 2, 3], [1, 0, 0])
+    names = [f"parts/{k}{ending}" for k in range(2)]
+    path = listing(tmp_path / f"all.p{ending[1:]}", kind, "Piece", "Source", names)
+    packing = scanfab.read(path)
+    np.testing.assert_array_equal(packing.id, range(4))
+    np.testing.assert_array_equal(packing.position, POSITION)
+
+
+def test_a_piece_that_is_missing_or_damaged_is_named(tmp_path):
+    cloud(tmp_path / "0.vtp", [0, 1])
+    path = listing(tmp_path / "a.pvtp", "PPolyData", "Piece", "Source", ["0.vtp", "1.vtp"])
+    with pytest.raises(ReadError, match=r"a\.pvtp: names '1\.vtp', but there is no such file"):
+        scanfab.read(path)
+    data = (tmp_path / "0.vtp").read_bytes()
+    (tmp_path / "1.vtp").write_bytes(data[: len(data) // 2])
+    with pytest.raises(ReadError, match=r"1\.vtp: .*damaged or incomplete"):
+        scanfab.read(path)
+
+
+def test_the_files_of_a_frame_are_its_grains_and_contacts(tmp_path):
+    cloud(tmp_path / "f/grains.vtu", [0, 1, 2, 3])
+    lines = pyvista.PolyData(POSITION, lines=[2, 0, 1, 2, 1, 2])
+    lines.save(tmp_path / "f/lines.vtp")
+    pyvista.Plane().save(tmp_path / "f/wall.vtp")
+    names = [f"f/{name}" for name in ("wall.vtp", "grains.vtu", "lines.vtp")]
+    path = listing(tmp_path / "f_7.vtm", "vtkMultiBlockDataSet", "DataSet", "file", names)
+    packing = scanfab.read(path)
+    np.testing.assert_array_equal(packing.contacts.pairs, [[0, 1], [1, 2]])
+    assert packing.step == 7
+    listing(path, "vtkMultiBlockDataSet", "DataSet", "file", names[1:2] * 2)
+    with pytest.raises(ReadError, match=r"expected one file of grains .* found 2 and 0"):
+        scanfab.read(path)
+
+
+@pytest.mark.parametrize(
+    "name", ["../secret.vtp", "/etc/passwd", "a/../../secret.vtp", "..\\\\secret.vtp", ".", "a\0b"]
+)
+@pytest.mark.parametrize("kind", ["PPolyData", "vtkMultiBlockDataSet", "Collection", "Xdmf"])
+def test_files_elsewhere_are_not_read(tmp_path, name, kind):
+    cloud(tmp_path / "secret.vtp", [0, 1])
+    folder = tmp_path / "given"
+    folder.mkdir()
+    if kind == "Xdmf":
+        text = f'<Xdmf><Domain><DataItem Format="HDF">{name}:/x</DataItem></Domain></Xdmf>'
+        path = write(folder / "a.xdmf", text)
+    else:
+        tag, key = ("Piece", "Source") if kind == "PPolyData" else ("DataSet", "file")
+        path = listing(folder / "a.pvd", kind, tag, key, [name], 'timestep="0"')
+    with pytest.raises(ReadError, match=r"which does not lie in its folder|no sound XML"):
+        next(iter(scanfab.read_series(path, radius=1.0))).read()
+
+
+def test_lists_of_lists_have_no_end_and_are_refused(tmp_path):
+    path = listing(tmp_path / "a.pvtp", "PPolyData", "Piece", "Source", ["a.pvtp"])
+    with pytest.raises(ReadError, match="lists pieces itself"):
+        scanfab.read(path)
+    path = listing(tmp_path / "a.vtm", "vtkMultiBlockDataSet", "DataSet", "file", ["a.vtm"])
+    with pytest.raises(ReadError, match="expected one file of grains"):
+        scanfab.read(path)
+
+
+@pytest.mark.parametrize("text", ['<!DOCTYPE a [<!ENTITY b "x">]>', "<!ENTITY b 'x'>"])
+def test_definitions_are_refused(tmp_path, text):
+    path = cloud(tmp_path / "a.vtp", [0, 1])
+    path.write_bytes(text.encode() + path.read_bytes())
+    with pytest.raises(ReadError, match="definitions"):
+        VtkReader().kind(path)

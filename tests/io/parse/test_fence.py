@@ -1,0 +1,84 @@
+"""The fence: what a library does to its own process ends nothing but that."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+
+import h5py
+import numpy as np
+import pytest
+
+from scanfab.base.errors import ReadError
+from scanfab.io.parse import fence
+from scanfab.io.parse.fence import fenced
+
+
+@pytest.fixture
+def path(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["x"] = np.arange(5.0)
+    return tmp_path / "a.h5"
+
+
+def read(path):
+    arrays, _ = fenced("hdf", path, path, with_data=True)
+    return arrays["x"].tolist()
+
+
+def test_arrays_come_through(path):
+    assert read(path) == [0, 1, 2, 3, 4]
+
+
+def test_a_process_that_died_is_told_and_replaced(path):
+    read(path)
+    fence._running[0].process.send_signal(signal.SIGKILL)
+    with pytest.raises(ReadError, match=r"a\.h5: cannot be read: its library crashed"):
+        read(path)
+    assert read(path) == [0, 1, 2, 3, 4]
+
+
+def test_a_process_that_hangs_is_told_and_replaced(path, monkeypatch):
+    read(path)
+    fence._running[0].process.send_signal(signal.SIGSTOP)
+    monkeypatch.setattr(fence, "SECONDS", 0.5)
+    with pytest.raises(ReadError, match="took too long"):
+        read(path)
+    monkeypatch.undo()
+    assert read(path) == [0, 1, 2, 3, 4]
+
+
+def test_threads_wait_for_each_other(path):
+    found = []
+    threads = [threading.Thread(target=lambda: found.append(read(path))) for _ in range(8)]
+    for one in threads:
+        one.start()
+    for one in threads:
+        one.join()
+    assert found == [[0, 1, 2, 3, 4]] * 8
+
+
+def test_what_is_too_large_is_refused(path, monkeypatch):
+    monkeypatch.setattr(fence, "MOST_UNPACKED", 0)
+    monkeypatch.setattr(fence, "SMALL", 8)
+    with pytest.raises(ReadError, match="fill more than 8 bytes"):
+        read(path)
+
+
+def test_no_file_of_the_working_folder_is_run(path, tmp_path, monkeypatch):
+    (tmp_path / "h5py.py").write_text(f"open({str(tmp_path / 'was run')!r}, 'w')")
+    monkeypatch.chdir(tmp_path)
+    fence._end()
+    assert read(path) == [0, 1, 2, 3, 4]
+    assert not (tmp_path / "was run").exists()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
+def test_a_forked_process_has_one_of_its_own(path):
+    read(path)
+    child = os.fork()
+    if child == 0:
+        os._exit(0 if read(path) == [0, 1, 2, 3, 4] else 1)
+    assert os.waitpid(child, 0)[1] == 0
+    assert read(path) == [0, 1, 2, 3, 4]
