@@ -29,7 +29,6 @@ _Stamp = tuple[int, int] | None
 # more frames than there can be: the end of frames that nobody has counted
 ENDLESS = 2**62
 
-
 ContactsFrom = Literal["auto", "beside", "geometric", "path", "grains"]
 """
 ``auto``: from what the source holds; ``beside``: from what lies beside single grain files;
@@ -331,12 +330,10 @@ class Series:
         -------
         list of Path
         """
-        listed = self._listed(path) if self.grains.kind == "index" else []
         told = [file for file in (frame_file(path), columns_file(path)) if file.is_file()]
-        listed += told
+        listed = [*(self._listed(path) if self.grains.kind == "index" else ()), *told]
         ask = getattr(self.grains.reader, "beside", None)
-        named = self.cells is not None or self.options.cell is not None
-        if named or ask is None:
+        if ask is None or self.cells is not None or self.options.cell is not None:
             return listed
         dumps = [one for one in listed if one not in told] or [path]
         return [*listed, *(file for one in dumps for file in ask(one))]
@@ -344,11 +341,10 @@ class Series:
     def _listed(self, index: Path) -> list[Path]:
         """The dumps of an index that are there; a frame that is not has been told of."""
         assert self.grains.reader is not None
-        try:
-            snapshots = self.grains.reader.snapshots(index)
-        except ReadError:
-            return []
-        return [path for path in dict.fromkeys(one.path for one in snapshots) if path.is_file()]
+        with suppress(ReadError):
+            paths = dict.fromkeys(one.path for one in self.grains.reader.snapshots(index))
+            return [path for path in paths if path.is_file()]
+        return []
 
     def files_through(self, number: int) -> Iterator[tuple[Path, bool]]:
         """
@@ -398,8 +394,7 @@ class Series:
 
 
 def _stamp(path: Path) -> _Stamp:
-    try:
+    with suppress(OSError):
         found = path.stat()
-    except OSError:
-        return None
-    return found.st_size, found.st_mtime_ns
+        return found.st_size, found.st_mtime_ns
+    return None
