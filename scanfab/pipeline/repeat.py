@@ -65,26 +65,25 @@ def repeat_command(
     asked: Mapping[str, Any], output: str | None = None, named: Collection[str] = ()
 ) -> str:
     """
-        The command line that repeats a computation, quoted for a shell.
+    The command line that repeats a computation, quoted for a shell.
 
-        Parameters
-        ----------
-        asked : mapping
-            The ``settings`` of a manifest.
-        output : str, optional
-            The table.
-        named : collection of str, optional
-            Options to name even with their usual value: those for which a settings file beside the
-            dumps has another.
+    Parameters
+    ----------
+    asked : mapping
+        The ``settings`` of a manifest.
+    output : str, optional
+        The table.
+    named : collection of str, optional
+        Options to name even with their usual value: those for which a settings file beside the
+        dumps has another.
 
-        Examples
-        --------
-        >>> from scanfab.pipeline.manifest import asked_for
-        >>> from scanfab.pipeline.repeat import repeat_command
-        >>> from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings, is_map
-    from scanfab.pipeline.settings import Settings
-        >>> repeat_command(asked_for(["dumps"], {}, Settings(boundary="type=2", seed=3)))
-        'scanfab compute dumps --boundary type=2 --seed 3'
+    Examples
+    --------
+    >>> from scanfab.pipeline.manifest import asked_for
+    >>> from scanfab.pipeline.repeat import repeat_command
+    >>> from scanfab.pipeline.settings import Settings
+    >>> repeat_command(asked_for(["dumps"], {}, Settings(boundary="type=2", seed=3)))
+    'scanfab compute dumps --boundary type=2 --seed 3'
     """
     settings = MapSettings(slices=1) if is_map(asked) else Settings()
     usual = spelt_settings(asked_for((), {"contacts": "auto"}, settings))

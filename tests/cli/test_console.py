@@ -31,6 +31,13 @@ ROWS = [
 ]
 
 
+# those that only maps have are left out
+OWN_KEYS, OWN_MORE = (
+    {name: title for name, title in every.items() if name in ROWS[0] or name == "total"}
+    for every in (KEYS, MORE)
+)
+
+
 @pytest.fixture
 def shown(capsys, monkeypatch):
     """The lines of a table on a terminal of some columns."""
@@ -52,23 +59,33 @@ def test_heads_are_whole_in_every_width(shown, width):
     head, *rows = shown(width)
     assert "…" not in head + "".join(rows)
     columns = titles(head)
-    assert set(KEYS.values()) <= set(columns) <= {*KEYS.values(), *MORE.values()}
+    assert set(OWN_KEYS.values()) <= set(columns) <= {*OWN_KEYS.values(), *OWN_MORE.values()}
     assert len(rows) == 3
     for row in rows:
         assert len(row.split()) == len(columns)
+
+
+def test_a_map_says_which_block_a_row_is_of(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")
+    place = {"block": 7, "x": 1.0, "y": 2.0, "z": 3.0, "at_surface": 0}
+    print_table([Row(**ROWS[0], **place)], Excerpt())
+    head, row = capsys.readouterr().out.splitlines()
+    assert dict(zip(titles(head), row.split(), strict=True))["block"] == "7"
+    assert {"x", "y", "z", "at surface"} <= set(titles(head))
+    assert "from r" not in titles(head)
 
 
 def test_what_does_not_fit_is_left_out_least_telling_first(shown):
     counts = []
     for width in range(60, 201):
         head = shown(width)[0]
-        present = [title in titles(head) for title in MORE.values()]
+        present = [title in titles(head) for title in OWN_MORE.values()]
         assert present == sorted(present, reverse=True)
         if any(present):
             assert len(head) <= width
         counts.append(sum(present))
     assert counts == sorted(counts)
-    assert (counts[0], counts[-1]) == (0, len(MORE))
+    assert (counts[0], counts[-1]) == (0, len(OWN_MORE))
 
 
 def test_error_is_that_of_scan_and_sample_together(shown):

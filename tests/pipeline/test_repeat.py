@@ -36,7 +36,7 @@ def asked_by(command, monkeypatch, tmp_path):
     for word in words:
         if not word.startswith("-"):
             (tmp_path / word).parent.mkdir(exist_ok=True, parents=True)
-    monkeypatch.setattr("scanfab.cli.compute.open_series", lambda *_: [])
+    monkeypatch.setattr("scanfab.cli.rows.open_series", lambda *_: [])
 
     def remember(*given):
         found.update(asked_for(*given))
