@@ -71,7 +71,8 @@ def page() -> str:
     """The whole page."""
     helps = [f"## scanfab {name}\n\n```text\n{help_of(name)}\n```\n" for name in COMMANDS]
     columns = "## Columns\n\nA value that does not exist is an empty cell, in JSON null. "
-    columns += "The unit `length` is that of the dump's lengths, `time` that of its times.\n"
+    columns += "The unit `length` is that of the dump's lengths, `time` that of its times, "
+    columns += "`stress` that of its forces over lengths squared.\n"
     tables = [table(command, columns) for command, columns in TABLES.items()]
     return "\n".join([INTRODUCTION, *helps, columns, *tables])
 

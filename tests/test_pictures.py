@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import importlib.util
 from pathlib import Path
 from types import ModuleType
@@ -29,7 +30,7 @@ def script() -> ModuleType:
 
 pictures = script()
 NAMES = (
-    *pictures.TABLE_FIGURES, *pictures.FRAME_FIGURES, *pictures.VIEWS, "picture",
+    *pictures.TABLE_FIGURES, *pictures.FRAME_FIGURES, *pictures.VIEWS, *pictures.STORED, "picture",
 )  # fmt: skip
 
 
@@ -87,3 +88,18 @@ def test_a_picture_that_does_not_say_what_it_was_drawn_from_is_not_fresh(tmp_pat
     assert pictures.differences(bare, ["a"]) == ["0 words and numbers, now 1"]
     pictures.shrink(Image.new("RGB", (2, 2)), tmp_path / "said.png", ["a", 1.5])
     assert pictures.content_of(tmp_path / "said.png") == ["a", 1.5]
+
+
+def test_stored_numbers_are_those_of_the_page():
+    """Each row of the file stands in the table of docs/validation.md."""
+    page = (ROOT / "docs" / "validation.md").read_text(encoding="utf-8")
+    with pictures.STORED["rv_size"].open(encoding="utf-8") as lines:
+        rows = [row for row in csv.DictReader(lines) if row["rule"] != "medium"]
+    for row in rows:
+        told = [
+            line for line in page.splitlines() if f"R = {row['radius']}, `{row['rule']}`" in line
+        ]
+        told = [line for line in told if line.startswith("| RV")]
+        assert len(told) == 1
+        assert f"{row['mean_length']} ± {row['mean_length_se']}" in told[0]
+        assert f"{float(row['alpha']):+.5f} ± {row['alpha_se']}" in told[0]

@@ -134,6 +134,71 @@ class Convex:
             inside &= points @ plane[:3] < plane[3]
         return np.asarray(inside)
 
+    def surely_holds(self, points: FloatArray, radius: FloatArray) -> BoolArray:
+        """
+        Which spheres lie inside as a whole; of a quadric that is no sphere not all of them.
+
+        Parameters
+        ----------
+        points : ndarray, shape (N, 3)
+            Their centres, from the origin of the region.
+        radius : ndarray, shape (N,)
+            Their radii.
+
+        Returns
+        -------
+        ndarray of bool, shape (N,)
+        """
+        isotropic, deviator, level = self.quadric
+        form = isotropic * np.eye(3) + deviator
+        # √(x·form·x) is a norm: that of a sphere's places is at most that of both parts
+        most = math.sqrt(max(float(np.linalg.eigvalsh(form)[-1]), 0.0))
+        middle = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", points, form, points), 0.0))
+        inside = middle + most * radius < math.sqrt(level)
+        for plane in self.planes:
+            inside &= points @ plane[:3] + radius < plane[3]
+        return np.asarray(inside)
+
+    def share(self, start: FloatArray, branch: FloatArray) -> FloatArray:
+        """
+        Which part of each straight piece lies inside.
+
+        Parameters
+        ----------
+        start : ndarray, shape (N, 3)
+            Where it begins, from the origin of the region.
+        branch : ndarray, shape (N, 3)
+            From there to where it ends; not of length 0.
+
+        Returns
+        -------
+        ndarray, shape (N,)
+            Length inside over length, 0 to 1.
+        """
+        isotropic, deviator, level = self.quadric
+        form = isotropic * np.eye(3) + deviator
+        first, last = np.zeros(len(start)), np.ones(len(start))
+        if form.any():
+            # x·form·x - level = a t² + 2 b t + c along x = start + t branch
+            a = np.einsum("ni,ij,nj->n", branch, form, branch)
+            b = np.einsum("ni,ij,nj->n", start, form, branch)
+            c = np.einsum("ni,ij,nj->n", start, form, start) - level
+            root = np.sqrt(np.maximum(b * b - a * c, 0.0))
+            # along the axis of a cylinder a is 0: all of the piece is inside, or none
+            steep = a > ROUNDING * (isotropic * np.einsum("ni,ni->n", branch, branch))
+            slope = np.where(steep, a, 1.0)
+            first = np.where(steep, np.maximum(first, (-b - root) / slope), first)
+            last = np.where(steep, np.minimum(last, (root - b) / slope), last)
+            last[~steep & (c >= 0.0)] = 0.0
+        for plane in self.planes:
+            rise, room = branch @ plane[:3], plane[3] - start @ plane[:3]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                crossing = room / rise
+            last = np.where(rise > 0.0, np.minimum(last, crossing), last)
+            first = np.where(rise < 0.0, np.maximum(first, crossing), first)
+            last[(rise == 0.0) & (room <= 0.0)] = 0.0
+        return np.asarray(np.maximum(last - first, 0.0))
+
     def may_meet(self, points: FloatArray, radius: FloatArray) -> BoolArray:
         """
         Which spheres reach inside; at times one that all but touches.

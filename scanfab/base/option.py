@@ -17,6 +17,7 @@ __all__ = [
     "GROUPS",
     "Option",
     "as_given",
+    "flag_of",
     "number",
     "one_of",
     "option",
@@ -96,7 +97,20 @@ class Option:
     @property
     def flag(self) -> str:
         """As the command line spells it."""
-        return self.spelling or f"--{self.name.replace('_', '-')}"
+        return self.spelling or flag_of(self.name)
+
+
+def flag_of(name: str) -> str:
+    """
+    An argument as the command line spells it; an underscore behind keeps it from being a keyword.
+
+    Examples
+    --------
+    >>> from scanfab.base.option import flag_of
+    >>> flag_of("rv_radius"), flag_of("with_")
+    ('--rv-radius', '--with')
+    """
+    return f"--{name.rstrip('_').replace('_', '-')}"
 
 
 def option(**declaration: Any) -> Any:
@@ -130,7 +144,7 @@ def takes_options(options: Sequence[Option]) -> Callable[[Callable[P, R]], Calla
     A decorator for functions with options in their signature.
 
     It refuses names that are none of them, with the nearest that is one, and puts what the options
-    mean in place of ``{options}`` into the docstring.
+    mean, in the order of the signature, in place of ``{options}`` into the docstring.
     """
 
     def decorate(function: Callable[P, R]) -> Callable[P, R]:
@@ -142,7 +156,9 @@ def takes_options(options: Sequence[Option]) -> Callable[[Callable[P, R]], Calla
             return function(*args, **kwargs)
 
         text = inspect.cleandoc(function.__doc__ or "")
-        call.__doc__ = text.replace("{options}", "\n".join(map(_documented, options)))
+        places = {name: place for place, name in enumerate(known)}
+        ordered = sorted(options, key=lambda option: places.get(option.name, len(places)))
+        call.__doc__ = text.replace("{options}", "\n".join(map(_documented, ordered)))
         return call
 
     return decorate

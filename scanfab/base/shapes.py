@@ -19,6 +19,8 @@ __all__ = ["box", "cylinder", "ellipsoid", "polyhedron"]
 TOLERANCE = 1e-6
 # each line is cut by all of them
 MOST_FACES = 1000
+# held against all planes of the hull at a time, so that a surface of many takes little memory
+SOME_FACES = 256
 
 
 def box(edges: Sequence[float] | FloatArray, turn: npt.ArrayLike | None = None) -> Convex:
@@ -206,7 +208,8 @@ def _faces(equations: FloatArray, extent: float) -> FloatArray:
     kept: list[FloatArray] = []
     left = planes[np.argsort(-planes[:, 3], kind="stable")]
     while len(left):
-        kept.append(left[0])
+        # a view would keep all of what is left
+        kept.append(left[0].copy())
         apart = np.abs(left - left[0]) / [1.0, 1.0, 1.0, extent]
         left = left[apart.max(axis=1) > TOLERANCE]
     return np.array(kept)
@@ -216,8 +219,11 @@ def _check_convex(
     points: FloatArray, triangles: IntArray, planes: FloatArray, tolerance: float
 ) -> None:
     """All of the surface lies on that of its hull."""
-    off = np.abs(points @ planes[:, :3].T - planes[:, 3])
-    inside = sum(1 for one in triangles if off[one].max(axis=0).min() > 10.0 * tolerance)
+    inside = 0
+    for first in range(0, len(triangles), SOME_FACES):
+        corners = points[triangles[first : first + SOME_FACES]]
+        off = np.abs(corners @ planes[:, :3].T - planes[:, 3]).max(axis=1)
+        inside += int(np.sum(off.min(axis=1) > 10.0 * tolerance))
     if inside:
         raise SettingsError(
             f"the surface is not convex: {inside} of its {len(triangles)} faces lie inside its hull"

@@ -58,7 +58,7 @@ TITLES = {
     help="Which frame, as in the fabric table (default: last).",
 )
 @options("variants", default="cd")
-@options(*WINDOW, "cutoff")
+@options(*WINDOW, "edge", "cutoff")
 @options("spacing", help="Of the ladder of directions (default: 0.25rmin).")
 @options("directions", help="Of the ladder of spacings (default: icosahedral:9).")
 @options(
@@ -67,7 +67,7 @@ TITLES = {
     "the recommended settings.",
 )
 @options("max_chords", help="Steps that would cut more chords from grains than this are left out.")
-@options("axis", "seed", "workers", "output", *EXCERPT, "plot")
+@options("axis", "strain", "seed", "workers", "output", *EXCERPT, "plot")
 @talk_options
 @click.pass_context
 def calibrate(

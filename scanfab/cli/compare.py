@@ -28,7 +28,9 @@ __all__ = ["compare"]
 @options("cutoff", **OF_SEVERAL)
 @options("labels", "output", *EXCERPT, "plot")
 @options(
-    "figure", help="Which figure: evolution, normalised or correlation (default: all on one page)."
+    "figure",
+    help="Which figure: evolution, normalised, correlation or columns:NAME,NAME (default: all on "
+    "one page).",
 )
 @talk_options
 def compare(
@@ -55,7 +57,6 @@ def compare(
     from scanfab.cli.comparison_tables import print_comparison
     from scanfab.cli.console import is_readable, print_csv, reported_warnings
     from scanfab.table.compare import compare_tables
-    from scanfab.table.comparison_rows import DifferenceRow, FrameRow, SummaryRow
     from scanfab.table.formats.registry import format_of
     from scanfab.table.reading import read_rows
     from scanfab.table.result_file import ResultFile
@@ -75,23 +76,20 @@ def compare(
         read = [(table, read_rows(table)) for table in tables]
         rows = [row for one in choose_rows(read, cutoff, labels) for row in one]
         comparison = compare_tables(rows, strain_max=strain_max)
-        kind: type = FrameRow
         chosen = comparison.frames
-        if summary:
-            chosen, kind = comparison.summary, SummaryRow
-        elif differences:
-            chosen, kind = comparison.differences, DifferenceRow
+        if summary or differences:
+            chosen = comparison.summary if summary else comparison.differences
         if not chosen:
             lacking = "two variants of one frame" if comparison.frames else "frames"
             raise SettingsError(f"there is nothing to compare: the tables hold no {lacking}")
         with usage_errors():
-            excerpt = Excerpt.make(kind, fields, digits)
+            excerpt = Excerpt.make(chosen.columns, fields, digits)
         if output is not None:
-            ResultFile(output, kind, excerpt).save(chosen)
+            ResultFile(output, chosen.columns, excerpt).save(chosen)
         elif is_readable() and not differences and excerpt.is_all:
             print_comparison(comparison)
         else:
-            print_csv(chosen, excerpt, kind)
+            print_csv(chosen, excerpt, chosen.columns)
         if plot is not None:
             save_figures(plot, make_figures(rows, "table", figure, comparison=comparison))
     return 0 if any(row.alpha_vs_axial is not None for row in comparison.frames) else 1

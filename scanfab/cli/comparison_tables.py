@@ -51,8 +51,10 @@ def _sources(rows: Sequence[Row], names: dict[str, str]) -> Titled:
 
 
 def _slopes(rows: Sequence[Row]) -> Titled:
+    from scanfab.table.reading import variant_of
+
     return [
-        ("variant", [row.variant for row in rows]),
+        ("variant", [variant_of(row) for row in rows]),
         ("slope", [spelt(row.slope) for row in rows]),
         ("±", [spelt(row.slope_se, 2) for row in rows]),
         ("R²", [spelt(row.r2) for row in rows]),
@@ -64,10 +66,12 @@ def _slopes(rows: Sequence[Row]) -> Titled:
 
 def _curves(comparison: Comparison, longest: int) -> Titled:
     """Both anisotropies over the frames, as bars."""
+    from scanfab.table.reading import variant_of
+
     groups: dict[tuple[str, str], list[Row]] = {}
     for frame in comparison.frames:
-        groups.setdefault((frame.source, frame.variant), []).append(frame)
-    curves = [groups[row.source, row.variant] for row in comparison.summary]
+        groups.setdefault((frame.source, variant_of(frame)), []).append(frame)
+    curves = [groups[row.source, variant_of(row)] for row in comparison.summary]
     return [
         ("α_vs", [_bars([row.alpha_vs_axial_norm for row in curve], longest) for curve in curves]),
         ("α_c", [_bars([row.alpha_c_axial_norm for row in curve], longest) for curve in curves]),
@@ -76,6 +80,7 @@ def _curves(comparison: Comparison, longest: int) -> Titled:
 
 def _frames(rows: Sequence[Row]) -> Titled:
     from scanfab.table.abscissa import strain_column
+    from scanfab.table.reading import variant_of
 
     sheared = strain_column(rows) == "shear_strain"
     return [
@@ -84,7 +89,7 @@ def _frames(rows: Sequence[Row]) -> Titled:
             "shear strain" if sheared else "strain",
             [spelt(row.shear_strain if sheared else row.strain) for row in rows],
         ),
-        ("variant", [row.variant for row in rows]),
+        ("variant", [variant_of(row) for row in rows]),
         ("α_vs axial", [spelt(row.alpha_vs_axial) for row in rows]),
         ("± total", [spelt(row.alpha_vs_axial_total_se, 2) for row in rows]),
         ("α_c axial", [spelt(row.alpha_c_axial) for row in rows]),

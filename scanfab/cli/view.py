@@ -41,7 +41,7 @@ LONGEST_SOURCE = 60
     metavar="K",
     help="Which frame; negative: from the end.",
 )
-@options(*SAMPLE, *WINDOW, "cutoff", "axis")
+@options(*SAMPLE, *WINDOW, "cutoff", "axis", "strain")
 @click.option(
     "--cut", is_flag=True, help="Leave out the grains in front, and show scan lines in the section."
 )

@@ -7,7 +7,9 @@ from functools import cached_property
 
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.contact import contact_fabric
+from scanfab.fabric.forces import ContactForces
 from scanfab.fabric.jackknife import BlockedSums, Jackknife, contact_jackknife, void_jackknife
+from scanfab.fabric.state import SampleState
 from scanfab.fabric.tensor import FabricTensor
 from scanfab.fabric.void import VoidFabric, void_fabric
 
@@ -46,6 +48,12 @@ class Measured:
     """Where these contacts are, shape (M, 3), dump's length unit."""
     blocks: IntArray
     """In which block of the sample each of these contacts is, from 0, shape (M,)."""
+    segment_count: int = 0
+    """Number of the kept void segments of all replicates."""
+    forces: ContactForces | None = None
+    """What these contacts bear; None if that is not known, or not asked for."""
+    state: SampleState | None = None
+    """Stress and void ratio, where they are asked for."""
 
     @cached_property
     def void(self) -> VoidFabric | None:

@@ -17,12 +17,16 @@ from scanfab.base.column import Column
 from scanfab.base.errors import ScanfabError
 from scanfab.base.plugins import having, load_offers
 from scanfab.fabric.contact import Contact
+from scanfab.fabric.forces import Forces
+from scanfab.fabric.harmonics import Harmonics
+from scanfab.fabric.invariants import Invariants
 from scanfab.fabric.jackknife import Halves, Scatter
 from scanfab.fabric.measured import Measured
 from scanfab.fabric.orientation import Orientation
+from scanfab.fabric.state import State
 from scanfab.fabric.void import Void
 
-__all__ = ["OWN_FABRICS", "Fabric", "Measured", "checked_values", "load_fabrics"]
+__all__ = ["GROUPS", "OWN_FABRICS", "Fabric", "Measured", "checked_values", "load_fabrics"]
 
 GROUP = "scanfab.fabrics"
 
@@ -44,6 +48,14 @@ OWN_FABRICS: dict[str, Fabric] = {
     "scatter": Scatter(),
     "orientation": Orientation(),
     "halves": Halves(),
+}
+
+# those of tables that are asked for with `with_`, by the names of the groups
+GROUPS: dict[str, Fabric] = {
+    "invariants": Invariants(),
+    "state": State(),
+    "forces": Forces(),
+    "harmonics": Harmonics(),
 }
 
 

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from scanfab.packing.sample import Sample, Variant
     from scanfab.packing.window import Window
 
-__all__ = ["SAMPLE_COLUMNS", "sample_values"]
+__all__ = ["RV_COLUMN", "SAMPLE_COLUMNS", "sample_values"]
 
 SAMPLE_COLUMNS = (
     Column("grains", int, "", "solid in this variant, centre in the window; a clump is one"),
@@ -25,6 +25,9 @@ SAMPLE_COLUMNS = (
         "mean number of contacts of the grains counted in grains, boundary's included; of clumps, "
         "neighbours",
     ),
+)
+RV_COLUMN = Column(
+    "rv", float, "", "size of the RV as a fraction of the sample's, where several are asked for"
 )
 
 

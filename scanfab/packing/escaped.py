@@ -10,8 +10,9 @@ from scipy.spatial import KDTree
 
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.packing.packing import Packing
+from scanfab.packing.window import SurfaceBox
 
-__all__ = ["Escaped", "escaped_grains"]
+__all__ = ["Escaped", "escaped_grains", "told_of_escaped"]
 
 
 # Gap between surfaces from which on grains are far away: so many largest radii, and so many times
@@ -24,6 +25,8 @@ FEWEST = 50
 # Grains of the sample that are left out at most, and how many may have flown away together: more of
 # them may be a part of the sample, for the user to decide.
 SHARE, TOGETHER = 0.01, 20
+# Spheres that a message names.
+MOST_NAMED = 20
 # Grains that tell how far apart they are.
 SOME = 10_000
 
@@ -65,17 +68,60 @@ def escaped_grains(packing: Packing, grains: BoolArray) -> Escaped:
     ([125], 15.0)
     """
     left = grains.copy()
-    most = max(SHARE * np.count_nonzero(grains), 1.0)
+    most = max(SHARE * _number(packing, np.flatnonzero(grains)), 1.0)
     flown: list[int] = []
     if np.count_nonzero(grains) >= FEWEST:
         far = _far(packing, grains)
         for axis, sign in product(_open_axes(packing), (-1.0, 1.0)):
-            while len(flown) <= most and (group := _group_at_end(packing, left, axis, sign, far)):
+            while _number(packing, flown) <= most and (
+                group := _group_at_end(packing, left, axis, sign, far)
+            ):
                 left[group] = False
                 flown += group
     rest = np.flatnonzero(left)
     gap = min((float(_gaps(packing, row, rest).min()) for row in flown), default=0.0)
-    return Escaped(grains & ~left, gap, len(flown) > most)
+    return Escaped(grains & ~left, gap, _number(packing, flown) > most)
+
+
+def _number(packing: Packing, rows: IntArray | list[int]) -> int:
+    """How many grains some spheres are, by their rows."""
+    return len(rows) if packing.bodies is None else len(np.unique(packing.bodies.head[rows]))
+
+
+def told_of_escaped(packing: Packing, grains: BoolArray, escaped: Escaped, more: int) -> str:
+    """
+    What to tell of grains that have escaped.
+
+    Parameters
+    ----------
+    packing : Packing
+        One frame.
+    grains : ndarray of bool, shape (N,)
+        Which of its particles are grains.
+    escaped : Escaped
+        Those of them that flew away, at least one.
+    more : int
+        How many grains they are beside the first.
+    """
+    rows = np.flatnonzero(escaped.grains)
+    first = rows[0]
+    place = ", ".join(f"{x:g}" for x in packing.position[first])
+    others = f" and {more} more" if more else ""
+    found = f"grain {packing.id[first]} at ({place}){others}: {escaped.gap:g} away from all others"
+    ids = ",".join(str(one) for one in packing.id[rows[:MOST_NAMED]])
+    cure = f'`boundary="id={ids}{",..." if len(rows) > MOST_NAMED else ""}"`'
+    if not escaped.are_many:
+        return (
+            f"{found}, so the sample's extents, RV and octants leave out what has flown away; "
+            f"in a and b it is still solid: {cure} takes it out"
+        )
+    boxes = [SurfaceBox.of(packing, chosen) for chosen in (grains, grains & ~escaped.grains)]
+    wide, narrow = (" x ".join(f"{x:.4g}" for x in box.high - box.low) for box in boxes)
+    return (
+        f"{found}; these are too many to be left out, so they widen the sample's extents, RV "
+        f"and octants: {wide} with them, {narrow} without; if they have flown away, {cure} "
+        f"takes them out"
+    )
 
 
 def _far(packing: Packing, grains: BoolArray) -> float:
@@ -108,7 +154,7 @@ def _group_at_end(
         rows = np.flatnonzero(left & (np.abs(along - along[member]) <= layer))
         near = rows[_gaps(packing, member, rows) <= far]
         group += [row for row in near.tolist() if row not in group]
-        if len(group) > min(TOGETHER, int(np.count_nonzero(left)) // 2):
+        if _number(packing, group) > min(TOGETHER, int(np.count_nonzero(left)) // 2):
             return []
     return group
 

@@ -17,17 +17,13 @@ from scanfab.base.note import Note
 from scanfab.base.spelling import counted
 from scanfab.base.typing import BoolArray, IntArray
 from scanfab.packing.boundary import BoundaryRule, select_boundary
-from scanfab.packing.escaped import Escaped, escaped_grains
+from scanfab.packing.escaped import Escaped, escaped_grains, told_of_escaped
 from scanfab.packing.packing import Contacts, Packing
 from scanfab.packing.rattlers import RattlerRule, Touching, count, installed_rules
 from scanfab.packing.search import find_contacts
-from scanfab.packing.window import SurfaceBox, Window
+from scanfab.packing.window import Window
 
 __all__ = ["VARIANTS", "Sample", "SampleRule", "Variant"]
-
-
-# grains that a message names
-MOST_NAMED = 20
 
 
 @dataclass(frozen=True)
@@ -143,6 +139,22 @@ class Sample:
         bodies = self.packing.bodies
         return int(np.count_nonzero(chosen)) if bodies is None else bodies.count(chosen)
 
+    def once(self, chosen: BoolArray) -> BoolArray:
+        """
+        One sphere each of grains all of whose spheres are chosen.
+
+        Parameters
+        ----------
+        chosen : ndarray of bool, shape (N,)
+            Spheres.
+
+        Returns
+        -------
+        ndarray of bool, shape (N,)
+        """
+        bodies = self.packing.bodies
+        return chosen if bodies is None else np.asarray(chosen & bodies.is_head)
+
     @property
     def clumps(self) -> int:
         """How many grains are bodies of several spheres."""
@@ -168,34 +180,10 @@ class Sample:
         list of Note
             Empty without any.
         """
-        rows = np.flatnonzero(self.escaped.grains)
-        return [Note("escaped", self._escaped(rows))] if len(rows) else []
-
-    def _escaped(self, rows: IntArray) -> str:
-        first, packing = rows[0], self.packing
-        place = ", ".join(f"{x:g}" for x in packing.position[first])
-        others = f" and {len(rows) - 1} more" if len(rows) > 1 else ""
-        found = (
-            f"grain {packing.id[first]} at ({place}){others}: {self.escaped.gap:g} away from all "
-            f"others"
-        )
-        ids = ",".join(str(one) for one in packing.id[rows[:MOST_NAMED]])
-        cure = f'`boundary="id={ids}{",..." if len(rows) > MOST_NAMED else ""}"`'
-        if not self.escaped.are_many:
-            return (
-                f"{found}, so the sample's extents, RV and octants leave out what has flown away; "
-                f"in a and b it is still solid: {cure} takes it out"
-            )
-        boxes = [
-            SurfaceBox.of(packing, chosen)
-            for chosen in (self.grains, self.grains & ~self.escaped.grains)
-        ]
-        wide, narrow = (" x ".join(f"{x:.4g}" for x in box.high - box.low) for box in boxes)
-        return (
-            f"{found}; these are too many to be left out, so they widen the sample's extents, RV "
-            f"and octants: {wide} with them, {narrow} without; if they have flown away, {cure} "
-            f"takes them out"
-        )
+        if not self.escaped.grains.any():
+            return []
+        more = self.number(self.escaped.grains) - 1
+        return [Note("escaped", told_of_escaped(self.packing, self.grains, self.escaped, more))]
 
     @cached_property
     def rattlers(self) -> BoolArray:
@@ -208,14 +196,8 @@ class Sample:
 
     @property
     def _touching(self) -> Touching:
-        return Touching(
-            self.contacts,
-            self.contact_numbers,
-            self.grains,
-            self.min_contacts,
-            self.packing.bodies,
-            self.min_force,
-        )
+        options = self.min_contacts, self.packing.bodies, self.min_force
+        return Touching(self.contacts, self.contact_numbers, self.grains, *options)
 
     @cached_property
     def contact_numbers(self) -> IntArray:
@@ -355,9 +337,7 @@ class Sample:
         float or None
             None if there is no grain.
         """
-        counted = self.counted(variant, window) & ~self.removed(variant)
-        if self.packing.bodies is not None:
-            counted &= self.packing.bodies.is_head
+        counted = self.once(self.counted(variant, window) & ~self.removed(variant))
         if not counted.any():
             return None
         numbers = (

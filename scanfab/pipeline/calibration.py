@@ -30,7 +30,8 @@ from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.plan import Plan, make_plan
 from scanfab.pipeline.settings import AUTO_RULE, Length, Settings
 from scanfab.pipeline.tolerance import TOLERANCE_MISSED, missing_work
-from scanfab.pipeline.values import SHAPES, parse_frames
+from scanfab.pipeline.values import parse_frames
+from scanfab.pipeline.window_settings import SHAPES
 from scanfab.scan.directions import direction_rule
 from scanfab.table.plots import Plots
 from scanfab.table.table import Row
@@ -154,6 +155,11 @@ class _Calibrator:
     """One frame, and the plan-making first frame of its series."""
 
     def __init__(self, source: Source, settings: Settings, frame: int) -> None:
+        if len(settings.rvs) > 1:
+            raise SettingsError(
+                f"rv: expected one size, as a calibration has RVs of its own beside it, found "
+                f"{len(settings.rvs)}"
+            )
         frames = Frames(source, replace(settings, frames=parse_frames(frame, "frame")))
         self.name = frames.name
         self.settings = settings
@@ -186,6 +192,11 @@ class _Calibrator:
         target = max(self.settings.tolerance, OF_SAMPLE * (sample or 0.0))
         best, options = self._recommended(ladders["spacing"], ladders["directions"], target)
         findings = [sentence(ladder, rows) for ladder, rows in ladders.items() if rows]
+        if self.settings.needs_window and not self._rv_has_sizes:
+            findings.append(
+                f"RV: its size is left out, as {self.settings.rv_shape} draws it: to try others, "
+                f"scale that surface"
+            )
         findings.append(sentence_of_recommended(best, target, sample))
         rows = [row for ladder in ladders.values() for row in ladder]
         return Calibration((*rows, *best), tuple(findings), options)
@@ -245,7 +256,7 @@ class _Calibrator:
             self._row(row, ladder, value, plan, seconds, _told(result.notes, row.variant))
             for row in result.rows
         ]
-        return rows, result.scanned
+        return rows, result.measurements[0]
 
     def _check_budget(self, ladder: str, plan: Plan) -> None:
         """Refuse a step of fixed lines that would cut more chords than allowed."""

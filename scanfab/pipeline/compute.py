@@ -18,10 +18,10 @@ from scanfab.base.note import SKIPPED, Note, tell
 from scanfab.base.option import options_of, takes_options, unusable
 from scanfab.base.threads import in_order
 from scanfab.packing.cell import Cell
+from scanfab.packing.groupings import Grouping, Groupings, grouping_of
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.frame import FrameResult, compute_frame
 from scanfab.pipeline.frames import Frames, Readable, Source
-from scanfab.pipeline.groupings import Grouping, Groupings, grouping_of
 from scanfab.pipeline.plan import Plan, make_plan, plan_without_grains
 from scanfab.pipeline.settings import MAX_CHORDS, Settings
 from scanfab.pipeline.strain import Flips, Strains
@@ -62,6 +62,7 @@ def compute(
     min_force: float = 0.0,
     contact_tolerance: float = 0.0,
     axis: str | Sequence[float] = "z",
+    with_: str | Sequence[str] | None = None,
     strain: str | Path = "auto",
     frames: str | int | slice | None = None,
     seed: int = 0,

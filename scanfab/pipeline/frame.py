@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from scanfab.base.note import Note, joined
 from scanfab.base.spelling import spelt_apart
+from scanfab.fabric.state import VOLUMETRIC_STRAIN
+from scanfab.packing.columns import RV_COLUMN
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.pipeline.frames import Readable
 from scanfab.pipeline.measurement import Measurement, measure
 from scanfab.pipeline.plan import Plan
+from scanfab.pipeline.state import refuse_without_forces
 from scanfab.pipeline.variant_columns import VariantColumns, no_columns
 from scanfab.table.columns import complete_row
 from scanfab.table.row import Row
@@ -30,17 +33,23 @@ class FrameResult:
     source: str
     number: int
     sample: Sample
-    measurement: Measurement | None
-    """None if there is nothing to scan."""
+    measurements: tuple[Measurement, ...]
+    """One for each RV, the smallest first, which has the whole, too; none without any grain."""
     rows: list[Row]
     notes: tuple[Note, ...] = ()
     """What is doubtful about them."""
 
-    @property
-    def scanned(self) -> Measurement:
-        """The measurement of a frame that has grains."""
-        assert self.measurement is not None
-        return self.measurement
+    def measured(self, variant: str, rv: float | None = None) -> Measurement:
+        """
+        The measurement of a variant in a frame that has grains.
+
+        ``rv`` is the size of its RV, where there are several.
+        """
+        return next(
+            one
+            for one in self.measurements
+            if one.plan.rvs_of(variant)[0].fraction == rv and variant in one.plan.variants
+        )
 
 
 def compute_frame(
@@ -79,20 +88,20 @@ def compute_frame(
         "step": frame.packing.step,
         "time": frame.packing.time,
         "contacts_from": frame.contacts.source,
-        **plan.strains.at(number, frame),
     }
+    strains = plan.strains.at(number, frame)
+    if VOLUMETRIC_STRAIN.name not in plan.more_columns:
+        del strains[VOLUMETRIC_STRAIN.name]
+    known |= strains
     if not frame.grains.any():
-        empty = {**no_columns(plan.more_columns), **known}
-        rows = [
-            complete_row({**empty, "variant": variant}, plan.more_columns)
-            for variant in plan.variants
-            for _ in plan.cutoffs
-        ]
-        return FrameResult(source, number, frame, None, rows)
-    measurement = measure(frame, plan.in_frame(frame), f"frame {number}")
+        return FrameResult(source, number, frame, (), list(_empty_rows(known, plan)))
+    if "forces" in plan.groups:
+        refuse_without_forces(frame)
+    measurements = measure(frame, plan.in_frame(frame), f"frame {number}")
     columns = [
         VariantColumns(measurement, VARIANTS[variant], place)
         for variant in plan.variants
+        for measurement, _ in zip(measurements, plan.rvs_of(variant), strict=False)
         for place in range(len(plan.cutoffs))
     ]
     rows = [
@@ -101,24 +110,36 @@ def compute_frame(
     ]
     notes = [
         *frame.doubts_of_escaped(),
-        *measurement.notes,
+        *(note for one in measurements for note in one.notes),
         *joined(note for one in columns for note in one.notes()),
         *_large_errors(rows, plan),
     ]
-    return FrameResult(source, number, frame, measurement, rows, tuple(notes))
+    return FrameResult(source, number, frame, measurements, rows, tuple(notes))
+
+
+def _empty_rows(known: Mapping[str, Any], plan: Plan) -> Iterator[Row]:
+    """The rows of a frame without grains."""
+    empty = {**no_columns(plan.more_columns), **known}
+    for variant in plan.variants:
+        for rv in plan.rvs_of(variant):
+            own = {RV_COLUMN.name: rv.fraction} if RV_COLUMN.name in plan.more_columns else {}
+            for _ in plan.cutoffs:
+                yield complete_row({**empty, "variant": variant, **own}, plan.more_columns)
 
 
 def _large_errors(rows: list[Row], plan: Plan) -> Iterator[Note]:
-    """Other cut-offs and the second moment are measured along lines that are chosen for one."""
-    if not (plan.auto and plan.lists_gaps):
+    """Other cut-offs, RVs and the second moment are measured along lines chosen for one."""
+    if not (plan.auto and (plan.lists_gaps or len(plan.rvs) > 1)):
         return
     worst = max(rows, key=lambda row: row.alpha_vs_axial_se or 0.0)
     error = worst.alpha_vs_axial_se or 0.0
     if error > plan.tolerance:
         reached, tolerance = spelt_apart(error, plan.tolerance)
+        rv = worst.get(RV_COLUMN.name)
         text = (
-            f"at the cut-off {worst.cutoff:g} alpha_vs_axial_se is {reached}, above the tolerance "
-            f"{tolerance}, which holds for the mean length at the cut-off {plan.cutoff:g}: choose "
-            f"a smaller `tolerance`"
+            f"at the cut-off {worst.cutoff:g}{f' in the RV {rv:g}' if rv else ''} "
+            f"alpha_vs_axial_se is {reached}, above the tolerance {tolerance}, which holds for "
+            f"the mean length at the cut-off {plan.cutoff:g}"
+            f"{f' in the RV {plan.rvs[0].fraction:g}' if rv else ''}: choose a smaller `tolerance`"
         )
         yield Note(OTHER_CUTOFFS, text, (worst.variant,))

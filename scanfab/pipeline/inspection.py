@@ -17,7 +17,7 @@ from scanfab.packing.doubts import cell_doubt, cell_hint, doubts_of, refuse_impo
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.frames import Frames, boundary_hints
-from scanfab.pipeline.rv import rv_of
+from scanfab.pipeline.rv import windows_of
 from scanfab.pipeline.settings import Settings
 from scanfab.table.row import Record
 
@@ -119,11 +119,11 @@ def _read(frames: Frames, frame: Frame) -> tuple[Sample, list[str]]:
 
 
 def _rv(frames: Frames, sample: Sample) -> Window | None:
-    """The RV, and a word on the boundary, from the first frame that has grains."""
+    """The RV, the largest of several, and a word on the boundary, from the first frame with any."""
     if not sample.grains.any():
         return None
     tell(frames.check_boundary(sample))
-    return rv_of(sample, frames.settings)
+    return windows_of(sample, frames.settings)[-1]
 
 
 def _report(

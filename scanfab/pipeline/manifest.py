@@ -15,7 +15,7 @@ from scanfab.base.files import whole_file
 from scanfab.base.option import options_of
 from scanfab.io.series import Series
 from scanfab.pipeline.settings import STRAIN_MODES, Settings
-from scanfab.pipeline.values import SHAPES
+from scanfab.pipeline.window_settings import SHAPES
 from scanfab.scan.directions import DirectionRule
 from scanfab.table.writing import ALL, Excerpt
 

@@ -96,8 +96,18 @@ class Measurement:
         return replace(self, plan=plan, gaps=gaps, blocked=blocked)
 
 
-def measure(sample: Sample, plan: Plan, where: str = "the frame") -> Measurement:
-    """Scan one frame that has grains; ``where`` names it where progress is told."""
+def measure(sample: Sample, plan: Plan, where: str = "the frame") -> tuple[Measurement, ...]:
+    """
+    Scan one frame that has grains, each RV along the same lines.
+
+    The whole is measured with the first of them. ``where`` names the frame where progress is told.
+    """
+    first = _measure(sample, plan, where)
+    others = first.plan.along(first.sums.replicates)
+    return (first, *(_measure(sample, other, where) for other in others))
+
+
+def _measure(sample: Sample, plan: Plan, where: str) -> Measurement:
     solids = solids_of(sample, plan.window, variants=plan.variants, edge=plan.edge)
     sums, plan, notes = scan_to_tolerance(solids, plan, where)
     blocks = _blocks(sample, plan)

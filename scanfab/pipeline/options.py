@@ -82,9 +82,9 @@ OUTPUT_OPTIONS = (
     Option(
         name="figure",
         group="output",
-        help="Which figure: of the table evolution, normalised or correlation (default: all on "
-        "one page); of the first and last frame rose (or rose:30,60,90 for these polar angles), "
-        "projection, histogram or cutoffs.",
+        help="Which figure: of the table evolution, normalised, correlation or columns:NAME,NAME "
+        "(default: all on one page); of the first and last frame rose (or rose:30,60,90 for these "
+        "polar angles), projection, histogram or cutoffs.",
         metavar="NAME",
         choices=_figures,
     ),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -10,10 +11,10 @@ from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
 from scanfab.base.note import Note
 from scanfab.packing.doubts import refuse_impossible
-from scanfab.packing.sample import Sample, SampleRule
+from scanfab.packing.sample import VARIANTS, Sample, SampleRule
 from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.frames import sample_rule
-from scanfab.pipeline.rv import Deformation, doubts_of_rv, rv_of
+from scanfab.pipeline.rv import RV, Deformation, doubts_of_rv, sizes_of, windows_of
 from scanfab.pipeline.settings import AUTO_RULE, Settings, Vector
 from scanfab.pipeline.strain import Strains
 from scanfab.scan.directions import DirectionRule, direction_rule
@@ -56,12 +57,15 @@ class Plan:
     """Of an auto scan: the wanted standard error of alpha_vs_axial."""
     max_chords: float
     """An auto scan stops before it cuts more."""
-    window: Window | None
-    """Of the first frame that has grains, if :meth:`in_frame` has not put another in its place."""
+    rvs: tuple[RV, ...]
+    """Of the first frame that has grains, if :meth:`in_frame` has not put others in their place, in
+    ascending order; the first is scanned until its tolerance holds, the others along its lines."""
     deformation: Deformation | None
-    """What the window follows."""
+    """What the windows follow."""
     more_columns: tuple[str, ...]
     """Of the table, behind those that it always has."""
+    groups: tuple[str, ...]
+    """Of further columns, see :data:`scanfab.fabric.registry.GROUPS`."""
     cutoff: float
     """Of the scan that is to meet the tolerance."""
     cutoffs: tuple[float, ...]
@@ -82,11 +86,35 @@ class Plan:
     notes: tuple[Note, ...] = ()
     """What is doubtful about the settings, for a user who has chosen them."""
 
+    @property
+    def window(self) -> Window | None:
+        """The RV that is scanned; None if no variant needs one."""
+        return next(iter(self.windows), None)
+
+    @property
+    def windows(self) -> list[Window]:
+        """All RVs."""
+        return [one.window for one in self.rvs if one.window is not None]
+
+    def rvs_of(self, variant: str) -> tuple[RV, ...]:
+        """Those that a variant has rows for; of the whole one that is none."""
+        return self.rvs if VARIANTS[variant].in_window else (RV(),)
+
     def in_frame(self, sample: Sample) -> Plan:
-        """The plan with the window as it lies in a frame."""
-        if self.window is None or self.deformation is None:
+        """The plan with the windows as they lie in a frame."""
+        if self.deformation is None:
             return self
-        return replace(self, window=self.deformation.window_in(sample, self.window))
+        return self._with(self.deformation.windows_in(sample, self.windows))
+
+    def _with(self, windows: Sequence[Window]) -> Plan:
+        rvs = zip(self.rvs, windows, strict=True)
+        return replace(self, rvs=tuple(rv._replace(window=window) for rv, window in rvs))
+
+    def along(self, replicates: int) -> Iterator[Plan]:
+        """The plans of the other RVs, for the lines that the first was scanned along."""
+        variants = "".join(one for one in self.variants if VARIANTS[one].in_window)
+        for rv in self.rvs[1:]:
+            yield replace(self, rvs=(rv,), variants=variants, replicates=replicates, auto="")
 
 
 def make_plan(settings: Settings, sample: Sample, strains: Strains | None = None) -> Plan:
@@ -120,10 +148,10 @@ def make_plan(settings: Settings, sample: Sample, strains: Strains | None = None
     box = SurfaceBox.of(sample.packing, sample.gathered)
     plan = _without_lengths(settings, strains or Strains.of(settings))
     notes: list[Note] = []
-    window = rv_of(sample, settings) if settings.needs_window else None
-    if window is not None:
+    windows = windows_of(sample, settings) if settings.needs_window else []
+    for window in windows:
         notes += doubts_of_rv(window, sample, box, lengths["rmax"])
-    scanned = _scanned(box, None if window is None else window.shape)
+    scanned = _scanned(box, windows[0].shape if windows else None)
     rule = plan.rule
     if rule.bias > 0.1 * settings.tolerance:
         text = f"directions {rule.name}: an isotropic sample would get alpha = {rule.bias:.2g}"
@@ -132,10 +160,10 @@ def make_plan(settings: Settings, sample: Sample, strains: Strains | None = None
     # as many as were asked for, also if two are equal: every frame has the same number of rows
     cutoffs = tuple(sorted(one.resolve(lengths) for one in settings.cutoffs)) or (cutoff,)
     return replace(
-        plan,
+        plan._with(windows),
         strains=plan.strains.since(sample),
-        window=window,
         deformation=_deformation(settings, sample),
+        max_chords=plan.max_chords * _share_of_first(windows, settings),
         cutoff=cutoff,
         cutoffs=cutoffs,
         notes=tuple(notes),
@@ -147,6 +175,17 @@ def _deformation(settings: Settings, sample: Sample) -> Deformation | None:
     if settings.rv_follows == "none" or not settings.needs_window:
         return None
     return Deformation.since(sample, settings.strain, settings.axis)
+
+
+def _share_of_first(windows: Sequence[Window], settings: Settings) -> float:
+    """The part of all chords that the scan of the first RV, of several, cuts at least."""
+    if len(windows) < 2:
+        return 1.0
+    if any(not VARIANTS[one].in_window for one in settings.variants):
+        # the first scan is that of the whole, too
+        return 1.0 / len(windows)
+    volumes = [one.shape.volume for one in windows]
+    return volumes[0] / sum(volumes)
 
 
 class _Scanned(NamedTuple):
@@ -211,9 +250,10 @@ def _without_lengths(settings: Settings, strains: Strains) -> Plan:
         workers=settings.workers,
         tolerance=settings.tolerance,
         max_chords=settings.max_chords,
-        window=None,
+        rvs=sizes_of(settings),
         deformation=None,
         more_columns=settings.more_columns,
+        groups=settings.with_,
         cutoff=math.nan,
         cutoffs=(math.nan,) * max(len(settings.cutoffs), 1),
         rule=settings.directions or direction_rule(AUTO_RULE),

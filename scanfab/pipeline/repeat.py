@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.base.errors import ReadError, SettingsError
+from scanfab.base.option import flag_of
 from scanfab.base.spelling import shortest
 from scanfab.io.opening import READING, open_sources
 from scanfab.io.series import Series
@@ -86,7 +87,7 @@ def repeat_command(
     usual = spelt_settings(asked_for((), {"contacts": "auto"}, Settings()))
     words = ["scanfab", "compute", *map(str, asked["sources"])]
     for name, value in spelt_settings(asked).items():
-        option = f"--{name.replace('_', '-')}"
+        option = flag_of(name)
         if usual.get(name) != value or option[2:] in named:
             words += _words(option, name, value)
     if output is not None:
@@ -152,6 +153,8 @@ def _spell(name: str, value: Any) -> Any:
         raise TypeError
     if name == "axis" and isinstance(value, list):
         return ",".join(map(shortest, value))
+    if name == "rv" and isinstance(value, list):
+        return ",".join(map(shortest, value))
     if name == "cutoffs" and isinstance(value, list):
         return ",".join(_length(one) for one in value)
     if isinstance(value, dict) and {"value", "unit"} <= set(value):
@@ -175,6 +178,8 @@ def _words(option: str, name: str, value: Any) -> list[str]:
         return [option, ",".join(f"{key}={column}" for key, column in value.items())]
     if isinstance(value, bool):
         return [option] if value else []
+    if name == "with_":
+        return [option, ",".join(value)]
     if name == "boundary":
         return [word for rule in value for word in (option, rule)]
     if isinstance(value, tuple):

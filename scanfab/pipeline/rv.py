@@ -1,9 +1,11 @@
-"""The RV of a series: where settings put it in the first frame, and in frames that are deformed."""
+"""The RVs of a series: where settings put them in the first frame, and in deformed frames."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,15 +20,31 @@ from scanfab.packing.window import RV_MEANING, SurfaceBox, Window
 from scanfab.pipeline.settings import Settings, Vector
 from scanfab.pipeline.strain import strain_mode
 
-__all__ = ["Deformation", "doubts_of_rv", "rv_of"]
+__all__ = ["RV", "Deformation", "doubts_of_rv", "sizes_of", "windows_of"]
 
 # of the smallest grain: what nobody means
 SMALLEST = 1e-9
 
 
-def rv_of(sample: Sample, settings: Settings) -> Window:
+class RV(NamedTuple):
+    """One of the RVs of a series."""
+
+    fraction: float | None = None
+    """Its size as a fraction of the sample's, where there are several to be told apart."""
+    window: Window | None = None
+    """None in a series without grains."""
+
+
+def sizes_of(settings: Settings) -> tuple[RV, ...]:
+    """The RVs of a series as far as the settings alone tell; none if no variant needs one."""
+    if not settings.needs_window:
+        return ()
+    return tuple(RV(one if len(settings.rvs) > 1 else None) for one in settings.rvs)
+
+
+def windows_of(sample: Sample, settings: Settings) -> list[Window]:
     """
-    The RV that settings make of the first frame that has grains.
+    The RVs that settings put into the first frame that has grains, in ascending order.
 
     Raises
     ------
@@ -36,7 +54,11 @@ def rv_of(sample: Sample, settings: Settings) -> Window:
         If the file of its surface cannot be read.
     """
     surfaces = SurfaceBox.of(sample.packing, sample.gathered)
-    shape, center = _shape(settings, 0.5 * surfaces.extents)
+    return [_window(sample, settings, one, surfaces) for one in settings.rvs]
+
+
+def _window(sample: Sample, settings: Settings, fraction: float, surfaces: SurfaceBox) -> Window:
+    shape, center = _shape(settings, 0.5 * surfaces.extents, fraction)
     if settings.rv_center is not None:
         center = np.array(settings.rv_center, dtype=float)
     elif center is None:
@@ -52,16 +74,19 @@ def rv_of(sample: Sample, settings: Settings) -> Window:
     return Window(center, shape)
 
 
-def _shape(settings: Settings, half: FloatArray) -> tuple[Convex, FloatArray | None]:
+def _shape(
+    settings: Settings, half: FloatArray, fraction: float
+) -> tuple[Convex, FloatArray | None]:
     """
     The shape, and its centre if a file says where it is.
 
-    ``half`` are the sample's half extents, which the sizes are a fraction of where none are given.
+    ``half`` are the sample's half extents, of which the sizes are the fraction where none are
+    given.
     """
-    sizes, part = settings.rv_size, settings.rv * half
+    sizes, part = settings.rv_size, fraction * half
     if settings.rv_shape == "sphere":
         radius = settings.rv_radius
-        return sphere(settings.rv * float(half.min()) if radius is None else radius), None
+        return sphere(float(part.min()) if radius is None else radius), None
     if settings.rv_shape == "box":
         return box(sizes or 2.0 * part), None
     if settings.rv_shape == "ellipsoid":
@@ -165,14 +190,16 @@ class Deformation:
             raise SettingsError(f"rv_follows: the {mode} it is to follow has no volume")
         return cls(mode, origin, edges)
 
-    def window_in(self, sample: Sample, window: Window) -> Window:
-        """The window of the first frame as it lies in another."""
+    def windows_in(self, sample: Sample, windows: Sequence[Window]) -> list[Window]:
+        """Windows of the first frame as they lie in another."""
         origin, edges = _edges(sample, self.mode)
         if np.array_equal(origin, self.origin) and np.array_equal(edges, self.edges):
-            return window
+            return list(windows)
         gradient = edges @ np.linalg.inv(self.edges)
-        center = origin + gradient @ (window.center - self.origin)
-        return Window(center, window.shape.deformed(gradient))
+        return [
+            Window(origin + gradient @ (one.center - self.origin), one.shape.deformed(gradient))
+            for one in windows
+        ]
 
 
 def _edges(sample: Sample, mode: str) -> tuple[FloatArray, FloatArray]:

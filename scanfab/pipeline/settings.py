@@ -10,41 +10,38 @@ from scanfab.base.option import (
     number,
     one_of,
     option,
-    optional,
     options_of,
     refuse_unknown,
     whole,
 )
+from scanfab.packing.columns import RV_COLUMN
 from scanfab.pipeline.values import (
     AXES,
-    RULE_NAMES,
-    SHAPES,
+    GROUP_NAMES,
     STRAIN_MODES,
     Axis,
     Length,
     Vector,
     as_written,
     check_moment,
-    check_window,
     parse_axis,
     parse_boundary,
     parse_cutoff,
     parse_cutoffs,
     parse_directions,
     parse_frames,
+    parse_groups,
     parse_rattlers,
-    parse_shape,
-    parse_sizes,
     parse_spacing,
     parse_strain,
     parse_tolerance,
     parse_variants,
-    parse_vector,
     parse_workers,
     rattler_rules,
 )
+from scanfab.pipeline.window_settings import WindowSettings, check_window
 from scanfab.scan.columns import EDGE_COLUMNS
-from scanfab.scan.edges import CLIP, EDGES
+from scanfab.scan.edges import CLIP
 
 if TYPE_CHECKING:
     from scanfab.packing.boundary import BoundaryRule
@@ -57,10 +54,13 @@ AUTO_RULE = "icosahedral:9"
 # of an auto scan of one frame: one to two minutes of one processor, some hundred times what dense
 # packings need for the default tolerance
 MAX_CHORDS = 1e10
+RULE_NAMES = (
+    "lebedev", "design", "icosahedral", "product", "fibonacci", "equal-angle", "equal-angle-full",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, init=False)
-class Settings:
+class Settings(WindowSettings):
     """
     What to compute, and how.
 
@@ -95,87 +95,6 @@ class Settings:
         metavar="LETTERS",
         choices=lambda: ("abcd", "ab", "cd", "ac", *"abcd"),
         first=True,
-    )
-    rv: float = option(
-        default=0.7,
-        parse=number("a fraction above 0", lambda value: 0 < value < math.inf),
-        group="window",
-        help="Size of the RV: radius of the sphere as a fraction of half the smallest extent of "
-        "the grains; sizes of other shapes, of half the extents.",
-        meaning="radius of the RV over half the smallest extent of the grains; of other shapes "
-        "their sizes over half the extents",
-        takes="float",
-        metavar="FRACTION",
-        first=True,
-    )
-    rv_radius: float | None = option(
-        parse=optional(number("a length above 0", lambda value: 0 < value < math.inf)),
-        group="window",
-        help="Radius of the sphere RV in the dump's units, instead of `rv`.",
-        meaning="radius of the RV instead, dump's unit",
-        takes="float",
-        metavar="L",
-    )
-    rv_center: Vector | None = option(
-        parse=optional(parse_vector),
-        group="window",
-        help="Centre of the RV (default: middle).",
-        meaning="centre of the RV, dump's unit; not given: the middle of the sample",
-        takes="str or three floats",
-        metavar="X Y Z",
-    )
-    rv_shape: str = option(
-        default="sphere",
-        parse=parse_shape,
-        group="window",
-        help="Shape of the RV; FILE is a closed convex surface in the dump's units (.stl .vtp .ply "
-        ".obj).",
-        meaning="shape of the RV: sphere, box, cylinder, ellipsoid, or the file of its surface",
-        takes="str or path",
-        metavar="sphere|box|cylinder|ellipsoid|FILE",
-        choices=lambda: SHAPES,
-        files=True,
-    )
-    rv_size: tuple[float, ...] = option(
-        parse=parse_sizes,
-        group="window",
-        help="In the dump's units, instead of `rv`: edges of the box, radius and height of the "
-        "cylinder, semi-axes of the ellipsoid.",
-        meaning="edges of the box, radius and height of the cylinder or semi-axes of the ellipsoid "
-        "instead, dump's unit",
-        takes="str or sequence of float",
-        metavar="A,B,C",
-    )
-    """None given: empty."""
-    rv_axis: Axis | None = option(
-        parse=optional(lambda name, value: parse_axis(value, name)),
-        group="window",
-        help="Axis of the cylinder (default: `axis`).",
-        meaning="axis of the cylinder; not given: the loading axis",
-        takes="str or three floats",
-        metavar="x|y|z|X,Y,Z",
-        choices=lambda: AXES,
-    )
-    rv_follows: str = option(
-        default="none",
-        parse=one_of("none", "strain"),
-        group="window",
-        help="The RV keeps its shape, or deforms with what `strain` is measured by: with the cell, "
-        "or by the extents of boundary or grains along x, y, z.",
-        meaning="none: the RV keeps its shape; strain: it deforms with the sample",
-        metavar="none|strain",
-        choices=lambda: ("none", "strain"),
-    )
-    edge: str = option(
-        default=CLIP,
-        parse=one_of(*EDGES),
-        group="window",
-        help="What counts at the surface of the RV: clip cuts the void segments there; start takes "
-        "their full length if they begin or end inside, ends their ends inside.",
-        meaning="clip: void segments are cut at the RV's surface; start: those that begin or end "
-        "in it count with their full length; ends: by their ends in it, in the whole, too",
-        metavar="|".join(EDGES),
-        choices=lambda: EDGES,
     )
     boundary: tuple[BoundaryRule, ...] = option(
         default=(),
@@ -308,6 +227,16 @@ class Settings:
         metavar="x|y|z|X,Y,Z",
         choices=lambda: AXES,
     )
+    with_: tuple[str, ...] = option(
+        parse=parse_groups,
+        group="fabric",
+        help="More columns: forces (with branches, strong and weak contacts), state (void ratio, "
+        "stress, fabric against stress), invariants, harmonics; several: forces,state.",
+        meaning="groups of further columns",
+        takes="str or sequence of str",
+        metavar="GROUP,...",
+        choices=lambda: GROUP_NAMES,
+    )
     strain: str = option(
         default="auto",
         parse=parse_strain,
@@ -368,9 +297,15 @@ class Settings:
     @property
     def more_columns(self) -> tuple[str, ...]:
         """Columns that the table has because these settings ask for more than the default."""
+        # to print the help of a command needs no fabric
+        from scanfab.fabric.registry import GROUPS
+
         shaped = self.rv_shape != "sphere" or self.rv_follows != "none"
-        columns = ("window_alpha_vs_axial",) if shaped and self.needs_window else ()
-        return columns if self.edge == CLIP else (*columns, *(one.name for one in EDGE_COLUMNS))
+        several = len(self.rvs) > 1
+        of_window = {RV_COLUMN.name: several, "window_alpha_vs_axial": shaped}
+        columns = [name for name, asked in of_window.items() if asked and self.needs_window]
+        columns += [one.name for one in EDGE_COLUMNS if self.edge != CLIP]
+        return (*columns, *(one.name for group in self.with_ for one in GROUPS[group].columns))
 
     def __repr__(self) -> str:
         usual = Settings()
@@ -388,8 +323,9 @@ class Settings:
 
     @property
     def rows_per_frame(self) -> int:
-        """Rows of each frame: one for each variant and cut-off."""
-        return len(self.variants) * max(len(self.cutoffs), 1)
+        """Rows of each frame: one for each variant, RV and cut-off."""
+        windows = sum(len(self.rvs) if variant in "cd" else 1 for variant in self.variants)
+        return windows * max(len(self.cutoffs), 1)
 
     @property
     def needs_window(self) -> bool:

@@ -22,6 +22,7 @@ __all__ = [
     "is_flipped",
     "shear_strain",
     "strain_mode",
+    "volumetric_strain",
 ]
 
 # programs that flip their cells do so when it leans by half a length or a little later
@@ -123,6 +124,34 @@ def shear_strain(cell: Cell | None, first: Cell | None) -> float | None:
     return float(np.sqrt(2.0 / 3.0) * np.linalg.norm(stretch - stretch.mean()))
 
 
+def volumetric_strain(cell: Cell | None, first: Cell | None) -> float | None:
+    """
+    How much a periodic cell was compressed: -ln(V/V0), the trace of the logarithmic strain.
+
+    Parameters
+    ----------
+    cell, first : Cell or None
+        Of this frame and of the first.
+
+    Returns
+    -------
+    float or None
+        Dimensionless, positive in compression; None unless both cells repeat along all vectors.
+
+    Examples
+    --------
+    >>> from scanfab import Cell
+    >>> from scanfab.pipeline.strain import volumetric_strain
+    >>> round(volumetric_strain(Cell([1, 1, 0.9]), Cell([1, 1, 1])), 4)
+    0.1054
+    """
+    if cell is None or first is None or not all(cell.periodic + first.periodic):
+        return None
+    now, before = (np.linalg.det(one.vectors) for one in (cell, first))
+    # no -0.0 of a cell that is as it was
+    return float(np.log(abs(before / now)))
+
+
 def is_flipped(cell: Cell | None, before: Cell | None) -> bool:
     """
     Whether a cell seems to be described by other vectors of its lattice than in the frame before.
@@ -199,11 +228,13 @@ class Strains:
         return replace(self, length=length, cell=sample.packing.cell)
 
     def at(self, number: int, sample: Sample) -> dict[str, float | None]:
-        """Axial and shear strain of a frame, by the names of their columns."""
-        shear: float | None = None
-        if sample.grains.any():
-            shear = shear_strain(sample.packing.cell, self.cell)
-        return {"strain": self._axial(number, sample), "shear_strain": shear}
+        """Axial, shear and volumetric strain of a frame, by the names of their columns."""
+        cells = (sample.packing.cell if sample.grains.any() else None, self.cell)
+        return {
+            "strain": self._axial(number, sample),
+            "shear_strain": shear_strain(*cells),
+            "volumetric_strain": volumetric_strain(*cells),
+        }
 
     def _axial(self, number: int, sample: Sample) -> float | None:
         if self.file is not None:

@@ -23,25 +23,22 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AXES",
-    "RULE_NAMES",
-    "SHAPES",
+    "GROUP_NAMES",
     "STRAIN_MODES",
     "Axis",
     "Length",
     "Vector",
     "check_moment",
-    "check_window",
     "parse_axis",
     "parse_boundary",
     "parse_cutoff",
     "parse_cutoffs",
     "parse_directions",
     "parse_frames",
+    "parse_groups",
     "parse_length",
     "parse_lengths",
     "parse_rattlers",
-    "parse_shape",
-    "parse_sizes",
     "parse_spacing",
     "parse_strain",
     "parse_tolerance",
@@ -49,21 +46,14 @@ __all__ = [
     "parse_vector",
     "parse_workers",
     "rattler_rules",
+    "words_of",
 ]
 
 Vector = tuple[float, float, float]
 STRAIN_MODES = ("auto", "cell", "boundary", "grains")
-# of windows, with the sizes that each takes
-RULE_NAMES = (
-    "lebedev", "design", "icosahedral", "product", "fibonacci", "equal-angle", "equal-angle-full",
-)  # fmt: skip
-SHAPES = {
-    "sphere": "",
-    "box": "A,B,C, full edges",
-    "cylinder": "R,H, radius and height",
-    "ellipsoid": "A,B,C, semi-axes",
-}
 MOST_CUTOFFS = 1000
+# of further columns, in their order in the table
+GROUP_NAMES = ("invariants", "state", "forces", "harmonics")
 
 
 class Axis(NamedTuple):
@@ -210,10 +200,20 @@ def parse_variants(name: str, letters: object) -> str:
     return "".join(variant for variant in "abcd" if variant in letters)
 
 
+def parse_groups(name: str, groups: Any) -> tuple[str, ...]:
+    """Groups of columns, in a text between commas or blanks; each once, in the table's order."""
+    given = groups.replace(",", " ").split() if isinstance(groups, str) else groups
+    words = tuple(given) if isinstance(given, Iterable) else () if given is None else (given,)
+    for word in words:
+        if word not in GROUP_NAMES:
+            raise unusable(name, f"groups of columns out of {', '.join(GROUP_NAMES)}", word)
+    return tuple(group for group in GROUP_NAMES if group in words)
+
+
 def parse_vector(name: str, values: Any) -> Vector:
     """Three finite numbers, in a text between commas or blanks."""
     try:
-        x, y, z = map(float, _words(values))
+        x, y, z = map(float, words_of(values))
     except (TypeError, ValueError):
         x = y = z = math.nan
     if not all(map(math.isfinite, (x, y, z))):
@@ -221,34 +221,9 @@ def parse_vector(name: str, values: Any) -> Vector:
     return (x, y, z)
 
 
-def _words(values: Any) -> Iterable[Any]:
+def words_of(values: Any) -> Iterable[Any]:
+    """Parts of a text between commas or blanks; of other values those that there are."""
     return values.replace(",", " ").split() if isinstance(values, str) else values
-
-
-def parse_sizes(name: str, values: Any) -> tuple[float, ...]:
-    """Two or three lengths above 0, in a text between commas or blanks; none if not given."""
-    if values is None or (isinstance(values, tuple | list) and not values):
-        return ()
-    try:
-        sizes = tuple(map(float, _words(values)))
-    except (TypeError, ValueError):
-        sizes = ()
-    if not all(0 < size < math.inf for size in sizes) or not 2 <= len(sizes) <= 3:
-        raise unusable(name, "two or three lengths above 0, such as 2,3,4", values)
-    return sizes
-
-
-def parse_shape(name: str, value: Any) -> str:
-    """The shape of a window: a word, or a file with its surface that exists."""
-    if str(value) in SHAPES:
-        return str(value)
-    from scanfab.io.parse.surface import SUFFIXES
-
-    path = Path(value)
-    if path.suffix.lower() not in SUFFIXES or not path.is_file():
-        words = f"{', '.join(SHAPES)} or a closed convex surface that exists ({' '.join(SUFFIXES)})"
-        raise unusable(name, words, str(value))
-    return str(value)
 
 
 def check_moment(chosen: Settings) -> None:
@@ -257,31 +232,6 @@ def check_moment(chosen: Settings) -> None:
         raise SettingsError(
             "moment: from what lies inside the window alone, as `edge=ends` takes it, the second "
             "moment of the full lengths is not known: choose `edge=start`, or `moment=1`"
-        )
-
-
-def check_window(chosen: Settings) -> None:
-    """SettingsError if what is said of the RV does not go together."""
-    shape, sizes = chosen.rv_shape, chosen.rv_size
-    takes = SHAPES.get(shape, "")
-    if sizes and not takes:
-        hint = "choose `rv_radius`" if shape == "sphere" else "its file says how large it is"
-        raise SettingsError(f"rv_size: the shape {shape} takes none: {hint}")
-    if sizes and len(sizes) != 2 + (shape != "cylinder"):
-        found = ",".join(f"{size:g}" for size in sizes)
-        raise SettingsError(f"rv_size: expected {takes} (`rv_shape` is {shape}), found {found}")
-    if chosen.rv_radius is not None and shape != "sphere":
-        hint = f"choose `rv_size` ({takes})" if takes else "its file says how large it is"
-        raise SettingsError(f"rv_radius: is that of a sphere, but `rv_shape` is {shape}: {hint}")
-    if chosen.rv_axis is not None and shape != "cylinder":
-        raise SettingsError(
-            f"rv_axis: is that of a cylinder, but `rv_shape` is {shape}: leave it out, or "
-            f'choose `rv_shape="cylinder"`'
-        )
-    if chosen.rv_follows == "strain" and chosen.strain not in STRAIN_MODES:
-        raise SettingsError(
-            f"rv_follows: a file of strains ({chosen.strain}) does not say how the sample "
-            f"deforms along all axes: choose another `strain`, or leave out `rv_follows`"
         )
 
 

@@ -12,12 +12,15 @@ import numpy as np
 
 from scanfab.base.note import Note
 from scanfab.base.typing import FloatArray, IntArray
+from scanfab.fabric.forces import doubts_of_forces
 from scanfab.fabric.jackknife import BLOCKS, BlockedSums
-from scanfab.fabric.registry import OWN_FABRICS, Measured, checked_values
+from scanfab.fabric.registry import GROUPS, OWN_FABRICS, Measured, checked_values
+from scanfab.fabric.state import SampleState
 from scanfab.fabric.window import WINDOW_ALPHA, window_alpha
-from scanfab.packing.columns import sample_values
+from scanfab.packing.columns import RV_COLUMN, sample_values
 from scanfab.packing.sample import Variant
 from scanfab.pipeline.measurement import Measurement
+from scanfab.pipeline.state import contact_forces, doubts_of_state, sample_state
 from scanfab.scan.edges import CLIP, ENDS, START
 from scanfab.table.columns import installed_fabrics, table_columns
 
@@ -52,8 +55,16 @@ class VariantColumns:
             found |= fabric.values(self.measured)
         for name, fabric in installed_fabrics().items():
             found |= checked_values(name, fabric, self.measured)
-        asked = {**self._window(), **self._edge()}
-        return {**found, **{name: asked[name] for name in self.plan.more_columns}}
+        asked = {RV_COLUMN.name: self.rv, **self._window(), **self._edge()}
+        for group in self.plan.groups:
+            asked |= GROUPS[group].values(self.measured)
+        # the strain of the frame is not known here
+        return found | {name: asked[name] for name in self.plan.more_columns if name in asked}
+
+    @property
+    def rv(self) -> float | None:
+        """The size of the variant's RV, where there are several."""
+        return self.plan.rvs_of(self.variant.name)[0].fraction
 
     @cached_property
     def measured(self) -> Measured:
@@ -74,7 +85,16 @@ class VariantColumns:
             normals=np.compress(chosen, contacts.normal, axis=0),
             points=points,
             blocks=self._blocks_of(points),
+            segment_count=self.segments,
+            forces=contact_forces(self.sample, chosen) if "forces" in self.plan.groups else None,
+            state=self._state,
         )
+
+    @property
+    def _state(self) -> SampleState | None:
+        if "state" not in self.plan.groups:
+            return None
+        return sample_state(self.sample, self.variant, self.plan.window)
 
     @cached_property
     def _no_solid(self) -> str:
@@ -188,8 +208,18 @@ class VariantColumns:
     def notes(self) -> Iterator[Note]:
         """Whether there is no void fabric, or a doubtful one, or lines without a grain."""
         texts = {"channels": self._channels(), "left_out": self._left_out()}
-        texts |= self._of_void_fabric()
-        return (Note(code, text, (self.variant.name,)) for code, text in texts.items() if text)
+        texts |= self._of_void_fabric() | self._of_groups()
+        about = self.variant.name if self.rv is None else f"{self.variant.name} (RV {self.rv:g})"
+        return (Note(code, text, (about,)) for code, text in texts.items() if text)
+
+    def _of_groups(self) -> dict[str, str]:
+        """Why columns that were asked for are empty."""
+        found: dict[str, str] = {}
+        if "state" in self.plan.groups:
+            found |= doubts_of_state(self.sample, self.variant, self.plan.window)
+        if "forces" in self.plan.groups:
+            found |= doubts_of_forces(self.measured)
+        return found
 
     def _channels(self) -> str:
         channels = int(self.sums.channels[:, self.which].sum())

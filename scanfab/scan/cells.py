@@ -58,7 +58,7 @@ def cells_of(grains: CellGrains) -> Cells:
     start = np.cumsum(start)
     grain, image = np.empty(start[-1], np.int64), np.empty((start[-1], 3), np.int64)
     fill_cells(low, high, grains.periodic, parts, start[:-1].copy(), grain, image)
-    sphere = np.column_stack([grains.position[grain] + image @ vectors, grains.radius[grain]])
+    sphere = np.vstack([(grains.position[grain] + image @ vectors).T, grains.radius[grain]])
     return Cells(
         sphere, grains.removed[grain], vectors, inverse, corner, grains.periodic, parts, start,
         _farthest(grains, volume),

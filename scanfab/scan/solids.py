@@ -37,7 +37,7 @@ MAX_LINES = 50_000_000
 # Of the smallest radius: what lies between surfaces that coincide but for rounding is no gap.
 SHORTEST = 1e-9
 # of the mean radius: the wider, the more chords are swept, and the fewer segments followed alone
-MARGIN = 4.5
+MARGIN = 5.0
 
 
 class Inner(NamedTuple):
@@ -98,6 +98,7 @@ class Solids:
     edge: str = CLIP
     around: CellGrains | None = None
     inner: Inner | None = None
+    _near: dict[float, BoolArray] = field(default_factory=dict, init=False)
 
     def __post_init__(self) -> None:
         """Cast without a copy; PackingError if the shapes do not fit."""
@@ -129,11 +130,23 @@ class Solids:
         assert self.around is not None
         return cells_of(self.around)
 
-    @cached_property
-    def near_window(self) -> BoolArray:
-        """Which spheres come within the margin of the window, shape (N,)."""
+    def near_window(self, margin: float) -> BoolArray:
+        """
+        Which spheres come near to the window.
+
+        Parameters
+        ----------
+        margin : float
+            How near, dump's length unit.
+
+        Returns
+        -------
+        ndarray of bool, shape (N,)
+        """
         assert self.window is not None
-        return self.window.may_meet(self.position, self.radius + self.margin)
+        if margin not in self._near:
+            self._near[margin] = self.window.may_meet(self.position, self.radius + margin)
+        return self._near[margin]
 
     @cached_property
     def near_inner(self) -> BoolArray:

@@ -14,7 +14,7 @@ from scanfab.scan.kernels import sweep
 from scanfab.scan.kernels.axes import scan_axes, scan_cell
 from scanfab.scan.kernels.bins import OF_WHOLE, OF_WINDOW, Bins, no_bins
 from scanfab.scan.kernels.cells import Cells
-from scanfab.scan.kernels.edges import CLIPPED
+from scanfab.scan.kernels.edges import CLIPPED, WEIGHED
 from scanfab.scan.kernels.strips import Edge
 from scanfab.scan.solids import CellGrains, Inner, Solids, clip_of, shortest_gap
 
@@ -23,6 +23,8 @@ __all__ = ["tally_triads"]
 # of the spacing and for each variant: spheres of such a radius are scanned as fast row by row as
 # over lists of chords; for the more variants the lists serve, the sooner they pay
 FEW_LINES = 0.5
+# of the margin beyond a window: in lists each chord takes longer, so that more is followed alone
+NARROW = 0.3
 
 
 def tally_triads(
@@ -113,7 +115,7 @@ class _Lines(NamedTuple):
             position, shape = position - inner.center, inner.shape
             solid = solids.near_inner & (self.first | ~removed)
         elif window is not None and solids.edge != CLIP:
-            solid = solids.near_window & (self.first | ~removed)
+            solid = solids.near_window(window.margin) & (self.first | ~removed)
         passes = (1 + (self.both is not None)) * ((whole is not None) + (window is not None))
         scan_axes(
             np.ascontiguousarray(position[solid]),
@@ -144,7 +146,7 @@ class _Lines(NamedTuple):
         if inner is None:
             return
         found, room = np.zeros_like(tallies), bins.of_whole(inner.center)
-        self.scan(None, Edge(True, None, 0.0), found, room, inner=inner)
+        self.scan(None, WEIGHED, found, room, inner=inner)
         tallies[..., sweep.WHOLE : sweep.WINDOW] += found[..., sweep.WINDOW : sweep.CHORDS]
         tallies[..., sweep.CHORDS] += found[..., sweep.CHORDS]
         bins.sums[:, OF_WHOLE] += room.sums[:, OF_WINDOW]
@@ -153,7 +155,11 @@ class _Lines(NamedTuple):
         """The window, by a rule that knows what is cut."""
         solids = self.solids
         cells = solids.cells if solids.edge == START and len(solids.grain_radius) else None
-        edge = Edge(True, None, 0.0) if cells is None else Edge(None, True, solids.margin)
+        margin = solids.margin
+        if bins.cutoffs.size or _few_lines(solids.radius, self.spacing, 1 + bool(self.both)):
+            # but for the cut-off: segments that reach it are known to count
+            margin = min(margin, max(NARROW * margin, 1.01 * self.cutoff))
+        edge = WEIGHED if cells is None else Edge(None, True, margin, None)
         if solids.edge == START and cells is None:
             return
         before = float(tallies[:, 0, sweep.STEPS].sum())

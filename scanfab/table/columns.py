@@ -8,9 +8,9 @@ from functools import cache
 from typing import Any
 
 from scanfab.base.column import Column, columns_of_fields, no_column
-from scanfab.fabric.registry import OWN_FABRICS, Fabric, load_fabrics
+from scanfab.fabric.registry import GROUPS, OWN_FABRICS, Fabric, load_fabrics
 from scanfab.fabric.window import WINDOW_ALPHA
-from scanfab.packing.columns import SAMPLE_COLUMNS
+from scanfab.packing.columns import RV_COLUMN, SAMPLE_COLUMNS
 from scanfab.scan.columns import EDGE_COLUMNS, SCAN_COLUMNS
 from scanfab.table.row import Row
 
@@ -61,14 +61,19 @@ COLUMNS: tuple[str, ...] = tuple(one.name for one in OWN_COLUMNS)
 """Their names."""
 
 
-MORE_COLUMNS = (WINDOW_ALPHA, *EDGE_COLUMNS)
+MORE_COLUMNS = (
+    RV_COLUMN,
+    WINDOW_ALPHA,
+    *EDGE_COLUMNS,
+    *(column for group in GROUPS.values() for column in group.columns),
+)
 """Those of tables of which more is asked than the default."""
 
 
 @cache
 def installed_fabrics() -> dict[str, Fabric]:
     """The fabrics of other packages by name; none as a rule."""
-    return load_fabrics(COLUMNS)
+    return load_fabrics([*COLUMNS, *(one.name for one in MORE_COLUMNS)])
 
 
 def table_columns(more: Collection[str] = ()) -> tuple[Column, ...]:

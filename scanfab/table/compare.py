@@ -17,7 +17,7 @@ from scanfab.table.abscissa import strain_column, why_not_strain
 from scanfab.table.columns import columns_of
 from scanfab.table.comparison_rows import Comparison, DifferenceRow, FrameRow, SummaryRow
 from scanfab.table.curves import is_turned
-from scanfab.table.reading import number_of, numbers_of, total_error
+from scanfab.table.reading import number_of, numbers_of, total_error, variant_of
 from scanfab.table.selection import check_rows
 from scanfab.table.table import Table
 
@@ -42,7 +42,8 @@ def compare_tables(
     Parameters
     ----------
     rows : iterable of mapping
-        Rows of fabric tables by column; numbers may be None. Groups are source and variant.
+        Rows of fabric tables by column; numbers may be None. Groups are source, variant and, where
+        there are several, RV.
     strain_max : float, optional
         Leave frames beyond this strain, a fraction, out of the fits; beyond this shear strain
         where the axial strain is the same in all frames.
@@ -79,19 +80,24 @@ def compare_tables(
     told_apart = {key: _with_strain(group, column) for key, group in groups.items()}
     points = [_points(group, strain_max) for group in told_apart.values()]
     return Comparison(
-        frames=Table(
-            (row for group in groups.values() for row in _normalised(group)), columns_of(FrameRow)
-        ),
-        summary=Table(
+        frames=_table(FrameRow, (row for group in groups.values() for row in _normalised(group))),
+        summary=_table(
+            SummaryRow,
             (
-                _summary(*key, group, fitted, strain_max)
-                for (key, group), fitted in zip(told_apart.items(), points, strict=True)
+                _summary(group, fitted, strain_max)
+                for group, fitted in zip(told_apart.values(), points, strict=True)
             ),
-            columns_of(SummaryRow),
         ),
         differences=Table(_differences(groups), columns_of(DifferenceRow)),
         points=tuple(points),
     )
+
+
+def _table(kind: type[FrameRow | SummaryRow], rows: Iterable[FrameRow | SummaryRow]) -> Table:
+    """The rows, with a column for the RV if some of them have one."""
+    rows = list(rows)
+    has_rv = any(row.rv is not None for row in rows)
+    return Table(rows, [one for one in columns_of(kind) if one.name != "rv" or has_rv])
 
 
 def _tell_of_strains(rows: Sequence[Mapping[str, Any]], strain_max: float | None) -> None:
@@ -157,11 +163,11 @@ def _with_strain(
 def _grouped(
     rows: Sequence[Mapping[str, Any]],
 ) -> dict[tuple[str, str], list[Mapping[str, Any]]]:
-    """Rows by source and variant, in the order of their first appearance."""
+    """Rows by source, variant and RV, in the order of their first appearance."""
     check_rows(rows)
     groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for row in rows:
-        groups.setdefault((row["source"], row["variant"]), []).append(row)
+        groups.setdefault((row["source"], variant_of(row)), []).append(row)
     for (source, variant), group in groups.items():
         frames = [row["frame"] for row in group if row["frame"] is not None]
         if len(set(frames)) < len(frames):
@@ -196,6 +202,7 @@ def _normalised(group: Sequence[Mapping[str, Any]]) -> list[FrameRow]:
             alpha_vs_axial_total_se=total_error(row, "alpha_vs_axial"),
             alpha_c_axial_sample_se=number_of(row, "alpha_c_axial_sample_se"),
             shear_strain=number_of(row, "shear_strain"),
+            rv=number_of(row, "rv"),
         )
         for row in group
     ]
@@ -207,18 +214,14 @@ def _largest(group: Sequence[Mapping[str, Any]], name: str) -> float | None:
 
 
 def _summary(
-    source: str,
-    variant: str,
-    group: Sequence[Mapping[str, Any]],
-    fitted: FloatArray,
-    strain_max: float | None,
+    group: Sequence[Mapping[str, Any]], fitted: FloatArray, strain_max: float | None
 ) -> SummaryRow:
     slope, slope_origin, r2 = _fit(*fitted.T)
     curve = [row for row in group if row["alpha_vs_axial"] is not None]
     peak = max(curve, key=lambda row: abs(row["alpha_vs_axial"]), default=None)
     return SummaryRow(
-        source=source,
-        variant=variant,
+        source=group[0]["source"],
+        variant=group[0]["variant"],
         frames=len(fitted),
         slope=slope,
         slope_origin=slope_origin,
@@ -227,6 +230,7 @@ def _summary(
         peak=None if peak is None else peak["alpha_vs_axial"],
         peak_strain=None if peak is None else peak["strain"],
         final=curve[-1]["alpha_vs_axial"] if curve else None,
+        rv=number_of(group[0], "rv"),
     )
 
 
@@ -312,7 +316,7 @@ def _difference(one: Mapping[str, Any], other: Mapping[str, Any]) -> DifferenceR
         source=one["source"],
         frame=one["frame"],
         strain=one["strain"],
-        variants=f"{one['variant']}-{other['variant']}",
+        variants=f"{variant_of(one)}-{variant_of(other)}",
         difference=one["alpha_vs_axial"] - other["alpha_vs_axial"],
         difference_se=None if None in errors else math.hypot(*errors),  # type: ignore[arg-type]
     )

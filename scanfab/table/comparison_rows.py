@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray
 from scanfab.table.preview import with_error
+from scanfab.table.reading import variant_of
 from scanfab.table.row import Record
 
 if TYPE_CHECKING:
@@ -59,6 +60,7 @@ class FrameRow(Record):
         "as in the fabric table; contacts are counted, not scanned, so this is all of the error",
     ]
     shear_strain: Annotated[float | None, "as in the fabric table"]
+    rv: Annotated[float | None, "as in the fabric table: only where that has several RVs"] = None
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -85,6 +87,7 @@ class SummaryRow(Record):
         "the strain there; shear_strain where strain is the same in all frames",
     ]
     final: Annotated[float | None, "alpha_vs_axial of the last frame that has one"]
+    rv: Annotated[float | None, "as in the fabric table: only where that has several RVs"] = None
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -163,8 +166,8 @@ class Comparison:
 
     def __repr__(self) -> str:
         lines = [
-            f"{one.source}, variant {one.variant}: slope {with_error(one.slope, one.slope_se)}, "
-            f"{counted(one.frames, 'frame')}"
+            f"{one.source}, variant {variant_of(one)}: "
+            f"slope {with_error(one.slope, one.slope_se)}, {counted(one.frames, 'frame')}"
             for one in self.summary
         ]
         return "\n".join([f"Comparison of {len(self.frames)} rows", *lines])

@@ -11,7 +11,7 @@ import numpy as np
 
 from scanfab.base.typing import FloatArray
 from scanfab.table.abscissa import STRAINS, strain_column
-from scanfab.table.reading import number_of, total_error
+from scanfab.table.reading import number_of, total_error, variant_of
 
 __all__ = [
     "Curve",
@@ -39,6 +39,7 @@ class Curve:
 
     source: str
     variant: str
+    """With the size of its RV, where there are several."""
     x: FloatArray
     """Strain in per cent, or the number of the frame."""
     void: FloatArray
@@ -60,6 +61,12 @@ class Curve:
     """alpha_c, dimensionless."""
     angle: FloatArray
     """Between both major axes, degrees."""
+    rows: Rows
+    """What it is made of."""
+
+    def values(self, name: str) -> FloatArray:
+        """Any column; NaN where there is no number."""
+        return _array([number_of(row, name) for row in self.rows])
 
 
 def curves_of(rows: Iterable[Mapping[str, Any]]) -> list[Curve]:
@@ -68,7 +75,7 @@ def curves_of(rows: Iterable[Mapping[str, Any]]) -> list[Curve]:
     abscissa = strain_column(rows)
     groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for row in rows:
-        groups.setdefault((row["source"], row["variant"]), []).append(row)
+        groups.setdefault((row["source"], variant_of(row)), []).append(row)
     names = short_names(source for source, _ in groups)
     return [
         _curve(names[source], variant, group, abscissa)
@@ -134,6 +141,7 @@ def _curve(source: str, variant: str, group: Rows, abscissa: str | None) -> Curv
         void_intensity=column("alpha_vs"),
         contact_intensity=column("alpha_c"),
         angle=column("coaxiality_deg"),
+        rows=group,
     )
 
 

@@ -51,7 +51,7 @@ class Plots:
     >>> import scanfab
     >>> table = scanfab.load("sample_data/yade_triaxial/engine.csv")
     >>> table.plot
-    Plots(evolution, normalised, correlation)
+    Plots(evolution, normalised, correlation, columns)
     """
 
     def __init__(self, data: Any, kind: str) -> None:

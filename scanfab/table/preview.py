@@ -20,6 +20,7 @@ SHOWN = {
     "strain": "strain",
     "shear_strain": "shear strain",
     "variant": "variant",
+    "rv": "RV",
     "cutoff": "cut-off",
     "grains": "grains",
     "contacts": "contacts",

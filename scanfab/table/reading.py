@@ -12,7 +12,7 @@ from scanfab.base.errors import ReadError
 from scanfab.base.streams import check_file_or_pipe
 from scanfab.table.formats.registry import reading_format
 
-__all__ = ["is_number", "number_of", "numbers_of", "read_rows", "total_error"]
+__all__ = ["is_number", "number_of", "numbers_of", "read_rows", "total_error", "variant_of"]
 
 
 def read_rows(path: Path | str) -> list[dict[str, Any]]:
@@ -68,6 +68,20 @@ def number_of(row: Mapping[str, Any], name: str) -> float | None:
 def numbers_of(rows: Iterable[Mapping[str, Any]], name: str) -> list[float]:
     """The numbers of such a column."""
     return [value for row in rows if (value := number_of(row, name)) is not None]
+
+
+def variant_of(row: Mapping[str, Any]) -> str:
+    """
+    What tells the curves of a source apart: the variant, and the size of its RV if there are more.
+
+    Examples
+    --------
+    >>> from scanfab.table.reading import variant_of
+    >>> variant_of({"variant": "a", "rv": None}), variant_of({"variant": "c", "rv": 0.4})
+    ('a', 'c RV 0.4')
+    """
+    rv = number_of(row, "rv")
+    return str(row["variant"]) if rv is None else f"{row['variant']} RV {rv:g}"
 
 
 def total_error(row: Mapping[str, Any], name: str) -> float | None:

@@ -13,7 +13,7 @@ from typing import Any
 
 from scanfab.base.errors import ScanfabWarning, SettingsError
 from scanfab.table.columns import MORE_COLUMNS, OWN_COLUMNS
-from scanfab.table.reading import is_number
+from scanfab.table.reading import is_number, variant_of
 
 __all__ = ["NEEDED", "check_rows", "choose_rows"]
 
@@ -21,7 +21,7 @@ Rows = list[dict[str, Any]]
 
 NEEDED = ("source", "frame", "strain", "variant", "alpha_vs_axial", "alpha_c_axial")
 NAMES = ("source", "variant")
-NUMBERS = tuple(one.name for one in (*OWN_COLUMNS, *MORE_COLUMNS) if one.kind is not str)
+NUMBERS = tuple(one.name for one in (*OWN_COLUMNS, *MORE_COLUMNS) if one.kind in (int, float))
 # columns that no fabric table has, and the table that they give away
 OTHER_TABLES = {
     ("alpha_vs_axial_norm", "alpha_c_axial_norm"): "a table of scanfab compare",
@@ -140,14 +140,14 @@ def _of_cutoff(name: str, rows: Rows, cutoff: float) -> Rows:
             f"{name}: no row has the cut-off {cutoff:g}: expected one of the table's: {there}"
         )
     empty = {
-        (row["source"], row["frame"], row["variant"]): row
+        (row["source"], row["frame"], variant_of(row)): row
         for row in reversed(rows)
         if row.get("cutoff") is None
     }
     return [
         row for row in rows
         if row.get("cutoff") == nearest
-        or row is empty.get((row["source"], row["frame"], row["variant"]))
+        or row is empty.get((row["source"], row["frame"], variant_of(row)))
     ]  # fmt: skip
 
 
@@ -164,7 +164,7 @@ def _each_once(tables: Sequence[tuple[str, Rows]]) -> list[Rows]:
     for name, rows in tables:
         new = []
         for row in rows:
-            key = (_place(row["source"]), row["frame"], row["variant"], row.get("cutoff"))
+            key = (_place(row["source"]), row["frame"], variant_of(row), row.get("cutoff"))
             earlier, twin = known.setdefault(key, (name, row))
             if twin is row or {**twin, "source": ""} != {**row, "source": ""}:
                 new.append(row)

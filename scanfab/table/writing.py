@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO, Any
 
@@ -70,6 +70,26 @@ class Excerpt:
     def is_all(self) -> bool:
         """Whether nothing is left out."""
         return not self.fields and self.digits == ALL_DIGITS
+
+    def without_lists(self, columns: Sequence[Column]) -> Excerpt:
+        """
+        The same for a format whose cells hold one value.
+
+        Raises
+        ------
+        SettingsError
+            If all that is asked for are lists.
+        """
+        lists = {column.name for column in columns if column.kind is list}
+        if not lists:
+            return self
+        fields = self.fields or tuple(column.name for column in columns)
+        kept = tuple(name for name in fields if name not in lists)
+        if not kept:
+            raise SettingsError(
+                f"fields: {', '.join(fields)} are lists of numbers: write JSON (.json or .jsonl)"
+            )
+        return replace(self, fields=kept)
 
     def columns(self, columns: Sequence[Column]) -> list[Column]:
         """Those that are written, in their order."""
@@ -161,6 +181,8 @@ def row_writer(
         If there is no such format, or its package is missing.
     """
     table_format = format_of(Path(f"table{suffix}"))
+    if not getattr(table_format, "holds_lists", False):
+        excerpt = excerpt.without_lists(columns)
     return ExcerptWriter(table_format.writer(stream, excerpt.columns(columns), header), excerpt)
 
 

@@ -72,7 +72,7 @@ def look_at(series: Series, settings: Settings, number: int = 0) -> Look:
     plan = None if first is None else _plan(first, settings)
     if plan is not None and sample.grains.any():
         plan = plan.in_frame(sample)
-    scene = scene_of(sample, None if plan is None else plan.window)
+    scene = scene_of(sample, *(() if plan is None else plan.windows))
     if plan is not None:
         scene = about_window(replace(scene, cutoff=plan.cutoff))
     strains = _strains(number, sample, first, settings)

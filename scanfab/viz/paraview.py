@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from threading import Lock
@@ -16,10 +16,13 @@ from scanfab.base.typing import FloatArray
 from scanfab.fabric.distribution import mean_length_function, sphere_points
 from scanfab.fabric.tensor import COMPONENTS
 from scanfab.packing.sample import VARIANTS
+from scanfab.packing.window import Window
 from scanfab.pipeline.frame import FrameResult
+from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.settings import Settings, Vector
 from scanfab.scan.lines import line_triads
 from scanfab.scan.segments import Segments, sample_segments
+from scanfab.table.reading import number_of
 from scanfab.table.table import Row
 from scanfab.viz import vtk_files as vtk
 from scanfab.viz.scene import contact_lines, grains_of
@@ -66,39 +69,41 @@ class VtkFolder:
     def __call__(self, result: FrameResult) -> None:
         """Write all files of a frame."""
         with self._lock:
-            window = None if result.measurement is None else result.measurement.plan.window
+            windows = {_name("window", rv): one for rv, one in _windows(result)}
+            # of several RVs the largest, which holds the others
+            window = [None, *windows.values()][-1]
             fields = _fields(result.rows)
             self._save("grains", vtk.grain_mesh(grains_of(result.sample, window)), result, fields)
             contacts = vtk.contact_mesh(contact_lines(result.sample, window))
             self._save("contacts", contacts, result, fields)
-            if window is not None:
-                surface = vtk.window_mesh(window.center, window.shape)
-                self._save("window", surface, result, fields)
+            for name, one in windows.items():
+                surface = vtk.window_mesh(one.center, one.shape)
+                self._save(name, surface, result, fields)
             for row in result.rows:
                 self._save_variant(result, row)
 
     def _save_variant(self, result: FrameResult, row: Row) -> None:
         fields = _fields([row])
-        if result.measurement is None:
+        if not result.measurements:
             return
-        center = result.measurement.solids.origin
-        lines = scan_line_sample(result, row.variant, self.axis)
-        mesh = vtk.line_mesh(lines, result.measurement.plan.cutoff)
-        self._save(f"lines-{row.variant}", mesh, result, fields)
-        sums = result.measurement.sums
-        kept = result.measurement.kept(row.variant)
-        function = mean_length_function(sums.axes, *kept)
+        rv = number_of(row, "rv")
+        measured, name = result.measured(row.variant, rv), _name(row.variant, rv)
+        center = measured.solids.origin
+        lines = scan_line_sample(measured, row.variant, self.axis)
+        mesh = vtk.line_mesh(lines, measured.plan.cutoff)
+        self._save(f"lines-{name}", mesh, result, fields)
+        function = mean_length_function(measured.sums.axes, *measured.kept(row.variant))
         if function is not None and row.alpha_vs is not None:
             points, weights = sphere_points()
             surface = vtk.distribution_mesh(points, function(points), weights)
-            self._save(f"distribution-{row.variant}", surface, result, fields)
+            self._save(f"distribution-{name}", surface, result, fields)
         tensors = _tensors(row)
         if tensors:
             size = 0.3 * _reach(result)
             mesh = vtk.ellipsoid_mesh(tensors, center, size)
-            self._save(f"ellipsoids-{row.variant}", mesh, result, fields)
+            self._save(f"ellipsoids-{name}", mesh, result, fields)
             mesh = vtk.tensor_points(tensors, center)
-            self._save(f"tensors-{row.variant}", mesh, result, fields)
+            self._save(f"tensors-{name}", mesh, result, fields)
 
     def _save(self, kind: str, mesh: Any, result: FrameResult, fields: Mapping[str, Any]) -> None:
         file = f"{kind}_{result.number:06d}.vtp"
@@ -124,16 +129,29 @@ def vtk_folders(folder: Path, count: int, settings: Settings, go_on: bool) -> li
     return [VtkFolder(one, settings.axis, go_on) for one in (own if count > 1 else [folder])]
 
 
+def _windows(result: FrameResult) -> Iterator[tuple[float | None, Window]]:
+    """The RVs of a frame with their sizes, if there are several to be told apart."""
+    for measured in result.measurements:
+        for rv in measured.plan.rvs[:1]:
+            if rv.window is not None:
+                yield rv.fraction, rv.window
+
+
+def _name(kind: str, rv: float | None) -> str:
+    """Of a file: with the size of the RV, where there are several."""
+    return kind if rv is None else f"{kind}-rv{rv:g}"
+
+
 def scan_line_sample(
-    result: FrameResult, variant: str, axis: Vector, lines: int = LINES
+    measured: Measurement, variant: str, axis: Vector, lines: int = LINES
 ) -> Segments:
     """A few scan lines along the loading axis and across it, in the dump's coordinates."""
-    position, radius, window = result.scanned.spheres_of(VARIANTS[variant])
+    position, radius, window = measured.spheres_of(VARIANTS[variant])
     frame = line_triads(np.array([axis]))[0]
     # along the axis, and along the first direction across it
     frames = np.stack([frame, np.roll(frame, -1, axis=0)])
     found = sample_segments(position, radius, frames, lines, window)
-    return replace(found, ends=found.ends + result.scanned.solids.origin)
+    return replace(found, ends=found.ends + measured.solids.origin)
 
 
 def _time(result: FrameResult) -> float:
@@ -144,7 +162,9 @@ def _time(result: FrameResult) -> float:
 
 
 def _reach(result: FrameResult) -> float:
-    position, _, window = result.scanned.spheres_of(VARIANTS[result.rows[-1].variant])
+    last = result.rows[-1]
+    measured = result.measured(last.variant, number_of(last, "rv"))
+    position, _, window = measured.spheres_of(VARIANTS[last.variant])
     return window.reach if window else float(np.linalg.norm(position, axis=1).max())
 
 

@@ -21,7 +21,7 @@ from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.settings import Settings
 from scanfab.table.abscissa import spelt_strain, strain_column
 from scanfab.table.plots import Plots
-from scanfab.table.reading import number_of
+from scanfab.table.reading import number_of, variant_of
 from scanfab.table.row import Row
 
 __all__ = ["ScannedFrame", "ScannedFrames", "scan_frames"]
@@ -91,6 +91,8 @@ class ScannedFrame:
     result: FrameResult
     title: str
     variant: str
+    rv: float | None
+    """The size of the variant's RV, where the scan is of several."""
 
     @property
     def number(self) -> int:
@@ -100,12 +102,13 @@ class ScannedFrame:
     @property
     def measurement(self) -> Measurement:
         """What the scan says."""
-        return self.result.scanned
+        return self.result.measured(self.variant, self.rv)
 
     @property
     def row(self) -> Row:
         """Of the variant, at the first cut-off."""
-        return next(row for row in self.result.rows if row.variant == self.variant)
+        name = variant_of({"variant": self.variant, "rv": self.rv})
+        return next(row for row in self.result.rows if variant_of(row) == name)
 
     @property
     def smallest(self) -> float:
@@ -136,7 +139,8 @@ class ScannedFrames:
     source : Packing or Series
         Where the frames are.
     settings : Settings
-        Those of the table. The variant is c, if it is among the settings', else the first.
+        Those of the table. The variant is c, if it is among the settings', else the first; of
+        several RVs the largest is drawn.
     rows : sequence of mapping, optional
         The rows of this source in the table; by default the first and the last frame of the
         settings are scanned.
@@ -163,10 +167,12 @@ class ScannedFrames:
         self.settings = settings
         self.note = note
         self.variant = "c" if "c" in settings.variants else settings.variants[0]
+        in_window = VARIANTS[self.variant].in_window
+        self.rv = settings.rvs[-1] if len(settings.rvs) > 1 and in_window else None
         self.rows: Rows | None = None
         self._scanned: dict[str, list[ScannedFrame]] = {}
         if rows is not None:
-            self.rows = [row for row in rows if row["variant"] == self.variant]
+            self.rows = [row for row in rows if variant_of(row) == self._told_apart]
             self._refuse_none(self.rows)
 
     @property
@@ -175,7 +181,12 @@ class ScannedFrames:
         source = Frames(self.source, self.settings).name
         if self.rows:
             source = str(self.rows[0]["source"])
-        return f"variant {self.variant}{f' of {source}' if source else ''}"
+        return f"variant {self._told_apart}{f' of {source}' if source else ''}"
+
+    @property
+    def _told_apart(self) -> str:
+        """The variant, and the size of its RV if there are several."""
+        return variant_of({"variant": self.variant, "rv": self.rv})
 
     @property
     def plot(self) -> Plots:
@@ -205,7 +216,7 @@ class ScannedFrames:
         # frames are numbered in the whole series, also those of a part
         whole = self.source.whole if isinstance(self.source, Series) else self.source
         computed = compute_rows(whole, settings, observe=results.append)
-        rows = [row for row in computed if row["variant"] == self.variant]
+        rows = [row for row in computed if variant_of(row) == self._told_apart]
         self._refuse_none(rows)
         # of the table: what is asked of a strain file now may be another
         rows_of = {row["frame"]: row for row in self.rows or rows}
@@ -213,7 +224,10 @@ class ScannedFrames:
         drawn = {row["frame"] for row in rows if row["alpha_vs_axial"] is not None}
         return [
             ScannedFrame(
-                self._with_all_threads(one), self._title(rows_of[one.number], column), self.variant
+                self._with_all_threads(one),
+                self._title(rows_of[one.number], column),
+                self.variant,
+                self.rv,
             )
             for one in sorted(results, key=lambda result: result.number)
             if one.number in drawn
@@ -221,8 +235,11 @@ class ScannedFrames:
 
     def _with_all_threads(self, result: FrameResult) -> FrameResult:
         """A frame whose further scans have the threads that both frames have shared."""
-        plan = replace(result.scanned.plan, workers=self.settings.workers)
-        return replace(result, measurement=replace(result.scanned, plan=plan))
+        workers = self.settings.workers
+        measurements = (
+            replace(one, plan=replace(one.plan, workers=workers)) for one in result.measurements
+        )
+        return replace(result, measurements=tuple(measurements))
 
     @cached_property
     def _ends(self) -> tuple[int, int]:
@@ -237,13 +254,14 @@ class ScannedFrames:
     def _title(self, row: Mapping[str, Any], column: str | None) -> str:
         """Variant, frame and, if the table has one, the strain."""
         strain = spelt_strain(row, column, symbol=True)
-        parts = (f"variant {self.variant}", f"frame {row['frame']}", strain)
+        parts = (f"variant {self._told_apart}", f"frame {row['frame']}", strain)
         return ", ".join(filter(None, parts))
 
     def _refuse_none(self, rows: Rows) -> None:
         if all(number_of(row, "alpha_vs_axial") is None for row in rows):
             raise SettingsError(
-                f"there is nothing to draw: no frame has a void fabric of variant {self.variant}"
+                f"there is nothing to draw: no frame has a void fabric of variant "
+                f"{self._told_apart}"
             )
 
     def __repr__(self) -> str:

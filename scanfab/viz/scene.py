@@ -78,7 +78,9 @@ class Scene:
     center: FloatArray
     """Of the RV, or of the grains without an RV, shape (3,)."""
     window: Convex | None
-    """The RV about its centre; None without one."""
+    """The RV about its centre, of several the largest; None without one."""
+    smaller: tuple[Convex, ...] = ()
+    """The others."""
     lines: Segments | None = None
     """A few scan lines, in the dump's coordinates."""
     cutoff: float = 0.0
@@ -87,15 +89,17 @@ class Scene:
     """Of a periodic frame."""
 
 
-def scene_of(sample: Sample, window: Window | None) -> Scene:
-    """The grains of a frame and its RV."""
+def scene_of(sample: Sample, *windows: Window) -> Scene:
+    """The grains of a frame and its RVs, in ascending order, about one centre."""
+    window = windows[-1] if windows else None
     chosen = sample.grains if sample.grains.any() else np.ones(len(sample.packing), bool)
     center = np.zeros(3) if window is None else window.center
     if window is None and len(sample.packing):
         center = sample.packing.position[chosen].mean(axis=0)
     cell = sample.packing.cell if sample.packing.is_periodic else None
     shape = None if window is None else window.shape
-    return Scene(grains_of(sample, window), center, shape, cell=cell)
+    smaller = tuple(one.shape for one in windows[:-1])
+    return Scene(grains_of(sample, window), center, shape, smaller, cell=cell)
 
 
 def about_window(scene: Scene) -> Scene:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.convex import Convex
 from scanfab.base.errors import ScanfabError
 from scanfab.base.files import whole_file
 from scanfab.base.typing import BoolArray, FloatArray
@@ -89,8 +90,9 @@ def _show(scene: Scene, up: FloatArray, title: str, screenshot: Path | None) -> 
     look = toward if scene.lines is not None else toward + 0.45 * np.cross(up, toward) + 0.35 * up
     drawn = _drawn(scene, toward, look)
     _add_grains(plotter, scene, drawn, toward)
-    if scene.window is not None:
-        _add_window(plotter, scene, toward)
+    for window in (scene.window, *scene.smaller):
+        if window is not None:
+            _add_window(plotter, scene, window, toward)
     if scene.lines is not None:
         _add_lines(plotter, scene)
     _framing(scene, drawn, up, look).aim(plotter)
@@ -235,12 +237,11 @@ def _add_section(
     plotter.add_mesh(disks, color=pale.tolist(), lighting=False)
 
 
-def _add_window(plotter: Any, scene: Scene, toward: FloatArray) -> None:
-    """The RV's surface; in a section its outline."""
+def _add_window(plotter: Any, scene: Scene, window: Convex, toward: FloatArray) -> None:
+    """An RV's surface; in a section its outline."""
     import pyvista
 
-    center, window = tuple(scene.center), scene.window
-    assert window is not None
+    center = tuple(scene.center)
     if scene.lines is None:
         surface = window_mesh(scene.center, window, nsub=5)
         smooth = not len(window.planes)

@@ -18,7 +18,7 @@ from scanfab.scan.directions import DirectionRule
 from scanfab.scan.edges import EDGES, START
 from scanfab.scan.lines import line_triads
 from scanfab.scan.scan import scan_lines
-from scanfab.scan.solids import CellGrains, Solids
+from scanfab.scan.solids import CellGrains, Solids, margin_of
 from tests.benchmarks.packings import PAPER, dense
 from tests.benchmarks.timing import interleaved, table
 
@@ -30,6 +30,8 @@ RULE = DirectionRule("one", AXIS, np.ones(1), None, turned=False)
 # of a scan in threads: as many as an auto scan starts with
 DIRECTIONS = 16
 EMBREE_LIMIT = 110.0
+# of RVs for which the rules at their surface are compared, in mean radii
+EDGE_RADII = (5.0, 10.0, 20.0)
 
 
 def rv_solids() -> Solids:
@@ -223,7 +225,7 @@ def run(repeats: int) -> dict[str, str]:
         return {
             "chords": _chords(solids, projected, count, Path(name), repeats),
             "variants": _variants(solids, repeats),
-            "edges": _edges(solids, repeats),
+            "edges": _edges(repeats),
             "threads": _threads(solids, projected, repeats),
         }
 
@@ -272,35 +274,34 @@ def _variants(solids, repeats):
     return table(["variants in one pass", "time of a alone"], rows)
 
 
-def _edges(solids, repeats):
+def _edges(repeats):
     """The rules at the window's surface, of which one needs the grains beyond it, too."""
     position, radius = dense(PAPER)
     removed = np.zeros(PAPER, bool)
     around = CellGrains(position, radius, removed, np.eye(3), np.zeros(3, bool))
-    ways = {
-        edge: Solids(
-            *(position, radius, removed)
-            if edge == START
-            else (solids.position, solids.radius, solids.removed),
-            solids.window,
-            edge=edge,
-            around=around if edge == START else None,
-        )
-        for edge in EDGES
-    }
     rows = []
-    for spacing, directions in ((SPACING, 1), (1.5, 200)):
-        words = {"spacing": spacing, "directions": directions}
-        seconds = interleaved(
-            {edge: lambda s=of, w=words: sweep(s, **w) for edge, of in ways.items()},
-            repeats,
-            clock=time.process_time,
-        )
-        rows += [
-            (f"`{edge}`, lines {spacing:g} mean radii apart", f"{value / seconds['clip']:.2f}")
-            for edge, value in seconds.items()
-        ]
-    return table(["variant c", "of `clip`"], rows)
+    for size in EDGE_RADII:
+        window, ways = sphere(size * float(radius.mean())), {}
+        for edge in EDGES:
+            every = around if edge == START else None
+            near = window.may_meet(position, radius + (margin_of(every) if every else 0.0))
+            chosen = position[near], radius[near], removed[near], window
+            ways[edge] = Solids(*chosen, edge=edge, around=every)
+        for spacing, directions in ((SPACING, int(400 / size**2)), (1.5, int(20_000 / size**1.5))):
+            words = {"spacing": spacing, "directions": directions}
+            seconds = interleaved(
+                {edge: lambda s=of, w=words: sweep(s, **w) for edge, of in ways.items()},
+                repeats,
+                clock=time.process_time,
+            )
+            ratios = [f"{seconds[edge] / seconds['clip']:.2f}" for edge in EDGES[1:]]
+            rows.append((f"{size:g}", f"{spacing:g}", *ratios))
+    titles = [
+        "radius of the RV",
+        "spacing of lines",
+        *(f"`{edge}` over `clip`" for edge in EDGES[1:]),
+    ]
+    return table(titles, rows)
 
 
 def _threads(solids, projected, repeats):

@@ -3,7 +3,7 @@ How often the scan's standard error covers the truth: 68 of 100 times if it is r
 
 Usage, from the root of the repository (1600 seeds take half an hour on two cores)::
 
-    python -m tests.campaigns.coverage [--seeds N] [--workers N] [--edge clip|start|ends]
+    python -m tests.campaigns.coverage [--seeds N] [--first SEED] [--edge clip|start|ends]
 
 The last frames of two series of sample_data, all variants. The truth is a scan with an error ten
 times smaller or more, with other random numbers. Each seed is a scan of its own: the default
@@ -44,16 +44,16 @@ VARIANTS = "abcd"
 
 
 def coverage(
-    name: str, kind: str, options: dict, scan: dict, seeds: int, truth, workers: int
+    name: str, kind: str, options: dict, scan: dict, seeds: range, truth, workers: int
 ) -> bool:
     """Print the coverage of one frame and kind of scan; whether it is as expected."""
     packing = last_frame(name)
-    values = np.empty((seeds, len(VARIANTS), 2))
+    values = np.empty((len(seeds), len(VARIANTS), 2))
     replicates = set()
-    for seed in range(seeds):
+    for place, seed in enumerate(seeds):
         table = scanfab.compute(packing, seed=seed, workers=workers, **options, **scan)
-        values[seed, :, 0] = table["alpha_vs_axial"]
-        values[seed, :, 1] = table["alpha_vs_axial_se"]
+        values[place, :, 0] = table["alpha_vs_axial"]
+        values[place, :, 1] = table["alpha_vs_axial_se"]
         replicates |= set(table["replicates"])
     off = values[:, :, 0] - truth
     covered = np.mean(np.abs(off) < values[:, :, 1], axis=0)
@@ -81,14 +81,17 @@ def main() -> int:
     """How many frames and kinds of scan lie outside."""
     parser = argparse.ArgumentParser(description=__doc__.strip().splitlines()[0])
     parser.add_argument("--seeds", type=int, default=1600)
+    parser.add_argument("--first", type=int, default=0, help="the first of the seeds")
+    parser.add_argument("--frames", nargs="+", choices=FRAMES, default=[*FRAMES])
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--edge", choices=EDGES, default=EDGES[0])
     parser.add_argument("--only", nargs="+", choices=[*SCANS, "calibrate"], help="kinds of scan")
     asked = parser.parse_args()
     warnings.simplefilter("ignore", scanfab.ScanfabWarning)
     outside = 0
-    for name, options in FRAMES.items():
-        options = {**options, "edge": asked.edge}
+    seeds = range(asked.first, asked.first + asked.seeds)
+    for name in asked.frames:
+        options = {**FRAMES[name], "edge": asked.edge}
         table = scanfab.compute(last_frame(name), workers=asked.workers, **options, **TRUTH)
         truth = table["alpha_vs_axial"]
         print(f"{name} truth: {truth.round(6)} ± {table['alpha_vs_axial_se'].round(6)}", flush=True)
@@ -97,7 +100,7 @@ def main() -> int:
         if "calibrate" in (asked.only or ["calibrate"]):
             kinds["calibrate"] = scanfab.calibrate(last_frame(name), **words).options
         for kind, scan in kinds.items():
-            right = coverage(name, kind, options, scan, asked.seeds, truth, asked.workers)
+            right = coverage(name, kind, options, scan, seeds, truth, asked.workers)
             outside += not right
     return outside
 

@@ -13,6 +13,7 @@ from scanfab.cli.main import run
 from scanfab.pipeline.calibration import Calibration
 from scanfab.pipeline.calibration_ladders import StepRow
 from scanfab.table.columns import columns_of
+from tests.cli.test_windows import surface
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.truth import TRIAXIAL
 
@@ -130,3 +131,21 @@ def test_what_is_said_beside_is_no_setting_of_the_recommended_command(calibrate,
 def test_calibrate_refuses_a_boundary_that_no_particle_has(calibrate):
     _, err = calibrate(TRIAXIAL, "--boundary", "mask=5", code=1)
     assert "no particle of any frame has mask=5: mask is 1 or 3" in err
+
+
+def test_the_size_of_an_rv_that_a_file_draws_is_left_out_in_words(calibrate, tmp_path):
+    words = ("--rv-shape", surface(tmp_path / "box.stl"), "--edge", "ends", "--variants", "c")
+    out, err = calibrate(TRIAXIAL, *QUICK, "--rv-center", "0,0,0", *words)
+    assert {row["ladder"] for row in csv.DictReader(io.StringIO(out))} >= {"spacing", "cutoff"}
+    assert "rv" not in {row["ladder"] for row in csv.DictReader(io.StringIO(out))}
+    assert "box.stl draws it: to try others, scale that surface" in err
+    assert "--edge ends" in err.strip().splitlines()[-1]
+
+
+def test_an_rv_follows_the_strain_that_is_named(calibrate, tmp_path):
+    """Else it could follow the cell or a boundary alone."""
+    follows = ("--rv-follows", "strain", "--strain", "grains")
+    words = ("--variants", "c", "--max-chords", "1e6")
+    assert "--strain grains" in calibrate(TRIAXIAL, *QUICK, *words, *follows)[1]
+    picture = tmp_path / "view.png"
+    assert run(["view", str(TRIAXIAL), *follows, "--screenshot", str(picture)]) == 0

@@ -27,7 +27,7 @@ def on_terminal(words: list[str], **environment: str) -> tuple[int, str]:
     """Exit code and what a terminal shows of a process."""
     pty = pytest.importorskip("pty", reason="terminals are POSIX")
     ours, theirs = pty.openpty()
-    env = {**os.environ, "COLUMNS": "180", "TERM": "dumb", **environment}
+    env = {**os.environ, "COLUMNS": "180", "LINES": "40", "TERM": "dumb", **environment}
     with subprocess.Popen([*PROGRAM, *words], stdout=theirs, stderr=theirs, env=env) as process:
         os.close(theirs)
         shown = b""

@@ -141,7 +141,9 @@ def test_figures_of_frames_are_of_one_series(series, tmp_path, capsys):
 def test_compare_knows_no_figures_of_frames(table, tmp_path, capsys):
     words = ["--plot", str(tmp_path / "x.png"), "--figure", "rose"]
     assert run(["compare", table, *words]) == 2
-    assert "--figure: expected evolution, normalised, correlation" in capsys.readouterr().err
+    assert (
+        "--figure: expected evolution, normalised, correlation, columns" in capsys.readouterr().err
+    )
 
 
 def test_a_table_without_void_fabric_is_written_and_not_drawn(series, tmp_path, capsys):

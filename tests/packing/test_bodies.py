@@ -243,3 +243,14 @@ def test_a_packing_and_a_sample_say_how_many_grains_they_are():
     assert repr(packing).startswith("Packing: 3 particles of radius 1, parts of 2 grains")
     sample = Sample(find_contacts(packing), np.zeros(3, bool))
     assert repr(sample) == "Sample: 2 grains, 2 rattlers (fewer than 2 neighbours)"
+
+
+def test_a_clump_of_many_spheres_that_flew_away_is_one_grain_that_did():
+    grid = np.stack(np.meshgrid(*3 * [np.arange(6.0)]), axis=-1).reshape(-1, 3)
+    clump = np.array([30.0, 2.0, 2.0]) + 0.1 * np.random.default_rng(0).random((40, 3))
+    number = np.concatenate([np.full(216, -1), np.full(40, 7)])
+    sample = grains(np.vstack([grid, clump]), number, 0.5)
+    assert not sample.escaped.are_many
+    assert np.flatnonzero(sample.escaped.grains).tolist() == list(range(216, 256))
+    (note,) = sample.doubts_of_escaped()
+    assert "more" not in note.text.partition(":")[0]

@@ -11,9 +11,9 @@ import pytest
 import scanfab
 from scanfab import Cell, Packing, Settings, find_contacts
 from scanfab.cli.main import run
+from scanfab.packing.groupings import Grouping, Groupings
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.calibration import calibrate
-from scanfab.pipeline.groupings import Grouping, Groupings
 from scanfab.pipeline.inspection import inspect_series
 from tests.helpers.dumps import NAMES, dump_text, write
 from tests.helpers.lattices import shaken_cubic

@@ -22,6 +22,7 @@ from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.packing.window import Window
 from scanfab.pipeline.measurement import measure
 from scanfab.pipeline.plan import make_plan
+from scanfab.pipeline.rv import RV
 from scanfab.scan.gaps import Blocks
 from tests.helpers import naive
 from tests.helpers.lattices import rotation, shaken_cubic
@@ -157,7 +158,7 @@ def test_a_window_made_up_of_half_spaces_is_measured_like_any_other(packing):
     sample, settings = Sample(packing, np.zeros(len(packing), bool)), Settings(**LINES)
     plan = make_plan(settings, sample)
     window = Window(plan.window.center, box([2.0, 3.0, 4.0], rotation(np.random.default_rng(1))))
-    found = measure(sample, replace(plan, window=window, auto=""))
+    (found,) = measure(sample, replace(plan, rvs=(RV(window=window),), auto=""))
     position = packing.position - window.center
     removed = sample.rattlers
     solids = Solids(position, packing.radius, removed, window.shape)
@@ -174,7 +175,8 @@ def test_a_window_made_up_of_half_spaces_is_measured_like_any_other(packing):
 
 def measured(packing, **words):
     sample, settings = Sample(packing, np.zeros(len(packing), bool)), Settings(**words)
-    return measure(sample, make_plan(settings, sample))
+    (found,) = measure(sample, make_plan(settings, sample))
+    return found
 
 
 @pytest.mark.parametrize("variants", ["ab", "abcd"])

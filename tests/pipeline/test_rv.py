@@ -8,7 +8,7 @@ from scanfab.packing.sample import Sample
 from scanfab.packing.window import SurfaceBox, Window
 from scanfab.pipeline.measurement import measure
 from scanfab.pipeline.plan import make_plan
-from scanfab.pipeline.rv import Deformation, rv_of
+from scanfab.pipeline.rv import Deformation, windows_of
 from scanfab.scan.scan import scan_lines
 from scanfab.scan.solids import Solids
 from tests.helpers import naive
@@ -33,7 +33,7 @@ def flat():
 
 
 def window_of(sample, **options):
-    return rv_of(sample, Settings(**options))
+    return windows_of(sample, Settings(**options))[0]
 
 
 def test_sizes_are_fractions_of_the_half_extents(flat):
@@ -158,7 +158,7 @@ def test_a_window_across_periodic_faces_is_that_of_the_repeated_packing(tilted, 
     settings = Settings(**PERIODIC[name], rv_center=center, variants="cd", seed=3, **LINES)
     plan = make_plan(settings, tilted)
     window = plan.window
-    found = measure(tilted, plan)
+    (found,) = measure(tilted, plan)
     shifts = np.array([[i, j, k] for i in range(-4, 5) for j in range(-4, 5) for k in range(-4, 5)])
     images = (tilted.packing.position[None] + (shifts @ TILTED)[:, None]).reshape(-1, 3)
     radius = np.tile(tilted.packing.radius, len(shifts))

@@ -136,6 +136,19 @@ def test_grains_and_contacts_are_those_of_the_table(computed):
         assert normal.T @ normal / inside.sum() == pytest.approx(tensor(row, "gc"))
 
 
+def test_spheres_of_clumps_have_the_number_of_their_body(tmp_path):
+    spheres = shaken_cubic(np.random.default_rng(0), 4)
+    number = np.where(np.arange(64) < 60, np.arange(64) // 2, -1)
+    packing = scanfab.Packing(spheres.position, spheres.radius, bodies=number)
+    settings = Settings(variants="c", directions=9, spacing="1rmin", contact_tolerance=0.02)
+    folder = VtkFolder(tmp_path, settings.axis)
+    (row,) = compute_rows(packing, settings, observe=folder)
+    grains = pyvista.read(tmp_path / "grains_000000.vtp")
+    assert grains["body"].tolist() == number.tolist()
+    inside = number[grains["in_window"] == 1]
+    assert len(set(inside[inside >= 0])) + np.sum(inside < 0) == row.grains
+
+
 def test_pieces_of_lines_are_kept_from_the_cut_off_on(computed):
     mesh = pyvista.read(computed.vtk / "lines-c_000006.vtp")
     length, void, kept = (np.asarray(mesh.cell_data[name]) for name in ("length", "void", "kept"))

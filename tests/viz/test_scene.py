@@ -9,7 +9,14 @@ import scanfab
 from scanfab.base.convex import sphere
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import Window
-from scanfab.viz.scene import Scene, contact_lines, grains_of, scene_of, section_lines
+from scanfab.viz.scene import (
+    Scene,
+    about_window,
+    contact_lines,
+    grains_of,
+    scene_of,
+    section_lines,
+)
 from tests.helpers.lattices import simple_cubic
 
 
@@ -31,6 +38,8 @@ def test_grains_are_told_apart(sample):
     assert grains.boundary.tolist() == [False] * 4 + [True]
     assert grains.in_window.tolist() == [True, True, False, False, False]
     assert not grains_of(sample, None).in_window.any()
+    assert grains.body is None
+    np.testing.assert_array_equal(grains.places, sample.packing.position)
 
 
 def test_contacts_are_lines_between_centres(sample):
@@ -73,7 +82,34 @@ def test_a_section_cuts_periodic_images_too():
 
 
 def test_a_section_without_window_or_grains_is_no_error(sample):
-    assert section_lines(scene_of(sample, None), (0, 0, 1)).line.ndim == 1
+    assert section_lines(scene_of(sample), (0, 0, 1)).line.ndim == 1
     nothing = Sample(scanfab.Packing(np.zeros((0, 3)), 1.0, contacts=[]), np.zeros(0, bool))
     empty = Scene(grains_of(nothing, None), np.zeros(3), None)
     assert len(section_lines(empty, (0, 0, 1)).length) == 0
+
+
+def clumps(**options):
+    """Two of them, one through the face x = 10, and a sphere alone."""
+    position = [[9.6, 5, 5], [0.8, 5, 5], [4.0, 5, 5], [5.2, 5, 5], [2.6, 5, 5]]
+    cell = scanfab.Cell([10.0, 10.0, 10.0])
+    packing = scanfab.Packing(position, 1.0, bodies=[3, 3, 8, 8, -1], cell=cell, **options)
+    return Sample(scanfab.find_contacts(packing), np.zeros(5, bool))
+
+
+def test_grains_of_clumps_have_their_numbers_and_places():
+    sample = clumps()
+    grains = grains_of(sample, Window(np.array([0.2, 5.0, 5.0]), sphere(0.1)))
+    assert grains.body.tolist() == [3, 3, 8, 8, -1]
+    assert grains.contacts.tolist() == [1, 1, 1, 1, 2]
+    assert grains.in_window.tolist() == [True, True, False, False, False]
+    np.testing.assert_allclose(grains.places[:, 0], [10.2, 0.2, 4.6, 4.6, 2.6])
+
+
+def test_a_clump_is_seen_whole_next_to_the_window():
+    sample = clumps()
+    window = Window(np.array([4.7, 5.0, 5.0]), sphere(2.0))
+    grains = about_window(scene_of(sample, window)).grains
+    first = grains.position[grains.body == 3]
+    assert np.ptp(first[:, 0]) == pytest.approx(1.2)
+    assert grains.in_window[grains.body == 8].all()
+    assert not grains.in_window[grains.body == 3].any()

@@ -23,15 +23,17 @@ from scanfab.scan.kernels.lists import (
 )
 from scanfab.scan.kernels.periodic import CellGrains, Prism, cell_grid, measured_in
 from scanfab.scan.kernels.projection import Spheres, project, sort_into_strips, sphere_at
+from scanfab.scan.kernels.start import visit_beyond
 from scanfab.scan.kernels.strips import (
     MOST_LINES,
     STATE_SIZE,
     Edge,
+    Sphere,
     Strip,
     begin,
     measure_from,
 )
-from scanfab.scan.kernels.sweep import NOTHING, STEPS, Measured, settle, visit
+from scanfab.scan.kernels.sweep import CHORDS, NOTHING, STEPS, Measured, settle, visit
 from scanfab.scan.kernels.windows import Clip, Section, section_along
 
 __all__ = ["scan_axes", "scan_cell"]
@@ -41,12 +43,35 @@ SMALLEST = 5e-324
 
 
 @inner()
+def visit_started(
+    lines: FloatArray,
+    strip: Strip,
+    sphere: Sphere,
+    kept: float,
+    section: Section,
+    least: float,
+    tally: FloatArray,
+    second: Flag,
+    window: Edge,
+) -> None:
+    """Visit the chords of a sphere by the rule ``start``, and do only what its place asks for."""
+    away = np.sqrt(sphere.u * sphere.u + sphere.v * sphere.v + sphere.depth * sphere.depth)
+    if away - sphere.radius > section.reach:
+        tally[0, CHORDS] += visit_beyond(lines, strip, sphere, kept, second)
+    elif away + sphere.radius < section.core:
+        inside = Edge(None, True, window.margin, True)
+        visit(lines, strip, sphere, kept, least, tally, second, None, inside, None)
+    else:
+        visit(lines, strip, sphere, kept, least, tally, second, None, window, None)
+
+
+@inner()
 def visit_all(
     lines: FloatArray,
     strip: Strip,
     spheres: Spheres,
     chosen: IntArray,
-    reach_of_window: float,
+    section: Section,
     least: float,
     tally: FloatArray,
     second: Flag,
@@ -58,8 +83,17 @@ def visit_all(
     for k in chosen:
         sphere = sphere_at(spheres, k)
         kept = np.nan if spheres.removed[k] else NOTHING
+        if window is not None and window.start is not None:
+            away = np.sqrt(sphere.u * sphere.u + sphere.v * sphere.v + sphere.depth * sphere.depth)
+            if away - sphere.radius > section.reach:
+                tally[0, CHORDS] += visit_beyond(lines, strip, sphere, kept, second)
+                continue
+            if away + sphere.radius < section.core:
+                inside = Edge(None, True, window.margin, True)
+                visit(lines, strip, sphere, kept, least, tally, second, whole, inside, measured)
+                continue
         if whole is not None and window is not None:
-            reach = reach_of_window + sphere.radius
+            reach = section.reach + sphere.radius
             if sphere.u * sphere.u + sphere.v * sphere.v > reach * reach:
                 # its lines miss the window
                 visit(lines, strip, sphere, kept, least, tally, second, whole, None, measured)
@@ -132,7 +166,7 @@ def scan_strips(
         if by_lists:
             visit_listed(lines, lists, strip, spheres, met, least, tally, bins, *flags)
         else:
-            visit_all(lines, strip, spheres, met, section.reach, least, tally, *flags)
+            visit_all(lines, strip, spheres, met, section, least, tally, *flags)
         for which in range(1 if second is None else 2):
             if in_bins:
                 closed = bin_last_gaps(lines, strip, which, bins, whole, window, measured)
@@ -224,7 +258,7 @@ def scan_axes(
     for axis in range(triads.shape[0]):
         triad = triads[axis]
         grid = open_grid(extent, triad, offsets[axis], spacing, clip.reach, whole is not None)
-        spheres = project(position, radius, removed, triad, grid)
+        spheres = project(position, radius, removed, triad, grid, clip.reach, window)
         section = section_along(clip, triad)
         beyond = None
         if cells is not None:

@@ -10,15 +10,14 @@ from scanfab.base.jit import ZERO, inner
 from scanfab.base.typing import FloatArray
 from scanfab.scan.kernels.bins import Bins, add_gaps, list_gap, room_for_gaps
 from scanfab.scan.kernels.cells import Cells, Ray, next_solid, room_for_ray
-from scanfab.scan.kernels.edges import cut_at_entry, listed_to, window_gap
+from scanfab.scan.kernels.edges import listed_to, window_gap
 from scanfab.scan.kernels.strips import (
+    BEFORE,
+    BEHIND,
     END,
     ENTRY,
     EXIT,
     FAR,
-    FIRST,
-    GAP_END,
-    GAP_START,
     SET,
     Edge,
     Strip,
@@ -43,30 +42,33 @@ class Beyond(NamedTuple):
 def add_followed(
     low: float,
     high: float,
-    u: float,
-    v: float,
-    enters: float,
-    leaves: float,
+    sign: float,
+    line: tuple[float, float, float, float],
     least: float,
     which: int,
     edge: Edge,
     tally: FloatArray,
     bins: Bins,
 ) -> None:
-    """Add a segment to the tallies or the bins; one without an end to those that are left out."""
+    """
+    Add a segment to the tallies or the bins, or take it off; without an end, to what is left out.
+
+    ``line``: where it is along u and v, where it enters and leaves the window.
+    """
+    u, v, enters, leaves = line
     if high - low > 0.5 * FAR:
         tally[which, LEFT] += 0.5
     elif bins.cutoffs.size > 0:
         one = room_for_gaps(1)
         list_gap(one, ZERO, u, low, high, enters, leaves, None, edge, None)
-        add_gaps(bins, one, np.uint64(1), 1.0, which, v, None, edge)
+        add_gaps(bins, one, np.uint64(1), sign, which, v, None, edge)
     else:
         length, number, _ = window_gap(low, high, least, enters, leaves, None, edge)
-        tally[which, WINDOW + LENGTH] += length
-        tally[which, WINDOW + KEPT] += number
+        tally[which, WINDOW + LENGTH] += sign * length
+        tally[which, WINDOW + KEPT] += sign * number
 
 
-@inner(error_model="numpy")
+@inner(forceinline=True, error_model="numpy")
 def followed(
     beyond: Beyond, ray: Ray, which: int, u: float, v: float, depth: float, sign: float
 ) -> tuple[float, float]:
@@ -93,33 +95,42 @@ def follow_beyond(
     """
     Tally the segments with one end in the window that reach further than solids are listed.
 
-    A line has two of them at most, one at either end. Those that meet no solid any more leave the
-    sample: only their number is known.
+    A line has two of them at most, one at either end. The first one has been counted as if it began
+    where the list does. Those that meet no solid any more leave the sample: only their number is
+    known.
     """
-    # to it every place of a segment's beginning is known
-    known = Edge(edge.ends, edge.start, FAR)
+    # to it every place of a segment's end is known
+    known = Edge(edge.ends, edge.start, FAR, None)
     ray = room_for_ray()
+    # what is listed of a first segment suffices to count it
+    adds_on = (bins.cutoffs.size == 0) & (listed_to(edge) > least)
     for row in range(strip.rows):
         v = strip.first_v + row * strip.spacing
         for column in range(strip.low[row], strip.high[row]):
-            line = np.uint64(row * strip.pitch + column)
-            state = line + SET * np.uint64(which)
-            enters, leaves = lines[line + ENTRY], lines[line + EXIT]
-            first, end = lines[state + FIRST], lines[state + END]
-            if cut_at_entry(lines[state + GAP_START], lines[state + GAP_END], enters, leaves, edge):
-                first = lines[state + GAP_END]
-            goes_on = (end > enters) & (end < leaves)
-            if (first == -FAR and not goes_on) or tally[0, STEPS] >= beyond.most_steps:
+            place = np.uint64(row * strip.pitch + column)
+            state = place + SET * np.uint64(which)
+            enters, leaves, end = lines[place + ENTRY], lines[place + EXIT], lines[state + END]
+            # NaN: a line that misses the window
+            is_met = end > -FAR
+            begins_before = is_met & (-lines[state + BEFORE] <= enters - listed_to(edge))
+            goes_on = is_met & (end < leaves) & (lines[state + BEHIND] >= leaves + listed_to(edge))
+            if not (begins_before or goes_on) or tally[0, STEPS] >= beyond.most_steps:
                 continue
             u = strip.first_u + column * strip.spacing
-            words = u, v, enters, leaves, least, which, known, tally, bins
-            if first > -FAR:
-                before = enters - listed_to(edge)
-                far, steps = followed(beyond, ray, which, u, v, before, -1.0)
+            words = (u, v, enters, leaves), least, which, known, tally, bins
+            if begins_before:
+                far, steps = followed(beyond, ray, which, u, v, enters - listed_to(edge), -1.0)
                 tally[0, STEPS] += steps
-                add_followed(before - far, first, *words)
+                if adds_on and far < FAR:
+                    begins = enters - listed_to(edge) - far
+                    tally[which, WINDOW + LENGTH] += 0.5 * (-lines[state + BEFORE] - begins)
+                else:
+                    first, steps = followed(beyond, ray, which, u, v, enters, 1.0)
+                    tally[0, STEPS] += steps
+                    add_followed(-lines[state + BEFORE], enters + first, -1.0, *words)
+                    add_followed(enters - listed_to(edge) - far, enters + first, 1.0, *words)
             if goes_on:
                 behind = leaves + listed_to(edge)
                 far, steps = followed(beyond, ray, which, u, v, behind, 1.0)
                 tally[0, STEPS] += steps
-                add_followed(end, behind + far, *words)
+                add_followed(end, behind + far, 1.0, *words)

@@ -134,8 +134,8 @@ def list_gap(
         if window.ends is not None or window.start is not None:
             gaps[WEIGHT, k] = ends_inside(low, high, enters, leaves)
         if window.start is not None:
-            # those that begin beyond the listed solids are followed
-            known = (low > enters - listed_to(window)) & (low < leaves) & (high > enters)
+            # those that end beyond the listed solids are followed
+            known = (high < leaves + listed_to(window)) & (low < leaves) & (high > enters)
             gaps[FULL, k] = high - low if known else 0.0
 
 

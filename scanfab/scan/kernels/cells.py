@@ -16,6 +16,12 @@ from scanfab.base.jit import inner, kernel
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.scan.kernels.strips import FAR
 
+# what lets the compiler make vector instructions of a loop that looks for the least number
+LEAST = {"nnan", "nsz", "contract"}
+
+# of a cell: nearer to the grid than that a ray is in it, but for rounding
+SLIGHT = 1e-9
+
 __all__ = ["Cells", "Ray", "fill_cells", "next_solid", "room_for_ray"]
 
 
@@ -24,7 +30,7 @@ class Cells(NamedTuple):
 
     sphere: FloatArray
     """
-    Centre and radius of each entry, shape (K, 4).
+    Centre and radius of each entry, shape (4, K).
 
     Entries of a cell lie together, as to look up each grain elsewhere would take longer than all
     else.
@@ -87,88 +93,127 @@ class Ray(NamedTuple):
     """A half line on its way through the cells; room for one, used again and again."""
 
     place: FloatArray
-    """Where it begins, in the void, shape (3,)."""
+    """Where it begins, in the void, shape (3,); moved by periods as the ray crosses their faces."""
     along: FloatArray
     """Unit vector."""
-    at: FloatArray
-    """Where it begins, counted in cells."""
-    rise: FloatArray
-    """Cells along each edge of the grid for a length of 1."""
     cell: IntArray
-    """In which it is, counted through the periods."""
+    """In which it is."""
+    step: IntArray
+    """1 or -1: to which side it leaves its cell, along each edge of the grid."""
+    out: FloatArray
+    """How far from its beginning it meets the next face, across each edge of the grid."""
+    width: FloatArray
+    """From one such face to the next."""
 
 
 @inner()
 def room_for_ray() -> Ray:
     """A ray to be filled in."""
-    return Ray(np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3, np.int64))
+    return Ray(
+        np.empty(3),
+        np.empty(3),
+        np.empty(3, np.int64),
+        np.empty(3, np.int64),
+        np.empty(3),
+        np.empty(3),
+    )
 
 
-@inner(error_model="numpy")
-def first_in_cell(cells: Cells, ray: Ray, without_removed: bool) -> tuple[float, int]:
+# Of a ray: these functions are made part of their caller, as to count the references to all these
+# arrays in a call would take longer than what it does.
+
+
+@inner(forceinline=True, fastmath=LEAST, error_model="numpy")
+def first_in_cell(cells: Cells, ray: Ray, number: int, without_removed: bool) -> float:
     """
-    How far the first solid is of those that reach into the ray's cell, and how many these are.
+    How far the first solid is of those that reach into a cell.
 
     As the ray begins in void, each of its chords is before or behind that; by its middle, as that
     of a solid that ends there may lie before it by rounding.
     """
     # no array is looked up in the loop
-    parts, vectors, sphere, removed = cells.parts, cells.vectors, cells.sphere, cells.removed
-    i, j, k = ray.cell[0] // parts[0], ray.cell[1] // parts[1], ray.cell[2] // parts[2]
-    number = cell_of(
-        parts,
-        ray.cell[0] - i * parts[0],
-        ray.cell[1] - j * parts[1],
-        ray.cell[2] - k * parts[2],
-    )
-    first, last = np.uint64(cells.start[number]), np.uint64(cells.start[number + 1])
-    # the ray's place, moved to the first period
-    p_x = ray.place[0] - i * vectors[0, 0] - j * vectors[1, 0] - k * vectors[2, 0]
-    p_y = ray.place[1] - i * vectors[0, 1] - j * vectors[1, 1] - k * vectors[2, 1]
-    p_z = ray.place[2] - i * vectors[0, 2] - j * vectors[1, 2] - k * vectors[2, 2]
+    sphere, removed, start = cells.sphere, cells.removed, cells.start
+    p_x, p_y, p_z = ray.place[0], ray.place[1], ray.place[2]
     n_x, n_y, n_z = ray.along[0], ray.along[1], ray.along[2]
     found = FAR
-    for entry in range(first, last):
-        if without_removed and removed[entry]:
-            continue
-        x, y, z = sphere[entry, 0] - p_x, sphere[entry, 1] - p_y, sphere[entry, 2] - p_z
+    for entry in range(np.uint64(start[number]), np.uint64(start[number + 1])):
+        x, y, z = sphere[0, entry] - p_x, sphere[1, entry] - p_y, sphere[2, entry] - p_z
         depth = x * n_x + y * n_y + z * n_z
-        radius = sphere[entry, 3]
+        radius = sphere[3, entry]
         reach2 = radius * radius - (x * x + y * y + z * z - depth * depth)
-        if depth > 0.0 and reach2 > 0.0:
-            found = min(found, depth - np.sqrt(reach2))
-    return found, int(last - first)
+        is_met = (depth > 0.0) & (reach2 > 0.0) & (not (without_removed & removed[entry]))
+        # choices instead of branches, which would be guessed wrong
+        distance = depth - np.sqrt(reach2 if reach2 > 0.0 else 0.0)
+        distance = distance if is_met else FAR
+        found = distance if distance < found else found
+    return found
 
 
-@inner(error_model="numpy")
-def way_out(ray: Ray) -> tuple[float, int]:
-    """How far the ray's way out of its cell is, and through which pair of faces it leads."""
-    nearest, through = FAR, 0
-    for i in range(3):
-        rise = ray.rise[i]
-        if rise != 0.0:
-            face = (ray.cell[i] + (1 if rise > 0.0 else 0) - ray.at[i]) / rise
-            if face < nearest:
-                nearest, through = face, i
-    return nearest, through
+@inner(forceinline=True, error_model="numpy")
+def to_grid(cells: Cells, ray: Ray) -> float:
+    """
+    How far from its beginning the ray is in the grid, which has no end where grains repeat, or FAR.
 
-
-@inner(error_model="numpy")
-def begins_inside(cells: Cells, ray: Ray) -> bool:
-    """Let the ray begin; whether that is in the grid, which has no end where grains repeat."""
-    inside = True
+    Fills in where it begins, counted in cells, as ``out``, and what it rises as ``width``.
+    """
+    first = 0.0
     for i in range(3):
         at = rise = 0.0
         for j in range(3):
             at += (ray.place[j] - cells.corner[j]) * cells.inverse[j, i]
             rise += ray.along[j] * cells.inverse[j, i]
-        ray.at[i], ray.rise[i] = at * cells.parts[i], rise * cells.parts[i]
-        ray.cell[i] = int(np.floor(ray.at[i]))
-        inside &= cells.periodic[i] or 0 <= ray.cell[i] < cells.parts[i]
-    return inside
+        parts = cells.parts[i]
+        at, rise = at * parts, rise * parts
+        ray.out[i], ray.width[i] = at, rise
+        if not cells.periodic[i] and not 0.0 <= at <= parts:
+            # else it only gets further away
+            comes = rise > 0.0 if at < 0.0 else rise < 0.0
+            first = max(first, ((0.0 if at < 0.0 else parts) - at) / rise if comes else FAR)
+    for i in range(3):
+        at = ray.out[i] + first * ray.width[i]
+        if not cells.periodic[i] and not -SLIGHT <= at <= cells.parts[i] + SLIGHT:
+            first = FAR
+    return first
 
 
-@inner(error_model="numpy")
+@inner(forceinline=True, error_model="numpy")
+def begins_inside(cells: Cells, ray: Ray) -> bool:
+    """Let the ray begin in its first cell; whether it has one."""
+    first = to_grid(cells, ray)
+    if first == FAR:
+        return False
+    for i in range(3):
+        at, rise, parts = ray.out[i], ray.width[i], cells.parts[i]
+        at += first * rise
+        cell, period = np.floor(at), 0.0
+        if cells.periodic[i]:
+            period = np.floor(cell / parts)
+            for j in range(3):
+                ray.place[j] -= period * cells.vectors[i, j]
+        else:
+            cell = min(max(cell, 0.0), parts - 1.0)
+        ray.cell[i] = int(cell) - int(period) * parts
+        ray.step[i] = 1 if rise > 0.0 else -1
+        ray.width[i] = 1.0 / abs(rise) if rise != 0.0 else FAR
+        ray.out[i] = first + (cell + (rise > 0.0) - at) / rise if rise != 0.0 else FAR
+    return True
+
+
+@inner(forceinline=True, error_model="numpy")
+def enters_next(cells: Cells, ray: Ray, through: int) -> bool:
+    """Let the ray enter its next cell, through that pair of faces; whether it is in the grid."""
+    step = ray.step[through]
+    ray.out[through] += ray.width[through]
+    ray.cell[through] += step
+    if 0 <= ray.cell[through] < cells.parts[through]:
+        return True
+    ray.cell[through] -= step * cells.parts[through]
+    for j in range(3):
+        ray.place[j] -= step * cells.vectors[through, j]
+    return bool(cells.periodic[through])
+
+
+@inner(forceinline=True, error_model="numpy")
 def next_solid(
     cells: Cells, ray: Ray, without_removed: bool, most_steps: float
 ) -> tuple[float, float]:
@@ -178,15 +223,17 @@ def next_solid(
     And the steps that this took: one for each cell and each grain in it.
     """
     found, steps = FAR, 0.0
+    parts, out = cells.parts, ray.out
     goes_on = begins_inside(cells, ray)
     while goes_on:
-        here, grains = first_in_cell(cells, ray, without_removed)
-        found = min(found, here)
-        steps += 1.0 + grains
-        out, through = way_out(ray)
+        number = cell_of(parts, ray.cell[0], ray.cell[1], ray.cell[2])
+        here = first_in_cell(cells, ray, number, without_removed)
+        found = here if here < found else found
+        steps += 1.0 + cells.start[number + 1] - cells.start[number]
+        through = 0 if out[0] < out[1] else 1
+        through = through if out[through] < out[2] else 2
+        nearest = out[through]
         # what is found behind the cell may have others before it
-        goes_on = found > out and out <= cells.farthest and steps <= most_steps
-        ray.cell[through] += 1 if ray.rise[through] > 0.0 else -1
-        inside = 0 <= ray.cell[through] < cells.parts[through]
-        goes_on &= cells.periodic[through] or inside
+        goes_on = found > nearest and nearest <= cells.farthest and steps <= most_steps
+        goes_on = goes_on and enters_next(cells, ray, through)
     return found, steps

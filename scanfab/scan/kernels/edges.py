@@ -14,9 +14,7 @@ the cut-off::
 The mean length is the ratio of the two sums. That of ``ends`` is c + Σ (I - c) / Σ e/2, written as
 one ratio. docs/method.md says why the last two have no bias.
 
-Under ``start`` solids are listed as far as a margin before and behind the window, where its lines
-are concerned; segments that reach further are followed alone
-(:mod:`scanfab.scan.kernels.beyond`).
+What ``start`` keeps of the solids beyond the window, :mod:`scanfab.scan.kernels.start` says.
 """
 
 from __future__ import annotations
@@ -24,13 +22,13 @@ from __future__ import annotations
 from scanfab.base.jit import Flag, inner
 from scanfab.scan.kernels.strips import FAR, Edge
 
-__all__ = ["CLIPPED", "cut_at_entry", "ends_inside", "listed_to", "window_gap"]
+__all__ = ["CLIPPED", "WEIGHED", "ends_inside", "listed_to", "window_gap"]
 
 # Of the margin: segments that reach so far are followed, whatever rounding says of its very end.
 NEARLY = 1.0 - 1e-6
 
 
-CLIPPED = Edge(None, None, 0.0)
+CLIPPED, WEIGHED = Edge(None, None, 0.0, None), Edge(True, None, 0.0, None)
 
 
 @inner(forceinline=True, error_model="numpy")
@@ -43,12 +41,6 @@ def ends_inside(low: float, high: float, enters: float, leaves: float) -> float:
 def listed_to(edge: Edge) -> float:
     """From where on solids beyond the window may not be listed."""
     return edge.margin * NEARLY
-
-
-@inner(forceinline=True, error_model="numpy")
-def cut_at_entry(low: float, high: float, enters: float, leaves: float, edge: Edge) -> bool:
-    """Whether a segment that ends in the window begins further before it than solids are listed."""
-    return (low <= enters - listed_to(edge)) & (high > enters) & (high < leaves)
 
 
 @inner(forceinline=True, error_model="numpy")
@@ -66,7 +58,7 @@ def window_gap(
     if edge.start is not None:
         length = high - low
         # the others are followed
-        known = (low > enters - listed_to(edge)) & (length < 0.5 * FAR)
+        known = (high < leaves + listed_to(edge)) & (length < 0.5 * FAR)
         kept = (inside > 0.0) & (length >= least) & known
         weight = ends_inside(low, high, enters, leaves)
         return weight * length if kept else 0.0, weight if kept else 0.0, void

@@ -7,16 +7,13 @@ import numpy as np
 from scanfab.base.jit import ZERO, Flag, inner
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.kernels.bins import Bins, add_gaps, list_gap, room_for_gaps
-from scanfab.scan.kernels.edges import cut_at_entry
 from scanfab.scan.kernels.projection import Spheres, number_from, sort_by, sphere_at
+from scanfab.scan.kernels.start import begins_at, reaches_in
 from scanfab.scan.kernels.strips import (
     END,
     ENTRY,
     EXIT,
     FAR,
-    FIRST,
-    GAP_END,
-    GAP_START,
     SET,
     Edge,
     Strip,
@@ -142,22 +139,28 @@ def gaps_of(
     their starts: exact, as none of them can reach back.
     """
     end, low, high = -FAR, -FAR, -FAR
-    if whole is None:
+    before, behind = FAR, FAR
+    if window is not None and window.start is not None:
+        before, behind = window.margin - enters, leaves + window.margin
+    elif whole is None:
         end = enters
-        if window is not None:
-            end = enters - window.margin
     count = 0
     for k in order:
         start, stop = chords[0, k], chords[1, k]
-        if not is_listed(start, enters, leaves, window, measured):
+        if not is_listed(start, enters, measured):
             continue
+        if window is not None and window.start is not None:
+            before = min(before, -stop) if start <= enters else before
+            behind = min(behind, start) if start >= leaves else behind
+            if not reaches_in(start, stop, enters, leaves):
+                continue
         if start > end:
-            ends[0, count], ends[1, count] = low, high
+            ends[0, count], ends[1, count] = begins_at(low, before), high
             count += 1
         end, low, high = moved(start, stop, end, low, high)
     if end < FAR:
-        ends[0, count], ends[1, count] = low, high
-        ends[0, count + 1], ends[1, count + 1] = end, FAR
+        ends[0, count], ends[1, count] = begins_at(low, before), high
+        ends[0, count + 1], ends[1, count + 1] = end, behind
         count += 2
     return count, end
 
@@ -192,6 +195,9 @@ def tally_line(
             a, b, c, d, e, f = counted(
                 True, low, high, least, enters, leaves, whole, window, measured
             )
+            if window is not None and window.start is not None and sign < 0.0:
+                # the sweep has added all its length
+                f = max(high - low, 0.0)
             add(tally, which, (sign * a, sign * b, sign * c, sign * d, sign * e, sign * f))
 
 
@@ -239,10 +245,4 @@ def solve_closed(
                 measured, bins,
             )  # fmt: skip
             sort_by(chords[0], order)
-        state = place + SET * np.uint64(which)
-        lines[state + END] = end
-        if window is not None and window.start is not None:
-            lines[state + FIRST] = lines[state + GAP_START] = lines[state + GAP_END] = -FAR
-            for k in range(count):
-                if cut_at_entry(ends[0, k], ends[1, k], enters, leaves, window):
-                    lines[state + FIRST] = ends[1, k]
+        lines[place + SET * np.uint64(which) + END] = end

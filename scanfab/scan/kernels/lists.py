@@ -21,14 +21,15 @@ from scanfab.scan.kernels.bins import (
     list_gap,
     room_for_gaps,
 )
-from scanfab.scan.kernels.edges import cut_at_entry
 from scanfab.scan.kernels.projection import Spheres, sphere_at
+from scanfab.scan.kernels.start import begins_at, met_beyond, reaches_in
 from scanfab.scan.kernels.strips import (
+    BEFORE,
+    BEHIND,
     END,
     ENTRY,
     EXIT,
     FAR,
-    FIRST,
     GAP_END,
     GAP_START,
     SET,
@@ -160,7 +161,7 @@ def sweep_abreast(
         half_chord = half_chord if np.int64(k) < lists.stop[i] else np.nan
         start, stop = depth - half_chord, depth + half_chord
         enters, leaves = lines[i + ENTRY], lines[i + EXIT]
-        known = is_listed(start, enters, leaves, window, measured)
+        known = is_listed(start, enters, measured)
         start, stop = start if known else np.nan, stop if known else np.nan
         found = meet(lines, i, start, stop, least, enters, leaves, whole, window, measured)
         sums = both(sums, found)
@@ -220,6 +221,33 @@ def sweep_lists(
     tally[0, CHORDS] += chords
 
 
+@inner(forceinline=True, error_model="numpy")
+def meets(
+    lines: FloatArray,
+    i: np.uint64,
+    start: float,
+    stop: float,
+    enters: float,
+    leaves: float,
+    window: Edge | None,
+    measured: Measured | None,
+) -> bool:
+    """Whether a line's state is moved on by a chord."""
+    is_met = is_listed(start, enters, measured)
+    if window is not None and window.start is not None:
+        met_beyond(lines, i, start, stop, enters, leaves)
+        is_met = reaches_in(start, stop, enters, leaves)
+    return is_met
+
+
+@inner(forceinline=True, error_model="numpy")
+def begin_of(lines: FloatArray, i: np.uint64, low: float, window: Edge | None) -> float:
+    """Where a line's last gap begins."""
+    if window is not None and window.start is not None:
+        low = begins_at(low, lines[i + BEFORE])
+    return low
+
+
 @inner(error_model="numpy")
 def bin_lists(
     lines: FloatArray,
@@ -249,23 +277,24 @@ def bin_lists(
                 depth, reach2 = chords[np.uint64(place)], chords[np.uint64(place + ABREAST)]
                 half_chord = np.sqrt(abs(reach2))
                 start, stop = depth - half_chord, depth + half_chord
-                if not is_listed(start, enters, leaves, window, measured):
+                is_met = meets(lines, i, start, stop, enters, leaves, window, measured)
+                if second is not None and reach2 > 0.0:
+                    meets(lines, i2, start, stop, enters, leaves, window, measured)
+                if not is_met:
                     continue
-                if window is not None and window.start is not None:
-                    cut = cut_at_entry(low, high, enters, leaves, window)
-                    lines[i + FIRST] = high if cut and start > end else lines[i + FIRST]
+                first = begin_of(lines, i, low, window)
                 # listed anyhow, as chords are
-                list_gap(gaps, count, u, low, high, enters, leaves, whole, window, measured)
-                count += np.uint64((start > end) & (high - low >= least))
+                list_gap(gaps, count, u, first, high, enters, leaves, whole, window, measured)
+                count += np.uint64((start > end) & (high - first >= least))
                 end, low, high = moved(start, stop, end, low, high)
                 if second is not None:
                     start = start if reach2 > 0.0 else np.nan
                     stop = stop if reach2 > 0.0 else np.nan
-                    if window is not None and window.start is not None:
-                        cut = cut_at_entry(low2, high2, enters, leaves, window)
-                        lines[i2 + FIRST] = high2 if cut and start > end2 else lines[i2 + FIRST]
-                    list_gap(gaps2, count2, u, low2, high2, enters, leaves, whole, window, measured)
-                    count2 += np.uint64((start > end2) & (high2 - low2 >= least))
+                    first = begin_of(lines, i2, low2, window)
+                    list_gap(
+                        gaps2, count2, u, first, high2, enters, leaves, whole, window, measured
+                    )
+                    count2 += np.uint64((start > end2) & (high2 - first >= least))
                     end2, low2, high2 = moved(start, stop, end2, low2, high2)
             lines[i + END], lines[i + GAP_START], lines[i + GAP_END] = end, low, high
             if second is not None:
@@ -308,8 +337,11 @@ def bin_last_gaps(
                 lines[i + ENTRY],
                 lines[i + EXIT],
             )
-            last = lines[k + GAP_START], lines[k + GAP_END]
-            for low, high in (last, (lines[k + END], FAR)):
+            last = begin_of(lines, k, lines[k + GAP_START], window), lines[k + GAP_END]
+            behind = FAR
+            if window is not None and window.start is not None:
+                behind = lines[k + BEHIND]
+            for low, high in (last, (lines[k + END], behind)):
                 list_gap(gaps, count, u, low, high, enters, leaves, whole, window, measured)
                 # behind the last solid there is void in the window alone
                 count += (high - low > 0.0) & ((high < FAR) | (low < leaves))

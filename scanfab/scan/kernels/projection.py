@@ -9,7 +9,7 @@ import numpy as np
 from scanfab.base.jit import ONE, ZERO, inner
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.scan.kernels.grid import Grid
-from scanfab.scan.kernels.strips import FAR, Sphere, span
+from scanfab.scan.kernels.strips import FAR, Edge, Sphere, span
 
 __all__ = [
     "Spheres",
@@ -64,8 +64,15 @@ def project(
     removed: BoolArray,
     triad: FloatArray,
     grid: Grid,
+    reach_of_window: float,
+    window: Edge | None,
 ) -> Spheres:
-    """The spheres that may meet a line, ordered by depth, in the triad with rows u, v, n."""
+    """
+    The spheres that may meet a line, ordered by depth, in the triad with rows u, v, n.
+
+    By the rule ``start`` without those that lie aside of the ball that holds the window, or more
+    than the margin before or behind it.
+    """
     u_x, u_y, u_z = triad[0, 0], triad[0, 1], triad[0, 2]
     v_x, v_y, v_z = triad[1, 0], triad[1, 1], triad[1, 2]
     n_x, n_y, n_z = triad[2, 0], triad[2, 1], triad[2, 2]
@@ -78,14 +85,18 @@ def project(
         # a row and a column within reach; whether they cross there, the visit will see
         column = (u_x * x + u_y * y + u_z * z - grid.first_u) * per_spacing
         row = (v_x * x + v_y * y + v_z * z - grid.first_v) * per_spacing
-        reach = radius[k] * per_spacing
+        away = radius[k] * per_spacing
         met[count] = k
         along = n_x * x + n_y * y + n_z * z
         depth[count] = along
         low, high = min(low, along), max(high, along)
-        count += np.uint64(
-            (np.floor(row + reach) >= row - reach) & (np.floor(column + reach) >= column - reach)
-        )
+        meets = (np.floor(row + away) >= row - away) & (np.floor(column + away) >= column - away)
+        if window is not None and window.start is not None:
+            beyond = max(abs(along) - window.margin, 0.0)
+            reach = reach_of_window + radius[k]
+            from_axis2 = x * x + y * y + z * z - along * along
+            meets &= from_axis2 + beyond * beyond <= reach * reach
+        count += np.uint64(meets)
     order = order_of(depth[:count], low, high)
     found = room_for_spheres(int(count))
     for i in range(count):

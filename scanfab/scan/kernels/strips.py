@@ -17,11 +17,12 @@ from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.kernels.windows import Clip, Section, section_along
 
 __all__ = [
+    "BEFORE",
+    "BEHIND",
     "END",
     "ENTRY",
     "EXIT",
     "FAR",
-    "FIRST",
     "GAP_END",
     "GAP_START",
     "MOST_LINES",
@@ -49,15 +50,19 @@ PLANE = np.uint64(MOST_LINES + 24)
 END, GAP_START, GAP_END = np.uint64(0), PLANE, np.uint64(2) * PLANE
 SET = np.uint64(3) * PLANE
 ENTRY, EXIT = np.uint64(6) * PLANE, np.uint64(7) * PLANE
-# Of lines that are followed beyond the window: where their first gap ends, if it begins further
-# before the window than solids are listed. The second set's plane is SET behind, and those between
-# are never touched.
-FIRST = np.uint64(8) * PLANE
-STATE_SIZE = int(12 * PLANE)
+# Of the rule ``start``: where the last solid before the window ends, with a minus, and where the
+# first one behind it begins, see :mod:`scanfab.scan.kernels.start`. The second set's planes are SET
+# behind, and the one between is never touched.
+BEFORE, BEHIND = np.uint64(8) * PLANE, np.uint64(9) * PLANE
+STATE_SIZE = int(13 * PLANE)
 ONE = np.uint64(1)
 # a sphere that is no more lines wide is visited as a square: to find where its chords begin and end
 # in each row would take longer than the corners
 NARROW = 12
+
+
+# steps towards the lines of a row that meet a window of planes: the more, the fewer are left over
+TANGENTS = 2
 
 
 class Edge(NamedTuple):
@@ -71,6 +76,8 @@ class Edge(NamedTuple):
     start: Flag
     margin: float
     """Of ``start``: how far beyond the window solids are listed; else 0."""
+    inside: Flag
+    """Of ``start``: whether only chords of spheres that lie wholly in the window are met."""
 
 
 class Strip(NamedTuple):
@@ -114,9 +121,6 @@ def begin(
 
     Rows lose the lines at their ends that miss its planes, if these serve the window alone.
     """
-    before = 0.0
-    if window is not None:
-        before = window.margin
     a, rise_u = section.a, section.rise_u
     chosen = np.empty(section.planes.shape[0], np.int64)
     for row in range(strip.rows):
@@ -129,54 +133,140 @@ def begin(
             u = strip.first_u + strip.spacing * np.int32(j)
             half = np.sqrt(rest - (aslant + a * u) * u)
             middle = aside + rise_u * u
-            enters = middle - half
-            end = -FAR if whole is not None else enters - before
-            lines[i + ENTRY] = enters
-            lines[i + EXIT] = middle + half
-            lines[i + END] = end
+            set_off(lines, i, middle - half, middle + half, whole, window)
             lines[i + GAP_START] = -FAR
             lines[i + GAP_END] = -FAR
             if second is not None:
-                lines[i + SET + END] = end
+                set_off(lines, i + SET, middle - half, middle + half, whole, window)
                 lines[i + SET + GAP_START] = -FAR
                 lines[i + SET + GAP_END] = -FAR
-            if window is not None and window.start is not None:
-                lines[i + FIRST] = -FAR
-                if second is not None:
-                    lines[i + SET + FIRST] = -FAR
+            lines[i + ENTRY] = middle - half
+            lines[i + EXIT] = middle + half
         if section.planes.shape[0] > 0:
-            cut_row(lines, strip, section.planes, chosen, row, whole, before)
+            cut_row(lines, strip, section.planes, chosen, row, second, whole, window)
         no_lines(lines, at, np.uint64(0), np.uint64(strip.low[row]))
         no_lines(lines, at, np.uint64(strip.high[row]), np.uint64(strip.pitch))
 
 
+@inner(forceinline=True, error_model="numpy")
+def set_off(
+    lines: FloatArray,
+    i: np.uint64,
+    enters: float,
+    leaves: float,
+    whole: Flag,
+    window: Edge | None,
+) -> None:
+    """Let a line, which has met nothing yet, begin: before all, or where it enters the window."""
+    if window is not None and window.start is not None:
+        # NaN, a line that misses the window, stays NaN
+        lines[i + END] = 0.0 * enters - FAR
+        lines[i + BEFORE] = window.margin - enters
+        lines[i + BEHIND] = leaves + window.margin
+    else:
+        lines[i + END] = -FAR if whole is not None else enters
+
+
 @inner()
-def cutting(planes: FloatArray, chosen: IntArray, first: float, last: float, v: float) -> int:
+def cutting(
+    planes: FloatArray, side: float, chosen: IntArray, first: float, last: float, v: float
+) -> int:
     """
-    List the planes that may cut a line of a row before all others, from u = first to last.
+    List the planes of a side that may cut a line of a row, from u = first to last, before others.
 
     Returns how many. A plane's distance from the origin is linear along the row: where it is beyond
     that of another on its side at both ends, it is so everywhere; the others are the nearest at
     either end.
     """
-    nearest, beyond = np.full(4, np.inf), np.full(4, np.inf)
+    at_first = at_last = beyond_first = beyond_last = np.inf
     for k in range(planes.shape[0]):
-        side = 2 * int(planes[k, 3] < 0.0)
-        rest = planes[k, 0] - planes[k, 2] * v
-        start, stop = rest - planes[k, 1] * first, rest - planes[k, 1] * last
-        if start < nearest[side]:
-            nearest[side], beyond[side] = start, stop
-        if stop < nearest[side + 1]:
-            nearest[side + 1], beyond[side + 1] = stop, start
+        if planes[k, 3] == side:
+            rest = planes[k, 0] - planes[k, 2] * v
+            start, stop = rest - planes[k, 1] * first, rest - planes[k, 1] * last
+            if start < at_first:
+                at_first, beyond_last = start, stop
+            if stop < at_last:
+                at_last, beyond_first = stop, start
     count = 0
     for k in range(planes.shape[0]):
-        side = 2 * int(planes[k, 3] < 0.0)
-        rest = planes[k, 0] - planes[k, 2] * v
-        start, stop = rest - planes[k, 1] * first, rest - planes[k, 1] * last
-        if stop <= beyond[side] and start <= beyond[side + 1]:
-            chosen[count] = k
-            count += 1
+        if planes[k, 3] == side:
+            rest = planes[k, 0] - planes[k, 2] * v
+            start, stop = rest - planes[k, 1] * first, rest - planes[k, 1] * last
+            if stop <= beyond_last and start <= beyond_first:
+                chosen[count] = k
+                count += 1
     return count
+
+
+@inner(error_model="numpy")
+def nearer(planes: FloatArray, u: float, v: float, sign: float) -> float:
+    """
+    From a place on a row, one that is nearer to the lines between all planes, if it has none.
+
+    On a line by how much the last plane to be entered is behind the first one to be left is a
+    convex function along the row: its tangent meets 0 before it does. ``sign`` is that of the way
+    to these lines. FAR if there are none.
+    """
+    enters, leaves = -np.inf, np.inf
+    slope_in = slope_out = 0.0
+    for k in range(planes.shape[0]):
+        depth = planes[k, 3] * (planes[k, 0] - planes[k, 1] * u - planes[k, 2] * v)
+        if planes[k, 3] < 0.0:
+            if depth > enters:
+                enters, slope_in = depth, planes[k, 1]
+        elif depth < leaves:
+            leaves, slope_out = depth, planes[k, 1]
+    missing, falls = enters - leaves, -sign * (slope_in + slope_out)
+    if not missing > 0.0:
+        return u
+    return u + sign * missing / falls if falls > 0.0 else sign * FAR
+
+
+@inner(error_model="numpy")
+def narrow_row(strip: Strip, planes: FloatArray, row: int) -> None:
+    """Take lines at the ends of a row that miss a window for its planes out of it, or most."""
+    v = strip.first_v + row * strip.spacing
+    first = strip.first_u + strip.spacing * strip.low[row]
+    last = strip.first_u + strip.spacing * (strip.high[row] - 1)
+    for _ in range(TANGENTS):
+        first, last = nearer(planes, first, v, 1.0), nearer(planes, last, v, -1.0)
+        if not first <= last:
+            strip.high[row] = strip.low[row]
+            return
+    # a line more, as a place may be beyond by rounding
+    low = int((first - strip.first_u) * strip.per_spacing) - 1
+    high = int((last - strip.first_u) * strip.per_spacing) + 3
+    strip.low[row] = max(low, strip.low[row])
+    strip.high[row] = min(high, strip.high[row])
+
+
+@inner(fastmath={"contract"}, error_model="numpy")
+def cut_between(
+    lines: FloatArray, strip: Strip, planes: FloatArray, chosen: IntArray, row: int
+) -> None:
+    """Let the lines of a row enter and leave no further out than at its planes."""
+    v = strip.first_v + row * strip.spacing
+    at = np.uint64(row * strip.pitch)
+    low, high = np.uint64(strip.low[row]), np.uint64(strip.high[row])
+    first = strip.first_u + strip.spacing * strip.low[row]
+    last = strip.first_u + strip.spacing * (strip.high[row] - 1)
+    # NaN, a line that misses the quadric, stays NaN
+    for place in range(cutting(planes, -1.0, chosen, first, last, v)):
+        k = chosen[place]
+        slope, rest = planes[k, 1], planes[k, 0] - planes[k, 2] * v
+        for j in range(low, high):
+            i = at + j
+            cut = slope * (strip.first_u + strip.spacing * np.int32(j)) - rest
+            enters = lines[i + ENTRY]
+            lines[i + ENTRY] = cut if cut > enters else enters
+    for place in range(cutting(planes, 1.0, chosen, first, last, v)):
+        k = chosen[place]
+        slope, rest = planes[k, 1], planes[k, 0] - planes[k, 2] * v
+        for j in range(low, high):
+            i = at + j
+            cut = rest - slope * (strip.first_u + strip.spacing * np.int32(j))
+            leaves = lines[i + EXIT]
+            lines[i + EXIT] = cut if cut < leaves else leaves
 
 
 @inner(fastmath={"contract"}, error_model="numpy")
@@ -186,31 +276,16 @@ def cut_row(
     planes: FloatArray,
     chosen: IntArray,
     row: int,
+    second: Flag,
     whole: Flag,
-    before: float,
+    window: Edge | None,
 ) -> None:
     """Let the lines of a row enter and leave the window between its planes, too."""
-    v = strip.first_v + row * strip.spacing
+    if whole is None:
+        narrow_row(strip, planes, row)
+    cut_between(lines, strip, planes, chosen, row)
     at = np.uint64(row * strip.pitch)
     low, high = np.uint64(strip.low[row]), np.uint64(strip.high[row])
-    first = strip.first_u + strip.spacing * strip.low[row]
-    last = strip.first_u + strip.spacing * (strip.high[row] - 1)
-    for place in range(cutting(planes, chosen, first, last, v)):
-        k = chosen[place]
-        slope, rest = planes[k, 1], planes[k, 0] - planes[k, 2] * v
-        # NaN, a line that misses the quadric, stays NaN
-        if planes[k, 3] < 0.0:
-            for j in range(low, high):
-                i = at + j
-                cut = slope * (strip.first_u + strip.spacing * np.int32(j)) - rest
-                enters = lines[i + ENTRY]
-                lines[i + ENTRY] = cut if cut > enters else enters
-        else:
-            for j in range(low, high):
-                i = at + j
-                cut = rest - slope * (strip.first_u + strip.spacing * np.int32(j))
-                leaves = lines[i + EXIT]
-                lines[i + EXIT] = cut if cut < leaves else leaves
     for j in range(low, high):
         i = at + j
         enters, leaves = lines[i + ENTRY], lines[i + EXIT]
@@ -218,8 +293,9 @@ def cut_row(
         lines[i + ENTRY] = enters
         lines[i + EXIT] = leaves if enters < leaves else np.nan
         if whole is None:
-            lines[i + END] = enters - before
-            lines[i + SET + END] = enters - before
+            set_off(lines, i, enters, leaves, whole, window)
+            if second is not None:
+                set_off(lines, i + SET, enters, leaves, whole, window)
     if whole is None:
         # lines that miss the window at either end of the row need not be visited
         while low < high and np.isnan(lines[at + low + ENTRY]):

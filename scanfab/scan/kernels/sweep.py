@@ -28,13 +28,14 @@ import numpy as np
 
 from scanfab.base.jit import LANES, REORDERED, Flag, inner
 from scanfab.base.typing import FloatArray
-from scanfab.scan.kernels.edges import cut_at_entry, window_gap
+from scanfab.scan.kernels.edges import window_gap
+from scanfab.scan.kernels.start import last_gap, met_beyond, reaches_in, settled_gap
 from scanfab.scan.kernels.strips import (
+    BEFORE,
     END,
     ENTRY,
     EXIT,
     FAR,
-    FIRST,
     GAP_END,
     GAP_START,
     SET,
@@ -111,15 +112,11 @@ def whole_gap(
 
 
 @inner(forceinline=True, error_model="numpy")
-def is_listed(
-    start: float, enters: float, leaves: float, window: Edge | None, measured: Measured | None
-) -> bool:
+def is_listed(start: float, enters: float, measured: Measured | None) -> bool:
     """Whether a chord begins where all of them are listed; others are left out."""
     known = True
     if measured is not None:
         known = start - enters < measured.known
-    if window is not None and window.start is not None:
-        known = start < leaves + window.margin
     return known
 
 
@@ -184,10 +181,17 @@ def meet(
     A chord of NaN settles none, and leaves the line as it is.
     """
     end, low, high = lines[i + END], lines[i + GAP_START], lines[i + GAP_END]
-    sums = counted(start > end, low, high, least, enters, leaves, whole, window, measured)
     if window is not None and window.start is not None:
-        cut = (start > end) & cut_at_entry(low, high, enters, leaves, window)
-        lines[i + FIRST] = high if cut else lines[i + FIRST]
+        if window.inside is None:
+            met_beyond(lines, i, start, stop, enters, leaves)
+            counts = reaches_in(start, stop, enters, leaves)
+            start, stop = start if counts else np.nan, stop if counts else np.nan
+        settles = start > end
+        # no gap is longer
+        a, b, c = settled_gap(low, high, lines[i + BEFORE], least if settles else 2.0 * FAR)
+        sums = NOTHING, NOTHING, NOTHING, a, b, c if settles else 0.0
+    else:
+        sums = counted(start > end, low, high, least, enters, leaves, whole, window, measured)
     end, low, high = moved(start, stop, end, low, high)
     lines[i + END], lines[i + GAP_START], lines[i + GAP_END] = end, low, high
     return sums
@@ -249,7 +253,7 @@ def visit(
             start = sphere.depth - half_chord
             stop = sphere.depth + half_chord
             enters, leaves = lines[i + ENTRY], lines[i + EXIT]
-            known = is_listed(start, enters, leaves, window, measured)
+            known = is_listed(start, enters, measured)
             start, stop = start if known else np.nan, stop if known else np.nan
             found = meet(lines, i, start, stop, least, enters, leaves, whole, window, measured)
             sums = both(sums, found)
@@ -301,12 +305,20 @@ def settle(
         end, low, high = lines[k + END], lines[k + GAP_START], lines[k + GAP_END]
         enters, leaves = lines[i + ENTRY], lines[i + EXIT]
         closed += 1.0 if end == FAR else 0.0
-        sums = counted(end < FAR, low, high, least, enters, leaves, whole, window, measured)
+        if window is not None and window.start is not None:
+            at_most = least if end < FAR else 2.0 * FAR
+            x, y, z = settled_gap(low, high, lines[k + BEFORE], at_most)
+            sums = NOTHING, NOTHING, NOTHING, x, y, z if end < FAR else 0.0
+        else:
+            sums = counted(end < FAR, low, high, least, enters, leaves, whole, window, measured)
         a, b, c = a + sums[0], b + sums[1], c + sums[2]
         d, e, f = d + sums[3], e + sums[4], f + sums[5]
         if window is not None:
             start = end if end < FAR else leaves
-            behind = window_gap(start, FAR, least, enters, leaves, whole, window)
+            if window.start is not None:
+                behind = last_gap(lines, k, least, enters, leaves, window)
+            else:
+                behind = window_gap(start, FAR, least, enters, leaves, whole, window)
             d, e, f = d + behind[0], e + behind[1], f + behind[2]
             crossing += np.int64(leaves > enters)
             length += leaves - enters if leaves > enters else 0.0

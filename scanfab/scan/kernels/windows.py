@@ -14,6 +14,8 @@ __all__ = ["Clip", "Section", "section_along"]
 # Of the quadric's own size: along a line for which it changes less than that by rounding alone, it
 # does not change at all. Such a line, one along a cylinder's axis, leaves it far beyond the planes.
 FLAT, LEAST = 1e-15, 1e-300
+# of a ball inside that may touch the surface: so much smaller it does not, whatever rounding does
+NEARLY = 1.0 - 1e-9
 # of the unit normal of a plane, along a line: where it is less, the line is taken for parallel
 GRAZING = 1e-100
 
@@ -50,6 +52,8 @@ class Section(NamedTuple):
     rise_u: float
     rise_v: float
     reach: float
+    core: float
+    """Radius of a ball about the origin that lies inside, and has no place of the surface."""
 
 
 @inner()
@@ -77,6 +81,20 @@ def planes_along(planes: FloatArray, triad: FloatArray) -> FloatArray:
         along[k, 0], along[k, 1], along[k, 2] = planes[k, 3] / steep, n_u / steep, n_v / steep
         along[k, 3] = -1.0 if n_n < 0.0 else 1.0
     return along
+
+
+@inner()
+def core_of(clip: Clip) -> float:
+    """Radius of a ball about the origin that lies inside a window: not always the largest."""
+    squares = 0.0
+    for i in range(3):
+        for j in range(3):
+            squares += clip.deviator[i, j] * clip.deviator[i, j]
+    # no eigenvalue of the quadric is greater
+    core = np.sqrt(max(clip.level, 0.0) / max(clip.isotropic + np.sqrt(squares), LEAST))
+    for k in range(clip.planes.shape[0]):
+        core = min(core, clip.planes[k, 3])
+    return NEARLY * float(core)
 
 
 @inner()
@@ -111,4 +129,5 @@ def section_along(clip: Clip, triad: FloatArray) -> Section:
         -lean_u,
         -lean_v,
         clip.reach,
+        core_of(clip),
     )

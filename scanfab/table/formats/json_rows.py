@@ -20,6 +20,7 @@ class JsonArray:
     description = "one array of objects; a missing value is null"
     is_text = True
     appends = False
+    holds_lists = True
 
     def check(self) -> None:
         """It needs no package."""
@@ -44,6 +45,7 @@ class JsonLines:
     description = "JSON lines: one object a line"
     is_text = True
     appends = True
+    holds_lists = True
 
     def check(self) -> None:
         """It needs no package."""

@@ -21,6 +21,7 @@ class Parquet:
     description = "Apache Parquet"
     is_text = False
     appends = False
+    holds_lists = True
 
     def check(self) -> None:
         """SettingsError without pyarrow."""

@@ -43,7 +43,8 @@ class TableFormat(Protocol):
     A file format for tables.
 
     A package offers one under the entry point ``scanfab.table_formats``; a file here needs a line
-    in ``OWN_FORMATS``.
+    in ``OWN_FORMATS``. One whose cells may be lists of numbers says ``holds_lists = True``; from
+    others such columns are left out.
     """
 
     suffix: str

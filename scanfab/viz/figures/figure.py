@@ -69,6 +69,11 @@ class Figure:
         """The options behind the colon of ``--figure NAME:...``; None if it takes none."""
         return None
 
+    @classmethod
+    def suits(cls, data: Any) -> bool:
+        """Whether it is drawn, unasked, with the others of some data that have its columns."""
+        return True
+
     @property
     def size(self) -> tuple[float, float]:
         """Width and height, inches."""

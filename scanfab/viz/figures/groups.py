@@ -57,12 +57,12 @@ def grouped(curves: Sequence[Curve]) -> list[Group]:
     sources = list(dict.fromkeys(curve.source for curve in curves))
     variants = sorted({curve.variant for curve in curves})
     if len(sources) == 1:
-        return [_group("", curves, curves, _by_variant(True))]
+        return [_group("", curves, curves, _by_variant(variants, True))]
     if len(variants) == 1:
         return [_group("", curves, curves, _by_source(sources, f"variant {variants[0]}, "))]
     if len(sources) <= len(variants):
         return [
-            _group(plain(source), curves, _of(curves, "source", source), _by_variant(False))
+            _group(plain(source), curves, _of(curves, "source", source), _by_variant(variants))
             for source in sources
         ]
     return [
@@ -102,9 +102,16 @@ def _group(
     return Group(title, [Drawn(one, curves.index(one), *looks(one)) for one in chosen])
 
 
-def _by_variant(spelt: bool) -> Callable[[Curve], tuple[Look, str]]:
+def _by_variant(
+    variants: Sequence[str], spelt: bool = False
+) -> Callable[[Curve], tuple[Look, str]]:
+    # several RVs of a variant have not the one look that it has alone
+    several = len({variant[0] for variant in variants}) < len(variants)
+
     def look(curve: Curve) -> tuple[Look, str]:
         name = _spelt(curve.variant) if spelt else f"variant {curve.variant}"
+        if several:
+            return SOURCE_LOOKS[variants.index(curve.variant) % len(SOURCE_LOOKS)], name
         return LOOKS.get(curve.variant, OTHER), name
 
     return look

@@ -85,7 +85,9 @@ def make_figures(data: Any, kind: str, text: str | None = None, **offered: Any) 
                 f"figure: {text} needs {', '.join(lacking)}, which the table does not have"
             )
         return [_made(figure, data, {**offered, **options})]
-    found = [one for one in figures_of(kind).values() if not _lacking(one, data)]
+    found = [
+        one for one in figures_of(kind).values() if not _lacking(one, data) and one.suits(data)
+    ]
     return [_made(one, data, offered) for one in found]
 
 

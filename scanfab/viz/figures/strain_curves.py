@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Page
     from matplotlib.figure import SubFigure
 
-__all__ = ["ROW", "StrainCurves"]
+__all__ = ["ROW", "StrainCurves", "set_abscissa"]
 
 
 # of each further row of panels, inches
@@ -123,7 +123,7 @@ class StrainCurves(Figure):
         """Of voids, unless contacts are asked for."""
         group = group_of(self.groups)
         _draw_curves(ax, group.drawn, self._quantities[0], self.share)
-        _set_abscissa(ax, abscissa_label(self.data), [group])
+        set_abscissa(ax, abscissa_label(self.data), [group])
         for one in group.drawn:
             # for the legend alone: the curve itself has errors beside it
             ax.plot([], [], label=one.name, **one.look)
@@ -138,7 +138,7 @@ class StrainCurves(Figure):
                 _draw_curves(axes, group.drawn, quantity, self.share)
             panels[0].set_title(group.title, loc="left")
         for axes in rows[-1]:
-            _set_abscissa(axes, abscissa_label(self.data), self.groups)
+            set_abscissa(axes, abscissa_label(self.data), self.groups)
         self._legend(part)
         found: list[Axes] = rows.ravel().tolist()
         return found
@@ -181,7 +181,7 @@ class StrainCurves(Figure):
         )
 
 
-def _set_abscissa(axes: Axes, label: str, groups: Sequence[Group]) -> None:
+def set_abscissa(axes: Axes, label: str, groups: Sequence[Group]) -> None:
     """Label and scale of what the curves are drawn over."""
     from matplotlib.ticker import MaxNLocator
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from scanfab.base.errors import SettingsError
 from scanfab.scan.directions import direction_rule
-from scanfab.table.reading import number_of, numbers_of
+from scanfab.table.reading import number_of, numbers_of, variant_of
 
 __all__ = ["caveats_of"]
 
@@ -64,7 +64,7 @@ def _groups(rows: Sequence[Mapping[str, Any]]) -> dict[tuple[str, str], list[Map
     groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for row in rows:
         if row["alpha_vs_axial"] is not None:
-            groups.setdefault((row["source"], row["variant"]), []).append(row)
+            groups.setdefault((row["source"], variant_of(row)), []).append(row)
     return groups
 
 

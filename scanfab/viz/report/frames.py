@@ -87,17 +87,14 @@ def _facts(look: Look, settings: Settings) -> list[tuple[str, str]]:
         return facts
     facts.append(("cut-off", f"{plan.cutoff:.4g}, {plan.cutoff / smallest:.3g} smallest radii"))
     if plan.window is not None:
-        radius = plan.window.radius
         facts.append(("centre of the RV", ", ".join(f"{one:.4g}" for one in plan.window.center)))
-        if not plan.window.shape.is_sphere:
-            return [*facts, ("shape of the RV", str(plan.window.shape))]
-        facts += [
-            (
-                "radius of the RV",
-                f"{radius:.4g}, {_part_of_sample(first, look, radius)}, "
-                f"{radius / radii.mean():.3g} mean radii",
-            ),
-        ]
+    for window in plan.windows:
+        radius = window.radius
+        if not window.shape.is_sphere:
+            facts.append(("shape of the RV", str(window.shape)))
+            continue
+        size = f"{radius:.4g}, {_part_of_sample(first, look, radius)}"
+        facts.append(("radius of the RV", f"{size}, {radius / radii.mean():.3g} mean radii"))
     return facts
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from scanfab.base.option import flag_of
 from scanfab.pipeline.options import MEANINGS
 from scanfab.pipeline.repeat import spelt_settings
 
@@ -16,7 +17,7 @@ def settings_table(asked: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     spelt = spelt_settings(asked)
     return [
         (
-            name.replace("_", "-"),
+            flag_of(name)[2:],
             _plain(spelt.get(name, "auto" if name in ("spacing", "directions") else "-")),
             MEANINGS.get(name, ""),
         )

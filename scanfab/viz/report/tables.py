@@ -9,7 +9,7 @@ from typing import Any
 
 from scanfab.table.abscissa import STRAINS, spelt_strain, strain_column
 from scanfab.table.curves import is_turned
-from scanfab.table.reading import number_of, numbers_of, total_error
+from scanfab.table.reading import number_of, numbers_of, total_error, variant_of
 from scanfab.table.row import Row as TableRow
 from scanfab.viz.report.page import Part
 
@@ -63,8 +63,8 @@ def overview(table: Path, rows: Sequence[Row]) -> str:
 def _grains(rows: Sequence[Row]) -> str:
     """How many grains each variant has, which are all, those in the RV, or those that carry."""
     of_variant = {}
-    for variant in sorted({str(row["variant"]) for row in rows}):
-        own = numbers_of([row for row in rows if str(row["variant"]) == variant], "grains")
+    for variant in sorted(set(map(variant_of, rows))):
+        own = numbers_of([row for row in rows if variant_of(row) == variant], "grains")
         of_variant[variant] = _span([f"{one:.0f}" for one in sorted(own)]) if own else "-"
     if len(set(of_variant.values())) == 1:
         return f"{next(iter(of_variant.values()))} grains"
@@ -120,7 +120,7 @@ def _part(
 ) -> Part:
     """The lines that are known of some variant."""
     shown = [[name, *cells] for name, cells in lines if any(cell != "-" for cell in cells)]
-    return Part(["variant", *(one.variant for one in summary)], shown, note, source)
+    return Part(["variant", *map(variant_of, summary)], shown, note, source)
 
 
 def _turned_results(
@@ -159,7 +159,8 @@ def _ends(one: TableRow, rows: Sequence[Row]) -> tuple[Row, Row]:
     group = [
         row
         for row in rows
-        if (row["source"], row["variant"]) == (one.source, one.variant) and row[VOID] is not None
+        if (row["source"], variant_of(row)) == (one.source, variant_of(one))
+        and row[VOID] is not None
     ]
     return (group[0], group[-1]) if group else ({}, {})
 
@@ -235,7 +236,7 @@ def _frame_line(row: Row, column: str, several: bool, turned: bool) -> dict[str,
     spelt = "-" if strain is None else f"{100 * strain:.3g} %"
     return {
         "frame": str(row["frame"]),
-        "variant": str(row["variant"]),
+        "variant": variant_of(row),
         "strain": spelt if column == "strain" else "-",
         "shear strain": spelt if column == "shear_strain" else "-",
         **(intensities if turned else {}),

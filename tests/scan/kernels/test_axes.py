@@ -195,15 +195,17 @@ def check_random_packing(kind, random):
 @njit
 def closed_lines(position, radius, triad, grid, clip):
     """How many lines of one strip the sweep of all spheres leaves to be solved again."""
-    projected = project(position, radius, np.zeros(radius.size, np.bool_), triad, grid)
+    projected = project(position, radius, np.zeros(radius.size, np.bool_), triad, grid, 0.0, None)
     pitch = grid.columns + LANES
     strip = strip_of(grid, 0, grid.rows, pitch)
     state, tally = np.empty(strips.STATE_SIZE), np.zeros((2, sweep.TALLY_SIZE))
     every = np.arange(projected.u.size)
     section = section_along(clip, triad)
     strips.begin(state, strip, section, None, True, CLIPPED)
-    reach = section.reach
-    axes.visit_all(state, strip, projected, every, reach, 1e-300, tally, None, True, CLIPPED, None)
+
+    axes.visit_all(
+        state, strip, projected, every, section, 1e-300, tally, None, True, CLIPPED, None
+    )
     return sweep.settle(state, strip, 0, 1e-300, tally, True, CLIPPED, None)
 
 

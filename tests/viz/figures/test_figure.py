@@ -27,8 +27,8 @@ from tests.helpers.tables import curve
 
 pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.base.errors.ScanfabNote")
 OWN = (
-    "evolution", "normalised", "correlation", "rose", "projection", "histogram", "cutoffs",
-    "calibration",
+    "evolution", "normalised", "correlation", "columns", "rose", "projection", "histogram",
+    "cutoffs", "calibration",
 )  # fmt: skip
 FAST = ["--boundary", "mask=3", "--tolerance", "3e-3", "--variants", "c", "--frames", "::6"]
 
@@ -65,8 +65,8 @@ def table(tmp_path):
 
 def test_the_figures_of_the_package_stand_first_and_in_their_order(made_up):
     assert tuple(installed_figures()) == (*OWN, "heights", "made_up")
-    assert [*figures_of("table")] == [*OWN[:3], "made_up"]
-    assert [*figures_of("frames")] == [*OWN[3:7], "heights"]
+    assert [*figures_of("table")] == [*OWN[:4], "made_up"]
+    assert [*figures_of("frames")] == [*OWN[4:8], "heights"]
 
 
 @pytest.mark.parametrize(
@@ -87,7 +87,7 @@ def test_a_made_up_figure_draws_on_the_axes_that_it_gets(table):
     plot = load(table).plot
     assert plot.made_up(ax=ax) is ax
     assert ax.lines[0].get_ydata().tolist() == [0, 5, 10, 15, 20]
-    assert repr(plot) == "Plots(evolution, normalised, correlation, made_up)"
+    assert repr(plot) == "Plots(evolution, normalised, correlation, columns, made_up)"
 
 
 @pytest.mark.usefixtures("made_up")
@@ -133,7 +133,10 @@ def test_a_table_without_its_columns_goes_without_it(tmp_path, capsys):
 @pytest.mark.usefixtures("made_up")
 def test_what_there_is_instead_of_a_figure_names_the_made_up_ones(table, capsys):
     assert run(["compare", str(table), "--plot", "x.png", "--figure", "pie"]) == 2
-    assert "expected evolution, normalised, correlation, made_up, found" in capsys.readouterr().err
+    assert (
+        "expected evolution, normalised, correlation, columns, made_up, found"
+        in capsys.readouterr().err
+    )
 
 
 @pytest.mark.usefixtures("made_up")

@@ -1,0 +1,350 @@
+"""
+Fabric of branches and forces, and the contacts that bear much or little: `with=forces`.
+
+Rothenburg and Bathurst (1989), doi:10.1680/geot.1989.39.4.601, expand the mean branch length and
+the mean forces of the contacts of a direction; Ouadfel and Rothenburg (2001),
+doi:10.1016/S0167-6636(00)00057-0, in three dimensions. With C = 15/2 (G_c - I/3), the second
+order of the density of contacts, and <X> = (1/N_c) Σ X / (1 + n·C·n), a mean over all directions
+alike,
+
+    bn = 15/2 (<b n⊗n> / b0 - I/3),   b0 = tr <b n⊗n>,
+    fn = 15/2 (<f_n n⊗n> / f0 - I/3),  f0 = tr <f_n n⊗n>,
+    ft = 5 dev sym <f_t⊗n> / f0,
+
+with the branch length b, the normal force f_n and the vector f_t of the tangential force. The
+strong contacts, whose normal force is above the mean, and the weak ones have fabric tensors of
+their own (Radjai et al. 1998, doi:10.1103/PhysRevLett.80.61).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.base.column import Column
+from scanfab.base.typing import FloatArray
+from scanfab.fabric.contact import axial_error, contact_fabric
+from scanfab.fabric.tensor import COMPONENTS, FabricTensor
+
+if TYPE_CHECKING:
+    from scanfab.fabric.measured import Measured
+
+__all__ = [
+    "ContactForces",
+    "DirectionalMean",
+    "Forces",
+    "branch_fabric",
+    "doubts_of_forces",
+    "normal_force_fabric",
+    "tangential_force_fabric",
+]
+
+# of a tangential to the mean normal force: what remains of it where only digits are left
+NO_FRICTION = 1e-4
+
+
+class ContactForces(NamedTuple):
+    """What the contacts of one variant bear, and what they span."""
+
+    branch: FloatArray
+    """From the first grain's centre to the second's, along the normal; shape (M,), a length."""
+    force_n: FloatArray
+    """Normal force, compression positive; shape (M,), dump's force unit."""
+    force: FloatArray | None
+    """On the second grain, shape (M, 3); None where only its normal part is known."""
+
+
+@dataclass(frozen=True, eq=False)
+class DirectionalMean:
+    """
+    How a mean over the contacts of a direction depends on that: a tensor without trace.
+
+    Attributes
+    ----------
+    matrix : ndarray
+        Shape (3, 3), dimensionless.
+    axial : float
+        Its value along the loading axis less the mean of those across it.
+    axial_se : float or None
+        Standard error of that if contacts were independent; None for fewer than two.
+    """
+
+    matrix: FloatArray
+    axial: float
+    axial_se: float | None
+
+
+def branch_fabric(
+    normals: npt.ArrayLike, branch: npt.ArrayLike, axis: npt.ArrayLike
+) -> DirectionalMean | None:
+    """
+    Anisotropy of the branch length: 15/2 (<b n⊗n>/b0 - I/3).
+
+    Parameters
+    ----------
+    normals : array_like, shape (M, 3)
+        Unit normals.
+    branch : array_like, shape (M,)
+        Branch lengths.
+    axis : array_like, shape (3,)
+        Loading axis, a unit vector.
+
+    Returns
+    -------
+    DirectionalMean or None
+        None without contacts, and where so few of them lie about some direction that
+        1 + n·C·n is not above 0 there.
+
+    References
+    ----------
+    Rothenburg and Bathurst (1989), doi:10.1680/geot.1989.39.4.601.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab.fabric.forces import branch_fabric
+    >>> found = branch_fabric(np.eye(3), [1.0, 1.0, 2.0], [0, 0, 1])
+    >>> round(found.axial, 9)
+    1.875
+    """
+    vectors = np.asarray(branch, dtype=np.float64)[:, None] * np.asarray(normals)
+    return _mean_by_direction(normals, vectors, np.asarray(branch), 7.5, axis)
+
+
+def normal_force_fabric(
+    normals: npt.ArrayLike, force_n: npt.ArrayLike, axis: npt.ArrayLike
+) -> DirectionalMean | None:
+    """
+    Anisotropy of the normal force: 15/2 (<f_n n⊗n>/f0 - I/3).
+
+    Parameters
+    ----------
+    normals : array_like, shape (M, 3)
+        Unit normals.
+    force_n : array_like, shape (M,)
+        Normal forces, compression positive.
+    axis : array_like, shape (3,)
+        Loading axis, a unit vector.
+
+    Returns
+    -------
+    DirectionalMean or None
+        As :func:`branch_fabric`; None also if f0 is not compression.
+
+    References
+    ----------
+    Ouadfel and Rothenburg (2001), doi:10.1016/S0167-6636(00)00057-0.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab.fabric.forces import normal_force_fabric
+    >>> round(normal_force_fabric(np.eye(3), [1.0, 1.0, 2.0], [0, 0, 1]).axial, 9)
+    1.875
+    """
+    vectors = np.asarray(force_n, dtype=np.float64)[:, None] * np.asarray(normals)
+    return _mean_by_direction(normals, vectors, np.asarray(force_n), 7.5, axis)
+
+
+def tangential_force_fabric(
+    normals: npt.ArrayLike, force: npt.ArrayLike, axis: npt.ArrayLike
+) -> DirectionalMean | None:
+    """
+    Anisotropy of the tangential force: 5 dev sym <f_t⊗n> / f0.
+
+    Parameters
+    ----------
+    normals : array_like, shape (M, 3)
+        Unit normals from the first grain to the second.
+    force : array_like, shape (M, 3)
+        Forces on the second grain.
+    axis : array_like, shape (3,)
+        Loading axis, a unit vector.
+
+    Returns
+    -------
+    DirectionalMean or None
+        As :func:`normal_force_fabric`.
+
+    References
+    ----------
+    Ouadfel and Rothenburg (2001), doi:10.1016/S0167-6636(00)00057-0.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab.fabric.forces import tangential_force_fabric
+    >>> n = np.eye(3)
+    >>> found = tangential_force_fabric(n, n, [0, 0, 1])  # normal forces alone
+    >>> np.abs(found.matrix).max()
+    np.float64(0.0)
+    """
+    n, f = np.asarray(normals, dtype=np.float64), np.asarray(force, dtype=np.float64)
+    force_n = np.einsum("ci,ci->c", f, n)
+    return _mean_by_direction(n, f - force_n[:, None] * n, force_n, 5.0, axis)
+
+
+def _mean_by_direction(
+    normals: npt.ArrayLike,
+    vectors: FloatArray,
+    size: FloatArray,
+    factor: float,
+    axis: npt.ArrayLike,
+) -> DirectionalMean | None:
+    """``factor`` dev sym <v⊗n> / <size>, and its axial value with the error of that."""
+    n, a = np.asarray(normals, dtype=np.float64), np.asarray(axis, dtype=np.float64)
+    weights = _weights(n)
+    if weights is None:
+        return None
+    count = len(n)
+    scale = float(weights @ size) / count
+    if scale <= 0.0:
+        return None
+    product = (weights[:, None] * vectors).T @ n / count
+    product = 0.5 * (product + product.T)
+    matrix = factor / scale * (product - np.trace(product) / 3.0 * np.eye(3))
+    # 3/2 a·T·a of a tensor without trace: its value along the axis less that across it
+    along = (vectors @ a) * (n @ a) - np.einsum("ci,ci->c", vectors, n) / 3.0
+    ratio = float(weights @ along) / count / scale
+    influence = _influence(n, weights, along - ratio * size)
+    error = 1.5 * factor / scale * np.std(influence, ddof=1) / np.sqrt(count) if count > 1 else None
+    return DirectionalMean(matrix, 1.5 * factor * ratio, None if error is None else float(error))
+
+
+def _weights(normals: FloatArray) -> FloatArray | None:
+    """1 / (1 + n·C·n) of each contact; None where that is not above 0."""
+    fabric = contact_fabric(normals)
+    if fabric is None:
+        return None
+    deviator = 7.5 * (fabric.matrix - np.eye(3) / 3.0)
+    density = 1.0 + np.einsum("ci,ij,cj->c", normals, deviator, normals)
+    return None if density.min() <= 0.0 else 1.0 / density
+
+
+def _influence(normals: FloatArray, weights: FloatArray, values: FloatArray) -> FloatArray:
+    """
+    By how much each contact moves the mean of weights times values, times their number.
+
+    A contact counts in the mean, and moves C, and so the weights of all: without this second part
+    the error would be several times too large.
+    """
+    count = len(normals)
+    through = 7.5 * ((weights**2 * values)[:, None] * normals).T @ normals / count
+    moved: FloatArray = weights * values
+    moved -= np.einsum("ci,ij,cj->c", normals, through, normals)
+    return moved
+
+
+def _tensor_columns(name: str, what: str) -> tuple[Column, ...]:
+    return tuple(Column(f"{name}_{one}", float, "", f"{one} of {what}") for one in COMPONENTS)
+
+
+def _axial_columns(name: str, what: str) -> tuple[Column, ...]:
+    return (
+        Column(f"alpha_{name}_axial", float, "", f"{what}, signed, along the loading axis"),
+        Column(
+            f"alpha_{name}_axial_se", float, "", "its standard error if contacts were independent"
+        ),
+    )
+
+
+TENSORS = {
+    "bn": "the tensor of branch lengths, 15/2 (<b n n>/b0 - I/3)",
+    "fn": "the tensor of normal forces, 15/2 (<f_n n n>/f0 - I/3)",
+    "ft": "the tensor of tangential forces, 5 dev sym <f_t n>/f0",
+    "gc_strong": "the fabric tensor of contacts whose normal force is above the mean, trace 1",
+    "gc_weak": "the fabric tensor of the other contacts, trace 1",
+}
+AXIAL = {
+    "bn": "anisotropy of branch lengths, 3/2 a·bn·a",
+    "fn": "anisotropy of normal forces, 3/2 a·fn·a",
+    "ft": "anisotropy of tangential forces, 3/2 a·ft·a",
+    "gc_strong": "anisotropy of the strong contacts",
+    "gc_weak": "anisotropy of the weak contacts",
+}
+
+
+class Forces:
+    """The columns of branches, forces, and strong and weak contacts."""
+
+    columns = (
+        *(column for name, what in TENSORS.items() for column in _tensor_columns(name, what)),
+        *(column for name, what in AXIAL.items() for column in _axial_columns(name, what)),
+    )
+
+    def values(self, measured: Measured) -> dict[str, Any]:
+        """All None without contacts."""
+        found: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
+        normals, axis, forces = measured.normals, measured.axis, measured.forces
+        if forces is None:
+            return found
+        found |= _mean_values("bn", branch_fabric(normals, forces.branch, axis))
+        found |= _mean_values("fn", normal_force_fabric(normals, forces.force_n, axis))
+        if forces.force is not None:
+            found |= _mean_values("ft", tangential_force_fabric(normals, forces.force, axis))
+        if len(normals):
+            strong = forces.force_n > forces.force_n.mean()
+            found |= _contact_values("gc_strong", normals[strong], axis)
+            found |= _contact_values("gc_weak", normals[~strong], axis)
+        return found
+
+
+def _mean_values(name: str, mean: DirectionalMean | None) -> dict[str, float | None]:
+    if mean is None:
+        return {}
+    components = {f"{name}_{one}": float(mean.matrix[place]) for one, place in COMPONENTS.items()}
+    return {
+        **components,
+        f"alpha_{name}_axial": mean.axial,
+        f"alpha_{name}_axial_se": mean.axial_se,
+    }
+
+
+def _contact_values(name: str, normals: FloatArray, axis: FloatArray) -> dict[str, float | None]:
+    tensor: FabricTensor | None = contact_fabric(normals)
+    if tensor is None:
+        return {}
+    return {
+        **{f"{name}_{one}": value for one, value in tensor.components().items()},
+        f"alpha_{name}_axial": tensor.axial(axis),
+        f"alpha_{name}_axial_se": axial_error(normals, axis),
+    }
+
+
+def _is_frictionless(normals: FloatArray, forces: ContactForces) -> bool:
+    """Whether all forces are along the normals, but for the digits of the dump."""
+    assert forces.force is not None
+    tangential = forces.force - forces.force_n[:, None] * normals
+    return bool(np.abs(tangential).max() <= NO_FRICTION * np.abs(forces.force_n).mean())
+
+
+def doubts_of_forces(measured: Measured) -> dict[str, str]:
+    """Why some of these columns are empty, or 0, by the code of a note."""
+    forces = measured.forces
+    if forces is None or not len(measured.normals):
+        return {}
+    texts = {}
+    if _weights(measured.normals) is None:
+        texts["few_contacts"] = (
+            "the contacts are so few, or so anisotropic, that 1 + n·C·n is not above 0 in "
+            "some direction: bn, fn and ft are empty"
+        )
+    elif forces.force_n.sum() <= 0.0:
+        texts["tension"] = (
+            "the contacts pull in the mean, so fn and ft are empty: is the force in the dump "
+            "that on the other grain?"
+        )
+    if forces.force is None:
+        texts["no_tangential"] = (
+            "the dump has the normal part of the contact forces only: ft is empty"
+        )
+    elif _is_frictionless(measured.normals, forces):
+        texts["no_tangential"] = (
+            "no contact has a tangential force, so ft is 0: are the contacts without friction, "
+            "or is the force of `contact_columns` its normal part only (LAMMPS: name tx, ty, "
+            "tz too)?"
+        )
+    return texts

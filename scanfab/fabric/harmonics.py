@@ -1,0 +1,155 @@
+"""
+Order 2 and 4 of the void lengths and of the contact normals, and fourth-order tensors.
+
+a_l = (2l + 1) <P_l(a·n)> about the loading axis a, with the Legendre polynomials P_l: the
+coefficients of the distribution E(n) = 1/4π (1 + a_2 P_2 + a_4 P_4 + ...). For contacts the mean
+is over them, for voids it is weighted with ℓ(n). Kanatani (1984),
+doi:10.1016/0020-7225(84)90090-9, has the tensors of any order.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.base.column import Column
+from scanfab.base.typing import FloatArray
+
+if TYPE_CHECKING:
+    from scanfab.fabric.measured import Measured
+    from scanfab.fabric.void import VoidFabric
+
+__all__ = ["Harmonics", "legendre", "tensor4"]
+
+ORDERS = (2, 4)
+
+
+def legendre(order: int, cosine: npt.ArrayLike) -> FloatArray:
+    """
+    The Legendre polynomial of order 2 or 4.
+
+    Parameters
+    ----------
+    order : int
+        2 or 4.
+    cosine : array_like
+        Of the angle to the axis.
+
+    Returns
+    -------
+    ndarray
+        Of the same shape.
+
+    Examples
+    --------
+    >>> from scanfab.fabric.harmonics import legendre
+    >>> float(legendre(4, 1.0)), float(legendre(2, 0.0))
+    (1.0, -0.5)
+    """
+    square = np.asarray(cosine, dtype=np.float64) ** 2
+    if order == 2:
+        return np.asarray(1.5 * square - 0.5)
+    return np.asarray((35.0 * square**2 - 30.0 * square + 3.0) / 8.0)
+
+
+def tensor4(vectors: npt.ArrayLike, weights: npt.ArrayLike) -> FloatArray:
+    """
+    The weighted mean of n⊗n⊗n⊗n.
+
+    Parameters
+    ----------
+    vectors : array_like, shape (M, 3)
+        Unit vectors.
+    weights : array_like, shape (M,)
+        Of any sum.
+
+    Returns
+    -------
+    ndarray, shape (3, 3, 3, 3)
+        Symmetric in all its indices; twice contracted it has trace 1.
+
+    References
+    ----------
+    Kanatani, Distribution of directional data and fabric tensors, Int. J. Eng. Sci. 22 (1984),
+    doi:10.1016/0020-7225(84)90090-9: N of rank 4.
+
+    Examples
+    --------
+    >>> from scanfab.fabric.harmonics import tensor4
+    >>> tensor4([[0, 0, 1], [1, 0, 0]], [1, 1])[2, 2, 2, 2]
+    np.float64(0.5)
+    """
+    n, w = np.asarray(vectors, dtype=np.float64), np.asarray(weights, dtype=np.float64)
+    pairs = np.einsum("ci,cj->cij", n, n).reshape(len(n), 9)
+    found: FloatArray = ((w[:, None] * pairs).T @ pairs / w.sum()).reshape(3, 3, 3, 3)
+    return found
+
+
+def _columns(prefix: str, what: str) -> tuple[Column, ...]:
+    return tuple(
+        column
+        for order in ORDERS
+        for column in (
+            Column(f"{prefix}_a{order}", float, "", f"order {order} of {what} about the axis"),
+            Column(f"{prefix}_a{order}_se", float, "", "its standard error"),
+        )
+    )
+
+
+class Harmonics:
+    """The columns of the harmonics; those of the tensors are in JSON alone."""
+
+    columns = (
+        *_columns("vs", "the mean void lengths"),
+        *_columns("c", "the contact normals"),
+        Column(
+            "vs_tensor4",
+            list,
+            "",
+            "void fabric tensor of fourth order, Σ w ℓ nnnn / Σ w ℓ: 81 numbers, the last index "
+            "counts fastest; in JSON only",
+        ),
+        Column(
+            "c_tensor4", list, "", "contact fabric tensor of fourth order, likewise; in JSON only"
+        ),
+    )
+
+    def values(self, measured: Measured) -> dict[str, Any]:
+        """All None of a fabric that does not exist."""
+        found: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
+        if measured.void is not None:
+            found |= _of_voids(measured.void, measured.axis)
+        if len(measured.normals):
+            found |= _of_contacts(measured.normals, measured.axis)
+        return found
+
+
+def _of_voids(void: VoidFabric, axis: FloatArray) -> dict[str, Any]:
+    """Of each replicate, then their mean; the error from their scatter, as that of the tensor."""
+    weights = void.weights * void.mean_lengths
+    weights = weights / weights.sum(axis=1, keepdims=True)
+    found: dict[str, Any] = {}
+    for order in ORDERS:
+        means = np.sum(weights * legendre(order, void.axes @ axis), axis=1)
+        values = (2 * order + 1) * means
+        found[f"vs_a{order}"] = float(values.mean())
+        found[f"vs_a{order}_se"] = _error(values)
+    tensor = tensor4(void.axes.reshape(-1, 3), weights.ravel())
+    return {**found, "vs_tensor4": tensor.ravel().tolist()}
+
+
+def _of_contacts(normals: FloatArray, axis: FloatArray) -> dict[str, Any]:
+    """The error is that of a mean over independent contacts."""
+    found: dict[str, Any] = {}
+    for order in ORDERS:
+        values = (2 * order + 1) * legendre(order, normals @ axis)
+        found[f"c_a{order}"] = float(values.mean())
+        found[f"c_a{order}_se"] = _error(values)
+    return {**found, "c_tensor4": tensor4(normals, np.ones(len(normals))).ravel().tolist()}
+
+
+def _error(values: FloatArray) -> float | None:
+    """Standard error of the mean; None for one value."""
+    return float(np.std(values, ddof=1) / np.sqrt(len(values))) if len(values) > 1 else None

@@ -1,0 +1,185 @@
+"""
+Invariants of the fabric tensors: F = 15/2 (G - I/3), a = √(3/2 F:F), principal values, b.
+
+Kanatani (1984), doi:10.1016/0020-7225(84)90090-9: F is the second order of the distribution of
+directions 1/4π (1 + n·F·n). a is never negative: in an isotropic sample it is what the scatter of
+its few contacts or segments makes it, and the columns ``_bias`` say how much that is.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from scanfab.base.column import Column
+from scanfab.base.typing import FloatArray
+from scanfab.fabric.tensor import FabricTensor
+
+if TYPE_CHECKING:
+    from scanfab.fabric.measured import Measured
+
+__all__ = ["Invariants", "fabric_deviator", "intensity"]
+
+# a tensor's deviator has five components of equal variance in an isotropic sample: a is
+# √(3/2) · 15/2 times the root of the sum of their squares, which in the mean is 2.1277 standard
+# deviations, the mean of chi with five degrees of freedom
+MEAN_CHI5 = math.sqrt(2.0) * math.gamma(3.0) / math.gamma(2.5)
+BIAS = math.sqrt(1.5) * 7.5 * MEAN_CHI5
+# variance of one such component of n⊗n, of a unit vector n that has any direction alike
+CONTACT_VARIANCE = 2.0 / 15.0
+# b says nothing where largest and smallest principal value differ by less, over √N
+LEAST_ALPHA = 3.0
+
+
+def fabric_deviator(matrix: FloatArray) -> FloatArray:
+    """
+    F = 15/2 (G - I/3).
+
+    Parameters
+    ----------
+    matrix : ndarray, shape (..., 3, 3)
+        Fabric tensors of trace 1.
+
+    Returns
+    -------
+    ndarray, shape (..., 3, 3)
+
+    References
+    ----------
+    Kanatani (1984), doi:10.1016/0020-7225(84)90090-9.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab.fabric.invariants import fabric_deviator
+    >>> np.round(np.diag(fabric_deviator(np.diag([0.3, 0.3, 0.4]))), 9)
+    array([-0.25, -0.25,  0.5 ])
+    """
+    return 7.5 * (matrix - np.eye(3) / 3.0)
+
+
+def intensity(matrix: FloatArray) -> float:
+    """
+    a = √(3/2 F:F), which is 7.5 |alpha_axial| for transverse isotropy about the axis.
+
+    Parameters
+    ----------
+    matrix : ndarray, shape (3, 3)
+        Fabric tensor of trace 1.
+
+    Returns
+    -------
+    float
+        0 or more.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab.fabric.invariants import intensity
+    >>> round(intensity(np.diag([0.3, 0.3, 0.4])), 9)
+    0.75
+    """
+    return float(math.sqrt(1.5) * np.linalg.norm(fabric_deviator(matrix)))
+
+
+def _columns() -> tuple[Column, ...]:
+    names = {"vs": "void fabric", "c": "contact fabric"}
+    of = {"vs": "of the scan", "c": "if contacts were independent"}
+    bias = {"vs": "the noise of this scan", "c": "as many independent contacts"}
+    main = [
+        Column(f"f_{one}", float, "", f"a = √(3/2 F:F) of the {what}, F = 15/2 (G - I/3)")
+        for one, what in names.items()
+    ]
+    main += [
+        Column(f"f_{one}_bias", float, "", f"what {bias[one]} would give f_{one} in the mean")
+        for one in names
+    ]
+    main += [
+        Column(f"g{one}_{k}", float, "", f"principal value of the {what}, {which}")
+        for one, what in names.items()
+        for k, which in ((1, "the largest"), (2, "the middle one"), (3, "the smallest"))
+    ]
+    main += [
+        Column(
+            f"b_{one}",
+            float,
+            "",
+            f"(G2 - G3)/(G1 - G3) of the {what}, 0 to 1; empty where G1 - G3 is below 3/√N",
+        )
+        for one, what in names.items()
+    ]
+    errors = [
+        Column(f"{name}_se", float, "", f"standard error of {name}, {of[one]}")
+        for one in names
+        for name in (f"f_{one}", *(f"g{one}_{k}" for k in (1, 2, 3)))
+    ]
+    return (*main, *errors)
+
+
+class Invariants:
+    """The columns of the invariants."""
+
+    columns = _columns()
+
+    def values(self, measured: Measured) -> dict[str, Any]:
+        """All None of a fabric that does not exist."""
+        found: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
+        if measured.void is not None:
+            tensors = measured.void.replicates
+            found |= _values("vs", measured.void.tensor, measured.segment_count)
+            found["f_vs_bias"] = _scan_bias(tensors)
+            found |= _errors("vs", measured.void.tensor, lambda form: _scatter(tensors, form))
+        if measured.contact is not None:
+            count = len(measured.normals)
+            found |= _values("c", measured.contact, count)
+            found["f_c_bias"] = BIAS * math.sqrt(CONTACT_VARIANCE / count)
+            n = measured.normals
+            pairs = np.einsum("ci,cj->cij", n, n)
+            found |= _errors("c", measured.contact, lambda form: _scatter(pairs, form))
+        return found
+
+
+def _values(name: str, tensor: FabricTensor, count: int) -> dict[str, float | None]:
+    largest, middle, smallest = (float(one) for one in tensor.principal_values)
+    alpha = largest - smallest
+    known = count > 0 and alpha >= LEAST_ALPHA / math.sqrt(count)
+    return {
+        f"f_{name}": intensity(tensor.matrix),
+        f"g{name}_1": largest,
+        f"g{name}_2": middle,
+        f"g{name}_3": smallest,
+        f"b_{name}": (middle - smallest) / alpha if known else None,
+    }
+
+
+def _scan_bias(tensors: FloatArray) -> float | None:
+    """What the scatter of replicates, shape (R, 3, 3), gives a of their mean; None for one."""
+    count = len(tensors)
+    if count < 2:
+        return None
+    # all are of trace 1, so the five components of the deviator share what there is of variance
+    variance = float(np.sum(np.var(tensors, axis=0, ddof=1))) / 5.0 / count
+    return BIAS * math.sqrt(variance)
+
+
+def _scatter(tensors: FloatArray, form: FloatArray) -> float | None:
+    """Standard error of the mean of T:form over some tensors, shape (M, 3, 3)."""
+    count = len(tensors)
+    if count < 2:
+        return None
+    along = np.einsum("cij,ij->c", tensors, form)
+    return float(np.std(along, ddof=1) / math.sqrt(count))
+
+
+def _errors(name: str, tensor: FabricTensor, scatter: Any) -> dict[str, float | None]:
+    """Of a and of the principal values: to first order each is linear in G."""
+    deviator = fabric_deviator(tensor.matrix)
+    size = float(np.linalg.norm(deviator))
+    found: dict[str, float | None] = {}
+    if size > 0.0:
+        found[f"f_{name}_se"] = scatter(math.sqrt(1.5) * 7.5 * deviator / size)
+    for k, axis in enumerate(tensor.principal_axes, start=1):
+        found[f"g{name}_{k}_se"] = scatter(np.outer(axis, axis))
+    return found

@@ -1,0 +1,244 @@
+"""Void ratio, stress and mechanical coordination of a frame: what `with=state` is made of."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from scanfab.base.convex import Convex
+from scanfab.base.errors import PackingError
+from scanfab.base.typing import BoolArray, FloatArray
+from scanfab.fabric.forces import ContactForces
+from scanfab.fabric.state import SampleState, love_weber
+from scanfab.packing.clump_volumes import lens_volumes, own_shares
+from scanfab.packing.packing import Packing
+from scanfab.packing.sample import Sample, Variant
+from scanfab.packing.window import Window
+
+__all__ = ["contact_forces", "doubts_of_state", "refuse_without_forces", "sample_state"]
+
+# points that stand for a grain where the surface of an RV that is no sphere cuts it
+POINTS = 2048
+# grains at a time, times their points: some tens of megabytes
+CHUNK = 256
+
+
+def refuse_without_forces(sample: Sample) -> None:
+    """PackingError if the forces of contacts are asked for, and the dump has none."""
+    contacts = sample.contacts
+    if contacts.force_n is None and len(contacts):
+        found = "are found by geometry" if contacts.source == "geometric" else "have none"
+        raise PackingError(
+            f"with_: forces were asked for, but the contacts of the frame {found}: name a file "
+            f"that lists contacts with their forces (`contacts`), or which of its columns they are "
+            f"(`contact_columns`)"
+        )
+
+
+def contact_forces(sample: Sample, chosen: BoolArray) -> ContactForces | None:
+    """
+    What some contacts bear and span; None if that is not known.
+
+    Raises
+    ------
+    PackingError
+        If a force is no finite number.
+    """
+    contacts, packing = sample.contacts, sample.packing
+    if contacts.force_n is None:
+        return None
+    wrong = chosen & ~np.isfinite(contacts.force_n)
+    if wrong.any():
+        one, two = packing.id[contacts.pairs[np.argmax(wrong)]]
+        raise PackingError(
+            f"the contact of the grains {one} and {two} has a force that is no finite number"
+        )
+    branch = np.einsum("ci,ci->c", _branches(packing)[chosen], contacts.normal[chosen])
+    force = None if contacts.force is None else contacts.force[chosen]
+    return ContactForces(branch, contacts.force_n[chosen], force)
+
+
+def sample_state(sample: Sample, variant: Variant, window: Window | None) -> SampleState:
+    """
+    The state of the whole, or of the RV.
+
+    Rattlers are solid, and all contacts bear stress, in all variants; the coordination is of the
+    variant's grains.
+    """
+    region = window if variant.in_window else None
+    counted = sample.once(sample.counted(variant, region) & ~sample.removed(variant))
+    numbers = (
+        sample.contact_numbers_without_rattlers
+        if variant.without_rattlers
+        else sample.contact_numbers
+    )[counted]
+    held = numbers[numbers >= 2]
+    return SampleState(
+        void_ratio=_void_ratio(sample, region),
+        coordination_mechanical=float(held.mean()) if len(held) else None,
+        stress=_stress(sample, region),
+    )
+
+
+def doubts_of_state(sample: Sample, variant: Variant, window: Window | None) -> dict[str, str]:
+    """Why there is no stress, or whom it leaves out, by the code of a note."""
+    contacts, packing = sample.contacts, sample.packing
+    region = window if variant.in_window else None
+    if len(contacts) and contacts.force is None:
+        known = "no forces" if contacts.force_n is None else "the normal part of forces only"
+        return {
+            "no_stress": f"the contacts have {known}: stress, and what follows from it, is empty"
+        }
+    if _volume(packing, region) is None:
+        return {
+            "no_volume": "void ratio and stress of the whole are empty: they need a volume, which "
+            "is that of a cell that repeats along all its vectors, or of an RV"
+        }
+    walls = packing.wall_contacts > 0
+    if (
+        region is not None
+        and walls.any()
+        and region.contains(packing.position[walls], packing).any()
+    ):
+        return {
+            "wall_stress": "grains in the RV touch walls, whose forces are not read: the stress "
+            "leaves these contacts out; choose a smaller RV"
+        }
+    return {}
+
+
+def _volume(packing: Packing, window: Window | None) -> float | None:
+    if window is not None:
+        return window.shape.volume
+    cell = packing.cell
+    if cell is None or not all(cell.periodic):
+        return None
+    return float(abs(np.linalg.det(cell.vectors)))
+
+
+def _places(packing: Packing) -> FloatArray:
+    """The place of each sphere's grain, next to the sphere, shape (N, 3): that of a clump."""
+    bodies, position = packing.bodies, packing.position
+    return position if bodies is None else position + bodies.to_place(position, packing.cell)
+
+
+def _branches(packing: Packing) -> FloatArray:
+    """From the first grain's place to the second's, shape (M, 3)."""
+    contacts, places = packing.contacts, _places(packing)
+    assert contacts is not None
+    one, two = contacts.pairs.T
+    branch: FloatArray = places[two] - places[one]
+    if packing.cell is not None:
+        branch = branch + contacts.image @ packing.cell.vectors
+    return branch
+
+
+def _stress(sample: Sample, window: Window | None) -> FloatArray | None:
+    """Of all contacts that a grain has part in; None without forces or a volume."""
+    packing, contacts = sample.packing, sample.contacts
+    volume = _volume(packing, window)
+    if contacts.force is None or volume is None:
+        return None
+    one, two = contacts.pairs.T
+    start, branch = _places(packing)[one], _branches(packing)
+    end = start + branch
+    # boundary is a wall: the branch of such a contact ends where the grain does
+    start = np.where(sample.boundary[one][:, None], contacts.point, start)
+    end = np.where(sample.boundary[two][:, None], contacts.point, end)
+    branch = end - start
+    chosen = ~(sample.boundary[one] & sample.boundary[two]) & branch.any(axis=1)
+    start, branch, force = start[chosen], branch[chosen], contacts.force[chosen]
+    if window is not None:
+        branch = branch * _shares(start, branch, window, packing)[:, None]
+    return love_weber(force, branch, volume)
+
+
+def _shares(start: FloatArray, branch: FloatArray, window: Window, packing: Packing) -> FloatArray:
+    """The part of each branch that lies in the window, of all its images together."""
+    shape, origin = window.shape, start - window.center
+    if packing.cell is None or not packing.is_periodic:
+        return shape.share(origin, branch)
+    lattice = packing.cell.lattice
+    origin = origin + packing.cell.nearest_image(origin) @ packing.cell.vectors
+    longest = float(np.linalg.norm(branch, axis=1).max(initial=0.0))
+    found = shape.share(origin, branch)
+    for shift in lattice.within(shape.reach + longest + lattice.half_extent):
+        found += shape.share(origin + shift, branch)
+    return found
+
+
+def _void_ratio(sample: Sample, window: Window | None) -> float | None:
+    """(1 - ν)/ν with the volumes of grains summed up; None without a volume or grains."""
+    packing = sample.packing
+    volume = _volume(packing, window)
+    if volume is None:
+        return None
+    position, radius = packing.position[sample.grains], packing.radius[sample.grains]
+    # in a clump what several spheres share is there once
+    share = np.ones_like(radius)
+    if packing.bodies is not None:
+        share = own_shares(packing, _points_in_ball())[sample.grains]
+    if window is None:
+        solid = float(np.sum(4.0 / 3.0 * math.pi * radius**3 * share))
+    else:
+        solid = _volume_inside(position, radius, share, window, packing)
+    return None if solid == 0.0 else (volume - solid) / solid
+
+
+def _volume_inside(
+    position: FloatArray, radius: FloatArray, share: FloatArray, window: Window, packing: Packing
+) -> float:
+    """
+    What of the volumes of spheres lies in a window, through periodic faces too.
+
+    Of the volume of each, ``share`` counts, shape (N,).
+    """
+    shape, origin = window.shape, position - window.center
+    shifts = np.zeros((1, 3))
+    if packing.cell is not None and packing.is_periodic:
+        lattice = packing.cell.lattice
+        origin = origin + packing.cell.nearest_image(origin) @ packing.cell.vectors
+        reach = shape.reach + float(radius.max(initial=0.0)) + lattice.half_extent
+        shifts = np.concatenate([shifts, lattice.within(reach)])
+    total = 0.0
+    for shift in shifts:
+        places = origin + shift
+        near = shape.may_meet(places, radius)
+        part = lenses if shape.is_sphere else cut_volumes
+        inside = part(places[near], radius[near], shape)
+        total += float((inside * share[near]).sum())
+    return total
+
+
+def lenses(places: FloatArray, radius: FloatArray, ball: Convex) -> FloatArray:
+    """Volumes that spheres share with a ball about the origin, shape (N,)."""
+    return lens_volumes(np.linalg.norm(places, axis=1), radius, ball.reach)
+
+
+def cut_volumes(places: FloatArray, radius: FloatArray, shape: Convex) -> FloatArray:
+    """Volumes that spheres share with a region, by points that fill each evenly, shape (N,)."""
+    points = _points_in_ball()
+    found = shape.surely_holds(places, radius).astype(np.float64)
+    cut = np.flatnonzero(found == 0.0)
+    for first in range(0, len(cut), CHUNK):
+        rows = cut[first : first + CHUNK]
+        spread = places[rows, None] + radius[rows, None, None] * points
+        inside = shape.contains(spread.reshape(-1, 3)).reshape(-1, len(points))
+        found[rows] = inside.mean(axis=1)
+    return found * 4.0 / 3.0 * math.pi * radius**3
+
+
+def _points_in_ball() -> FloatArray:
+    """Points that fill the unit ball evenly, each with its opposite, shape (P, 3)."""
+    from scipy.stats import qmc
+
+    # shells of equal volume, directions of equal solid angle
+    share, height, turn = qmc.Sobol(3, scramble=False).random(POINTS // 2).T
+    share = (share + 0.5 / len(share)) ** (1.0 / 3.0)
+    cosine = 2.0 * (height + 0.5 / len(height)) - 1.0
+    across = np.sqrt(1.0 - cosine**2)
+    angle = 2.0 * math.pi * turn
+    unit = np.column_stack([across * np.cos(angle), across * np.sin(angle), cosine])
+    half = share[:, None] * unit
+    return np.concatenate([half, -half])

@@ -1,0 +1,240 @@
+"""Groups of further columns, as users ask for them: what is there, what is said where it is not."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab import Cell, ContactList, Packing
+from scanfab.base.errors import PackingError, SettingsError
+from scanfab.fabric.registry import GROUPS
+from scanfab.fabric.state import SampleState, State
+from scanfab.pipeline.values import GROUP_NAMES
+from scanfab.table.columns import COLUMNS
+from tests.helpers.measured import measured_of
+from tests.helpers.truth import CELL, SAMPLE_DATA, TRIAXIAL
+
+FAST = {"directions": 13, "spacing": "3rmin", "workers": 1}
+YADE = SAMPLE_DATA / "yade_forces" / "forces.xml.bz2"
+
+
+@pytest.fixture(scope="module")
+def yade():
+    return scanfab.read(YADE)
+
+
+def names(*groups):
+    return [
+        column.name for group in GROUP_NAMES if group in groups for column in GROUPS[group].columns
+    ]
+
+
+def test_the_groups_are_those_of_the_option():
+    assert tuple(GROUPS) == GROUP_NAMES
+    found = [column.name for group in GROUPS.values() for column in group.columns]
+    assert len(set(found)) == len(found)
+    assert not set(found) & set(COLUMNS)
+
+
+@pytest.mark.parametrize("asked", ["forces,state", ["state", "forces"], "state forces"])
+def test_several_groups_stand_behind_the_others_in_one_order(yade, asked):
+    row = scanfab.compute(yade, variants="a", with_=asked, **{**FAST, "spacing": "1rmin"})[0]
+    assert list(row) == [*COLUMNS, *names("state", "forces")]
+    missing = [name for name in names("state", "forces") if row[name] is None]
+    assert missing == []
+
+
+def test_without_them_nothing_changes(yade):
+    rows = [scanfab.compute(yade, variants="ac", with_=one, **FAST) for one in ((), "harmonics")]
+    for plain, more in zip(*rows, strict=True):
+        assert dict(plain) == {name: more[name] for name in plain}
+
+
+@pytest.mark.parametrize("wrong", ["force", "forces,stress", 3])
+def test_an_unknown_group_is_named(yade, wrong):
+    with pytest.raises(SettingsError, match="with_: expected groups of columns out of invariants"):
+        scanfab.compute(yade, with_=wrong)
+
+
+def test_forces_that_nobody_has_are_an_error():
+    packing = scanfab.read(YADE, contacts="geometric")
+    with pytest.raises(PackingError, match=r"forces were asked for, but .* found by geometry"):
+        scanfab.compute(packing, with_="forces", **FAST)
+
+
+def test_a_frame_without_forces_can_be_skipped(yade):
+    bare = scanfab.find_contacts(yade.with_contacts(ContactList(np.zeros((0, 2)))))
+    bare = bare.with_contacts(ContactList(bare.contacts.pairs, bare.contacts.image))
+    with pytest.warns(scanfab.ScanfabWarning, match="forces were asked for, but .* have none"):
+        found = scanfab.compute([yade, bare], with_="forces", variants="a", on_error="skip", **FAST)
+    assert found["frame"].tolist() == [0]
+
+
+def test_stress_without_forces_is_empty_with_one_note():
+    packing = scanfab.read(YADE, contacts="geometric")
+    with pytest.warns(scanfab.ScanfabWarning) as told:
+        found = scanfab.compute(packing, with_="state", variants="ac", **FAST)
+    texts = [str(one.message) for one in told if "stress" in str(one.message)]
+    assert len(texts) == 1
+    assert "variants a, c" in texts[0] or "a and c" in texts[0] or "variant" in texts[0]
+    for row in found:
+        assert row.void_ratio > 0
+        assert row.coordination_mechanical > 2
+        for name in names("state"):
+            if name not in ("void_ratio", "coordination_mechanical", "volumetric_strain"):
+                assert row[name] is None
+
+
+def test_the_normal_part_alone_gives_all_but_the_tangential(yade):
+    contacts = yade.contacts
+    packing = yade.with_contacts(
+        ContactList(contacts.pairs, contacts.image, force_n=contacts.force_n)
+    )
+    with pytest.warns(scanfab.ScanfabWarning, match="normal part of"):
+        row = scanfab.compute(packing, with_="forces,state", variants="a", **FAST)[0]
+    full = scanfab.compute(yade, with_="forces,state", variants="a", **FAST)[0]
+    for name in names("forces"):
+        if "ft" in name:
+            assert row[name] is None
+        else:
+            assert row[name] == pytest.approx(full[name], abs=1e-12)
+    assert row.stress_xx is None
+
+
+def test_contacts_that_pull_have_no_force_fabric(yade):
+    contacts = yade.contacts
+    packing = yade.with_contacts(ContactList(contacts.pairs, contacts.image, -contacts.force))
+    with pytest.warns(scanfab.ScanfabWarning, match="the contacts pull in the mean"):
+        row = scanfab.compute(packing, with_="forces", variants="a", **FAST)[0]
+    assert row.fn_xx is None
+    assert row.bn_xx is not None
+
+
+def test_a_force_that_is_no_number_is_named(yade):
+    contacts, force = yade.contacts, yade.contacts.force.copy()
+    force[3, 1] = np.nan
+    packing = yade.with_contacts(ContactList(contacts.pairs, contacts.image, force))
+    with pytest.raises(PackingError, match="has a force that is no finite number"):
+        scanfab.compute(packing, with_="forces", variants="a", **FAST)
+
+
+def test_no_contacts_are_no_error():
+    rng = np.random.default_rng(1)
+    grid = np.stack(np.meshgrid(*3 * [np.arange(4.0)]), axis=-1).reshape(-1, 3)
+    packing = Packing(
+        grid + 0.1 * rng.random(grid.shape), 0.3, contacts=[], cell=Cell([4.0, 4.0, 4.0])
+    )
+    row = scanfab.compute(packing, with_="forces,state", variants="a", **FAST)[0]
+    assert row.fn_xx is None
+    assert row.void_ratio > 0
+
+
+def test_boundary_and_rattlers(yade):
+    """Rattlers are solid in the void ratio, and not in the contacts of b."""
+    found = scanfab.compute(yade, with_="forces,state", variants="abcd", rv=0.6, **FAST)
+    a, b, c, d = found
+    assert a.void_ratio == b.void_ratio
+    assert c.void_ratio == d.void_ratio
+    assert a.p == b.p
+    assert b.coordination_mechanical >= a.coordination_mechanical
+    assert c.p == pytest.approx(a.p, rel=0.3)
+
+
+def test_strain_and_directions_of_a_series():
+    fine = {**FAST, "spacing": "1rmin"}
+    found = scanfab.compute(scanfab.read_series(CELL), with_="state", variants="a", **fine)
+    first, last = found[0], found[-1]
+    assert first.volumetric_strain == 0.0
+    assert abs(last.volumetric_strain) < 1e-5
+    assert abs(first.q) < 0.02 * first.p
+    # triaxial: A is 6.12 alpha_axial where stress and fabric share their axis
+    assert last.acst_c == pytest.approx(15 / np.sqrt(6) * last.alpha_c_axial, rel=0.1)
+    assert last.angle_c_stress < 10
+    assert last.acst_vs_se > 0
+    assert last.acst_c == pytest.approx(
+        np.sum(
+            7.5 * (found.tensor("gc")[-1] - np.eye(3) / 3) * _direction(found.tensor("stress")[-1])
+        )
+    )
+
+
+def test_a_stress_without_direction_has_no_angle():
+    state = SampleState(0.6, 5.0, np.diag([1.0, 1.0, 1.018]))
+    assert state.direction is None
+    found = State().values(measured_of(np.eye(3), state=state))
+    assert found["acst_c"] is None
+    assert found["angle_c_stress"] is None
+    assert found["q"] == pytest.approx(0.018)
+    state = SampleState(0.6, 5.0, np.diag([1.0, 1.0, 1.022]))
+    found = State().values(measured_of(np.array([[0, 0, 1.0], [0, 0, 1.0]]), state=state))
+    assert found["acst_c"] == pytest.approx(15 / np.sqrt(6))
+    assert found["angle_c_stress"] == pytest.approx(0.0, abs=1e-6)
+
+
+def _direction(stress):
+    deviator = stress - np.trace(stress) / 3 * np.eye(3)
+    return deviator / np.linalg.norm(deviator)
+
+
+def test_an_open_whole_has_no_volume_and_says_so():
+    series = scanfab.read_series(TRIAXIAL)[:1]
+    with pytest.warns(scanfab.ScanfabWarning, match="they need a volume"):
+        a, c = scanfab.compute(series, with_="state", variants="ac", boundary="mask=3", **FAST)
+    assert a.void_ratio is None
+    assert a.stress_zz is None
+    assert c.p == pytest.approx(200e3, rel=0.2)
+    assert 0.4 < c.void_ratio < 0.8
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".json", ".jsonl", ".parquet"])
+def test_lists_of_numbers_are_where_cells_may_be_lists(tmp_path, yade, suffix):
+    if suffix == ".parquet":
+        pytest.importorskip("pyarrow")
+    found = scanfab.compute(yade, with_="harmonics", variants="a", **FAST)
+    path = tmp_path / f"table{suffix}"
+    found.save(path)
+    again = scanfab.load(path)[0]
+    assert again.c_a4 == found[0].c_a4
+    assert ("c_tensor4" in again) == (suffix != ".csv")
+    if suffix != ".csv":
+        assert len(again.c_tensor4) == 81
+        fourth = np.array(again.c_tensor4).reshape(3, 3, 3, 3)
+        np.testing.assert_allclose(np.einsum("ijkk->ij", fourth), found.tensor("gc")[0], atol=1e-12)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".json"])
+def test_a_table_with_groups_is_gone_on_with(tmp_path, suffix):
+    series, path = scanfab.read_series(CELL), tmp_path / f"table{suffix}"
+    options = {"with_": "harmonics,state,forces,invariants", "variants": "a", **FAST}
+    whole = tmp_path / f"whole{suffix}"
+    scanfab.compute_file(series, whole, **options)
+    scanfab.compute_file(series, path, frames=":2", **options)
+    scanfab.compute_file(series, path, resume=True, **options)
+    assert path.read_bytes() == whole.read_bytes()
+    manifest = json.loads(path.with_name(path.name + ".manifest.json").read_text())
+    assert manifest["settings"]["with_"] == ["invariants", "state", "forces", "harmonics"]
+    with pytest.raises(SettingsError, match="with_"):
+        scanfab.compute_file(series, path, resume=True, **{**options, "with_": "state"})
+
+
+def test_the_command_line_says_with(tmp_path):
+    from click.testing import CliRunner
+
+    from scanfab.cli.group import cli
+
+    out = tmp_path / "a.csv"
+    run = CliRunner().invoke(
+        cli,
+        ["compute", str(YADE), "--with", "forces,invariants", "--variants", "a", "--directions",
+         "13", "--spacing", "3rmin", "--workers", "1", "-o", str(out)],
+    )  # fmt: skip
+    assert run.exit_code == 0, run.output
+    header = next(csv.reader(out.open()))
+    assert header[len(COLUMNS) :] == names("invariants", "forces")
+    run = CliRunner().invoke(cli, ["compute", str(YADE), "--with", "nothing"])
+    assert run.exit_code == 2
+    assert "--with: expected groups of columns" in run.output
