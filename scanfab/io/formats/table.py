@@ -221,6 +221,7 @@ class PfcReader(TableReader):
 
     name = "pfc"
     description = "tables of PFC's ball and contact attributes: ball.pos.x, contact.end1.id, ..."
+    extensions = ()
     names: Names = field(default_factory=lambda: PFC, init=False, repr=False)
 
     def recognises(self, path: Path) -> bool:
@@ -236,6 +237,7 @@ class EdemReader(TableReader):
     description = (
         'tables of EDEM\'s export, by the titles of its queries: "Particle Position X", ...'
     )
+    extensions = ()
     names: Names = field(default_factory=lambda: EDEM, init=False, repr=False)
 
     def recognises(self, path: Path) -> bool:
