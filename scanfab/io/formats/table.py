@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -70,7 +70,15 @@ class TableReader:
     description = (
         "tables with a column each of x, y, z, radius: CSV, TSV, blanks, Parquet, NPZ, xyzd"
     )
-    extensions = (".csv", ".tsv", ".txt", ".dat", ".parquet", ".npz", ".xyzd")
+    extensions: ClassVar[tuple[str, ...]] = (
+        ".csv",
+        ".tsv",
+        ".txt",
+        ".dat",
+        ".parquet",
+        ".npz",
+        ".xyzd",
+    )
     generic = True
     is_table = True
     names: Names = field(default_factory=lambda: {**TABLE, **CONTACTS}, init=False, repr=False)
