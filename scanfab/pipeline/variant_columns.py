@@ -14,9 +14,11 @@ from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.forces import doubts_of_forces
 from scanfab.fabric.jackknife import BlockedSums, blocks_of
 from scanfab.fabric.registry import GROUPS, OWN_FABRICS, Measured, checked_values
+from scanfab.fabric.spectrum import LONGEST_GAP, PREDICTED_ALPHA, predicted_alpha
 from scanfab.fabric.state import SampleState
 from scanfab.fabric.window import WINDOW_ALPHA, window_alpha
 from scanfab.packing.columns import RV_COLUMN, sample_values
+from scanfab.packing.near import near_pairs
 from scanfab.packing.sample import Variant
 from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.plan import Plan
@@ -63,6 +65,8 @@ class VariantColumns:
         for name, fabric in installed_fabrics().items():
             found |= checked_values(name, fabric, self.measured)
         asked = {RV_COLUMN.name: self.rv, **self._window(), **self._edge()}
+        if PREDICTED_ALPHA.name in self.plan.more_columns:
+            asked[PREDICTED_ALPHA.name] = self.predicted_alpha
         for group in self.plan.groups:
             asked |= GROUPS[group].values(self.measured)
         # the strain of the frame is not known here
@@ -165,6 +169,20 @@ class VariantColumns:
         if length == 0:
             return None
         return 1.0 - float(weights @ self.sums.void[:, self.which].sum(axis=0)) / length
+
+    @property
+    def predicted_alpha(self) -> float | None:
+        """What contacts predict at a small cut-off, in a region whose porosity is known."""
+        cutoff, packing = self.plan.cutoffs[self.place], self.sample.packing
+        solid = self._solid_fraction()
+        longest = LONGEST_GAP * float(packing.radius[self.sample.grains].min())
+        if solid is None or packing.bodies is not None or self.plan.moment != 1:
+            return None
+        if cutoff > longest or self.measured.void is None:
+            return None
+        window = self.plan.window if self.variant.in_window else None
+        pairs = near_pairs(self.sample, self.variant, window, cutoff)
+        return predicted_alpha(pairs, 1.0 - solid, cutoff, self.plan.axis)
 
     def _blocked_sums(self) -> BlockedSums:
         gaps = self.measurement.blocked
