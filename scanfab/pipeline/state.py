@@ -69,11 +69,7 @@ def sample_state(sample: Sample, variant: Variant, window: Window | None) -> Sam
     """
     region = window if variant.in_window else None
     counted = sample.once(sample.counted(variant, region) & ~sample.removed(variant))
-    numbers = (
-        sample.contact_numbers_without_rattlers
-        if variant.without_rattlers
-        else sample.contact_numbers
-    )[counted]
+    numbers = sample.numbers_of(variant)[counted]
     held = numbers[numbers >= 2]
     return SampleState(
         void_ratio=_void_ratio(sample, region),

@@ -193,11 +193,7 @@ class BlocksOfVariant:
         """Columns of grains; coordination is NaN without any."""
         counted = self.sample.counted(self.variant, self.plan.window)
         removed = self.sample.removed(self.variant)
-        numbers = (
-            self.sample.contact_numbers_without_rattlers
-            if self.variant.without_rattlers
-            else self.sample.contact_numbers
-        )
+        numbers = self.sample.numbers_of(self.variant)
         bodies = self.sample.packing.bodies
         places = self.sample.packing.position if bodies is None else bodies.place
         # a clump is one grain, where its middle is
