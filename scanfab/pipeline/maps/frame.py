@@ -24,7 +24,7 @@ from scanfab.pipeline.frames import Readable
 from scanfab.pipeline.maps.measurement import MapMeasurement, measure_map
 from scanfab.pipeline.maps.surface import cut_by_hull, cut_by_window, volumes_inside
 from scanfab.pipeline.plan import Plan
-from scanfab.pipeline.variant_columns import channels_text, edge_of, left_out_text
+from scanfab.pipeline.variant_columns import doubts_of_lines, edge_of, left_out_of
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.edges import ENDS, START
 from scanfab.table.map_columns import map_row
@@ -107,6 +107,7 @@ class BlocksOfVariant:
         self.fabrics = measurement.sums.fabrics[variant.name]
         self.parts = measurement.parts[variant.name]
         self.axis = np.asarray(self.plan.axis)
+        self.edge = edge_of(variant, self.plan, measurement.solids)
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """The values of each block by their columns."""
@@ -129,7 +130,7 @@ class BlocksOfVariant:
             "replicates": scan.replicates,
             "spacing": self.plan.spacing / math.sqrt(scan.replicates),
             "cutoff": self.plan.cutoff,
-            "edge": edge_of(self.variant, self.plan, self.measurement.solids),
+            "edge": self.edge,
         }
         tensors, contacts = self.fabrics.tensors, self._contacts_by_block()
         for block in range(count):
@@ -261,27 +262,11 @@ class BlocksOfVariant:
 
     def notes(self) -> Iterator[Note]:
         """Lines and blocks that are doubtful, and whether the sample is homogeneous."""
-        edge = edge_of(self.variant, self.plan, self.measurement.solids)
-        texts = {
-            "channels": self._channels(),
-            "left_out": left_out_text(self._left_out(edge)),
-            "few_segments": self._too_few(),
-            HOMOGENEITY: self._homogeneity(),
-        }
+        scan, kept = self.measurement.sums.scan, float(self.fabrics.segments.sum())
+        left_out = left_out_of(scan, self.variant, self.edge, kept)
+        texts = doubts_of_lines(scan, self.variant, left_out)
+        texts |= {"few_segments": self._too_few(), HOMOGENEITY: self._homogeneity()}
         return (Note(code, text, (self.variant.name,)) for code, text in texts.items() if text)
-
-    def _left_out(self, edge: str | None) -> float | None:
-        """Share of the segments that leave the sample, and so are not counted."""
-        if edge != START:
-            return None
-        scan, which = self.measurement.sums.scan, "abcd".index(self.variant.name)
-        left = float(scan.left_out[:, which].sum())
-        every = left + float(self.fabrics.segments.sum())
-        return left / every if every else None
-
-    def _channels(self) -> str:
-        scan, which = self.measurement.sums.scan, "abcd".index(self.variant.name)
-        return channels_text(int(scan.channels[:, which].sum()), int(scan.lines[:, which].sum()))
 
     def _too_few(self) -> str:
         fabrics = self.fabrics
