@@ -117,7 +117,7 @@ class BlocksOfVariant:
             "block": np.arange(count),
             **dict(zip("xyz", middles.T, strict=True)),
             **self._grains,
-            **self._void(),
+            **self._void,
             **self._solid_fraction(),
             "segments": self.fabrics.segments.sum(axis=0).astype(np.int64),
             "at_surface": self.at_surface.astype(np.int64),
@@ -140,6 +140,7 @@ class BlocksOfVariant:
             values["alpha_vs"] = tensor.alpha if tensor else None
             yield {**same, **values, **contacts[block]}
 
+    @cached_property
     def _void(self) -> dict[str, FloatArray]:
         """Columns of the void fabric and its errors; NaN where there is none."""
         fabrics, without = self.fabrics, self.parts.without
@@ -285,7 +286,7 @@ class BlocksOfVariant:
 
     def _homogeneity(self) -> str:
         """What the test says, in words."""
-        found = self._void()
+        found = self._void
         inner = self.fabrics.exists & ~self.at_surface
         values = np.where(inner, found["alpha_vs_axial"], np.nan)
         variances = found["alpha_vs_axial_sample_se"] ** 2
