@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from scanfab.base.arrays import concatenated
 from scanfab.base.note import Note
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.blocks import BlockFabrics, WithoutParts
@@ -87,8 +88,7 @@ class MedianBlock:
     def concatenate(self, parts: Sequence[MapSums]) -> MapSums:
         """All replicates."""
         fabrics = {
-            name: BlockFabrics.concatenate([one.fabrics[name] for one in parts])
-            for name in parts[0].fabrics
+            name: concatenated([one.fabrics[name] for one in parts]) for name in parts[0].fabrics
         }
         return MapSums(fabrics, ScanSums.concatenate([one.scan for one in parts]))
 
@@ -180,7 +180,7 @@ def _part_sums(
             found[name].append(PartSums(without, void / rule.weights.sum()))
     return {
         name: PartSums(
-            WithoutParts.concatenate([one.without for one in parts]),
+            concatenated([one.without for one in parts]),
             np.concatenate([one.void for one in parts]),
         )
         for name, parts in found.items()
