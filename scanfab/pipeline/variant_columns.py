@@ -123,7 +123,7 @@ class VariantColumns:
         """Number of the kept segments."""
         if self.measurement.gaps is None:
             return int(self.sums.segments[:, self.which].sum())
-        return int(self.measurement.gaps.number[:, self.which, ..., self.place].sum())
+        return int(self.measurement.gaps.in_blocks(self.variant.name, self.place)[1].sum())
 
     def _scan(self) -> dict[str, Any]:
         """The values of the columns that scan/columns.py declares."""
