@@ -260,7 +260,9 @@ class Convex:
             toward = points[open_] - at
             distance = np.linalg.norm(toward, axis=1)
             furthest = self.support(toward)
-            gap = np.einsum("ij,ij->i", points[open_] - furthest, toward) / distance
+            gap = np.einsum("ij,ij->i", points[open_] - furthest, toward)
+            # a place on the surface may be reached, and then is no distance away
+            gap /= np.where(distance > 0.0, distance, 1.0)
             missed = gap >= radius[open_]
             meets[open_[missed]] = False
             unsure = ~missed & (distance >= radius[open_])
