@@ -87,11 +87,6 @@ def test_volumes_middles_and_corners_are_those_of_the_places_inside():
         found = blocks.of(random.uniform(low, high, (400_000, 3)))
         counted = np.bincount(found[found >= 0], minlength=len(blocks)) / 400_000
         np.testing.assert_allclose(counted * (high - low) ** 3, blocks.volumes, rtol=0.2)
-        filled = [blocks.filled(block) for block in range(len(blocks))]
-        for block, (places, volumes) in enumerate(filled):
-            assert set(blocks.of(places)) == {block}
-            assert volumes.sum() == pytest.approx(blocks.volumes[block])
-            np.testing.assert_allclose(volumes @ places / volumes.sum(), blocks.middles[block])
         if blocks.edges is None:
             np.testing.assert_allclose(blocks.corners.mean(axis=1), blocks.middles)
 
