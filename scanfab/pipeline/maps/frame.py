@@ -26,7 +26,6 @@ from scanfab.pipeline.maps.region import Region
 from scanfab.pipeline.plan import Plan
 from scanfab.pipeline.variant_columns import doubts_of_lines, edge_of, left_out_of
 from scanfab.scan.blocks import Blocks
-from scanfab.scan.edges import START
 from scanfab.table.map_columns import map_row
 
 __all__ = ["HOMOGENEITY", "MapResult", "map_frame"]
@@ -244,10 +243,10 @@ class BlocksOfVariant:
         found = f"{lacking} of {counted(len(self.blocks), 'block')} have no void fabric"
         if empty == lacking:
             return f"{found}: no void segment has its middle there"
+        those = f"{empty} hold no void segment at all, the others" if empty else "they hold"
         return (
-            f"{found}: {empty} hold no void segment at all, the others none in more than 5 % of "
-            f"the directions: choose fewer blocks, closer lines (`spacing`, `tolerance`) or a "
-            f"shorter `cutoff`"
+            f"{found}: {those} none in more than 5 % of the directions: choose fewer blocks, "
+            f"closer lines (`spacing`, `tolerance`) or a shorter `cutoff`"
         )
 
     def _homogeneity(self) -> str:
@@ -262,12 +261,12 @@ class BlocksOfVariant:
         if test is None:
             if not self.region.at_surface.any():
                 return "too few blocks to tell whether the sample is homogeneous"
-            better = "" if self.plan.edge == START else ", or of the RV by `edge=start`"
+            better = "" if self.variant.in_window else "those of the RV by `variants=c` and "
             few = int(inner.sum())
             return (
                 f"whether the sample is homogeneous cannot be told: all blocks"
-                f"{f' but {few}' * bool(few)} are at a surface or empty: choose blocks that are "
-                f"smaller{better}"
+                f"{f' but {few}' * bool(few)} are at a surface or empty: choose smaller blocks, "
+                f"or {better}`edge=start`"
             )
         chance = "p < 0.0001" if test.chance < 1e-4 else f"p = {test.chance:.2g}"
         scatter = (
