@@ -102,7 +102,7 @@ def force(touching: Touching) -> BoolArray:
     Grains with fewer than ``min_contacts`` neighbours that press on them, in one pass.
 
     A contact counts if its normal force is above ``min_force`` times the mean over all contacts,
-    compression positive. Contacts with walls, whose forces are not known, count.
+    compression positive. Contacts with walls count, whatever their force.
 
     Raises
     ------

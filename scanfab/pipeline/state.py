@@ -15,6 +15,7 @@ from scanfab.fabric.state import SampleState, love_weber
 from scanfab.packing.clump_volumes import lens_volumes, own_shares
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample, Variant
+from scanfab.packing.walls import WallForces
 from scanfab.packing.window import Window
 
 __all__ = ["contact_forces", "doubts_of_state", "refuse_without_forces", "sample_state"]
@@ -23,6 +24,11 @@ __all__ = ["contact_forces", "doubts_of_state", "refuse_without_forces", "sample
 POINTS = 2048
 # grains at a time, times their points: some tens of megabytes
 CHUNK = 256
+WALLS_LEFT_OUT = (
+    "grains touch walls, and the forces of these contacts are not known (they are read from "
+    "LIGGGHTS' wall/gran/local and YADE's O.save): the stress leaves them out; choose an RV away "
+    "from the walls"
+)
 
 
 def refuse_without_forces(sample: Sample) -> None:
@@ -97,17 +103,16 @@ def doubts_of_state(sample: Sample, variant: Variant, window: Window | None) -> 
             "no_volume": "void ratio and stress of the whole are empty: they need a volume, which "
             "is that of a cell that repeats along all its vectors, or of an RV"
         }
-    walls = packing.wall_contacts > 0
-    if (
-        region is not None
-        and walls.any()
-        and region.contains(packing.position[walls], packing).any()
-    ):
-        return {
-            "wall_stress": "grains in the RV touch walls, whose forces are not read: the stress "
-            "leaves these contacts out; choose a smaller RV"
-        }
-    return {}
+    return {"wall_stress": WALLS_LEFT_OUT} if _lacks_walls(sample, region) else {}
+
+
+def _lacks_walls(sample: Sample, region: Window | None) -> bool:
+    """Whether grains touch walls, in the RV if there is one, and with forces that nobody knows."""
+    packing = sample.packing
+    if packing.wall_forces is not None:
+        return False
+    touching = packing.position[(packing.wall_contacts > 0) & sample.grains]
+    return bool(len(touching) if region is None else region.contains(touching, packing).any())
 
 
 def _volume(packing: Packing, window: Window | None) -> float | None:
@@ -149,9 +154,19 @@ def _stress(sample: Sample, window: Window | None) -> FloatArray | None:
     branch = end - start
     chosen = ~(sample.boundary[one] & sample.boundary[two]) & branch.any(axis=1)
     start, branch, force = start[chosen], branch[chosen], contacts.force[chosen]
+    if packing.wall_forces is not None:
+        walls = _at_walls(sample, packing.wall_forces)
+        start, branch, force = map(np.concatenate, zip((start, branch, force), walls, strict=True))
     if window is not None:
         branch = branch * _shares(start, branch, window, packing)[:, None]
     return love_weber(force, branch, volume)
+
+
+def _at_walls(sample: Sample, walls: WallForces) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Where grains touch walls, from there to their places, and the forces on them."""
+    ours = sample.grains[walls.row]
+    row, point, force = walls.row[ours], walls.point[ours], walls.force[ours]
+    return point, _places(sample.packing)[row] - point, force
 
 
 def _shares(start: FloatArray, branch: FloatArray, window: Window, packing: Packing) -> FloatArray:
