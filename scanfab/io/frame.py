@@ -226,10 +226,11 @@ class Frame:
         return "cell" if told or ask is None else ask(self.snapshot.path)
 
     @property
-    def cell_is_named(self) -> bool:
-        """Whether the user names a cell, or what is periodic."""
+    def named(self) -> dict[str, bool]:
+        """Whether the user names a cell (or what is periodic), and which spheres are one body."""
         options = self.series.options
-        return bool(self.series.cells or options.cell or options.periodic)
+        cell = bool(self.series.cells or options.cell or options.periodic)
+        return {"cell_is_named": cell, "bodies_are_named": options.bodies is not None}
 
     def _options(self) -> ReadOptions:
         """How to read this frame, with its cell if a file names those of the frames."""

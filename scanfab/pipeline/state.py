@@ -37,8 +37,8 @@ def refuse_without_forces(sample: Sample) -> None:
     if contacts.force_n is None and len(contacts):
         found = "are found by geometry" if contacts.source == "geometric" else "have none"
         raise PackingError(
-            f"with_: forces were asked for, but the contacts of the frame {found}: name a file "
-            f"that lists contacts with their forces (`contacts`), or which of its columns they are "
+            f'`with_="forces"` needs the forces of contacts, but these {found}: name a file that '
+            f"lists contacts with their forces (`contacts`), or which of its columns they are "
             f"(`contact_columns`)"
         )
 
@@ -55,15 +55,21 @@ def contact_forces(sample: Sample, chosen: BoolArray) -> ContactForces | None:
     contacts, packing = sample.contacts, sample.packing
     if contacts.force_n is None:
         return None
-    wrong = chosen & ~np.isfinite(contacts.force_n)
-    if wrong.any():
-        one, two = packing.id[contacts.pairs[np.argmax(wrong)]]
-        raise PackingError(
-            f"the contact of the grains {one} and {two} has a force that is no finite number"
-        )
+    _refuse_odd_forces(packing, contacts.force_n)
     branch = np.einsum("ci,ci->c", _branches(packing)[chosen], contacts.normal[chosen])
     force = None if contacts.force is None else contacts.force[chosen]
     return ContactForces(branch, contacts.force_n[chosen], force)
+
+
+def _refuse_odd_forces(packing: Packing, force: FloatArray) -> None:
+    """PackingError if a force is no finite number, shape (M,) or (M, 3)."""
+    wrong = ~np.isfinite(force.reshape(len(force), -1)).all(axis=1)
+    if wrong.any():
+        assert packing.contacts is not None
+        one, two = packing.id[packing.contacts.pairs[np.argmax(wrong)]]
+        raise PackingError(
+            f"the contact of the grains {one} and {two} has a force that is no finite number"
+        )
 
 
 def sample_state(sample: Sample, variant: Variant, window: Window | None) -> SampleState:
@@ -145,6 +151,7 @@ def _stress(sample: Sample, window: Window | None) -> FloatArray | None:
     volume = _volume(packing, window)
     if contacts.force is None or volume is None:
         return None
+    _refuse_odd_forces(packing, contacts.force)
     one, two = contacts.pairs.T
     start, branch = _places(packing)[one], _branches(packing)
     end = start + branch
