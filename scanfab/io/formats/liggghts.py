@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,6 +36,7 @@ from scanfab.io.reader import (
     ReadOptions,
     Snapshot,
 )
+from scanfab.packing.walls import ListedWallForces
 
 __all__ = ["LiggghtsReader"]
 
@@ -152,15 +154,17 @@ class LiggghtsReader:
         if grains.id is None:
             raise ReadError(f"{path}: names grains by id, but the grain file has no ids")
         refuse_rounded_ids(path, block.values, grains)
+        pair = _pair_column(block.values, grains)
+        wall = _wall_columns(block.values, grains) if pair is None else None
+        if wall is not None:
+            # also where `contact_columns` are named: those of the pairs
+            return _joined_walls(path, block.values, wall, grains)
         places = _given_places(path, options.contact_columns, block)
         place = places.get("id")
         if place is None:
-            place = _pair_column(block.values, grains)
+            place = pair
             if place is not None and _pushes(block.values, place, grains):
                 places = {"force": place + 3}
-            wall = _wall_column(block.values, grains) if place is None else None
-            if wall is not None:
-                return JoinedContacts(None, _wall_contacts(path, block.values[:, wall], grains))
         if place is None:
             raise ReadError(
                 f"{path}: cannot tell which columns are the two ids of a contact: the ids may "
@@ -253,9 +257,18 @@ def _pushes(values: FloatArray, place: int, grains: GrainTable) -> bool:
     return bool(pushed.mean() > 0.9)
 
 
+class _WallColumns(NamedTuple):
+    """Where a file of wall/gran/local has what."""
+
+    id: int
+    """Of the grain."""
+    centre: int
+    """Where the grain is, in three columns."""
+
+
 @np.errstate(over="ignore", invalid="ignore")
-def _wall_column(values: FloatArray, grains: GrainTable) -> int | None:
-    """The grains' ids of a wall/gran/local file: behind wall and triangle, and a listed centre."""
+def _wall_columns(values: FloatArray, grains: GrainTable) -> _WallColumns | None:
+    """The ids of grains stand behind wall and triangle, and behind a listed centre."""
     for place in range(5, values.shape[1]):
         if not are_ids(values[:, place], grains) or not are_whole(values[:, place - 2 : place]):
             continue
@@ -264,16 +277,43 @@ def _wall_column(values: FloatArray, grains: GrainTable) -> int | None:
         for start in range(place - 4):
             distance = np.linalg.norm(values[:, start : start + 3] - centres, axis=1)
             if np.mean(distance < 0.01 * size) > MOST_ROWS:
-                return place
+                return _WallColumns(place, start)
     return None
 
 
-def _wall_contacts(path: Path, ids: FloatArray, grains: GrainTable) -> IntArray:
-    """Contacts with walls of each grain."""
+def _joined_walls(
+    path: Path, values: FloatArray, columns: _WallColumns, grains: GrainTable
+) -> JoinedContacts:
+    """Contacts with walls of each grain, and their forces if the file has them."""
+    ids = values[:, columns.id]
     rows = rows_of_ids(grains, ids)
     if np.any(rows < 0):
         raise ReadError(
             f"{path}: names the grain {ids[np.argmin(rows)]:g}, which is not in the grain file: "
             f"do both files belong to the same step?"
         )
-    return count_walls(rows, len(grains.radius))
+    forces = _wall_forces(values, columns, rows, grains)
+    return JoinedContacts(None, count_walls(rows, len(grains.radius)), forces)
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def _wall_forces(
+    values: FloatArray, columns: _WallColumns, rows: IntArray, grains: GrainTable
+) -> ListedWallForces | None:
+    """
+    The force behind the ids and the point before the centre, if they are what they seem to be.
+
+    The point lies on the grain's surface, and the force pushes the grain off it.
+    """
+    point = values[:, max(columns.centre - 3, 0) : columns.centre]
+    force = values[:, columns.id + 1 : columns.id + 4]
+    if point.shape[1] < 3 or force.shape[1] < 3:
+        return None
+    inwards = values[:, columns.centre : columns.centre + 3] - point
+    distance = np.linalg.norm(inwards, axis=1) / grains.radius[rows]
+    touches = (distance > 0.5) & (distance < 1.01)
+    pushes = np.sum(force * inwards, axis=1) > 0
+    # damping makes the force of a few contacts attractive
+    if touches.mean() < MOST_ROWS or pushes.mean() < 0.9:
+        return None
+    return ListedWallForces(rows, point, force)
