@@ -400,10 +400,9 @@ def test_walls_and_boxes_are_neither_grains_nor_contacts(name):
         scanfab.read(FLOOR / name)
 
 
-@pytest.mark.parametrize("name", ["mesh_30000.stl", "binary_30000.bin"])
-def test_files_of_other_programs_are_not_known(name):
+def test_files_of_other_programs_are_not_known():
     with pytest.raises(UnknownFormatError, match="no reader knows the format"):
-        scanfab.read(FLOOR / name)
+        scanfab.read(FLOOR / "mesh_30000.stl")
 
 
 def test_contacts_alone_are_no_grains():

@@ -1,0 +1,98 @@
+"""Rows of numbers in a part of a text, as many and as wide as a format says."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from scanfab.base.errors import ReadError
+from scanfab.base.typing import FloatArray
+from scanfab.io.files import check_memory, plain
+from scanfab.io.parse.number_rows import rows_of_numbers
+from scanfab.io.reader import Snapshot
+from scanfab.io.unpacking import check_lines
+
+__all__ = ["counted_rows", "lines_above", "spelt", "text_of"]
+
+# times its size in memory: the text, its numbers, and the columns made of them
+IN_MEMORY = 6.0
+# a line that is not blank or a comment, as numpy has them
+FILLED = re.compile(rb"^[ \t\r\f\v\x1c-\x1f\x85\xa0]*[^#\s\x1c-\x1f\x85\xa0]", re.MULTILINE)
+
+
+def text_of(snapshot: Snapshot) -> bytes:
+    """The bytes of a snapshot, which may be its whole file; ReadError if they cannot be sound."""
+    path, file = snapshot.path, plain(snapshot.path)
+    stop = file.stat().st_size if snapshot.stop is None else snapshot.stop
+    check_memory(path, IN_MEMORY * (stop - snapshot.start))
+    check_lines(path, file)
+    with open(file, "rb") as stream:
+        stream.seek(snapshot.start)
+        data = stream.read(max(stop - snapshot.start, 0))
+    return data.removeprefix(b"\xef\xbb\xbf") if snapshot.start == 0 else data
+
+
+def lines_above(snapshot: Snapshot) -> int:
+    """How many lines of the file stand before the snapshot."""
+    with open(plain(snapshot.path), "rb") as stream:
+        lines, left = 0, snapshot.start
+        while left > 0 and (part := stream.read(min(left, 1 << 20))):
+            lines += part.count(b"\n")
+            left -= len(part)
+    return lines
+
+
+def counted_rows(
+    snapshot: Snapshot,
+    data: bytes,
+    begin: int,
+    end: int,
+    *,
+    widths: tuple[int, ...],
+    names: str,
+    count: int | None = None,
+) -> FloatArray:
+    """
+    The rows of numbers between two bytes of a snapshot's text, shape (N, columns).
+
+    Parameters
+    ----------
+    snapshot : Snapshot
+        Where the text comes from.
+    data : bytes
+        Its text, see :func:`text_of`.
+    begin, end : int
+        First byte, and the one behind the last.
+    widths : tuple of int
+        How many columns there may be; the first is that of an empty table.
+    names : str
+        What stands in the rows, for messages.
+    count : int, optional
+        How many rows there must be.
+
+    Raises
+    ------
+    ReadError
+        If there are more or fewer rows or columns, a word is no number, or the last line has no
+        end, so that digits may be missing.
+    """
+    path = snapshot.path
+    if FILLED.search(data[begin:end]) is None:
+        values: FloatArray = np.zeros((0, widths[0]))
+    else:
+        if not data[begin:end].rstrip(b" \t\r").endswith(b"\n"):
+            raise ReadError(f"{path}: the last line has no end: the file is incomplete")
+        above = lines_above(snapshot) if snapshot.start else 0
+        values = rows_of_numbers(path, data, begin, end, above)
+    if count is not None and len(values) != count:
+        raise ReadError(f"{path}: the header counts {count} {names}, found {len(values)}")
+    if values.shape[1] not in widths:
+        expected = " or ".join(map(str, widths))
+        raise ReadError(f"{path}: expected {expected} columns of {names}, found {values.shape[1]}")
+    return values
+
+
+def spelt(line: bytes) -> str:
+    """A line as messages show it."""
+    return repr(line[:80].decode("utf-8", "replace").strip())
