@@ -1,4 +1,4 @@
-"""LAMMPS: ``dump custom`` and ``dump local`` text, and ``write_data``."""
+"""LAMMPS: ``dump custom``, ``dump local``, ``dump yaml``, ``dump netcdf`` and ``write_data``."""
 
 from __future__ import annotations
 
@@ -28,6 +28,13 @@ from scanfab.io.formats.ids import (
 )
 from scanfab.io.formats.join import join_ids, rows_of_ids
 from scanfab.io.formats.lammps_data import is_data_file, of_liggghts, read_data_grains, step_of_data
+from scanfab.io.formats.lammps_netcdf import (
+    index_netcdf,
+    is_netcdf,
+    netcdf_kind,
+    read_netcdf_grains,
+)
+from scanfab.io.formats.lammps_yaml import index_yaml, is_yaml, read_yaml_grains, yaml_kind
 from scanfab.io.parse.binary_dump import index_binary, is_binary, names_of_binary
 from scanfab.io.parse.text_dump import DumpBlock, index_dump, read_block, row_word
 from scanfab.io.reader import (
@@ -60,10 +67,8 @@ class LammpsReader:
     """Reader plugin for what LAMMPS dumps."""
 
     name = "lammps"
-    description = (
-        "LAMMPS dump custom (text, binary), dump local (text), write_data of atom_style sphere"
-    )
-    extensions = (".lammpstrj", ".lmp", ".data", ".local", ".bin")
+    description = "LAMMPS dump custom (text, binary, yaml, netcdf), dump local (text), write_data"
+    extensions = (".lammpstrj", ".lmp", ".data", ".local", ".bin", ".yaml", ".nc")
 
     def recognises(self, path: Path) -> bool:
         """What LAMMPS writes and LIGGGHTS does not: units, time, bounds with all digits."""
@@ -72,6 +77,8 @@ class LammpsReader:
         is_new = isinstance(names_of_binary(head), list)
         return (
             is_new
+            or is_yaml(head)
+            or is_netcdf(head)
             or (is_data_file(head) and not of_liggghts(head))
             or (row_word(head) is not None and LAMMPS_ITEMS.search(head) is not None)
         )
@@ -81,6 +88,10 @@ class LammpsReader:
         head = first_bytes(path, 1 << 16)
         if is_data_file(head):
             return "grains"
+        if is_yaml(head):
+            return yaml_kind(head)
+        if is_netcdf(head):
+            return netcdf_kind(path)
         if is_binary(head):
             return binary_kind(head)
         return "other" if row_word(head) is None else dump_kind(head)
@@ -90,6 +101,10 @@ class LammpsReader:
         head = first_bytes(path)
         if is_data_file(head):
             return [Snapshot(path, step=step_of_data(head))]
+        if is_yaml(head):
+            return index_yaml(path)
+        if is_netcdf(head):
+            return index_netcdf(path)
         return index_binary(path) if is_binary(head) else index_dump(path)
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
@@ -97,6 +112,10 @@ class LammpsReader:
         head = first_bytes(snapshot.path)
         if is_data_file(head):
             return read_data_grains(snapshot, options)
+        if is_yaml(head):
+            return read_yaml_grains(snapshot, options)
+        if is_netcdf(head):
+            return read_netcdf_grains(snapshot, options)
         if is_binary(head):
             return read_binary_grains(snapshot, options)
         return read_dump_grains(snapshot, options)
@@ -115,9 +134,10 @@ class LammpsReader:
         their values, if there is no doubt, and no force is read.
         """
         path = snapshot.path
-        if is_data_file(first_bytes(path)):
-            raise ReadError(f"{path}: a data file holds no contacts")
-        if is_binary(first_bytes(path)):
+        head = first_bytes(path)
+        if is_data_file(head) or is_yaml(head) or is_netcdf(head):
+            raise ReadError(f"{path}: a file of this kind holds no contacts")
+        if is_binary(head):
             raise ReadError(
                 f"{path}: contacts are read from text: dump local to a file without .bin"
             )
