@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import re
+import warnings
+from pathlib import Path
 
 import numpy as np
 
-from scanfab.base.errors import ReadError
+from scanfab.base.errors import ReadError, ScanfabWarning
 from scanfab.base.typing import FloatArray
 from scanfab.io.files import check_memory, plain
 from scanfab.io.parse.number_rows import rows_of_numbers
 from scanfab.io.reader import Snapshot
 from scanfab.io.unpacking import check_lines
 
-__all__ = ["counted_rows", "lines_above", "spelt", "text_of"]
+__all__ = ["counted_rows", "leave_out_last", "lines_above", "spelt", "text_of"]
 
 # times its size in memory: the text, its numbers, and the columns made of them
 IN_MEMORY = 6.0
@@ -91,6 +93,25 @@ def counted_rows(
         expected = " or ".join(map(str, widths))
         raise ReadError(f"{path}: expected {expected} columns of {names}, found {values.shape[1]}")
     return values
+
+
+def leave_out_last(path: Path, complete: int, reason: str) -> None:
+    """
+    Warn that the last snapshot of a file, which ends too early, is left out.
+
+    Raises
+    ------
+    ReadError
+        If there is no complete one before it.
+    """
+    if complete == 0:
+        raise ReadError(f"{path}: {reason}: the file is incomplete")
+    warnings.warn(
+        f"{path}: the last snapshot, number {complete + 1}, is incomplete and is left out: "
+        f"{reason}",
+        ScanfabWarning,
+        stacklevel=3,
+    )
 
 
 def spelt(line: bytes) -> str:
