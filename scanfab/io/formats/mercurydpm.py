@@ -85,7 +85,9 @@ class MercuryReader:
                 f"{path}: MercuryDPM's interactions for ParaView do not say which grains touch: "
                 f"contacts are read from .fstat or .restart"
             )
-        return "contacts" if FSTAT_HEAD.match(head) else "grains"
+        if FSTAT_HEAD.match(head):
+            return "contacts"
+        return "grains" if self.recognises(path) else "other"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """Frames one behind the other, with their times."""

@@ -1,0 +1,192 @@
+"""Kratos' DEM application: ``.mdpa`` input, and HDF5 files with a group for each time."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.base.errors import ReadError
+from scanfab.base.typing import FloatArray
+from scanfab.io.files import first_bytes
+from scanfab.io.formats.columns import grain_table
+from scanfab.io.parse.counted_rows import counted_rows, text_of
+from scanfab.io.parse.vtk_hdf import is_hdf, read_hdf_file
+from scanfab.io.reader import (
+    Carries,
+    FileKind,
+    GrainTable,
+    JoinedContacts,
+    ReadOptions,
+    Snapshot,
+)
+
+__all__ = ["KratosReader"]
+
+START = re.compile(rb"^[ \t]*Begin[ \t]+(?:ModelPartData|Properties|Nodes|Table)\b", re.MULTILINE)
+COMMENT = re.compile(rb"//[^\n]*")
+NODES, RADII, ELEMENTS = (
+    re.compile(
+        rb"^[ \t]*Begin[ \t]+" + head + rb"[ \t]*\r?\n(.*?)^[ \t]*(End)[ \t]+" + tail,
+        re.MULTILINE | re.DOTALL,
+    )
+    for head, tail in (
+        (rb"Nodes", rb"Nodes\b"),
+        (rb"NodalData[ \t]+RADIUS", rb"NodalData\b"),
+        (rb"Elements[ \t]+(\S+)", rb"Elements\b"),
+    )
+)
+BEGUN = re.compile(
+    rb"^[ \t]*Begin[ \t]+(Nodes|NodalData[ \t]+RADIUS|Elements[ \t]+\S+)", re.MULTILINE
+)
+# of a group in HDF5
+DATASETS = {"id", "x", "y", "z", "radius"}
+
+
+class KratosReader:
+    """Reader plugin for Kratos DEM."""
+
+    name = "kratos"
+    description = "Kratos DEM: .mdpa (nodes with a RADIUS), HDF5 with groups of x y z radius"
+    extensions: tuple[str, ...] = (".mdpa", ".hdf5", ".h5")
+
+    def recognises(self, path: Path) -> bool:
+        """By the blocks of ``.mdpa``, or the datasets in the groups of an HDF5 file."""
+        head = first_bytes(path)
+        if is_hdf(head):
+            return bool(_groups(path))
+        return START.search(COMMENT.sub(b"", head)) is not None and b"\x00" not in head
+
+    def kind(self, path: Path) -> FileKind:
+        """Grains where nodes have radii; meshes of walls have none."""
+        if is_hdf(first_bytes(path)):
+            return "grains" if _groups(path) else "other"
+        if not self.recognises(path):
+            return "other"
+        return "grains" if RADII.search(_plain_text(Snapshot(path))) else "other"
+
+    def snapshots(self, path: Path) -> list[Snapshot]:
+        """One, or the groups with their times; ``start`` is then the number of the group."""
+        if not is_hdf(first_bytes(path)):
+            return [Snapshot(path)]
+        found = []
+        for number, (_, attributes) in enumerate(_groups(path)):
+            time = attributes.get("time")
+            seconds = float(time) if isinstance(time, int | float) else None
+            found.append(Snapshot(path, time=seconds, start=number, stop=number + 1))
+        if not found:
+            raise ReadError(f"{path}: expected groups with id, x, y, z and radius, found none")
+        return found
+
+    def carries(self, path: Path) -> Carries:
+        """It has no cell."""
+        return "nothing"
+
+    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+        """Nodes with a radius; the arrays of a group."""
+        if is_hdf(first_bytes(snapshot.path)):
+            return _read_group(snapshot, options)
+        return _read_mdpa(snapshot, options)
+
+    def read_contacts(
+        self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
+    ) -> JoinedContacts:
+        """It has none."""
+        raise ReadError(f"{snapshot.path}: these files of Kratos hold no contacts")
+
+
+def _groups(path: Path) -> list[tuple[str, dict[str, object]]]:
+    """The groups at the top that hold grains, in the order of their numbers."""
+    file = read_hdf_file(path, with_data=False)
+    found = [
+        (name, file.attributes[name])
+        for name in file.attributes
+        if "/" not in name and name.isdecimal() and file.below(name).keys() >= DATASETS
+    ]
+    return sorted(found, key=lambda one: int(one[0]))
+
+
+def _read_group(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+    path = snapshot.path
+    groups = _groups(path)
+    if snapshot.start >= len(groups):
+        raise ReadError(f"{path}: there is no group {snapshot.start} among {len(groups)}")
+    name = groups[snapshot.start][0]
+    own = read_hdf_file(path).below(name)
+    shapes = {values.shape for values in own.values()}
+    if len(shapes) != 1 or len(next(iter(shapes))) != 1:
+        raise ReadError(f"{path}: group {name}: expected columns of one length, found {shapes}")
+    return grain_table(path, own, None, options, f", group {name}")
+
+
+def _plain_text(snapshot: Snapshot) -> bytes:
+    """Without comments."""
+    data = text_of(snapshot)
+    return COMMENT.sub(b"", data) if b"//" in data else data
+
+
+def _read_mdpa(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+    path, data = snapshot.path, _plain_text(snapshot)
+    blocks = [len(list(one.finditer(data))) for one in (NODES, RADII, ELEMENTS)]
+    if sum(blocks) != len(BEGUN.findall(data)):
+        raise ReadError(f"{path}: a block of Nodes, NodalData or Elements has no end: incomplete")
+    for block in ELEMENTS.finditer(data):
+        kind = block[1].decode("utf-8", "replace")
+        if "Particle" not in kind or "Cluster" in kind:
+            raise ReadError(
+                f"{path}: expected elements that are spheres, found {kind}: their shapes lie in "
+                f"other files"
+            )
+    nodes = _block(snapshot, data, NODES, 4, "nodes")
+    radii = _block(snapshot, data, RADII, 3, "NodalData RADIUS")
+    row = _rows_of(path, nodes[:, 0], radii[:, 0])
+    columns: dict[str, npt.NDArray[np.float64]] = {
+        "id": radii[:, 0],
+        **dict(zip("xyz", nodes[row, 1:].T, strict=True)),
+        # the second column says whether the value is fixed
+        "radius": radii[:, 2],
+    }
+    _check_elements(snapshot, data, radii[:, 0])
+    return grain_table(path, columns, None, options)
+
+
+def _block(
+    snapshot: Snapshot, data: bytes, pattern: re.Pattern[bytes], width: int, names: str
+) -> FloatArray:
+    """The rows of all blocks of a kind."""
+    group = pattern.groups - 1
+    parts = [
+        counted_rows(snapshot, data, *one.span(group), widths=(width,), names=names)
+        for one in pattern.finditer(data)
+    ]
+    if not parts:
+        raise ReadError(f"{snapshot.path}: expected a block of {names}, found none")
+    return np.concatenate(parts)
+
+
+def _rows_of(
+    path: Path, nodes: npt.NDArray[np.float64], wanted: npt.NDArray[np.float64]
+) -> npt.NDArray[np.int64]:
+    order = np.argsort(nodes, kind="stable")
+    if len(nodes) == 0 and len(wanted):
+        raise ReadError(f"{path}: radii of {len(wanted)} nodes, but no nodes")
+    place = np.minimum(np.searchsorted(nodes[order], wanted), max(len(nodes) - 1, 0))
+    rows = order[place] if len(nodes) else place
+    if len(wanted) and not np.array_equal(nodes[rows], wanted):
+        lost = wanted[nodes[rows] != wanted][0]
+        raise ReadError(f"{path}: the node {lost:g} has a radius, but no place among the nodes")
+    return np.asarray(rows, dtype=np.int64)
+
+
+def _check_elements(snapshot: Snapshot, data: bytes, ids: FloatArray) -> None:
+    """Every sphere needs a radius."""
+    for block in ELEMENTS.finditer(data):
+        rows = counted_rows(snapshot, data, *block.span(2), widths=(3,), names="elements")
+        lost = rows[~np.isin(rows[:, 2], ids), 2]
+        if len(lost):
+            raise ReadError(
+                f"{snapshot.path}: the sphere at node {lost[0]:g} and {len(lost) - 1} more have no "
+                f"radius in NodalData RADIUS"
+            )

@@ -1,0 +1,78 @@
+"""MUSEN's export as text: times, objects that are no spheres or not there, the periodic domain."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab import ReadError
+from scanfab.io.registry import reader_named
+from scanfab.testing import check_reader
+from tests.helpers.dumps import write
+
+STATE = "2 {time} 12 {x} 0.5 0.5 15 9 9 9 16 9 9 9 18 0 20 9 9 9 31 1 0 0 0 36 9 9 9 9 9 9 9 9 9"
+
+
+def sphere(id, x, radius=0.1, active="0 1e+300"):
+    """Its contact radius is another number; it moves by 0.01 between both times."""
+    states = " ".join(STATE.format(time=time, x=x + time / 50) for time in (0, 0.5))
+    return f"0 {id} 1 1 5 {radius} 0.4 23 KEY 24 {active} {states}\n"
+
+
+def export(*rows, domain="28 0 0 0 0 0 0 0 0 0 0"):
+    bond = "0 7 1 9 5 3 1 0.1 0.2 23 KEY 24 0 1e+300 2 0 12 0 0 0 15 0 0 0 18 0 20 0 0 0\n"
+    return "".join(rows) + bond + f"22 0 0 0 1 1 1\n{domain}\n29 0\n32 KEY Glass 0 2500\n\n"
+
+
+ROWS = (sphere(3, 0.2), sphere(1, 0.375), sphere(2, 0.6, active="0.25 0.5"))
+
+
+def test_spheres_of_each_time(tmp_path):
+    series = scanfab.read_series(write(tmp_path / "a.txt", export(*ROWS)))
+    assert [frame.snapshot.time for frame in series] == [0, 0.5]
+    first, second = (frame.read() for frame in series)
+    # one sphere comes later
+    assert first.id.tolist() == [3, 1]
+    assert second.id.tolist() == [3, 1, 2]
+    np.testing.assert_array_equal(first.radius, 0.1)
+    np.testing.assert_allclose(second.position[:, 0], [0.21, 0.385, 0.61])
+    # bonds are no contacts
+    assert first.contacts is None
+    assert first.cell is None
+
+
+def test_the_periodic_domain(tmp_path):
+    domain = "28 1 1 0 1 -1 0 -2 1 0 2"
+    cell = scanfab.read_series(write(tmp_path / "a.txt", export(*ROWS, domain=domain)))[0].read()
+    cell = cell.cell
+    assert cell.periodic == (True, False, True)
+    assert cell.origin.tolist() == [-1, 0, -2]
+    assert cell.vectors.diagonal()[[0, 2]].tolist() == [2, 4]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("0 1 1 1 5 0.1", "0 1 1 1 5 word", "expected 2 numbers, found 'word 0.4'"),
+        (" 36 9", " 99 9", "expected the number of a property, found '99'"),
+        ("28 0", "28 1", "its periodic domain"),
+        (STATE.format(time=0.5, x=0.375 + 0.01) + "\n", "\n", "sphere 1 has no state at the time"),
+    ],
+)
+def test_what_is_wrong(tmp_path, old, new, message):
+    text = export(*ROWS)
+    assert old in text
+    with pytest.raises(ReadError, match=message):
+        for frame in scanfab.read_series(write(tmp_path / "a.txt", text.replace(old, new))):
+            frame.read()
+
+
+def test_a_part_of_a_file_is_an_error(tmp_path):
+    with pytest.raises(ReadError, match="the last line has no end"):
+        scanfab.read_series(write(tmp_path / "a.txt", export(*ROWS)[:-100]))[0].read()
+
+
+def test_the_kit(tmp_path):
+    path = write(tmp_path / "a.txt", export(*ROWS))
+    check_reader(reader_named("musen"), [path], tmp_path / "damaged")
