@@ -10,22 +10,7 @@ from scanfab import ReadError
 from scanfab.io.registry import reader_named
 from scanfab.testing import check_reader
 from tests.helpers.dumps import write
-
-STATE = "2 {time} 12 {x} 0.5 0.5 15 9 9 9 16 9 9 9 18 0 20 9 9 9 31 1 0 0 0 36 9 9 9 9 9 9 9 9 9"
-
-
-def sphere(id, x, radius=0.1, active="0 1e+300"):
-    """Its contact radius is another number; it moves by 0.01 between both times."""
-    states = " ".join(STATE.format(time=time, x=x + time / 50) for time in (0, 0.5))
-    return f"0 {id} 1 1 5 {radius} 0.4 23 KEY 24 {active} {states}\n"
-
-
-def export(*rows, domain="28 0 0 0 0 0 0 0 0 0 0"):
-    bond = "0 7 1 9 5 3 1 0.1 0.2 23 KEY 24 0 1e+300 2 0 12 0 0 0 15 0 0 0 18 0 20 0 0 0\n"
-    return "".join(rows) + bond + f"22 0 0 0 1 1 1\n{domain}\n29 0\n32 KEY Glass 0 2500\n\n"
-
-
-ROWS = (sphere(3, 0.2), sphere(1, 0.375), sphere(2, 0.6, active="0.25 0.5"))
+from tests.helpers.made.musen import ROWS, STATE, export
 
 
 def test_spheres_of_each_time(tmp_path):
@@ -63,9 +48,9 @@ def test_the_periodic_domain(tmp_path):
 def test_what_is_wrong(tmp_path, old, new, message):
     text = export(*ROWS)
     assert old in text
+    series = scanfab.read_series(write(tmp_path / "a.txt", text.replace(old, new)))
     with pytest.raises(ReadError, match=message):
-        for frame in scanfab.read_series(write(tmp_path / "a.txt", text.replace(old, new))):
-            frame.read()
+        [frame.read() for frame in series]
 
 
 def test_a_part_of_a_file_is_an_error(tmp_path):
