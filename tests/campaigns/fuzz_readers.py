@@ -50,7 +50,9 @@ def main() -> None:
     if given.process is not None:
         fuzz(given.readers[0], given.runs, given.out, given.process)
         return
-    for reader in given.readers or ("lammps", "liggghts", "table", "vtk", "yade"):
+    from tests.helpers.fuzzing import READERS
+
+    for reader in given.readers or READERS:
         supervise(reader, given.runs, given.out / reader)
 
 
@@ -202,7 +204,7 @@ def _keep(out: Path, data: bytes, suffix: str, error: BaseException) -> None:
     target.write_bytes(data[2:])
     text = "".join(traceback.format_exception(error))
     target.with_name(target.name + ".report").write_text(
-        f"options {data[1] % 8}, ending {suffix}\n{text}"
+        f"options {data[1]}, ending {suffix}\n{text}"
     )
 
 

@@ -12,7 +12,7 @@ from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.columns import grain_table
-from scanfab.io.parse.counted_rows import counted_rows, text_of
+from scanfab.io.parse.counted_rows import counted_rows, spelt, text_of
 from scanfab.io.parse.vtk_hdf import is_hdf, read_hdf_file
 from scanfab.io.reader import (
     Carries,
@@ -27,20 +27,9 @@ __all__ = ["KratosReader"]
 
 START = re.compile(rb"^[ \t]*Begin[ \t]+(?:ModelPartData|Properties|Nodes|Table)\b", re.MULTILINE)
 COMMENT = re.compile(rb"//[^\n]*")
-NODES, RADII, ELEMENTS = (
-    re.compile(
-        rb"^[ \t]*Begin[ \t]+" + head + rb"[ \t]*\r?\n(.*?)^[ \t]*(End)[ \t]+" + tail,
-        re.MULTILINE | re.DOTALL,
-    )
-    for head, tail in (
-        (rb"Nodes", rb"Nodes\b"),
-        (rb"NodalData[ \t]+RADIUS", rb"NodalData\b"),
-        (rb"Elements[ \t]+(\S+)", rb"Elements\b"),
-    )
-)
-BEGUN = re.compile(
-    rb"^[ \t]*Begin[ \t]+(Nodes|NodalData[ \t]+RADIUS|Elements[ \t]+\S+)", re.MULTILINE
-)
+# the first and the last line of a block, which may hold others
+BORDER = re.compile(rb"^[ \t]*(Begin|End)[ \t]+([^\r\n]*?)[ \t]*\r?(?:\n|\Z)", re.MULTILINE)
+RADII = b"NodalData RADIUS"
 # of a group in HDF5
 DATASETS = {"id", "x", "y", "z", "radius"}
 
@@ -65,7 +54,7 @@ class KratosReader:
             return "grains" if _groups(path) else "other"
         if not self.recognises(path):
             return "other"
-        return "grains" if RADII.search(_plain_text(Snapshot(path))) else "other"
+        return "grains" if _blocks(path, _plain_text(Snapshot(path)), RADII) else "other"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """One, or the groups with their times; ``start`` is then the number of the group."""
@@ -127,20 +116,37 @@ def _plain_text(snapshot: Snapshot) -> bytes:
     return COMMENT.sub(b"", data) if b"//" in data else data
 
 
+def _blocks(path: Path, data: bytes, kind: bytes) -> list[tuple[bytes, int, int]]:
+    """The blocks whose titles begin so: what else the title says, and where their rows stand."""
+    found, open_blocks = [], []
+    for border in BORDER.finditer(data):
+        words = border[2].split() or [b""]
+        if border[1] == b"Begin":
+            open_blocks.append((words, border.end()))
+            continue
+        if not open_blocks or open_blocks[-1][0][0] != words[0]:
+            raise ReadError(f"{path}: expected no {spelt(border[0])} here: a block is incomplete")
+        title, start = open_blocks.pop()
+        if title[: len(kind.split())] == kind.split():
+            found.append((b" ".join(title[len(kind.split()) :]), start, border.start()))
+    if open_blocks:
+        title = b" ".join(open_blocks[-1][0])
+        raise ReadError(f"{path}: the block {spelt(title)} has no end: the file is incomplete")
+    return found
+
+
 def _read_mdpa(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
     path, data = snapshot.path, _plain_text(snapshot)
-    blocks = [len(list(one.finditer(data))) for one in (NODES, RADII, ELEMENTS)]
-    if sum(blocks) != len(BEGUN.findall(data)):
-        raise ReadError(f"{path}: a block of Nodes, NodalData or Elements has no end: incomplete")
-    for block in ELEMENTS.finditer(data):
-        kind = block[1].decode("utf-8", "replace")
+    elements = _blocks(path, data, b"Elements")
+    for title, _, _ in elements:
+        kind = title.decode("utf-8", "replace")
         if "Particle" not in kind or "Cluster" in kind:
             raise ReadError(
                 f"{path}: expected elements that are spheres, found {kind}: their shapes lie in "
                 f"other files"
             )
-    nodes = _block(snapshot, data, NODES, 4, "nodes")
-    radii = _block(snapshot, data, RADII, 3, "NodalData RADIUS")
+    nodes = _rows(snapshot, data, _blocks(path, data, b"Nodes"), 4, "nodes")
+    radii = _rows(snapshot, data, _blocks(path, data, RADII), 3, RADII.decode())
     row = _rows_of(path, nodes[:, 0], radii[:, 0])
     columns: dict[str, npt.NDArray[np.float64]] = {
         "id": radii[:, 0],
@@ -148,45 +154,43 @@ def _read_mdpa(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         # the second column says whether the value is fixed
         "radius": radii[:, 2],
     }
-    _check_elements(snapshot, data, radii[:, 0])
+    if elements:
+        spheres = _rows(snapshot, data, elements, 3, "elements")[:, 2]
+        lost = spheres[~np.isin(spheres, radii[:, 0])]
+        if len(lost):
+            raise ReadError(
+                f"{path}: the sphere at node {lost[0]:g} and {len(lost) - 1} more have no radius "
+                f"in {RADII.decode()}"
+            )
     return grain_table(path, columns, None, options)
 
 
-def _block(
-    snapshot: Snapshot, data: bytes, pattern: re.Pattern[bytes], width: int, names: str
+def _rows(
+    snapshot: Snapshot,
+    data: bytes,
+    blocks: list[tuple[bytes, int, int]],
+    width: int,
+    names: str,
 ) -> FloatArray:
     """The rows of all blocks of a kind."""
-    group = pattern.groups - 1
     parts = [
-        counted_rows(snapshot, data, *one.span(group), widths=(width,), names=names)
-        for one in pattern.finditer(data)
+        counted_rows(snapshot, data, start, end, widths=(width,), names=names)
+        for _, start, end in blocks
     ]
     if not parts:
         raise ReadError(f"{snapshot.path}: expected a block of {names}, found none")
     return np.concatenate(parts)
 
 
-def _rows_of(
-    path: Path, nodes: npt.NDArray[np.float64], wanted: npt.NDArray[np.float64]
-) -> npt.NDArray[np.int64]:
+def _rows_of(path: Path, nodes: FloatArray, wanted: FloatArray) -> npt.NDArray[np.int64]:
+    """The rows of the nodes with these numbers."""
     order = np.argsort(nodes, kind="stable")
-    if len(nodes) == 0 and len(wanted):
-        raise ReadError(f"{path}: radii of {len(wanted)} nodes, but no nodes")
-    place = np.minimum(np.searchsorted(nodes[order], wanted), max(len(nodes) - 1, 0))
-    rows = order[place] if len(nodes) else place
-    if len(wanted) and not np.array_equal(nodes[rows], wanted):
-        lost = wanted[nodes[rows] != wanted][0]
-        raise ReadError(f"{path}: the node {lost:g} has a radius, but no place among the nodes")
-    return np.asarray(rows, dtype=np.int64)
-
-
-def _check_elements(snapshot: Snapshot, data: bytes, ids: FloatArray) -> None:
-    """Every sphere needs a radius."""
-    for block in ELEMENTS.finditer(data):
-        rows = counted_rows(snapshot, data, *block.span(2), widths=(3,), names="elements")
-        lost = rows[~np.isin(rows[:, 2], ids), 2]
-        if len(lost):
-            raise ReadError(
-                f"{snapshot.path}: the sphere at node {lost[0]:g} and {len(lost) - 1} more have no "
-                f"radius in NodalData RADIUS"
-            )
+    place = np.searchsorted(nodes[order], wanted)
+    known = place < len(nodes)
+    rows = order[place[known]]
+    known[known] = nodes[rows] == wanted[known]
+    if not known.all():
+        raise ReadError(
+            f"{path}: the node {wanted[~known][0]:g} has a radius, but no place among the nodes"
+        )
+    return rows.astype(np.int64)

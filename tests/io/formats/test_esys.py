@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+from random import Random
+
 import numpy as np
 import pytest
 
 import scanfab
 from scanfab.io.registry import reader_named
 from scanfab.testing import check_reader
+from tests.helpers.fuzzing import mutate
 from tests.helpers.made.esys import TURNS, run
 
 
@@ -67,3 +71,13 @@ def test_the_kit(tmp_path):
     for name in ("snap_t=30_1.txt", "snap_t=30_2.txt"):
         (tmp_path / "damaged" / name).write_bytes((tmp_path / name).read_bytes())
     check_reader(reader_named("esys"), [path], tmp_path / "damaged")
+
+
+def test_damaged_files_of_workers_give_grains_or_an_error(tmp_path):
+    header = run(tmp_path)
+    worker = tmp_path / "snap_t=30_1.txt"
+    sound, random = worker.read_bytes(), Random(0)
+    for _ in range(500):
+        worker.write_bytes(mutate(sound, random))
+        with suppress(scanfab.ScanfabError):
+            scanfab.read(header)

@@ -34,7 +34,7 @@ def test_several_blocks_of_radii(tmp_path):
         ("7 0.5 0.25", "8 0.5 0.25", "the node 7 has a radius, but no place"),
         ("SphericParticle3D", "Cluster3D", "expected elements that are spheres, found Cluster3D"),
         ("7  1 0.2", "7  1", "the number of columns changed"),
-        ("End Nodes", "", "has no end"),
+        ("End Nodes", "", "expected no .End Elements. here|has no end|a block is incomplete"),
         ("RADIUS", "MASS", "no grains: expected points with a radius"),
     ],
 )
