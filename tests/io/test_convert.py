@@ -310,7 +310,7 @@ def test_contacts_cut_within_their_first_line_are_an_error(tmp_path):
     made = made_up_packings()["everything"]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        convert(made, tmp_path / "a.xyz")
+        scanfab.convert(made, tmp_path / "a.xyz")
     (tmp_path / "a.contacts.csv").write_text("id1,id2,ix,iy,iz")
     with pytest.raises(ReadError, match="the last line has no end"):
         scanfab.read(tmp_path / "a.xyz")

@@ -20,7 +20,6 @@ from scanfab.base.typing import FloatArray
 from scanfab.io.files import bare_name, first_bytes, plain
 from scanfab.io.formats.columns import grain_table
 from scanfab.io.formats.join import count_walls, join_ids
-from scanfab.io.formats.mercury_restart import is_restart, read_restart, time_of_restart
 from scanfab.io.parse.counted_rows import counted_rows, leave_out_last, spelt, text_of
 from scanfab.io.reader import (
     Carries,
@@ -30,6 +29,7 @@ from scanfab.io.reader import (
     ReadOptions,
     Snapshot,
 )
+from scanfab.io.small_formats.mercury_restart import is_restart, read_restart, time_of_restart
 from scanfab.io.unpacking import check_lines
 from scanfab.packing.cell import Cell
 
