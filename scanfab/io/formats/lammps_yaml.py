@@ -20,8 +20,6 @@ __all__ = ["index_yaml", "is_yaml", "read_yaml_grains", "yaml_kind"]
 START = re.compile(rb"\A(?:\xef\xbb\xbf)?---[ \t]*\r?\ncreator:[ \t]*LAMMPS[ \t]*\r?\n")
 DATA = re.compile(rb"^data:[ \t]*\r?\n", re.MULTILINE)
 END = b"..."
-# one entry a line, in brackets
-BRACKETS = re.compile(rb"^[ \t]*-[ \t]*\[|\][ \t]*(?=\r?$)", re.MULTILINE)
 # a header never comes near this size
 HEADER_BYTES = 1 << 16
 
@@ -84,8 +82,7 @@ def read_yaml_grains(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
     names = _listed(head, b"keywords")
     if not names:
         raise ReadError(f"{path}: expected keywords: [ id, ... ] above the data, found none")
-    # blanks in their place: lines keep their numbers
-    rows = BRACKETS.sub(b" ", data[body.end() : end]).replace(b",", b" ")
+    rows = _plain(data[body.end() : end])
     text = data[: body.end()] + rows
     count = _value(head, b"natoms")
     if not re.fullmatch(r"\d{1,15}", count):
@@ -116,6 +113,11 @@ def _snapshot(path: Path, head: bytes, start: int, stop: int) -> Snapshot:
     return Snapshot(path, int(step), seconds, start, stop)
 
 
+def _plain(rows: bytes) -> bytes:
+    """Entries such as ``- [ 1, 0.5, ]``, one a line, without their brackets and commas."""
+    return rows.replace(b"- [", b"").replace(b"]", b"").replace(b",", b"")
+
+
 def _value(head: bytes, key: bytes) -> str:
     """What stands behind a key at the start of a line."""
     found = re.search(rb"^" + key + rb":[ \t]*([^\r\n]*)", head, re.MULTILINE)
@@ -135,7 +137,7 @@ def _cell(path: Path, head: bytes) -> Cell | None:
     box = re.search(rb"^box:[ \t]*\r?\n((?:[ \t]*-[^\n]*\n){1,4})", head, re.MULTILINE)
     if box is None:
         return None
-    lines = BRACKETS.sub(b" ", box[1]).replace(b",", b" ").decode("utf-8", "replace").splitlines()
+    lines = _plain(box[1]).decode("utf-8", "replace").splitlines()
     letters = _listed(head, b"boundary")
     flags = [letters[place] + letters[place + 1] for place in range(0, len(letters) - 1, 2)]
     if len(lines) == 4:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from itertools import islice
 from pathlib import Path
 from typing import IO, Any
 
@@ -13,7 +12,7 @@ import numpy.typing as npt
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.io.files import check_memory, first_bytes, plain
 from scanfab.io.formats.columns import grain_table, has_radius
-from scanfab.io.parse.counted_rows import leave_out_last
+from scanfab.io.parse.counted_rows import leave_out_last, skip_rows
 from scanfab.io.reader import (
     Carries,
     FileKind,
@@ -67,7 +66,7 @@ class XyzReader:
         found: list[Snapshot] = []
         with open(plain(path), "rb") as stream:
             while (head := _head_or_end(path, stream)) is not None:
-                rows = sum(line.endswith(b"\n") for line in islice(stream, head.count))
+                rows = skip_rows(stream, head.count)
                 if rows < head.count:
                     reason = f"expected {head.count} rows, the file ends after {rows}"
                     leave_out_last(path, len(found), reason)

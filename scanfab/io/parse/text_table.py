@@ -21,7 +21,7 @@ import numpy.typing as npt
 from scanfab.base.memory import free_memory
 from scanfab.base.threads import in_order
 
-__all__ = ["LARGE", "TextTable", "read_regular"]
+__all__ = ["LARGE", "TextTable", "parse_regular", "read_regular"]
 
 # bytes; a smaller table is parsed before polars is loaded
 LARGE = 8 << 20
@@ -80,6 +80,24 @@ def read_regular(table: TextTable, columns: Mapping[int, npt.NDArray[Any]]) -> b
             _put(frame[f"{place}"].get_chunks(), column[rows : rows + frame.height])
         rows += frame.height
     return rows == table.count
+
+
+def parse_regular(text: bytes, width: int) -> npt.NDArray[np.float64] | None:
+    """All numbers of a long text, shape (N, width), if it is regular; else None."""
+    if free_memory() < ROOM + 2 * len(text):
+        return None
+    behind = text[: text.find(b"\n") + 1].endswith(b" \n")
+    kinds = dict.fromkeys(range(width), np.dtype(np.float64))
+    found, start = [], 0
+    while start < len(text):
+        stop = len(text) if start + PIECE >= len(text) else text.find(b"\n", start + PIECE) + 1
+        frame = _parse_piece(text[start:stop], width, kinds, behind)
+        if frame is None:
+            return None
+        found.append(np.column_stack([frame[f"{place}"].to_numpy() for place in range(width)]))
+        # a last piece without its end is none
+        start = stop or len(text)
+    return np.concatenate(found)
 
 
 def _put(parts: list[Any], column: npt.NDArray[Any]) -> None:

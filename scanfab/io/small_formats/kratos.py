@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +29,7 @@ __all__ = ["KratosReader"]
 START = re.compile(rb"^[ \t]*Begin[ \t]+(?:ModelPartData|Properties|Nodes|Table)\b", re.MULTILINE)
 COMMENT = re.compile(rb"//[^\n]*")
 # the first and the last line of a block, which may hold others
-BORDER = re.compile(rb"^[ \t]*(Begin|End)[ \t]+([^\r\n]*?)[ \t]*\r?(?:\n|\Z)", re.MULTILINE)
+BORDER = re.compile(rb"^[ \t]*(Begin|End)[ \t]+([^\r\n]*?)[ \t]*\r?$")
 RADII = b"NodalData RADIUS"
 # of a group in HDF5
 DATASETS = {"id", "x", "y", "z", "radius"}
@@ -54,7 +55,8 @@ class KratosReader:
             return "grains" if _groups(path) else "other"
         if not self.recognises(path):
             return "other"
-        return "grains" if _blocks(path, _plain_text(Snapshot(path)), RADII) else "other"
+        blocks = _blocks(path, _plain_text(Snapshot(path)))
+        return "grains" if _of_kind(blocks, RADII) else "other"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """One, or the groups with their times; ``start`` is then the number of the group."""
@@ -116,37 +118,64 @@ def _plain_text(snapshot: Snapshot) -> bytes:
     return COMMENT.sub(b"", data) if b"//" in data else data
 
 
-def _blocks(path: Path, data: bytes, kind: bytes) -> list[tuple[bytes, int, int]]:
-    """The blocks whose titles begin so: what else the title says, and where their rows stand."""
-    found, open_blocks = [], []
-    for border in BORDER.finditer(data):
+Block = tuple[list[bytes], int, int]
+
+
+def _borders(data: bytes) -> Iterator[tuple[re.Match[bytes], int, int]]:
+    """The lines that begin or end a block, with their first byte and the one behind the last."""
+    place = 0
+    nearest = dict.fromkeys((b"Begin", b"End"), -2)
+    while True:
+        for word, found in nearest.items():
+            if found != -1 and found < place:
+                nearest[word] = data.find(word, place)
+        found = min((one for one in nearest.values() if one >= 0), default=-1)
+        if found < 0:
+            return
+        start = data.rfind(b"\n", 0, found) + 1
+        place = data.find(b"\n", found) + 1 or len(data)
+        border = BORDER.match(data[start:place].rstrip(b"\n"))
+        if border is not None:
+            yield border, start, place
+
+
+def _blocks(path: Path, data: bytes) -> list[Block]:
+    """The words of each block's title, and where its rows stand."""
+    found: list[Block] = []
+    begun: list[tuple[list[bytes], int]] = []
+    for border, start, stop in _borders(data):
         words = border[2].split() or [b""]
         if border[1] == b"Begin":
-            open_blocks.append((words, border.end()))
+            begun.append((words, stop))
             continue
-        if not open_blocks or open_blocks[-1][0][0] != words[0]:
+        if not begun or begun[-1][0][0] != words[0]:
             raise ReadError(f"{path}: expected no {spelt(border[0])} here: a block is incomplete")
-        title, start = open_blocks.pop()
-        if title[: len(kind.split())] == kind.split():
-            found.append((b" ".join(title[len(kind.split()) :]), start, border.start()))
-    if open_blocks:
-        title = b" ".join(open_blocks[-1][0])
-        raise ReadError(f"{path}: the block {spelt(title)} has no end: the file is incomplete")
+        title, first = begun.pop()
+        found.append((title, first, start))
+    if begun:
+        last = b" ".join(begun[-1][0])
+        raise ReadError(f"{path}: the block {spelt(last)} has no end: the file is incomplete")
     return found
+
+
+def _of_kind(blocks: list[Block], kind: bytes) -> list[Block]:
+    words = kind.split()
+    return [one for one in blocks if one[0][: len(words)] == words]
 
 
 def _read_mdpa(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
     path, data = snapshot.path, _plain_text(snapshot)
-    elements = _blocks(path, data, b"Elements")
+    blocks = _blocks(path, data)
+    elements = _of_kind(blocks, b"Elements")
     for title, _, _ in elements:
-        kind = title.decode("utf-8", "replace")
+        kind = b" ".join(title[1:]).decode("utf-8", "replace")
         if "Particle" not in kind or "Cluster" in kind:
             raise ReadError(
                 f"{path}: expected elements that are spheres, found {kind}: their shapes lie in "
                 f"other files"
             )
-    nodes = _rows(snapshot, data, _blocks(path, data, b"Nodes"), 4, "nodes")
-    radii = _rows(snapshot, data, _blocks(path, data, RADII), 3, RADII.decode())
+    nodes = _rows(snapshot, data, _of_kind(blocks, b"Nodes"), 4, "nodes")
+    radii = _rows(snapshot, data, _of_kind(blocks, RADII), 3, RADII.decode())
     row = _rows_of(path, nodes[:, 0], radii[:, 0])
     columns: dict[str, npt.NDArray[np.float64]] = {
         "id": radii[:, 0],
@@ -168,7 +197,7 @@ def _read_mdpa(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
 def _rows(
     snapshot: Snapshot,
     data: bytes,
-    blocks: list[tuple[bytes, int, int]],
+    blocks: list[Block],
     width: int,
     names: str,
 ) -> FloatArray:

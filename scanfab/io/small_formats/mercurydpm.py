@@ -8,7 +8,6 @@ both sides, unless one of them is fixed or an image in a periodic cell.
 from __future__ import annotations
 
 import re
-from itertools import islice, takewhile
 from pathlib import Path
 from typing import IO
 
@@ -20,7 +19,7 @@ from scanfab.base.typing import FloatArray
 from scanfab.io.files import bare_name, first_bytes, plain
 from scanfab.io.formats.columns import grain_table
 from scanfab.io.formats.join import count_walls, join_ids
-from scanfab.io.parse.counted_rows import counted_rows, leave_out_last, spelt, text_of
+from scanfab.io.parse.counted_rows import counted_rows, leave_out_last, skip_rows, spelt, text_of
 from scanfab.io.reader import (
     Carries,
     FileKind,
@@ -30,7 +29,6 @@ from scanfab.io.reader import (
     Snapshot,
 )
 from scanfab.io.small_formats.mercury_restart import is_restart, read_restart, time_of_restart
-from scanfab.io.unpacking import check_lines
 from scanfab.packing.cell import Cell
 
 __all__ = ["MercuryReader"]
@@ -176,7 +174,6 @@ def _bounds(line: bytes) -> list[float] | None:
 
 def _grain_frames(path: Path) -> list[Snapshot]:
     found: list[Snapshot] = []
-    check_lines(path, plain(path))
     with open(plain(path), "rb") as stream:
         start = 0
         while line := stream.readline(LONGEST):
@@ -188,7 +185,7 @@ def _grain_frames(path: Path) -> list[Snapshot]:
                 )
             if bounds is not None:
                 count = int(bounds[0])
-                rows = sum(1 for _ in takewhile(_is_whole, islice(stream, count)))
+                rows = skip_rows(stream, count)
                 if rows < count or not line.endswith(b"\n"):
                     reason = f"expected {count} grains at time {bounds[1]:g}, found {rows}"
                     leave_out_last(path, len(found), reason)
@@ -198,10 +195,6 @@ def _grain_frames(path: Path) -> list[Snapshot]:
                 leave_out_last(path, len(found), f"found {spelt(line)} at its end")
             start = stream.tell()
     return found
-
-
-def _is_whole(line: bytes) -> bool:
-    return line.endswith(b"\n")
 
 
 def _contact_frames(path: Path) -> list[Snapshot]:

@@ -151,7 +151,7 @@ def _numbers(
     names: str,
     count: int | None = None,
 ) -> FloatArray:
-    text = data[:begin] + DIGITS.sub(b"e", data[begin:])
+    text = data[:begin] + DIGITS.sub(b"e", data[begin:]) if re.search(b"[dD]", data) else data
     return counted_rows(snapshot, text, begin, len(text), widths=widths, names=names, count=count)
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator, Sequence
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +31,9 @@ SIZES = {
 }  # fmt: skip
 
 
+WANTED = (ID, TIME, GEOMETRY, PLACE, ACTIVE)
+
+
 class MusenReader:
     """Reader plugin for MUSEN."""
 
@@ -46,10 +51,10 @@ class MusenReader:
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """One for each time of the first sphere; ``start`` of a snapshot is its number."""
-        line = next(_spheres(text_of(Snapshot(path))), None)
-        if line is None:
+        first = next(_objects(path, text_of(Snapshot(path))), None)
+        if first is None:
             raise ReadError(f"{path}: expected spheres (0 ID 1 1 5 RADIUS ...), found none")
-        times = [time for time, _ in _object(path, line)[3]]
+        times = [time for time, _ in first[3]]
         return [
             Snapshot(path, time=time, start=number, stop=number + 1)
             for number, time in enumerate(times)
@@ -61,8 +66,7 @@ class MusenReader:
         if not data.endswith(b"\n"):
             raise ReadError(f"{path}: the last line has no end: the file is incomplete")
         rows = []
-        for line in _spheres(data):
-            id, radius, (begin, end), states = _object(path, line)
+        for id, radius, (begin, end), states in _objects(path, data):
             if len(states) <= snapshot.start or states[snapshot.start][0] != snapshot.time:
                 raise ReadError(
                     f"{path}: the sphere {id:g} has no state at the time {snapshot.time}: export "
@@ -81,7 +85,10 @@ class MusenReader:
         raise ReadError(f"{snapshot.path}: MUSEN's export holds bonds, but no contacts")
 
 
-def _spheres(data: bytes):  # type: ignore[no-untyped-def]
+Object = tuple[float, float, tuple[float, float], list["State"]]
+
+
+def _spheres(data: bytes) -> Iterator[bytes]:
     """The rows of spheres; words stand apart by single blanks."""
     start = 0
     while start < len(data):
@@ -97,49 +104,77 @@ def _spheres(data: bytes):  # type: ignore[no-untyped-def]
 State = tuple[float, list[float]]
 
 
-def _object(path: Path, line: bytes) -> tuple[float, float, tuple[float, float], list[State]]:
+class _Layout:
+    """Where which property stands in a row: the same in all rows that have the same ones."""
+
+    def __init__(self, path: Path, words: list[bytes], line: bytes) -> None:
+        keys: dict[int, bytes] = {}
+        place = 0
+        while place < len(words):
+            keys[place] = words[place]
+            size = SIZES.get(words[place])
+            if size is None:
+                raise ReadError(
+                    f"{path}: expected the number of a property, found {spelt(words[place])} in "
+                    f"the row that begins {spelt(line[:60])}"
+                )
+            place += 1 + size
+        self.length = len(words)
+        self._keys, self._names = itemgetter(*keys), tuple(keys.values())
+        self.wanted = [key for key in keys.values() if key in WANTED]
+        places = [
+            place + k + 1 for place, key in keys.items() if key in WANTED for k in range(SIZES[key])
+        ]
+        self.values = itemgetter(*places, 0)
+        self.ends = place
+
+    def fits(self, words: list[bytes]) -> bool:
+        """Whether another row has the same properties at the same places."""
+        return len(words) == self.length and self._keys(words) == self._names
+
+
+def _objects(path: Path, data: bytes) -> Iterator[Object]:
+    layout: _Layout | None = None
+    for line in _spheres(data):
+        words = line.split()
+        if layout is None or not layout.fits(words):
+            layout = _Layout(path, words, line)
+        yield _object(path, layout, words, line)
+
+
+def _object(path: Path, layout: _Layout, words: list[bytes], line: bytes) -> Object:
     """Id, radius, the times between which it is active, and its places at all times."""
-    words = line.split()
-    place, radius, id = 0, 0.0, -1.0
+    radius, id, time = 0.0, -1.0, np.nan
     active, states = (-np.inf, np.inf), []
-    time: float | None = None
-    while place < len(words):
-        key = words[place]
-        size = SIZES.get(key)
-        if size is None:
-            raise ReadError(
-                f"{path}: expected the number of a property, found {spelt(key)} in the row that "
-                f"begins {spelt(line[:60])}"
-            )
-        values = words[place + 1 : place + 1 + size]
-        place += 1 + size
-        if key not in (ID, TIME, GEOMETRY, PLACE, ACTIVE):
-            continue
-        numbers = _numbers(path, line, values, size)
+    # a word behind the last wanted one keeps them a tuple
+    numbers = _numbers(path, line, layout.values(words)[:-1]) if layout.ends == len(words) else []
+    place = 0
+    for key in layout.wanted if numbers else ():
         if key == ID:
-            id = numbers[0]
+            id = numbers[place]
         elif key == GEOMETRY:
-            radius = numbers[0]
+            radius = numbers[place]
         elif key == ACTIVE:
-            active = (numbers[0], numbers[1])
+            active = (numbers[place], numbers[place + 1])
         elif key == TIME:
-            time = numbers[0]
-        elif time is not None:
-            states.append((time, numbers))
-    if not states:
-        raise ReadError(f"{path}: expected 2 TIME 12 X Y Z in the row of {spelt(line[:60])}")
+            time = numbers[place]
+        else:
+            states.append((time, numbers[place : place + 3]))
+        place += SIZES[key]
+    if not states or states[0][0] != states[0][0]:
+        raise ReadError(f"{path}: expected 2 TIME 12 X Y Z ... in the row of {spelt(line[:60])}")
     return id, radius, active, states
 
 
-def _numbers(path: Path, line: bytes, words: list[bytes], size: int) -> list[float]:
+def _numbers(path: Path, line: bytes, words: Sequence[bytes]) -> list[float]:
     try:
-        if len(words) < size or any(b"_" in word for word in words):
+        if b"_" in b" ".join(words):
             raise ValueError
-        return [float(word) for word in words]
+        return list(map(float, words))
     except ValueError:
         raise ReadError(
-            f"{path}: expected {size} numbers, found {spelt(b' '.join(words))} in the row that "
-            f"begins {spelt(line[:60])}"
+            f"{path}: expected numbers, found {spelt(b' '.join(words))} in the row that begins "
+            f"{spelt(line[:60])}"
         ) from None
 
 
@@ -148,7 +183,7 @@ def _cell(path: Path, data: bytes) -> Cell | None:
     found = PERIODIC.search(data, max(data.rfind(b"\n28"), 0))
     if found is None or found[1] == b"0":
         return None
-    along, low, high = np.array(_numbers(path, found[0], found[2].split(), 9)).reshape(3, 3)
+    along, low, high = np.array(_numbers(path, found[0], found[2].split())).reshape(3, 3)
     edges: FloatArray = high - low
     # a domain that does not repeat along an axis may have no width there
     edges[(along == 0) & (edges <= 0)] = max(edges.max(), 0.0)

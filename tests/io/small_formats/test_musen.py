@@ -39,7 +39,7 @@ def test_the_periodic_domain(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("0 1 1 1 5 0.1", "0 1 1 1 5 word", "expected 2 numbers, found 'word 0.4'"),
+        ("0 1 1 1 5 0.1", "0 1 1 1 5 word", "expected numbers, found '1 word 0.4"),
         (" 36 9", " 99 9", "expected the number of a property, found '99'"),
         ("28 0", "28 1", "its periodic domain"),
         (STATE.format(time=0.5, x=0.375 + 0.01) + "\n", "\n", "sphere 1 has no state at the time"),
