@@ -97,6 +97,10 @@ def fuzz(reader: str, runs: int, out: Path, folder: Path) -> None:
         installed_readers()
     _write_corpus(fuzzing, reader, folder)
     fuzzing.companion_grains(reader)
+    # the libraries that the first table loads take 1 GB of addresses, whatever stands in it
+    table = folder / "table.csv"
+    table.write_text("x,y,z,radius\n0,0,0,1\n")
+    fuzzing.read_everything(table, "table", fuzzing.OPTIONS[0])
     execution = _Execution(fuzzing, reader, out, folder)
 
     def mutate(data: bytes, most: int, seed: int) -> bytes:

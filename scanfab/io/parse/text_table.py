@@ -88,16 +88,19 @@ def parse_regular(text: bytes, width: int) -> npt.NDArray[np.float64] | None:
         return None
     behind = text[: text.find(b"\n") + 1].endswith(b" \n")
     kinds = dict.fromkeys(range(width), np.dtype(np.float64))
-    found, start = [], 0
+    frames, start = [], 0
     while start < len(text):
-        stop = len(text) if start + PIECE >= len(text) else text.find(b"\n", start + PIECE) + 1
+        stop = text.find(b"\n", min(start + PIECE, len(text) - 1)) + 1 or len(text)
         frame = _parse_piece(text[start:stop], width, kinds, behind)
         if frame is None:
             return None
-        found.append(np.column_stack([frame[f"{place}"].to_numpy() for place in range(width)]))
-        # a last piece without its end is none
-        start = stop or len(text)
-    return np.concatenate(found)
+        frames.append(frame)
+        start = stop
+    # by columns, as they are used
+    values = np.empty((width, sum(frame.height for frame in frames)))
+    for place, column in enumerate(values):
+        _put([part for frame in frames for part in frame[f"{place}"].get_chunks()], column)
+    return values.T
 
 
 def _put(parts: list[Any], column: npt.NDArray[Any]) -> None:
