@@ -399,9 +399,14 @@ def test_walls_and_boxes_are_neither_grains_nor_contacts(name):
         scanfab.read(FLOOR / name)
 
 
-def test_files_of_other_programs_are_not_known():
+def test_a_mesh_is_not_known():
     with pytest.raises(UnknownFormatError, match="no reader knows the format"):
         scanfab.read(FLOOR / "mesh_30000.stl")
+
+
+def test_a_binary_dump_asks_for_the_names_of_its_columns():
+    with pytest.raises(ReadError, match="does not name its 6 columns: name them"):
+        scanfab.read(FLOOR / "binary_30000.bin")
 
 
 def test_contacts_alone_are_no_grains():
