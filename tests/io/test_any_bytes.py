@@ -40,6 +40,18 @@ HEADS = (
     b"PAR1",
     b"PK\x03\x04",
     b"x,y,z,radius\n",
+    b"LIGGGHTS data file\n\n1 atoms\n0 1 xlo xhi\n\nAtoms\n\n",
+    b"---\ncreator: LAMMPS\ntimestep: 1\n",
+    b"CDF\x05",
+    b"\xdf\x65\xdf\x65\xdf\x65\xdf\x65",
+    b"MercuryDPM 1.0 name a\n",
+    b"1 0 0 0 0 1 1 1\n",
+    b"# 0 1\n# 0 0 0 1 1 1\n# 1 1 0 0 0 0\n",
+    b"# LF_DEM version 2\n# np 1\n",
+    b"0 1 1 1 5 0.1 0.1 ",
+    b"Version 2.0\nDimension: 3\nParticles: 1\n",
+    b"Begin Nodes\n",
+    b"V 3\n1\n0.5\n1\nESyS-Particle 2\nBoundingBox 0 0 0 1 1 1\n",
     b"\xff\xfe",
 )
 FEW = settings(
