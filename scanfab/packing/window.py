@@ -179,10 +179,23 @@ class Window:
         self, points: FloatArray, packing: Packing, margin: float = 0.0
     ) -> tuple[FloatArray, FloatArray]:
         """
-        From the window's centre to all images of points, (N, 3), that may lie near the window.
+        From the window's centre to all images of points that may lie near the window.
 
-        That is within a margin of it: branches to the nearest image of each point, shape (N, 3),
-        and shifts from there to others, shape (T, 3), the first of which is 0.
+        Parameters
+        ----------
+        points : ndarray, shape (N, 3)
+            Dump's coordinates.
+        packing : Packing
+            Whose cell repeats, if it does.
+        margin : float, optional
+            How near: from the window's surface, dump's length unit.
+
+        Returns
+        -------
+        branch : ndarray, shape (N, 3)
+            To the nearest image of each point.
+        shifts : ndarray, shape (T, 3)
+            From there to other images; the first is 0.
         """
         branch = points - self.center
         shifts = np.zeros((1, 3))
