@@ -168,3 +168,17 @@ def test_anisotropy_grows_with_the_strain(biaxial):
         parts = sum(row[f"alpha_{name}_axial"] for name in ("bn", "fn", "ft")) / 2
         expected = 0.5 * (2 * row.alpha_c_axial + parts)
         assert row["q"] / (2 * row["p"]) == pytest.approx(expected, abs=0.02)
+
+
+@pytest.mark.parametrize(("variant", "slope"), [("a", 0.246), ("c", 0.233)])
+def test_the_slope_at_15_percent_is_near_that_of_the_paper(biaxial, variant, slope):
+    """Of the voids on the contacts, 0.231 in the two dimensions of the 2017 paper."""
+    row = [row for row in biaxial if row.variant == variant][4]
+    assert row.strain == pytest.approx(0.15, abs=0.002)
+    found = row.alpha_vs_axial / row.alpha_c_axial
+    error = (
+        np.hypot(row.alpha_vs_axial_sample_se, 0.231 * row.alpha_c_axial_sample_se)
+        / row.alpha_c_axial
+    )
+    assert found == pytest.approx(slope, abs=0.004)
+    assert abs(found - 0.231) < 2 * error
