@@ -259,7 +259,10 @@ class Frame:
                 found.append((family, contacts))
         if not found and series.contacts:
             patterns = ", ".join(family.pattern for family in series.contacts)
-            message = f"{self.snapshot.path}: no contact file for step {self.step} among {patterns}"
+            moment = f"step {self.step}"
+            if self.step is None and self.snapshot.time is not None:
+                moment = f"time {self.snapshot.time:g}"
+            message = f"{self.snapshot.path}: no contact file for {moment} among {patterns}"
             if series.contacts_from == "path":
                 raise ReadError(message)
             warnings.warn(

@@ -81,11 +81,7 @@ def sample_state(sample: Sample, variant: Variant, window: Window | None) -> Sam
     """
     region = window if variant.in_window else None
     counted = sample.once(sample.counted(variant, region) & ~sample.removed(variant))
-    numbers = (
-        sample.contact_numbers_without_rattlers
-        if variant.without_rattlers
-        else sample.contact_numbers
-    )[counted]
+    numbers = sample.numbers_of(variant)[counted]
     held = numbers[numbers >= 2]
     return SampleState(
         void_ratio=_void_ratio(sample, region),
@@ -178,15 +174,11 @@ def _at_walls(sample: Sample, walls: WallForces) -> tuple[FloatArray, FloatArray
 
 def _shares(start: FloatArray, branch: FloatArray, window: Window, packing: Packing) -> FloatArray:
     """The part of each branch that lies in the window, of all its images together."""
-    shape, origin = window.shape, start - window.center
-    if packing.cell is None or not packing.is_periodic:
-        return shape.share(origin, branch)
-    lattice = packing.cell.lattice
-    origin = origin + packing.cell.nearest_image(origin) @ packing.cell.vectors
     longest = float(np.linalg.norm(branch, axis=1).max(initial=0.0))
-    found = shape.share(origin, branch)
-    for shift in lattice.within(shape.reach + longest + lattice.half_extent):
-        found += shape.share(origin + shift, branch)
+    origin, shifts = window.images(start, packing, longest)
+    found = np.zeros(len(branch))
+    for shift in shifts:
+        found += window.shape.share(origin + shift, branch)
     return found
 
 
@@ -216,14 +208,8 @@ def _volume_inside(
 
     Of the volume of each, ``share`` counts, shape (N,).
     """
-    shape, origin = window.shape, position - window.center
-    shifts = np.zeros((1, 3))
-    if packing.cell is not None and packing.is_periodic:
-        lattice = packing.cell.lattice
-        origin = origin + packing.cell.nearest_image(origin) @ packing.cell.vectors
-        reach = shape.reach + float(radius.max(initial=0.0)) + lattice.half_extent
-        shifts = np.concatenate([shifts, lattice.within(reach)])
-    total = 0.0
+    shape, total = window.shape, 0.0
+    origin, shifts = window.images(position, packing, float(radius.max(initial=0.0)))
     for shift in shifts:
         places = origin + shift
         near = shape.may_meet(places, radius)

@@ -192,8 +192,6 @@ def test_an_open_whole_has_no_volume_and_says_so():
 
 @pytest.mark.parametrize("suffix", [".csv", ".json", ".jsonl", ".parquet"])
 def test_lists_of_numbers_are_where_cells_may_be_lists(tmp_path, yade, suffix):
-    if suffix == ".parquet":
-        pytest.importorskip("pyarrow")
     found = scanfab.compute(yade, with_="harmonics", variants="a", **FAST)
     path = tmp_path / f"table{suffix}"
     found.save(path)
