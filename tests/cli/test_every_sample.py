@@ -155,4 +155,4 @@ def test_forces_of_contacts_by_geometry_are_not_known(compute):
 def test_a_map_of_discs_is_refused(capsys):
     assert run(["map", DISCS, "--contacts", "geometric", "--grid", "2,2,1"]) == 1
     told = " ".join(capsys.readouterr().err.split())
-    assert "--dim: maps are of spheres, but all grains are taken for discs in the plane" in told
+    assert "spheres in space, but all grains are discs in the plane x-y" in told
