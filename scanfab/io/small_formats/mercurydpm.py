@@ -107,7 +107,7 @@ class MercuryReader:
         if is_restart(first_bytes(path)):
             return read_restart(snapshot, options)
         data = text_of(snapshot)
-        line, _, _ = data.partition(b"\n")
+        line = data[: max(data.find(b"\n"), 0)]
         bounds = _bounds(line)
         if bounds is None:
             raise ReadError(f"{path}: expected the number of grains, time and bounds")
@@ -231,6 +231,8 @@ def _ends_whole(stream: IO[bytes], size: int) -> bool:
     return stream.read(1) == b"\n"
 
 
+# what is not finite is the packing's to refuse
+@np.errstate(over="ignore", invalid="ignore")
 def _once(
     rows: npt.NDArray[np.int64], values: FloatArray
 ) -> tuple[npt.NDArray[np.int64], FloatArray]:
