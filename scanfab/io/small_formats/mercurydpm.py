@@ -148,6 +148,8 @@ class MercuryReader:
                 f"both files belong to the same time?"
             )
         pairs, force = _once(rows[~wall], values[~wall])
+        if not np.all(np.isfinite(force)):
+            raise ReadError(f"{path}: expected finite numbers as forces and normals")
         # rows of the grain file, whatever ids these have
         numbered = grains._replace(id=np.arange(count))
         joined = join_ids(path, numbered, pairs, force, walls=False)
@@ -231,7 +233,6 @@ def _ends_whole(stream: IO[bytes], size: int) -> bool:
     return stream.read(1) == b"\n"
 
 
-# what is not finite is the packing's to refuse
 @np.errstate(over="ignore", invalid="ignore")
 def _once(
     rows: npt.NDArray[np.int64], values: FloatArray
