@@ -19,7 +19,8 @@ GROUPS = {
         "compute", "compute_file", "fabric_map", "Settings", "calibrate", "Calibration",
     ),
     "Tables": (
-        "Table", "Row", "load", "read_rows", "compare_tables", "Comparison", "COLUMNS", "Column",
+        "Table", "Row", "load", "read_rows", "merge_tables", "compare_tables", "Comparison",
+        "COLUMNS", "Column",
     ),
     "Figures and reports": ("scan_frames", "ScannedFrames", "make_report", "Report"),
     "Scanning by hand": (

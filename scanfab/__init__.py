@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from scanfab.packing.search import find_contacts
     from scanfab.packing.window import Window
     from scanfab.pipeline.calibration import Calibration, calibrate
+    from scanfab.pipeline.cluster.merging import merge_tables
     from scanfab.pipeline.compute import compute
     from scanfab.pipeline.maps.fabric_map import fabric_map
     from scanfab.pipeline.samples import samples
@@ -99,6 +100,7 @@ _HOME = {
     "find_contacts": "packing.search",
     "load": "table.table",
     "make_report": "viz.report.report",
+    "merge_tables": "pipeline.cluster.merging",
     "polyhedron": "base.shapes",
     "read": "io.opening",
     "read_rows": "table.reading",
@@ -157,6 +159,7 @@ __all__ = [
     "find_contacts",
     "load",
     "make_report",
+    "merge_tables",
     "polyhedron",
     "read",
     "read_rows",

@@ -79,7 +79,7 @@ def compute(
         )  # fmt: skip
         if plot is not None:
             _draw(plot, figure, job)
-    return 0 if job.found_void_fabric and not job.has_skipped else 1
+    return 0 if job.is_good else 1
 
 
 def _check_figure(plot: Path | None, figure: str | None) -> None:

@@ -63,7 +63,7 @@ def map(
         )  # fmt: skip
         if plot is not None:
             _draw(plot, job)
-    return 0 if job.found_void_fabric and not job.has_skipped else 1
+    return 0 if job.is_good else 1
 
 
 def _columns_drawn() -> tuple[str, ...]:

@@ -26,6 +26,7 @@ from scanfab.pipeline.values import as_written
 
 __all__ = [
     "Frames",
+    "NoChosenFrameError",
     "Readable",
     "Source",
     "boundary_hints",
@@ -37,6 +38,10 @@ __all__ = [
 
 Source = Packing | Series | Iterable[Packing]
 """One frame, a series that is read frame by frame, or packings from anywhere."""
+
+
+class NoChosenFrameError(SettingsError):
+    """The series has frames, but none of those that were chosen."""
 
 
 class Readable(Protocol):
@@ -271,7 +276,7 @@ class Frames:
             return SettingsError(f"expected frames, found none in {self.name or 'the source'}")
         name, frames = self.name or "the packing", self.settings.frames
         has = "1 frame, 0" if count == 1 else f"{count} frames, 0 to {count - 1}"
-        return SettingsError(
+        return NoChosenFrameError(
             f"frames: the series has no frame in {as_written(frames)}: {name} has {has}"
         )
 

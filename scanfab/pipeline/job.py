@@ -13,7 +13,7 @@ from scanfab.base.errors import ScanfabNote, SettingsError
 from scanfab.base.files import check_folder
 from scanfab.io.series import Series
 from scanfab.pipeline.compute import Observer, compute_rows
-from scanfab.pipeline.frames import chosen_frames
+from scanfab.pipeline.frames import NoChosenFrameError, chosen_frames
 from scanfab.pipeline.manifest import (
     Inputs,
     asked_for,
@@ -122,9 +122,11 @@ class Job:
         ]
 
     @property
-    def has_skipped(self) -> bool:
-        """Whether a frame was skipped, now or by an earlier run."""
-        return bool(self._told.skipped) or self._has_gaps
+    def is_good(self) -> bool:
+        """Whether no frame was skipped, now or by an earlier run, and one has a void fabric."""
+        skipped = bool(self._told.skipped) or self._has_gaps
+        # a table without frames, of a job that none was left for, lacks nothing
+        return not skipped and (self.found_void_fabric or not self.done)
 
     def frames(self) -> int:
         """About how many frames there are to be finished, those of earlier runs among them."""
@@ -242,7 +244,12 @@ class Job:
             ready = {frame: rows for frame, rows in of_table.items() if frame >= start}
             done = {*range(start), *ready}
             computed = compute_rows(one, self.settings, done=done, observe=observe)
-            yield from _in_order(ready, computed)
+            try:
+                yield from _in_order(ready, computed)
+            except NoChosenFrameError as none:
+                # of an array of more jobs than frames some have nothing to do
+                text = str(none).removeprefix("frames: ")
+                warnings.warn(f"{text}: it has no row in this table", ScanfabNote, stacklevel=3)
 
 
 def _in_order(ready: dict[int, list[Row]], computed: Iterator[Row]) -> Iterator[Row]:

@@ -116,7 +116,7 @@ def manifest(
     inputs : Inputs, optional
         Those that have been looked at already.
     """
-    inputs = inputs or Inputs()
+    inputs, series = inputs or Inputs(), list(series)
     files = {path for one in series for path in one.files()}
     files.update(one for one in (strain_file(asked), surface_file(asked)) if one is not None)
     return {
@@ -129,6 +129,8 @@ def manifest(
         "inputs": [inputs.entry(path) for path in sorted(files)],
         "warnings": list(warnings),
         "notes": list(notes),
+        # of the whole series: who merges parts knows by it which frames are missing
+        "frames": {one.name: len(one) for one in series},
     }
 
 
