@@ -13,7 +13,7 @@ BEGIN, END = "<!-- names -->", "<!-- end of names -->"
 
 # in the order in which a computation needs them
 GROUPS = {
-    "Reading and writing": ("read", "read_series", "Series", "Frame", "convert"),
+    "Reading and writing": ("read", "read_series", "follow_series", "Series", "Frame", "convert"),
     "Packings from anywhere": ("Packing", "Cell", "ContactList", "Contacts", "find_contacts"),
     "Computing": (
         "compute", "compute_file", "fabric_map", "Settings", "calibrate", "Calibration",

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from scanfab.fabric.tensor import FabricTensor
     from scanfab.fabric.void import VoidFabric, void_fabric
     from scanfab.io.convert import convert
+    from scanfab.io.following import follow_series
     from scanfab.io.frame import Frame
     from scanfab.io.opening import read, read_series
     from scanfab.io.series import Series
@@ -98,6 +99,7 @@ _HOME = {
     "ellipsoid": "base.shapes",
     "fabric_map": "pipeline.maps.fabric_map",
     "find_contacts": "packing.search",
+    "follow_series": "io.following",
     "load": "table.table",
     "make_report": "viz.report.report",
     "merge_tables": "pipeline.cluster.merging",
@@ -157,6 +159,7 @@ __all__ = [
     "ellipsoid",
     "fabric_map",
     "find_contacts",
+    "follow_series",
     "load",
     "make_report",
     "merge_tables",

@@ -55,14 +55,19 @@ def map(
     from scanfab.pipeline.maps.settings import MapSettings
 
     check_plot(plot, None, "map")
+
+    def draw(job: Job) -> None:
+        if plot is not None:
+            _draw(plot, job)
+
     with reported_warnings() as told:
         job = finished_job(
             ctx, sources, chosen, MapSettings, told,
             output=output, resume=resume, manifest=manifest, vtk=vtk,
             drawn=None if plot is None else _columns_drawn(),
+            draw=draw,
         )  # fmt: skip
-        if plot is not None:
-            _draw(plot, job)
+        draw(job)
     return 0 if job.is_good else 1
 
 

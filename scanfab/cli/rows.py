@@ -11,7 +11,8 @@ import click
 
 from scanfab.cli.options import usage_errors
 from scanfab.cli.settings_file import fill_from_file
-from scanfab.cli.sources import open_series, reading_arguments
+from scanfab.cli.signals import ending_in_order
+from scanfab.cli.sources import follow_one, open_series, reading_arguments
 from scanfab.cli.talk import tell_inputs, working
 
 if TYPE_CHECKING:
@@ -38,12 +39,14 @@ def finished_job(
     vtk: Path | None,
     check: Callable[[list[Series], dict[str, Any]], None] = lambda series, chosen: None,
     drawn: Sequence[str] | None = None,
+    draw: Callable[[Job], object] = lambda job: None,
 ) -> Job:
     """
     A job whose rows are written, with its manifests and ParaView files.
 
     ``chosen`` are the options of reading, and of settings of that kind; ``check`` refuses what does
-    not go together, and ``drawn`` are the columns that figures need, if some are to be drawn.
+    not go together, and ``drawn`` are the columns that figures need, if some are to be drawn. A
+    series that is followed is drawn again whenever there is nothing else to do.
     """
     from scanfab.cli.console import announce_compiling
     from scanfab.pipeline.job import Job
@@ -53,6 +56,7 @@ def finished_job(
 
     if resume and output is None:
         raise click.UsageError("--resume goes with -o FILE")
+    follows, seconds = chosen.pop("follow"), chosen.pop("follow_for")
     chosen, settings_file = fill_from_file(ctx, sources, chosen)
     check([], chosen)
     with settings_file.named_errors():
@@ -61,7 +65,11 @@ def finished_job(
         settings = kind(**chosen)
         excerpt = Excerpt.make(settings.columns, fields, digits)
         result = None if output is None else ResultFile(output, settings.columns, excerpt)
-    series = open_series(sources, reading)
+    followed = None
+    if follows or seconds is not None:
+        followed = follow_one(sources, reading, seconds)
+    # whether it holds frames is not known yet
+    series: list[Series] = open_series(sources, reading) if followed is None else [followed]
     check(series, chosen)
     tell_inputs(series, settings.workers)
     announce_compiling()
@@ -82,6 +90,9 @@ def finished_job(
             keep=drawn is not None,
         )
     with ExitStack() as stack:
+        if followed is not None:
+            stack.enter_context(ending_in_order(followed.end))
+            followed.when_idle(_Redraw(job, draw))
         with usage_errors():
             stack.enter_context(job.begun())
             if drawn is not None and job.table is not None:
@@ -89,6 +100,19 @@ def finished_job(
         _write_or_say(job, excerpt)
     job.save_manifests(settings_file.asked())
     return job
+
+
+class _Redraw:
+    """Draws what there is, if that is more than before."""
+
+    def __init__(self, job: Job, draw: Callable[[Job], object]) -> None:
+        self.job, self.draw = job, draw
+        self.done = 0
+
+    def __call__(self) -> None:
+        if self.job.found_void_fabric and self.job.done > self.done:
+            self.done = self.job.done
+            self.draw(self.job)
 
 
 def _write_or_say(job: Job, excerpt: Excerpt) -> None:

@@ -9,8 +9,6 @@ import warnings
 from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from functools import partial
-from itertools import chain, islice
 from pathlib import Path
 
 from scanfab.base.errors import PackingError, ReadError
@@ -214,11 +212,15 @@ class _Run:
         self._flips = Flips(frames.settings.frames.step)
         self._groupings = Groupings()
 
-    def jobs(self, done: Container[int], observe: Observer | None) -> Iterator[_FrameJob]:
-        """The chosen frames that are not done."""
+    def jobs(self, done: Container[int], observe: Observer | None) -> Iterator[_FrameJob | None]:
+        """The chosen frames that are not done; None where one is still to come."""
         plan = self._plan()
         name, skips = self.frames.name, self.frames.settings.on_error == "skip"
-        for number, frame in self.frames.due():
+        for due in self.frames.as_they_come():
+            if due is None:
+                yield None
+                continue
+            number, frame = due
             known = self.frames.sample_if_read(number, frame)
             if number not in done and known is not None:
                 yield _FrameJob(known, plan, number, name, skips, observe, os.getpid())
@@ -265,14 +267,9 @@ class _Pool:
         if self._own is not None:
             self._own.shutdown(wait=False, cancel_futures=True)
 
-    def in_order(self, jobs: Iterator[_FrameJob]) -> Iterator[_Computed]:
+    def in_order(self, jobs: Iterator[_FrameJob | None]) -> Iterator[_Computed]:
         """The results in the order of the jobs, of which one a worker is under way."""
-        first = list(islice(jobs, self.workers))
-        threads = max(1, self.workers // max(len(first), 1))
         pool = self._own or self.executor
         assert pool is not None
-        if self._own is None:
-            # how many processors there are elsewhere, only the executor knows
-            threads = 1
-        every = (partial(job, threads) for job in chain(first, jobs))
-        return in_order(pool, every, self.workers)
+        # how many processors there are elsewhere, only the executor knows
+        return in_order(pool, jobs, self.workers, shares=self._own is not None)

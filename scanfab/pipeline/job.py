@@ -11,6 +11,7 @@ from typing import Any
 
 from scanfab.base.errors import ScanfabNote, SettingsError
 from scanfab.base.files import check_folder
+from scanfab.io.following import FollowedSeries
 from scanfab.io.series import Series
 from scanfab.pipeline.compute import Observer, compute_rows
 from scanfab.pipeline.frames import NoChosenFrameError, chosen_frames
@@ -162,6 +163,9 @@ class Job:
                 self.done += 1
                 advance(new=not self._is_taken_over(row))
         self.is_over = True
+        for one in self.series:
+            if isinstance(one, FollowedSeries):
+                one.end()
 
     def write(self, advance: Advance = lambda new: None) -> None:
         """
@@ -195,16 +199,22 @@ class Job:
             found = manifest(self.asked, self.series, texts, self._told.notes, self._inputs)
             write_manifest(path, {**found, **(more or {})})
 
+    @property
+    def _there(self) -> list[Series]:
+        """The series as they are now, also those that are followed."""
+        return [one.as_it_is if isinstance(one, FollowedSeries) else one for one in self.series]
+
     def _find_rows(self, result: ResultFile) -> None:
         """
         The rows of earlier runs; what is asked for gets their frames too.
 
         A part is of the run that was interrupted last, so it counts, whatever FILE holds.
         """
+        series = self._there
         if result.path.is_file():
             try:
-                self.table = finished_table(result.path, self.asked, self.series, self.settings)
-                frames = self.table.with_frames(self.series, self.settings.frames)
+                self.table = finished_table(result.path, self.asked, series, self.settings)
+                frames = self.table.with_frames(series, self.settings.frames)
                 self.settings = replace(self.settings, frames=frames)
                 self.asked = with_frames(self.asked, frames)
             except SettingsError:
@@ -214,11 +224,11 @@ class Job:
         rows_per_frame = self.settings.rows_per_frame
         self._part = result.finished_rows(self.asked, rows_per_frame, default_settings())
         of_part = {"settings": self.asked, "inputs": result.recorded_inputs()}
-        check_part(result.part, of_part, self._part, self.series, self.settings)
+        check_part(result.part, of_part, self._part, series, self.settings)
         in_part = any(row["alpha_vs"] is not None for row in self._part)
         in_table = self.table is not None and self.table.has_void_fabric
         self.found_void_fabric = in_part or in_table
-        self._has_gaps = any(map(self._lacks_frames, self.series))
+        self._has_gaps = any(map(self._lacks_frames, series))
         self.kept = list(self._part) if self._keep else []
         self.done = len(self._part) // self.settings.rows_per_frame
 

@@ -51,6 +51,21 @@ OUTPUT_OPTIONS = (
         metavar="N",
     ),
     Option(
+        name="follow",
+        default=False,
+        group="reading",
+        help="Wait for the frames of a running simulation, each computed once its files are whole; "
+        "Ctrl-C or SIGTERM ends it in order, a second one interrupts.",
+        kind=bool,
+    ),
+    Option(
+        name="follow_for",
+        group="reading",
+        help="The same until so long after the last new frame.",
+        kind=float,
+        metavar="SECONDS",
+    ),
+    Option(
         name="resume",
         default=False,
         group="output",
