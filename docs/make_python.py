@@ -16,7 +16,8 @@ GROUPS = {
     "Reading and writing": ("read", "read_series", "follow_series", "Series", "Frame", "convert"),
     "Packings from anywhere": ("Packing", "Cell", "ContactList", "Contacts", "find_contacts"),
     "Computing": (
-        "compute", "compute_file", "fabric_map", "Settings", "calibrate", "Calibration",
+        "compute", "compute_file", "dask_executor", "fabric_map", "Settings",
+        "calibrate", "Calibration",
     ),
     "Tables": (
         "Table", "Row", "load", "read_rows", "merge_tables", "compare_tables", "Comparison",

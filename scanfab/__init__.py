@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from scanfab.packing.search import find_contacts
     from scanfab.packing.window import Window
     from scanfab.pipeline.calibration import Calibration, calibrate
+    from scanfab.pipeline.cluster.dask_executor import dask_executor
     from scanfab.pipeline.cluster.merging import merge_tables
     from scanfab.pipeline.compute import compute
     from scanfab.pipeline.maps.fabric_map import fabric_map
@@ -95,6 +96,7 @@ _HOME = {
     "convert": "io.convert",
     "contact_fabric": "fabric.contact",
     "cylinder": "base.shapes",
+    "dask_executor": "pipeline.cluster.dask_executor",
     "direction_rule": "scan.directions",
     "ellipsoid": "base.shapes",
     "fabric_map": "pipeline.maps.fabric_map",
@@ -155,6 +157,7 @@ __all__ = [
     "contact_fabric",
     "convert",
     "cylinder",
+    "dask_executor",
     "direction_rule",
     "ellipsoid",
     "fabric_map",

@@ -49,6 +49,7 @@ def finished_job(
     series that is followed is drawn again whenever there is nothing else to do.
     """
     from scanfab.cli.console import announce_compiling
+    from scanfab.pipeline.cluster.dask_executor import dask_executor
     from scanfab.pipeline.job import Job
     from scanfab.table.result_file import ResultFile
     from scanfab.table.writing import Excerpt
@@ -57,6 +58,9 @@ def finished_job(
     if resume and output is None:
         raise click.UsageError("--resume goes with -o FILE")
     follows, seconds = chosen.pop("follow"), chosen.pop("follow_for")
+    scheduler, scheduler_file = chosen.pop("scheduler"), chosen.pop("scheduler_file")
+    if (scheduler or scheduler_file) and vtk is not None:
+        raise click.UsageError("--vtk is written where frames are computed: not with --scheduler")
     chosen, settings_file = fill_from_file(ctx, sources, chosen)
     check([], chosen)
     with settings_file.named_errors():
@@ -72,24 +76,30 @@ def finished_job(
     series: list[Series] = open_series(sources, reading) if followed is None else [followed]
     check(series, chosen)
     tell_inputs(series, settings.workers)
-    announce_compiling()
-    with usage_errors():
-        observers: Sequence[Observer] = ()
-        if vtk is not None:
-            observers = vtk_folders(vtk, len(series), settings, resume)
-        job = Job(
-            series,
-            settings,
-            result,
-            sources=sources,
-            reading=reading,
-            resume=resume,
-            manifest_path=manifest,
-            observers=observers,
-            told=told,
-            keep=drawn is not None,
-        )
     with ExitStack() as stack:
+        executor = None
+        if scheduler or scheduler_file:
+            with usage_errors():
+                cluster = dask_executor(scheduler, scheduler_file=scheduler_file)
+                executor = stack.enter_context(cluster)
+        announce_compiling()
+        with usage_errors():
+            observers: Sequence[Observer] = ()
+            if vtk is not None:
+                observers = vtk_folders(vtk, len(series), settings, resume)
+            job = Job(
+                series,
+                settings,
+                result,
+                sources=sources,
+                reading=reading,
+                resume=resume,
+                manifest_path=manifest,
+                observers=observers,
+                told=told,
+                keep=drawn is not None,
+                executor=executor,
+            )
         if followed is not None:
             stack.enter_context(ending_in_order(followed.end))
             followed.when_idle(_Redraw(job, draw))

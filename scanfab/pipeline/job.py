@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -63,6 +64,8 @@ class Job:
         What is told meanwhile, for the manifest.
     keep : bool, optional
         Keep all rows in memory too.
+    executor : concurrent.futures.Executor, optional
+        As for :func:`scanfab.compute`.
 
     Raises
     ------
@@ -83,6 +86,7 @@ class Job:
         observers: Sequence[Observer] = (),
         told: Told | None = None,
         keep: bool = False,
+        executor: Executor | None = None,
     ) -> None:
         names = [one.name for one in series]
         for name in names:
@@ -112,6 +116,7 @@ class Job:
         """Whether any row has one."""
         self._told = told or Told()
         self._keep = keep
+        self._executor = executor
         self._observers: Sequence[Observer | None] = observers or [None] * len(series)
         self._part: list[dict[str, Any]] = []
         self._has_gaps = False
@@ -253,7 +258,9 @@ class Job:
             of_table = {} if self.table is None else self.table.rows[one.name]
             ready = {frame: rows for frame, rows in of_table.items() if frame >= start}
             done = {*range(start), *ready}
-            computed = compute_rows(one, self.settings, done=done, observe=observe)
+            computed = compute_rows(
+                one, self.settings, done=done, observe=observe, executor=self._executor
+            )
             try:
                 yield from _in_order(ready, computed)
             except NoChosenFrameError as none:

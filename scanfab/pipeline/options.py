@@ -66,6 +66,20 @@ OUTPUT_OPTIONS = (
         metavar="SECONDS",
     ),
     Option(
+        name="scheduler",
+        group="scan",
+        help="Send the frames to the workers of a Dask cluster in place of `workers`; they see the "
+        "same files by the same paths.",
+        metavar="tcp://HOST:PORT",
+    ),
+    Option(
+        name="scheduler_file",
+        group="scan",
+        help="The same by the file that dask scheduler, dask-mpi and dask-jobqueue write.",
+        kind=Path,
+        metavar="FILE",
+    ),
+    Option(
         name="resume",
         default=False,
         group="output",

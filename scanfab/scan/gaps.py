@@ -105,7 +105,7 @@ def scan_gaps(
     triads, offsets = drawn_lines(rule, seed, replicates)
     least = np.maximum(np.array(cutoffs, dtype=np.float64), shortest_gap(solids))
     lines = _BinnedLines(solids, spacing, least, blocks, variants, Following(most_steps))
-    asked = in_parts(lambda *some: lines.sums(*some)[0], triads, offsets, workers)
+    asked = in_parts(lines.binned, triads, offsets, workers)
     sums = np.zeros((*asked.shape[:2], 4, *asked.shape[3:]))
     sums[:, :, lines.rows] = asked
     number, length, square = np.moveaxis(np.swapaxes(sums, 1, 2), -1, 0)
@@ -165,15 +165,7 @@ def scan_blocks(
     triads, offsets = drawn_lines(rule, seed, replicates)
     least = np.maximum(np.array(cutoffs, dtype=np.float64), shortest_gap(solids))
     lines = _BinnedLines(solids, spacing, least, blocks, variants, Following(most_steps))
-
-    def some(triads: FloatArray, offsets: FloatArray) -> FloatArray:
-        sums, tallies = lines.sums(triads, offsets)
-        # one array of both, as the parts of a scan come together
-        return np.concatenate(
-            [sums.reshape(len(triads), -1), tallies.reshape(len(triads), -1)], axis=1
-        )
-
-    found = in_parts(some, triads, offsets, workers)
+    found = in_parts(lines.both, triads, offsets, workers)
     tallies = found[:, :, -2 * TALLY_SIZE :].reshape(*offsets.shape[:2], 2, TALLY_SIZE)
     sums = found[:, :, : -2 * TALLY_SIZE]
     sums = sums.reshape(*offsets.shape[:2], len(variants), lines.blocks_kept, len(least), 3)
@@ -201,6 +193,17 @@ class _BinnedLines(NamedTuple):
     def blocks_kept(self) -> int:
         """For the whole and for the window the same number."""
         return max(map(len, self.blocks))
+
+    def binned(self, triads: FloatArray, offsets: FloatArray) -> FloatArray:
+        """The first of :meth:`sums`."""
+        return self.sums(triads, offsets)[0]
+
+    def both(self, triads: FloatArray, offsets: FloatArray) -> FloatArray:
+        """One array of both, as the parts of a scan come together."""
+        sums, tallies = self.sums(triads, offsets)
+        return np.concatenate(
+            [sums.reshape(len(triads), -1), tallies.reshape(len(triads), -1)], axis=1
+        )
 
     def sums(self, triads: FloatArray, offsets: FloatArray) -> tuple[FloatArray, FloatArray]:
         """
