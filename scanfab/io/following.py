@@ -67,7 +67,7 @@ def follow_series(
     >>> import scanfab
     >>> series = scanfab.follow_series("sample_data/liggghts_periodic", seconds=0)
     >>> [frame.step for frame in series]
-    [30000, 60000, 100000]
+    [30000, 60000, 90000, 120000, 150000]
     """
     refuse_unknown("follow_series", options, [*READING, "seconds"])
     if not isinstance(source, str | os.PathLike) or not Path(source).exists():

@@ -28,7 +28,8 @@ class DaskCluster:
         self.workers: list[subprocess.Popen[bytes]] = []
         self.scheduler = self._start("scheduler")
         end = time.monotonic() + 60
-        while not self.file.exists():
+        # it ends with a brace
+        while not self.file.exists() or not self.file.read_text().rstrip().endswith("}"):
             assert time.monotonic() < end
             time.sleep(0.05)
         for _ in range(workers):

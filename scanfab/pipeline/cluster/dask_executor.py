@@ -117,32 +117,33 @@ def dask_executor(
 @contextmanager
 def _quiet() -> Iterator[None]:
     """What Dask would print of lost connections is told once, by us."""
-    logger = logging.getLogger("distributed")
-    before = logger.level
-    logger.setLevel(logging.CRITICAL + 1)
+    names = [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]
+    before = {name: logging.getLogger(name).level for name in names}
+    for name in names:
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     try:
         yield
     finally:
-        logger.setLevel(before)
+        for name, level in before.items():
+            logging.getLogger(name).setLevel(level)
 
 
 def _address_in(path: Path) -> str:
     """The address in a scheduler file, which may come in a moment."""
     end = time.monotonic() + TIMEOUT
-    while not path.is_file():
-        if time.monotonic() > end:
-            raise ClusterError(
-                f"{path}: expected the file that a Dask scheduler writes, found nothing within "
-                f"{TIMEOUT:g} s: is it started with this scheduler file?"
-            )
+    while True:
+        try:
+            return str(json.loads(path.read_text("utf-8"))["address"])
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            # it may be in the middle of being written
+            if time.monotonic() > end or isinstance(error, KeyError | TypeError):
+                break
         time.sleep(0.1)
-    try:
-        return str(json.loads(path.read_text("utf-8"))["address"])
-    except (OSError, ValueError, KeyError, TypeError):
-        raise ClusterError(
-            f"{path}: expected the file that a Dask scheduler writes, with its address, found "
-            f"something else"
-        ) from None
+    found = "something else" if path.exists() else f"nothing within {TIMEOUT:g} s"
+    raise ClusterError(
+        f"{path}: expected the file that a Dask scheduler writes, with its address, found {found}: "
+        f"is the scheduler started with this file?"
+    )
 
 
 def _check_that_one_listens(address: str) -> None:
@@ -284,6 +285,9 @@ class DaskExecutor(Executor):
         with self._gone_if_lost():
             found = self.client.run(versions_here, on_error="return")
         for worker, theirs in found.items():
+            if isinstance(theirs, OSError | TimeoutError):
+                # it is ending just now
+                continue
             if isinstance(theirs, BaseException):
                 raise ClusterError(
                     f"{worker}: this worker cannot load scanfab ({theirs}): it needs the same "
@@ -307,7 +311,7 @@ class DaskExecutor(Executor):
         path = file.snapshot.path.absolute()
         with self._gone_if_lost():
             views = self.client.run(view_there, str(path), on_error="return")
-        blind = {worker: view for worker, view in views.items() if view}
+        blind = {worker: view for worker, view in views.items() if view and isinstance(view, str)}
         if blind and path.exists():
             worker, view = next(iter(blind.items()))
             raise ClusterError(
