@@ -78,7 +78,6 @@ def test_from_a_series_to_a_slope(series, tmp_path):
 
 
 def test_to_pandas():
-    pytest.importorskip("pandas")
     table = scanfab.compute(scanfab.Packing(SPHERES.position, SPHERES.radius), **FAST)
     frame = table.to_pandas()
     assert list(frame["variant"]) == ["c", "d"]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import fields
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -10,7 +12,10 @@ import numpy.typing as npt
 from scanfab.base.errors import PackingError
 from scanfab.base.typing import IntArray
 
-__all__ = ["cast", "grains_named"]
+__all__ = ["cast", "concatenated", "grains_named"]
+
+Arrays = TypeVar("Arrays")
+"""A dataclass all of whose fields are arrays."""
 
 
 def cast(
@@ -48,3 +53,11 @@ def grains_named(id: IntArray, wrong: npt.NDArray[np.bool_]) -> str:
     first = id[np.argmax(wrong)]
     number = np.count_nonzero(wrong)
     return f"grain {first}" if number == 1 else f"{number} grains, the first is {first}"
+
+
+def concatenated(parts: Sequence[Arrays]) -> Arrays:
+    """Dataclasses of arrays as one, in which each field has those of all parts, in their order."""
+    kind: Any = type(parts[0])
+    names = [field.name for field in fields(kind)]
+    whole: Arrays = kind(*(np.concatenate([getattr(one, name) for one in parts]) for name in names))
+    return whole

@@ -258,9 +258,10 @@ class Convex:
         open_, at = np.arange(len(points)), np.zeros_like(points)
         for _ in range(STEPS):
             toward = points[open_] - at
-            distance = np.linalg.norm(toward, axis=1)
-            furthest = self.support(toward)
-            gap = np.einsum("ij,ij->i", points[open_] - furthest, toward) / distance
+            distance, furthest = np.linalg.norm(toward, axis=1), self.support(toward)
+            # a place on the surface may be reached, and then is no distance away
+            over = np.where(distance > 0.0, distance, 1.0)
+            gap = np.einsum("ij,ij->i", points[open_] - furthest, toward) / over
             missed = gap >= radius[open_]
             meets[open_[missed]] = False
             unsure = ~missed & (distance >= radius[open_])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 __all__ = [
+    "DimensionError",
     "NoFrameError",
     "PackingError",
     "ReadError",
@@ -37,6 +38,10 @@ class PackingError(ScanfabError):
 
 class SettingsError(ScanfabError):
     """An option has a value that cannot be used, by itself or with this packing."""
+
+
+class DimensionError(SettingsError):
+    """An option of three dimensions meets discs, or the other way round: wrong usage."""
 
 
 class ScanfabWarning(UserWarning):

@@ -79,7 +79,7 @@ def run(args: list[str]) -> int:
     """The command line's exit code; errors become one message on standard error."""
     import click
 
-    from scanfab.base.errors import ScanfabError
+    from scanfab.base.errors import DimensionError, ScanfabError
     from scanfab.cli.group import cli
     from scanfab.cli.signals import interrupted_words
 
@@ -99,7 +99,7 @@ def run(args: list[str]) -> int:
         if debug or not (isinstance(error, ScanfabError | OSError) or _lacks_memory(error)):
             raise
         click.echo(f"scanfab: error: {_describe(error)}", err=True)
-        return 1
+        return 2 if isinstance(error, DimensionError) else 1
 
 
 def _lacks_memory(error: Exception) -> bool:

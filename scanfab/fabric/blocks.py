@@ -8,7 +8,6 @@ need not be kept axis by axis: of a thousand blocks these would be too many.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,12 +62,6 @@ class BlockFabrics:
             number.sum(axis=1),
             filled,
         )
-
-    @classmethod
-    def concatenate(cls, parts: Sequence[BlockFabrics]) -> BlockFabrics:
-        """All replicates of several scans."""
-        names = ("replicates", "length", "number", "segments", "filled")
-        return cls(*(np.concatenate([getattr(one, name) for one in parts]) for name in names))
 
     @property
     def exists(self) -> BoolArray:
@@ -132,12 +125,6 @@ class WithoutParts:
         shape = (count[0], *count[2:])
         over, under = (np.einsum("d,rdbp->rbp", weights, one) for one in (rest_length, rest))
         return cls(along(tensors, axis).reshape(shape), _ratio(over, under), number.sum(axis=1))
-
-    @classmethod
-    def concatenate(cls, parts: Sequence[WithoutParts]) -> WithoutParts:
-        """All replicates of several scans."""
-        names = ("axial", "mean_length", "segments")
-        return cls(*(np.concatenate([getattr(one, name) for one in parts]) for name in names))
 
     @property
     def is_met(self) -> BoolArray:

@@ -27,6 +27,9 @@ __all__ = ["Void", "VoidFabric", "void_fabric"]
 
 
 MOST_FILLED = 0.5
+# By dimension, the highest degree of a polynomial in the direction that mean lengths are held
+# against. Of discs they follow the direction in finer detail, and a degree costs two terms only.
+MOST_EVEN = {3: 8, 2: 16}
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,33 +114,43 @@ class VoidFabric:
             Unit vector.
         degree : int, optional
             The direction rule's: what it integrates exactly is no error, so the polynomial has the
-            highest even degree, from 4 to 8, whose product with n⊗n is exact.
+            highest even degree, from 4 to 8 (to 16 in a plane), whose product with n⊗n is
+            exact.
 
         Returns
         -------
         float or None
             None if there are too few mean lengths.
         """
-        count, number = self.mean_lengths.shape
-        even = min(max((degree or 0) // 2 * 2 - 2, 4), 8)
+        count = len(self.mean_lengths)
         space = self.tensor.space
-        powers = [(i, j, even - i - j) for i in range(even + 1) for j in range(even + 1 - i)]
-        # in a plane those without its third coordinate
-        powers = [one for one in powers if space.across is None or one[space.across] == 0]
-        if count * number < 3 * len(powers):
+        even = min(max((degree or 0) // 2 * 2 - 2, 4), MOST_EVEN[space.dimension])
+        design = _even_polynomials(self.axes.reshape(-1, 3), even, space)
+        lengths, terms = self.mean_lengths.ravel(), design.shape[1]
+        if len(lengths) < 3 * terms:
             return None
-        i, j, k = np.array(powers).T
-        x, y, z = (np.vander(one, even + 1, increasing=True) for one in self.axes.reshape(-1, 3).T)
-        design = x[:, i] * y[:, j] * z[:, k]
-        lengths = self.mean_lengths.ravel()
         # many more lengths than terms: the normal equations do, and are much faster
         fit = np.linalg.lstsq(design.T @ design, design.T @ lengths, rcond=None)[0]
-        variance = np.sum((lengths - design @ fit) ** 2) / (len(lengths) - len(powers))
+        variance = np.sum((lengths - design @ fit) ** 2) / (len(lengths) - terms)
         # by how much a mean length moves the axial anisotropy, a ratio of sums over the axes
         along = space.axial((self.axes @ np.asarray(axis, dtype=float)) ** 2)
         slope = self.weights * (along - self.tensor.axial(axis))
         slope /= (self.mean_lengths @ self.weights)[:, None]
         return float(np.sqrt(variance * np.sum(slope**2)) / count)
+
+
+def _even_polynomials(axes: FloatArray, degree: int, space: Space) -> FloatArray:
+    """A basis of the even polynomials of a degree on the sphere or the circle, a column each."""
+    if space.is_plane:
+        u, v = space.basis[:2] @ axes.T
+        orders = np.arange(2, degree + 1, 2)
+        angles = np.arctan2(v, u)[:, None] * orders
+        return np.column_stack([np.ones(len(axes)), np.cos(angles), np.sin(angles)])
+    powers = [(i, j, degree - i - j) for i in range(degree + 1) for j in range(degree + 1 - i)]
+    i, j, k = np.array(powers).T
+    x, y, z = (np.vander(one, degree + 1, increasing=True) for one in axes.T)
+    design: FloatArray = x[:, i] * y[:, j] * z[:, k]
+    return design
 
 
 def void_fabric(

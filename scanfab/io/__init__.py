@@ -19,6 +19,7 @@ from scanfab.io.reader import (
 )
 from scanfab.io.writer import Left, Writer
 from scanfab.io.written import more_columns
+from scanfab.packing.walls import ListedWallForces
 
 __all__ = [
     "Carries",
@@ -26,6 +27,7 @@ __all__ = [
     "GrainTable",
     "JoinedContacts",
     "Left",
+    "ListedWallForces",
     "ReadOptions",
     "Reader",
     "Snapshot",

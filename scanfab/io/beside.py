@@ -158,9 +158,9 @@ def read_contacts(path: Path, grains: GrainTable) -> JoinedContacts:
     kinds = np.dtype([(name, np.int64 if name in whole else np.float64) for name in names])
     check_memory(path, OF_TEXT * plain(path).stat().st_size)
     with open(plain(path), "rb") as stream:
-        rows = stream.read().split(b"\n", 1)[1]
+        _, end, rows = stream.read().partition(b"\n")
     table = np.zeros(0, kinds)
-    if rows.strip():
+    if rows.strip() or not end:
         if not rows.endswith(b"\n"):
             raise ReadError(f"{path}: the last line has no end: the file is incomplete")
         try:

@@ -46,7 +46,10 @@ def body_numbers(path: Path, grains: GrainTable, named: str | None) -> IntArray 
         return grains.bodies
     name = _clump_column(grains.columns) if named is None else named
     # an empty frame may have lost its columns
-    if name is None or len(grains.radius) == 0 or (name == "id" and grains.id is not None):
+    if name is None or len(grains.radius) == 0:
+        return None
+    if name == "id" and name not in grains.columns:
+        # there need not be ids to say that each sphere is a grain
         return None
     if name not in grains.columns:
         known = ", ".join(["id", *grains.columns])

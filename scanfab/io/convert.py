@@ -212,7 +212,10 @@ def save_packing(packing: Packing, path: Path, writer: Writer | None = None) -> 
         for file, data in beside.items():
             files.enter_context(whole_file(file)).write_bytes(data)
     _remove_others(path, set(beside))
-    for note in left.notes:
+    notes = list(left.notes)
+    if packing.wall_forces is not None:
+        notes.append("the forces of contacts with walls are left out: no format has them")
+    for note in notes:
         warnings.warn(f"{path.name}: {note}", ScanfabNote, stacklevel=3)
 
 

@@ -137,8 +137,9 @@ def file_inside(index: Path, name: str) -> Path:
             f"{index}: names {name!r}, which does not lie in its folder: move the files together"
         )
     path = index.parent / os.path.relpath(file, folder)
-    if not path.is_file():
-        raise ReadError(f"{index}: names {name!r}, but there is no such file")
+    # a name may be too long for any file
+    if not os.path.isfile(path):
+        raise ReadError(f"{index}: names {name[:200]!r}, but there is no such file")
     return path
 
 

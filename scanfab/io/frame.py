@@ -26,6 +26,7 @@ from scanfab.io.reader import (
 )
 from scanfab.io.unpacking import unpacking_up_to
 from scanfab.packing.packing import Packing, check_lengths
+from scanfab.packing.walls import ListedWallForces
 
 if TYPE_CHECKING:
     from scanfab.io.series import Series
@@ -134,6 +135,7 @@ class Frame:
                 bodies=body_numbers(self.snapshot.path, grains, options.bodies),
                 contacts=listed[0] if listed else None,
                 wall_contacts=_wall_contacts(grains, joined, with_own),
+                wall_forces=_wall_forces(grains, joined, with_own),
                 cell=grains.cell,
                 step=self.step,
                 time=self.snapshot.time,
@@ -236,10 +238,11 @@ class Frame:
         return "cell" if told or ask is None else ask(self.snapshot.path)
 
     @property
-    def cell_is_named(self) -> bool:
-        """Whether the user names a cell, or what is periodic."""
+    def named(self) -> dict[str, bool]:
+        """Whether the user names a cell (or what is periodic), and which spheres are one body."""
         options = self.series.options
-        return bool(self.series.cells or options.cell or options.periodic)
+        cell = bool(self.series.cells or options.cell or options.periodic)
+        return {"cell_is_named": cell, "bodies_are_named": options.bodies is not None}
 
     def _options(self) -> ReadOptions:
         """How to read this frame, with its cell if a file names those of the frames."""
@@ -268,7 +271,10 @@ class Frame:
                 found.append((family, contacts))
         if not found and series.contacts:
             patterns = ", ".join(family.pattern for family in series.contacts)
-            message = f"{self.snapshot.path}: no contact file for step {self.step} among {patterns}"
+            moment = f"step {self.step}"
+            if self.step is None and self.snapshot.time is not None:
+                moment = f"time {self.snapshot.time:g}"
+            message = f"{self.snapshot.path}: no contact file for {moment} among {patterns}"
             if series.contacts_from == "path":
                 raise ReadError(message)
             warnings.warn(
@@ -306,3 +312,17 @@ def _wall_contacts(grains: GrainTable, joined: list[JoinedContacts], with_own: b
         return own
     first = np.zeros(len(grains.radius), np.int64) if own is None else own
     return sum((part.wall_contacts for part in joined), first)
+
+
+def _wall_forces(
+    grains: GrainTable, joined: list[JoinedContacts], with_own: bool
+) -> ListedWallForces | None:
+    """Of all files that list contacts with walls; None if one of them does not say the forces."""
+    listing = [part for part in joined if part.wall_contacts.any()]
+    parts = [part.wall_forces for part in listing]
+    if with_own and grains.wall_contacts is not None and grains.wall_contacts.any():
+        parts.append(grains.wall_forces)
+    known = [part for part in parts if part is not None]
+    if not known or len(known) < len(parts):
+        return None
+    return ListedWallForces(*(np.concatenate(values) for values in zip(*known, strict=True)))

@@ -196,6 +196,7 @@ READING_OPTIONS = (
         group="reading",
         help="Times its size that a packed file may unpack to; given, lines may also be of any "
         "length (default: 1000, and 16 MiB).",
+        meaning="times its size that a packed file may unpack to; not given: 1000",
         takes="float",
         kind=float,
         metavar="TIMES",

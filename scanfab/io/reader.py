@@ -19,6 +19,7 @@ from scanfab.io.options import (
 )
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import ContactList
+from scanfab.packing.walls import ListedWallForces
 
 __all__ = [
     "BODIES",
@@ -114,6 +115,8 @@ class GrainTable(NamedTuple):
     """Number of contacts with walls of each grain, shape (N,), if the grain file lists them."""
     bodies: IntArray | None = None
     """Number of each sphere's body, shape (N,), if the file says so beyond all doubt."""
+    wall_forces: ListedWallForces | None = None
+    """The forces of all contacts with walls that the grain file lists, if it says them."""
 
 
 class JoinedContacts(NamedTuple):
@@ -123,6 +126,8 @@ class JoinedContacts(NamedTuple):
     """None if the file lists contacts with walls only."""
     wall_contacts: IntArray
     """Number of contacts with walls of each grain, shape (N,)."""
+    wall_forces: ListedWallForces | None = None
+    """The forces of all these contacts with walls, if the file says them."""
 
 
 class Reader(Protocol):

@@ -19,6 +19,7 @@ from scanfab.io.dimension import decided_space
 from scanfab.io.families import Family
 from scanfab.io.frame import Frame
 from scanfab.io.frame_csv import FrameFile
+from scanfab.io.moments import of_moment
 from scanfab.io.reader import ReadOptions, Snapshot
 from scanfab.io.unpacking import unpacking_up_to
 
@@ -282,7 +283,8 @@ class Series:
         """
         The contacts of a grain snapshot in a family of contact files.
 
-        Steps inside the files decide; where a file has none, the number in its name does.
+        Steps inside the files decide, or times if there are no steps; where a file has none, the
+        number in its name does.
 
         Parameters
         ----------
@@ -310,12 +312,9 @@ class Series:
             assert family.reader is not None
             with unpacking_up_to(self.options.max_unpacked):
                 self._contact_snapshots[path] = family.reader.snapshots(path)
-        snapshots = self._contact_snapshots[path]
-        if len(snapshots) == 1 and (snapshots[0].step is None or grains.step is None):
-            numbered = None not in family.files and step is not None
-            matches = named or not numbered or bool({name_step, step} & set(family.files))
-            return snapshots[0] if matches else None
-        return next((one for one in snapshots if one.step == grains.step), None)
+        numbered = None not in family.files and step is not None
+        sure = named or not numbered or bool({name_step, step} & set(family.files))
+        return of_moment(self._contact_snapshots[path], grains, sure)
 
     def beside(self, path: Path) -> list[Path]:
         """

@@ -52,7 +52,9 @@ def refuse_impossible(sample: Sample) -> None:
             raise PackingError(text)
 
 
-def doubts_of(sample: Sample, *, cell_is_named: bool = False) -> list[Note]:
+def doubts_of(
+    sample: Sample, *, cell_is_named: bool = False, bodies_are_named: bool = False
+) -> list[Note]:
     """
     What a user should know of a frame whose contacts are known.
 
@@ -62,11 +64,13 @@ def doubts_of(sample: Sample, *, cell_is_named: bool = False) -> list[Note]:
         One frame.
     cell_is_named : bool, optional
         Whether the user has said what the cell is, or what is periodic, and may be mistaken.
+    bodies_are_named : bool, optional
+        Whether the user has said which spheres are one body: that each is one, if none are.
     """
     packing = sample.packing
     if len(packing) < FEWEST:
         return []
-    clumps = _clumps(packing)
+    clumps = "" if bodies_are_named else _clumps(packing)
     texts = {
         "clumps": clumps,
         "spread_bodies": _spread_bodies(packing),

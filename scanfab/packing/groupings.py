@@ -62,18 +62,18 @@ class Groupings:
 
 
 def _difference(first: int, before: Grouping, now: Grouping) -> Note | None:
-    if (before.grains, len(before.id)) != (now.grains, len(now.id)):
+    common, early, late = np.intersect1d(before.id, now.id, return_indices=True)
+    one, two = before.body[early], now.body[late]
+    both = len(np.unique(np.column_stack([one, two]), axis=0))
+    # the numbers of bodies may be others, as long as the same spheres are one
+    if both == len(np.unique(one)) == len(np.unique(two)):
+        if len(common) == len(before.id) == len(now.id):
+            return None
         text = (
             f"{now.in_words()}, where frame {first} has {before.in_words()}: grains have left or "
             f"come in (told once)"
         )
         return Note("grains_left", text)
-    _, early, late = np.intersect1d(before.id, now.id, return_indices=True)
-    one, two = before.body[early], now.body[late]
-    both = len(np.unique(np.column_stack([one, two]), axis=0))
-    if both == len(np.unique(one)) == len(np.unique(two)):
-        # the numbers of bodies may be others, as long as the same spheres are one
-        return None
     text = (
         f"other spheres are one body than in frame {first}: each frame is computed with its own "
         f"bodies; is the column that numbers them the right one (`bodies`)? (told once)"

@@ -20,6 +20,7 @@ from scanfab.packing.bodies import Bodies, bodies_of
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import ContactList, Contacts, Spheres, resolve_contacts
 from scanfab.packing.plane import cell_in_plane, flat_space, place_of, refuse_outside
+from scanfab.packing.walls import ListedWallForces, WallForces, resolve_wall_forces
 
 __all__ = [
     "ContactList",
@@ -125,6 +126,8 @@ class Packing:
         Pairs of rows. Without it contacts are to be found from geometry.
     wall_contacts : array_like of int, shape (N,), optional
         Number of contacts of each grain with walls, that is with bodies that are not in the table.
+    wall_forces : ListedWallForces, optional
+        The forces of these contacts, for sources that say them.
     cell : Cell, optional
         The (periodic) cell.
     step, time : int, float, optional
@@ -159,6 +162,7 @@ class Packing:
         bodies: npt.ArrayLike | None = None,
         contacts: npt.ArrayLike | ContactList | None = None,
         wall_contacts: npt.ArrayLike | None = None,
+        wall_forces: ListedWallForces | None = None,
         cell: Cell | None = None,
         step: int | None = None,
         time: float | None = None,
@@ -191,6 +195,9 @@ class Packing:
             numbers = cast("bodies", bodies, np.int64, (count,))
             self.bodies = bodies_of(numbers, self.position, self.radius, cell, self.space)
         self.wall_contacts: IntArray = _wall_contacts(wall_contacts, count)
+        self.wall_forces: WallForces | None = None
+        if wall_forces is not None:
+            self.wall_forces = resolve_wall_forces(wall_forces, self.position, cell)
         self.cell = cell
         self.step = None if step is None else int(step)
         self.time = None if time is None else float(time)
@@ -241,7 +248,7 @@ class Packing:
             Images in a list are from the wrapped positions. Contacts that are worked out already
             are taken as they are.
         wall_contacts : array_like of int, shape (N,), optional
-            Those of this packing by default.
+            Those of this packing by default; of others the forces are not known.
 
         Returns
         -------
@@ -250,6 +257,7 @@ class Packing:
         other = copy.copy(self)
         if wall_contacts is not None:
             other.wall_contacts = _wall_contacts(wall_contacts, len(self))
+            other.wall_forces = None
         if isinstance(contacts, ContactList):
             contacts = resolve_contacts(contacts, self._spheres(None))
         other.contacts = contacts

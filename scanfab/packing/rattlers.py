@@ -102,12 +102,12 @@ def force(touching: Touching) -> BoolArray:
     Grains with fewer than ``min_contacts`` neighbours that press on them, in one pass.
 
     A contact counts if its normal force is above ``min_force`` times the mean over all contacts,
-    compression positive. Contacts with walls, whose forces are not known, count.
+    compression positive. Contacts with walls count, whatever their force.
 
     Raises
     ------
     ReadError
-        If the contacts have no forces.
+        If the contacts have no forces, or one that is no finite number.
     """
     contacts = touching.contacts
     if contacts.force_n is None:
@@ -115,6 +115,10 @@ def force(touching: Touching) -> BoolArray:
             'the rule `rattlers="force"` needs the forces of the contacts, which are '
             f"{'not in the file' if contacts.source == 'file' else 'found by geometry'}: choose "
             '`rattlers="count"`, or name a contact file with forces (`contacts`)'
+        )
+    if not np.isfinite(contacts.force_n).all():
+        raise ReadError(
+            'the rule `rattlers="force"`: a contact has a force that is no finite number'
         )
     mean = contacts.force_n.mean() if len(contacts) else 0.0
     pressing = contacts.force_n > touching.min_force * mean

@@ -219,6 +219,23 @@ class Sample:
         """The same without rattlers as neighbours."""
         return self._touching.numbers_without(~self.contacts_without(self.rattlers))
 
+    def numbers_of(self, variant: Variant) -> IntArray:
+        """
+        Number of neighbours of each particle, those that the variant leaves out not counted.
+
+        Parameters
+        ----------
+        variant : Variant
+            One of ``VARIANTS``.
+
+        Returns
+        -------
+        ndarray of int, shape (N,)
+        """
+        if variant.without_rattlers:
+            return self.contact_numbers_without_rattlers
+        return self.contact_numbers
+
     def removed(self, variant: Variant) -> BoolArray:
         """
         Grains that the variant leaves out.
@@ -340,12 +357,7 @@ class Sample:
         counted = self.once(self.counted(variant, window) & ~self.removed(variant))
         if not counted.any():
             return None
-        numbers = (
-            self.contact_numbers_without_rattlers
-            if variant.without_rattlers
-            else self.contact_numbers
-        )
-        return float(numbers[counted].mean())
+        return float(self.numbers_of(variant)[counted].mean())
 
 
 @dataclass(frozen=True)

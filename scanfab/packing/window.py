@@ -95,14 +95,10 @@ class Window:
         -------
         ndarray of bool, shape (N,)
         """
-        branch = self._nearest(points, packing)
-        meets = self.shape.may_meet(branch, radius)
-        if self.shape.is_sphere or packing.cell is None or not packing.is_periodic:
-            return meets
         # which image is the nearest to the centre says little of a long window
-        lattice = packing.cell.lattice
-        reach = self.shape.reach + float(radius.max(initial=0.0)) + lattice.half_extent
-        for shift in lattice.within(reach):
+        branch, shifts = self.images(points, packing, float(radius.max(initial=0.0)))
+        meets = np.zeros(len(points), bool)
+        for shift in shifts:
             left = np.flatnonzero(~meets)
             meets[left] = self.shape.may_meet(branch[left] + shift, radius[left])
         return meets
@@ -171,26 +167,45 @@ class Window:
         -------
         ndarray, shape (N, 3)
         """
-        branch = self._nearest(points, packing)
-        if packing.cell is None or not packing.is_periodic:
-            return branch
-        lattice = packing.cell.lattice
-        if self.shape.reach <= 0.5 * lattice.shortest:
-            # no other image is as near
-            return branch
-        for shift in lattice.within(self.shape.reach + lattice.half_extent):
+        branch, shifts = self.images(points, packing)
+        for shift in shifts[1:]:
             outside = np.flatnonzero(~self.shape.contains(branch))
             moved = branch[outside] + shift
             inside = self.shape.contains(moved)
             branch[outside[inside]] = moved[inside]
         return branch
 
-    def _nearest(self, points: FloatArray, packing: Packing) -> FloatArray:
-        """From the centre to the nearest image of each point, shape (N, 3)."""
+    def images(
+        self, points: FloatArray, packing: Packing, margin: float = 0.0
+    ) -> tuple[FloatArray, FloatArray]:
+        """
+        From the window's centre to all images of points that may lie near the window.
+
+        Parameters
+        ----------
+        points : ndarray, shape (N, 3)
+            Dump's coordinates.
+        packing : Packing
+            Whose cell repeats, if it does.
+        margin : float, optional
+            How near: from the window's surface, dump's length unit.
+
+        Returns
+        -------
+        branch : ndarray, shape (N, 3)
+            To the nearest image of each point.
+        shifts : ndarray, shape (T, 3)
+            From there to other images; the first is 0.
+        """
         branch = points - self.center
+        shifts = np.zeros((1, 3))
         if packing.cell is not None and packing.is_periodic:
             branch = branch + packing.cell.nearest_image(branch) @ packing.cell.vectors
-        return branch
+            reach, lattice = self.shape.reach + margin, packing.cell.lattice
+            # of images closer than half a period there is one only
+            if reach > 0.5 * lattice.shortest:
+                shifts = np.concatenate([shifts, lattice.within(reach + lattice.half_extent)])
+        return branch, shifts
 
 
 @dataclass(frozen=True, eq=False)

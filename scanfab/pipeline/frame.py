@@ -81,7 +81,14 @@ def compute_frame(
     ScanfabError
         If the frame cannot be read or measured.
     """
-    frame = as_sample(frame, plan)
+    sample = as_sample(frame, plan)
+    try:
+        return _computed(sample, plan, number, source)
+    except PackingError as error:
+        raise PackingError(f"frame {number}: {error}") from None
+
+
+def _computed(frame: Sample, plan: Plan, number: int, source: str) -> FrameResult:
     _check_space(frame, plan)
     known = frame_values(frame, plan, number, source)
     if not frame.grains.any():

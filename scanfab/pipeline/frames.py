@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -52,7 +52,7 @@ class Readable(Protocol):
     def carries(self) -> Carries: ...
 
     @property
-    def cell_is_named(self) -> bool: ...
+    def named(self) -> Mapping[str, bool]: ...
 
     def read(self) -> Packing: ...
 
@@ -63,7 +63,7 @@ class _Given:
 
     packing: Packing
     carries: Carries = "cell"
-    cell_is_named: bool = False
+    named: Mapping[str, bool] = field(default_factory=dict)
 
     def read(self) -> Packing:
         return self.packing
@@ -250,7 +250,7 @@ class Frames:
 
     def notes(self, frame: Readable, sample: Sample) -> list[Note]:
         """What looks wrong in a frame before anything is measured."""
-        notes = doubts_of(sample, cell_is_named=frame.cell_is_named)
+        notes = doubts_of(sample, **frame.named)
         if no_cell := cell_doubt(sample, frame.carries):
             notes.append(Note("no_cell", no_cell))
         if not self.settings.boundary:

@@ -175,7 +175,7 @@ def _hints(frame: Frame, sample: Sample, settings: Settings) -> list[str]:
     except PackingError as error:
         hints.append(str(error))
     no_cell = cell_doubt(sample, frame.carries)
-    hints += [one.text for one in doubts_of(sample, cell_is_named=frame.cell_is_named)]
+    hints += [one.text for one in doubts_of(sample, **frame.named)]
     hints += [no_cell] if no_cell else []
     hints += [one.text for one in sample.doubts_of_escaped()]
     if not no_cell and (hint := cell_hint(sample, frame.carries)):

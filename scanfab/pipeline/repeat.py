@@ -12,6 +12,7 @@ from scanfab.base.errors import ReadError, SettingsError
 from scanfab.base.option import flag_of
 from scanfab.base.spelling import shortest
 from scanfab.io.opening import READING, open_sources
+from scanfab.io.options import READING_OPTIONS
 from scanfab.io.series import Series
 from scanfab.pipeline.manifest import asked_for
 from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings, is_map
@@ -86,7 +87,8 @@ def repeat_command(
     'scanfab compute dumps --boundary type=2 --seed 3'
     """
     settings = MapSettings(slices=1) if is_map(asked) else Settings()
-    usual = spelt_settings(asked_for((), {"contacts": "auto"}, settings))
+    reading = {one.name: one.default for one in READING_OPTIONS}
+    usual = spelt_settings(asked_for((), reading, settings))
     # those that make it a map have no usual value
     usual |= dict.fromkeys(BLOCK_OPTIONS)
     words = ["scanfab", "map" if is_map(asked) else "compute", *map(str, asked["sources"])]

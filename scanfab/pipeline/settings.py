@@ -305,6 +305,7 @@ class Settings(WindowSettings):
         of_window = {RV_COLUMN.name: several, "window_alpha_vs_axial": shaped}
         columns = [name for name, asked in of_window.items() if asked and self.needs_window]
         columns += [one.name for one in EDGE_COLUMNS if self.edge != CLIP]
+        columns += ["alpha_vs_axial_contacts"] * bool(self.cutoffs)
         return (*columns, *(one.name for group in self.with_ for one in GROUPS[group].columns))
 
     def __repr__(self) -> str:

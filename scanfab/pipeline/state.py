@@ -15,6 +15,7 @@ from scanfab.fabric.state import SampleState, love_weber
 from scanfab.packing.clump_volumes import lens_volumes, own_shares
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample, Variant
+from scanfab.packing.walls import WallForces
 from scanfab.packing.window import Window
 
 __all__ = ["contact_forces", "doubts_of_state", "refuse_without_forces", "sample_state"]
@@ -23,6 +24,11 @@ __all__ = ["contact_forces", "doubts_of_state", "refuse_without_forces", "sample
 POINTS = 2048
 # grains at a time, times their points: some tens of megabytes
 CHUNK = 256
+WALLS_LEFT_OUT = (
+    "grains touch walls, and the forces of these contacts are not known (they are read from "
+    "LIGGGHTS' wall/gran/local and YADE's O.save): the stress leaves them out; choose an RV away "
+    "from the walls"
+)
 
 
 def refuse_without_forces(sample: Sample) -> None:
@@ -31,8 +37,8 @@ def refuse_without_forces(sample: Sample) -> None:
     if contacts.force_n is None and len(contacts):
         found = "are found by geometry" if contacts.source == "geometric" else "have none"
         raise PackingError(
-            f"with_: forces were asked for, but the contacts of the frame {found}: name a file "
-            f"that lists contacts with their forces (`contacts`), or which of its columns they are "
+            f'`with_="forces"` needs the forces of contacts, but these {found}: name a file that '
+            f"lists contacts with their forces (`contacts`), or which of its columns they are "
             f"(`contact_columns`)"
         )
 
@@ -49,15 +55,21 @@ def contact_forces(sample: Sample, chosen: BoolArray) -> ContactForces | None:
     contacts, packing = sample.contacts, sample.packing
     if contacts.force_n is None:
         return None
-    wrong = chosen & ~np.isfinite(contacts.force_n)
-    if wrong.any():
-        one, two = packing.id[contacts.pairs[np.argmax(wrong)]]
-        raise PackingError(
-            f"the contact of the grains {one} and {two} has a force that is no finite number"
-        )
+    _refuse_odd_forces(packing, contacts.force_n)
     branch = np.einsum("ci,ci->c", _branches(packing)[chosen], contacts.normal[chosen])
     force = None if contacts.force is None else contacts.force[chosen]
     return ContactForces(branch, contacts.force_n[chosen], force)
+
+
+def _refuse_odd_forces(packing: Packing, force: FloatArray) -> None:
+    """PackingError if a force is no finite number, shape (M,) or (M, 3)."""
+    wrong = ~np.isfinite(force.reshape(len(force), -1)).all(axis=1)
+    if wrong.any():
+        assert packing.contacts is not None
+        one, two = packing.id[packing.contacts.pairs[np.argmax(wrong)]]
+        raise PackingError(
+            f"the contact of the grains {one} and {two} has a force that is no finite number"
+        )
 
 
 def sample_state(sample: Sample, variant: Variant, window: Window | None) -> SampleState:
@@ -69,11 +81,7 @@ def sample_state(sample: Sample, variant: Variant, window: Window | None) -> Sam
     """
     region = window if variant.in_window else None
     counted = sample.once(sample.counted(variant, region) & ~sample.removed(variant))
-    numbers = (
-        sample.contact_numbers_without_rattlers
-        if variant.without_rattlers
-        else sample.contact_numbers
-    )[counted]
+    numbers = sample.numbers_of(variant)[counted]
     held = numbers[numbers >= 2]
     return SampleState(
         void_ratio=_void_ratio(sample, region),
@@ -97,17 +105,16 @@ def doubts_of_state(sample: Sample, variant: Variant, window: Window | None) -> 
             "no_volume": "void ratio and stress of the whole are empty: they need a volume, which "
             "is that of a cell that repeats along all its vectors, or of an RV"
         }
-    walls = packing.wall_contacts > 0
-    if (
-        region is not None
-        and walls.any()
-        and region.contains(packing.position[walls], packing).any()
-    ):
-        return {
-            "wall_stress": "grains in the RV touch walls, whose forces are not read: the stress "
-            "leaves these contacts out; choose a smaller RV"
-        }
-    return {}
+    return {"wall_stress": WALLS_LEFT_OUT} if _lacks_walls(sample, region) else {}
+
+
+def _lacks_walls(sample: Sample, region: Window | None) -> bool:
+    """Whether grains touch walls, in the RV if there is one, and with forces that nobody knows."""
+    packing = sample.packing
+    if packing.wall_forces is not None:
+        return False
+    touching = packing.position[(packing.wall_contacts > 0) & sample.grains]
+    return bool(len(touching) if region is None else region.contains(touching, packing).any())
 
 
 def _volume(packing: Packing, window: Window | None) -> float | None:
@@ -140,6 +147,7 @@ def _stress(sample: Sample, window: Window | None) -> FloatArray | None:
     volume = _volume(packing, window)
     if contacts.force is None or volume is None:
         return None
+    _refuse_odd_forces(packing, contacts.force)
     one, two = contacts.pairs.T
     start, branch = _places(packing)[one], _branches(packing)
     end = start + branch
@@ -149,22 +157,28 @@ def _stress(sample: Sample, window: Window | None) -> FloatArray | None:
     branch = end - start
     chosen = ~(sample.boundary[one] & sample.boundary[two]) & branch.any(axis=1)
     start, branch, force = start[chosen], branch[chosen], contacts.force[chosen]
+    if packing.wall_forces is not None:
+        walls = _at_walls(sample, packing.wall_forces)
+        start, branch, force = map(np.concatenate, zip((start, branch, force), walls, strict=True))
     if window is not None:
         branch = branch * _shares(start, branch, window, packing)[:, None]
     return love_weber(force, branch, volume)
 
 
+def _at_walls(sample: Sample, walls: WallForces) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Where grains touch walls, from there to their places, and the forces on them."""
+    ours = sample.grains[walls.row]
+    row, point, force = walls.row[ours], walls.point[ours], walls.force[ours]
+    return point, _places(sample.packing)[row] - point, force
+
+
 def _shares(start: FloatArray, branch: FloatArray, window: Window, packing: Packing) -> FloatArray:
     """The part of each branch that lies in the window, of all its images together."""
-    shape, origin = window.shape, start - window.center
-    if packing.cell is None or not packing.is_periodic:
-        return shape.share(origin, branch)
-    lattice = packing.cell.lattice
-    origin = origin + packing.cell.nearest_image(origin) @ packing.cell.vectors
     longest = float(np.linalg.norm(branch, axis=1).max(initial=0.0))
-    found = shape.share(origin, branch)
-    for shift in lattice.within(shape.reach + longest + lattice.half_extent):
-        found += shape.share(origin + shift, branch)
+    origin, shifts = window.images(start, packing, longest)
+    found = np.zeros(len(branch))
+    for shift in shifts:
+        found += window.shape.share(origin + shift, branch)
     return found
 
 
@@ -194,14 +208,8 @@ def _volume_inside(
 
     Of the volume of each, ``share`` counts, shape (N,).
     """
-    shape, origin = window.shape, position - window.center
-    shifts = np.zeros((1, 3))
-    if packing.cell is not None and packing.is_periodic:
-        lattice = packing.cell.lattice
-        origin = origin + packing.cell.nearest_image(origin) @ packing.cell.vectors
-        reach = shape.reach + float(radius.max(initial=0.0)) + lattice.half_extent
-        shifts = np.concatenate([shifts, lattice.within(reach)])
-    total = 0.0
+    shape, total = window.shape, 0.0
+    origin, shifts = window.images(position, packing, float(radius.max(initial=0.0)))
     for shift in shifts:
         places = origin + shift
         near = shape.may_meet(places, radius)

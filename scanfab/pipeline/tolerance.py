@@ -110,7 +110,7 @@ class EachVariant:
 
     def errors(self, sums: ScanSums, plan: Plan, variant: str) -> Errors | None:
         """By the replicates, and about a polynomial."""
-        fabric = void_fabric(sums.axes, plan.rule.weights, *sums.kept(variant))
+        fabric = void_fabric(sums.axes, plan.rule.weights, *sums.kept(variant), plan.space)
         if fabric is None:
             return None
         reported = fabric.axial_error(plan.axis) or 0.0

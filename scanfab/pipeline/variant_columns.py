@@ -14,22 +14,25 @@ from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.forces import doubts_of_forces
 from scanfab.fabric.jackknife import BlockedSums, blocks_of
 from scanfab.fabric.registry import GROUPS, OWN_FABRICS, Measured, checked_values
+from scanfab.fabric.spectrum import LONGEST_GAP, PREDICTED_ALPHA, predicted_alpha
 from scanfab.fabric.state import SampleState
 from scanfab.fabric.window import WINDOW_ALPHA, window_alpha
 from scanfab.packing.columns import RV_COLUMN, sample_values
+from scanfab.packing.near import near_pairs
 from scanfab.packing.sample import Variant
 from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.plan import Plan
 from scanfab.pipeline.state import contact_forces, doubts_of_state, sample_state
 from scanfab.scan.edges import CLIP, ENDS, START
+from scanfab.scan.scan import ScanSums
 from scanfab.scan.solids import Solids
 from scanfab.table.columns import installed_fabrics, table_columns
 
 __all__ = [
     "VariantColumns",
-    "channels_text",
+    "doubts_of_lines",
     "edge_of",
-    "left_out_text",
+    "left_out_of",
     "no_columns",
 ]
 
@@ -63,6 +66,8 @@ class VariantColumns:
         for name, fabric in installed_fabrics().items():
             found |= checked_values(name, fabric, self.measured)
         asked = {RV_COLUMN.name: self.rv, **self._window(), **self._edge()}
+        if PREDICTED_ALPHA.name in self.plan.more_columns:
+            asked[PREDICTED_ALPHA.name] = self.predicted_alpha
         for group in self.plan.groups:
             asked |= GROUPS[group].values(self.measured)
         # the strain of the frame is not known here
@@ -122,7 +127,7 @@ class VariantColumns:
         """Number of the kept segments."""
         if self.measurement.gaps is None:
             return int(self.sums.segments[:, self.which].sum())
-        return int(self.measurement.gaps.number[:, self.which, ..., self.place].sum())
+        return int(self.measurement.gaps.in_blocks(self.variant.name, self.place)[1].sum())
 
     def _scan(self) -> dict[str, Any]:
         """The values of the columns that scan/columns.py declares."""
@@ -149,11 +154,8 @@ class VariantColumns:
     @cached_property
     def left_out(self) -> float | None:
         """Share of the segments that leave the sample, and so are not counted."""
-        if self.edge != START:
-            return None
-        left = float(self.sums.left_out[:, self.which].sum())
-        every = left + float(self.sums.segments[:, self.which].sum())
-        return left / every if every else None
+        kept = float(self.sums.segments[:, self.which].sum())
+        return left_out_of(self.sums, self.variant, self.edge, kept)
 
     def _solid_fraction(self) -> float | None:
         """1 - void length / line length in the window, weighted like the directions."""
@@ -165,6 +167,20 @@ class VariantColumns:
         if length == 0:
             return None
         return 1.0 - float(weights @ self.sums.void[:, self.which].sum(axis=0)) / length
+
+    @property
+    def predicted_alpha(self) -> float | None:
+        """What contacts predict at a small cut-off, in a region whose porosity is known."""
+        cutoff, packing = self.plan.cutoffs[self.place], self.sample.packing
+        solid = self._solid_fraction()
+        longest = LONGEST_GAP * float(packing.radius[self.sample.grains].min())
+        if solid is None or packing.bodies is not None or self.plan.moment != 1:
+            return None
+        if cutoff > longest or self.measured.void is None:
+            return None
+        window = self.plan.window if self.variant.in_window else None
+        pairs = near_pairs(self.sample, self.variant, window, cutoff)
+        return predicted_alpha(pairs, 1.0 - solid, cutoff, self.plan.axis)
 
     def _blocked_sums(self) -> BlockedSums:
         gaps = self.measurement.blocked
@@ -211,7 +227,7 @@ class VariantColumns:
 
     def notes(self) -> Iterator[Note]:
         """Whether there is no void fabric, or a doubtful one, or lines without a grain."""
-        texts = {"channels": self._channels(), "left_out": left_out_text(self.left_out)}
+        texts = doubts_of_lines(self.sums, self.variant, self.left_out)
         texts |= self._of_void_fabric() | self._of_groups()
         about = self.variant.name if self.rv is None else f"{self.variant.name} (RV {self.rv:g})"
         return (Note(code, text, (about,)) for code, text in texts.items() if text)
@@ -224,12 +240,6 @@ class VariantColumns:
         if "forces" in self.plan.groups:
             found |= doubts_of_forces(self.measured)
         return found
-
-    def _channels(self) -> str:
-        of = self.sums
-        return channels_text(
-            int(of.channels[:, self.which].sum()), int(of.lines[:, self.which].sum())
-        )
 
     def _of_void_fabric(self) -> dict[str, str]:
         void = self.measured.void
@@ -266,18 +276,26 @@ def edge_of(variant: Variant, plan: Plan, solids: Solids) -> str | None:
     return ENDS if plan.edge == ENDS else CLIP
 
 
-def channels_text(channels: int, others: int) -> str:
-    """What a note says of lines that stay in a channel, beside so many that meet grains."""
-    text = f"{channels} of {channels + others} lines stay in a channel and meet no grain"
-    return text * bool(channels)
+def left_out_of(sums: ScanSums, variant: Variant, edge: str | None, kept: float) -> float | None:
+    """Share of the segments that leave the sample, beside the kept; None by rules that cut them."""
+    if edge != START:
+        return None
+    left = float(sums.left_out[:, "abcd".index(variant.name)].sum())
+    return left / (left + kept) if left + kept else None
 
 
-def left_out_text(left_out: float | None) -> str:
-    """Whether too many segments leave the sample."""
-    if (left_out or 0.0) <= MOST_LEFT_OUT:
-        return ""
-    return (
-        f"{left_out:.1%} of the void segments of the RV leave the sample and are left "
-        f"out: they are the long ones, so the mean length is too small: choose a smaller `rv`, "
-        f"or `edge=ends`, which needs nothing from outside"
-    )
+def doubts_of_lines(sums: ScanSums, variant: Variant, left_out: float | None) -> dict[str, str]:
+    """Lines that meet no grain, and too many segments that leave the sample, by notes' codes."""
+    found, which = {}, "abcd".index(variant.name)
+    channels, others = (int(one[:, which].sum()) for one in (sums.channels, sums.lines))
+    if channels:
+        found["channels"] = (
+            f"{channels} of {channels + others} lines stay in a channel and meet no grain"
+        )
+    if left_out is not None and left_out > MOST_LEFT_OUT:
+        found["left_out"] = (
+            f"{left_out:.1%} of the void segments of the RV leave the sample and are left "
+            f"out: they are the long ones, so the mean length is too small: choose a smaller `rv`, "
+            f"or `edge=ends`, which needs nothing from outside"
+        )
+    return found

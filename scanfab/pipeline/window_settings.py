@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from scanfab.base.errors import SettingsError
+from scanfab.base.errors import DimensionError, SettingsError
 from scanfab.base.option import number, one_of, option, optional, unusable
 from scanfab.pipeline.values import (
     AXES,
@@ -213,7 +213,7 @@ def check_window(chosen: Settings) -> None:
 
 
 def check_sizes(chosen: Settings, dimension: int) -> None:
-    """SettingsError if the RV has too many sizes, or too few."""
+    """DimensionError if the RV has too many sizes, or too few."""
     shape, sizes = chosen.rv_shape, chosen.rv_size
     if not sizes or shape not in SHAPES:
         return
@@ -222,7 +222,7 @@ def check_sizes(chosen: Settings, dimension: int) -> None:
         found = ",".join(f"{size:g}" for size in sizes)
         if dimension == 2:
             takes = f"two, {takes.replace(',C', '')}, in the plane of the discs"
-        raise SettingsError(f"rv_size: expected {takes} (`rv_shape` is {shape}), found {found}")
+        raise DimensionError(f"rv_size: expected {takes} (`rv_shape` is {shape}), found {found}")
 
 
 def _check_several(chosen: Settings) -> None:
@@ -254,7 +254,7 @@ def settings_in(settings: Settings, space: Space) -> Settings:
 
     Raises
     ------
-    SettingsError
+    DimensionError
         If they are of three dimensions and the grains are discs, or the other way round.
     """
     check_sizes(settings, space.dimension)
@@ -263,7 +263,7 @@ def settings_in(settings: Settings, space: Space) -> Settings:
     shape = settings.rv_shape
     if shape not in ("sphere", "box", "ellipsoid"):
         what = "is no window of" if shape == "cylinder" else "is a surface in space, no window of"
-        raise SettingsError(
+        raise DimensionError(
             f"rv_shape: {shape} {what} discs in {space}: choose sphere (the circle), box or "
             f"ellipsoid (the ellipse)"
         )
@@ -277,7 +277,7 @@ def _axis(axis: Axis, space: Space) -> Axis:
         return AXES["xyz"[max(space.along)]]
     if abs(axis[space.across]) > ROUNDING:
         first, second = ("xyz"[k] for k in sorted(space.along))
-        raise SettingsError(
+        raise DimensionError(
             f"axis: the axis {axis.spelt} leads out of {space}, in which all discs lie: choose "
             f"{first}, {second}, or another axis in the plane"
         )
@@ -296,7 +296,7 @@ def _rule(settings: Settings, space: Space) -> DirectionRule | None:
     if rule is None or rule.space == space:
         return rule
     if rule.asked is None:
-        raise SettingsError(
+        raise DimensionError(
             f"directions: {rule.name} is a rule of three dimensions, but all discs lie in {space}: "
             f"choose a number of axes, such as 16"
         )

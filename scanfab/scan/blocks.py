@@ -15,12 +15,6 @@ from scanfab.scan.lines import line_triads
 
 __all__ = ["Blocks", "partition_of"]
 
-# of the places that fill a shell: distances, polar angles, azimuths; the last two are even, so that
-# all octants get as many, and none lies on a plane between two
-DISTANCES, POLAR, AZIMUTHS = 16, 32, 64
-# places along each edge of a block of a grid
-ALONG_EDGE = 10
-
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
@@ -250,34 +244,6 @@ class Blocks:
             return np.full(len(self), each)
         inner, outer = self.radii.T
         return np.asarray(4.0 / 3.0 * np.pi * (outer**3 - inner**3) / math.prod(self.parts))
-
-    def filled(self, block: int) -> tuple[FloatArray, FloatArray]:
-        """Places all over a block, shape (P, 3), with their volumes, whose sum is the block's."""
-        if self.edges is None:
-            _, edges = self.corner_edges
-            steps = (np.arange(ALONG_EDGE) + 0.5) / ALONG_EDGE
-            z, y, x = np.meshgrid(steps, steps, steps, indexing="ij")
-            inside = np.column_stack([x.ravel(), y.ravel(), z.ravel()]) / np.array(self.parts)
-            places = self.lattice(0.0)[block] + inside @ edges
-            return places, np.full(len(places), self.volumes[block] / len(places))
-        inner, outer = self.radii[block]
-        # distances at which equal volumes end
-        share = (np.arange(DISTANCES) + 0.5) / DISTANCES
-        distance = np.cbrt(inner**3 + share * (outer**3 - inner**3))
-        cosine, weight = np.polynomial.legendre.leggauss(POLAR)
-        azimuth = 2.0 * np.pi * (np.arange(AZIMUTHS) + 0.5) / AZIMUTHS
-        sine = np.sqrt(1.0 - cosine**2)
-        unit = np.stack(
-            [
-                np.outer(sine, np.cos(azimuth)),
-                np.outer(sine, np.sin(azimuth)),
-                np.repeat(cosine[:, None], AZIMUTHS, axis=1),
-            ],
-            axis=-1,
-        ).reshape(-1, 3)
-        weights = np.repeat(0.5 * weight, AZIMUTHS) / (AZIMUTHS * DISTANCES)
-        places = self.middles[block] + (distance[:, None, None] * unit).reshape(-1, 3)
-        return places, self.volumes[block] * np.tile(weights, DISTANCES)
 
     @property
     def form(self) -> FloatArray:

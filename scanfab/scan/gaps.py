@@ -26,49 +26,65 @@ from scanfab.scan.scan import ScanSums, in_parts, sums_of
 from scanfab.scan.solids import Solids, check_spacing, shortest_gap
 from scanfab.scan.tallies import tally_triads
 
-__all__ = ["BlockSums", "GapSums", "scan_blocks", "scan_gaps"]
+__all__ = ["GapSums", "scan_gaps"]
 
 
 @dataclass(frozen=True, eq=False)
 class GapSums:
     """
-    Sums over the gaps of replicate r, variant v (a, b, c, d), axis d, block b, at each cut-off c.
+    Sums over the gaps of replicate r, variant v, axis d, block b, at each cut-off c.
 
     Of the gaps not shorter than the cut-off; lengths in the dump's unit.
     """
 
     axes: FloatArray
     """Unit vectors, shape (R, D, 3)."""
-    cutoffs: FloatArray
-    """In ascending order, shape (C,)."""
+    variants: str
+    """Which variants, in this order."""
     number: FloatArray
-    """Number of gaps, shape (R, 4, D, B, C)."""
+    """Number of gaps, shape (R, V, D, B, C)."""
     length: FloatArray
     """Sum of their lengths, same shape."""
     square: FloatArray
     """Sum of their squared lengths, same shape."""
+    scan: ScanSums
+    """Of the same lines all but what was put in blocks: lines, chords, steps, what is left out."""
+
+    def in_blocks(
+        self, variant: str, cutoff: int = 0, moment: int = 1
+    ) -> tuple[FloatArray, FloatArray]:
+        """
+        Numerator and denominator of ℓ in each block, shapes (R, D, B).
+
+        Parameters
+        ----------
+        variant : str
+            One of ``variants``.
+        cutoff : int, optional
+            Number of the cut-off, in ascending order.
+        moment : int, optional
+            1: the mean length, Σ l / Σ 1; 2: ℓ² = Σ l² / Σ l.
+        """
+        which = self.variants.index(variant)
+        over, under = (self.length, self.number) if moment == 1 else (self.square, self.length)
+        return over[:, which, ..., cutoff], under[:, which, ..., cutoff]
 
     def kept(
         self, variant: str, cutoff: int = 0, moment: int = 1, without: int | None = None
     ) -> tuple[FloatArray, FloatArray]:
         """
-        Numerator and denominator of ℓ for one variant and cut-off, shapes (R, D).
+        The same of all blocks together, shapes (R, D).
 
         Parameters
         ----------
-        variant : str
-            One of a, b, c, d.
-        cutoff : int, optional
-            Index in ``cutoffs``.
-        moment : int, optional
-            1: the mean length, Σ l / Σ 1; 2: ℓ² = Σ l² / Σ l.
+        variant, cutoff, moment
+            As of :meth:`in_blocks`.
         without : int, optional
             A block to leave out.
         """
         blocks = np.arange(self.number.shape[3]) != without
-        which = "abcd".index(variant)
-        over, under = (self.length, self.number) if moment == 1 else (self.square, self.length)
-        return over[:, which, ..., cutoff] @ blocks, under[:, which, ..., cutoff] @ blocks
+        over, under = self.in_blocks(variant, cutoff, moment)
+        return over @ blocks, under @ blocks
 
 
 def scan_gaps(
@@ -100,66 +116,8 @@ def scan_gaps(
     Raises
     ------
     SettingsError
-        If following lines through a periodic medium takes more steps than allowed.
-    """
-    triads, offsets = drawn_lines(rule, seed, replicates)
-    least = np.maximum(np.array(cutoffs, dtype=np.float64), shortest_gap(solids))
-    lines = _BinnedLines(solids, spacing, least, blocks, variants, Following(most_steps))
-    asked = in_parts(lines.binned, triads, offsets, workers)
-    sums = np.zeros((*asked.shape[:2], 4, *asked.shape[3:]))
-    sums[:, :, lines.rows] = asked
-    number, length, square = np.moveaxis(np.swapaxes(sums, 1, 2), -1, 0)
-    return GapSums(triads[:, :, 2], least, number, length, square)
-
-
-@dataclass(frozen=True, eq=False)
-class BlockSums:
-    """
-    Sums over the gaps of replicate r, axis d, variant v, block b, at each cut-off.
-
-    Of the gaps not shorter than the cut-off; lengths in the dump's unit.
-    """
-
-    axes: FloatArray
-    """Unit vectors, shape (R, D, 3)."""
-    variants: str
-    """Which variants, in this order."""
-    number: FloatArray
-    """Number of gaps, shape (R, D, V, B, C)."""
-    length: FloatArray
-    """Sum of their lengths, same shape."""
-    square: FloatArray
-    """Sum of their squared lengths, same shape."""
-    scan: ScanSums
-    """Of the same lines all but what was put in blocks: lines, chords, steps, what is left out."""
-
-    def kept(self, variant: str, cutoff: int = 0, moment: int = 1) -> tuple[FloatArray, FloatArray]:
-        """Numerator and denominator of ℓ as of :meth:`GapSums.kept`, shapes (R, D, B)."""
-        which = self.variants.index(variant)
-        over, under = (self.length, self.number) if moment == 1 else (self.square, self.length)
-        return over[:, :, which, :, cutoff], under[:, :, which, :, cutoff]
-
-
-def scan_blocks(
-    solids: Solids,
-    rule: DirectionRule,
-    *,
-    spacing: float,
-    cutoffs: Sequence[float],
-    blocks: tuple[Blocks, Blocks],
-    variants: str = "abcd",
-    replicates: Iterable[int] = range(16),
-    seed: int = 0,
-    workers: int = 1,
-    most_steps: float = MOST_STEPS,
-) -> BlockSums:
-    """
-    Scan as :func:`scan_gaps` does, and keep the variants that are asked for, and what it took.
-
-    Parameters
-    ----------
-    solids, rule, spacing, cutoffs, blocks, variants, replicates, seed, workers, most_steps
-        As for :func:`scan_gaps`.
+        If the spacing asks for more lines than can be scanned in reasonable time, or following
+        lines through a periodic medium takes more steps than allowed.
     """
     check_spacing(solids, spacing)
     triads, offsets = drawn_lines(rule, seed, replicates)
@@ -169,8 +127,10 @@ def scan_blocks(
     tallies = found[:, :, -2 * TALLY_SIZE :].reshape(*offsets.shape[:2], 2, TALLY_SIZE)
     sums = found[:, :, : -2 * TALLY_SIZE]
     sums = sums.reshape(*offsets.shape[:2], len(variants), lines.blocks_kept, len(least), 3)
+    number, length, square = np.moveaxis(np.swapaxes(sums, 1, 2), -1, 0)
     scan = sums_of(triads, tallies, variants, solids.edge)
-    return BlockSums(triads[:, :, 2], variants, sums[..., 0], sums[..., 1], sums[..., 2], scan)
+    lines.following.check(float(scan.steps.sum()))
+    return GapSums(triads[:, :, 2], variants, number, length, square, scan)
 
 
 class _BinnedLines(NamedTuple):
@@ -193,10 +153,6 @@ class _BinnedLines(NamedTuple):
     def blocks_kept(self) -> int:
         """For the whole and for the window the same number."""
         return max(map(len, self.blocks))
-
-    def binned(self, triads: FloatArray, offsets: FloatArray) -> FloatArray:
-        """The first of :meth:`sums`."""
-        return self.sums(triads, offsets)[0]
 
     def both(self, triads: FloatArray, offsets: FloatArray) -> FloatArray:
         """One array of both, as the parts of a scan come together."""

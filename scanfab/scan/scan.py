@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
+from scanfab.base.arrays import concatenated
 from scanfab.base.spelling import counted
 from scanfab.base.threads import in_threads
 from scanfab.base.typing import FloatArray, IntArray
@@ -136,13 +137,7 @@ class ScanSums:
         -------
         ScanSums
         """
-        parts = list(parts)
-        return cls(
-            *(
-                np.concatenate([getattr(part, field.name) for part in parts])
-                for field in fields(cls)
-            )
-        )
+        return concatenated(list(parts))
 
 
 def scan_lines(

@@ -9,6 +9,7 @@ from typing import Any
 
 from scanfab.base.column import Column, columns_of_fields, no_column
 from scanfab.fabric.registry import GROUPS, OWN_FABRICS, Fabric, load_fabrics
+from scanfab.fabric.spectrum import PREDICTED_ALPHA
 from scanfab.fabric.window import WINDOW_ALPHA
 from scanfab.packing.columns import RV_COLUMN, SAMPLE_COLUMNS
 from scanfab.scan.columns import EDGE_COLUMNS, SCAN_COLUMNS
@@ -65,6 +66,7 @@ MORE_COLUMNS = (
     RV_COLUMN,
     WINDOW_ALPHA,
     *EDGE_COLUMNS,
+    PREDICTED_ALPHA,
     *(column for group in GROUPS.values() for column in group.columns),
 )
 """Those of tables of which more is asked than the default."""

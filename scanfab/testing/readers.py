@@ -145,6 +145,7 @@ def _grains(reader: Reader, path: Path, options: ReadOptions) -> list[GrainTable
             columns=table.columns,
             contacts=table.contacts,
             wall_contacts=table.wall_contacts,
+            wall_forces=table.wall_forces,
             cell=table.cell,
         )
         assert len(packing) == len(table.radius)

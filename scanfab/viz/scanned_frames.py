@@ -108,8 +108,8 @@ class ScannedFrame:
     @property
     def row(self) -> Row:
         """Of the variant, at the first cut-off."""
-        name = variant_of({"variant": self.variant, "rv": self.rv})
-        return next(row for row in self.result.rows if variant_of(row) == name)
+        key = self.variant, self.rv
+        return next(row for row in self.result.rows if (row["variant"], row.get("rv")) == key)
 
     @property
     def smallest(self) -> float:

@@ -17,6 +17,7 @@ from scanfab.packing.window import Window
 from scanfab.scan.segments import Segments, cut_lines
 
 __all__ = [
+    "SHADES",
     "ContactLines",
     "Grains",
     "Scene",
@@ -31,6 +32,8 @@ __all__ = [
 
 # between the lines of a section and the plane across the axis, degrees
 LINE_ANGLE = 30.0
+# of a colour, each of its parts: what tells clumps apart that are neighbours
+SHADES = (1.0, 0.8, 0.62)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +58,13 @@ class Grains:
     def places(self) -> FloatArray:
         """Where the grains are: for each sphere, the place of the body that it is a part of."""
         return self.position if self.to_place is None else self.position + self.to_place
+
+    @property
+    def shade(self) -> IntArray:
+        """Which of the shades each sphere has: one for all spheres of a body, shape (N,)."""
+        if self.body is None:
+            return np.zeros(len(self.radius), np.int64)
+        return np.asarray(np.maximum(self.body, 0) % len(SHADES))
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,14 +19,12 @@ from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.base.vtk_log import quiet_vtk
 from scanfab.viz.figures.style import COLOURS
 from scanfab.viz.overlay import SIZE, Framing, add_scale, add_words
-from scanfab.viz.scene import Grains, Scene, towards_viewer
+from scanfab.viz.scene import SHADES, Grains, Scene, towards_viewer
 from scanfab.viz.vtk_files import window_mesh
 
 __all__ = ["check_screen", "show_scene"]
 
 
-# of a colour: in these, clumps that are numbered one after the other are told apart
-SHADES = (1.0, 0.8, 0.62)
 ADVICE = (
     "install one of them: on Debian or Ubuntu apt-get install libegl1 libgl1 libosmesa6, or "
     "apt-get install xvfb and run the command under xvfb-run"
@@ -158,7 +156,7 @@ def shades(
             continue
         for number, shade in enumerate(SHADES):
             mixed = Color([part * shade for part in Color(colour).float_rgb])
-            yield mixed.hex_rgb, kind & (np.maximum(grains.body, 0) % len(SHADES) == number)
+            yield mixed.hex_rgb, kind & (grains.shade == number)
 
 
 def _drawn(scene: Scene, toward: FloatArray, look: FloatArray) -> BoolArray:

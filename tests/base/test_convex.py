@@ -218,3 +218,14 @@ def test_an_outline_has_the_volume_of_the_region():
 
     for name, shape in SHAPES.items():
         assert ConvexHull(shape.outline).volume == pytest.approx(shape.volume, rel=6e-3), name
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_small_sphere_on_a_corner_or_rim_meets():
+    """Where the walk ends at its centre there is no way left to divide by."""
+    for shape, place in [
+        (box([2.0, 2.0, 2.0]), [1.0, 1.0, 1.0]),
+        (cylinder(1.0, 2.0), [0.6, 0.8, 1.0]),
+    ]:
+        assert shape.may_meet(np.array([place]), np.array([1e-3])).all()
+        assert not shape.may_meet(1.1 * np.array([place]), np.array([1e-3])).any()

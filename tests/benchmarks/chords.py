@@ -17,7 +17,7 @@ from scanfab.base.convex import sphere
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.edges import EDGES, START
-from scanfab.scan.gaps import scan_blocks
+from scanfab.scan.gaps import scan_gaps
 from scanfab.scan.lines import line_triads
 from scanfab.scan.scan import scan_lines
 from scanfab.scan.solids import CellGrains, Solids, margin_of
@@ -323,7 +323,7 @@ def _maps(repeats):
         words = {"spacing": spacing, "variants": "a", "replicates": range(directions)}
         ways = {"none": lambda w=words: scan_lines(solids, RULE, cutoff=CUTOFF, **w)}
         for name, one in kinds.items():
-            ways[name] = lambda b=one, w=words: scan_blocks(
+            ways[name] = lambda b=one, w=words: scan_gaps(
                 solids, RULE, cutoffs=[CUTOFF], blocks=(b, b), **w
             )
         seconds = interleaved(ways, repeats, clock=time.process_time)

@@ -75,7 +75,7 @@ MEASURES = {
     "ends": Measure(("--edge", "ends")),
     "cutoffs": Measure(
         ("--cutoffs", "0,0.1rmin,0.3rmin,0.5rmin,0.75rmin,1rmin,1.5rmin,2rmin,3rmin", *SWEEP),
-        (*CURVES, "cutoff"),
+        (*CURVES, "cutoff", "alpha_vs_axial_contacts"),
     ),
     "rvs": Measure(("--rv", "0.4,0.5,0.6", "--variants", "cd", *SWEEP), (*CURVES, "rv")),
     "recursive": Measure(("--rattlers", "recursive", "--variants", "bd", *SWEEP), (*CURVES,)),

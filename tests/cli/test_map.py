@@ -6,6 +6,7 @@ import json
 import shlex
 
 import pytest
+import pyvista
 
 import scanfab
 from scanfab.cli.main import run
@@ -48,7 +49,6 @@ def test_a_file_from_python_is_that_of_the_command(series, table, tmp_path):
 
 
 def test_it_is_drawn_and_written_for_paraview(table):
-    pyvista = pytest.importorskip("pyvista")
     assert table.with_name("map.png").stat().st_size > 10_000
     collection = table.with_name("vtk") / "map-a.pvd"
     assert collection.read_text().count("map-a_00000") == 3

@@ -98,7 +98,7 @@ def offered(words: str, current: str = "") -> set[str]:
 
 
 def test_commands_and_options_are_completed():
-    assert offered("scanfab", "co") == {"plain,compute", "plain,compare"}
+    assert offered("scanfab", "co") == {"plain,compute", "plain,compare", "plain,convert"}
     assert offered("scanfab compute", "--tol") == {"plain,--tolerance"}
 
 

@@ -287,7 +287,7 @@ def test_a_second_run_into_the_same_file_is_refused(compute, tmp_path, capsys, m
 
 
 def test_where_there_are_no_locks_runs_go_on(compute, tmp_path, monkeypatch):
-    fcntl = pytest.importorskip("fcntl")
+    fcntl = pytest.importorskip("fcntl", reason="such locks are POSIX")
 
     def none(*_):
         raise OSError(95, "Operation not supported")

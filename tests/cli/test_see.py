@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from scanfab.cli.main import run
 from scanfab.io.opening import read_series
@@ -180,20 +181,18 @@ def can_draw() -> bool:
 )
 @pytest.mark.parametrize("words", [[], ["--cut"], ["--axis", "x", "--rv", "0.5"]])
 def test_view_writes_a_picture_of_several_colours(tmp_path, words, monkeypatch):
-    image = pytest.importorskip("PIL.Image")
     monkeypatch.chdir(ROOT)
     picture = tmp_path / "view.png"
     words = [*words, "--boundary", "mask=3", "--frame", "-1", "--screenshot", str(picture)]
     assert run(["view", SAMPLE, *words]) == 0
-    colours = image.open(picture).convert("RGB").quantize(8).getcolors()
+    colours = Image.open(picture).convert("RGB").quantize(8).getcolors()
     assert sum(count > 2000 for count, _ in colours) >= 4
     assert [path.name for path in tmp_path.iterdir()] == ["view.png"]
 
 
 def drawn(path):
     """Pixels of a picture as numbers from 0 to 255, shape (900, 1200, 3)."""
-    image = pytest.importorskip("PIL.Image")
-    return np.asarray(image.open(path).convert("RGB")).astype(int)
+    return np.asarray(Image.open(path).convert("RGB")).astype(int)
 
 
 @pytest.mark.skipif(not can_draw(), reason="VTK cannot draw here")

@@ -91,7 +91,7 @@ def test_principal_values_and_b():
 
 def test_spam_has_the_same_numbers():
     """SPAM 0.9.1: fabricTensor gives G, F and a; its axes are z, y, x, in whatever order."""
-    spam = pytest.importorskip("spam.orientations")
+    spam = pytest.importorskip("spam.orientations", reason="SPAM is not on every system")
     normals = drawn(500, np.random.default_rng(5), 0.7)
     tensor, deviator, a = spam.fabricTensor(normals)
     found = contact_fabric(normals).matrix

@@ -9,7 +9,9 @@ from contextlib import contextmanager, suppress
 from functools import cache, partial
 from pathlib import Path
 from random import Random
+from tempfile import mkdtemp
 
+import h5py
 import meshio
 import numpy as np
 import pyvista
@@ -30,12 +32,32 @@ from tests.helpers.dumps import (
     local_text,
     pairs_text,
     small_save,
+    write,
     yade_lines,
     yade_spheres,
 )
+from tests.helpers.made import esys, gsd, kratos, lf_dem, mercurydpm, mfix, musen
+from tests.helpers.made.data_files import data_file
+from tests.helpers.made.lammps import netcdf, yaml_text
 from tests.helpers.truth import FLOOR, PERIODIC, YADE
 
-READERS = ("lammps", "liggghts", "npz", "on-dem", "table", "vtk", "xyz", "yade")
+READERS = (
+    "esys",
+    "gsd",
+    "kratos",
+    "lammps",
+    "lf-dem",
+    "liggghts",
+    "mercurydpm",
+    "mfix",
+    "musen",
+    "npz",
+    "on-dem",
+    "table",
+    "vtk",
+    "xyz",
+    "yade",
+)
 NAMES = (
     "f_1.txt",
     "f_1.vtk",
@@ -53,6 +75,14 @@ NAMES = (
     "f_1.csv.zst",
     "f_1.csv.lz4",
     "f_1.bin",
+    "f_1.data",
+    "f_1.fstat",
+    "f_1.restart",
+    "f_1.nc",
+    "f_1.gsd",
+    "f_1.mdpa",
+    "f_1.hdf5",
+    "particle_input_f_1.dat",
 )
 OPTIONS = (
     ReadOptions(),
@@ -254,6 +284,12 @@ def _family(path: Path, format: str, kind) -> Family:
 @cache
 def companion_grains(format: str) -> tuple[GrainTable, Family]:
     """Sound grains to read contacts with: the table, and the file."""
+    if format in SMALL:
+        folder = Path(mkdtemp(prefix="companion-"))
+        path = SMALL[format](folder)[0]
+        reader = reader_named(format)
+        snapshot = reader.snapshots(path)[-1]
+        return reader.read_grains(snapshot, ReadOptions()), _family(path, format, "grains")
     path = {
         "lammps": FLOOR / "shuffled.txt",
         "liggghts": FLOOR / "shuffled.txt",
@@ -272,6 +308,7 @@ def companion_grains(format: str) -> tuple[GrainTable, Family]:
 def seeds(format: str, folder: Path) -> list[Seed]:
     """Sound files to damage: tiny ones, made in the folder, before those of sample_data."""
     made = {
+        **SMALL,
         "lammps": _lammps_files,
         "liggghts": _liggghts_files,
         "npz": partial(_packings, (".npz", ".contacts.csv", ".frame.csv", ".columns.csv")),
@@ -296,11 +333,52 @@ def seeds(format: str, folder: Path) -> list[Seed]:
 def _is_for(format: str, path: Path) -> bool:
     if format == "vtk":
         return path.name.removesuffix(".gz")[-4:] in (".vtk", ".vtp", ".vtu")
-    if format in ("npz", "on-dem", "table", "xyz"):
+    if format in ("npz", "on-dem", "table", "xyz", *SMALL):
         return False
     if format == "lammps":
         return path.suffix == ".txt" and YADE not in path.parents
     return (YADE in path.parents) == (format == "yade")
+
+
+def _groups(path: Path) -> Path:
+    """Kratos' HDF5 of two times."""
+    with h5py.File(path, "w") as file:
+        for time in (0.5, 1.0):
+            group = file.create_group(f"{time * 2:.0f}")
+            group.attrs["time"] = time
+            for column in ("id", "x", "y", "z", "radius"):
+                group[column] = np.array([1.0, 2.0]) + time
+    return path
+
+
+def _mercury_files(folder: Path) -> list[Path]:
+    files = {
+        "run.data": mercurydpm.data_frame(0.1) + mercurydpm.data_frame(0.2),
+        "flat.data": "1 0.5 0 0 1 2 \n0.1 1 9 9 0.1 0 0 0\n",
+        "run.fstat": mercurydpm.fstat_frame(0.2, mercurydpm.contacts_at(0.2)),
+        "run.restart": mercurydpm.restart(),
+    }
+    return [write(folder / name, text) for name, text in files.items()]
+
+
+SMALL: dict[str, Callable[[Path], list[Path]]] = {
+    "esys": lambda folder: [esys.run(folder, prefix="")],
+    "gsd": lambda folder: [gsd.gsd_file(folder / "a.gsd", gsd.frame(0), gsd.frame(5, count=2))],
+    "kratos": lambda folder: [
+        write(folder / "a.mdpa", kratos.MDPA),
+        _groups(folder / "a.hdf5"),
+    ],
+    "lf-dem": lambda folder: [
+        write(folder / "par.dat", lf_dem.grains_text()),
+        write(folder / "int.dat", lf_dem.pairs_text()),
+    ],
+    "mercurydpm": _mercury_files,
+    "mfix": lambda folder: [
+        write(folder / "a.dat", mfix.version_2()),
+        write(folder / "particle_input_f_1.dat", "0.1 0.2 0.5D-1 2650 7 8\n"),
+    ],
+    "musen": lambda folder: [write(folder / "a.txt", musen.export(*musen.ROWS))],
+}
 
 
 def _lammps_files(folder: Path) -> list[Path]:
@@ -323,6 +401,8 @@ def _lammps_files(folder: Path) -> list[Path]:
     paths = [folder / name for name in files]
     for path in paths:
         path.write_text(files[path.name])
+    (folder / "a.yaml").write_text(yaml_text(100) + yaml_text(200))
+    paths += [folder / "a.yaml", netcdf(folder / "a.nc", written=2)]
     new, old = folder / "new.bin", folder / "old.bin"
     new.write_bytes(binary_dump(names="id type x y z radius", time=0.5, blocks=2))
     old.write_bytes(binary_dump() + binary_dump(step=100, tilt=(0.2, 0.1, 0.0)))
@@ -342,6 +422,8 @@ def _liggghts_files(folder: Path) -> list[Path]:
             [(*ROWS[0][2:5], *ROWS[1][2:5], *pair, 0, 1, 0, 0) for pair in PAIRS]
         ),
         "empty.txt": dump_text(()) + pairs_text((), step=1),
+        "plain.data": data_file(),
+        "hybrid.data": data_file("hybrid", behind=" 7 0 0 1"),
     }
     paths = [folder / name for name in files]
     for path in paths:

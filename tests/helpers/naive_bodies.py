@@ -22,9 +22,10 @@ class NaiveBodies:
     are those of another contact, is told by how far apart the two bodies lie in space.
     """
 
-    def __init__(self, position, radius, number, vectors=None):
+    def __init__(self, position, radius, number, vectors=None, dimension=3):
         self.position, self.radius = np.asarray(position), np.asarray(radius)
-        shifts = [np.zeros(3)] if vectors is None else [np.array(k) @ vectors for k in IMAGES]
+        images = [k for k in IMAGES if dimension == 3 or k[2] == 0]
+        shifts = [np.zeros(3)] if vectors is None else [np.array(k) @ vectors for k in images]
         members = {}
         for row, name in enumerate(number):
             members.setdefault(("alone", row) if name < 0 else ("body", name), []).append(row)
@@ -35,8 +36,8 @@ class NaiveBodies:
         for rows in self.members:
             first = self.position[rows[0]]
             near = {row: nearest(self.position[row], shifts, first) for row in rows}
-            volume = sum(self.radius[row] ** 3 for row in rows)
-            place = sum(self.radius[row] ** 3 * near[row] for row in rows) / volume
+            volume = sum(self.radius[row] ** dimension for row in rows)
+            place = sum(self.radius[row] ** dimension * near[row] for row in rows) / volume
             self.to_place |= {row: place - near[row] for row in rows}
         self.contacts, self.neighbours = 0, set()
         for one, two in combinations_with_replacement(range(len(self.radius)), 2):

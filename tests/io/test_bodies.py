@@ -44,6 +44,11 @@ def test_any_column_may_be_named_and_id_makes_each_sphere_a_grain(tmp_path):
     assert heads(dump(tmp_path, "clump", values, bodies="type")) == [0, 0, 0, 0]
 
 
+def test_each_sphere_can_be_a_grain_also_where_spheres_have_no_ids():
+    file = SAMPLE_DATA / "yade_formats" / "noid-spheres-00000000.vtk.gz"
+    assert scanfab.read(file, contacts="geometric", bodies="id").bodies is None
+
+
 def test_a_column_that_is_not_there_is_an_error_that_names_those_that_are(tmp_path):
     with pytest.raises(ReadError, match=r"dump.txt: there is no column 'body' .*are id, .*clump"):
         dump(tmp_path, "clump", [1, 1, 2, 2], bodies="body")

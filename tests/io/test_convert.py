@@ -304,3 +304,13 @@ def test_forces_and_tilted_cells_of_the_sample_data_come_through(tmp_path):
     packing = scanfab.read(source)
     for name in WRITERS:
         assert differences(packing, scanfab.read(written(packing, tmp_path, name))) == [], name
+
+
+def test_contacts_cut_within_their_first_line_are_an_error(tmp_path):
+    made = made_up_packings()["everything"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        scanfab.convert(made, tmp_path / "a.xyz")
+    (tmp_path / "a.contacts.csv").write_text("id1,id2,ix,iy,iz")
+    with pytest.raises(ReadError, match="the last line has no end"):
+        scanfab.read(tmp_path / "a.xyz")

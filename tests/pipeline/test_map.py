@@ -165,6 +165,25 @@ def test_the_rv_and_its_rules(packing):
         assert ("edge" in table.names) == (edge != "clip")
 
 
+def test_discs_are_refused_without_advice_that_would_be_refused_too():
+    random = np.random.default_rng(0)
+    discs = Packing(random.uniform(0, 9, (40, 2)), 0.4, contacts=np.zeros((0, 2), int))
+    with pytest.raises(SettingsError, match="all grains are discs in the plane x-y: `compute`"):
+        fabric_map(discs, grid=(2, 2, 1))
+
+
+def test_the_way_to_blocks_that_no_surface_cuts_is_told():
+    position, radius = simple_cubic(6)
+    for variants, better in [
+        ("a", "or those of the RV by `variants=c` and `edge"),
+        ("c", "or `edge"),
+    ]:
+        _, told = mapped(
+            Packing(position, radius * 0.98), slices=2, variants=variants, contact_tolerance=0.05
+        )
+        assert any(f"choose smaller blocks, {better}=start`" in one for one in told)
+
+
 def test_the_median_block_meets_the_tolerance(packing):
     words = {"directions": "auto", "spacing": "auto", "tolerance": 4e-3}
     table, _ = mapped(packing, grid=(3, 3, 3), **words)

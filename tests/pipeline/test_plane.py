@@ -230,6 +230,16 @@ def test_the_noise_of_a_scan_is_as_planned(spacing):
     assert expected == pytest.approx(fabric.axial_error((0, 1, 0)), rel=0.3)
 
 
+@pytest.mark.parametrize(("variants", "tolerance"), [("a", 1e-4), ("a", 5e-5), ("abcd", 1e-4)])
+@pytest.mark.filterwarnings("ignore::scanfab.ScanfabNote")
+def test_an_auto_scan_meets_its_tolerance_and_goes_little_further(variants, tolerance):
+    """The goal is the error in the plane, 2 a·G·a - 1, which is 4/3 of that in space."""
+    run = SAMPLE_DATA / "lammps_biaxial"
+    packing = scanfab.read(run / "discs.60000.lammpstrj.gz", contacts=run / "pairs.60000.local.gz")
+    table = compute(packing, variants=variants, tolerance=tolerance, workers=1)
+    assert 0.6 * tolerance < max(row.alpha_vs_axial_se for row in table) <= tolerance
+
+
 def test_several_rvs_and_cutoffs(discs):
     table = compute(Packing(*discs), variants="cd", rv="0.4,0.7", cutoffs="0.3,0.6", **FAST)
     assert [row.rv for row in table] == [0.4, 0.4, 0.7, 0.7] * 2

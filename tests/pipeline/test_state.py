@@ -12,10 +12,11 @@ import scanfab
 from scanfab import Cell, ContactList, Packing, Sample, Window, sphere
 from scanfab.base.shapes import box, cylinder
 from scanfab.packing.sample import VARIANTS
+from scanfab.packing.walls import ListedWallForces
 from scanfab.pipeline.state import cut_volumes, lenses, sample_state
 from tests.fabric.test_forces import directions
 from tests.helpers.lattices import simple_cubic
-from tests.helpers.truth import CELL, SAMPLE_DATA
+from tests.helpers.truth import CELL, SAMPLE_DATA, csv_rows
 
 PUSH = np.diag([1.0, 2.0, 4.0])
 YADE, LAMMPS = SAMPLE_DATA / "yade_forces", SAMPLE_DATA / "lammps_forces"
@@ -105,6 +106,56 @@ def test_boundary_is_a_wall():
     )
     again = in_window(swapped, sphere(10.0), boundary=boundary)
     np.testing.assert_allclose(again.stress, state.stress, atol=1e-18)
+
+
+@pytest.mark.parametrize("frame", [0, 3, 6])
+def test_the_stress_of_a_box_is_the_pressure_on_its_walls(frame):
+    """
+    Of the space between LIGGGHTS' walls: Love-Weber with the walls is the moment of their forces.
+
+    The frames are close to rest; without the walls the stress would be a tenth too low.
+    """
+    run = SAMPLE_DATA / "liggghts_box"
+    packing = scanfab.read_series(run)[frame].read()
+    engine = csv_rows(run / "engine.csv")
+    low, high = (
+        np.array([engine[f"{axis}{end}"][frame] for axis in "xyz"]) for end in ("lo", "hi")
+    )
+    space = box(high - low)
+    found = in_window(packing, space, 0.5 * (low + high))
+    pressure = [
+        0.5 * (engine[f"engine_p{axis}lo"][frame] + engine[f"engine_p{axis}hi"][frame])
+        for axis in "xyz"
+    ]
+    np.testing.assert_allclose(np.diag(found.stress), pressure, rtol=5e-4)
+    without = packing.with_contacts(packing.contacts, packing.wall_contacts)
+    lower = np.diag(in_window(without, space, 0.5 * (low + high)).stress)
+    assert np.all(lower < 0.92 * np.array(pressure))
+
+
+def test_walls_press_on_clumps_through_a_periodic_face():
+    """The branch is from the wall to the clump's place, whichever image the point is written at."""
+    cell = Cell([10.0, 10.0, 10.0])
+    position = [[0.5, 5, 5], [9.5, 5, 5]]
+    for image in (0.0, 10.0, -20.0):
+        walls = ListedWallForces([1], [[9.5 + image, 5, 4.0]], [[0, 1.0, 3.0]])
+        packing = Packing(
+            position, 1.0, bodies=[7, 7], cell=cell, wall_contacts=[0, 1], wall_forces=walls,
+            contacts=ContactList(np.zeros((0, 2), int), force=np.zeros((0, 3))),
+        )  # fmt: skip
+        # from (-0.5, 5, 4) to (0, 5, 5)
+        force, branch = np.array([0, 1.0, 3.0]), np.array([0.5, 0, 1.0])
+        expected = np.outer(force, branch) / 1000
+        np.testing.assert_allclose(whole(packing).stress, 0.5 * (expected + expected.T))
+
+
+def test_wall_forces_that_cannot_be_are_refused():
+    walls = ListedWallForces([2], [[0, 0, 0.0]], [[0, 0, 1.0]])
+    with pytest.raises(scanfab.PackingError, match="a row that is none of 2 grains"):
+        Packing([[0, 0, 0], [3, 0, 0]], 1.0, wall_forces=walls)
+    walls = ListedWallForces([1], [[0, 0, np.nan]], [[0, 0, 1.0]])
+    with pytest.raises(scanfab.PackingError, match="finite"):
+        Packing([[0, 0, 0], [3, 0, 0]], 1.0, wall_forces=walls)
 
 
 def test_without_a_volume_there_is_no_stress():

@@ -10,7 +10,7 @@ from scanfab.base.convex import sphere
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.edges import START
 from scanfab.scan.following import Following
-from scanfab.scan.gaps import _BinnedLines, scan_blocks
+from scanfab.scan.gaps import _BinnedLines, scan_gaps
 from scanfab.scan.solids import Solids
 from tests.helpers import naive
 from tests.helpers.lattices import poisson_spheres, rotation
@@ -87,11 +87,6 @@ def test_volumes_middles_and_corners_are_those_of_the_places_inside():
         found = blocks.of(random.uniform(low, high, (400_000, 3)))
         counted = np.bincount(found[found >= 0], minlength=len(blocks)) / 400_000
         np.testing.assert_allclose(counted * (high - low) ** 3, blocks.volumes, rtol=0.2)
-        filled = [blocks.filled(block) for block in range(len(blocks))]
-        for block, (places, volumes) in enumerate(filled):
-            assert set(blocks.of(places)) == {block}
-            assert volumes.sum() == pytest.approx(blocks.volumes[block])
-            np.testing.assert_allclose(volumes @ places / volumes.sum(), blocks.middles[block])
         if blocks.edges is None:
             np.testing.assert_allclose(blocks.corners.mean(axis=1), blocks.middles)
 
@@ -188,11 +183,11 @@ def test_all_blocks_together_are_the_scan_of_the_same_lines(edge):
     blocks = Blocks.of_edges(14.0 * rotation(random), np.zeros(3), (5, 6, 3))
     blocks = blocks.moved(blocks.lattice(0.5).mean(axis=0))
     words = {"spacing": 0.3, "replicates": range(3), "variants": "abcd"}
-    found = scan_blocks(solids, RULE, cutoffs=[0.1, 0.5], blocks=(blocks, blocks), **words)
+    found = scan_gaps(solids, RULE, cutoffs=[0.1, 0.5], blocks=(blocks, blocks), **words)
     for place, cutoff in enumerate([0.1, 0.5]):
         sums = scan_lines(solids, RULE, cutoff=cutoff, **words)
         for variant in "abcd":
-            length, number = (one.sum(axis=2) for one in found.kept(variant, place))
+            length, number = (one.sum(axis=2) for one in found.in_blocks(variant, place))
             np.testing.assert_allclose(number, sums.kept(variant)[1], rtol=1e-12)
             np.testing.assert_allclose(length, sums.kept(variant)[0], rtol=1e-9)
     assert np.all(found.scan.chords > 0)
@@ -203,6 +198,6 @@ def test_lines_of_a_map_are_kept_in_any_number_of_threads():
     solids = solids_of(poisson_spheres(random, 0.15, 3.0), 2.0)
     blocks = some_blocks(random)[0]
     words = {"spacing": 0.2, "cutoffs": [0.1], "blocks": (blocks, blocks), "variants": "ac"}
-    one, three = (scan_blocks(solids, RULE, workers=n, **words) for n in (1, 3))
+    one, three = (scan_gaps(solids, RULE, workers=n, **words) for n in (1, 3))
     assert np.array_equal(one.length, three.length)
     assert np.array_equal(one.scan.chords, three.scan.chords)

@@ -7,6 +7,7 @@ import pickle
 import sys
 
 import numpy as np
+import pandas
 import pytest
 
 import scanfab
@@ -238,7 +239,6 @@ def test_pandas_is_needed_where_it_is_asked_for(results, monkeypatch):
 
 
 def test_a_data_frame_of_pandas(results):
-    pandas = pytest.importorskip("pandas")
     frame = results.to_pandas()
     assert isinstance(frame, pandas.DataFrame)
     assert tuple(frame.columns) == COLUMNS

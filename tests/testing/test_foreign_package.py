@@ -28,7 +28,6 @@ print("all is well")
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory):
     """The environment of a process that has the package."""
-    pytest.importorskip("hatchling", reason="builds the package")
     target = tmp_path_factory.mktemp("site")
     command = "-m pip install --quiet --no-index --no-deps --no-build-isolation --target"
     done = subprocess.run(

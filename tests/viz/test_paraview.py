@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import pyvista
 
 import scanfab
 from scanfab.pipeline.compute import compute_rows
@@ -13,8 +14,6 @@ from scanfab.viz.paraview import VtkFolder
 from scanfab.viz.vtk_files import Collection
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.lattices import shaken_cubic
-
-pyvista = pytest.importorskip("pyvista")
 
 ARRAYS = {
     "grains": {"radius", "id", "contacts", "rattler", "boundary", "in_window"},

@@ -1,4 +1,4 @@
-"""LAMMPS: ``dump custom`` and ``dump local`` text, and ``write_data``."""
+"""LAMMPS: ``dump custom``, ``dump local``, ``dump yaml``, ``dump netcdf`` and ``write_data``."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import re
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray, IntArray
@@ -17,9 +16,25 @@ from scanfab.io.formats.dump_grains import (
     read_binary_grains,
     read_dump_grains,
 )
-from scanfab.io.formats.ids import are_ids, are_whole, refuse_rounded_ids
+from scanfab.io.formats.ids import (
+    IDS,
+    are_ids,
+    are_whole,
+    gaps,
+    named_force,
+    named_places,
+    refuse_rounded_ids,
+    touching_pairs,
+)
 from scanfab.io.formats.join import join_ids, rows_of_ids
-from scanfab.io.formats.lammps_data import is_data_file, read_data_grains, step_of_data
+from scanfab.io.formats.lammps_data import is_data_file, of_liggghts, read_data_grains, step_of_data
+from scanfab.io.formats.lammps_netcdf import (
+    index_netcdf,
+    is_netcdf,
+    netcdf_kind,
+    read_netcdf_grains,
+)
+from scanfab.io.formats.lammps_yaml import index_yaml, is_yaml, read_yaml_grains, yaml_kind
 from scanfab.io.parse.binary_dump import index_binary, is_binary, names_of_binary
 from scanfab.io.parse.text_dump import DumpBlock, index_dump, read_block, row_word
 from scanfab.io.reader import (
@@ -42,13 +57,6 @@ LAMMPS_ITEMS = re.compile(
     re.MULTILINE,
 )
 
-# names of contact_columns: ids, force on the first grain, its tangential part if apart from it
-IDS = ("id1", "id2")
-FORCE = ("fx", "fy", "fz")
-TANGENTIAL = ("tx", "ty", "tz")
-
-# in r1 + r2: where no gap is wider, the list is one of contacts, and the rest is rounding
-ROUNDING = 1e-3
 # in r1 + r2: pairs that LAMMPS lists are not further apart, unless the columns are no ids
 NEIGHBOURS = 2.0
 # of the rows of a list of neighbours
@@ -59,10 +67,8 @@ class LammpsReader:
     """Reader plugin for what LAMMPS dumps."""
 
     name = "lammps"
-    description = (
-        "LAMMPS dump custom (text, binary), dump local (text), write_data of atom_style sphere"
-    )
-    extensions = (".lammpstrj", ".lmp", ".data", ".local", ".bin")
+    description = "LAMMPS dump custom (text, binary, yaml, netcdf), dump local (text), write_data"
+    extensions = (".lammpstrj", ".lmp", ".data", ".local", ".bin", ".yaml", ".nc")
 
     def recognises(self, path: Path) -> bool:
         """What LAMMPS writes and LIGGGHTS does not: units, time, bounds with all digits."""
@@ -71,7 +77,9 @@ class LammpsReader:
         is_new = isinstance(names_of_binary(head), list)
         return (
             is_new
-            or is_data_file(head)
+            or is_yaml(head)
+            or is_netcdf(head)
+            or (is_data_file(head) and not of_liggghts(head))
             or (row_word(head) is not None and LAMMPS_ITEMS.search(head) is not None)
         )
 
@@ -80,6 +88,10 @@ class LammpsReader:
         head = first_bytes(path, 1 << 16)
         if is_data_file(head):
             return "grains"
+        if is_yaml(head):
+            return yaml_kind(head)
+        if is_netcdf(head):
+            return netcdf_kind(path)
         if is_binary(head):
             return binary_kind(head)
         return "other" if row_word(head) is None else dump_kind(head)
@@ -89,6 +101,10 @@ class LammpsReader:
         head = first_bytes(path)
         if is_data_file(head):
             return [Snapshot(path, step=step_of_data(head))]
+        if is_yaml(head):
+            return index_yaml(path)
+        if is_netcdf(head):
+            return index_netcdf(path)
         return index_binary(path) if is_binary(head) else index_dump(path)
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
@@ -96,6 +112,10 @@ class LammpsReader:
         head = first_bytes(snapshot.path)
         if is_data_file(head):
             return read_data_grains(snapshot, options)
+        if is_yaml(head):
+            return read_yaml_grains(snapshot, options)
+        if is_netcdf(head):
+            return read_netcdf_grains(snapshot, options)
         if is_binary(head):
             return read_binary_grains(snapshot, options)
         return read_dump_grains(snapshot, options)
@@ -114,9 +134,10 @@ class LammpsReader:
         their values, if there is no doubt, and no force is read.
         """
         path = snapshot.path
-        if is_data_file(first_bytes(path)):
-            raise ReadError(f"{path}: a data file holds no contacts")
-        if is_binary(first_bytes(path)):
+        head = first_bytes(path)
+        if is_data_file(head) or is_yaml(head) or is_netcdf(head):
+            raise ReadError(f"{path}: a file of this kind holds no contacts")
+        if is_binary(head):
             raise ReadError(
                 f"{path}: contacts are read from text: dump local to a file without .bin"
             )
@@ -126,35 +147,13 @@ class LammpsReader:
         if grains.id is None:
             raise ReadError(f"{path}: names grains by id, but the grain file has no ids")
         refuse_rounded_ids(path, block.values, grains)
-        places = _named_places(path, options.contact_columns, block)
+        places = named_places(path, options.contact_columns, block)
         ids = _ids(path, block, places, grains)
-        force = _force_on_second(block, places)
-        touching = _touching(grains, rows_of_ids(grains, ids), force)
+        force = named_force(block, places)
+        touch = touching_pairs(grains, rows_of_ids(grains, ids), force)
         if force is not None:
-            force = force[touching]
-        return join_ids(path, grains, ids[touching], force, walls=False)
-
-
-def _named_places(path: Path, text: str | None, block: DumpBlock) -> dict[str, int]:
-    """Columns by their meaning, from ``id1=c_ids[1],id2=c_ids[2],...``; empty without it."""
-    if text is None:
-        return {}
-    pairs = [part.partition("=") for part in text.split(",")]
-    named = {key.strip(): own.strip() for key, _, own in pairs}
-    known = ({*IDS}, {*IDS, *FORCE}, {*IDS, *FORCE, *TANGENTIAL})
-    if set(named) not in known or not all(named.values()):
-        raise ReadError(
-            f"{path}: `contact_columns`: expected id1=NAME,id2=NAME, and fx, fy, fz (with tx, ty, "
-            f"tz) for the force on the first grain, found {text!r}; "
-            f"the columns are {', '.join(block.names)}"
-        )
-    for own in named.values():
-        if own not in block.names:
-            raise ReadError(
-                f"{path}: `contact_columns`: there is no column {own!r}; "
-                f"the columns are {', '.join(block.names)}"
-            )
-    return {key: block.names.index(own) for key, own in named.items()}
+            force = force[touch]
+        return join_ids(path, grains, ids[touch], force, walls=False)
 
 
 def _ids(path: Path, block: DumpBlock, places: dict[str, int], grains: GrainTable) -> IntArray:
@@ -193,43 +192,5 @@ def _name_neighbours(values: FloatArray, grains: GrainTable) -> bool:
     if len(np.unique(np.sort(values, axis=1), axis=0)) < 0.5 * len(values):
         return False
     rows = rows_of_ids(grains, values)
-    gap = _gaps(grains, rows[(rows >= 0).all(axis=1)])
+    gap = gaps(grains, rows[(rows >= 0).all(axis=1)])
     return bool(np.mean(gap < NEIGHBOURS - 1.0) > NEARLY_ALL)
-
-
-def _gaps(grains: GrainTable, rows: IntArray) -> FloatArray:
-    """Gaps between the surfaces of pairs of grains, nearest image, in r1 + r2."""
-    branch = grains.position[rows[:, 1]] - grains.position[rows[:, 0]]
-    if grains.cell is not None and np.all(np.isfinite(branch)):
-        branch = branch + grains.cell.nearest_image(branch) @ grains.cell.vectors
-    gaps: FloatArray = np.linalg.norm(branch, axis=1) / grains.radius[rows].sum(axis=1) - 1.0
-    return gaps
-
-
-@np.errstate(all="ignore")
-def _touching(
-    grains: GrainTable, rows: IntArray, force: FloatArray | None
-) -> npt.NDArray[np.bool_]:
-    """
-    Which pairs are contacts: LAMMPS lists all pairs within a cut-off, unless told otherwise.
-
-    Without a wide gap all are. Else those with a force, or without a force column those that
-    overlap. What is no grain stays, for the error that names it.
-    """
-    known = (rows >= 0).all(axis=1)
-    gap = np.zeros(len(rows))
-    gap[known] = _gaps(grains, rows[known])
-    if not np.any(gap > ROUNDING):
-        return np.ones(len(rows), dtype=bool)
-    touches = gap < 0 if force is None else force.any(axis=1)
-    return np.asarray(touches | ~known)
-
-
-def _force_on_second(block: DumpBlock, places: dict[str, int]) -> FloatArray | None:
-    """LAMMPS has the force on the first grain, its normal and tangential part apart."""
-    if FORCE[0] not in places:
-        return None
-    force = block.values[:, [places[key] for key in FORCE]]
-    if TANGENTIAL[0] in places:
-        force = force + block.values[:, [places[key] for key in TANGENTIAL]]
-    return -force

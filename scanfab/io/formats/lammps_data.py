@@ -1,4 +1,4 @@
-"""LAMMPS' data files (``write_data``) of ``atom_style sphere``."""
+"""Data files of LAMMPS and LIGGGHTS (``write_data``, ``read_data``): the section of atoms."""
 
 from __future__ import annotations
 
@@ -10,32 +10,45 @@ import numpy as np
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.lengths import MOST
 from scanfab.base.typing import FloatArray
-from scanfab.io.files import check_memory, plain
 from scanfab.io.formats.columns import grain_table
+from scanfab.io.parse.counted_rows import counted_rows, text_of
 from scanfab.io.parse.lammps_box import box_vectors
-from scanfab.io.parse.number_rows import exact_column, rows_of_numbers
+from scanfab.io.parse.number_rows import exact_column
 from scanfab.io.reader import GrainTable, ReadOptions, Snapshot
-from scanfab.io.unpacking import check_lines
 from scanfab.packing.cell import Cell
 
-__all__ = ["is_data_file", "read_data_grains", "step_of_data"]
+__all__ = ["is_data_file", "of_liggghts", "read_data_grains", "step_of_data"]
 
 
 FIRST_LINE = re.compile(rb"\A(?:\xef\xbb\xbf)?LAMMPS data file[^\n]*")
+# the first line is a comment; these two must stand below it
+ATOMS = re.compile(rb"^[ \t]*\d{1,15}[ \t]+atoms[ \t]*(?:#[^\n]*)?\r?$", re.MULTILINE)
+BOX = re.compile(rb"^[^\n]*[ \t]xlo[ \t]+xhi\b", re.MULTILINE)
 STEP = re.compile(rb"timestep = (\d{1,18})\b")
-# its third column is the diameter; the image flags may be missing
-SPHERE = ("id", "type", "diameter", "density", "x", "y", "z")
+# orders of the columns; image flags, and of hybrid styles the columns of others, stand behind
+PLAIN = ("id", "type", "diameter", "density", "x", "y", "z")
+HYBRID = ("id", "type", "x", "y", "z", "diameter", "density")
 FLAGS = ("ix", "iy", "iz")
-# a line that is not blank or a comment, as numpy has them
-FILLED = re.compile(rb"^[ \t\r\f\v\x1c-\x1f\x85\xa0]*[^#\s\x1c-\x1f\x85\xa0]", re.MULTILINE)
+MOST_COLUMNS = 40
+# what atoms may be that are no spheres: their third column is a flag, not a diameter
+NO_SPHERES = ("ellipsoids", "lines", "triangles", "bodies")
+# YADE writes this first line, and radii in the column of diameters
+OF_YADE = b"LIGGGHTS Description"
 
 # a section is a line that starts with a word, behind the header
 SECTION = re.compile(rb"^[ \t]*([A-Z][A-Za-z ]*?)[ \t]*(?:#[ \t]*(\S+)[^\n]*)?\r?$", re.MULTILINE)
 
 
 def is_data_file(head: bytes) -> bool:
-    """Whether a file starts as LAMMPS' data files do."""
-    return FIRST_LINE.match(head) is not None
+    """Whether a file starts as data files do."""
+    return FIRST_LINE.match(head) is not None or (
+        ATOMS.search(head) is not None and BOX.search(head) is not None
+    )
+
+
+def of_liggghts(head: bytes) -> bool:
+    """Whether the first line, which is free, names LIGGGHTS."""
+    return b"LIGGGHTS" in head.partition(b"\n")[0].upper()
 
 
 def step_of_data(head: bytes) -> int | None:
@@ -52,34 +65,41 @@ def read_data_grains(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
     Raises
     ------
     ReadError
-        If the atoms are not of style sphere, or a line is not as it should be.
+        If the atoms are no spheres, or a line is not as it should be.
     """
-    path = snapshot.path
-    check_memory(path, 6.0 * plain(path).stat().st_size)
-    check_lines(path, plain(path))
-    data = plain(path).read_bytes()
-    sections = list(SECTION.finditer(data, len(FIRST_LINE.match(data)[0])))  # type: ignore[index]
+    path, data = snapshot.path, text_of(snapshot)
+    # a header of one line is at most a comment
+    sections = list(SECTION.finditer(data, max(data.find(b"\n"), 0)))
     atoms = next((place for place, one in enumerate(sections) if one[1] == b"Atoms"), None)
     if atoms is None:
         raise ReadError(f"{path}: expected a section Atoms, found none")
-    style = (sections[atoms][2] or b"").decode("utf-8", "replace")
-    if style != "sphere":
-        found = f"'Atoms # {style}'" if style else "'Atoms' without a style"
-        raise ReadError(
-            f"{path}: expected 'Atoms # sphere' (atom_style sphere), found {found}: "
-            f"write the grains with dump custom ... id type x y z radius"
-        )
     header = data[: sections[0].start()].decode("utf-8", "replace").splitlines()
     begin = sections[atoms].end()
     end = sections[atoms + 1].start() if atoms + 1 < len(sections) else len(data)
-    values = _values(path, data, begin, end, _count(path, header))
-    names = (*SPHERE, *FLAGS)[: values.shape[1]]
+    values = counted_rows(
+        snapshot,
+        data,
+        begin,
+        end,
+        count=_counted(path, header),
+        widths=(len(PLAIN), *range(4, MOST_COLUMNS)),
+        names="atoms",
+    )
+    cell = _cell(path, header)
+    if options.columns and all(f"{own}".isdecimal() for own in options.columns.values()):
+        names = tuple(f"{place + 1}" for place in range(values.shape[1]))
+    else:
+        style = (sections[atoms][2] or b"").decode("utf-8", "replace")
+        _refuse_others(path, style, header, data)
+        names = _names(path, style, values, cell)
     columns = {name: values[:, place] for place, name in enumerate(names)}
-    columns["id"] = exact_column(values, data[begin:end], names.index("id"))
-    return grain_table(path, columns, _cell(path, header), options)
+    id = options.columns.get("id", "id")
+    if id in columns:
+        columns[id] = exact_column(values, data[begin:end], names.index(id))
+    return grain_table(path, columns, cell, options)
 
 
-def _count(path: Path, header: list[str]) -> int:
+def _counted(path: Path, header: list[str]) -> int:
     for line in header:
         words = line.split()
         if words[1:2] == ["atoms"] and re.fullmatch(r"\d{1,15}", words[0]):
@@ -87,20 +107,79 @@ def _count(path: Path, header: list[str]) -> int:
     raise ReadError(f"{path}: expected a line 'N atoms' in the header, found none")
 
 
-def _values(path: Path, data: bytes, begin: int, end: int, count: int) -> FloatArray:
-    if FILLED.search(data[begin:end]) is None:
-        if count:
-            raise ReadError(f"{path}: the header counts {count} atoms, found none")
-        return np.zeros((0, len(SPHERE)))
-    values = rows_of_numbers(path, data, begin, end)
-    if len(values) != count:
-        raise ReadError(f"{path}: the header counts {count} atoms, found {len(values)}")
-    if values.shape[1] not in (len(SPHERE), len(SPHERE) + len(FLAGS)):
+def _refuse_others(path: Path, style: str, header: list[str], data: bytes) -> None:
+    """ReadError for atoms that are no spheres, and for radii among diameters."""
+    if style not in ("", "sphere", "granular", "hybrid"):
         raise ReadError(
-            f"{path}: expected {len(SPHERE)} or {len(SPHERE) + len(FLAGS)} columns of atoms "
-            f"({' '.join(SPHERE)}), found {values.shape[1]}"
+            f"{path}: expected 'Atoms # sphere' (atom_style sphere), found 'Atoms # {style}': "
+            f"write the grains with dump custom ... id type x y z radius"
         )
-    return values
+    for line in header:
+        words = line.split()
+        if words[1:2] and words[1] in NO_SPHERES and words[0] != "0":
+            raise ReadError(f"{path}: expected spheres, found {line.strip()[:80]!r}")
+    if data.startswith(OF_YADE):
+        raise ReadError(
+            f"{path}: YADE writes radii in the column of diameters of such files, so LIGGGHTS "
+            f"takes grains for half as large as they are: say which they are to be, by "
+            f'`columns="id=1,type=2,radius=3,x=5,y=6,z=7"` or by diameter=3'
+        )
+
+
+def _names(path: Path, style: str, values: FloatArray, cell: Cell | None) -> tuple[str, ...]:
+    """
+    The names of the columns, of atom_style sphere or of a hybrid with it.
+
+    A file that does not name its style has the order in which diameters and densities are above
+    zero, types are whole, and the centres in the box; ReadError if both orders do, or none.
+    """
+    orders = {"hybrid": (HYBRID,), "": (PLAIN, HYBRID)}.get(style, (PLAIN,))
+    width = values.shape[1]
+    fitting = [
+        order
+        for order in orders
+        if width >= len(order) and (len(orders) == 1 or _fits(order, values, cell))
+    ]
+    if orders == (PLAIN,) and width not in (len(PLAIN), len(PLAIN) + len(FLAGS)):
+        fitting = []
+    if len(values) == 0:
+        fitting = fitting[:1]
+    if len(fitting) != 1:
+        found = f"'Atoms # {style}'" if style else "'Atoms' without a style"
+        raise ReadError(
+            f"{path}: expected the columns {' '.join(PLAIN)} of atom_style sphere (or, in a hybrid "
+            f"style, {' '.join(HYBRID)}), found {found} with {width} columns, which "
+            f"{'may be both' if fitting else 'are neither'}: name them by their numbers, for "
+            f'instance `columns="id=1,type=2,diameter=3,x=5,y=6,z=7"`'
+        )
+    more = width - len(PLAIN)
+    numbered = tuple(f"{place + 1}" for place in range(len(PLAIN), width))
+    flags = FLAGS if more >= 3 and _are_flags(values[:, -3:]) else ()
+    rest = numbered[: more - len(flags)]
+    if fitting[0] is HYBRID and rest:
+        rest = ("mol", *rest[1:])
+    return (*fitting[0], *rest, *flags)
+
+
+def _are_flags(values: FloatArray) -> bool:
+    return bool(np.all(values == np.rint(values)))
+
+
+@np.errstate(invalid="ignore")
+def _fits(order: tuple[str, ...], values: FloatArray, cell: Cell | None) -> bool:
+    column = {name: values[:, place] for place, name in enumerate(order)}
+    if not (np.all(column["diameter"] > 0) and np.all(column["density"] > 0)):
+        return False
+    if not np.all(column["type"] == np.rint(column["type"])):
+        return False
+    if order is PLAIN and values.shape[1] not in (len(PLAIN), len(PLAIN) + len(FLAGS)):
+        return False
+    if cell is None:
+        return order is PLAIN
+    centre = np.column_stack([column[axis] for axis in "xyz"])
+    # a grain may reach out of the box, and a periodic one lie there
+    fraction = cell.fractional(centre)
+    return bool(np.all((fraction > -0.5) & (fraction < 1.5)))
 
 
 def _cell(path: Path, header: list[str]) -> Cell | None:

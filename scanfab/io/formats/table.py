@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -70,7 +70,15 @@ class TableReader:
     description = (
         "tables with a column each of x, y, z, radius: CSV, TSV, blanks, Parquet, NPZ, xyzd"
     )
-    extensions = (".csv", ".tsv", ".txt", ".dat", ".parquet", ".npz", ".xyzd")
+    extensions: ClassVar[tuple[str, ...]] = (
+        ".csv",
+        ".tsv",
+        ".txt",
+        ".dat",
+        ".parquet",
+        ".npz",
+        ".xyzd",
+    )
     generic = True
     is_table = True
     names: Names = field(default_factory=lambda: {**TABLE, **CONTACTS}, init=False, repr=False)
@@ -221,6 +229,7 @@ class PfcReader(TableReader):
 
     name = "pfc"
     description = "tables of PFC's ball and contact attributes: ball.pos.x, contact.end1.id, ..."
+    extensions = ()
     names: Names = field(default_factory=lambda: PFC, init=False, repr=False)
 
     def recognises(self, path: Path) -> bool:
@@ -236,6 +245,7 @@ class EdemReader(TableReader):
     description = (
         'tables of EDEM\'s export, by the titles of its queries: "Particle Position X", ...'
     )
+    extensions = ()
     names: Names = field(default_factory=lambda: EDEM, init=False, repr=False)
 
     def recognises(self, path: Path) -> bool:

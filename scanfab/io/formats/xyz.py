@@ -12,6 +12,7 @@ import numpy.typing as npt
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.io.files import check_memory, first_bytes, plain
 from scanfab.io.formats.columns import grain_table, has_radius
+from scanfab.io.parse.counted_rows import leave_out_last, skip_rows
 from scanfab.io.reader import (
     Carries,
     FileKind,
@@ -62,14 +63,14 @@ class XyzReader:
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """One behind the other."""
-        found = []
+        found: list[Snapshot] = []
         with open(plain(path), "rb") as stream:
             while (head := _head_or_end(path, stream)) is not None:
-                for row in range(head.count):
-                    if not stream.readline().endswith(b"\n"):
-                        raise ReadError(
-                            f"{path}: expected {head.count} rows, the file ends after {row}"
-                        )
+                rows = skip_rows(stream, head.count)
+                if rows < head.count:
+                    reason = f"expected {head.count} rows, the file ends after {rows}"
+                    leave_out_last(path, len(found), reason)
+                    break
                 found.append(head.snapshot(path, stream.tell()))
         if not found:
             raise ReadError(f"{path}: the file is empty")

@@ -14,12 +14,14 @@ import numpy as np
 
 from scanfab.base.errors import PackingError, ReadError, ScanfabWarning
 from scanfab.base.lengths import MOST
+from scanfab.base.typing import IntArray
 from scanfab.io.files import first_bytes, unpacked
 from scanfab.io.formats.columns import grain_table, whole_numbers
-from scanfab.io.formats.join import join_ids
+from scanfab.io.formats.join import join_ids, rows_of_ids
 from scanfab.io.reader import GrainTable, ReadOptions, Snapshot
 from scanfab.io.unpacking import Readable
 from scanfab.packing.cell import Cell
+from scanfab.packing.walls import ListedWallForces
 
 __all__ = ["is_binary_save", "is_save", "read_save", "snapshot_of_save"]
 
@@ -101,7 +103,24 @@ def read_save(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         joined = join_ids(path, grains, pairs[ours], force, walls=True)
     else:
         joined = join_ids(path, grains, pairs[ours], force, walls=True, image=image[ours])
-    return grains._replace(contacts=joined.contacts, wall_contacts=joined.wall_contacts)
+    return grains._replace(
+        contacts=joined.contacts,
+        wall_contacts=joined.wall_contacts,
+        wall_forces=_wall_forces(scene, pairs, grains),
+    )
+
+
+def _wall_forces(scene: _Scene, pairs: IntArray, grains: GrainTable) -> ListedWallForces | None:
+    """Of contacts between a sphere and what is none; None if their points or forces are missing."""
+    rows = rows_of_ids(grains, pairs)
+    first, second = (rows >= 0).T
+    at = first != second
+    if not at.any() or len(scene.forces) != len(pairs) or len(scene.points) != len(pairs):
+        return None
+    # forces are those on the second body
+    force = np.where(second, 1.0, -1.0)[:, None] * np.array(scene.forces).reshape(-1, 3)
+    point = np.array(scene.points).reshape(-1, 3)
+    return ListedWallForces(rows.max(axis=1)[at], point[at], force[at])
 
 
 @dataclass
@@ -120,6 +139,8 @@ class _Scene:
     pairs: list[list[float]] = field(default_factory=list)
     images: list[list[float]] = field(default_factory=list)
     forces: list[list[float]] = field(default_factory=list)
+    points: list[list[float]] = field(default_factory=list)
+    """Where bodies touch, for those that are walls."""
     size: list[float] | None = None
     is_periodic: bool = False
     shapes: dict[str, str] = field(default_factory=dict)
@@ -216,6 +237,9 @@ class _Scene:
         shift = contact.find("cellDist")
         self.pairs.append([_number(contact, "id1"), _number(contact, "id2")])
         self.images.append([0.0] * 3 if shift is None else _vector(shift))
+        geometry = contact.find("geom")
+        points = [] if geometry is None else [*geometry.iter("contactPoint")]
+        self.points += [_vector(point) for point in points[:1]]
         physics = contact.find("phys")
         parts = (
             [] if physics is None else [*physics.iter("normalForce"), *physics.iter("shearForce")]

@@ -14,6 +14,7 @@ import subprocess
 import sys
 import threading
 from contextlib import suppress
+from importlib.util import find_spec
 from pathlib import Path
 from typing import IO, Any
 
@@ -25,7 +26,7 @@ from scanfab.base.errors import ReadError
 from scanfab.base.memory import free_memory
 from scanfab.io.files import check_memory
 
-__all__ = ["fenced"]
+__all__ = ["fenced", "needed"]
 
 # seconds for a file, and bytes that are read in one more; and for the process to start
 SECONDS, PER_SECOND = 8.0, 10e6
@@ -121,6 +122,15 @@ def _read(stream: IO[bytes], size: int) -> bytes:
 
 _lock = threading.Lock()
 _running: list[_Process] = []
+
+
+def needed(path: Path, module: str, extra: str) -> None:
+    """ReadError if the package is not installed that reads a file."""
+    if find_spec(module) is None:
+        raise ReadError(
+            f"{path}: is read by another package, {module}, which is not installed: "
+            f'pip install "scanfab[{extra}]"'
+        )
 
 
 def fenced(reader: str, file: Path, path: Path, **more: Any) -> tuple[Arrays, dict[str, Any]]:

@@ -39,8 +39,22 @@ def _surface(request: dict[str, Any]) -> Answer:
     return read_faces(request["path"], request["suffix"]), {}
 
 
+def _netcdf(request: dict[str, Any]) -> Answer:
+    from scanfab.io.parse.netcdf_files import read_netcdf
+
+    return read_netcdf(request["path"], request["most"], request["frame"])
+
+
+def _gsd(request: dict[str, Any]) -> Answer:
+    from scanfab.io.parse.gsd_files import read_gsd
+
+    return read_gsd(request["path"], request["most"], request["frame"])
+
+
 READERS: dict[str, Callable[[dict[str, Any]], Answer]] = {
+    "gsd": _gsd,
     "hdf": _hdf,
+    "netcdf": _netcdf,
     "xdmf": _xdmf,
     "surface": _surface,
 }

@@ -19,10 +19,12 @@ ROUNDED = 2.0**53
 
 
 def rows_of_numbers(
-    path: Path, data: bytes, begin: int = 0, end: int | None = None
+    path: Path, data: bytes, begin: int = 0, end: int | None = None, above: int = 0
 ) -> npt.NDArray[np.float64]:
     """
-    The numbers between two bytes of a file, shape (N, columns); lines may end in a comment.
+    The numbers between two bytes of a text, shape (N, columns); lines may end in a comment.
+
+    ``above`` lines of the file stand before the text.
 
     Raises
     ------
@@ -35,7 +37,7 @@ def rows_of_numbers(
         )
     except ValueError as error:
         reason, row = plain_reason(str(error))
-        raise ReadError(f"{path}{_line_of(data, begin, row)}: {reason}") from None
+        raise ReadError(f"{path}{_line_of(data, begin, row, above)}: {reason}") from None
     return values
 
 
@@ -75,10 +77,10 @@ def plain_reason(reason: str) -> tuple[str, int | None]:
     return reason.replace(" to float64", ""), row
 
 
-def _line_of(data: bytes, begin: int, row: int | None) -> str:
+def _line_of(data: bytes, begin: int, row: int | None, above: int) -> str:
     lines = data[begin:].split(b"\n")
     filled = [number for number, line in enumerate(lines) if line.partition(b"#")[0].strip()]
     if row is None or row >= len(filled):
         return ""
-    before = data.count(b"\n", 0, begin)
+    before = above + data.count(b"\n", 0, begin)
     return f", line {before + 1 + filled[row]}"

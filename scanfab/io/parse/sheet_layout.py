@@ -137,8 +137,9 @@ def layout_of(path: Path, data: bytes, skip: int) -> Layout:
     separator, has_commas = _separator([text for _, _, text in lines])
     rows = [fields_of(text, separator) for _, _, text in lines]
     names: tuple[str, ...] | None = None
-    is_header = any(word and not _is_value(word, has_commas) for word in rows[0])
-    if is_header:
+    # a name beside a number is no header: "P 0.3 1.2 4.1" is a row whose first column is a word
+    is_value = [_is_value(word, has_commas) for word in rows[0] if word]
+    if is_value and not any(is_value):
         words = fields_of(lines[0][2].strip(), separator)
         names = tuple(word.strip() for word in words)
         lines, rows = lines[1:], rows[1:]

@@ -42,5 +42,9 @@ def read_surface(path: Path) -> tuple[FloatArray, IntArray]:
 
 def _from_meshio(path: Path) -> tuple[FloatArray, list[IntArray]]:
     check_memory(path, 20.0 * path.stat().st_size)
-    found, _ = fenced("surface", path, path, suffix=path.suffix.lower()[1:])
+    try:
+        found, _ = fenced("surface", path, path, suffix=path.suffix.lower()[1:])
+    except ReadError as error:
+        reason = str(error).removeprefix(f"{path}: ")
+        raise ReadError(f"{path}: cannot be read as a surface: {reason}") from error
     return found.pop("points"), list(found.values())

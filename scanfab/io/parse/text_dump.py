@@ -127,7 +127,8 @@ def read_columns(
 
     Of a large snapshot only the columns are parsed for which ``room`` makes arrays, from the names
     of all and the number of rows: those to fill in by the dump's names, and what they are to be
-    called. The others wait until they are asked for.
+    called. The others wait until they are asked for. Columns of old files, which name none, are
+    called by their numbers from 1.
 
     Raises
     ------
@@ -136,6 +137,10 @@ def read_columns(
     """
     where, sections, body = _header(snapshot)
     count, cell = _count(where, sections), dump_cell(where, sections)
+    if not body.names:
+        values = _tolerant(snapshot, body, count)
+        own = {f"{place + 1}": column for place, column in enumerate(values.T)}
+        return LazyColumns(list(own), own, own.__getitem__), cell
     table, load = _long_table(snapshot, body, count), partial(_read_column, snapshot)
     if table is not None:
         filled, ready = room(body.names, count)

@@ -21,7 +21,7 @@ import numpy.typing as npt
 from scanfab.base.memory import free_memory
 from scanfab.base.threads import in_order
 
-__all__ = ["LARGE", "TextTable", "read_regular"]
+__all__ = ["LARGE", "TextTable", "parse_regular", "read_regular"]
 
 # bytes; a smaller table is parsed before polars is loaded
 LARGE = 8 << 20
@@ -80,6 +80,27 @@ def read_regular(table: TextTable, columns: Mapping[int, npt.NDArray[Any]]) -> b
             _put(frame[f"{place}"].get_chunks(), column[rows : rows + frame.height])
         rows += frame.height
     return rows == table.count
+
+
+def parse_regular(text: bytes, width: int) -> npt.NDArray[np.float64] | None:
+    """All numbers of a long text, shape (N, width), if it is regular; else None."""
+    if free_memory() < ROOM + 2 * len(text):
+        return None
+    behind = text[: text.find(b"\n") + 1].endswith(b" \n")
+    kinds = dict.fromkeys(range(width), np.dtype(np.float64))
+    frames, start = [], 0
+    while start < len(text):
+        stop = text.find(b"\n", min(start + PIECE, len(text) - 1)) + 1 or len(text)
+        frame = _parse_piece(text[start:stop], width, kinds, behind)
+        if frame is None:
+            return None
+        frames.append(frame)
+        start = stop
+    # by columns, as they are used
+    values = np.empty((width, sum(frame.height for frame in frames)))
+    for place, column in enumerate(values):
+        _put([part for frame in frames for part in frame[f"{place}"].get_chunks()], column)
+    return values.T
 
 
 def _put(parts: list[Any], column: npt.NDArray[Any]) -> None:

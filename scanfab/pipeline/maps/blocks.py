@@ -112,8 +112,8 @@ def map_blocks(settings: MapSettings, sample: Sample) -> MapBlocks:
     packing, cell = sample.packing, sample.packing.cell
     if packing.space.is_plane:
         raise SettingsError(
-            f"dim: maps are of spheres, but all grains are taken for discs in the plane "
-            f"{packing.space.name}: `dim=3` takes them for spheres"
+            f"a map is of spheres in space, but all grains are discs in the plane "
+            f"{packing.space.name}: `compute` has the fabric of RVs, wherever `rv_center` is"
         )
     position, radius = packing.position[sample.gathered], packing.radius[sample.gathered]
     open_axes = _open_axes(settings)

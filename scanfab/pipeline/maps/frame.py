@@ -12,7 +12,7 @@ import numpy as np
 
 from scanfab.base.note import Note, joined
 from scanfab.base.spelling import counted
-from scanfab.base.typing import FloatArray, IntArray
+from scanfab.base.typing import FloatArray
 from scanfab.fabric.blocks import jackknife_errors, ratio_jackknife
 from scanfab.fabric.contact import axial_error, contact_fabric
 from scanfab.fabric.homogeneity import homogeneity_of
@@ -22,11 +22,10 @@ from scanfab.packing.sample import VARIANTS, Sample, Variant
 from scanfab.pipeline.frame import FrameResult, as_sample, frame_values
 from scanfab.pipeline.frames import Readable
 from scanfab.pipeline.maps.measurement import MapMeasurement, measure_map
-from scanfab.pipeline.maps.surface import cut_by_hull, cut_by_window, volumes_inside
+from scanfab.pipeline.maps.region import Region
 from scanfab.pipeline.plan import Plan
-from scanfab.pipeline.variant_columns import channels_text, edge_of, left_out_text
+from scanfab.pipeline.variant_columns import doubts_of_lines, edge_of, left_out_of
 from scanfab.scan.blocks import Blocks
-from scanfab.scan.edges import ENDS, START
 from scanfab.table.map_columns import map_row
 
 __all__ = ["HOMOGENEITY", "MapResult", "map_frame"]
@@ -81,7 +80,11 @@ def map_frame(
         ]
         return MapResult(source, number, sample, (), rows)
     measurement = measure_map(sample, plan.in_frame(sample), f"frame {number}")
-    variants = [BlocksOfVariant(measurement, VARIANTS[name]) for name in plan.variants]
+    regions = [Region(measurement, in_window=in_window) for in_window in (False, True)]
+    variants = [
+        BlocksOfVariant(measurement, one, regions[one.in_window])
+        for one in (VARIANTS[name] for name in plan.variants)
+    ]
     rows = [
         map_row(columns, {**known, "variant": one.variant.name, **values})
         for one in variants
@@ -98,15 +101,16 @@ def map_frame(
 class BlocksOfVariant:
     """All blocks of one variant."""
 
-    def __init__(self, measurement: MapMeasurement, variant: Variant) -> None:
+    def __init__(self, measurement: MapMeasurement, variant: Variant, region: Region) -> None:
         self.measurement = measurement
         self.variant = variant
+        self.region = region
         self.sample, self.plan = measurement.sample, measurement.plan
-        self.blocks = measurement.blocks[variant.in_window]
-        self.splits = measurement.splits[variant.in_window]
+        self.blocks = region.blocks
         self.fabrics = measurement.sums.fabrics[variant.name]
         self.parts = measurement.parts[variant.name]
         self.axis = np.asarray(self.plan.axis)
+        self.edge = edge_of(variant, self.plan, measurement.solids)
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """The values of each block by their columns."""
@@ -116,10 +120,10 @@ class BlocksOfVariant:
             "block": np.arange(count),
             **dict(zip("xyz", middles.T, strict=True)),
             **self._grains,
-            **self._void(),
+            **self._void,
             **self._solid_fraction(),
             "segments": self.fabrics.segments.sum(axis=0).astype(np.int64),
-            "at_surface": self.at_surface.astype(np.int64),
+            "at_surface": self.region.at_surface.astype(np.int64),
         }
         if self.blocks.edges is not None:
             arrays |= dict(zip(("r_inner", "r_outer"), self.blocks.radii.T, strict=True))
@@ -129,7 +133,7 @@ class BlocksOfVariant:
             "replicates": scan.replicates,
             "spacing": self.plan.spacing / math.sqrt(scan.replicates),
             "cutoff": self.plan.cutoff,
-            "edge": edge_of(self.variant, self.plan, self.measurement.solids),
+            "edge": self.edge,
         }
         tensors, contacts = self.fabrics.tensors, self._contacts_by_block()
         for block in range(count):
@@ -139,6 +143,7 @@ class BlocksOfVariant:
             values["alpha_vs"] = tensor.alpha if tensor else None
             yield {**same, **values, **contacts[block]}
 
+    @cached_property
     def _void(self) -> dict[str, FloatArray]:
         """Columns of the void fabric and its errors; NaN where there is none."""
         fabrics, without = self.fabrics, self.parts.without
@@ -152,32 +157,13 @@ class BlocksOfVariant:
         }
         return {name: np.where(exists, values, np.nan) for name, values in found.items()}
 
-    @cached_property
-    def at_surface(self) -> Any:
-        """Which blocks lose segments, shape (B,)."""
-        plan, inner = self.plan, self.measurement.solids.inner
-        mean = float(self.sample.packing.radius[self.sample.gathered].mean())
-        if self.variant.in_window:
-            window = plan.window
-            assert window is not None
-            if plan.edge == START:
-                # it follows segments beyond the RV, and gives each end to the block it is in
-                return np.zeros(len(self.blocks), bool)
-            return cut_by_window(self.blocks, window.shape, window.center, mean)
-        if plan.edge == ENDS and inner is not None:
-            center = inner.center + self.measurement.solids.origin
-            return cut_by_window(self.blocks, inner.shape, center, mean)
-        return cut_by_hull(self.blocks, self.sample)
-
     def _solid_fraction(self) -> dict[str, FloatArray]:
         """1 - void with its middle in the block / volume of the block in the window."""
-        window = self.plan.window if self.variant.in_window else None
-        shape, center = (None, np.zeros(3)) if window is None else (window.shape, window.center)
-        volumes = volumes_inside(self.blocks, self.splits, shape, center)
+        volumes = self.region.volumes
         void, every = self.parts.void, volumes.sum(axis=1)
         known = every > 0
         # beyond an open sample nobody knows what is void
-        known &= True if self.variant.in_window else ~self.at_surface
+        known &= True if self.variant.in_window else ~self.region.at_surface
         share = void.sum(axis=2).mean(axis=0) / np.where(known, every, 1.0)
         parts = volumes > 0
         rest = np.where(parts, every[:, None] - volumes, 1.0)
@@ -193,22 +179,18 @@ class BlocksOfVariant:
         """Columns of grains; coordination is NaN without any."""
         counted = self.sample.counted(self.variant, self.plan.window)
         removed = self.sample.removed(self.variant)
-        numbers = (
-            self.sample.contact_numbers_without_rattlers
-            if self.variant.without_rattlers
-            else self.sample.contact_numbers
-        )
+        numbers = self.sample.numbers_of(self.variant)
         bodies = self.sample.packing.bodies
         places = self.sample.packing.position if bodies is None else bodies.place
         # a clump is one grain, where its middle is
         rows = np.flatnonzero(self.sample.once(counted))
-        block, part = self._places(places[rows])
+        block, part = self.region.parts_of(places[rows])
         solid = ~removed[rows]
-        grains = self._sum(block, part, solid)
-        contacts = self._sum(block, part, solid * numbers[rows])
+        grains = self.region.sums(block, part, solid)
+        contacts = self.region.sums(block, part, solid * numbers[rows])
         total = grains.sum(axis=1)
         mean = contacts.sum(axis=1) / np.where(total > 0, total, 1.0)
-        rattlers = self._sum(block, part, self.sample.rattlers[rows]).sum(axis=1)
+        rattlers = self.region.sums(block, part, self.sample.rattlers[rows]).sum(axis=1)
         return {
             "grains": total.astype(np.int64),
             "rattlers": rattlers.astype(np.int64),
@@ -221,10 +203,10 @@ class BlocksOfVariant:
         chosen = self.sample.fabric_contacts(self.variant, self.plan.window)
         contacts = self.sample.contacts
         normals = np.compress(chosen, contacts.normal, axis=0)
-        block, part = self._places(np.compress(chosen, contacts.point, axis=0))
+        block, part = self.region.parts_of(np.compress(chosen, contacts.point, axis=0))
         along = 1.5 * (normals @ self.axis) ** 2 - 0.5
         errors = ratio_jackknife(
-            self._sum(block, part, along), self._sum(block, part, np.ones(len(along)))
+            self.region.sums(block, part, along), self.region.sums(block, part, np.ones(len(along)))
         )
         order = np.argsort(block, kind="stable")
         ends = np.searchsorted(block[order], np.arange(len(self.blocks) + 1))
@@ -244,48 +226,13 @@ class BlocksOfVariant:
             )
         return found
 
-    def _places(self, points: FloatArray) -> tuple[IntArray, IntArray]:
-        """The block of each place, -1 for none, and which part of it."""
-        if self.variant.in_window:
-            window = self.plan.window
-            assert window is not None
-            points = window.center + window.branches(points, self.sample.packing)
-        finer = self.blocks.finer(self.splits).of(points)
-        block, part = self.blocks.of_finer(self.splits)
-        return np.where(finer < 0, -1, block[finer]), part[finer]
-
-    def _sum(self, block: IntArray, part: IntArray, values: Any) -> FloatArray:
-        """By block and part, shape (B, P)."""
-        shape = len(self.blocks), math.prod(self.splits)
-        inside = block >= 0
-        where = block[inside] * shape[1] + part[inside]
-        weights = np.asarray(values, np.float64)[inside]
-        sums = np.bincount(where, weights, minlength=math.prod(shape))
-        return np.asarray(sums.reshape(shape), np.float64)
-
     def notes(self) -> Iterator[Note]:
         """Lines and blocks that are doubtful, and whether the sample is homogeneous."""
-        edge = edge_of(self.variant, self.plan, self.measurement.solids)
-        texts = {
-            "channels": self._channels(),
-            "left_out": left_out_text(self._left_out(edge)),
-            "few_segments": self._too_few(),
-            HOMOGENEITY: self._homogeneity(),
-        }
+        scan, kept = self.measurement.sums.scan, float(self.fabrics.segments.sum())
+        left_out = left_out_of(scan, self.variant, self.edge, kept)
+        texts = doubts_of_lines(scan, self.variant, left_out)
+        texts |= {"few_segments": self._too_few(), HOMOGENEITY: self._homogeneity()}
         return (Note(code, text, (self.variant.name,)) for code, text in texts.items() if text)
-
-    def _left_out(self, edge: str | None) -> float | None:
-        """Share of the segments that leave the sample, and so are not counted."""
-        if edge != START:
-            return None
-        scan, which = self.measurement.sums.scan, "abcd".index(self.variant.name)
-        left = float(scan.left_out[:, which].sum())
-        every = left + float(self.fabrics.segments.sum())
-        return left / every if every else None
-
-    def _channels(self) -> str:
-        scan, which = self.measurement.sums.scan, "abcd".index(self.variant.name)
-        return channels_text(int(scan.channels[:, which].sum()), int(scan.lines[:, which].sum()))
 
     def _too_few(self) -> str:
         fabrics = self.fabrics
@@ -296,30 +243,30 @@ class BlocksOfVariant:
         found = f"{lacking} of {counted(len(self.blocks), 'block')} have no void fabric"
         if empty == lacking:
             return f"{found}: no void segment has its middle there"
+        those = f"{empty} hold no void segment at all, the others" if empty else "they hold"
         return (
-            f"{found}: {empty} hold no void segment at all, the others none in more than 5 % of "
-            f"the directions: choose fewer blocks, closer lines (`spacing`, `tolerance`) or a "
-            f"shorter `cutoff`"
+            f"{found}: {those} none in more than 5 % of the directions: choose fewer blocks, "
+            f"closer lines (`spacing`, `tolerance`) or a shorter `cutoff`"
         )
 
     def _homogeneity(self) -> str:
         """What the test says, in words."""
-        found = self._void()
-        inner = self.fabrics.exists & ~self.at_surface
+        found = self._void
+        inner = self.fabrics.exists & ~self.region.at_surface
         values = np.where(inner, found["alpha_vs_axial"], np.nan)
         variances = found["alpha_vs_axial_sample_se"] ** 2
         variances = variances + np.nan_to_num(found["alpha_vs_axial_se"]) ** 2
         weights = self.fabrics.segments.sum(axis=0)
         test = homogeneity_of(values, variances, weights, FREEDOM)
         if test is None:
-            if not self.at_surface.any():
+            if not self.region.at_surface.any():
                 return "too few blocks to tell whether the sample is homogeneous"
-            better = "" if self.plan.edge == START else ", or of the RV by `edge=start`"
+            better = "" if self.variant.in_window else "those of the RV by `variants=c` and "
             few = int(inner.sum())
             return (
                 f"whether the sample is homogeneous cannot be told: all blocks"
-                f"{f' but {few}' * bool(few)} are at a surface or empty: choose blocks that are "
-                f"smaller{better}"
+                f"{f' but {few}' * bool(few)} are at a surface or empty: choose smaller blocks, "
+                f"or {better}`edge=start`"
             )
         chance = "p < 0.0001" if test.chance < 1e-4 else f"p = {test.chance:.2g}"
         scatter = (

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from scanfab.base.arrays import concatenated
 from scanfab.base.note import Note
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.blocks import BlockFabrics, WithoutParts
@@ -19,7 +20,7 @@ from scanfab.pipeline.tolerance import Errors, scan_to_tolerance
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.directions import DirectionRule, design_of
 from scanfab.scan.edges import CLIP, START
-from scanfab.scan.gaps import BlockSums, scan_blocks
+from scanfab.scan.gaps import GapSums, scan_gaps
 from scanfab.scan.scan import ScanSums
 from scanfab.scan.solids import Solids, most_lines
 
@@ -87,8 +88,7 @@ class MedianBlock:
     def concatenate(self, parts: Sequence[MapSums]) -> MapSums:
         """All replicates."""
         fabrics = {
-            name: BlockFabrics.concatenate([one.fabrics[name] for one in parts])
-            for name in parts[0].fabrics
+            name: concatenated([one.fabrics[name] for one in parts]) for name in parts[0].fabrics
         }
         return MapSums(fabrics, ScanSums.concatenate([one.scan for one in parts]))
 
@@ -171,16 +171,16 @@ def _part_sums(
             order = _order(blocks[kind], splits[kind])
             over, under = (
                 one[:, :, order].reshape(*one.shape[:2], number, -1)
-                for one in sums.kept(name, 1, plan.moment)
+                for one in sums.in_blocks(name, 1, plan.moment)
             )
-            void = voids.kept(name)[0][:, :, order].reshape(*over.shape)
+            void = voids.in_blocks(name)[0][:, :, order].reshape(*over.shape)
             void = spacing**2 * np.einsum("d,rdbp->rbp", rule.weights, void)
             axis = np.asarray(plan.axis)
             without = WithoutParts.of(sums.axes, rule.weights, over, under, axis)
             found[name].append(PartSums(without, void / rule.weights.sum()))
     return {
         name: PartSums(
-            WithoutParts.concatenate([one.without for one in parts]),
+            concatenated([one.without for one in parts]),
             np.concatenate([one.void for one in parts]),
         )
         for name, parts in found.items()
@@ -225,8 +225,8 @@ def _scan(
     cutoffs: tuple[float, ...],
     blocks: tuple[Blocks, Blocks],
     most_steps: float = math.inf,
-) -> BlockSums:
-    return scan_blocks(
+) -> GapSums:
+    return scan_gaps(
         solids,
         rule,
         spacing=spacing,
@@ -240,10 +240,10 @@ def _scan(
     )
 
 
-def _reduced(sums: BlockSums, plan: Plan) -> MapSums:
+def _reduced(sums: GapSums, plan: Plan) -> MapSums:
     """What is kept of each replicate: of many, the sums of all axes and blocks are too many."""
     fabrics = {
-        name: BlockFabrics.of(sums.axes, plan.rule.weights, *sums.kept(name, 0, plan.moment))
+        name: BlockFabrics.of(sums.axes, plan.rule.weights, *sums.in_blocks(name, 0, plan.moment))
         for name in plan.variants
     }
     return MapSums(fabrics, sums.scan)

@@ -41,6 +41,8 @@ __all__ = ["PAPER_SLOPE", "Correlation", "Fit", "fits_of"]
 
 # as the 2017 paper prints them, of spheres and of discs
 PAPER_SLOPE, PAPER_SLOPE_2D = 0.096, 0.231
+# heights in inches: a legend without curves, and the two lines of each curve
+LEGEND, ENTRY = 1.0, 0.32
 
 
 @dataclass(frozen=True)
@@ -110,8 +112,10 @@ class Correlation(Figure):
 
     @property
     def size(self) -> tuple[float, float]:
-        """A panel for each group, its legend beside it."""
-        return WIDTH, 2.6 + ROW * (len(self.groups) - 1)
+        """A panel for each group, its legend beside it, which may be the higher one."""
+        curves = max(len(group.drawn) for group in self.groups)
+        higher = max(LEGEND + ENTRY * curves - 2.6, 0.0)
+        return WIDTH, 2.6 + ROW * (len(self.groups) - 1) + higher * len(self.groups)
 
     @property
     def caption(self) -> str:

@@ -48,6 +48,8 @@ class CutoffCurve:
     total: FloatArray
     """Its standard error, of scan and sample together; NaN where either is not known."""
     chosen: float
+    predicted: FloatArray
+    """alpha_vs_axial as the contacts predict it; NaN where they do not."""
 
 
 class Cutoffs(FrameFigure):
@@ -115,6 +117,9 @@ def draw_curves(axes: Axes, curves: Sequence[CutoffCurve]) -> None:
             elinewidth=0.9,
             **look,
         )
+        axes.plot(curve.cutoff, 1e3 * curve.predicted, color=look["color"], lw=1.2, ls="-.")
+    if any(np.isfinite(curve.predicted).any() for curve in curves):
+        axes.plot([], [], color="0.3", lw=1.2, ls="-.", label="predicted from near contacts")
     axes.axvline(curves[-1].chosen, color="k", lw=0.9, ls=":", label="cut-off of the table")
     axes.axhline(0, color="0.6", lw=0.6, zorder=0)
     axes.set(xlabel=r"cut-off / $r_{min}$", ylabel=VOID_UNIT + VOID_AXIAL)
@@ -137,10 +142,10 @@ def _curve_of(frame: ScannedFrame) -> CutoffCurve:
     smallest, chosen = frame.smallest, frame.measurement.plan.cutoff
     lengths = {*(cutoff * smallest for cutoff in CUTOFFS), chosen}
     measured = frame.measurement.at_cutoffs(lengths)
-    rows = [
-        VariantColumns(measured, VARIANTS[frame.variant], place).columns()
-        for place in range(len(lengths))
+    each = [
+        VariantColumns(measured, VARIANTS[frame.variant], place) for place in range(len(lengths))
     ]
+    rows = [one.columns() for one in each]
 
     def column(values: Sequence[float | None]) -> FloatArray:
         return np.array([np.nan if one is None else one for one in values], np.float64)
@@ -152,4 +157,5 @@ def _curve_of(frame: ScannedFrame) -> CutoffCurve:
         error=column([number_of(row, "alpha_vs_axial_se") for row in rows]),
         total=column([total_error(row, "alpha_vs_axial") for row in rows]),
         chosen=chosen / smallest,
+        predicted=column([one.predicted_alpha for one in each]),
     )

@@ -16,8 +16,8 @@ __all__ = ["Drawn", "Group", "group_of", "grouped", "groups_of"]
 
 Look = dict[str, Any]
 
-# of curves that are told apart by their sources
-SOURCE_LOOKS: tuple[Look, ...] = tuple(
+# of curves that are told apart by their sources, or by the sizes of their RVs
+MANY_LOOKS: tuple[Look, ...] = tuple(
     {"color": COLOURS[colour], "marker": marker, "ls": line}
     for colour, marker, line in zip(
         ("blue", "vermilion", "green", "purple", "orange", "sky", "black"),
@@ -25,6 +25,11 @@ SOURCE_LOOKS: tuple[Look, ...] = tuple(
         ("-", "--", "-.", ":", "-", "--", "-."),
         strict=True,
     )
+)
+# of as many more, likewise but open
+MANY_LOOKS += tuple(
+    {**look, "ls": line, "mfc": "white", "ms": 5.5}
+    for look, line in zip(MANY_LOOKS, ("--", "-.", ":", "-", "--", "-.", ":"), strict=True)
 )
 OTHER: Look = {"color": "0.3", "marker": "v", "ls": "-"}
 MEANINGS = {"a": "whole", "b": "whole, rattlers void", "c": "RV", "d": "RV, rattlers void"}
@@ -111,7 +116,7 @@ def _by_variant(
     def look(curve: Curve) -> tuple[Look, str]:
         name = _spelt(curve.variant) if spelt else f"variant {curve.variant}"
         if several:
-            return SOURCE_LOOKS[variants.index(curve.variant) % len(SOURCE_LOOKS)], name
+            return MANY_LOOKS[variants.index(curve.variant) % len(MANY_LOOKS)], name
         return LOOKS.get(curve.variant, OTHER), name
 
     return look
@@ -119,8 +124,8 @@ def _by_variant(
 
 def _by_source(sources: Sequence[str], before: str = "") -> Callable[[Curve], tuple[Look, str]]:
     def look(curve: Curve) -> tuple[Look, str]:
-        place = sources.index(curve.source) % len(SOURCE_LOOKS)
-        return SOURCE_LOOKS[place], f"{before}{plain(curve.source)}"
+        place = sources.index(curve.source) % len(MANY_LOOKS)
+        return MANY_LOOKS[place], f"{before}{plain(curve.source)}"
 
     return look
 

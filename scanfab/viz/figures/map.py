@@ -99,11 +99,12 @@ class Map(Figure):
 
     @cached_property
     def frames(self) -> list[list[Any]]:
-        """The rows of the first and of the last frame; of one, if there is but one."""
+        """The rows of the first and of the last frame with a value; of one, if there is but one."""
         found: dict[Any, list[Any]] = {}
         for row in self.rows:
             found.setdefault((row.get("source"), row.get("frame")), []).append(row)
-        every = list(found.values())
+        drawn = [one.column for one in self.quantities]
+        every = [rows for rows in found.values() if any(_any(rows, name) for name in drawn)]
         return every if len(every) == 1 else [every[0], every[-1]]
 
     @cached_property
@@ -181,11 +182,15 @@ class Map(Figure):
     def _limits(self, one: Quantity) -> tuple[str, float, float]:
         """Colours, and the values at their ends."""
         values = one.scale * _numbers(self.frames[-1], one.column)
-        known = values[np.isfinite(values)]
+        # in another frame there are some
+        known = values[np.isfinite(values)] if np.isfinite(values).any() else np.zeros(1)
         if one.signed:
             largest = float(np.abs(known).max()) or 1.0
             return "RdBu_r", -largest, largest
-        return "viridis", float(known.min()), float(known.max())
+        low, high = float(known.min()), float(known.max())
+        # of one value alone each plane would make a scale of its own
+        wider = 0.0 if high > low else 0.05 * abs(low) or 1.0
+        return "viridis", low - wider, high + wider
 
     def _planes(self, part: Page | SubFigure) -> list[Axes]:
         panels = part.subplots(len(self.quantities), 3, squeeze=False)

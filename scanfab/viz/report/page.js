@@ -26,6 +26,12 @@
     return disk;
   }
 
+  // of "#rrggbb", as much darker as a shade says: it tells clumps that touch one another apart
+  function tinted(colour, shade) {
+    const parts = [1, 3, 5].map((at) => Math.round(shade * parseInt(colour.slice(at, at + 2), 16)));
+    return "#" + parts.map((part) => part.toString(16).padStart(2, "0")).join("");
+  }
+
   // 1, 2 or 5 times a power of ten, not above the value
   function rounded(value) {
     const power = Math.pow(10, Math.floor(Math.log10(value)));
@@ -90,7 +96,9 @@
 
   function start(canvas, data, key) {
     const pen = canvas.getContext("2d");
-    const looks = data.kinds.map((kind) => shaded(kind.colour));
+    const ofKinds = (make) => data.kinds.map((kind) => data.shades.map((shade) => make(kind, shade)));
+    const looks = ofKinds((kind, shade) => shaded(tinted(kind.colour, shade)));
+    const pales = ofKinds((kind, shade) => tinted(kind.pale, shade));
     const shown = data.kinds.map(() => true);
     const start = { ...START, ...data.start };
     const state = { ...start, cut: true };
@@ -115,25 +123,25 @@
       waiting = false;
       look();
       const balls = [], disks = [], solid = [];
-      for (const [x, y, z, r, kind] of data.spheres) {
+      for (const [x, y, z, r, kind, shade = 0] of data.spheres) {
         const [u, v, depth] = place(x, y, z);
         const met = Math.abs(depth) < r ? Math.sqrt(r * r - depth * depth) : 0;
         if (met > 0) solid.push([u, v, met]);
         if (!shown[kind]) continue;
-        if (!state.cut || depth < 0) balls.push([u, v, r, kind, depth]);
-        if (met > 0) disks.push([u, v, met, kind]);
+        if (!state.cut || depth < 0) balls.push([u, v, r, looks[kind][shade], depth]);
+        if (met > 0) disks.push([u, v, met, pales[kind][shade]]);
       }
       balls.sort((one, other) => one[4] - other[4]);
       pen.setTransform(1, 0, 0, 1, 0, 0);
       pen.fillStyle = "#ffffff";
       pen.fillRect(0, 0, canvas.width, canvas.height);
       pen.setTransform(scale, 0, 0, -scale, canvas.width / 2, canvas.height / 2);
-      for (const [u, v, r, kind] of balls) {
+      for (const [u, v, r, ball] of balls) {
         // upright, as the light comes from above
         pen.save();
         pen.translate(u, v);
         pen.scale(1, -1);
-        pen.drawImage(looks[kind], -r, -r, 2 * r, 2 * r);
+        pen.drawImage(ball, -r, -r, 2 * r, 2 * r);
         pen.restore();
       }
       if (state.cut) {
@@ -146,10 +154,10 @@
       drawScale();
     }
 
-    function drawDisk([u, v, radius, kind]) {
+    function drawDisk([u, v, radius, colour]) {
       pen.beginPath();
       pen.arc(u, v, radius, 0, 2 * Math.PI);
-      pen.fillStyle = data.kinds[kind].pale;
+      pen.fillStyle = colour;
       pen.fill();
       pen.strokeStyle = "rgba(0,0,0,0.35)";
       pen.lineWidth = dense / scale;

@@ -17,7 +17,7 @@ from scanfab.base.files import check_folder, whole_file
 from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray
 from scanfab.viz.figures.style import COLOURS
-from scanfab.viz.scene import Scene, towards_viewer
+from scanfab.viz.scene import SHADES, Scene, towards_viewer
 
 __all__ = [
     "Content",
@@ -162,7 +162,8 @@ def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
     shown = ~grains.boundary
     position = grains.position[shown] - scene.center
     radius = grains.radius[shown]
-    nearest = np.argsort(np.linalg.norm(position, axis=1), kind="stable")[:MOST_GRAINS]
+    away = np.linalg.norm(grains.places[shown] - scene.center, axis=1)
+    nearest = np.argsort(away, kind="stable")[:MOST_GRAINS]
     reach = np.linalg.norm(position[nearest], axis=1) + radius[nearest]
     size = float(reach.max(initial=0.0)) or (scene.window.reach if scene.window else 1.0)
     scale = 1000.0 / size
@@ -174,17 +175,19 @@ def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
     if scene.window is None:
         names[1] = "grains"
     numbers = np.column_stack([position @ turn.T, radius])[nearest] * scale
+    looks = np.column_stack([kinds] if grains.body is None else [kinds, grains.shade[shown]])
     return {
         "kinds": [
             {"name": name, "colour": colour, "pale": pale}
             for name, (colour, pale) in zip(names, KIND_COLOURS, strict=True)
         ],
         "spheres": [
-            [*values, kind]
-            for values, kind in zip(
-                np.rint(numbers).astype(int).tolist(), kinds[nearest].tolist(), strict=True
+            [*values, *look]
+            for values, look in zip(
+                np.rint(numbers).astype(int).tolist(), looks[nearest].tolist(), strict=True
             )
         ],
+        "shades": [1.0] if grains.body is None else SHADES,
         "axes": _axes(up, turn),
         "rv": None if scene.window is None else round(scene.window.reach * scale),
         "window": None if scene.window is None else _window_data(scene.window, turn, scale),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gzip
+
 import numpy as np
 import pytest
 
@@ -49,6 +51,52 @@ def test_a_heap_of_yade_stands_still():
     density = total[:, 2] / (4 / 3 * np.pi * packing.radius**3 * 9.81)
     nearest = np.where(density < 2000, 1500.0, 2600.0)
     np.testing.assert_allclose(density, nearest, rtol=1e-10)
+
+
+def test_walls_of_yade_press_as_it_lists():
+    packing = scanfab.read(YADE / "formats.xml.bz2")
+    truth = csv_rows(YADE / "truth_walls.csv")
+    walls = packing.wall_forces
+    found = np.column_stack([packing.id[walls.row], walls.force])
+    listed = np.column_stack([truth["sphere"], *(truth[f"f{axis}"] for axis in "xyz")])
+    np.testing.assert_allclose(found[np.lexsort(found.T)], listed[np.lexsort(listed.T)], rtol=1e-9)
+    away = np.linalg.norm(walls.point - packing.position[walls.row], axis=1)
+    np.testing.assert_allclose(away, packing.radius[walls.row], rtol=0.02)
+
+
+@pytest.mark.parametrize("keywords", [None, "pos id force delta contactPoint"])
+def test_walls_of_liggghts_carry_what_other_grains_do_not(keywords):
+    """With them the forces on grains at walls are those that LIGGGHTS dumps, too."""
+    files = [BOX / f"{name}_120000.txt.gz" for name in ("dump", "contacts", "walls")]
+    packing = scanfab.read_series(files, contact_columns=keywords)[0].read()
+    walls = packing.wall_forces
+    assert len(walls.row) == packing.wall_contacts.sum() > 300
+    total = on_each_grain(packing)
+    np.add.at(total, walls.row, walls.force)
+    dumped = np.column_stack([packing.columns[f"f{axis}"] for axis in "xyz"])
+    off = np.abs(total - dumped).max(axis=1)[packing.wall_contacts > 0]
+    size = np.linalg.norm(walls.force, axis=1)
+    assert np.median(off) < 0.01 * np.median(size)
+    assert np.quantile(off, 0.95) < 0.1 * np.median(size)
+    away = np.linalg.norm(walls.point - packing.position[walls.row], axis=1)
+    np.testing.assert_allclose(away, packing.radius[walls.row], rtol=0.1)
+
+
+@pytest.mark.filterwarnings("ignore:.*lists contacts with walls only")
+def test_of_walls_whose_columns_are_not_proved_the_force_is_not_known(tmp_path):
+    """Without the contact point in front of the centre, or with a force that pulls."""
+    text = gzip.decompress((BOX / "walls_120000.txt.gz").read_bytes()).decode()
+    head, rows = text.split("c_wcon[13] \n")
+    values = np.loadtxt(rows.splitlines())
+    changed = {"pulls": values * ([1] * 9 + [-1] * 3 + [1]), "short": values[:, :9]}
+    for name, table in changed.items():
+        names_of = " ".join(f"c_w[{k}]" for k in range(1, table.shape[1] + 1))
+        lines = "\n".join(" ".join(f"{x:.9g}" for x in row) for row in table)
+        first = head[: head.index("ITEM: ENTRIES")]
+        walls = write(tmp_path / f"{name}.txt", f"{first}ITEM: ENTRIES {names_of}\n{lines}\n")
+        packing = scanfab.read(BOX / "dump_120000.txt.gz", contacts=walls)
+        assert packing.wall_forces is None
+        assert packing.wall_contacts.sum() == len(values)
 
 
 @pytest.mark.parametrize(

@@ -283,7 +283,6 @@ def test_a_data_file_with_three_vectors(tmp_path):
     ("old", "new", "message"),
     [
         ("Atoms # sphere", "Atoms # full", "expected 'Atoms # sphere'.*found 'Atoms # full'"),
-        ("Atoms # sphere", "Atoms", "found 'Atoms' without a style"),
         ("Atoms # sphere", "Masses", "expected a section Atoms, found none"),
         ("3 atoms\n", "4 atoms\n", "counts 4 atoms, found 3"),
         ("3 atoms\n", "999999999999 atoms\n", "counts 999999999999 atoms, found 3"),

@@ -136,9 +136,8 @@ def test_a_column_of_words_is_no_obstacle(tmp_path):
     np.testing.assert_array_equal(packing.position[:, 0], [0.1, 0.2])
 
 
-@pytest.mark.parametrize("names", ["", "id type"])
-def test_a_dump_without_coordinates_is_refused(tmp_path, names):
-    path = write(tmp_path / "d", dump_text([(1, 2)], names))
+def test_a_dump_without_coordinates_is_refused(tmp_path):
+    path = write(tmp_path / "d", dump_text([(1, 2)], "id type"))
     with pytest.raises(ReadError, match="no coordinates"):
         scanfab.read(path)
 
@@ -400,10 +399,14 @@ def test_walls_and_boxes_are_neither_grains_nor_contacts(name):
         scanfab.read(FLOOR / name)
 
 
-@pytest.mark.parametrize("name", ["mesh_30000.stl", "binary_30000.bin"])
-def test_files_of_other_programs_are_not_known(name):
+def test_a_mesh_is_not_known():
     with pytest.raises(UnknownFormatError, match="no reader knows the format"):
-        scanfab.read(FLOOR / name)
+        scanfab.read(FLOOR / "mesh_30000.stl")
+
+
+def test_a_binary_dump_asks_for_the_names_of_its_columns():
+    with pytest.raises(ReadError, match="does not name its 6 columns: name them"):
+        scanfab.read(FLOOR / "binary_30000.bin")
 
 
 def test_contacts_alone_are_no_grains():
@@ -455,3 +458,36 @@ def test_the_pieces_of_a_vtm_file_are_read_by_themselves():
 def test_a_contact_across_a_face_without_a_cell_asks_for_it():
     with pytest.raises(scanfab.PackingError, match="name its cell \\(`cell` and `periodic`\\)"):
         scanfab.read(FLOOR / "grains_30000.vtk", contacts=FLOOR / VTK_CONTACTS[0])
+
+
+def test_columns_of_any_compute_are_named(tmp_path):
+    grains = write(tmp_path / "dump.0", dump_text())
+    # a number, both ids apart, the force on the first grain; no periodic flag
+    rows = [(0.5, first, 7, second, -1.5, 0, 2) for first, second in PAIRS]
+    pairs = write(tmp_path / "pairs.0", local_text(rows))
+    named = "id1=c_con[2],id2=c_con[4],fx=c_con[5],fy=c_con[6],fz=c_con[7]"
+    packing = scanfab.read(grains, contacts=pairs, contact_columns=named)
+    assert packing.contacts.pairs.tolist() == [[0, 1], [1, 2]]
+    np.testing.assert_array_equal(packing.contacts.force, [[1.5, 0, -2]] * 2)
+    with pytest.raises(ReadError, match=r"there is no column 'c_con\[9\]'"):
+        scanfab.read(grains, contacts=pairs, contact_columns="id1=c_con[2],id2=c_con[9]")
+
+
+def test_pairs_apart_are_left_out_of_named_columns(tmp_path):
+    rows = [*ROWS[:2], (3, 2, 0.61, 0.5, 0.5, 0.1)]
+    grains = write(tmp_path / "dump.0", dump_text(rows))
+    pairs = write(tmp_path / "pairs.0", local_text([(*pair, 0.0) for pair in PAIRS]))
+    named = "id1=c_con[1],id2=c_con[2]"
+    packing = scanfab.read(grains, contacts=pairs, contact_columns=named)
+    assert packing.contacts.pairs.tolist() == [[0, 1]]
+
+
+@pytest.mark.filterwarnings("ignore:.*lists contacts with walls only")
+def test_walls_are_known_whatever_the_columns_of_pairs_are_called():
+    for named in ("pos id force", "id1=c_a[1],id2=c_a[2]"):
+        packing = scanfab.read(
+            FLOOR / "shuffled.txt", contacts=FLOOR / "walls_all.txt", contact_columns=named
+        )
+        plain = scanfab.read(FLOOR / "shuffled.txt", contacts=FLOOR / "walls_all.txt")
+        assert packing.wall_contacts.sum() > 0
+        np.testing.assert_array_equal(packing.wall_contacts, plain.wall_contacts)

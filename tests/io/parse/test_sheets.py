@@ -185,3 +185,9 @@ def test_blanks_are_made_single_without_the_compiler():
         "data = np.frombuffer(b'  1 \\t 2 \\n\\n 3', np.uint8); out = np.empty_like(data)\n"
         "assert out[: single_blanks(data, out)].tobytes() == b'1 2\\n\\n3'"
     )
+
+
+def test_a_first_row_that_begins_with_a_word_is_no_header():
+    layout, found = read("P 0.5 1.5 2.5\nP 3.5 4.5 5.5\n", numbers=(1, 2, 3), whole=())
+    assert layout.names is None
+    np.testing.assert_array_equal(found[1], [0.5, 3.5])

@@ -170,7 +170,9 @@ def test_other_columns_are_parsed_when_they_are_asked_for(tmp_path, monkeypatch)
     calls = counted(monkeypatch)
     rows = [(*row, 0.25 * row[0]) for row in ROWS]
     text = dump_text(rows, "id type x y z radius vz")
-    packing = scanfab.read(write(tmp_path / "a.dump", dump_text(step=-1) + text), frame=1)
+    source = write(tmp_path / "a.dump", dump_text(step=-1) + text)
+    # without dim the first frame would be read too, to see whether it is one of discs
+    packing = scanfab.read(source, frame=1, dim=3)
     assert list(packing.columns) == ["type", "vz"]
     assert calls == [[0, 1, 2, 3, 4, 5]]
     np.testing.assert_array_equal(packing.columns["vz"], [0.25, 0.5, 0.75])

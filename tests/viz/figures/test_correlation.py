@@ -10,6 +10,7 @@ import pytest
 from scanfab.table.compare import compare_tables
 from scanfab.table.table import Table
 from scanfab.viz.figures.correlation import PAPER_SLOPE, Correlation
+from scanfab.viz.figures.groups import groups_of
 from scanfab.viz.figures.page import drawn_page
 from tests.helpers.figures import fitted, legend_of
 from tests.helpers.tables import curve, sheared
@@ -81,3 +82,20 @@ def test_errors_of_the_correlation_look_in_the_legend_as_they_are_drawn(drawn, e
     handle = margin.get_legend().legend_handles[-1]
     assert (handle.get_marker(), handle.get_linestyle()) == (shape, "None")
     assert legend_of(margin)[-1].startswith("one total standard error")
+
+
+def test_eight_curves_of_three_rvs_look_different_and_have_room_for_their_legend(drawn):
+    kinds = [("a", None), ("b", None), *((one, rv) for one in "cd" for rv in (0.4, 0.5, 0.7))]
+    rows = [
+        {**row, "rv": rv}
+        for number, (variant, rv) in enumerate(kinds)
+        for row in curve(variant=variant, factor=1.0 + number)
+    ]
+    looks = [tuple(one.look.items()) for group in groups_of(rows) for one in group.drawn]
+    assert len(set(looks)) == len(looks) == 8
+    page = drawn(rows)
+    legend = page.axes[-1].get_legend().get_window_extent()
+    above = [ax.get_tightbbox().y0 for ax in page.axes[:4]]
+    assert 0 < legend.y0 < legend.y1 < min(above)
+    # the panel is no strip beside it
+    assert page.axes[4].get_window_extent().height > 0.7 * legend.height

@@ -81,7 +81,7 @@ def test_a_cut_off_without_a_total_error_is_told():
     values = np.array([1.0, 2.0, 3.0])
     for total, told in ((values, False), (np.array([1.0, np.nan, 3.0]), True)):
         figure = Cutoffs(None)
-        figure.curves = [CutoffCurve("one", values, values, values, total, 1.0)]
+        figure.curves = [CutoffCurve("one", values, values, values, total, 1.0, values)]
         with drawn_page([figure]) as page:
             note = page.legends[0].get_title().get_text()
         assert ("(none where either is not known)" in note) == told

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import pyvista
 from matplotlib.figure import Figure
 
 import scanfab
@@ -81,7 +82,6 @@ def test_the_lines_of_a_section_lie_in_the_plane(packing):
 
 
 def test_paraview_files_lie_in_the_plane(tmp_path, packing):
-    pyvista = pytest.importorskip("pyvista")
     settings = Settings(variants="c", tolerance=0.05, rv_shape="box")
     list(compute_rows(packing, settings, observe=VtkFolder(tmp_path)))
     for name in ("grains", "contacts", "window", "lines-c", "distribution-c", "ellipsoids-c"):

@@ -461,7 +461,7 @@ def test_title_author_and_date(table):
 
 
 def test_the_author_is_whoever_the_system_knows_by_a_full_name(table, tmp_path, monkeypatch):
-    pwd = pytest.importorskip("pwd")
+    pwd = pytest.importorskip("pwd", reason="full names are POSIX")
     page = tmp_path / "r.html"
     for gecos, said in (("Ann Other,Room 3,,", "Ann Other, 20"), ("ann", ""), ("", "")):
         user = SimpleNamespace(pw_gecos=gecos, pw_name="ann")

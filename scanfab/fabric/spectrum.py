@@ -1,0 +1,108 @@
+"""
+The void fabric that contacts alone predict at small cut-offs, and why it follows the contacts.
+
+In a medium that is the same everywhere the mean length of void segments is
+
+    ℓ(n; c) = c + L / N,    N(n; c) = (Σ π r² - Σ 2 π R* |μ| (c |μ| + δ)⁺) / V,
+
+with N the number of gaps of at least c along n, a volume and line's cross-section, and
+L = φ - ∫ N dc from 0 to c the share of the volume in which a segment of length c along n may begin,
+φ the porosity. The second sum goes over pairs of grains whose surfaces are near: μ = n·m with the
+normal m, overlap δ (below 0: a gap), R* = r1 r2 / (r1 + r2), x⁺ = max(x, 0). An overlap removes
+gaps, a contact adds short ones that the cut-off drops: both more along the normal than across it.
+Of discs the sums are Σ 2 r and Σ 2 |μ| √(2 R* (c |μ| + δ)⁺), over an area.
+
+The surfaces count as parabolas, so it holds for short gaps only: of sheared samples the anisotropy
+is right within 15 % without a cut-off, and a quarter too large at 0.3 of the smallest radius.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.base.column import Column
+from scanfab.base.typing import FloatArray
+from scanfab.fabric.tensor import axial
+from scanfab.packing.near import NearPairs
+from scanfab.scan.directions import rule_of
+
+__all__ = ["LONGEST_GAP", "PREDICTED_ALPHA", "predicted_alpha"]
+
+# in smallest radii: for longer ones the surfaces are no parabolas
+LONGEST_GAP = 0.3
+# of the integral over all directions
+AXES = 100
+
+PREDICTED_ALPHA = Column(
+    "alpha_vs_axial_contacts",
+    float,
+    "",
+    "alpha_vs_axial as overlaps and near contacts predict it, for cut-offs up to 0.3 of the "
+    "smallest radius; empty for an open whole and for clumps",
+)
+
+
+def predicted_alpha(
+    pairs: NearPairs, porosity: float, cutoff: float, axis: npt.ArrayLike
+) -> float | None:
+    """
+    Signed anisotropy of the void fabric along an axis, from the near pairs alone.
+
+    Parameters
+    ----------
+    pairs : NearPairs
+        All whose surfaces are no more than the cut-off apart.
+    porosity : float
+        φ, of the same region, dimensionless.
+    cutoff : float
+        Of the void segments, dump's length unit.
+    axis : array_like, shape (3,)
+        Unit vector.
+
+    Returns
+    -------
+    float or None
+        Dimensionless. None if in some direction no gap is left, so that the formula does not hold.
+
+    References
+    ----------
+    Mean length of a stationary medium: Lu and Torquato, Lineal-path function for random
+    heterogeneous materials, 1992, doi:10.1103/PhysRevA.45.922.
+
+    Examples
+    --------
+    A chain of spheres that overlap along z loses gaps along z: the others are longer.
+
+    >>> import numpy as np
+    >>> from scanfab.fabric.spectrum import predicted_alpha
+    >>> from scanfab.packing.near import NearPairs
+    >>> chain = NearPairs(np.eye(3)[2:], np.array([0.02]), np.array([0.25]), np.pi / 4, 0.98)
+    >>> round(predicted_alpha(chain, 0.47, 0.0, (0, 0, 1)), 4)
+    0.0051
+    """
+    rule = rule_of(AXES, pairs.space)
+    number = np.empty(len(rule))
+    share = np.empty(len(rule))
+    for place, along in enumerate(rule.axes):
+        removed, integral = _removed(pairs, np.abs(pairs.normal @ along), cutoff)
+        number[place] = (pairs.shadow - removed) / pairs.volume
+        share[place] = porosity - (cutoff * pairs.shadow - integral) / pairs.volume
+    if np.any(number <= 0.0) or np.any(share <= 0.0):
+        return None
+    weighted = rule.weights * (cutoff + share / number)
+    tensor = np.einsum("d,di,dj->ij", weighted, rule.axes, rule.axes) / weighted.sum()
+    return float(axial(tensor, axis, pairs.space))
+
+
+def _removed(pairs: NearPairs, cosine: FloatArray, cutoff: float) -> tuple[float, float]:
+    """Gaps shorter than the cut-off or closed by overlap along a line, and their integral to it."""
+    opened = np.maximum(cutoff * cosine + pairs.overlap, 0.0)
+    closed = np.maximum(pairs.overlap, 0.0)
+    if pairs.space.is_plane:
+        width = 2.0 * np.sqrt(2.0 * pairs.reduced_radius)
+        integral = width * (opened**1.5 - closed**1.5) / 1.5
+        return float(np.sum(width * cosine * np.sqrt(opened))), float(np.sum(integral))
+    area = 2.0 * np.pi * pairs.reduced_radius
+    integral = 0.5 * area * (opened**2 - closed**2)
+    return float(np.sum(area * cosine * opened)), float(np.sum(integral))

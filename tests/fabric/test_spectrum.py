@@ -1,0 +1,124 @@
+"""The void fabric that near contacts predict, against closed forms and against scans."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab import Cell, Packing
+from scanfab.base.space import Space
+from scanfab.fabric.spectrum import LONGEST_GAP, predicted_alpha
+from scanfab.packing.near import NearPairs
+
+NAME = "alpha_vs_axial_contacts"
+
+
+def isotropic_pairs(count=4000):
+    """So many normals on a spiral over the sphere."""
+    height = 1 - (2 * np.arange(count) + 1) / count
+    angle = np.pi * (3 - np.sqrt(5)) * np.arange(count)
+    flat = np.sqrt(1 - height**2)
+    return np.column_stack([flat * np.cos(angle), flat * np.sin(angle), height])
+
+
+def test_weak_overlap_of_a_second_order_density_gives_an_eighth():
+    """|n·m| takes P2 of the normals' density to P2 times 1/8; α of ℓ (1 + e P2) is e/5."""
+    normal = isotropic_pairs()
+    weight = 1 + 0.3 * (1.5 * normal[:, 2] ** 2 - 0.5)
+    # as many gaps as weights say are closed: in the overlap, which enters linearly
+    overlap, reduced = 1e-4 * weight, np.full(len(normal), 0.25)
+    closed = 2 * np.pi * 0.25 * 1e-4 * len(normal)
+    pairs = NearPairs(normal, overlap, reduced, shadow=100 * closed, volume=1.0)
+    expected = closed * 0.3 / 8 / (100 * closed - closed / 2) / 5
+    assert predicted_alpha(pairs, 0.4, 0.0, (0, 0, 1)) == pytest.approx(expected, rel=5e-3)
+
+
+def test_touching_pairs_give_their_second_order_and_no_fourth():
+    """(n·m)² takes P2 to 2/15 and P4 to nothing: dα/dc at 0 is φ B₂ / (5 N²)."""
+    normal = isotropic_pairs()
+    second = 1.5 * normal[:, 2] ** 2 - 0.5
+    fourth = (35 * normal[:, 2] ** 4 - 30 * normal[:, 2] ** 2 + 3) / 8
+    for density, part in ((1 + 0.3 * second, 0.3 * 2 / 15), (1 + 0.3 * fourth, 0.0)):
+        pairs = NearPairs(normal, np.zeros(len(normal)), 0.25 * density, 4e3, 1.0)
+        cutoff, number, porosity = 1e-6, 4e3, 0.4
+        added = 2 * np.pi * 0.25 * len(normal) * part
+        expected = cutoff * added / number / 5
+        found = predicted_alpha(pairs, porosity, cutoff, (0, 0, 1))
+        assert found == pytest.approx(expected, rel=0.02, abs=1e-12)
+
+
+def flattened(side, height, radius=0.5):
+    """A lattice of equal grains, nearer to one another along z."""
+    grid = np.stack(np.meshgrid(*3 * [np.arange(float(side))], indexing="ij"), -1).reshape(-1, 3)
+    cell = [float(side), float(side), height * side]
+    return Packing(grid * [1.0, 1.0, height], radius, cell=Cell(cell))
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.ScanfabWarning")
+def test_a_lattice_that_overlaps_along_z():
+    """Hard along x and y, overlapping along z: without a cut-off all anisotropy is that."""
+    table = scanfab.compute(
+        flattened(3, 0.99), variants="a", cutoffs="0", directions="lebedev:29", spacing=0.03
+    )
+    row = table[0]
+    assert row["alpha_vs_axial"] > 5 * row["alpha_vs_axial_se"]
+    assert row[NAME] == pytest.approx(
+        row["alpha_vs_axial"], rel=0.1, abs=3 * row["alpha_vs_axial_se"]
+    )
+    assert scanfab.compute(flattened(2, 1.0), variants="a", cutoffs="0")[0][NAME] == pytest.approx(
+        0, abs=1e-12
+    )
+
+
+def test_discs_in_a_row_that_overlap():
+    """In a plane a pair closes 2 |n·m| √(2 R* δ) of gaps."""
+    plane = Space(2)
+    pairs = NearPairs(np.eye(3)[1:2], np.array([0.02]), np.array([0.25]), 1.0, 1.0, plane)
+    angle = (np.arange(10000) + 0.5) * np.pi / 10000
+    number = 1.0 - 2 * np.abs(np.sin(angle)) * np.sqrt(2 * 0.25 * 0.02)
+    expected = np.sum(-np.cos(2 * angle) / number) / np.sum(1 / number)
+    found = predicted_alpha(pairs, 0.2, 0.0, (0, 1, 0))
+    assert found == pytest.approx(expected, rel=1e-3)
+
+
+def test_the_integral_is_that_of_the_number():
+    """L(c) = φ - ∫ N dc: the mean length follows from its own derivative."""
+    normal = isotropic_pairs(50)
+    overlap = np.linspace(-0.02, 0.02, 50)
+    for space, flat in ((Space(None), normal), (Space(2), normal * [1, 1, 0])):
+        unit = flat / np.linalg.norm(flat, axis=1)[:, None]
+        pairs = NearPairs(unit, overlap, np.full(50, 0.25), 40.0, 60.0, space)
+        from scanfab.fabric.spectrum import _removed
+
+        cosine = np.abs(unit @ [0.6, 0.8, 0.0])
+        cutoffs = np.linspace(0.0, 0.1, 4001)
+        number = np.array([_removed(pairs, cosine, one)[0] for one in cutoffs])
+        steps = 0.5 * (number[1:] + number[:-1]) * np.diff(cutoffs)
+        assert _removed(pairs, cosine, 0.1)[1] == pytest.approx(steps.sum(), rel=1e-4)
+
+
+def test_it_stands_beside_the_sheared_sample():
+    """A real, periodic run: without a cut-off within 15 % where there is anisotropy, as at 0.1."""
+    series = scanfab.read_series("sample_data/liggghts_periodic")
+    table = scanfab.compute(series, cutoffs="0,0.1rmin,1rmin", variants="a", tolerance=1e-4)
+    for row in table:
+        smallest = table[2]["cutoff"]
+        if row["cutoff"] > LONGEST_GAP * smallest:
+            assert row[NAME] is None
+        elif row["frame"] > 0:
+            error = row["alpha_vs_axial_se"]
+            assert row[NAME] == pytest.approx(row["alpha_vs_axial"], rel=0.15, abs=3 * error)
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.ScanfabWarning")
+def test_where_there_is_none():
+    """Of an open whole no porosity is known; without cut-offs there is no column."""
+    packing = Packing(np.stack(np.meshgrid(*3 * [np.arange(6.0)]), -1).reshape(-1, 3), 0.5)
+    scan = {"contact_tolerance": 1e-6, "directions": 9, "spacing": 0.1}
+    table = scanfab.compute(packing, cutoffs="0", variants="ac", **scan)
+    assert table[0][NAME] is None
+    assert table[1][NAME] is not None
+    assert NAME not in scanfab.compute(packing, variants="a", **scan).columns
+    second = scanfab.compute(packing, cutoffs="0", moment=2, **scan)
+    assert all(row[NAME] is None for row in second)

@@ -1,0 +1,122 @@
+"""LAMMPS' dumps that are no usual text: YAML, NetCDF, and text of old versions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab import ReadError, ScanfabWarning
+from scanfab.io.parse import fence
+from scanfab.io.registry import reader_named
+from scanfab.testing import check_reader
+from tests.helpers.dumps import ROWS, dump_text, write
+from tests.helpers.made.lammps import netcdf, yaml_text
+
+
+def test_yaml_is_read_as_the_text_is(tmp_path):
+    packing = scanfab.read(write(tmp_path / "a.yaml", yaml_text()))
+    # the bounds are those around the tilted box
+    box = ((0, 1.5, 0.5), (0, 1, 0), (-1, 1, 0))
+    flags = " xy xz yz pp ff mm"
+    text = scanfab.read(write(tmp_path / "a.dump", dump_text(flags=flags, box=box, step=100)))
+    np.testing.assert_array_equal(packing.position, text.position)
+    np.testing.assert_array_equal(packing.radius, text.radius)
+    np.testing.assert_array_equal(packing.cell.vectors, text.cell.vectors)
+    assert packing.cell.periodic == text.cell.periodic == (True, False, False)
+    assert packing.id.tolist() == [1, 2, 3]
+    assert (packing.step, packing.time) == (100, 0.5)
+    assert packing.columns["c_a[1]"].tolist() == [-3, -3, -3]
+
+
+def test_yaml_of_many_frames(tmp_path):
+    text = yaml_text(200) + yaml_text(100)
+    series = scanfab.read_series(write(tmp_path / "a.yaml", text))
+    assert [frame.step for frame in series] == [100, 200]
+    with pytest.warns(ScanfabWarning, match="last snapshot, number 2, is incomplete"):
+        assert len(scanfab.read_series(write(tmp_path / "b.yaml", text[:-6]))) == 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("natoms: 3", "natoms: 4", "the header counts 4 atoms, found 3"),
+        ("natoms: 3", "natoms: x", "natoms: and a whole number"),
+        (", -3, ]", ", ]", "expected 7 columns of atoms, found 6"),
+        ("0.39", "word", "line 19: expected a number, found 'word'"),
+        ("boundary: [ p, p,", "boundary: [ p, q,", "three boundary flags"),
+        ("timestep: 100", "timestep: ", "expected timestep:"),
+        ("...", "", "found 1 beginnings and 0 ends"),
+    ],
+)
+def test_what_is_wrong_with_yaml(tmp_path, old, new, message):
+    text = yaml_text()
+    assert old in text
+    with pytest.raises(ReadError, match=message):
+        scanfab.read(write(tmp_path / "a.yaml", text.replace(old, new)))
+
+
+def test_netcdf(tmp_path):
+    series = scanfab.read_series(netcdf(tmp_path / "a.nc", written=2))
+    assert [(frame.step, frame.snapshot.time) for frame in series] == [(0, 0.0), (100, 50.0)]
+    first, second = (frame.read() for frame in series)
+    np.testing.assert_array_equal(first.position, first.cell.wrap(np.array(ROWS)[:, 2:5]))
+    np.testing.assert_array_equal(first.radius, 0.1)
+    # one atom was lost: its place holds what was never written
+    assert second.id.tolist() == [1, 2]
+    # edges a, b and their angle; an edge of length 0 does not repeat
+    assert first.cell.periodic == (True, True, False)
+    np.testing.assert_allclose(first.cell.vectors[:2], [[1, 0, 0], [1, 3**0.5, 0]], atol=1e-15)
+    assert first.cell.origin.tolist() == [0, -1, 0]
+
+
+def test_netcdf_of_scaled_coordinates(tmp_path):
+    path = netcdf(tmp_path / "a.nc", name="scaled_coordinates", lengths=(2, 2, 4))
+    cell = scanfab.read_series(path)[0].read().cell
+    found = scanfab.read_series(path)[0].read().position
+    expected = cell.wrap(cell.origin + np.array(ROWS)[:, 2:5] @ cell.vectors)
+    np.testing.assert_allclose(found, expected)
+
+
+def test_netcdf_without_a_cell_has_none(tmp_path):
+    assert scanfab.read_series(netcdf(tmp_path / "a.nc", lengths=(0, 0, 0)))[0].read().cell is None
+
+
+def test_netcdf_with_a_coordinate_that_was_not_dumped(tmp_path):
+    with pytest.raises(ReadError, match="coordinates was not written for all atoms"):
+        scanfab.read_series(netcdf(tmp_path / "a.nc", axes=2))[0].read()
+
+
+def test_netcdf_without_the_package(tmp_path, monkeypatch):
+    path = netcdf(tmp_path / "a.nc")
+    monkeypatch.setattr(fence, "find_spec", lambda name: None)
+    with pytest.raises(ReadError, match=r'pip install "scanfab\[netcdf\]"'):
+        scanfab.read(path)
+
+
+def test_a_dump_that_names_no_columns(tmp_path):
+    text = dump_text(names="", flags="").replace("ATOMS  \n", "ATOMS\n")
+    path = write(tmp_path / "old.dump", text)
+    with pytest.raises(ReadError, match="this dump does not name its 6 columns"):
+        scanfab.read(path)
+    numbers = {"id": 1, "x": 3, "y": 4, "z": 5, "radius": 6}
+    packing = scanfab.read(path, columns=numbers)
+    np.testing.assert_array_equal(packing.position, np.array(ROWS)[:, 2:5])
+    assert packing.columns["2"].tolist() == [1, 1, 2]
+    assert packing.cell.periodic == (False, False, False)
+
+
+def test_ids_of_old_versions(tmp_path):
+    text = dump_text(names="tag type x y z radius").replace("\n1 1", "\n7 1")
+    assert scanfab.read(write(tmp_path / "old.dump", text)).id.tolist() == [7, 2, 3]
+
+
+def test_the_kit(tmp_path):
+    text = write(tmp_path / "a.yaml", yaml_text())
+    reader = reader_named("lammps")
+    check_reader(reader, [text], tmp_path / "damaged", counts=True)
+
+
+def test_the_kit_with_netcdf(tmp_path):
+    files = [netcdf(tmp_path / "a.nc")]
+    check_reader(reader_named("lammps"), files, tmp_path / "damaged", counts=True)

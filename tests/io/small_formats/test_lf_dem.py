@@ -1,0 +1,71 @@
+"""LF_DEM: the sheared cell, columns by their legend, and pairs that do not touch."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab import ReadError, ScanfabWarning
+from scanfab.io.registry import reader_named
+from scanfab.testing import check_reader
+from tests.helpers.dumps import write
+from tests.helpers.made.lf_dem import HEAD, grains_text, pairs_text
+
+
+@pytest.fixture
+def run(tmp_path):
+    write(tmp_path / "par_a.dat", grains_text())
+    write(tmp_path / "int_a.dat", pairs_text())
+    return tmp_path
+
+
+def test_images_above_are_shifted(run):
+    series = scanfab.read_series(run / "par_a.dat", contacts=str(run / "int_a.dat"))
+    packing = series[1].read()
+    np.testing.assert_array_equal(packing.cell.vectors, [[10, 0, 0], [0, 8, 0], [1.5, 0, 6]])
+    assert packing.cell.periodic == (True, True, True)
+    np.testing.assert_array_equal(packing.radius, 1)
+    assert packing.columns["velocity (x, y, z)"].shape == (3, 3)
+    # the image of 1 stands right above 0, where the file has its normal
+    assert packing.contacts.pairs.tolist() == [[0, 1]]
+    np.testing.assert_allclose(packing.contacts.normal, [[0, 0, 1]])
+    assert packing.contacts.force is None
+
+
+def test_contacts_go_by_the_strain(run):
+    series = scanfab.read_series(run / "par_a.dat", contacts=str(run / "int_a.dat"))
+    with pytest.raises(ReadError, match="no contact file for time 0 among"):
+        series[0].read()
+
+
+def test_a_plane_does_not_repeat_across(tmp_path):
+    path = write(tmp_path / "par_a.dat", grains_text(HEAD.replace("Ly 8", "Ly 0")))
+    assert scanfab.read_series(path)[0].read().cell.periodic == (True, False, True)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("# np 3", "# np 4", "the header counts 4 particles, found 3"),
+        ("# Lz 6", "# Lz", "expected lines '# Lx'"),
+        ("#2: radius", "#2: size", "no reader knows|expected points with a radius"),
+        ("0 1 0 0 2.5 9", "0 1 0 0 2.5 9 9", "the number of columns changed"),
+        ("#6-8:", "#6-9:", "expected 9 columns of particles, found 8"),
+    ],
+)
+def test_what_is_wrong(tmp_path, old, new, message):
+    text = grains_text()
+    assert old in text
+    with pytest.raises(scanfab.ScanfabError, match=message):
+        scanfab.read_series(write(tmp_path / "par_a.dat", text.replace(old, new)))[1].read()
+
+
+def test_a_last_frame_that_is_cut_is_left_out(tmp_path):
+    path = write(tmp_path / "par_a.dat", grains_text()[:-3])
+    with pytest.warns(ScanfabWarning, match="number 2, is incomplete"):
+        assert len(reader_named("lf-dem").snapshots(path)) == 1
+
+
+def test_the_kit(run):
+    check_reader(reader_named("lf-dem"), [run / "par_a.dat"], run / "damaged")

@@ -1,0 +1,171 @@
+"""MercuryDPM: pairs listed from both sides, walls, times, planes, periodic boundaries."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab import ReadError, ScanfabWarning
+from scanfab.io.registry import reader_named
+from scanfab.testing import check_reader
+from tests.helpers.dumps import write
+from tests.helpers.made.mercurydpm import (
+    CENTRES,
+    IDS,
+    NORMAL,
+    RADIUS,
+    TANGENT,
+    contacts_at,
+    data_frame,
+    fstat_frame,
+    restart,
+)
+
+
+@pytest.fixture
+def run(tmp_path):
+    """Grains at three times, contacts at two of them."""
+    write(tmp_path / "run.data", "".join(map(data_frame, (0.1, 0.2, 0.3))))
+    write(
+        tmp_path / "run.fstat",
+        fstat_frame(0.1) + fstat_frame("0.3000000001", contacts_at(0.3)),
+    )
+    return tmp_path
+
+
+def test_each_pair_counts_once_and_forces_act_on_the_second_grain(run):
+    packing = scanfab.read_series(run, cell=(1, 2, 3))[2].read()
+    contacts = packing.contacts
+    assert contacts.pairs.tolist() == [[0, 1], [2, 0]]
+    # pushed off the first grain, through the face as well
+    np.testing.assert_array_equal(contacts.force, [[NORMAL, -TANGENT, 0], [NORMAL, 0, -TANGENT]])
+    np.testing.assert_allclose(contacts.normal, [[1, 0, 0], [1, 0, 0]])
+    assert packing.wall_contacts.tolist() == [0, 0, 1]
+
+
+def test_contacts_go_by_their_time(run):
+    series = scanfab.read_series(run, cell=(1, 2, 3))
+    assert [frame.snapshot.time for frame in series] == [0.1, 0.2, 0.3]
+    assert len(series[0].read().contacts) == 0
+    with pytest.warns(ScanfabWarning, match="no contact file for time 0.2 among"):
+        assert series[1].read().contacts is None
+
+
+def test_one_frame_of_contacts_is_not_that_of_all_grains(tmp_path):
+    write(tmp_path / "run.data", data_frame(0.1) + data_frame(0.2))
+    write(tmp_path / "run.fstat", fstat_frame(0.2, contacts_at(0.2)))
+    series = scanfab.read_series(tmp_path, cell=(1, 2, 3))
+    assert len(series[1].read().contacts) == 2
+    with pytest.warns(ScanfabWarning, match="no contact file for time 0.1"):
+        assert series[0].read().contacts is None
+
+
+def test_the_domain_is_not_said_to_repeat(run):
+    cell = scanfab.read_series(run)[0].read().cell
+    assert (cell.periodic, cell.vectors.diagonal().tolist()) == ((False,) * 3, [1, 2, 3])
+
+
+def test_a_plane(tmp_path):
+    rows = "0.1 1 9 9 0.1 0 0 0\n0.29 1 9 9 0.1 0 0 1\n"
+    packing = scanfab.read(write(tmp_path / "a.data", f"2 0.5 0 0 1 2 \n{rows}"), dim=2)
+    np.testing.assert_array_equal(packing.position, [[0.1, 1, 0], [0.29, 1, 0]])
+    np.testing.assert_array_equal(packing.radius, 0.1)
+    assert packing.columns["species"].tolist() == [0, 1]
+    assert packing.time == 0.5
+
+
+def test_a_frame_without_grains(tmp_path):
+    path = write(tmp_path / "a.data", "0 0 0 0 0 1 2 3 \n" + data_frame(1))
+    assert [len(frame.read()) for frame in scanfab.read_series(path)] == [0, 3]
+
+
+def test_a_restart_has_contacts_and_its_period(tmp_path):
+    packing = scanfab.read(write(tmp_path / "a.restart", restart()))
+    np.testing.assert_array_equal(packing.position, CENTRES)
+    np.testing.assert_array_equal(packing.radius, RADIUS)
+    assert packing.id.tolist() == list(IDS)
+    assert packing.time == 0.5
+    assert packing.cell.periodic == (True, False, False)
+    assert packing.contacts.pairs.tolist() == [[0, 1], [2, 0]]
+    np.testing.assert_array_equal(packing.contacts.force, [[2, -0.5, 0]] * 2)
+    np.testing.assert_allclose(packing.contacts.normal, [[1, 0, 0]] * 2)
+    assert packing.wall_contacts.tolist() == [0, 0, 2]
+
+
+def test_an_old_restart(tmp_path):
+    rows = "".join(f"TSP BP {x} {y} {z} 9 9 9 {RADIUS} 0 0 0\n" for x, y, z in CENTRES)
+    text = (
+        "restart_version 3\nname a\nxmin 0 xmax 1 ymin 0 ymax 2 zmin 0 zmax 3\n"
+        "dt 1 t 0.5 tmax 1\nBoundaries 1\nPeriodicBoundary normal 0 1 0 position_left 0.5 "
+        f"position_right 2.5 shift 0 2 0\nParticles 3\n{rows}FixedParticles 0\n"
+    )
+    packing = scanfab.read(write(tmp_path / "a.restart", text))
+    np.testing.assert_array_equal(packing.radius, RADIUS)
+    np.testing.assert_array_equal(packing.position, CENTRES)
+    assert packing.cell.periodic == (False, True, False)
+    assert packing.cell.origin.tolist() == [0, 0.5, 0]
+    assert packing.contacts is None
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("BaseParticle id 10", "SuperQuadricParticle id 10", "expected spheres, found a SuperQ"),
+        ("Particles 3", "Particles 30", "expected 30 Particles, found"),
+        ("radius 0.1", "radius", "expected 1 numbers in"),
+        ("particleIds 10 30", "particleIds 10 31", "names the grain 31, which is not in"),
+        ("PeriodicBoundary", "LeesEdwardsBoundary", "a LeesEdwardsBoundary repeats in a way"),
+        ("xMin 0", "zmin 0", "expected 1 numbers"),
+        ("shift 1 0 0", "shift 0 0 0", "make no cell"),
+    ],
+)
+def test_what_is_wrong_with_a_restart(tmp_path, old, new, message):
+    text = restart()
+    assert old in text
+    with pytest.raises(ReadError, match=message):
+        scanfab.read(write(tmp_path / "a.restart", text.replace(old, new)))
+
+
+def test_a_period_of_another_kind_can_be_named(tmp_path):
+    text = restart().replace("PeriodicBoundary", "LeesEdwardsBoundary")
+    packing = scanfab.read(write(tmp_path / "a.restart", text), cell=(1, 2, 3))
+    assert packing.cell.periodic == (True, True, True)
+
+
+def test_contacts_of_other_grains(run):
+    write(run / "run.data", data_frame(0.3, count=1))
+    with pytest.raises(ReadError, match="names the grain 2, but there are rows 0 to 0"):
+        scanfab.read(run / "run.data", contacts=run / "run.fstat")
+
+
+def test_interactions_for_paraview_are_refused(tmp_path):
+    names = "".join(
+        f'<DataArray Name="{name}"/>' for name in ("Overlap", "ContactRadius", "TangentialOverlap")
+    )
+    path = write(tmp_path / "a.vtu", f'<VTKFile type="UnstructuredGrid">{names}</VTKFile>')
+    with pytest.raises(ReadError, match="do not say which grains touch"):
+        scanfab.read(path)
+
+
+@pytest.mark.parametrize("ending", ["data", "fstat"])
+def test_a_last_frame_that_is_cut_is_left_out(run, ending):
+    path = run / f"run.{ending}"
+    path.write_bytes(path.read_bytes()[:-20])
+    reader = reader_named("mercurydpm")
+    with pytest.warns(ScanfabWarning, match=r"last snapshot, number \d, is incomplete"):
+        found = reader.snapshots(path)
+    assert [one.time for one in found] == ([0.1, 0.2] if ending == "data" else [0.1])
+    alone = data_frame(1) if ending == "data" else fstat_frame(1, contacts_at(1))
+    with pytest.raises(ReadError, match=r"the file is incomplete"):
+        reader.snapshots(write(run / f"b.{ending}", alone[:-9]))
+
+
+def test_the_kit(tmp_path):
+    files = [
+        write(tmp_path / "a.data", data_frame(0.1) + data_frame(0.2)),
+        write(tmp_path / "b.data", "1 0.5 0 0 1 2 \n0.1 1 9 9 0.1 0 0 0\n"),
+        write(tmp_path / "c.restart", restart()),
+    ]
+    check_reader(reader_named("mercurydpm"), files[:1], tmp_path / "damaged")
+    check_reader(reader_named("mercurydpm"), files[1:], tmp_path / "damaged", counts=True)

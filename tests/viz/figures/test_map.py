@@ -1,0 +1,60 @@
+"""The figure of maps: what is drawn where only some blocks, or some frames, have a value."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab import Cell, Packing
+from scanfab.viz.figures.map import Map
+from scanfab.viz.figures.page import drawn_page
+from tests.helpers.lattices import shaken_cubic
+
+pytestmark = pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabWarning")
+
+
+@pytest.fixture(scope="module")
+def packing():
+    position, radius = shaken_cubic(np.random.default_rng(0), 6, overlap=1.0)
+    return scanfab.find_contacts(Packing(position, radius, cell=Cell([6.0] * 3)))
+
+
+def mapped(packings, **blocks):
+    return scanfab.fabric_map(packings, directions=9, spacing=0.4, **blocks)
+
+
+def meshes(page):
+    return [mesh for axes in page.axes for mesh in axes.collections if mesh.get_array() is not None]
+
+
+def test_a_value_that_one_block_alone_has_is_of_one_colour_in_all_planes(packing):
+    rows = [dict(row) for row in mapped(packing, grid=(3, 3, 3))]
+    for row in rows:
+        row["solid_fraction"] = 0.6 if row["block"] == 13 else None
+    with drawn_page([Map(rows, quantity="solid_fraction")]) as page:
+        page.canvas.draw()
+        planes = meshes(page)[:3]
+        colours = {tuple(one.to_rgba([0.6])[0]) for one in planes}
+        assert len(planes) == 3
+        assert len(colours) == 1
+        assert planes[0].norm.vmin < 0.6 < planes[0].norm.vmax
+
+
+@pytest.mark.parametrize("blocks", [{"grid": (2, 2, 2)}, {"slices": 2}, {"shells": 2}])
+def test_frames_without_grains_are_not_drawn(packing, blocks):
+    nothing = Packing(np.zeros((0, 3)), 1.0, contacts=np.zeros((0, 2), int), cell=packing.cell)
+    figure = Map(mapped([nothing, packing, nothing], **blocks))
+    assert [row["frame"] for row in figure.frames[0]] == [1] * len(figure.frames[0])
+    assert len(figure.frames) == 1
+    with drawn_page([figure]) as page:
+        page.canvas.draw()
+
+
+def test_a_quantity_that_the_last_frame_lacks_leaves_its_planes_empty(packing):
+    rows = [dict(row) for row in mapped([packing, packing], grid=(2, 2, 2))]
+    for row in rows:
+        row["coordination"] = None if row["frame"] else row["coordination"]
+    with drawn_page([Map(rows, quantity=None)]) as page:
+        page.canvas.draw()
+        assert any(np.ma.getmaskarray(one.get_array()).all() for one in meshes(page))

@@ -1,0 +1,37 @@
+"""The data of the view inside the page of a report."""
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab.viz.frame_view import look_at
+from scanfab.viz.report.page import view_data
+from tests.helpers.truth import SAMPLE_DATA
+
+
+@pytest.fixture(scope="module")
+def clumps():
+    series = scanfab.read_series(SAMPLE_DATA / "liggghts_clumps", contacts="geometric")
+    return look_at(series, scanfab.Settings(), 2)
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.ScanfabNote")
+def test_all_spheres_of_a_clump_have_its_shade(clumps):
+    data = view_data(clumps.scene, clumps.axis)
+    body = clumps.sample.packing.bodies.number
+    away = np.linalg.norm(clumps.scene.grains.places - clumps.scene.center, axis=1)
+    shades = {}
+    for number, sphere in zip(body[np.argsort(away, kind="stable")], data["spheres"], strict=True):
+        shades.setdefault(number, set()).add(sphere[5])
+    assert max(len(found) for found in shades.values()) == 1
+    assert set.union(*shades.values()) == {0, 1, 2}
+    assert len(data["shades"]) == 3
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.ScanfabWarning")
+def test_spheres_have_no_shades():
+    series = scanfab.read_series(SAMPLE_DATA / "yade_triaxial")
+    look = look_at(series, scanfab.Settings(), 0)
+    data = view_data(look.scene, look.axis)
+    assert {len(sphere) for sphere in data["spheres"]} == {5}
+    assert len(data["shades"]) == 1
