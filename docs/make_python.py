@@ -13,13 +13,15 @@ BEGIN, END = "<!-- names -->", "<!-- end of names -->"
 
 # in the order in which a computation needs them
 GROUPS = {
-    "Reading and writing": ("read", "read_series", "Series", "Frame", "convert"),
+    "Reading and writing": ("read", "read_series", "follow_series", "Series", "Frame", "convert"),
     "Packings from anywhere": ("Packing", "Cell", "ContactList", "Contacts", "find_contacts"),
     "Computing": (
-        "compute", "compute_file", "fabric_map", "Settings", "calibrate", "Calibration",
+        "compute", "compute_file", "dask_executor", "fabric_map", "Settings",
+        "calibrate", "Calibration",
     ),
     "Tables": (
-        "Table", "Row", "load", "read_rows", "compare_tables", "Comparison", "COLUMNS", "Column",
+        "Table", "Row", "load", "read_rows", "merge_tables", "compare_tables", "Comparison",
+        "COLUMNS", "Column",
     ),
     "Figures and reports": ("scan_frames", "ScannedFrames", "make_report", "Report"),
     "Scanning by hand": (

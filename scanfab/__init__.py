@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from scanfab.fabric.tensor import FabricTensor
     from scanfab.fabric.void import VoidFabric, void_fabric
     from scanfab.io.convert import convert
+    from scanfab.io.following import follow_series
     from scanfab.io.frame import Frame
     from scanfab.io.opening import read, read_series
     from scanfab.io.series import Series
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
     from scanfab.packing.search import find_contacts
     from scanfab.packing.window import Window
     from scanfab.pipeline.calibration import Calibration, calibrate
+    from scanfab.pipeline.cluster.dask_executor import dask_executor
+    from scanfab.pipeline.cluster.merging import merge_tables
     from scanfab.pipeline.compute import compute
     from scanfab.pipeline.maps.fabric_map import fabric_map
     from scanfab.pipeline.samples import samples
@@ -93,12 +96,15 @@ _HOME = {
     "convert": "io.convert",
     "contact_fabric": "fabric.contact",
     "cylinder": "base.shapes",
+    "dask_executor": "pipeline.cluster.dask_executor",
     "direction_rule": "scan.directions",
     "ellipsoid": "base.shapes",
     "fabric_map": "pipeline.maps.fabric_map",
     "find_contacts": "packing.search",
+    "follow_series": "io.following",
     "load": "table.table",
     "make_report": "viz.report.report",
+    "merge_tables": "pipeline.cluster.merging",
     "polyhedron": "base.shapes",
     "read": "io.opening",
     "read_rows": "table.reading",
@@ -151,12 +157,15 @@ __all__ = [
     "contact_fabric",
     "convert",
     "cylinder",
+    "dask_executor",
     "direction_rule",
     "ellipsoid",
     "fabric_map",
     "find_contacts",
+    "follow_series",
     "load",
     "make_report",
+    "merge_tables",
     "polyhedron",
     "read",
     "read_rows",

@@ -68,18 +68,24 @@ def compute(
     def check(series: list[Series], chosen: dict[str, Any]) -> None:
         if plot is not None and chosen.get("cutoffs"):
             raise click.UsageError("--plot is of one cut-off: leave out --cutoffs")
-        if figure is not None and _is_of_frames(figure) and len(series) > 1:
+        if _needs_frames(figure) and len(series) > 1:
             raise click.UsageError(f"--figure {figure} draws one series: name one source")
+
+    def draw(job: Job) -> None:
+        # figures of frames scan again: once, at the end
+        if plot is not None and not _needs_frames(figure):
+            _draw(plot, figure, job)
 
     with reported_warnings() as told:
         job = finished_job(
             ctx, sources, chosen, Settings, told,
             output=output, resume=resume, manifest=manifest, vtk=vtk, check=check,
             drawn=None if plot is None else _columns_drawn(figure),
+            draw=draw,
         )  # fmt: skip
         if plot is not None:
             _draw(plot, figure, job)
-    return 0 if job.found_void_fabric and not job.has_skipped else 1
+    return 0 if job.is_good else 1
 
 
 def _check_figure(plot: Path | None, figure: str | None) -> None:
@@ -87,10 +93,10 @@ def _check_figure(plot: Path | None, figure: str | None) -> None:
         check_plot(plot, figure, *KINDS)
 
 
-def _is_of_frames(figure: str) -> bool:
+def _needs_frames(figure: str | None) -> bool:
     from scanfab.viz.figures.page import find_figure
 
-    return find_figure(figure, *KINDS)[0].kind == "frames"
+    return figure is not None and find_figure(figure, *KINDS)[0].kind == "frames"
 
 
 def _columns_drawn(figure: str | None) -> tuple[str, ...]:
@@ -109,7 +115,7 @@ def _draw(plot: Path, figure: str | None, job: Job) -> None:
 
     if not job.found_void_fabric:
         click.echo(f"scanfab: {plot} is not drawn: no row has a void fabric", err=True)
-    elif figure is not None and _is_of_frames(figure):
+    elif _needs_frames(figure):
         frames = ScannedFrames(job.series[0], job.settings, job.kept)
         save_figures(plot, make_figures(frames, "frames", figure))
     else:

@@ -119,6 +119,7 @@ def print_csv(
     writer = row_writer(".csv", sys.stdout, columns_of(kind), excerpt=excerpt)
     for row in rows:
         writer.write(row)
+    writer.close()
 
 
 def print_table(rows: Iterable[Row], excerpt: Excerpt) -> None:

@@ -12,6 +12,7 @@ __all__ = ["COMMANDS", "cli"]
 # one module a command, imported only when the command runs: --help stays fast
 COMMANDS = {
     "compute": "the fabric table: one row per frame and variant",
+    "merge": "the parts of job arrays as one table",
     "compare": "variants side by side, normalised curves, correlation with contact fabric",
     "inspect": "what the reader sees, nothing computed",
     "calibrate": "how many lines are enough: ladders of settings, and those it recommends",

@@ -55,15 +55,20 @@ def map(
     from scanfab.pipeline.maps.settings import MapSettings
 
     check_plot(plot, None, "map")
+
+    def draw(job: Job) -> None:
+        if plot is not None:
+            _draw(plot, job)
+
     with reported_warnings() as told:
         job = finished_job(
             ctx, sources, chosen, MapSettings, told,
             output=output, resume=resume, manifest=manifest, vtk=vtk,
             drawn=None if plot is None else _columns_drawn(),
+            draw=draw,
         )  # fmt: skip
-        if plot is not None:
-            _draw(plot, job)
-    return 0 if job.found_void_fabric and not job.has_skipped else 1
+        draw(job)
+    return 0 if job.is_good else 1
 
 
 def _columns_drawn() -> tuple[str, ...]:

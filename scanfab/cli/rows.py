@@ -11,7 +11,8 @@ import click
 
 from scanfab.cli.options import usage_errors
 from scanfab.cli.settings_file import fill_from_file
-from scanfab.cli.sources import open_series, reading_arguments
+from scanfab.cli.signals import ending_in_order
+from scanfab.cli.sources import follow_one, open_series, reading_arguments
 from scanfab.cli.talk import tell_inputs, working
 
 if TYPE_CHECKING:
@@ -38,14 +39,17 @@ def finished_job(
     vtk: Path | None,
     check: Callable[[list[Series], dict[str, Any]], None] = lambda series, chosen: None,
     drawn: Sequence[str] | None = None,
+    draw: Callable[[Job], object] = lambda job: None,
 ) -> Job:
     """
     A job whose rows are written, with its manifests and ParaView files.
 
     ``chosen`` are the options of reading, and of settings of that kind; ``check`` refuses what does
-    not go together, and ``drawn`` are the columns that figures need, if some are to be drawn.
+    not go together, and ``drawn`` are the columns that figures need, if some are to be drawn. A
+    series that is followed is drawn again whenever there is nothing else to do.
     """
     from scanfab.cli.console import announce_compiling
+    from scanfab.pipeline.cluster.dask_executor import dask_executor
     from scanfab.pipeline.job import Job
     from scanfab.table.result_file import ResultFile
     from scanfab.table.writing import Excerpt
@@ -53,6 +57,10 @@ def finished_job(
 
     if resume and output is None:
         raise click.UsageError("--resume goes with -o FILE")
+    follows, seconds = chosen.pop("follow"), chosen.pop("follow_for")
+    scheduler, scheduler_file = chosen.pop("scheduler"), chosen.pop("scheduler_file")
+    if (scheduler or scheduler_file) and vtk is not None:
+        raise click.UsageError("--vtk is written where frames are computed: not with --scheduler")
     chosen, settings_file = fill_from_file(ctx, sources, chosen)
     check([], chosen)
     with settings_file.named_errors():
@@ -61,27 +69,40 @@ def finished_job(
         settings = kind(**chosen)
         excerpt = Excerpt.make(settings.columns, fields, digits)
         result = None if output is None else ResultFile(output, settings.columns, excerpt)
-    series = open_series(sources, reading)
+    followed = None
+    if follows or seconds is not None:
+        followed = follow_one(sources, reading, seconds)
+    # whether it holds frames is not known yet
+    series: list[Series] = open_series(sources, reading) if followed is None else [followed]
     check(series, chosen)
     tell_inputs(series, settings.workers)
-    announce_compiling()
-    with usage_errors():
-        observers: Sequence[Observer] = ()
-        if vtk is not None:
-            observers = vtk_folders(vtk, len(series), settings, resume)
-        job = Job(
-            series,
-            settings,
-            result,
-            sources=sources,
-            reading=reading,
-            resume=resume,
-            manifest_path=manifest,
-            observers=observers,
-            told=told,
-            keep=drawn is not None,
-        )
     with ExitStack() as stack:
+        executor = None
+        if scheduler or scheduler_file:
+            with usage_errors():
+                cluster = dask_executor(scheduler, scheduler_file=scheduler_file)
+                executor = stack.enter_context(cluster)
+        announce_compiling()
+        with usage_errors():
+            observers: Sequence[Observer] = ()
+            if vtk is not None:
+                observers = vtk_folders(vtk, len(series), settings, resume)
+            job = Job(
+                series,
+                settings,
+                result,
+                sources=sources,
+                reading=reading,
+                resume=resume,
+                manifest_path=manifest,
+                observers=observers,
+                told=told,
+                keep=drawn is not None,
+                executor=executor,
+            )
+        if followed is not None:
+            stack.enter_context(ending_in_order(followed.end))
+            followed.when_idle(_Redraw(job, draw))
         with usage_errors():
             stack.enter_context(job.begun())
             if drawn is not None and job.table is not None:
@@ -89,6 +110,19 @@ def finished_job(
         _write_or_say(job, excerpt)
     job.save_manifests(settings_file.asked())
     return job
+
+
+class _Redraw:
+    """Draws what there is, if that is more than before."""
+
+    def __init__(self, job: Job, draw: Callable[[Job], object]) -> None:
+        self.job, self.draw = job, draw
+        self.done = 0
+
+    def __call__(self) -> None:
+        if self.job.found_void_fabric and self.job.done > self.done:
+            self.done = self.job.done
+            self.draw(self.job)
 
 
 def _write_or_say(job: Job, excerpt: Excerpt) -> None:

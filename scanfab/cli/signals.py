@@ -13,6 +13,7 @@ from scanfab.base.ending import finish
 
 __all__ = [
     "catch_signals",
+    "ending_in_order",
     "flush_streams",
     "ignore_signals",
     "interrupted_words",
@@ -49,6 +50,32 @@ def catch_signals() -> None:
     signal.signal(signal.SIGTERM, _end)
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, _end)
+
+
+@contextmanager
+def ending_in_order(end: Callable[[], object]) -> Iterator[None]:
+    """In the block the first signal calls this; a second one ends the process in our way."""
+
+    before = {one: signal.getsignal(one) for one in ENDED}
+    before = {one: what for one, what in before.items() if what is not signal.SIG_IGN}
+
+    def restore() -> None:
+        for one, what in before.items():
+            signal.signal(one, what)
+
+    def first(number: int, frame: FrameType | None) -> None:
+        restore()
+        end()
+        words = f"scanfab: {ENDED[number]}: frames under way are finished, again to leave at once\n"
+        with suppress(OSError):
+            os.write(2, words.encode())
+
+    for one in before:
+        signal.signal(one, first)
+    try:
+        yield
+    finally:
+        restore()
 
 
 def ignore_signals() -> None:

@@ -12,9 +12,10 @@ from scanfab.cli.options import usage_errors, write_groups
 from scanfab.io.options import take_reading
 
 if TYPE_CHECKING:
+    from scanfab.io.following import FollowedSeries
     from scanfab.io.series import Series
 
-__all__ = ["SourceCommand", "open_series", "reading_arguments"]
+__all__ = ["SourceCommand", "follow_one", "open_series", "reading_arguments"]
 
 # numbers that may stand apart behind an option, as users write them
 COUNTS = {"--cell": (3, 6), "--rv-center": (3,), "--rv-size": (2, 3)}
@@ -48,6 +49,19 @@ def reading_arguments(options: dict[str, Any]) -> dict[str, Any]:
     if taken["format"] is not None:
         _check_format(taken["format"])
     return taken
+
+
+def follow_one(
+    sources: tuple[str, ...], reading: dict[str, Any], seconds: float | None
+) -> FollowedSeries:
+    """The series of a command line that is still being written."""
+    from scanfab.io.following import follow_series
+
+    if len(sources) > 1 or "-" in sources:
+        raise click.UsageError("--follow takes one folder, or one file that grows")
+    if seconds is not None and not seconds >= 0:
+        raise click.UsageError(f"--follow-for: expected 0 or more, found {seconds:g}")
+    return follow_series(sources[0], seconds=seconds, **reading)
 
 
 def open_series(sources: tuple[str, ...], reading: dict[str, Any]) -> list[Series]:

@@ -72,6 +72,18 @@ class Frame:
         what += [] if self.problem is None else ["damaged"]
         return f"Frame {self.number} of {self.series.name}: {', '.join(what)}"
 
+    def alone(self) -> Frame:
+        """The frame for another process, which need not know the other files nor our folder."""
+        series, path = self.series, self.snapshot.path
+        families = [_of_step(one, self.name_step, self.step) for one in series.contacts]
+        grains = replace(series.grains, files=_absolute(series.grains.files))
+        if series.dim == 3 or series._spaces:
+            # else the space of the series is that of a frame before
+            grains = _of_step(grains, self.name_step, self.step)
+        other = replace(series, grains=grains, contacts=tuple(families))
+        vars(other)["_spaces"] = list(series._spaces)
+        return replace(self, series=other, snapshot=replace(self.snapshot, path=path.absolute()))
+
     @property
     def reader(self) -> Reader:
         """The reader of the grain file."""
@@ -269,6 +281,20 @@ class Frame:
                 f"{message}: contacts are found by geometry", ScanfabWarning, stacklevel=3
             )
         return found
+
+
+def _absolute(files: dict[int | None, Path]) -> dict[int | None, Path]:
+    return {step: path.absolute() for step, path in files.items()}
+
+
+def _of_step(family: Family, *steps: int | None) -> Family:
+    """The files of some steps; another one too, as a single file may be that of any step."""
+    wanted = (None, *steps)
+    files = {step: path for step, path in family.files.items() if step in wanted}
+    other = next((step for step in family.files if step not in wanted), None)
+    if other is not None and len(files) < 2:
+        files[other] = family.files[other]
+    return replace(family, files=_absolute(files))
 
 
 @contextmanager

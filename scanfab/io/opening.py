@@ -33,7 +33,7 @@ from scanfab.io.series import ContactsFrom, Series
 from scanfab.io.unpacking import unpacking_up_to
 from scanfab.packing.packing import Packing
 
-__all__ = ["READING", "SETTINGS_FILE", "open_sources", "read", "read_series"]
+__all__ = ["READING", "SETTINGS_FILE", "as_text", "open_sources", "read", "read_series"]
 
 READING = tuple(one.name for one in READING_OPTIONS)
 """The options of :func:`read_series`, by which commands and manifests know them too."""
@@ -189,7 +189,7 @@ def _series(
     )
     families = set_tables_aside(families, paths)
     grains = choose_grains(paths, families, options).check()
-    name = _as_text(os.fspath(given[0]) if len(paths) == len(given) == 1 else _common_folder(paths))
+    name = as_text(os.fspath(given[0]) if len(paths) == len(given) == 1 else _common_folder(paths))
     sources = tuple(os.fspath(path) for one in given for path in expanded(one))
     own = [family for family in families if family.kind == "contacts"]
     _note_passed_over(families, [grains, *own])
@@ -332,7 +332,7 @@ def _named_contacts(contacts: PathLike, format: str | None, options: ReadOptions
     return found
 
 
-def _as_text(name: str) -> str:
+def as_text(name: str) -> str:
     """A name as a table can hold it: those of files need be no text."""
     return name.encode("utf-8", "backslashreplace").decode()
 

@@ -4,28 +4,31 @@ from __future__ import annotations
 
 import logging
 import os
+import platform
 import time
 import warnings
 from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from functools import partial
-from itertools import chain, islice
 from pathlib import Path
+from typing import Any
 
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.note import SKIPPED, Note, tell
 from scanfab.base.option import options_of, takes_options, unusable
-from scanfab.base.threads import in_order
+from scanfab.base.threads import shared_in_order
+from scanfab.io.frame import Frame
 from scanfab.packing.cell import Cell
 from scanfab.packing.groupings import Grouping, Groupings, grouping_of
 from scanfab.packing.sample import Sample
+from scanfab.pipeline.cluster.dask_executor import DaskExecutor
 from scanfab.pipeline.frame import FrameResult, compute_frame
 from scanfab.pipeline.frames import Frames, Readable, Source
 from scanfab.pipeline.maps.frame import map_frame
 from scanfab.pipeline.plan import Plan, make_plan, plan_without_grains
 from scanfab.pipeline.settings import MAX_CHORDS, Settings
 from scanfab.pipeline.strain import Flips, Strains
+from scanfab.pipeline.told import heard_by_thread
 from scanfab.scan.directions import DirectionRule
 from scanfab.table.table import Row, Table
 
@@ -85,7 +88,7 @@ def compute(
         memory, unless `frames` counts from the end of an iterable.
     executor : concurrent.futures.Executor, optional
         Computes the frames in place of threads of this process, `workers` of them at a time, each
-        scanned by one thread.
+        scanned by one thread; that of :func:`scanfab.dask_executor` as many as its workers take.
     {options}
 
     Returns
@@ -168,18 +171,36 @@ class _FrameJob:
     source: str
     skips_damaged: bool
     observe: Observer | None
-    home: int
-    """The process that hears warnings."""
+    file: Readable | None = None
+    """Where another process finds the frame, if it lies in files."""
+    home: tuple[str, int] = field(default_factory=lambda: _here())
+    """The machine and process that hears warnings."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        # what was read here, is read again there
+        if not isinstance(self.file, Frame):
+            return dict(vars(self))
+        alone = self.file.alone()
+        return {**vars(self), "frame": alone, "file": alone}
 
     def __call__(self, threads: int) -> _Computed:
         plan = replace(self.plan, workers=threads)
-        if os.getpid() == self.home:
+        if _here() == self.home:
             return self._computed(plan)
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
+        with heard_by_thread() as caught:
             found = self._computed(plan)
-        heard = tuple(one.message for one in caught if isinstance(one.message, Warning))
-        return replace(found, heard=heard)
+        return replace(found, heard=tuple(caught))
+
+    @property
+    def strict(self) -> _FrameJob:
+        """The same, but whoever calls it decides on damaged frames."""
+        return replace(self, skips_damaged=False)
+
+    def given_up(self, error: Exception) -> _Computed:
+        """What is to be had of a frame that cannot be computed; raises if it is to stop the run."""
+        if not self.skips_damaged:
+            raise error
+        return _Computed(self.number, notes=(Note(SKIPPED, str(error)),))
 
     def _computed(self, plan: Plan) -> _Computed:
         begun = time.perf_counter()
@@ -187,9 +208,7 @@ class _FrameJob:
             compute_one = map_frame if plan.map_settings else compute_frame
             found = compute_one(self.frame, plan, number=self.number, source=self.source)
         except (PackingError, ReadError) as error:
-            if not self.skips_damaged:
-                raise
-            return _Computed(self.number, notes=(Note(SKIPPED, str(error)),))
+            return self.given_up(error)
         seconds = time.perf_counter() - begun
         grains = found.sample.number(found.sample.grains)
         LOGGER.info("%s: frame %d: %d grains in %.2g s", self.source, self.number, grains, seconds)
@@ -198,6 +217,10 @@ class _FrameJob:
         packing = found.sample.packing
         cell = packing.cell if grains else None
         return _Computed(self.number, found.rows, found.notes, cell, grouping_of(packing))
+
+
+def _here() -> tuple[str, int]:
+    return platform.node(), os.getpid()
 
 
 class _Run:
@@ -214,14 +237,19 @@ class _Run:
         self._flips = Flips(frames.settings.frames.step)
         self._groupings = Groupings()
 
-    def jobs(self, done: Container[int], observe: Observer | None) -> Iterator[_FrameJob]:
-        """The chosen frames that are not done."""
+    def jobs(self, done: Container[int], observe: Observer | None) -> Iterator[_FrameJob | None]:
+        """The chosen frames that are not done; None where one is still to come."""
         plan = self._plan()
         name, skips = self.frames.name, self.frames.settings.on_error == "skip"
-        for number, frame in self.frames.due():
+        for due in self.frames.as_they_come():
+            if due is None:
+                yield None
+                continue
+            number, frame = due
             known = self.frames.sample_if_read(number, frame)
             if number not in done and known is not None:
-                yield _FrameJob(known, plan, number, name, skips, observe, os.getpid())
+                file = frame if isinstance(frame, Frame) else None
+                yield _FrameJob(known, plan, number, name, skips, observe, file)
 
     def _plan(self) -> Plan:
         """Settings end here."""
@@ -265,14 +293,16 @@ class _Pool:
         if self._own is not None:
             self._own.shutdown(wait=False, cancel_futures=True)
 
-    def in_order(self, jobs: Iterator[_FrameJob]) -> Iterator[_Computed]:
+    def in_order(self, jobs: Iterator[_FrameJob | None]) -> Iterator[_Computed]:
         """The results in the order of the jobs, of which one a worker is under way."""
-        first = list(islice(jobs, self.workers))
-        threads = max(1, self.workers // max(len(first), 1))
         pool = self._own or self.executor
         assert pool is not None
+        workers = self.workers
+        if isinstance(pool, DaskExecutor):
+            return shared_in_order(pool, jobs, pool.room, pool.share)
         if self._own is None:
             # how many processors there are elsewhere, only the executor knows
-            threads = 1
-        every = (partial(job, threads) for job in chain(first, jobs))
-        return in_order(pool, every, self.workers)
+            return shared_in_order(pool, jobs, lambda: workers, lambda number: 1)
+        return shared_in_order(
+            pool, jobs, lambda: workers, lambda number: max(workers // number, 1)
+        )

@@ -15,6 +15,7 @@ from scanfab.base.errors import (
     SettingsError,
 )
 from scanfab.base.note import SKIPPED, Note, tell
+from scanfab.io.following import FollowedSeries
 from scanfab.io.reader import Carries
 from scanfab.io.series import ENDLESS, Series
 from scanfab.packing.boundary import enclosing_class, existing_values
@@ -26,6 +27,7 @@ from scanfab.pipeline.values import as_written
 
 __all__ = [
     "Frames",
+    "NoChosenFrameError",
     "Readable",
     "Source",
     "boundary_hints",
@@ -37,6 +39,10 @@ __all__ = [
 
 Source = Packing | Series | Iterable[Packing]
 """One frame, a series that is read frame by frame, or packings from anywhere."""
+
+
+class NoChosenFrameError(SettingsError):
+    """The series has frames, but none of those that were chosen."""
 
 
 class Readable(Protocol):
@@ -134,10 +140,20 @@ class Frames:
             self.source, self.settings = of_whole(source, settings)
         else:
             self.source, self.settings = _Stream(source), settings
+        if isinstance(self.source, FollowedSeries):
+            self._refuse_from_end()
         self.name = self.source.name
         self.particles = 0
         """Of the frames that were read on the way to the first that has grains."""
         self._ready: dict[int, Sample | None] = {}
+
+    def _refuse_from_end(self) -> None:
+        frames = self.settings.frames
+        if any((bound or 0) < 0 for bound in (frames.start, frames.stop, frames.step)):
+            raise SettingsError(
+                f"frames: {as_written(frames)} counts from the end of the series, which nobody "
+                f"knows while it is followed: count from its start, as in 10: or ::5"
+            )
 
     def __repr__(self) -> str:
         source, chosen = self.source, as_written(self.settings.frames)
@@ -161,18 +177,32 @@ class Frames:
         SettingsError
             At the end, if there is none.
         """
+        return (one for one in self.as_they_come() if one is not None)
+
+    def as_they_come(self) -> Iterator[tuple[int, Readable] | None]:
+        """The same of a series that is followed, with None where the next is not there yet."""
         # where they are counted from the end, that comes first
-        chosen, found = self.chosen, False
-        stream = self.source
-        last_time: Iterable[Readable] = stream.taken() if isinstance(stream, _Stream) else stream
-        for number, frame in enumerate(last_time):
+        chosen, found, number = self.chosen, False, 0
+        for frame in self._last_time():
+            if frame is None:
+                yield None
+                continue
             if number in chosen:
                 found = True
                 yield number, frame
             if number >= chosen.stop - 1:
                 break
+            number += 1
         if not found:
             raise self.no_such_frames()
+
+    def _last_time(self) -> Iterable[Readable | None]:
+        """All frames, for the last time."""
+        if isinstance(self.source, _Stream):
+            return self.source.taken()
+        if isinstance(self.source, FollowedSeries):
+            return self.source.as_they_come()
+        return self.source
 
     def one(self) -> tuple[int, Readable]:
         """The first chosen frame; SettingsError if there is none."""
@@ -267,11 +297,13 @@ class Frames:
     def no_such_frames(self) -> SettingsError:
         """The error for a choice that meets no frame."""
         count = self.source.count() if isinstance(self.source, _Stream) else len(list(self.source))
+        if count == 0 and isinstance(self.source, FollowedSeries):
+            return NoChosenFrameError(self.source.lack)
         if count == 0:
             return SettingsError(f"expected frames, found none in {self.name or 'the source'}")
         name, frames = self.name or "the packing", self.settings.frames
         has = "1 frame, 0" if count == 1 else f"{count} frames, 0 to {count - 1}"
-        return SettingsError(
+        return NoChosenFrameError(
             f"frames: the series has no frame in {as_written(frames)}: {name} has {has}"
         )
 

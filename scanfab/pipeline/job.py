@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -11,9 +12,10 @@ from typing import Any
 
 from scanfab.base.errors import ScanfabNote, SettingsError
 from scanfab.base.files import check_folder
+from scanfab.io.following import FollowedSeries
 from scanfab.io.series import Series
 from scanfab.pipeline.compute import Observer, compute_rows
-from scanfab.pipeline.frames import chosen_frames
+from scanfab.pipeline.frames import NoChosenFrameError, chosen_frames
 from scanfab.pipeline.manifest import (
     Inputs,
     asked_for,
@@ -62,6 +64,8 @@ class Job:
         What is told meanwhile, for the manifest.
     keep : bool, optional
         Keep all rows in memory too.
+    executor : concurrent.futures.Executor, optional
+        As for :func:`scanfab.compute`.
 
     Raises
     ------
@@ -82,6 +86,7 @@ class Job:
         observers: Sequence[Observer] = (),
         told: Told | None = None,
         keep: bool = False,
+        executor: Executor | None = None,
     ) -> None:
         names = [one.name for one in series]
         for name in names:
@@ -111,6 +116,7 @@ class Job:
         """Whether any row has one."""
         self._told = told or Told()
         self._keep = keep
+        self._executor = executor
         self._observers: Sequence[Observer | None] = observers or [None] * len(series)
         self._part: list[dict[str, Any]] = []
         self._has_gaps = False
@@ -122,9 +128,11 @@ class Job:
         ]
 
     @property
-    def has_skipped(self) -> bool:
-        """Whether a frame was skipped, now or by an earlier run."""
-        return bool(self._told.skipped) or self._has_gaps
+    def is_good(self) -> bool:
+        """Whether no frame was skipped, now or by an earlier run, and one has a void fabric."""
+        skipped = bool(self._told.skipped) or self._has_gaps
+        # a table without frames, of a job that none was left for, lacks nothing
+        return not skipped and (self.found_void_fabric or not self.done)
 
     def frames(self) -> int:
         """About how many frames there are to be finished, those of earlier runs among them."""
@@ -160,6 +168,9 @@ class Job:
                 self.done += 1
                 advance(new=not self._is_taken_over(row))
         self.is_over = True
+        for one in self.series:
+            if isinstance(one, FollowedSeries):
+                one.end()
 
     def write(self, advance: Advance = lambda new: None) -> None:
         """
@@ -193,16 +204,22 @@ class Job:
             found = manifest(self.asked, self.series, texts, self._told.notes, self._inputs)
             write_manifest(path, {**found, **(more or {})})
 
+    @property
+    def _there(self) -> list[Series]:
+        """The series as they are now, also those that are followed."""
+        return [one.as_it_is if isinstance(one, FollowedSeries) else one for one in self.series]
+
     def _find_rows(self, result: ResultFile) -> None:
         """
         The rows of earlier runs; what is asked for gets their frames too.
 
         A part is of the run that was interrupted last, so it counts, whatever FILE holds.
         """
+        series = self._there
         if result.path.is_file():
             try:
-                self.table = finished_table(result.path, self.asked, self.series, self.settings)
-                frames = self.table.with_frames(self.series, self.settings.frames)
+                self.table = finished_table(result.path, self.asked, series, self.settings)
+                frames = self.table.with_frames(series, self.settings.frames)
                 self.settings = replace(self.settings, frames=frames)
                 self.asked = with_frames(self.asked, frames)
             except SettingsError:
@@ -212,11 +229,11 @@ class Job:
         rows_per_frame = self.settings.rows_per_frame
         self._part = result.finished_rows(self.asked, rows_per_frame, default_settings())
         of_part = {"settings": self.asked, "inputs": result.recorded_inputs()}
-        check_part(result.part, of_part, self._part, self.series, self.settings)
+        check_part(result.part, of_part, self._part, series, self.settings)
         in_part = any(row["alpha_vs"] is not None for row in self._part)
         in_table = self.table is not None and self.table.has_void_fabric
         self.found_void_fabric = in_part or in_table
-        self._has_gaps = any(map(self._lacks_frames, self.series))
+        self._has_gaps = any(map(self._lacks_frames, series))
         self.kept = list(self._part) if self._keep else []
         self.done = len(self._part) // self.settings.rows_per_frame
 
@@ -241,8 +258,15 @@ class Job:
             of_table = {} if self.table is None else self.table.rows[one.name]
             ready = {frame: rows for frame, rows in of_table.items() if frame >= start}
             done = {*range(start), *ready}
-            computed = compute_rows(one, self.settings, done=done, observe=observe)
-            yield from _in_order(ready, computed)
+            computed = compute_rows(
+                one, self.settings, done=done, observe=observe, executor=self._executor
+            )
+            try:
+                yield from _in_order(ready, computed)
+            except NoChosenFrameError as none:
+                # of an array of more jobs than frames some have nothing to do
+                text = str(none).removeprefix("frames: ")
+                warnings.warn(f"{text}: it has no row in this table", ScanfabNote, stacklevel=3)
 
 
 def _in_order(ready: dict[int, list[Row]], computed: Iterator[Row]) -> Iterator[Row]:

@@ -31,6 +31,8 @@ __all__ = [
     "write_manifest",
 ]
 
+# bytes of a file that are read at a time
+PART = 1 << 20
 PACKAGES = (
     "scanfab", "numpy", "numba", "scipy", "meshio", "pyvista", "click", "rich", "h5py",
     "matplotlib", "jinja2", "polars",
@@ -90,7 +92,7 @@ class Inputs:
         found = path.stat()
         stamp = (found.st_size, found.st_mtime_ns)
         if path not in self._known or self._known[path][0] != stamp:
-            entry = {"path": str(path), "size": found.st_size, "sha256": _hash(path)}
+            entry = {"path": str(path), "size": found.st_size, "sha256": _hash(path, found.st_size)}
             self._known[path] = stamp, entry
         return self._known[path][1]
 
@@ -116,7 +118,7 @@ def manifest(
     inputs : Inputs, optional
         Those that have been looked at already.
     """
-    inputs = inputs or Inputs()
+    inputs, series = inputs or Inputs(), list(series)
     files = {path for one in series for path in one.files()}
     files.update(one for one in (strain_file(asked), surface_file(asked)) if one is not None)
     return {
@@ -129,6 +131,8 @@ def manifest(
         "inputs": [inputs.entry(path) for path in sorted(files)],
         "warnings": list(warnings),
         "notes": list(notes),
+        # of the whole series: who merges parts knows by it which frames are missing
+        "frames": {one.name: len(one) for one in series},
     }
 
 
@@ -170,6 +174,11 @@ def _plain(value: Any) -> Any:
     return str(value) if isinstance(value, Path) else value
 
 
-def _hash(path: Path) -> str:
+def _hash(path: Path, size: int) -> str:
+    """Of so many bytes: a simulation may write more meanwhile."""
+    digest = hashlib.sha256()
     with open(path, "rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
+        while size and (part := stream.read(min(size, PART))):
+            digest.update(part)
+            size -= len(part)
+    return digest.hexdigest()

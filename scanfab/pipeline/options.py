@@ -51,6 +51,35 @@ OUTPUT_OPTIONS = (
         metavar="N",
     ),
     Option(
+        name="follow",
+        default=False,
+        group="reading",
+        help="Wait for the frames of a running simulation, each computed once its files are whole; "
+        "Ctrl-C or SIGTERM ends it in order, a second one interrupts.",
+        kind=bool,
+    ),
+    Option(
+        name="follow_for",
+        group="reading",
+        help="The same until so long after the last new frame.",
+        kind=float,
+        metavar="SECONDS",
+    ),
+    Option(
+        name="scheduler",
+        group="scan",
+        help="Send the frames to the workers of a Dask cluster in place of `workers`; they see the "
+        "same files by the same paths.",
+        metavar="tcp://HOST:PORT",
+    ),
+    Option(
+        name="scheduler_file",
+        group="scan",
+        help="The same by the file that dask scheduler, dask-mpi and dask-jobqueue write.",
+        kind=Path,
+        metavar="FILE",
+    ),
+    Option(
         name="resume",
         default=False,
         group="output",

@@ -129,10 +129,11 @@ def restored_settings(asked: Mapping[str, Any]) -> Settings:
     SettingsError
         If one of them cannot be used any more.
     """
-    known = Settings.__dataclass_fields__
+    kind = MapSettings if is_map(asked) else Settings
+    known = kind.__dataclass_fields__
     spelt = {name: value for name, value in spelt_settings(asked).items() if name in known}
     try:
-        return Settings(**spelt)
+        return kind(**spelt)
     except (AttributeError, TypeError, ValueError) as error:
         raise SettingsError(f"the settings of the manifest cannot be used: {error}") from None
 

@@ -20,7 +20,7 @@ from scanfab.table.reading import read_rows
 from scanfab.table.result_file import differing_settings
 from scanfab.table.row import Row
 
-__all__ = ["FinishedTable", "InputsOfRows", "check_part", "finished_table"]
+__all__ = ["FinishedTable", "InputsOfRows", "check_part", "finished_table", "written_row"]
 
 # what may differ: inputs are compared by what they hold, and more frames are the point of it
 FREE = ("frames", "sources")
@@ -228,13 +228,13 @@ def _by_frame(
     for (source, frame), group in groupby(rows, key=lambda row: (row["source"], row["frame"])):
         if source not in found:
             raise _refused(path, f"its source {source} is not named now")
-        own = [_row(row, settings.columns) for row in group]
+        own = [written_row(row, settings.columns) for row in group]
         if len(own) == settings.rows_per_frame:
             found[source][frame] = own
     return found
 
 
-def _row(values: Mapping[str, Any], columns: Collection[Column]) -> Row:
+def written_row(values: Mapping[str, Any], columns: Collection[Column]) -> Row:
     """A row as it was written; columns that were not are empty, and are not written again."""
     return Row(**{one.name: values.get(one.name) for one in columns})
 

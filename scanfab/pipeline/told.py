@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,7 +12,9 @@ from typing import Any
 from scanfab.base.errors import ScanfabNote, ScanfabWarning, SkippedFrameWarning
 from scanfab.pipeline.options import as_options
 
-__all__ = ["Told", "recorded"]
+__all__ = ["Told", "heard_by_thread", "recorded"]
+
+_ears = threading.local()
 
 
 class Told:
@@ -82,3 +85,25 @@ def _action(
         ):
             return str(action)
     return "default"
+
+
+@contextmanager
+def heard_by_thread() -> Iterator[list[Warning]]:
+    """
+    The warnings of a thread, in a process where nobody else hears any.
+
+    Other threads may listen to theirs: what the standard library has for it is for one at a time.
+    """
+    if warnings.showwarning is not _hear:
+        warnings.showwarning = _hear
+        warnings.simplefilter("always")
+    _ears.heard = []
+    try:
+        yield _ears.heard
+    finally:
+        del _ears.heard
+
+
+def _hear(message: Warning | str, *rest: Any, **more: Any) -> None:
+    if isinstance(message, Warning) and hasattr(_ears, "heard"):
+        _ears.heard.append(message)

@@ -44,7 +44,15 @@ class Following:
         """
         with self._lock:
             self._taken += steps
-        if self._taken >= self.most:
+        self.check(self._taken)
+
+    def __reduce__(self) -> tuple[type, tuple[float]]:
+        # another process counts its own; whoever adds up all parts checks their sum
+        return Following, (self.most,)
+
+    def check(self, taken: float) -> None:
+        """FollowedTooFarError if so many steps are too many."""
+        if taken >= self.most:
             raise FollowedTooFarError(
                 f"void segments that leave the cell are long: following them through its images "
                 f"takes more than {self.most:.2g} steps. Much of the cell is empty, or a variant "

@@ -123,20 +123,13 @@ def scan_gaps(
     triads, offsets = drawn_lines(rule, seed, replicates)
     least = np.maximum(np.array(cutoffs, dtype=np.float64), shortest_gap(solids))
     lines = _BinnedLines(solids, spacing, least, blocks, variants, Following(most_steps))
-
-    def some(triads: FloatArray, offsets: FloatArray) -> FloatArray:
-        sums, tallies = lines.sums(triads, offsets)
-        # one array of both, as the parts of a scan come together
-        return np.concatenate(
-            [sums.reshape(len(triads), -1), tallies.reshape(len(triads), -1)], axis=1
-        )
-
-    found = in_parts(some, triads, offsets, workers)
+    found = in_parts(lines.both, triads, offsets, workers)
     tallies = found[:, :, -2 * TALLY_SIZE :].reshape(*offsets.shape[:2], 2, TALLY_SIZE)
     sums = found[:, :, : -2 * TALLY_SIZE]
     sums = sums.reshape(*offsets.shape[:2], len(variants), lines.blocks_kept, len(least), 3)
     number, length, square = np.moveaxis(np.swapaxes(sums, 1, 2), -1, 0)
     scan = sums_of(triads, tallies, variants, solids.edge)
+    lines.following.check(float(scan.steps.sum()))
     return GapSums(triads[:, :, 2], variants, number, length, square, scan)
 
 
@@ -160,6 +153,13 @@ class _BinnedLines(NamedTuple):
     def blocks_kept(self) -> int:
         """For the whole and for the window the same number."""
         return max(map(len, self.blocks))
+
+    def both(self, triads: FloatArray, offsets: FloatArray) -> FloatArray:
+        """One array of both, as the parts of a scan come together."""
+        sums, tallies = self.sums(triads, offsets)
+        return np.concatenate(
+            [sums.reshape(len(triads), -1), tallies.reshape(len(triads), -1)], axis=1
+        )
 
     def sums(self, triads: FloatArray, offsets: FloatArray) -> tuple[FloatArray, FloatArray]:
         """

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from scanfab.base.arrays import concatenated
 from scanfab.base.spelling import counted
+from scanfab.base.threads import in_threads
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.edges import CLIP
@@ -206,10 +207,13 @@ def scan_lines(
     triads, offsets = drawn_lines(rule, seed, replicates)
     following = Following(most_steps)
 
-    def some(triads: FloatArray, offsets: FloatArray) -> FloatArray:
-        return tally_triads(solids, triads, offsets, spacing, cutoff, variants, following=following)
-
-    return sums_of(triads, in_parts(some, triads, offsets, workers), variants, solids.edge)
+    some = partial(
+        tally_triads, solids,
+        spacing=spacing, cutoff=cutoff, variants=variants, following=following,
+    )  # fmt: skip
+    sums = sums_of(triads, in_parts(some, triads, offsets, workers), variants, solids.edge)
+    following.check(float(sums.steps.sum()))
+    return sums
 
 
 def in_parts(
@@ -219,7 +223,7 @@ def in_parts(
     workers: int,
 ) -> FloatArray:
     """
-    Scan along the axes of all replicates, a few in each job of several threads.
+    Scan along the axes of all replicates, a few in each job of several threads, or of workers.
 
     ``scan`` takes the triads and shifts of some axes, (A, 3, 3) and (A, 2) or (A, 1), and returns
     what it adds up for each, (A, ...); the result has the shape (R, D, ...).
@@ -230,15 +234,15 @@ def in_parts(
     axes = min(max(count // (JOBS_A_THREAD * workers), 1), MOST_AXES)
     parts = [slice(first, first + axes) for first in range(0, count, axes)]
 
-    def one(part: slice) -> FloatArray:
-        return scan(triads[part], shifts[part])
-
-    if workers == 1 or len(parts) == 1:
-        sums = np.concatenate([one(part) for part in parts])
-    else:
-        with ThreadPoolExecutor(workers) as pool:
-            sums = np.concatenate(list(pool.map(one, parts)))
+    lines = [(triads[part], shifts[part]) for part in parts]
+    sums = np.concatenate(in_threads(partial(_scan_part, scan), lines, workers))
     return sums.reshape(*offsets.shape[:2], *sums.shape[1:])
+
+
+def _scan_part(
+    scan: Callable[[FloatArray, FloatArray], FloatArray], lines: tuple[FloatArray, FloatArray]
+) -> FloatArray:
+    return scan(*lines)
 
 
 def sums_of(triads: FloatArray, tallies: FloatArray, variants: str, edge: str = CLIP) -> ScanSums:

@@ -153,7 +153,10 @@ class ResultFile:
             with self._open_part() as stream:
                 columns = columns_of(self.kind)
                 excerpt = self.excerpt if self._part_suffix == self.suffix else ALL
-                yield row_writer(self._part_suffix, stream, columns, not going_on, excerpt)
+                writer = row_writer(self._part_suffix, stream, columns, not going_on, excerpt)
+                yield writer
+                # of a table without rows the names of its columns
+                writer.close()
             # what stands there is of the table that was FILE before
             self.manifest.unlink(missing_ok=True)
             if self._part_suffix == self.suffix:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,7 @@ def compute_file(
     fields: str | Sequence[str] | None = None,
     digits: int = DEFAULT_DIGITS,
     progress: Callable[[int, int], object] | None = None,
+    executor: Executor | None = None,
     **options: Any,
 ) -> Table:
     """
@@ -70,6 +72,8 @@ def compute_file(
         Significant digits of floats; with 17 they read back the same.
     progress : callable, optional
         Called after each frame with the number of finished frames, and about how many there are.
+    executor : concurrent.futures.Executor, optional
+        As for :func:`scanfab.compute`.
     **options
         Those of :func:`scanfab.compute`, or with `grid`, `slices` or `shells` those of
         :func:`scanfab.fabric_map`; for paths those of :func:`scanfab.read_series` too.
@@ -126,6 +130,7 @@ def compute_file(
             manifest_path=None if manifest is None else Path(manifest),
             observers=folders,
             told=told,
+            executor=executor,
         )
 
         def advance(new: bool) -> None:

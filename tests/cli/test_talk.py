@@ -52,8 +52,8 @@ def test_quiet_leaves_out_notes_but_no_warning(said):
 
 
 def test_quiet_leaves_errors(said):
-    _, _, lines = said("compute", "--quiet", "--frames", "9")
-    assert lines[-1].startswith("scanfab: error: --frames: the series has no frame in 9")
+    _, _, lines = said("compute", "--quiet", "--boundary", "type=9")
+    assert lines[-1].startswith("scanfab: error: --boundary: no particle of any frame has type=9")
 
 
 def test_verbose_says_what_is_used_and_how_long_each_frame_takes(said, series):

@@ -61,7 +61,9 @@ def test_a_result_file_has_its_manifest_beside_it(series, tmp_path):
     output = tmp_path / "table.csv"
     assert run(["compute", str(series), *FAST, "--seed", "5", "-o", str(output)]) == 0
     found = json.loads(Path(f"{output}.manifest.json").read_text())
-    assert list(found) == ["settings", "seed", "versions", "inputs", "warnings", "notes"]
+    names = ["settings", "seed", "versions", "inputs", "warnings", "notes", "frames"]
+    assert list(found) == names
+    assert found["frames"] == {str(series): 2}
     assert found["seed"] == found["settings"]["seed"] == 5
     assert len(found["inputs"]) == 4
 

@@ -7,17 +7,17 @@ Knows where numbers stand, not what columns mean. The old layout has no names of
 from __future__ import annotations
 
 import struct
-import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
 import numpy as np
 
-from scanfab.base.errors import PackingError, ReadError, ScanfabWarning
+from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.lengths import MOST
 from scanfab.base.typing import FloatArray
 from scanfab.io.files import check_memory, plain
+from scanfab.io.parse.growing import warn_incomplete
 from scanfab.io.parse.lammps_box import box_of_bounds, box_vectors
 from scanfab.io.reader import Snapshot
 from scanfab.packing.cell import Cell
@@ -134,7 +134,7 @@ def index_binary(path: Path) -> list[Snapshot]:
                 text = f"{path}: snapshot {len(found) + 1} is damaged or incomplete: {error}"
                 if not found:
                     raise ReadError(text) from None
-                warnings.warn(f"{text}; it is left out", ScanfabWarning, stacklevel=2)
+                warn_incomplete(f"{text}; it is left out")
                 break
             found.append(Snapshot(path, header.step, header.time, start, stop))
             start = stop

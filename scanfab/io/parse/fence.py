@@ -58,6 +58,8 @@ class _Process:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
+            # Ctrl-C is for us: who ends in order still reads
+            start_new_session=True,
             env={**os.environ, "PYTHONPATH": places},
         )
         with _Limit(self.process, SECONDS_TO_START):

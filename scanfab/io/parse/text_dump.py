@@ -9,7 +9,6 @@ from __future__ import annotations
 import io
 import os
 import re
-import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -19,9 +18,10 @@ from typing import IO, Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.errors import ReadError, ScanfabWarning
+from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray
 from scanfab.io.files import check_memory, plain
+from scanfab.io.parse.growing import warn_incomplete
 from scanfab.io.parse.lammps_box import dump_cell
 from scanfab.io.parse.number_rows import exact_column, plain_reason
 from scanfab.io.parse.text_table import LARGE, TextTable, read_regular
@@ -91,10 +91,8 @@ def index_dump(path: Path) -> list[Snapshot]:
             raise ReadError(f"{path}: expected a line ITEM: TIMESTEP, found none")
         stops = [*starts[1:], size]
         if len(starts) > 1 and not _is_complete(stream, starts[-1], stops[-1]):
-            warnings.warn(
-                f"{path}: the last snapshot, number {len(starts)}, is incomplete and is left out",
-                ScanfabWarning,
-                stacklevel=2,
+            warn_incomplete(
+                f"{path}: the last snapshot, number {len(starts)}, is incomplete and is left out"
             )
             starts.pop()
         found = [

@@ -1,0 +1,49 @@
+"""scanfab merge: the parts of job arrays as one table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from scanfab.cli.options import options, usage_errors
+from scanfab.cli.talk import talk_options
+
+__all__ = ["merge"]
+
+
+@click.command()
+@click.argument(
+    "parts", metavar="PART...", nargs=-1, required=True, type=click.Path(path_type=Path)
+)
+@options("output")
+@options("frames", help="Which frames the table is to have, as a Python slice (default: all).")
+@talk_options
+def merge(parts: tuple[Path, ...], output: Path | None, frames: str | None) -> int:
+    """
+    Merge the parts of job arrays into one table: the bytes of one run.
+
+    PART is what scanfab compute -o PART --frames I::N has written, with its PART.manifest.json.
+    Parts of several series, or whole tables, become one table of all of them.
+
+    \b
+    Job I of 8:  scanfab compute dumps/ --frames I::8 -o part_I.csv
+    Then:        scanfab merge part_*.csv -o fabric.csv
+    """
+    from scanfab.cli.console import is_readable, print_csv, print_table, reported_warnings
+    from scanfab.io.options import parse_frames
+    from scanfab.pipeline.cluster.merging import check_output, merged
+
+    with reported_warnings():
+        with usage_errors():
+            chosen = parse_frames(frames)
+            if output is not None:
+                check_output(output, parts)
+        found = merged(parts, chosen)
+        if output is not None:
+            found.save(output)
+        elif is_readable():
+            print_table(found.rows, found.excerpt)
+        else:
+            print_csv(found.rows, found.excerpt, found.settings.columns)
+    return 0 if not found.rows or any(row.get("alpha_vs") is not None for row in found.rows) else 1

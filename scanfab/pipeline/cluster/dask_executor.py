@@ -1,0 +1,478 @@
+"""dask_executor(): frames go to the workers of a Dask cluster; the one file that knows Dask."""
+
+from __future__ import annotations
+
+import json
+import logging
+import socket
+import threading
+import time
+import uuid
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor, Future, InvalidStateError, ThreadPoolExecutor
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+from scanfab.base.errors import ScanfabError, ScanfabNote, SettingsError
+from scanfab.base.spelling import counted
+from scanfab.base.threads import spread_over
+from scanfab.io.grain_files import PathLike
+from scanfab.pipeline.cluster.on_worker import (
+    Failed,
+    Outdated,
+    scanned_there,
+    sendable,
+    versions_here,
+    view_there,
+)
+from scanfab.pipeline.cluster.packed import Packed
+
+__all__ = ["ClusterError", "DaskExecutor", "dask_executor"]
+
+NEEDS = "a Dask cluster needs the package distributed: pip install 'scanfab[cluster]'"
+# seconds within which a scheduler answers
+TIMEOUT = 10.0
+# of a frame that raises errors, or takes its worker down
+TRIES = 3
+# seconds for which the number of workers is taken for what it was
+RECENT = 2.0
+
+
+class ClusterError(ScanfabError):
+    """The scheduler or the workers cannot be used; says what was found and what to do."""
+
+
+class FrameJob(Protocol):
+    """What :class:`DaskExecutor` sends away."""
+
+    @property
+    def strict(self) -> FrameJob: ...
+
+    def given_up(self, error: Exception) -> Any: ...
+
+    def __call__(self, threads: int) -> Any: ...
+
+
+@contextmanager
+def dask_executor(
+    scheduler: str | None = None, *, scheduler_file: PathLike | None = None
+) -> Iterator[DaskExecutor]:
+    """
+    Connect to a Dask cluster: an executor for :func:`scanfab.compute` and the other functions.
+
+    Workers read the files of their frames themselves, so they see the same files by the same paths.
+    A worker that dies costs its frame again. A frame that raises an error is tried on other workers
+    before that counts. A single frame, or fewer than half as many as the workers have threads, is
+    read here; its axes and replicates go to the workers, and its packing once to each.
+
+    Parameters
+    ----------
+    scheduler : str, optional
+        Its address, such as ``tcp://10.0.0.5:8786``.
+    scheduler_file : path, optional
+        In its place the file that ``dask scheduler --scheduler-file``, ``dask-mpi`` and
+        ``dask-jobqueue`` write.
+
+    Yields
+    ------
+    DaskExecutor
+        Until the end of the block.
+
+    Raises
+    ------
+    ClusterError
+        If no scheduler answers, or workers have other versions or do not see the files.
+    SettingsError
+        If not just one of the two is named, or distributed is not installed.
+
+    Examples
+    --------
+    >>> import scanfab
+    >>> def fabric(folder, address):
+    ...     with scanfab.dask_executor(address) as executor:
+    ...         return scanfab.compute(scanfab.read_series(folder), executor=executor)
+    """
+    if (scheduler is None) == (scheduler_file is None):
+        raise SettingsError("a cluster is named by just one of `scheduler` and `scheduler_file`")
+    try:
+        import distributed
+    except ImportError:
+        raise SettingsError(NEEDS) from None
+    connect: Any = distributed.Client
+    address = _address_in(Path(scheduler_file)) if scheduler_file is not None else str(scheduler)
+    with _quiet():
+        _check_that_one_listens(address)
+        client = _connected(connect, address)
+        executor = DaskExecutor(client, address)
+        try:
+            executor.check_versions()
+            yield executor
+        finally:
+            executor.shutdown()
+            client.close(timeout=2)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """What Dask would print of lost connections is told once, by us."""
+    names = [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]
+    before = {name: logging.getLogger(name).level for name in names}
+    for name in names:
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for name, level in before.items():
+            logging.getLogger(name).setLevel(level)
+
+
+def _address_in(path: Path) -> str:
+    """The address in a scheduler file, which may come in a moment."""
+    end = time.monotonic() + TIMEOUT
+    while True:
+        try:
+            return str(json.loads(path.read_text("utf-8"))["address"])
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            # it may be in the middle of being written
+            if time.monotonic() > end or isinstance(error, KeyError | TypeError):
+                break
+        time.sleep(0.1)
+    found = "something else" if path.exists() else f"nothing within {TIMEOUT:g} s"
+    raise ClusterError(
+        f"{path}: expected the file that a Dask scheduler writes, with its address, found {found}: "
+        f"is the scheduler started with this file?"
+    )
+
+
+def _check_that_one_listens(address: str) -> None:
+    """ClusterError if there is nobody; addresses of other kinds than tcp are left to Dask."""
+    kind, _, place = address.rpartition("://")
+    host, _, port = place.rpartition(":")
+    if kind not in ("", "tcp"):
+        return
+    if not host or not port.isdigit():
+        raise ClusterError(f"{address}: expected the address of a scheduler, as tcp://HOST:8786")
+    try:
+        with socket.create_connection((host.strip("[]"), int(port)), TIMEOUT) as stream:
+            stream.settimeout(TIMEOUT)
+            # a scheduler speaks first, and Dask would wait for it without an end
+            speaks = bool(stream.recv(1))
+    except TimeoutError:
+        speaks = False
+    except (OSError, OverflowError) as error:
+        raise ClusterError(
+            f"{address}: no scheduler is there ({error}): start one with `dask scheduler`, or name "
+            f"the address that it prints"
+        ) from None
+    if not speaks:
+        raise _silent(address, "it says nothing")
+
+
+def _connected(connect: Callable[..., Any], address: str) -> Any:
+    """A client, within the time that a scheduler has to answer."""
+    found: Future[Any] = Future()
+
+    def try_it() -> None:
+        try:
+            found.set_result(connect(address, timeout=TIMEOUT, set_as_default=False))
+        except Exception as error:
+            found.set_exception(error)
+
+    threading.Thread(target=try_it, daemon=True).start()
+    try:
+        return found.result(2 * TIMEOUT)
+    except Exception as error:
+        raise _silent(address, str(error) or "no answer") from None
+
+
+def _silent(address: str, reason: str) -> ClusterError:
+    return ClusterError(
+        f"{address}: does not answer as a Dask scheduler within {TIMEOUT:g} s ({reason}): is "
+        f"another program there, or another version of Dask?"
+    )
+
+
+class DaskExecutor(Executor):
+    """Sends frames to the workers of a Dask cluster; as :func:`dask_executor` makes it."""
+
+    def __init__(self, client: Any, address: str) -> None:
+        self.client = client
+        self.address = address
+        self.name = f"scanfab-{uuid.uuid4().hex[:12]}"
+        self._here = ThreadPoolExecutor(4)
+        self._threads: dict[str, int] = {}
+        self._asked = -RECENT
+        self._number = 0
+        self._has_seen_files = False
+        self._lock = threading.Lock()
+
+    def __repr__(self) -> str:
+        workers = self.workers()
+        return f"DaskExecutor {self.address}: {counted(len(workers), 'worker')}"
+
+    def workers(self) -> dict[str, int]:
+        """The threads of each worker, as they were a moment ago."""
+        if time.monotonic() - self._asked >= RECENT:
+            with self._gone_if_lost():
+                self._threads = dict(self.client.nthreads())
+            self._asked = time.monotonic()
+        return self._threads
+
+    def room(self) -> int:
+        """How many frames may be under way: one for each thread, and for each worker the next."""
+        workers = self.workers()
+        return max(sum(workers.values()) + len(workers), 1)
+
+    def share(self, number: int) -> int:
+        """How many threads each of so many frames has; if but one, it goes to a worker whole."""
+        return max(sum(self.workers().values()) // number, 1)
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """Have a frame computed by one worker, or by the threads of several."""
+        (threads,) = args
+        job: Any = fn
+        if threads > 1:
+            return self._here.submit(self._spread, job, threads)
+        self._check_files(job)
+        trial = _Trial(self, job)
+        trial.send()
+        return trial.future
+
+    def shutdown(self, wait: bool = False, *, cancel_futures: bool = True) -> None:
+        """Leave what is under way; the cluster goes on for others."""
+        self._here.shutdown(wait=wait, cancel_futures=cancel_futures)
+
+    def send(self, function: Callable[..., Any], *args: Any, but: Sequence[str] = ()) -> Any:
+        """A future of Dask; it is not computed by some workers if there are others."""
+        with self._lock:
+            self._number += 1
+            key = f"{self.name}-{self._number}"
+        others = [one for one in self.workers() if one not in but] if but else None
+        return self.client.submit(
+            function, *args, key=key, pure=False, workers=others or None,
+            allow_other_workers=bool(others),
+        )  # fmt: skip
+
+    def starts(self, key: str) -> int:
+        """How many workers have begun with what a future stands for."""
+        with suppress(Exception):
+            return sum(told == key for _, told in self.client.get_events(self.name))
+        return 0
+
+    def gone(self) -> ClusterError:
+        """The error for a scheduler that is lost."""
+        return ClusterError(
+            f"{self.address}: the scheduler has gone while frames were computed: start it again, "
+            f"and go on with `resume`"
+        )
+
+    @contextmanager
+    def _gone_if_lost(self) -> Iterator[None]:
+        try:
+            yield
+        except ScanfabError:
+            raise
+        except Exception as error:
+            if isinstance(error, OSError | TimeoutError) or self.client.status != "running":
+                raise self.gone() from None
+            raise
+
+    def check_versions(self) -> None:
+        """ClusterError if workers have other versions than this process."""
+        mine = versions_here()
+        with self._gone_if_lost():
+            found = self.client.run(versions_here, on_error="return")
+        for worker, theirs in found.items():
+            if isinstance(theirs, OSError | TimeoutError):
+                # it is ending just now
+                continue
+            if isinstance(theirs, BaseException):
+                raise ClusterError(
+                    f"{worker}: this worker cannot load scanfab ({theirs}): it needs the same "
+                    f"packages as this process (scanfab {mine['scanfab']})"
+                )
+            if theirs != mine:
+                raise outdated(worker, theirs)
+        if not found:
+            warnings.warn(
+                f"{self.address}: the scheduler has no workers yet: frames wait for them",
+                ScanfabNote,
+                stacklevel=4,
+            )
+
+    def _check_files(self, job: Any) -> None:
+        """ClusterError if workers do not see the file of the first frame that is sent."""
+        file = getattr(job, "file", None)
+        if self._has_seen_files or file is None:
+            return
+        self._has_seen_files = True
+        path = file.snapshot.path.absolute()
+        with self._gone_if_lost():
+            views = self.client.run(view_there, str(path), on_error="return")
+        blind = {worker: view for worker, view in views.items() if view and isinstance(view, str)}
+        if blind and path.exists():
+            worker, view = next(iter(blind.items()))
+            raise ClusterError(
+                f"{counted(len(blind), 'worker')} of {len(views)} cannot read {path}: {worker} "
+                f"sees {view}: workers need the same files by the same paths as this process"
+            )
+
+    def _spread(self, job: Any, threads: int) -> Any:
+        """Compute a frame here, whose scans are done there."""
+        with spread_over(_Parts(self)):
+            return job(threads)
+
+
+class _Trial:
+    """One frame, tried until it is computed or given up."""
+
+    def __init__(self, executor: DaskExecutor, job: FrameJob) -> None:
+        self.executor = executor
+        self.job = job
+        self.future: Future[Any] = Future()
+        self.failures: list[tuple[str, Exception]] = []
+        """Worker and error of each try."""
+        self._sent: Any = None
+
+    def send(self) -> None:
+        """Try it, on a worker that has not failed with it, if there is one."""
+        executor = self.executor
+        but = [worker for worker, _ in self.failures]
+        topic, versions = executor.name, versions_here()
+        self._sent = executor.send(computed_there, self.job.strict, versions, topic, but=but)
+        self._sent.add_done_callback(self._done)
+
+    def _done(self, sent: Any) -> None:
+        """What has become of a try."""
+        try:
+            if not self.future.cancelled():
+                self._settle(sent)
+        except InvalidStateError:
+            # whoever wanted it has left meanwhile
+            return
+        except Exception as error:
+            with suppress(InvalidStateError):
+                self.future.set_exception(error)
+
+    def _settle(self, sent: Any) -> None:
+        if sent.status != "finished":
+            self._lost(sent)
+            return
+        found = sent.result()
+        if isinstance(found, Outdated):
+            raise outdated(found.worker, found.versions)
+        if not isinstance(found, Failed):
+            self.future.set_result(found)
+            return
+        self.failures.append((found.worker, found.error))
+        self._try_again()
+
+    def _lost(self, sent: Any) -> None:
+        """Its workers have died, or the scheduler has."""
+        from distributed.scheduler import KilledWorker
+
+        error = sent.exception() if sent.status == "error" else None
+        if isinstance(error, KilledWorker):
+            # those that had it but queued have not tried it
+            worker = str(getattr(error.last_worker, "address", error.last_worker))
+            died = ClusterError("the worker died: had it too little memory?")
+            self.failures += [(worker, died)] * self.executor.starts(sent.key)
+            self._try_again()
+        elif error is not None:
+            self.failures.append(("a worker", error))
+            self._try_again()
+        else:
+            raise self.executor.gone()
+
+    def _try_again(self) -> None:
+        if len(self.failures) < TRIES:
+            self.send()
+            return
+        error = self.failures[-1][1]
+        places = ", ".join(dict.fromkeys(place for place, _ in self.failures))
+        text = f"{error} (tried {len(self.failures)} times, on {places})"
+        known = type(error) if isinstance(error, ScanfabError) else ClusterError
+        with suppress(TypeError):
+            error = known(text)
+        self.future.set_result(self.job.given_up(error))
+
+
+class _Parts:
+    """The scans of one frame, in parts that are done by workers; its solids are sent once."""
+
+    def __init__(self, executor: DaskExecutor) -> None:
+        self.executor = executor
+        self._held: dict[str, Any] = {}
+
+    def map(self, function: Callable[..., Any], parts: Sequence[Any]) -> list[Any]:
+        """What the function makes of each part, in their order."""
+        with self.executor._gone_if_lost():
+            for _ in range(TRIES):
+                found = self._tried(Packed.of(function), parts)
+                if found is not None:
+                    return found
+                # the workers that held the solids have died
+                self._held.clear()
+        raise ClusterError(
+            f"{self.executor.address}: the workers died again and again while one frame was "
+            f"scanned: have they too little memory?"
+        )
+
+    def _tried(self, packed: Packed, parts: Sequence[Any]) -> list[Any] | None:
+        held = {name: self._sent(name, what) for name, what in packed.heavy.items()}
+        sent = [self.executor.send(scanned_there, packed.light, held, part) for part in parts]
+        found = []
+        for one in sent:
+            error = one.exception()
+            if error is None:
+                found.append(one.result())
+            elif isinstance(error, ScanfabError):
+                raise error
+            elif self.executor.client.status != "running":
+                raise self.executor.gone()
+            else:
+                return None
+        return found
+
+    def _sent(self, name: str, what: Any) -> Any:
+        if name not in self._held:
+            scatter = self.executor.client.scatter
+            self._held[name] = what, scatter(what, broadcast=True, hash=False)
+        return self._held[name][1]
+
+
+class _Difference(NamedTuple):
+    name: str
+    mine: str
+    theirs: str
+
+
+def outdated(worker: str, theirs: dict[str, str]) -> ClusterError:
+    """The error for a worker with other versions."""
+    mine = versions_here()
+    differing = [
+        _Difference(name, mine.get(name, "none"), theirs.get(name, "none"))
+        for name in sorted({*mine, *theirs})
+        if mine.get(name) != theirs.get(name)
+    ]
+    told = ", ".join(f"{one.name} {one.theirs} there and {one.mine} here" for one in differing)
+    return ClusterError(
+        f"{worker}: this worker has other versions than this process: {told}: the same are needed "
+        f"for the same numbers"
+    )
+
+
+def computed_there(job: Any, versions: dict[str, str], topic: str) -> Any:
+    """A frame's results, or why there are none."""
+    from distributed import get_worker
+
+    worker = get_worker()
+    if versions_here() != versions:
+        return Outdated(worker.address, versions_here())
+    worker.log_event(topic, worker.get_current_task())
+    try:
+        return job(1)
+    except Exception as error:
+        return Failed(worker.address, sendable(error))

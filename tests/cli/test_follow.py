@@ -1,0 +1,292 @@
+"""A running simulation is followed: the rows, and bytes, of a run over the finished folder."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+import scanfab
+from scanfab.base.errors import ReadError, ScanfabWarning, SettingsError
+from scanfab.cli.main import run
+from tests.helpers.dumps import cubic_rows, dump_text, pairs_text
+from tests.helpers.growing import in_halves, meanwhile, sample_frames
+from tests.helpers.interruptions import PROGRAM, write_series
+
+FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--workers", "1")
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    return write_series(tmp_path_factory.mktemp("follow") / "series", 4)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "dumps").mkdir()
+    return tmp_path / "dumps"
+
+
+def copied(folder: Path, files: list[Path], pause: float = 0.05) -> list:
+    """Steps that write these files one after the other."""
+    return [partial(in_halves, path.read_bytes(), folder / path.name, pause) for path in files]
+
+
+def follow(*words: str, seconds: float = 2.0) -> int:
+    return run(["compute", "dumps", *FAST, "--follow-for", str(seconds), "-o", "t.csv", *words])
+
+
+def finished_run(*words: str) -> bytes:
+    run(["compute", "dumps", *FAST, "-o", "finished.csv", *words])
+    return Path("finished.csv").read_bytes()
+
+
+def test_an_empty_folder_waits_for_frames(folder, finished):
+    thread = meanwhile([partial(time.sleep, 0.5), *copied(folder, sorted(finished.iterdir()))])
+    assert follow() == 0
+    thread.join()
+    assert Path("t.csv").read_bytes() == finished_run()
+    assert not Path("t.csv.part").exists()
+
+
+def test_grains_wait_for_their_contacts(folder):
+    """As VTK, packed; contact files come long after the grains of their frame."""
+    steps = []
+    for grains, contacts in sample_frames()[:3]:
+        steps += [*copied(folder, [grains]), partial(time.sleep, 1.4), *copied(folder, [contacts])]
+    thread = meanwhile(steps)
+    assert follow("--boundary", "mask=3") == 0
+    thread.join()
+    data = Path("t.csv").read_bytes()
+    assert data == finished_run("--boundary", "mask=3")
+    assert b",file," in data
+    assert b",geometric," not in data
+
+
+def test_a_folder_with_contact_files_only_waits(folder):
+    (folder / "pairs_0.txt").write_text(pairs_text(step=0))
+    grains = dump_text(cubic_rows(), step=0).encode()
+    thread = meanwhile(
+        [partial(time.sleep, 0.5), partial(in_halves, grains, folder / "dump_0.txt", 0.1)]
+    )
+    assert follow() == 0
+    thread.join()
+    assert Path("t.csv").read_bytes() == finished_run()
+
+
+def test_one_file_that_grows(folder, finished):
+    texts = [path.read_bytes() for path in sorted(finished.iterdir())]
+    growing = folder / "dump.txt"
+    growing.write_bytes(b"")
+
+    def append(part: bytes) -> None:
+        with open(growing, "ab") as stream:
+            stream.write(part)
+        time.sleep(0.1)
+
+    halves = [half for text in texts for half in (text[: len(text) // 2], text[len(text) // 2 :])]
+    thread = meanwhile([partial(append, half) for half in halves])
+    words = ["compute", f"dumps/{growing.name}", *FAST]
+    assert run([*words, "--follow-for", "2", "-o", "t.csv"]) == 0
+    thread.join()
+    assert run([*words, "-o", "finished.csv"]) == 0
+    assert Path("t.csv").read_bytes() == Path("finished.csv").read_bytes()
+
+
+def test_frames_of_every_kind_of_file(folder):
+    frames = write_series(folder.parent / "series", 3)
+    Path("converted").mkdir()
+    assert run(["convert", str(frames), "converted/f_{step}.npz"]) == 0
+    thread = meanwhile(copied(folder, sorted(Path("converted").iterdir())))
+    assert follow() == 0
+    thread.join()
+    assert Path("t.csv").read_bytes() == finished_run()
+
+
+@pytest.fixture
+def process(folder):
+    """Follows the folder in a process of its own."""
+    words = [*PROGRAM, "compute", "dumps", *FAST, "--follow", "-o", "t.csv"]
+    with subprocess.Popen(words, stderr=subprocess.PIPE, text=True) as process:
+        yield process
+        process.kill()
+
+
+def wait_for_rows(frames: int) -> None:
+    part, end = Path("t.csv.part"), time.monotonic() + 60
+    while not part.exists() or part.read_text().count("\n") < 4 * frames + 1:
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
+def test_the_first_signal_ends_it_in_order(process, folder, finished, sent):
+    files = sorted(finished.iterdir())
+    for path in files[:2]:
+        shutil.copy(path, folder)
+    wait_for_rows(2)
+    (folder / files[2].name).write_bytes(files[2].read_bytes()[:300])
+    process.send_signal(sent)
+    said = process.stderr.read()
+    assert process.wait(60) == 0, said
+    assert "frames under way are finished" in said
+    assert not Path("t.csv.part").exists()
+    (folder / files[2].name).unlink()
+    assert Path("t.csv").read_bytes() == finished_run()
+    # and it is gone on with, in the same way
+    for path in files[2:]:
+        shutil.copy(path, folder)
+    assert follow("--resume") == 0
+    assert Path("t.csv").read_bytes() == finished_run()
+
+
+def test_a_second_signal_interrupts(process, folder):
+    text = dump_text(cubic_rows(), step=0, box=((0, 4),) * 3)
+    (folder / "dump_0.txt").write_text(text)
+    process.send_signal(signal.SIGSTOP)
+    process.send_signal(signal.SIGTERM)
+    time.sleep(0.1)
+    process.send_signal(signal.SIGINT)
+    process.send_signal(signal.SIGCONT)
+    assert process.wait(60) in (130, 143, -signal.SIGINT, -signal.SIGTERM)
+    assert not Path("t.csv").exists()
+
+
+def test_without_any_frame_the_table_has_no_rows(folder, capsys):
+    (folder / "log.txt").write_text("nothing yet\n")
+    assert follow(seconds=0.5) == 0
+    assert Path("t.csv").read_text().count("\n") == 1
+    assert "scanfab: note: dumps: no reader knows" in capsys.readouterr().err
+
+
+def test_a_broken_file_stops_it_or_is_skipped(folder, finished, capsys):
+    files = sorted(finished.iterdir())
+    for path in files:
+        shutil.copy(path, folder)
+    (folder / files[1].name).write_bytes(files[1].read_bytes()[:300])
+    assert follow(seconds=0.5) == 1
+    said = capsys.readouterr().err
+    assert f"dumps/{files[1].name}" in said
+    assert Path("t.csv.part").read_text().count("\n") == 5
+    Path("t.csv.part").unlink()
+    assert follow("--on-error", "skip", seconds=0.5) == 1
+    assert Path("t.csv").read_bytes() == finished_run("--on-error", "skip")
+
+
+def test_a_last_file_that_is_never_whole_is_left_out(folder, finished, capsys):
+    files = sorted(finished.iterdir())
+    shutil.copy(files[0], folder)
+    (folder / files[1].name).write_bytes(files[1].read_bytes()[:300])
+    assert follow(seconds=1.5) == 0
+    said = capsys.readouterr().err
+    assert f"warning: dumps/{files[1].name}: is left out, as it was not whole" in said
+    (folder / files[1].name).unlink()
+    assert Path("t.csv").read_bytes() == finished_run()
+
+
+def test_a_folder_that_vanishes_is_named_and_nothing_is_lost(folder, finished, capsys):
+    files = sorted(finished.iterdir())
+    for path in files[:2]:
+        shutil.copy(path, folder)
+    thread = meanwhile([partial(wait_for_rows, 2), partial(shutil.rmtree, folder)])
+    assert follow("--on-error", "skip", seconds=30) == 1
+    thread.join()
+    (error,) = [one for one in capsys.readouterr().err.splitlines() if "error" in one]
+    assert error.startswith("scanfab: error: dumps: has vanished while it was followed, after 2 ")
+    assert "--resume" in error
+    shutil.copytree(finished, folder)
+    assert follow("--resume", "--on-error", "skip", seconds=0.5) == 0
+    assert Path("t.csv").read_bytes() == finished_run()
+
+
+def test_what_belongs_before_is_an_error(folder, finished):
+    files = sorted(finished.iterdir())
+    for path in files[1:3]:
+        shutil.copy(path, folder)
+    series = scanfab.follow_series(folder, seconds=5)
+    frames = iter(series)
+    assert next(frames).number == 0
+    assert next(frames).number == 1
+    shutil.copy(files[0], folder)
+    with pytest.raises(ReadError, match=f"{files[0].name}: is new, and belongs before"):
+        next(frames)
+
+
+def test_a_file_that_grows_after_it_was_taken_is_an_error(folder, finished):
+    files = sorted(finished.iterdir())
+    for path in files[:2]:
+        shutil.copy(path, folder)
+    frames = iter(scanfab.follow_series(folder, seconds=5))
+    next(frames), next(frames)
+    with open(folder / files[1].name, "a") as stream:
+        stream.write("\n")
+    with pytest.raises(ReadError, match=f"{files[1].name}: has changed after its frame was taken"):
+        next(frames)
+
+
+def test_the_plot_is_drawn_again(folder, finished, monkeypatch):
+    from scanfab.viz.figures import page
+
+    drawn = []
+    monkeypatch.setattr(page, "save_figures", lambda path, figures: drawn.append(path))
+    files = sorted(finished.iterdir())
+    thread = meanwhile(
+        [*copied(folder, files[:2]), partial(time.sleep, 2), *copied(folder, files[2:])]
+    )
+    assert follow("--plot", "p.png", seconds=3) == 0
+    thread.join()
+    assert len(drawn) >= 3
+
+
+@pytest.mark.parametrize("frames", ["-2:", "::-1", ":-1"])
+def test_frames_cannot_be_counted_from_the_end(folder, frames):
+    with pytest.raises(SettingsError, match="counts from the end of the series"):
+        scanfab.compute(scanfab.follow_series(folder, seconds=0), frames=frames)
+
+
+def test_it_ends_with_the_last_frame_that_is_asked_for(folder, finished):
+    for path in finished.iterdir():
+        shutil.copy(path, folder)
+    words = ["compute", "dumps", *FAST, "--follow", "--frames", ":2", "-o", "t.csv"]
+    assert run(words) == 0
+    assert Path("t.csv").read_bytes() == finished_run("--frames", ":2")
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["dumps", "dumps/dump_0.txt", "--follow"],
+        ["-", "--format", "lammps", "--follow"],
+        ["dumps", "--follow-for", "-1"],
+    ],
+)
+def test_wrong_usage(folder, words):
+    (folder / "dump_0.txt").write_text(dump_text(cubic_rows()))
+    assert run(["compute", *words]) == 2
+
+
+def test_the_library_follows(folder, finished):
+    thread = meanwhile(copied(folder, sorted(finished.iterdir())))
+    series = scanfab.follow_series(folder, seconds=2)
+    words = {"directions": 9, "spacing": "0.5rmin", "cutoff": "0.2rmin"}
+    table = scanfab.compute(series, **words)
+    thread.join()
+    assert table == scanfab.compute(scanfab.read_series(folder), **words)
+    assert repr(series) == f"FollowedSeries {folder}: 4 frames so far"
+    assert [frame.number for frame in series] == [0, 1, 2, 3]
+    with pytest.raises(ReadError, match="found nothing"):
+        scanfab.follow_series("no such folder")
+    with pytest.raises(SettingsError, match="seconds: expected 0 or more"):
+        scanfab.follow_series(folder, seconds=-1)
+    os.truncate(folder / "dump_300.txt", 100)
+    with pytest.warns(ScanfabWarning, match="left out"):
+        assert len(list(scanfab.follow_series(folder, seconds=0))) == 3

@@ -1,0 +1,84 @@
+"""A Dask cluster of processes of their own: a scheduler and some workers, to be killed at will."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+__all__ = ["DaskCluster"]
+
+# the usual process of a worker or a scheduler, without the one that would start it again
+KINDS = {
+    "scheduler": ("dask_scheduler", "--port", "0", "--no-dashboard", "--host", "127.0.0.1"),
+    "worker": ("dask_worker", "--nthreads", "1", "--no-nanny", "--no-dashboard"),
+}
+
+
+class DaskCluster:
+    """A scheduler and its workers, in a folder that has their file and logs."""
+
+    def __init__(self, folder: Path, workers: int = 2) -> None:
+        self.folder = folder
+        self.file = folder / "scheduler.json"
+        self.workers: list[subprocess.Popen[bytes]] = []
+        self.scheduler = self._start("scheduler")
+        end = time.monotonic() + 60
+        # it ends with a brace
+        while not self.file.exists() or not self.file.read_text().rstrip().endswith("}"):
+            assert time.monotonic() < end
+            time.sleep(0.05)
+        for _ in range(workers):
+            self.add()
+
+    def __enter__(self) -> DaskCluster:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for one in (*self.workers, self.scheduler):
+            one.kill()
+            one.wait()
+
+    @property
+    def address(self) -> str:
+        """Of the scheduler."""
+        return str(json.loads(self.file.read_text())["address"])
+
+    def add(self, **variables: str) -> None:
+        """One more worker."""
+        self.workers.append(self._start("worker", **variables))
+
+    def kill(self, place: int = 0) -> None:
+        """Kill a worker at once."""
+        worker = self.workers.pop(place)
+        worker.send_signal(signal.SIGKILL)
+        worker.wait()
+
+    def kill_scheduler(self) -> None:
+        """Kill the scheduler at once; its workers end too."""
+        self.scheduler.send_signal(signal.SIGKILL)
+        self.scheduler.wait()
+        for one in self.workers:
+            one.kill()
+            one.wait()
+        self.workers.clear()
+        self.file.unlink()
+
+    def _start(self, kind: str, **variables: str) -> subprocess.Popen[bytes]:
+        module, *words = KINDS[kind]
+        root = str(Path(__file__).parents[2])
+        log = open(self.folder / f"{kind}.log", "ab")  # noqa: SIM115
+        return subprocess.Popen(
+            [
+                sys.executable, "-m", f"distributed.cli.{module}", *words,
+                "--scheduler-file", str(self.file),
+            ],
+            cwd=self.folder,
+            stdout=log,
+            stderr=log,
+            env={**os.environ, "PYTHONPATH": root, "OMP_NUM_THREADS": "1", **variables},
+        )  # fmt: skip

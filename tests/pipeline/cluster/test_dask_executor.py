@@ -1,0 +1,323 @@
+"""Frames on a real Dask cluster of separate processes: the same rows, whatever dies."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("distributed")
+
+import scanfab
+from scanfab.base.errors import ReadError, ScanfabError
+from scanfab.cli.main import run
+from scanfab.pipeline.cluster import dask_executor as module
+from scanfab.pipeline.cluster.dask_executor import ClusterError
+from tests.helpers.dask_cluster import DaskCluster
+from tests.helpers.growing import SAMPLE
+from tests.helpers.interruptions import PROGRAM, write_series
+
+FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin")
+YADE = ("--boundary", "mask=3")
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory):
+    with DaskCluster(tmp_path_factory.mktemp("cluster")) as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def executor(cluster):
+    with scanfab.dask_executor(cluster.address) as found:
+        end = time.monotonic() + 60
+        while len(found.client.nthreads()) < 2:
+            assert time.monotonic() < end
+            time.sleep(0.1)
+        yield found
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_series(tmp_path / "dumps", 6)
+    return tmp_path
+
+
+def compute(*words: str, output: str = "t.csv") -> int:
+    return run(["compute", *words, "-o", output])
+
+
+def test_the_bytes_are_those_of_one_core(cluster, executor, folder):
+    """Sources are relative, and the workers stand elsewhere."""
+    (folder / "yade").symlink_to(SAMPLE / "yade_triaxial")
+    for words in (("dumps", *FAST), ("yade", *FAST, *YADE)):
+        assert compute(*words, "--workers", "1", output="one.csv") == 0
+        assert compute(*words, "--scheduler", cluster.address) == 0
+        assert compute(*words, "--scheduler-file", str(cluster.file), output="u.csv") == 0
+        expected = Path("one.csv").read_bytes()
+        assert Path("t.csv").read_bytes() == expected
+        assert Path("u.csv").read_bytes() == expected
+
+
+def test_manifests_are_the_same_too(cluster, executor, folder):
+    assert compute("dumps", *FAST, output="one.csv") == 0
+    assert compute("dumps", *FAST, "--scheduler", cluster.address) == 0
+    one, other = (json.loads(Path(f"{n}.csv.manifest.json").read_text()) for n in ("one", "t"))
+    assert one == other
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"tolerance": 3e-3, "with_": "harmonics"},
+        {"cutoffs": "0.2rmin,0.5rmin", "tolerance": 5e-3},
+        {"edge": "start", "tolerance": 1e-2},
+        {"edge": "ends", "tolerance": 1e-2},
+    ],
+)
+@pytest.mark.filterwarnings("ignore:frame 0, variant")
+def test_one_frame_is_scanned_by_all(executor, folder, options):
+    frame = scanfab.read_series("dumps")[:1]
+    far = scanfab.compute(frame, executor=executor, **options)
+    assert far == scanfab.compute(frame, workers=1, **options)
+
+
+def test_a_periodic_frame_too(executor):
+    frame = scanfab.read_series(SAMPLE / "liggghts_periodic")[-1:]
+    words = {"tolerance": 5e-3, "variants": "ac"}
+    assert scanfab.compute(frame, executor=executor, **words) == scanfab.compute(frame, **words)
+
+
+def test_packings_from_anywhere(executor, folder):
+    packings = [frame.read() for frame in scanfab.read_series("dumps")]
+    words = {"directions": 9, "spacing": "0.5rmin"}
+    far = scanfab.compute(iter(packings), executor=executor, **words)
+    assert far == scanfab.compute(packings, **words)
+
+
+def test_the_plain_executor_of_dask_serves_too(executor, folder):
+    words = {"directions": 9, "spacing": "0.5rmin"}
+    series = scanfab.read_series("dumps")
+    far = scanfab.compute(series, executor=executor.client.get_executor(), **words)
+    assert far == scanfab.compute(series, **words)
+
+
+def test_a_running_simulation(cluster, executor, folder):
+    words = ("dumps", *FAST, "--follow-for", "1.5", "--scheduler", cluster.address)
+    assert compute(*words) == 0
+    assert compute("dumps", *FAST, output="one.csv") == 0
+    assert Path("t.csv").read_bytes() == Path("one.csv").read_bytes()
+
+
+def test_a_frame_that_fails_is_tried_on_other_workers_and_skipped(
+    cluster, executor, folder, capsys
+):
+    text = Path("dumps/dump_300.txt").read_text().splitlines(keepends=True)
+    Path("dumps/dump_300.txt").write_text("".join([*text[:20], "1 2 x\n", *text[21:]]))
+    words = ("dumps", *FAST, "--scheduler", cluster.address)
+    assert compute(*words, "--on-error", "skip") == 1
+    said = capsys.readouterr().err
+    (skipped,) = [line for line in said.splitlines() if "skipped" in line]
+    assert "frame 3 skipped: " in skipped
+    assert "dump_300.txt" in skipped
+    assert "tried 3 times, on tcp://" in skipped
+    assert skipped.count("tcp://") == 2
+    assert compute("dumps", *FAST, "--on-error", "skip", output="one.csv") == 1
+    assert Path("t.csv").read_bytes() == Path("one.csv").read_bytes()
+    assert compute(*words, output="stopped.csv") == 1
+    assert "dump_300.txt" in capsys.readouterr().err
+
+
+@dataclass(frozen=True)
+class Slow:
+    """A job that leaves a mark where it begins, and may take its worker down."""
+
+    mark: Path
+    deaths: int = 0
+    file: Any = None
+
+    @property
+    def strict(self) -> Slow:
+        return self
+
+    def given_up(self, error: Exception) -> Any:
+        raise error
+
+    def __call__(self, threads: int) -> int:
+        with open(self.mark, "a") as stream:
+            stream.write(f"{os.getpid()}\n")
+        time.sleep(0.3)
+        if len(self.mark.read_text().splitlines()) <= self.deaths:
+            os._exit(9)
+        return threads
+
+
+@pytest.fixture
+def fragile(tmp_path):
+    """A cluster whose workers may die."""
+    (tmp_path / "cluster").mkdir()
+    with DaskCluster(tmp_path / "cluster") as found:
+        yield found
+
+
+def test_workers_that_die_cost_their_frames_again(fragile, folder):
+    """Killed in the middle; the frames that they had but queued are no tries."""
+    assert compute("dumps", *FAST, output="one.csv") == 0
+    part = Path("t.csv.part")
+
+    def kill_some() -> None:
+        while not part.exists() or not part.stat().st_size:
+            time.sleep(0.01)
+        for _ in range(2):
+            fragile.add()
+            fragile.kill()
+
+    killer = threading.Thread(target=kill_some)
+    killer.start()
+    assert compute("dumps", *FAST, "--scheduler-file", str(fragile.file)) == 0
+    killer.join()
+    assert Path("t.csv").read_bytes() == Path("one.csv").read_bytes()
+
+
+def test_a_frame_that_kills_its_workers_is_given_up(fragile, tmp_path):
+    for _ in range(3):
+        fragile.add()
+    with scanfab.dask_executor(scheduler_file=fragile.file) as executor:
+        while len(executor.client.nthreads()) < 5:
+            time.sleep(0.1)
+        deadly = executor.submit(Slow(tmp_path / "deadly", 99), 1)
+        with pytest.raises(ClusterError, match=r"the worker died: .*tried"):
+            deadly.result(60)
+        # the others go on
+        assert executor.submit(Slow(tmp_path / "other"), 1).result(60) == 1
+
+
+def test_the_scheduler_dies_and_the_run_is_resumed(fragile, folder):
+    assert compute("dumps", *FAST, output="one.csv") == 0
+    words = [*PROGRAM, "compute", "dumps", *FAST, "-o", "t.csv", "--scheduler-file"]
+    with subprocess.Popen(
+        [*words, str(fragile.file)], stderr=subprocess.PIPE, text=True
+    ) as process:
+        part = Path("t.csv.part")
+        while not part.exists() or not part.stat().st_size:
+            time.sleep(0.01)
+        fragile.kill_scheduler()
+        said = process.stderr.read()
+        assert process.wait(60) == 1
+    assert "error: tcp://127.0.0.1:" in said
+    assert "the scheduler has gone while frames were computed" in said
+    assert said.count("error") == 1
+    (folder / "next").mkdir()
+    with DaskCluster(folder / "next") as other:
+        assert compute("dumps", *FAST, "--scheduler-file", str(other.file), "--resume") == 0
+    assert Path("t.csv").read_bytes() == Path("one.csv").read_bytes()
+
+
+def test_files_that_workers_do_not_see(executor, folder, monkeypatch):
+    monkeypatch.setattr(module, "view_there", _blind)
+    monkeypatch.setattr(executor, "_has_seen_files", False)
+    with pytest.raises(ClusterError) as told:
+        scanfab.compute(scanfab.read_series("dumps"), executor=executor, directions=9)
+    assert f"2 workers of 2 cannot read {folder}/dumps/dump_" in str(told.value)
+    assert "sees /home with nothing in it" in str(told.value)
+
+
+def _blind(path: str) -> str:
+    return "/home with nothing in it"
+
+
+def test_what_a_worker_sees(tmp_path):
+    from scanfab.pipeline.cluster.on_worker import view_there
+
+    (tmp_path / "dump_0.txt").write_text("")
+    assert view_there(str(tmp_path / "dump_0.txt")) == ""
+    missing = tmp_path / "no" / "such" / "dump_1.txt"
+    assert view_there(str(missing)) == f"{tmp_path} with dump_0.txt in it"
+
+
+def test_other_versions_are_an_error_that_names_both(executor, monkeypatch):
+    mine = {**module.versions_here(), "numpy": "1.0.0"}
+    theirs = module.versions_here()["numpy"]
+    monkeypatch.setattr(module, "versions_here", _Stays(mine))
+    with pytest.raises(ClusterError, match=f"numpy {theirs} there and 1.0.0 here"):
+        executor.submit(Slow(Path("unused")), 1).result(60)
+
+
+class _Stays:
+    """What is sent to workers is still the function of their own."""
+
+    def __init__(self, mine: dict[str, str]) -> None:
+        self.mine = mine
+
+    def __call__(self) -> dict[str, str]:
+        return self.mine
+
+    def __reduce__(self) -> str | tuple[Any, ...]:
+        from scanfab.pipeline.cluster import on_worker
+
+        return getattr, (on_worker, "versions_here")
+
+
+def test_workers_that_come_later_are_waited_for(tmp_path, folder):
+    (tmp_path / "late").mkdir()
+    with DaskCluster(tmp_path / "late", workers=0) as late:
+        timer = threading.Timer(1.0, late.add)
+        timer.start()
+        code = compute("dumps", *FAST, "--scheduler", late.address)
+        timer.join()
+        assert code == 0
+
+
+def test_no_scheduler_is_one_clear_message(folder, capsys):
+    with socket.socket() as silent:
+        silent.bind(("127.0.0.1", 0))
+        free = silent.getsockname()[1]
+        words = ("dumps", *FAST, "--scheduler", f"tcp://127.0.0.1:{free}")
+        assert compute(*words) == 1
+        assert "no scheduler is there" in capsys.readouterr().err
+    assert compute("dumps", *FAST, "--scheduler", "nonsense") == 1
+    assert "expected the address of a scheduler" in capsys.readouterr().err
+    Path("file.json").write_text("{}")
+    assert compute("dumps", *FAST, "--scheduler-file", "file.json") == 1
+    assert "with its address, found something else: is" in capsys.readouterr().err
+
+
+def test_who_does_not_answer_is_named(folder, capsys, monkeypatch):
+    monkeypatch.setattr(module, "TIMEOUT", 0.3)
+    with socket.socket() as silent:
+        silent.bind(("127.0.0.1", 0))
+        silent.listen()
+        address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
+        assert compute("dumps", *FAST, "--scheduler", address) == 1
+    assert f"{address}: does not answer as a Dask scheduler" in capsys.readouterr().err
+    assert compute("dumps", *FAST, "--scheduler-file", "none.json") == 1
+    assert "none.json: expected the file that a Dask scheduler writes" in capsys.readouterr().err
+
+
+def test_wrong_usage(cluster, folder):
+    both = ("--scheduler", cluster.address, "--scheduler-file", str(cluster.file))
+    assert compute("dumps", *both) == 2
+    assert compute("dumps", "--scheduler", cluster.address, "--vtk", "vtk") == 2
+
+
+def test_errors_that_cannot_be_sent_are_told_all_the_same():
+    from scanfab.pipeline.cluster.on_worker import sendable
+
+    class OddError(Exception):
+        def __init__(self, one: int, two: int) -> None:
+            super().__init__("odd")
+
+    assert str(sendable(OddError(1, 2))) == "OddError: odd"
+    assert isinstance(sendable(ReadError("x")), ReadError)
+    assert issubclass(ClusterError, ScanfabError)
