@@ -101,7 +101,7 @@ RUNS = {
     "yade_2": Run("yade_2", SHELL),
     "yade_dense": Run("yade_dense", SHELL),
     "yade_reversal": Run("yade_1", SHELL, "40:", ("default", "start")),
-    "periodic_1": Run("periodic_1", measures=("default", "counts", "cutoffs")),
+    "periodic_1": Run("periodic_1", measures=("default", "start", "counts", "cutoffs")),
     "biaxial_1": Run("biaxial_1", measures=("default", "counts", "cutoffs")),
 }
 
