@@ -73,7 +73,14 @@ class Frame:
         return f"Frame {self.number} of {self.series.name}: {', '.join(what)}"
 
     def alone(self) -> Frame:
-        """The frame for another process, which need not know the other files nor our folder."""
+        """
+        The frame for another process, which need not know the other files nor our folder.
+
+        Returns
+        -------
+        Frame
+            With absolute paths.
+        """
         series, path = self.series, self.snapshot.path
         families = [_of_step(one, self.name_step, self.step) for one in series.contacts]
         grains = replace(series.grains, files=_absolute(series.grains.files))

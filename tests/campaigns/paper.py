@@ -55,6 +55,10 @@ class Run:
     def is_shell(self) -> bool:
         return "--boundary" in self.options
 
+    @property
+    def is_plane(self) -> bool:
+        return self.folder.startswith("biaxial")
+
 
 @dataclass(frozen=True)
 class Measure:
@@ -109,6 +113,8 @@ RUNS = {
 def words(runs: Path, run: Run, name: str) -> list[str]:
     """The command that computes a table, but for the file."""
     measure, more = MEASURES[name], []
+    # in a plane directions are so many equal steps
+    options = ["25" if run.is_plane and one == "lebedev:15" else one for one in measure.options]
     if name == "counts" and run.is_shell:
         radius = np.genfromtxt(runs / run.folder / "engine.csv", delimiter=",", names=True)
         more = ["--rv-radius", repr(float(radius["rv_radius"][0])), "--rv-center", "0", "0", "0"]
@@ -122,7 +128,7 @@ def words(runs: Path, run: Run, name: str) -> list[str]:
         *run.options,
         "--frames",
         run.frames,
-        *measure.options,
+        *options,
         *more,
         *kept,
     ]

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import logging
-import socket
 import threading
 import time
 import uuid
@@ -13,12 +11,19 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, InvalidStateError, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 from scanfab.base.errors import ScanfabError, ScanfabNote, SettingsError
 from scanfab.base.spelling import counted
 from scanfab.base.threads import spread_over
 from scanfab.io.grain_files import PathLike
+from scanfab.pipeline.cluster.connection import (
+    ClusterError,
+    address_in,
+    check_that_one_listens,
+    connected,
+    outdated,
+)
 from scanfab.pipeline.cluster.on_worker import (
     Failed,
     Outdated,
@@ -32,16 +37,10 @@ from scanfab.pipeline.cluster.packed import Packed
 __all__ = ["ClusterError", "DaskExecutor", "dask_executor"]
 
 NEEDS = "a Dask cluster needs the package distributed: pip install 'scanfab[cluster]'"
-# seconds within which a scheduler answers
-TIMEOUT = 10.0
 # of a frame that raises errors, or takes its worker down
 TRIES = 3
 # seconds for which the number of workers is taken for what it was
 RECENT = 2.0
-
-
-class ClusterError(ScanfabError):
-    """The scheduler or the workers cannot be used; says what was found and what to do."""
 
 
 class FrameJob(Protocol):
@@ -82,7 +81,7 @@ def dask_executor(
 
     Raises
     ------
-    ClusterError
+    ScanfabError
         If no scheduler answers, or workers have other versions or do not see the files.
     SettingsError
         If not just one of the two is named, or distributed is not installed.
@@ -101,10 +100,10 @@ def dask_executor(
     except ImportError:
         raise SettingsError(NEEDS) from None
     connect: Any = distributed.Client
-    address = _address_in(Path(scheduler_file)) if scheduler_file is not None else str(scheduler)
+    address = address_in(Path(scheduler_file)) if scheduler_file is not None else str(scheduler)
     with _quiet():
-        _check_that_one_listens(address)
-        client = _connected(connect, address)
+        check_that_one_listens(address)
+        client = connected(connect, address)
         executor = DaskExecutor(client, address)
         try:
             executor.check_versions()
@@ -126,72 +125,6 @@ def _quiet() -> Iterator[None]:
     finally:
         for name, level in before.items():
             logging.getLogger(name).setLevel(level)
-
-
-def _address_in(path: Path) -> str:
-    """The address in a scheduler file, which may come in a moment."""
-    end = time.monotonic() + TIMEOUT
-    while True:
-        try:
-            return str(json.loads(path.read_text("utf-8"))["address"])
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            # it may be in the middle of being written
-            if time.monotonic() > end or isinstance(error, KeyError | TypeError):
-                break
-        time.sleep(0.1)
-    found = "something else" if path.exists() else f"nothing within {TIMEOUT:g} s"
-    raise ClusterError(
-        f"{path}: expected the file that a Dask scheduler writes, with its address, found {found}: "
-        f"is the scheduler started with this file?"
-    )
-
-
-def _check_that_one_listens(address: str) -> None:
-    """ClusterError if there is nobody; addresses of other kinds than tcp are left to Dask."""
-    kind, _, place = address.rpartition("://")
-    host, _, port = place.rpartition(":")
-    if kind not in ("", "tcp"):
-        return
-    if not host or not port.isdigit():
-        raise ClusterError(f"{address}: expected the address of a scheduler, as tcp://HOST:8786")
-    try:
-        with socket.create_connection((host.strip("[]"), int(port)), TIMEOUT) as stream:
-            stream.settimeout(TIMEOUT)
-            # a scheduler speaks first, and Dask would wait for it without an end
-            speaks = bool(stream.recv(1))
-    except TimeoutError:
-        speaks = False
-    except (OSError, OverflowError) as error:
-        raise ClusterError(
-            f"{address}: no scheduler is there ({error}): start one with `dask scheduler`, or name "
-            f"the address that it prints"
-        ) from None
-    if not speaks:
-        raise _silent(address, "it says nothing")
-
-
-def _connected(connect: Callable[..., Any], address: str) -> Any:
-    """A client, within the time that a scheduler has to answer."""
-    found: Future[Any] = Future()
-
-    def try_it() -> None:
-        try:
-            found.set_result(connect(address, timeout=TIMEOUT, set_as_default=False))
-        except Exception as error:
-            found.set_exception(error)
-
-    threading.Thread(target=try_it, daemon=True).start()
-    try:
-        return found.result(2 * TIMEOUT)
-    except Exception as error:
-        raise _silent(address, str(error) or "no answer") from None
-
-
-def _silent(address: str, reason: str) -> ClusterError:
-    return ClusterError(
-        f"{address}: does not answer as a Dask scheduler within {TIMEOUT:g} s ({reason}): is "
-        f"another program there, or another version of Dask?"
-    )
 
 
 class DaskExecutor(Executor):
@@ -294,7 +227,7 @@ class DaskExecutor(Executor):
                     f"packages as this process (scanfab {mine['scanfab']})"
                 )
             if theirs != mine:
-                raise outdated(worker, theirs)
+                raise outdated(worker, theirs, mine)
         if not found:
             warnings.warn(
                 f"{self.address}: the scheduler has no workers yet: frames wait for them",
@@ -362,7 +295,7 @@ class _Trial:
             return
         found = sent.result()
         if isinstance(found, Outdated):
-            raise outdated(found.worker, found.versions)
+            raise outdated(found.worker, found.versions, versions_here())
         if not isinstance(found, Failed):
             self.future.set_result(found)
             return
@@ -441,27 +374,6 @@ class _Parts:
             scatter = self.executor.client.scatter
             self._held[name] = what, scatter(what, broadcast=True, hash=False)
         return self._held[name][1]
-
-
-class _Difference(NamedTuple):
-    name: str
-    mine: str
-    theirs: str
-
-
-def outdated(worker: str, theirs: dict[str, str]) -> ClusterError:
-    """The error for a worker with other versions."""
-    mine = versions_here()
-    differing = [
-        _Difference(name, mine.get(name, "none"), theirs.get(name, "none"))
-        for name in sorted({*mine, *theirs})
-        if mine.get(name) != theirs.get(name)
-    ]
-    told = ", ".join(f"{one.name} {one.theirs} there and {one.mine} here" for one in differing)
-    return ClusterError(
-        f"{worker}: this worker has other versions than this process: {told}: the same are needed "
-        f"for the same numbers"
-    )
 
 
 def computed_there(job: Any, versions: dict[str, str], topic: str) -> Any:

@@ -20,6 +20,7 @@ pytest.importorskip("distributed")
 import scanfab
 from scanfab.base.errors import ReadError, ScanfabError
 from scanfab.cli.main import run
+from scanfab.pipeline.cluster import connection
 from scanfab.pipeline.cluster import dask_executor as module
 from scanfab.pipeline.cluster.dask_executor import ClusterError
 from tests.helpers.dask_cluster import DaskCluster
@@ -294,7 +295,7 @@ def test_no_scheduler_is_one_clear_message(folder, capsys):
 
 
 def test_who_does_not_answer_is_named(folder, capsys, monkeypatch):
-    monkeypatch.setattr(module, "TIMEOUT", 0.3)
+    monkeypatch.setattr(connection, "TIMEOUT", 0.3)
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))
         silent.listen()
