@@ -7,12 +7,14 @@ Every number of it comes from the tables in sample_data/paper, which
 
 from __future__ import annotations
 
+import csv
 import io
 import math
 import warnings
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import redirect_stdout
 from functools import cache
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -315,6 +317,46 @@ def printed_radius() -> float:
     return float((13_723 * 1.25 / (1 - porosity)) ** (1 / 3))
 
 
+def others() -> str:
+    """Packings of other people: the mean length against a closed form, and how isotropic it is."""
+    lines = []
+    with (TABLES / "others.csv").open(encoding="utf-8", newline="") as file:
+        samples = groupby(csv.DictReader(file), key=lambda row: row["sample"])
+        for name, rows in samples:
+            first, *_, last = cut = list(rows)
+            solid = float(first["solid_fraction"])
+            # equal spheres that do not overlap: the void over what all lines meet of the surfaces
+            exact = 4 * (1 - solid) / (3 * solid) * float(last["cutoff"])
+            ratios = [
+                abs(float(row[f"alpha_vs_{axis}"]) / float(row[f"alpha_vs_{axis}_se"]))
+                for row in cut
+                for axis in "xyz"
+                if row[f"alpha_vs_{axis}_se"]
+            ]
+            lines.append(
+                [
+                    name,
+                    f"{solid:.3f}",
+                    f"{float(first['coordination']):.2f}",
+                    f"{100 * (float(first['mean_length']) / exact - 1):+.2f} %",
+                    thousandths(first),
+                    thousandths(last),
+                    f"{max(ratios):.1f}" if ratios else "-",
+                ]
+            )
+    head = ["sample", "solid fraction", "coordination", "ℓ at c = 0, off its closed form"]
+    head += ["10³ α_vs axial along z, c = 0", "c = r", "most errors from 0"]
+    return markdown(head, lines)
+
+
+def thousandths(row: dict[str, str]) -> str:
+    """The anisotropy along z with its error, where that is known."""
+    error = row["alpha_vs_z_se"]
+    return f"{1e3 * float(row['alpha_vs_z']):+.2f}" + (
+        f" ± {1e3 * float(error):.2f}" if error else ""
+    )
+
+
 def command(*words: str) -> str:
     """What a command prints, with the command, as people would run it."""
     out = io.StringIO()
@@ -338,6 +380,7 @@ PARTS: dict[str, Callable[[], str]] = {
     "off_diagonals": off_diagonals, "rise": rise, "apart": apart, "smoothness": smoothness,
     "normalised": normalised,
     "slopes": slopes, "choices": choices, "shell_stress": shell_stress, "summaries": summaries,
+    "others": others,
     "printed_radius": lambda: f"{printed_radius():.1f}",
 }  # fmt: skip
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import shutil
 from pathlib import Path
 
 import pytest
@@ -28,6 +29,7 @@ def page(tmp_path, monkeypatch):
         write(folder / f"{name}_engine.csv", engine_rows("biaxial" in name))
         for measure in run.measures:
             write(folder / f"{name}_{measure}.csv", table_rows(run, measure))
+    shutil.copy(paper.TABLES / "others.csv", folder)
     monkeypatch.chdir(tmp_path)
     made = script("make_validation")
     monkeypatch.setattr(made, "TABLES", folder)

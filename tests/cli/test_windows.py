@@ -117,7 +117,7 @@ def test_a_box_is_resumed_with_its_column(compute):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--rv-shape", "box", "--rv-size", "1,2,3,4"], "--rv-size: expected A,B,C, full edges"),
+        (["--rv-shape", "box", "--rv-size", "1,2"], "--rv-size: expected A,B,C, full edges"),
         (["--rv-shape", "cylinder", "--rv-size", "1,2,3"], "--rv-size: expected R,H, radius and"),
         (["--rv-shape", "ellipsoid", "--rv-size", "1,0,1"], "two or three lengths above 0"),
         (["--rv-size", "1,2,3"], "--rv-size: the shape sphere takes none: choose --rv-radius"),
@@ -140,8 +140,6 @@ def test_what_cannot_be_is_told_with_what_to_choose(compute, words, message):
     [
         (SHEAR, ["--rv-size", "0.1,0.1,0.1"], "overlaps its own image"),
         (SHEAR, ["--rv-size", "1e-15,0.01,0.01"], "is nothing beside"),
-        # of discs that would do: what the grains are is known when they are read
-        (BOX, ["--rv-size", "0.01,0.01"], "--rv-size: expected A,B,C, full edges"),
         (BOX, ["--rv-size", "0.2,0.01,0.01"], "beyond the sample, that is more than two"),
         (BOX, ["--rv-size", "0.001,0.001,0.001", "--rv-center", "9", "9", "9"], "holds no grain"),
         (BOX, ["--rv", "70"], "beyond the sample"),
@@ -163,7 +161,7 @@ def test_broken_surfaces_are_told(compute, tmp_path):
     file.write_bytes(b"ply\nnonsense")
     code, told = compute("--rv-shape", str(file))
     assert code == 1
-    assert "open.ply: cannot be read: meshio cannot read it" in told
+    assert "open.ply: cannot be read as a surface" in told
 
 
 @pytest.mark.parametrize("name", ["box", "cylinder", "ellipsoid", "follows"])

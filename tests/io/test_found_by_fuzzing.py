@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import time
+import warnings
 
 import numpy as np
 import pytest
@@ -401,3 +402,15 @@ def test_lines_beside_cells_of_other_kinds(tmp_path):
     mesh = read_mesh(legacy(tmp_path / "a.vtk", body, dataset="UNSTRUCTURED_GRID"))
     assert mesh.lines.tolist() == [[0, 1]]
     assert mesh.has_faces
+
+
+def test_a_nan_that_signals_is_no_warning(tmp_path):
+    points = np.array([[1, 2, 3]], np.float32)
+    points.view(np.uint32)[0, 0] = 0x7F800001
+    cloud = pyvista.PolyData(points)
+    cloud["radius"] = [1.0]
+    cloud.save(tmp_path / "a.vtp")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        with pytest.raises(scanfab.ScanfabError, match="finite"):
+            scanfab.read(tmp_path / "a.vtp")

@@ -71,7 +71,7 @@ class Sample:
             total += np.outer(force, self.branch(one, two, image)) / AREA
         return 0.5 * (total + total.T)
 
-    def solid_area(self, steps=600):
+    def solid_area(self, steps=300):
         """Of all bodies, what discs of one body share once, on a fine grid."""
         at = (np.arange(steps) + 0.5) / steps
         points = np.stack(np.meshgrid(at, at, indexing="ij"), -1).reshape(-1, 2) @ VECTORS[:2, :2]

@@ -84,10 +84,12 @@ def counted_rows(
         end, so that digits may be missing.
     """
     path = snapshot.path
-    if FILLED.search(data[begin:end]) is None:
+    end = min(end, len(data))
+    if FILLED.search(data, begin, end) is None:
         values: FloatArray = np.zeros((0, widths[0]))
     else:
-        if not data[begin:end].rstrip(b" \t\r").endswith(b"\n"):
+        # blanks behind the last line end do no harm
+        if not data[max(begin, end - PIECE) : end].rstrip(b" \t\r").endswith(b"\n"):
             raise ReadError(f"{path}: the last line has no end: the file is incomplete")
         large = _large(data, begin, end)
         if large is None:
@@ -106,10 +108,11 @@ def _large(data: bytes, begin: int, end: int) -> FloatArray | None:
     """The rows of a long table, by a faster parser that wants single blanks; None if it fails."""
     if end - begin < LONG:
         return None
-    text = data[begin:end].strip() + b"\n"
+    first = FILLED.search(data, begin, end)
+    text = data[begin if first is None else first.start() : end].rstrip(b"\n") + b"\n"
     while b"  " in text:
         text = text.replace(b"  ", b" ")
-    text = text.replace(b"\n ", b"\n").replace(b" \n", b"\n")
+    text = text.lstrip(b" ").replace(b"\n ", b"\n").replace(b" \n", b"\n")
     return parse_regular(text, len(text[: text.find(b"\n")].split()))
 
 

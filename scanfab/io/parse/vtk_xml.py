@@ -101,6 +101,8 @@ class _Piece:
         """What all arrays fill."""
         return sum(array.bytes for arrays in self.found.values() for array in arrays)
 
+    # a float may be a NaN that signals when it is cast
+    @np.errstate(invalid="ignore")
     def content(self) -> Content:
         """The piece, read."""
         if self.file.root.get("type") == "RectilinearGrid":

@@ -92,7 +92,7 @@ class LfDemReader:
         columns = {"position": values[:, place.start : place.stop]}
         names = {"particle index": "id"}
         for name, where in legend.items():
-            if where is not place and len(where):
+            if where is not place:
                 own = values[:, where.start : where.stop]
                 columns[names.get(name, name)] = own[:, 0] if len(where) == 1 else own
         return grain_table(path, columns, _cell(path, head, shift), options)
@@ -124,8 +124,9 @@ def _legend(head: bytes) -> dict[str, range]:
     """The columns of each name, from 0."""
     found = {}
     for first, last, name in LEGEND.findall(head):
-        start = int(first) - 1
-        found[name.decode("utf-8", "replace").strip()] = range(start, int(last or first))
+        where = range(max(int(first) - 1, 0), int(last or first))
+        if len(where):
+            found[name.decode("utf-8", "replace").strip()] = where
     return found
 
 

@@ -149,6 +149,8 @@ def _with_contacts(path: Path, grains: GrainTable, rows: Rows | None) -> GrainTa
     if np.any(pairs[:, 0] == pairs[:, 1]):
         raise ReadError(f"{path}: an interaction names the grain {pairs[0, 0]} twice")
     forces = -np.array(force, dtype=np.float64).reshape(-1, 3)
+    if not np.all(np.isfinite(forces)):
+        raise ReadError(f"{path}: expected finite numbers as forces of interactions")
     joined = join_ids(path, grains, pairs, forces, walls=False)
     # a wall's own number is none of a grain: the second id is one that no grain has
     touching = _whole(path, walls)

@@ -107,7 +107,7 @@ class MercuryReader:
         if is_restart(first_bytes(path)):
             return read_restart(snapshot, options)
         data = text_of(snapshot)
-        line, _, _ = data.partition(b"\n")
+        line = data[: max(data.find(b"\n"), 0)]
         bounds = _bounds(line)
         if bounds is None:
             raise ReadError(f"{path}: expected the number of grains, time and bounds")
@@ -148,6 +148,8 @@ class MercuryReader:
                 f"both files belong to the same time?"
             )
         pairs, force = _once(rows[~wall], values[~wall])
+        if not np.all(np.isfinite(force)):
+            raise ReadError(f"{path}: expected finite numbers as forces and normals")
         # rows of the grain file, whatever ids these have
         numbered = grains._replace(id=np.arange(count))
         joined = join_ids(path, numbered, pairs, force, walls=False)
@@ -231,6 +233,7 @@ def _ends_whole(stream: IO[bytes], size: int) -> bool:
     return stream.read(1) == b"\n"
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def _once(
     rows: npt.NDArray[np.int64], values: FloatArray
 ) -> tuple[npt.NDArray[np.int64], FloatArray]:

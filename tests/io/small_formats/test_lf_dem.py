@@ -51,6 +51,7 @@ def test_a_plane_does_not_repeat_across(tmp_path):
         ("# Lz 6", "# Lz", "expected lines '# Lx'"),
         ("#2: radius", "#2: size", "no reader knows|expected points with a radius"),
         ("0 1 0 0 2.5 9", "0 1 0 0 2.5 9 9", "the number of columns changed"),
+        ("#6-8:", "#0:", "expected 5 columns of particles, found 8"),
         ("#6-8:", "#6-9:", "expected 9 columns of particles, found 8"),
     ],
 )

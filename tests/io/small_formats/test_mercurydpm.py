@@ -139,6 +139,13 @@ def test_contacts_of_other_grains(run):
         scanfab.read(run / "run.data", contacts=run / "run.fstat")
 
 
+def test_a_force_that_is_no_number(run):
+    path = run / "run.fstat"
+    path.write_text(path.read_text().replace(f" {NORMAL} ", " 1e308 ").replace(" 0.5 ", " nan "))
+    with pytest.raises(scanfab.ScanfabError, match="force"):
+        scanfab.read_series(run, cell=(1, 2, 3))[2].read()
+
+
 def test_interactions_for_paraview_are_refused(tmp_path):
     names = "".join(
         f'<DataArray Name="{name}"/>' for name in ("Overlap", "ContactRadius", "TangentialOverlap")
