@@ -40,8 +40,6 @@ MAIN = "yade_1"
 SLOPE, SLOPE_2D = 0.096, 0.231
 UP_TO = 0.12
 VARIANTS = "abcd"
-# an interval from octants, each left out in turn
-QUANTILE = float(student.ppf(0.975, 7))
 CUT = ["--fields", "source,variant,frames,slope,slope_se,r2,peak,peak_strain,final"]
 SUMMARY = ["--summary", *CUT, "--digits", "4"]
 
@@ -87,13 +85,19 @@ def markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "".join("| " + " | ".join(line) + " |\n" for line in lines)
 
 
-def interval(fit: Any) -> str:
+def half_width(fit: Any, name: str) -> float:
+    """Of the 95 % interval of a slope, from octants or quadrants that are left out in turn."""
+    blocks = 4 if "biaxial" in name else 8
+    return float(student.ppf(0.975, blocks - 1)) * (fit.slope_se or 0.0)
+
+
+def interval(fit: Any, name: str) -> str:
     """A slope with its 95 % interval, where the table has octants."""
     if fit.slope is None:
         return "-"
     if fit.slope_se is None:
         return f"{fit.slope:.3f}"
-    half = QUANTILE * fit.slope_se
+    half = half_width(fit, name)
     return f"{fit.slope:.3f} ({fit.slope - half:.3f} to {fit.slope + half:.3f})"
 
 
@@ -246,10 +250,10 @@ def slopes() -> str:
             early, all_ = fits(f"{name}_{measure}"), fits(f"{name}_{measure}", None)
             for variant in early:
                 expected = SLOPE_2D if "biaxial" in name else SLOPE
-                half = QUANTILE * (early[variant].slope_se or 0)
+                half = half_width(early[variant], name)
                 holds = abs((early[variant].slope or math.nan) - expected) <= half
                 rule = "clip" if measure == "default" else measure
-                cells = [interval(early[variant]), interval(all_[variant])]
+                cells = [interval(fit[variant], name) for fit in (early, all_)]
                 cells.append(f"{early[variant].slope_origin:.3f}")
                 lines.append([f"`{name}`", variant, rule, *cells, "yes" if holds else "no"])
     head = [
