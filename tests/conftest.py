@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,6 +14,11 @@ from scanfab.table.reading import read_rows
 
 ROOT = Path(__file__).parents[1]
 SAMPLE = "sample_data/yade_triaxial"
+
+# A shell's job in the background ignores interrupts, and so would the programs that tests start and
+# interrupt.
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 class Computed(NamedTuple):
