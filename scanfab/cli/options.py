@@ -37,7 +37,7 @@ Completion = Callable[[click.Context, click.Parameter, str], list[CompletionItem
 
 READING = (
     "format", "columns", "contact_columns", "skip", "radius", "cell", "periodic", "bodies",
-    "max_unpacked", "contacts",
+    "max_unpacked", "contacts", "dim",
 )  # fmt: skip
 SAMPLE = ("boundary", "min_contacts", "rattlers", "min_force", "contact_tolerance")
 WINDOW = ("rv", "rv_radius", "rv_center", "rv_shape", "rv_size", "rv_axis", "rv_follows")

@@ -46,6 +46,8 @@ __all__ = [
 
 # of a tangential to the mean normal force: what remains of it where only digits are left
 NO_FRICTION = 1e-4
+# of the largest force: what differs by less is equal
+ROUNDING = 1e-12
 
 
 class ContactForces(NamedTuple):
@@ -298,7 +300,10 @@ class Forces:
             mean = tangential_force_fabric(normals, forces.force, axis, space)
             found |= _mean_values("ft", mean)
         if len(normals):
-            strong = forces.force_n > forces.force_n.mean()
+            # what differs from the mean by rounding alone is equal to it
+            strong = (
+                forces.force_n > forces.force_n.mean() + ROUNDING * np.abs(forces.force_n).max()
+            )
             found |= _contact_values("gc_strong", normals[strong], axis, space)
             found |= _contact_values("gc_weak", normals[~strong], axis, space)
         return found

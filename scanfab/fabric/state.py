@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 __all__ = ["VOLUMETRIC_STRAIN", "SampleState", "State", "love_weber"]
 
-# q/p below which the stress has no direction
+# of √(3/2 s:s), s the stress's deviator, to p, below which the stress has no direction
 LEAST_RATIO = 0.02
 
 
@@ -134,7 +134,8 @@ class State:
                 f"acst_{one}",
                 float,
                 "",
-                f"A = F:n of the {what} and the stress deviator's direction; empty for q/p < 0.02",
+                f"A = F:n of the {what} and the direction of the stress deviator s; empty for "
+                "√(3/2 s:s) < 0.02 p",
             )
             for one, what in (("vs", "void fabric"), ("c", "contact fabric"))
         ),
@@ -143,7 +144,8 @@ class State:
                 f"angle_{one}_stress",
                 float,
                 "degrees",
-                f"angle between the major axes of {what} and stress, 0 to 90; empty for q/p < 0.02",
+                f"angle between the major axes of {what} and stress, 0 to 90; empty for "
+                "√(3/2 s:s) < 0.02 p",
             )
             for one, what in (("vs", "void fabric"), ("c", "contact fabric"))
         ),

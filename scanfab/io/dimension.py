@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import warnings
 
-from scanfab.base.errors import ScanfabNote
+from scanfab.base.errors import PackingError, ScanfabNote
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
 from scanfab.packing.plane import flat_space, space_of, spelt_plane
 
-__all__ = ["decided_space"]
+__all__ = ["decided_space", "refuse_other_space"]
 
 
 def decided_space(name: str, position: FloatArray, dim: str | int) -> Space:
@@ -41,3 +41,14 @@ def decided_space(name: str, position: FloatArray, dim: str | int) -> Space:
             stacklevel=5,
         )
     return found
+
+
+def refuse_other_space(position: FloatArray, decided: Space) -> None:
+    """PackingError if a frame of a series that is one of spheres is one of discs."""
+    found = space_of(position)
+    if found.is_plane and not decided.is_plane:
+        raise PackingError(
+            f"all its centres lie in {found}, but the first frame that has grains lies in "
+            f"{decided}: the frames of a series are all discs in one plane, or all spheres; "
+            f"`dim=3` reads these as spheres, too"
+        )

@@ -15,7 +15,7 @@ from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray
 from scanfab.io.beside import columns_file, frame_file, read_frame
-from scanfab.io.dimension import decided_space
+from scanfab.io.dimension import decided_space, refuse_other_space
 from scanfab.io.families import Family
 from scanfab.io.frame import Frame
 from scanfab.io.frame_csv import FrameFile
@@ -204,7 +204,7 @@ class Series:
         Raises
         ------
         PackingError
-            If discs are asked for, and these are none.
+            If discs are asked for, and these are none; or these are, and the first frame is not.
         """
         if self.dim == 3:
             return SPACE
@@ -213,6 +213,7 @@ class Series:
             if not len(first):
                 return SPACE
             self._spaces.append(decided_space(self.name, first, self.dim))
+        refuse_other_space(position, self._spaces[0])
         return self._spaces[0]
 
     def _centres_before(self, number: int) -> Iterator[FloatArray]:

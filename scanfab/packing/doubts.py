@@ -44,12 +44,11 @@ def refuse_impossible(sample: Sample) -> None:
     Raises
     ------
     PackingError
-        If spheres all have their centres in one plane, or the solids do not fit into their own box
-        by far.
+        If the solids do not fit into their own box by far.
     """
-    for text in (_plane(sample.packing), _overfull(sample)):
-        if text:
-            raise PackingError(text)
+    text = _overfull(sample)
+    if text:
+        raise PackingError(text)
 
 
 def doubts_of(
@@ -72,6 +71,7 @@ def doubts_of(
         return []
     clumps = "" if bodies_are_named else _clumps(packing)
     texts = {
+        "plane": _plane(packing),
         "clumps": clumps,
         "spread_bodies": _spread_bodies(packing),
         "own_images": _own_images(packing),

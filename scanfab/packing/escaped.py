@@ -70,7 +70,7 @@ def escaped_grains(packing: Packing, grains: BoolArray) -> Escaped:
     left = grains.copy()
     most = max(SHARE * _number(packing, np.flatnonzero(grains)), 1.0)
     flown: list[int] = []
-    if np.count_nonzero(grains) >= FEWEST:
+    if _number(packing, np.flatnonzero(grains)) >= FEWEST:
         far = _far(packing, grains)
         for axis, sign in product(_open_axes(packing), (-1.0, 1.0)):
             while _number(packing, flown) <= most and (
@@ -149,13 +149,14 @@ def _group_at_end(
     """The outermost grain along an axis and those near it; none if there are too many of these."""
     along, radius = packing.position[:, axis], packing.radius
     group = [int(np.argmax(np.where(left, sign * along + radius, -np.inf)))]
+    most = min(TOGETHER, _number(packing, np.flatnonzero(left)) // 2)
     for member in group:
         # of a large sample few lie in the layer that is near enough
         layer = far + radius[member] + radius.max()
         rows = np.flatnonzero(left & (np.abs(along - along[member]) <= layer))
         near = rows[_gaps(packing, member, rows) <= far]
         group += [row for row in near.tolist() if row not in group]
-        if _number(packing, group) > min(TOGETHER, int(np.count_nonzero(left)) // 2):
+        if _number(packing, group) > most:
             return []
     return group
 

@@ -121,6 +121,11 @@ def force(touching: Touching) -> BoolArray:
             'the rule `rattlers="force"`: a contact has a force that is no finite number'
         )
     mean = contacts.force_n.mean() if len(contacts) else 0.0
+    if mean < 0.0:
+        raise ReadError(
+            'the rule `rattlers="force"`: the contacts pull in the mean, as where a file lists '
+            "the force on the other grain: name id1 and id2 the other way round"
+        )
     pressing = contacts.force_n > touching.min_force * mean
     found = touching.numbers_without(~pressing) < touching.min_contacts
     return np.asarray(touching.grains & found)

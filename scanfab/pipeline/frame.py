@@ -12,7 +12,6 @@ from scanfab.base.spelling import spelt_apart
 from scanfab.fabric.state import VOLUMETRIC_STRAIN
 from scanfab.packing.columns import RV_COLUMN
 from scanfab.packing.packing import Packing
-from scanfab.packing.plane import space_of
 from scanfab.packing.sample import VARIANTS, Sample
 from scanfab.pipeline.frames import Readable
 from scanfab.pipeline.measurement import Measurement, measure
@@ -120,10 +119,9 @@ def _check_space(sample: Sample, plan: Plan) -> None:
     packing = sample.packing
     if not sample.grains.any():
         return
-    found = packing.space if packing.space.is_plane else space_of(packing.position)
-    if found != plan.space:
+    if packing.space != plan.space:
         raise PackingError(
-            f"all its centres lie in {found}, but the first frame that has grains lies in "
+            f"all its centres lie in {packing.space}, but the first frame that has grains lies in "
             f"{plan.space}: the frames of a series are all discs in one plane, or all spheres "
             f"(`dim`)"
         )

@@ -24,6 +24,7 @@ from scanfab.pipeline.values import (
     Length,
     Vector,
     as_written,
+    check_min_force,
     check_moment,
     parse_axis,
     parse_boundary,
@@ -293,6 +294,7 @@ class Settings(WindowSettings):
             object.__setattr__(self, one.name, value)
         check_window(self)
         check_moment(self)
+        check_min_force(self)
 
     @property
     def more_columns(self) -> tuple[str, ...]:

@@ -63,7 +63,8 @@ def contact_forces(sample: Sample, chosen: BoolArray) -> ContactForces | None:
 
 def _refuse_odd_forces(packing: Packing, force: FloatArray) -> None:
     """PackingError if a force is no finite number, shape (M,) or (M, 3)."""
-    wrong = ~np.isfinite(force.reshape(len(force), -1)).all(axis=1)
+    # -1 for the second part would be undecided without a contact
+    wrong = ~np.isfinite(force.reshape(len(force), force[:1].size or 1)).all(axis=1)
     if wrong.any():
         assert packing.contacts is not None
         one, two = packing.id[packing.contacts.pairs[np.argmax(wrong)]]

@@ -232,6 +232,15 @@ def check_moment(chosen: Settings) -> None:
         )
 
 
+def check_min_force(chosen: Settings) -> None:
+    """Whether the rule for rattlers looks at forces."""
+    if chosen.min_force and chosen.rattlers != "force":
+        raise SettingsError(
+            f'min_force: is that of the rule `rattlers="force"`, but `rattlers` is '
+            f"{chosen.rattlers}: choose that rule, or leave out `min_force`"
+        )
+
+
 def parse_boundary(name: str, rules: Any) -> tuple[BoundaryRule, ...]:
     """Rules from one expression or several."""
     from scanfab.packing.boundary import BoundaryRule

@@ -83,7 +83,7 @@ def test_a_body_all_over_the_box_is_told(compute):
     ("frames", "message"),
     [
         ((FLAT, GRID), "dump.1: the series is read as discs in the plane x-y"),
-        ((GRID, FLAT), "frame 1: all its centres lie in the plane x-y"),
+        ((GRID, FLAT), "all its centres lie in the plane x-y"),
         ((FLAT, FLAT[:, [0, 2, 1]]), "dump.1: the series is read as discs in the plane x-y"),
     ],
 )

@@ -79,7 +79,7 @@ def test_wrong_usage_is_exit_code_2_and_one_message(args: list[str], message: st
     ("word", "hint"),
     [
         ("computee", "No such command 'computee'. Did you mean 'compute'?"),
-        ("nonsense", "No such command 'nonsense'. Choose from compute, compare, inspect"),
+        ("nonsense", "No such command 'nonsense'. Choose from compute, merge, compare, inspect"),
     ],
 )
 def test_a_command_that_does_not_exist_gets_a_suggestion(

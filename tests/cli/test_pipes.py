@@ -108,7 +108,7 @@ def test_commands_and_options_are_completed():
         ("compute --on-error", "", {"plain,stop", "plain,skip"}),
         ("compute --strain", "ce", {"plain,cell", "file,ce"}),
         ("compute --contacts", "g", {"plain,geometric", "file,g"}),
-        ("inspect --format", "l", {"plain,lammps", "plain,liggghts"}),
+        ("inspect --format", "l", {"plain,lammps", "plain,liggghts", "plain,lf-dem"}),
         ("compute --figure", "ro", {"plain,rose"}),
         ("compare --figure", "ev", {"plain,evolution"}),
         ("calibrate --variants", "c", {"plain,cd", "plain,c"}),

@@ -70,7 +70,7 @@ class Browser:
             self._ask("DELETE", "")
         finally:
             self._driver.terminate()
-            self._driver.wait(10)
+            self._driver.wait(60)
             self._profile.cleanup()
 
     def _wait_for_driver(self) -> None:

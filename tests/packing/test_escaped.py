@@ -129,3 +129,13 @@ def test_strain_of_the_grains_does_not_follow_one_that_flies_away():
         scanfab.pipeline.strain.axial_length(one, "grains", (0.0, 0.0, 1.0)) for one in samples
     ]
     assert lengths[0] == lengths[1] < 10
+
+
+@pytest.mark.parametrize("count", [2, 7, 20])
+def test_a_few_bodies_of_many_spheres_are_no_crowd(count):
+    """Each at a place of its own: none is far away from a crowd that there is not."""
+    random = np.random.default_rng(3)
+    bodies = np.arange(60) % count
+    position = 10.0 * random.random((count, 3))[bodies] + random.random((60, 3))
+    packing = Packing(position, 0.5, bodies=bodies)
+    assert not escaped_grains(packing, np.ones(60, bool)).grains.any()

@@ -140,6 +140,12 @@ def test_by_force_contacts_count_that_press(forces, min_force, expected):
     assert pressed(forces, min_force=min_force) == expected
 
 
+def test_by_force_contacts_that_pull_in_the_mean_are_refused():
+    """With the sign of the other grain's force a limit would hold for the strong contacts."""
+    with pytest.raises(ReadError, match="name id1 and id2 the other way round"):
+        pressed([-4, -4, -1, -3])
+
+
 def test_by_force_walls_count_and_it_is_one_pass():
     """The grain in the middle stays, though both that hold it go."""
     assert pressed([0, 1, 1, 0], walls=[1, 0, 0, 0, 2]) == [0, 1, 3]

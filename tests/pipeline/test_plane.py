@@ -77,8 +77,7 @@ def test_frames_of_mixed_dimension_are_an_error(discs):
     position, radius = discs
     flat = Packing(position, radius)
     ball = Packing(np.column_stack([position, np.arange(200.0) % 14]), radius)
-    thin = Packing(np.column_stack([position, np.zeros(200)]), radius)
-    for first, second in ((flat, ball), (ball, flat), (ball, thin)):
+    for first, second in ((flat, ball), (ball, flat)):
         with pytest.raises(PackingError, match="the first frame that has grains lies in"):
             compute([first, second], variants="a", **FAST)
 

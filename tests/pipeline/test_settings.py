@@ -351,7 +351,7 @@ def test_compute_hands_every_option_to_the_settings(monkeypatch):
             "edge": "start",
         "boundary": ("type=2",), "cutoff": "2rmin", "cutoffs": "1,2", "moment": 2,
         "spacing": "1rmean", "directions": direction_rule("9"), "tolerance": 1e-3,
-        "max_chords": 1e5, "min_contacts": 3, "rattlers": "recursive",
+        "max_chords": 1e5, "min_contacts": 3, "rattlers": "force",
         "min_force": 0.1,
         "contact_tolerance": 1e-4, "axis": "x", "strain": "cell", "with_": "state",
         "frames": "1:2", "seed": 5, "workers": 3, "on_error": "skip",
@@ -372,6 +372,7 @@ def test_compute_hands_every_option_to_the_settings(monkeypatch):
 @pytest.mark.parametrize(
     ("options", "words"),
     [
+        ({"min_force": 0.5}, "min_force: is that of the rule `rattlers=.force.`"),
         ({"rv_shape": "cone"}, "rv_shape: expected sphere, box, cylinder, ellipsoid or a closed"),
         ({"rv_shape": "none.stl"}, "rv_shape: expected sphere, .* that exists"),
         ({"rv_size": "1,2,3"}, "rv_size: the shape sphere takes none: choose `rv_radius`"),

@@ -132,15 +132,17 @@ def _named(data: Table, of: str | Sequence[str] | None) -> list[str]:
     names = [name.strip() for name in asked] or _first(data)
     if not names:
         raise SettingsError(
-            "of: name the columns to draw: the table has none of those that `with_` adds"
+            "figure columns: name those to draw: the table has none of those that `with_` adds"
         )
     for name in names:
         if name not in data.names:
-            raise SettingsError(f"of: {no_column(name, data.names)}")
+            raise SettingsError(f"figure columns: {no_column(name, data.names)}")
         if not any(isinstance(one[name], int | float) for one in data):
-            raise SettingsError(f"of: the column {name} holds no numbers")
+            raise SettingsError(f"figure columns: the column {name} holds no numbers")
     if len(names) > MOST_PANELS:
-        raise SettingsError(f"of: expected at most {MOST_PANELS} columns, found {len(names)}")
+        raise SettingsError(
+            f"figure columns: expected at most {MOST_PANELS} columns, found {len(names)}"
+        )
     return names
 
 

@@ -49,7 +49,7 @@ def test_columns_that_cannot_be_drawn(of, message):
 
 
 def test_a_table_without_groups_says_what_to_name():
-    with pytest.raises(SettingsError, match="name the columns to draw"):
+    with pytest.raises(SettingsError, match="name those to draw"):
         Columns(Table(curve()))
 
 
