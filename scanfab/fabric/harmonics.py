@@ -166,6 +166,9 @@ def _of_voids(void: VoidFabric, axis: FloatArray, space: Space) -> dict[str, Any
     weights = weights / weights.sum(axis=1, keepdims=True)
     found: dict[str, Any] = {}
     for order in ORDERS:
+        # in a plane fewer steps take other orders for this one
+        if space.is_plane and void.axes.shape[1] < order // 2 + 2:
+            continue
         means = np.sum(weights * harmonic(order, void.axes @ axis, space), axis=1)
         values = harmonics_of(order, space) * means
         found[f"vs_a{order}"] = float(values.mean())

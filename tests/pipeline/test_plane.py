@@ -264,3 +264,12 @@ def test_the_unit_of_length_does_not_matter(discs, scale):
         assert theirs.alpha_vs_axial == pytest.approx(mine.alpha_vs_axial, abs=1e-9)
         assert theirs.segments == mine.segments
         assert theirs.mean_length == pytest.approx(mine.mean_length * scale)
+
+
+@pytest.mark.parametrize(("steps", "known"), [(2, []), (3, [2]), (4, [2, 4])])
+def test_harmonics_need_more_directions_than_the_tensor(discs, steps, known):
+    position, radius = discs
+    words = {**FAST, "directions": steps, "with_": "harmonics", "variants": "a"}
+    row = compute(Packing(position, radius, dim=2), **words)[0]
+    assert row["alpha_vs_axial"] is not None
+    assert [order for order in (2, 4) if row[f"vs_a{order}"] is not None] == known
