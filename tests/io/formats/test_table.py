@@ -453,7 +453,7 @@ def test_damaged_files_are_told(tmp_path, name):
 
 
 def test_options_that_users_write_into_the_settings_file(tmp_path, capsys):
-    from scanfab.cli.main import main
+    from scanfab.cli.main import run
 
     text = rows(tmp_path / "g.txt", POSITION, 2 * RADIUS).read_text()
     write(tmp_path / "g.txt", "two lines\nbefore it\n" + text)
@@ -461,7 +461,5 @@ def test_options_that_users_write_into_the_settings_file(tmp_path, capsys):
         tmp_path / "scanfab.toml",
         '[compute]\nformat = "table"\nskip = 2\ncolumns = "x=1,y=2,z=3,diameter=4"\n',
     )
-    with pytest.raises(SystemExit) as ended:
-        main(["inspect", str(tmp_path / "g.txt"), "--json"])
-    assert ended.value.code == 0
+    assert run(["inspect", str(tmp_path / "g.txt"), "--json"]) == 0
     assert '"grains": 64' in capsys.readouterr().out
