@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -16,11 +16,14 @@ from scanfab.cli.sources import follow_one, open_series, reading_arguments
 from scanfab.cli.talk import tell_inputs, working
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+
+    from scanfab.io.following import FollowedSeries
     from scanfab.io.series import Series
-    from scanfab.pipeline.compute import Observer
     from scanfab.pipeline.job import Job
     from scanfab.pipeline.settings import Settings
     from scanfab.pipeline.told import Told
+    from scanfab.table.result_file import ResultFile
     from scanfab.table.writing import Excerpt
 
 __all__ = ["finished_job"]
@@ -49,44 +52,27 @@ def finished_job(
     series that is followed is drawn again whenever there is nothing else to do.
     """
     from scanfab.cli.console import announce_compiling
-    from scanfab.pipeline.cluster.dask_executor import dask_executor
     from scanfab.pipeline.job import Job
-    from scanfab.table.result_file import ResultFile
-    from scanfab.table.writing import Excerpt
     from scanfab.viz.paraview import vtk_folders
 
     if resume and output is None:
         raise click.UsageError("--resume goes with -o FILE")
-    follows, seconds = chosen.pop("follow"), chosen.pop("follow_for")
-    scheduler, scheduler_file = chosen.pop("scheduler"), chosen.pop("scheduler_file")
-    if (scheduler or scheduler_file) and vtk is not None:
+    way = _way(chosen)
+    if way.is_cluster and vtk is not None:
         raise click.UsageError("--vtk is written where frames are computed: not with --scheduler")
     chosen, settings_file = fill_from_file(ctx, sources, chosen)
     check([], chosen)
     with settings_file.named_errors():
         reading = reading_arguments(chosen)
-        fields, digits = chosen.pop("fields"), int(chosen.pop("digits"))
-        settings = kind(**chosen)
-        excerpt = Excerpt.make(settings.columns, fields, digits)
-        result = None if output is None else ResultFile(output, settings.columns, excerpt)
-    followed = None
-    if follows or seconds is not None:
-        followed = follow_one(sources, reading, seconds)
-    # whether it holds frames is not known yet
-    series: list[Series] = open_series(sources, reading) if followed is None else [followed]
+        settings, excerpt, result = _asked(chosen, kind, output)
+    series, followed = way.opened(sources, reading)
     check(series, chosen)
     tell_inputs(series, settings.workers)
     with ExitStack() as stack:
-        executor = None
-        if scheduler or scheduler_file:
-            with usage_errors():
-                cluster = dask_executor(scheduler, scheduler_file=scheduler_file)
-                executor = stack.enter_context(cluster)
+        with usage_errors():
+            executor = stack.enter_context(way.executor())
         announce_compiling()
         with usage_errors():
-            observers: Sequence[Observer] = ()
-            if vtk is not None:
-                observers = vtk_folders(vtk, len(series), settings, resume)
             job = Job(
                 series,
                 settings,
@@ -95,7 +81,7 @@ def finished_job(
                 reading=reading,
                 resume=resume,
                 manifest_path=manifest,
-                observers=observers,
+                observers=() if vtk is None else vtk_folders(vtk, len(series), settings, resume),
                 told=told,
                 keep=drawn is not None,
                 executor=executor,
@@ -110,6 +96,57 @@ def finished_job(
         _write_or_say(job, excerpt)
     job.save_manifests(settings_file.asked())
     return job
+
+
+def _asked(
+    chosen: dict[str, Any], kind: type[Settings], output: Path | None
+) -> tuple[Settings, Excerpt, ResultFile | None]:
+    """What the options that are not those of reading ask for, and the file that it goes to."""
+    from scanfab.table.result_file import ResultFile
+    from scanfab.table.writing import Excerpt
+
+    fields, digits = chosen.pop("fields"), int(chosen.pop("digits"))
+    settings = kind(**chosen)
+    excerpt = Excerpt.make(settings.columns, fields, digits)
+    result = None if output is None else ResultFile(output, settings.columns, excerpt)
+    return settings, excerpt, result
+
+
+class _Way(NamedTuple):
+    """How frames come, and where they are computed."""
+
+    follows: bool
+    seconds: float | None
+    scheduler: str | None
+    scheduler_file: Path | None
+
+    @property
+    def is_cluster(self) -> bool:
+        return bool(self.scheduler or self.scheduler_file)
+
+    def opened(
+        self, sources: tuple[str, ...], reading: dict[str, Any]
+    ) -> tuple[list[Series], FollowedSeries | None]:
+        """The series, and the one that is followed, which may hold no frames yet."""
+        if not self.follows:
+            return open_series(sources, reading), None
+        followed = follow_one(sources, reading, self.seconds)
+        return [followed], followed
+
+    def executor(self) -> AbstractContextManager[Executor | None]:
+        """That of a cluster, while it is connected; None for this machine."""
+        from scanfab.pipeline.cluster.dask_executor import dask_executor
+
+        if not self.is_cluster:
+            return nullcontext()
+        return dask_executor(self.scheduler, scheduler_file=self.scheduler_file)
+
+
+def _way(chosen: dict[str, Any]) -> _Way:
+    """Taken out of the options."""
+    follows, seconds = chosen.pop("follow"), chosen.pop("follow_for")
+    scheduler, file = chosen.pop("scheduler"), chosen.pop("scheduler_file")
+    return _Way(follows or seconds is not None, seconds, scheduler, file)
 
 
 class _Redraw:

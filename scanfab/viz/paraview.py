@@ -35,24 +35,7 @@ TEXT_FIELDS = ("source", "variant", "contacts_from", "edge")
 
 
 class VtkFolder(vtk.Folder):
-    """
-    A folder of ParaView files, to be called with each computed frame of one series.
-
-    Parameters
-    ----------
-    folder : Path
-        Is made if it does not exist.
-    go_on : bool, optional
-        Keep the frames of an earlier run in the collections.
-
-    Raises
-    ------
-    SettingsError
-        If the folder cannot be made or written to.
-    """
-
-    def __init__(self, folder: Path, go_on: bool = False) -> None:
-        super().__init__(folder, go_on)
+    """ParaView files of one series, to be called with each of its computed frames."""
 
     def __call__(self, result: FrameResult) -> None:
         """Write all files of a frame."""
