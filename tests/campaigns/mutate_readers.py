@@ -5,7 +5,7 @@ Random damage for the readers, without a guide: quicker than fuzz_readers.py, an
 
 Small sound files of each format are damaged at random, and read as grains and as contacts.
 Anything but an answer or a ScanfabError is kept in the folder `mutate_findings`, as is what takes
-over 5 s; one line for each reader at the end.
+over 10 s; one line for each reader at the end.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from scanfab.io.registry import reader_named  # noqa: E402
 from scanfab.packing.packing import Packing  # noqa: E402
 from tests.helpers import fuzzing, sound_files  # noqa: E402
 
-SECONDS = 5.0
+SECONDS = 10.0
 OUT = Path("mutate_findings")
 
 

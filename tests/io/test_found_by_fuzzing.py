@@ -414,3 +414,18 @@ def test_a_nan_that_signals_is_no_warning(tmp_path):
         warnings.simplefilter("error", RuntimeWarning)
         with pytest.raises(scanfab.ScanfabError, match="finite"):
             scanfab.read(tmp_path / "a.vtp")
+
+
+@pytest.mark.parametrize("word", ["9" * 5000 + "x", "9" * 5000 + ".5.5", "1" * 5000 + "e"])
+def test_words_of_many_digits_take_no_time(tmp_path, word):
+    """A pattern that could cut the digits anywhere tried all places: 32 s for a table of these."""
+    rows = f"1,0,{word},0,1\n" * 40
+    path = write(tmp_path / "a.csv", f"id,x,y,z,radius\n{rows}")
+    began = time.monotonic()
+    refuses(scanfab.read, path)
+    assert time.monotonic() - began < 5
+
+
+def test_radii_near_zero_prove_nothing(tmp_path):
+    rows = "".join(f"{k}e300 0 0 1e-300\n" for k in range(12))
+    refuses(scanfab.read, write(tmp_path / "a.txt", rows), match="no names")

@@ -20,6 +20,9 @@ __all__ = ["index_yaml", "is_yaml", "read_yaml_grains", "yaml_kind"]
 START = re.compile(rb"\A(?:\xef\xbb\xbf)?---[ \t]*\r?\ncreator:[ \t]*LAMMPS[ \t]*\r?\n")
 DATA = re.compile(rb"^data:[ \t]*\r?\n", re.MULTILINE)
 END = b"..."
+# a line that begins a document, or ends it; the first may have a byte order mark
+BORDER = re.compile(rb"^(?:\xef\xbb\xbf)?(---|\.\.\.)[ \t\r\f\v]*(?:\n|\Z)", re.MULTILINE)
+PIECE = 1 << 20
 # a header never comes near this size
 HEADER_BYTES = 1 << 16
 
@@ -38,12 +41,14 @@ def index_yaml(path: Path) -> list[Snapshot]:
     """The documents; a last one without its end is left out with a warning if there are others."""
     starts, ends, place = [], [], 0
     with open(plain(path), "rb") as stream:
-        while line := stream.readline(HEADER_BYTES):
-            if line.rstrip() == b"---" or (place == 0 and line.endswith((b"---\n", b"---\r\n"))):
-                starts.append(place)
-            place += len(line)
-            if line.rstrip() == END:
-                ends.append(place)
+        # whole lines, so that no border is cut in two
+        while piece := stream.read(PIECE) + stream.readline(HEADER_BYTES):
+            for border in BORDER.finditer(piece):
+                if border[1] == END:
+                    ends.append(place + border.end())
+                else:
+                    starts.append(place + border.start())
+            place += len(piece)
         if len(ends) == len(starts) - 1 and ends:
             warnings.warn(
                 f"{path}: the last snapshot, number {len(starts)}, is incomplete and is left out",
@@ -115,7 +120,7 @@ def _snapshot(path: Path, head: bytes, start: int, stop: int) -> Snapshot:
 
 def _plain(rows: bytes) -> bytes:
     """Entries such as ``- [ 1, 0.5, ]``, one a line, without their brackets and commas."""
-    return rows.replace(b"- [", b"").replace(b"]", b"").replace(b",", b"")
+    return rows.replace(b"- [", b"").translate(None, b"],")
 
 
 def _value(head: bytes, key: bytes) -> str:

@@ -206,7 +206,8 @@ class TableReader:
             position, size = np.column_stack(part[:3]).astype(float), part[3].astype(float)
             if touch(position, size):
                 fits.append(begin)
-            large = large or touch(position, 0.5 * size)
+            elif not fits:
+                large = large or touch(position, 0.5 * size)
         if len(fits) != 1:
             lacks = (
                 f"fewer than {TOO_FEW} grains prove nothing"

@@ -88,16 +88,16 @@ class MusenReader:
 Object = tuple[float, float, tuple[float, float], list["State"]]
 
 
-def _spheres(data: bytes) -> Iterator[bytes]:
-    """The rows of spheres; words stand apart by single blanks."""
+def _spheres(data: bytes) -> Iterator[tuple[bytes, list[bytes]]]:
+    """The rows of spheres, and their words."""
     start = 0
     while start < len(data):
         end = data.find(b"\n", start)
         end = len(data) if end < 0 else end
         line = data[start:end]
-        words = line[:60].split(None, 4)
-        if words[:1] == [ID] and words[2:4] == [TYPE, SPHERE]:
-            yield line
+        words = line.split()
+        if words[2:4] == [TYPE, SPHERE] and words[0] == ID:
+            yield line, words
         start = end + 1
 
 
@@ -135,8 +135,7 @@ class _Layout:
 
 def _objects(path: Path, data: bytes) -> Iterator[Object]:
     layout: _Layout | None = None
-    for line in _spheres(data):
-        words = line.split()
+    for line, words in _spheres(data):
         if layout is None or not layout.fits(words):
             layout = _Layout(path, words, line)
         yield _object(path, layout, words, line)
@@ -168,7 +167,8 @@ def _object(path: Path, layout: _Layout, words: list[bytes], line: bytes) -> Obj
 
 def _numbers(path: Path, line: bytes, words: Sequence[bytes]) -> list[float]:
     try:
-        if b"_" in b" ".join(words):
+        # float() takes 1_000 for a number
+        if b"_" in line and b"_" in b" ".join(words):
             raise ValueError
         return list(map(float, words))
     except ValueError:
