@@ -68,7 +68,11 @@ def make_dumps(folder: Path, rows: Rows) -> dict[str, Made]:
     _write(path, "#format x_y_z_r\n", ("%g\t%g\t%g\t%g\n" % row[1:] for row in rows))  # noqa: UP031
     made["YADE `export.text`"] = Made(path, "\t", [(1, len(rows), 4, ())], {})
     path = folder / "lammps.yamls" / "lammps.yaml"
-    text = YAML.format(step=0, rows="@").replace("natoms: 3", f"natoms: {len(rows)}")
+    text = (
+        YAML.format(step=0, rows="@")
+        .replace("natoms: 3", f"natoms: {len(rows)}")
+        .replace("p, p", "f, f")
+    )
     lines = ("  - [ %d, 1, %g, %g, %g, %g, 7, ]\n" % row for row in rows)  # noqa: UP031
     _write(path, text.partition("@")[0], lines, "...\n")
     above = text.partition("@")[0].count("\n")
@@ -200,11 +204,7 @@ def parsers(made: Made) -> dict[str, Callable[[], object]]:
             found += [frame[name].to_numpy() for name in numbers]
         return found
 
-    return (
-        {"pandas": with_pandas}
-        if made.separator == r"\s+"
-        else {"polars": with_polars, "pandas": with_pandas}
-    )
+    return {"pandas": with_pandas} if made.separator == r"\s+" else {"polars": with_polars}
 
 
 def read(made: Made) -> object:

@@ -56,7 +56,8 @@ def single_blanks(text: npt.NDArray[np.uint8], out: npt.NDArray[np.uint8]) -> in
             waits = False
         elif byte <= BLANK:
             # of the ends of lines of Windows
-            is_return = byte == RETURN and (k + 1 == text.size or text[k + 1] == LINE_END)
+            behind = text[k + 1] if k + 1 < text.size else LINE_END
+            is_return = byte == RETURN and behind in (RETURN, LINE_END)
             if byte not in (BLANK, TAB) and not is_return:
                 return -1
             waits = bool(size > 0 and out[size - 1] != LINE_END)
