@@ -12,7 +12,7 @@ from pathlib import Path
 from scanfab.base.errors import ReadError, UnknownFormatError
 from scanfab.io.files import bare_name
 from scanfab.io.reader import FileKind, Reader, ReadOptions
-from scanfab.io.registry import reader_for, reader_named
+from scanfab.io.registry import installed_readers, reader_for, reader_named
 
 __all__ = [
     "SETTINGS_FILE",
@@ -80,8 +80,18 @@ def sort_into_families(
     """
     return [
         _family(_by_step(members), members, _glob(members, files), format, options)
-        for members in _groups(files)
+        for members in _groups(_heads(files, format))
     ]
+
+
+def _heads(files: Sequence[Path], format: str | None) -> Sequence[Path]:
+    """The files without those that another one of them lists as its parts."""
+    readers = installed_readers()
+    named = readers.values() if format not in readers else [readers[format]]
+    for ask in [one.plugin.listed_by for one in named if hasattr(one.plugin, "listed_by")]:
+        there = set(files)
+        files = [file for file in files if ask(file) not in there]
+    return files
 
 
 def _groups(files: Sequence[Path]) -> list[list[Path]]:
@@ -111,7 +121,7 @@ def families_beside(
     found: dict[str, list[tuple[int | None, Path]]] = defaultdict(list)
     for folder, own in keys.items():
         files = files_in(folder)
-        groups = _groups(files)
+        groups = _groups(_heads(files, format))
         wanted = {
             step: own[file] for group in groups for step, file in _by_step(group) if file in own
         }
