@@ -149,6 +149,9 @@ class TableReader:
                 f'them with `contact_columns="id1=NAME,id2=NAME"`'
             )
         columns = read_table(path, options.skip, *_needed(found))
+        for name in found.values():
+            if name not in columns:
+                raise ReadError(f"{path}: expected numbers in the column {name}, which is empty")
         return join_table(path, grains, {what: columns[name] for what, name in found.items()})
 
     def _find(self, path: Path, names: Sequence[str], *, contacts: bool) -> dict[str, str]:
