@@ -1,4 +1,9 @@
-"""scanfab.read on tables, dumps of YADE and the small formats, against general parsers."""
+"""
+scanfab.read on tables, dumps of YADE and the small formats, against general parsers.
+
+These are told where the rows begin and how many there are, and make arrays of all columns.
+Processor time, which is best compared in one thread: POLARS_MAX_THREADS=1.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +34,6 @@ class Made:
     """Between words; of several blanks in a row polars makes empty words, so pandas reads them."""
     tables: Sequence[tuple[int, int, int, Sequence[int]]]
     """Lines above, rows, words in each with those that are no numbers; the places of the latter."""
-    options: dict[str, object]
 
 
 def grains(count: int) -> Rows:
@@ -50,14 +54,14 @@ def make_tables(folder: Path, rows: Rows) -> dict[str, Made]:
         path = folder / name / f"table.{name}"
         lines = (sign.join(map(repr, row)) + "\n" for row in rows)
         _write(path, sign.join(("id", "x", "y", "z", "radius")) + "\n", lines)
-        made[f"table, .{name}"] = Made(path, sign, [(1, len(rows), 5, ())], {})
+        made[f"table, .{name}"] = Made(path, sign, [(1, len(rows), 5, ())])
     path = folder / "aligned.txts" / "aligned.txt"
     lines = (" %8d %14.7e %14.7e %14.7e %14.7e\n" % row for row in rows)  # noqa: UP031
     _write(path, "# id x y z radius\n", lines)
-    made["table, aligned by blanks"] = Made(path, r"\s+", [(1, len(rows), 5, ())], {})
+    made["table, aligned by blanks"] = Made(path, r"\s+", [(1, len(rows), 5, ())])
     path = folder / "unnamed.txts" / "unnamed.txt"
     _write(path, "", ("%.9g %.9g %.9g %.9g\n" % row[1:] for row in rows))  # noqa: UP031
-    made["table, without names"] = Made(path, " ", [(0, len(rows), 4, ())], {})
+    made["table, without names"] = Made(path, " ", [(0, len(rows), 4, ())])
     return made
 
 
@@ -66,7 +70,7 @@ def make_dumps(folder: Path, rows: Rows) -> dict[str, Made]:
     made = {}
     path = folder / "yade.txts" / "yade.txt"
     _write(path, "#format x_y_z_r\n", ("%g\t%g\t%g\t%g\n" % row[1:] for row in rows))  # noqa: UP031
-    made["YADE `export.text`"] = Made(path, "\t", [(1, len(rows), 4, ())], {})
+    made["YADE `export.text`"] = Made(path, "\t", [(1, len(rows), 4, ())])
     path = folder / "lammps.yamls" / "lammps.yaml"
     text = (
         YAML.format(step=0, rows="@")
@@ -76,17 +80,17 @@ def make_dumps(folder: Path, rows: Rows) -> dict[str, Made]:
     lines = ("  - [ %d, 1, %g, %g, %g, %g, 7, ]\n" % row for row in rows)  # noqa: UP031
     _write(path, text.partition("@")[0], lines, "...\n")
     above = text.partition("@")[0].count("\n")
-    made["LAMMPS `dump yaml`"] = Made(path, ",", [(above, len(rows), 8, (0, 7))], {})
+    made["LAMMPS `dump yaml`"] = Made(path, ",", [(above, len(rows), 8, (0, 7))])
     path = folder / "liggghts.datas" / "liggghts.data"
     head = DATA_HEAD.format(title="LIGGGHTS data file", style=" # sphere")
     head = head.replace("3 atoms", f"{len(rows)} atoms")
     lines = ("%d 1 %.17g 2500 %.17g %.17g %.17g\n" % (i, 2 * r, *xyz) for i, *xyz, r in rows)  # noqa: UP031
     _write(path, head, lines)
-    made["LIGGGHTS data file"] = Made(path, " ", [(head.count("\n"), len(rows), 7, ())], {})
+    made["LIGGGHTS data file"] = Made(path, " ", [(head.count("\n"), len(rows), 7, ())])
     path = folder / "packing.xyzs" / "packing.xyz"
     head = f'{len(rows)}\nLattice="9 0 0 0 9 0 0 0 9" Properties=id:I:1:pos:R:3:radius:R:1\n'
     _write(path, head, (" ".join(map(repr, row)) + "\n" for row in rows))
-    made["extended XYZ"] = Made(path, " ", [(2, len(rows), 5, ())], {})
+    made["extended XYZ"] = Made(path, " ", [(2, len(rows), 5, ())])
     return made
 
 
@@ -94,10 +98,10 @@ def make_small(folder: Path, rows: Rows) -> dict[str, Made]:
     """What the small plugins read, as the programs write it."""
     made, count = {}, len(rows)
 
-    def put(name: str, title: str, head: str, lines, width: int, sign=" ", words=(), tail="", **o):
+    def put(name: str, title: str, head: str, lines, width: int, sign=" ", words=(), tail=""):
         path = folder / title / name
         _write(path, head, lines, tail)
-        made[title] = Made(path, sign, [(head.count("\n"), count, width, words)], o)
+        made[title] = Made(path, sign, [(head.count("\n"), count, width, words)])
 
     mercury = "%.10g %.10g %.10g 0.1 0.2 0.3 %.10g 1 0 0 0 0 0 0\n"
     head = f"{count} 0.5 0 0 0 1 1 1 \n"
@@ -123,7 +127,7 @@ def make_small(folder: Path, rows: Rows) -> dict[str, Made]:
     lines = (f"{x} {y} {z} {r} {i} 77{esys.OTHERS}\n" for i, x, y, z, r in rows)
     _write(path.with_name("snap_t=30_1.txt"), f"{count}\n", lines, "TMIG 1\nBonded 0\n")
     _write(path.with_name("snap_t=30_2.txt"), "0\n", (), "TMIG 1\nBonded 0\n")
-    made["ESyS-Particle"] = Made(path.with_name("snap_t=30_1.txt"), " ", [(1, count, 22, ())], {})
+    made["ESyS-Particle"] = Made(path.with_name("snap_t=30_1.txt"), " ", [(1, count, 22, ())])
     return made | make_mdpa(folder, rows)
 
 
@@ -142,7 +146,7 @@ def make_mdpa(folder: Path, rows: Rows) -> dict[str, Made]:
     places = [3, count + 5, 2 * count + 7]
     widths = [(count, width, ()) for width in (4, 3, 3)]
     tables = [(above, *one) for above, one in zip(places, widths, strict=True)]
-    return {"Kratos `.mdpa`": Made(path, " ", tables, {})}
+    return {"Kratos `.mdpa`": Made(path, " ", tables)}
 
 
 def _write(path: Path, head: str, lines, tail: str = "") -> None:
@@ -208,10 +212,11 @@ def parsers(made: Made) -> dict[str, Callable[[], object]]:
 
 
 def read(made: Made) -> object:
+    """By scanfab; of ESyS-Particle by the header of the file."""
     path = made.path
     if path.parent.name == "esys":
         path = path.with_name("snap_t=30_0.txt")
-    return scanfab.read(path, **made.options)
+    return scanfab.read(path)
 
 
 def run(repeats: int, count: int = 300_000) -> dict[str, str]:
@@ -231,5 +236,4 @@ def run(repeats: int, count: int = 300_000) -> dict[str, str]:
             best = min((value, name) for name, value in seconds.items() if name != "scanfab")
             speed = made.path.stat().st_size / seconds["scanfab"] / 1e6
             lines.append((title, f"{speed:.0f}", best[1], f"{best[0] / seconds['scanfab']:.2f}"))
-            print(*lines[-1], flush=True)
     return {"reading formats": table(["file", "MB/s", "best parser", "of its speed"], lines)}
