@@ -32,7 +32,7 @@ def page(tmp_path, monkeypatch):
     shutil.copy(paper.TABLES / "others.csv", folder)
     monkeypatch.chdir(tmp_path)
     made = script("make_validation")
-    monkeypatch.setattr(made, "TABLES", folder)
+    monkeypatch.setattr(made.paper_tables, "TABLES", folder)
     return made
 
 
@@ -85,7 +85,7 @@ def is_void(name: str) -> bool:
 
 
 def test_known_tables_give_their_slope_everywhere(page) -> None:
-    lines = [line for line in page.slopes().splitlines()[2:] if line]
+    lines = [line for line in page.claims.slopes().splitlines()[2:] if line]
     assert len(lines) == 4 * 5 + 3 * (4 + 4) + 4
     assert all(
         "| 0.100 (0.100 to 0.100) | 0.100 (0.100 to 0.100) | 0.100 | no |" in line for line in lines
@@ -96,15 +96,15 @@ def test_known_tables_give_their_slope_everywhere(page) -> None:
 
 
 def test_counts_that_are_equal_are_said_to_be_equal(page) -> None:
-    lines = page.counted().splitlines()[2:]
-    assert len(lines) == len(page.RUNS)
+    lines = page.claims.counted().splitlines()[2:]
+    assert len(lines) == len(page.paper_tables.RUNS)
     assert all("| 41 of 41 | 41 of 41 | 0e+00 |" in line for line in lines)
 
 
 def test_one_contact_more_is_told(page) -> None:
-    path = page.TABLES / "yade_2_engine.csv"
+    path = page.paper_tables.TABLES / "yade_2_engine.csv"
     path.write_text(path.read_text("utf-8").replace(",9000,", ",9001,", 1), encoding="utf-8")
-    assert "| `yade_2` | 40 of 41 | 41 of 41 |" in page.counted()
+    assert "| `yade_2` | 40 of 41 | 41 of 41 |" in page.claims.counted()
 
 
 def test_every_part_of_the_page_is_filled(page) -> None:
