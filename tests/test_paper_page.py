@@ -114,9 +114,6 @@ def test_every_part_of_the_page_is_filled(page) -> None:
     assert "$ scanfab compare sample_data/paper/yade_1_default.csv" in text
 
 
-@pytest.mark.skipif(
-    not (paper.TABLES / "yade_1_default.csv").exists(), reason="the runs are not measured yet"
-)
 def test_the_page_is_that_of_the_stored_tables(monkeypatch) -> None:
     monkeypatch.chdir(ROOT)
     made = script("make_validation")
