@@ -11,12 +11,14 @@ import csv
 import io
 from collections.abc import Callable
 from contextlib import redirect_stdout
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 import paper_claims as claims
 import paper_tables
+import paper_words as words
 from paper_tables import MAIN, UP_TO, VARIANTS, fits, has, markdown, runs, table
 
 from scanfab.cli.main import run
@@ -134,14 +136,24 @@ def summaries() -> str:
 CLAIMS = (
     claims.experiment, claims.counted, claims.isotropic_start, claims.off_diagonals, claims.rise,
     claims.apart, claims.smoothness, claims.normalised, claims.slopes, claims.predicted,
-    claims.shell_stress,
+    claims.shell_stress, claims.harmonics,
+)  # fmt: skip
+NUMBERS = (
+    words.start_worst, words.off_share, words.lateral_share, words.contact_share, words.void_share,
+    words.normalised_worst, words.slope_misses, words.pooled, words.disc_misses, words.disc_ratio,
+    words.printed_radius, words.best_cutoff, words.cutoff_slopes, words.predicted_off,
+    words.null_tests,
 )  # fmt: skip
 PARTS: dict[str, Callable[[], str]] = {
     **{claim.__name__: claim for claim in CLAIMS},
     "choices": choices,
     "summaries": summaries,
     "others": others,
-    "printed_radius": lambda: f"{claims.printed_radius():.1f}",
+    **{number.__name__: number for number in NUMBERS},
+    "order_four_contacts": partial(words.order_four, "c"),
+    "order_four_voids": partial(words.order_four, "vs"),
+    "order_four_discs": partial(words.order_four, "vs", plane=True),
+    **{f"left_{percent}": partial(words.left_by_ends, percent / 100) for percent in (8, 12, 20)},
 }
 
 

@@ -21,6 +21,7 @@ from paper_tables import (
     row_of,
     runs,
     table,
+    usual_variant,
     with_error,
 )
 
@@ -189,7 +190,7 @@ def predicted() -> str:
     """Void anisotropy at small cut-offs beside what near contacts predict."""
     lines = []
     for name in runs("cutoffs"):
-        for variant in "c" if name.startswith("yade") else "a":
+        for variant in usual_variant(name):
             of_variant = table(f"{name}_cutoffs").select(variant=variant)
             found = sorted({row["cutoff"] for row in of_variant})
             for strain in (0.05, 0.1, 0.2):
@@ -217,7 +218,30 @@ def shell_stress() -> str:
     return markdown(["run", "strain", "q/p of the RV", "of the whole", "ratio"], lines)
 
 
-def printed_radius() -> float:
-    """Of the ball that 13,723 grains of the paper's sizes fill, in mm."""
-    porosity = engine(MAIN)["porosity"][0]
-    return float((13_723 * 1.25 / (1 - porosity)) ** (1 / 3))
+def harmonics() -> str:
+    """Order 2 and 4 of both fabrics about the axis."""
+    names = ("vs_a2", "vs_a4", "c_a2", "c_a4")
+    lines = []
+    for name in runs("harmonics"):
+        variant = usual_variant(name)
+        for strain in (0.05, 0.1, 0.2):
+            row = row_of(f"{name}_harmonics", variant, strain)
+            cells = [f"{1e3 * row[one]:.1f} ± {1e3 * row[f'{one}_se']:.1f}" for one in names]
+            lines.append([f"`{name}`, {variant}, {strain:.0%}", *cells])
+    head = ["10³", "ℓ(n), order 2", "order 4", "contacts, order 2", "order 4"]
+    return markdown(head, lines)
+
+
+def hysteresis() -> str:
+    """A load reversal: the way back beside the way there, at the same strain."""
+    lines = []
+    for strain in (0.2, 0.195, 0.19, 0.18, 0.16, 0.14, 0.12, 0.1):
+        there, back = (row_of(f"{one}_default", "c", strain) for one in (MAIN, "yade_reversal"))
+        cells = [
+            f"{1e3 * row[column]:.2f}"
+            for column in ("alpha_vs_axial", "alpha_c_axial")
+            for row in (there, back)
+        ]
+        lines.append([f"{strain:.1%}", *cells])
+    head = ["10³, strain", "α_vs there", "and back", "α_c there", "and back"]
+    return markdown(head, lines)

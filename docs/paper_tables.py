@@ -56,6 +56,11 @@ def row_of(name: str, variant: str, strain: float) -> Any:
     return min(rows, key=lambda row: abs(row["strain"] - strain))
 
 
+def usual_variant(name: str) -> str:
+    """The RV of a sample in a shell; a periodic medium as a whole has no edge."""
+    return "c" if name.startswith("yade") else "a"
+
+
 def fits(name: str, strain_max: float | None = UP_TO, **chosen: Any) -> dict[str, Any]:
     """Rows of the comparison by variant."""
     rows = table(name).select(**chosen) if chosen else table(name)
@@ -86,8 +91,12 @@ def interval(fit: Any, name: str) -> str:
     return f"{fit.slope:.3f} ({fit.slope - half:.3f} to {fit.slope + half:.3f})"
 
 
-def with_error(row: Any, name: str) -> str:
-    """An anisotropy in thousandths with its error, of the scan and of the sample."""
+def total_error(row: Any, name: str) -> float:
+    """Of the scan and of the sample."""
     parts = [row[f"{name}{end}"] for end in ("_se", "_sample_se") if f"{name}{end}" in row]
-    error = math.hypot(*(part for part in parts if part is not None))
-    return f"{1e3 * row[name]:.2f} ± {1e3 * error:.2f}"
+    return math.hypot(*(part for part in parts if part is not None))
+
+
+def with_error(row: Any, name: str) -> str:
+    """An anisotropy in thousandths with its error."""
+    return f"{1e3 * row[name]:.2f} ± {1e3 * total_error(row, name):.2f}"
