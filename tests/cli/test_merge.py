@@ -103,6 +103,24 @@ def test_more_jobs_than_frames(series, whole, tmp_path, capsys):
     assert merged.read_bytes() == whole.read_bytes()
 
 
+def test_a_run_without_rows_leaves_a_finished_table_alone(series, tmp_path, capsys):
+    table = compute(series, tmp_path / "whole.csv")
+    before = table.read_bytes()
+    words = ["compute", str(series), *FAST, "--frames", "100:", "-o", str(table)]
+    assert run(words) == 1
+    assert "the table that is there stays as it is" in capsys.readouterr().err
+    assert table.read_bytes() == before
+    # one without rows may be written again
+    empty = tmp_path / "empty.csv"
+    for _ in range(2):
+        assert run([*words[:-1], str(empty)]) == 0
+
+
+def test_parts_without_the_void_fabric_are_merged_like_others(series, tmp_path):
+    parts = as_parts(series, tmp_path, 2, "--fields", "source,frame,variant,mean_length")
+    assert run(["merge", *parts, "-o", str(tmp_path / "merged.csv")]) == 0
+
+
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_a_job_without_frames_writes_every_format(series, tmp_path, suffix):
     parts = as_parts(series, tmp_path, 6, suffix=suffix)
