@@ -140,8 +140,9 @@ CLAIMS = (
 )  # fmt: skip
 NUMBERS = (
     words.start_worst, words.off_share, words.lateral_share, words.contact_share, words.void_share,
+    words.lagging,
     words.normalised_worst, words.slope_misses, words.pooled, words.disc_misses, words.disc_ratio,
-    words.printed_radius, words.best_cutoff, words.cutoff_slopes, words.predicted_off,
+    words.printed_radius, words.cutoff_slopes, words.predicted_off,
     words.null_tests,
 )  # fmt: skip
 PARTS: dict[str, Callable[[], str]] = {
@@ -150,6 +151,8 @@ PARTS: dict[str, Callable[[], str]] = {
     "summaries": summaries,
     "others": others,
     **{number.__name__: number for number in NUMBERS},
+    "best_cutoff_early": partial(words.best_cutoff, 0.05),
+    "best_cutoff": partial(words.best_cutoff, 0.2),
     "order_four_contacts": partial(words.order_four, "c"),
     "order_four_voids": partial(words.order_four, "vs"),
     "order_four_discs": partial(words.order_four, "vs", plane=True),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Iterable, Sequence
 from functools import cache
@@ -13,6 +12,7 @@ import numpy as np
 from scipy.stats import t as student
 
 import scanfab
+from scanfab.table.reading import total_error
 
 TABLES = Path(__file__).parents[1] / "sample_data" / "paper"
 RUNS = {
@@ -91,12 +91,7 @@ def interval(fit: Any, name: str) -> str:
     return f"{fit.slope:.3f} ({fit.slope - half:.3f} to {fit.slope + half:.3f})"
 
 
-def total_error(row: Any, name: str) -> float:
-    """Of the scan and of the sample."""
-    parts = [row[f"{name}{end}"] for end in ("_se", "_sample_se") if f"{name}{end}" in row]
-    return math.hypot(*(part for part in parts if part is not None))
-
-
 def with_error(row: Any, name: str) -> str:
-    """An anisotropy in thousandths with its error."""
-    return f"{1e3 * row[name]:.2f} ± {1e3 * total_error(row, name):.2f}"
+    """An anisotropy in thousandths with its error, where that is known."""
+    error = total_error(row, name)
+    return f"{1e3 * row[name]:.2f}" + ("" if error is None else f" ± {1e3 * error:.2f}")

@@ -20,9 +20,10 @@ from paper_tables import (
     row_of,
     runs,
     table,
-    total_error,
     usual_variant,
 )
+
+from scanfab.table.reading import total_error
 
 
 def span(values: Iterable[float], form: str = "{:.0f}") -> str:
@@ -34,10 +35,10 @@ def span(values: Iterable[float], form: str = "{:.0f}") -> str:
 
 def start_worst() -> str:
     """How many of its errors the isotropic void fabric is from 0, at the most."""
-    rows = [row_of(f"{name}_default", one, 0.0) for name in runs() for one in VARIANTS]
-    return (
-        f"{max(abs(row.alpha_vs_axial) / total_error(row, 'alpha_vs_axial') for row in rows):.1f}"
-    )
+    name = "alpha_vs_axial"
+    rows = [row_of(f"{run}_default", one, 0.0) for run in runs() for one in VARIANTS]
+    known = [(abs(row[name]), total_error(row, name)) for row in rows]
+    return f"{max(value / error for value, error in known if error):.1f}"
 
 
 def off_share() -> str:
@@ -69,6 +70,12 @@ def contact_share() -> str:
 def void_share() -> str:
     """Of the void fabric at 20 % strain, what is there at 10 %."""
     return span(_at_ten("alpha_vs_axial"))
+
+
+def lagging() -> str:
+    """In how many curves void fabric has the smaller share."""
+    pairs = [*zip(_at_ten("alpha_vs_axial"), _at_ten("alpha_c_axial"), strict=True)]
+    return f"{sum(void < contact for void, contact in pairs)} of {len(pairs)}"
 
 
 def _at_ten(column: str) -> list[float]:
@@ -156,11 +163,12 @@ def printed_radius() -> str:
     return f"{(13_723 * 1.25 / (1 - porosity)) ** (1 / 3):.1f}"
 
 
-def best_cutoff() -> str:
-    """The cut-off at which the RV's final void anisotropy is largest, in r_min."""
+def best_cutoff(strain: float) -> str:
+    """The cut-off at which the RV's void anisotropy is largest, in r_min."""
     rows = table(f"{MAIN}_cutoffs").select(variant="c")
-    last = [row for row in rows if row["strain"] == max(rows["strain"])]
-    best = max(last, key=lambda row: row["alpha_vs_axial"])
+    nearest = min(rows["strain"], key=lambda one: abs(one - strain))
+    at_strain = [row for row in rows if row["strain"] == nearest]
+    best = max(at_strain, key=lambda row: row["alpha_vs_axial"])
     return f"{3 * best['cutoff'] / max(rows['cutoff']):.2g}"
 
 

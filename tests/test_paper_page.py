@@ -121,7 +121,7 @@ def test_the_sentences_hold_the_numbers_of_the_tables(page) -> None:
     assert words.disc_ratio() == "0.10"
     assert words.contact_share() == words.void_share() == "71"
     assert words.normalised_worst() == "0.00"
-    assert words.best_cutoff() == "0"
+    assert words.best_cutoff(0.2) == "0"
     assert words.order_four("vs") == "0"
 
 
