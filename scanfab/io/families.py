@@ -7,12 +7,13 @@ from collections import defaultdict
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatch
+from functools import lru_cache
 from pathlib import Path
 
 from scanfab.base.errors import ReadError, UnknownFormatError
 from scanfab.io.files import bare_name
 from scanfab.io.reader import FileKind, Reader, ReadOptions
-from scanfab.io.registry import reader_for, reader_named
+from scanfab.io.registry import installed_readers, reader_for, reader_named
 
 __all__ = [
     "SETTINGS_FILE",
@@ -80,8 +81,18 @@ def sort_into_families(
     """
     return [
         _family(_by_step(members), members, _glob(members, files), format, options)
-        for members in _groups(files)
+        for members in _groups(_heads(files, format))
     ]
+
+
+def _heads(files: Sequence[Path], format: str | None) -> Sequence[Path]:
+    """The files without those that another one of them lists as its parts."""
+    readers = installed_readers()
+    named = readers.values() if format not in readers else [readers[format]]
+    for ask in [one.plugin.listed_by for one in named if hasattr(one.plugin, "listed_by")]:
+        there = set(files)
+        files = [file for file in files if ask(file) not in there]
+    return files
 
 
 def _groups(files: Sequence[Path]) -> list[list[Path]]:
@@ -111,7 +122,7 @@ def families_beside(
     found: dict[str, list[tuple[int | None, Path]]] = defaultdict(list)
     for folder, own in keys.items():
         files = files_in(folder)
-        groups = _groups(files)
+        groups = _groups(_heads(files, format))
         wanted = {
             step: own[file] for group in groups for step, file in _by_step(group) if file in own
         }
@@ -184,14 +195,16 @@ def contacts_beside(
 
 def files_in(folder: Path) -> list[Path]:
     """The files of a folder that may be dumps: not hidden ones, nor what is left behind."""
-    return sorted(
+    files = [
         file
         for file in folder.iterdir()
         if not file.name.startswith(".")
         and file.name != SETTINGS_FILE
         and not file.name.endswith(LEFTOVERS)
         and file.is_file()
-    )
+    ]
+    # to compare names is quicker than to compare paths
+    return sorted(files, key=lambda file: file.name)
 
 
 def own_contacts(
@@ -240,6 +253,7 @@ def _kinship(one: Family, two: Family) -> tuple[int, bool]:
     return common, _ending(one) == _ending(two)
 
 
+@lru_cache(1 << 16)
 def _numbers(file: Path) -> tuple[int, ...]:
     # the ending of a name (.mp4) is not a number of the frame, unless it is nothing else (dump.100)
     name = Path(bare_name(file))

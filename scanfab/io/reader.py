@@ -140,7 +140,9 @@ class Reader(Protocol):
     whose grain files do not all carry their cell has a method ``carries(path)`` that answers with
     one of :data:`Carries`. One that reads other files together with a file of grains, such as that
     of its cell, has a method ``beside(path)`` that answers with a list of their paths: they are
-    inputs too. It is asked for each file of a series, so it should not open them. One that cannot
+    inputs too. It is asked for each file of a series, so it should not open them. If these are
+    called like files of grains, a method ``listed_by(path)`` answers, by its name alone, which file
+    lists a file, or None: in a folder the listed ones are no frames. One that cannot
     know what a file holds without what users tell of it (the columns of a table) has a method
     ``told(options)`` that answers with a reader that does know. One of tables that may hold
     anything says ``is_table = True``: in a folder they count only where there are no dumps.

@@ -97,7 +97,8 @@ def place_of(position: FloatArray, space: Space) -> float:
 
 def _shared(position: FloatArray) -> BoolArray:
     """Which coordinates all centres have in common."""
-    return np.asarray(np.all(position == position[0], axis=0))
+    few = np.all(position[:FEWEST] == position[0], axis=0)
+    return np.asarray(np.all(position == position[0], axis=0) if few.any() else few)
 
 
 def cell_in_plane(cell: Cell, space: Space) -> Cell:

@@ -16,7 +16,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-GROUPS = ("chords", "windows", "periodic", "scaling", "startup", "reading")
+GROUPS = ("chords", "windows", "periodic", "scaling", "startup", "reading", "reading_formats")
 PACKAGES = ("scanfab", "numpy", "numba", "polars")
 
 

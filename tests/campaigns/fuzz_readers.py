@@ -45,30 +45,34 @@ def main() -> None:
     parser.add_argument("readers", nargs="*", metavar="READER", default=[])
     parser.add_argument("--runs", type=int, default=200_000, help="executions of each reader")
     parser.add_argument("--out", type=Path, default=Path("fuzz_findings"))
+    parser.add_argument("--minutes", type=float, default=1e6, help="of each reader, about")
+    parser.add_argument("--only", nargs="+", default=[""], help="endings of the files to damage")
     parser.add_argument("--process", type=Path, help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.process is not None:
-        fuzz(given.readers[0], given.runs, given.out, given.process)
+        fuzz(given.readers[0], given.runs, given.out, given.process, tuple(given.only))
         return
     from tests.helpers.fuzzing import READERS
 
     for reader in given.readers or READERS:
-        supervise(reader, given.runs, given.out / reader)
+        supervise(reader, given.runs, given.out / reader, given.only, given.minutes)
 
 
-def supervise(reader: str, runs: int, out: Path) -> None:
+def supervise(reader: str, runs: int, out: Path, only: list[str], minutes: float) -> None:
     """Fuzz one reader, with a new process after each that ends; print the summary."""
     out.mkdir(parents=True, exist_ok=True)
     began, done, ended = time.monotonic(), 0, 0
     with tempfile.TemporaryDirectory(dir=RAM if RAM.is_dir() else None) as name:
         folder = Path(name)
         (folder / "corpus").mkdir()
-        while done < runs:
+        while done < runs and time.monotonic() - began < 60 * minutes:
             (folder / "count").write_bytes(COUNTER.pack(0))
             chunk = min(runs - done, RUNS_OF_A_PROCESS)
             command = [sys.executable, __file__, reader, f"--runs={chunk}", f"--out={out}"]
             with open(out / "log.report", "ab") as log:
-                code = subprocess.call([*command, f"--process={folder}"], stdout=log, stderr=log)
+                code = subprocess.call(
+                    [*command, f"--process={folder}", "--only", *only], stdout=log, stderr=log
+                )
             executed = COUNTER.unpack((folder / "count").read_bytes())[0]
             done, ended = done + executed, ended + (code != 0)
             if executed == 0:
@@ -82,7 +86,7 @@ def supervise(reader: str, runs: int, out: Path) -> None:
     )
 
 
-def fuzz(reader: str, runs: int, out: Path, folder: Path) -> None:
+def fuzz(reader: str, runs: int, out: Path, folder: Path, only: tuple[str, ...]) -> None:
     """Fuzz in this process until it has made its runs, or breaks."""
     import atheris
 
@@ -92,11 +96,11 @@ def fuzz(reader: str, runs: int, out: Path, folder: Path) -> None:
     single_blanks(np.zeros(1, np.uint8), np.zeros(1, np.uint8))
     with atheris.instrument_imports(include=["scanfab", "meshio.vtk", "meshio.vtu", "meshio.xdmf"]):
         from scanfab.io.registry import installed_readers
-        from tests.helpers import fuzzing
+        from tests.helpers import fuzzing, sound_files
 
         installed_readers()
-    _write_corpus(fuzzing, reader, folder)
-    fuzzing.companion_grains(reader)
+    _write_corpus(fuzzing, sound_files, reader, only, folder)
+    sound_files.companion_grains(reader)
     # the libraries that the first table loads take 1 GB of addresses, whatever stands in it
     table = folder / "table.csv"
     table.write_text("x,y,z,radius\n0,0,0,1\n")
@@ -126,13 +130,14 @@ def fuzz(reader: str, runs: int, out: Path, folder: Path) -> None:
     atheris.Fuzz()
 
 
-def _write_corpus(fuzzing, reader: str, folder: Path) -> None:
+def _write_corpus(fuzzing, sound_files, reader: str, only: tuple[str, ...], folder: Path) -> None:
     """Two bytes before each file choose its ending and the options; they mutate as well."""
+    (folder / "seeds").mkdir(exist_ok=True)
+    seeds = [one for one in sound_files.seeds(reader, folder / "seeds") if one[0].endswith(only)]
     if any((folder / "corpus").iterdir()):
         return
-    (folder / "seeds").mkdir()
     endings = [Path(name).suffix for name in fuzzing.NAMES]
-    for number, (name, data) in enumerate(fuzzing.seeds(reader, folder / "seeds")):
+    for number, (name, data) in enumerate(seeds):
         suffix = Path(name).suffix
         place = endings.index(suffix) if suffix in endings else 0
         (folder / "corpus" / f"seed_{number}").write_bytes(bytes([place, 0]) + data)
@@ -155,8 +160,8 @@ class _Execution:
         if len(data) < 2:
             return
         name = fuzzing.NAMES[data[0] % len(fuzzing.NAMES)]
-        # a name of its own, since decompressed copies are kept by name, time and size
-        path = self.folder / name.replace("f_1", f"f_{self.count % 1000}")
+        # beside sound files, which lists may name; decompressed copies are kept by their names
+        path = self.folder / "seeds" / name.replace("f_1", f"f_{self.count % 1000}")
         path.write_bytes(data[2:])
         options = fuzzing.OPTIONS[data[1] % len(fuzzing.OPTIONS)]
         began = time.monotonic()

@@ -1,11 +1,11 @@
 """
 Random damage for the readers, without a guide: quicker than fuzz_readers.py, and needs no package.
 
-    python tests/campaigns/mutate_readers.py [--runs 5000] [READER ...]
+    python tests/campaigns/mutate_readers.py [--runs 5000] [READER ...] [--only .bin]
 
 Small sound files of each format are damaged at random, and read as grains and as contacts.
 Anything but an answer or a ScanfabError is kept in the folder `mutate_findings`, as is what takes
-over 5 s; one line for each reader at the end.
+over 10 s; one line for each reader at the end.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from scanfab.base.errors import ScanfabError  # noqa: E402
 from scanfab.io.reader import GrainTable  # noqa: E402
 from scanfab.io.registry import reader_named  # noqa: E402
 from scanfab.packing.packing import Packing  # noqa: E402
-from tests.helpers import fuzzing  # noqa: E402
+from tests.helpers import fuzzing, sound_files  # noqa: E402
 
-SECONDS = 5.0
+SECONDS = 10.0
 OUT = Path("mutate_findings")
 
 
@@ -38,11 +38,14 @@ def main() -> None:
     parser.add_argument("readers", nargs="*", default=[])
     parser.add_argument("--runs", type=int, default=5000)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--only", nargs="+", default=[""], help="endings of the files to damage")
     given = parser.parse_args()
     for name in given.readers or fuzzing.READERS:
         began = time.monotonic()
         with tempfile.TemporaryDirectory() as folder:
-            findings, answers = damage(name, given.runs, Random(given.seed), Path(folder))
+            findings, answers = damage(
+                name, given.runs, Random(given.seed), Path(folder), tuple(given.only)
+            )
         print(
             f"{name}: {given.runs} executions, {time.monotonic() - began:.0f} s, {answers} read, "
             f"{findings} findings",
@@ -50,21 +53,23 @@ def main() -> None:
         )
 
 
-def damage(name: str, runs: int, random: Random, folder: Path) -> tuple[int, int]:
+def damage(
+    name: str, runs: int, random: Random, folder: Path, only: tuple[str, ...] = ("",)
+) -> tuple[int, int]:
     """How many findings, and how many files that could be read in spite of their damage."""
-    (folder / "seeds").mkdir()
-    seeds = fuzzing.seeds(name, folder / "seeds")
-    companion, _ = fuzzing.companion_grains(name)
+    seeds = [one for one in sound_files.seeds(name, folder) if one[0].endswith(only)]
+    companion, _ = sound_files.companion_grains(name)
     findings = answers = 0
     for number in range(runs):
         own, data = random.choice(seeds)
-        # a name of its own, since decompressed copies are kept by name, time and size
+        # beside sound files, which lists may name; decompressed copies are kept by their names
         path = folder / f"{number % 50}_{own}"
         path.write_bytes(fuzzing.mutate(data, random))
+        options = fuzzing.OPTIONS[0] if random.random() < 0.5 else random.choice(fuzzing.OPTIONS)
         began = time.monotonic()
         try:
             with fuzzing.only_scanfabs_warnings():
-                answers += read(path, name, random.choice(fuzzing.OPTIONS), companion)
+                answers += read(path, name, options, companion)
             if time.monotonic() - began > SECONDS:
                 raise fuzzing.ForbiddenError(f"slow: {time.monotonic() - began:.0f} s")
         except (Exception, SystemExit):
@@ -78,6 +83,7 @@ def damage(name: str, runs: int, random: Random, folder: Path) -> tuple[int, int
 
 def read(path: Path, name: str, options, companion: GrainTable) -> bool:
     """All that a reader is asked of a file; whether there are grains in it."""
+    path = sound_files.entry(name, path)
     reader = reader_named(name, options)
     try:
         reader.recognises(path)

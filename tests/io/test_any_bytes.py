@@ -13,12 +13,11 @@ from tests.helpers.fuzzing import (
     NAMES,
     OPTIONS,
     READERS,
-    companion_grains,
     mutate,
     only_scanfabs_warnings,
     read_everything,
-    seeds,
 )
+from tests.helpers.sound_files import companion_grains, seeds
 
 HEADS = (
     b"",

@@ -414,3 +414,26 @@ def test_a_nan_that_signals_is_no_warning(tmp_path):
         warnings.simplefilter("error", RuntimeWarning)
         with pytest.raises(scanfab.ScanfabError, match="finite"):
             scanfab.read(tmp_path / "a.vtp")
+
+
+@pytest.mark.parametrize("word", ["9" * 5000 + "x", "9" * 5000 + ".5.5", "1" * 5000 + "e"])
+def test_words_of_many_digits_take_no_time(tmp_path, word):
+    """A pattern that could cut the digits anywhere tried all places: 32 s for a table of these."""
+    rows = f"1,0,{word},0,1\n" * 40
+    path = write(tmp_path / "a.csv", f"id,x,y,z,radius\n{rows}")
+    began = time.monotonic()
+    refuses(scanfab.read, path)
+    assert time.monotonic() - began < 5
+
+
+def test_radii_near_zero_prove_nothing(tmp_path):
+    rows = "".join(f"{k}e300 0 0 1e-300\n" for k in range(12))
+    refuses(scanfab.read, write(tmp_path / "a.txt", rows), match="no names")
+
+
+@pytest.mark.parametrize("rows", ["", "1,2,0.5,0,\n"])
+def test_a_column_without_name_and_numbers_that_the_user_names(tmp_path, rows):
+    grains = write(tmp_path / "d1.csv", "id,x,y,z,radius\n1,0,0,0,1\n2,2,0,0,1\n")
+    pairs = write(tmp_path / "p1.csv", f"id1,id2,fx,fy,\n{rows}")
+    named = "id1=id1,id2=id2,fx2=fx,fy2=fy,fz2=5"
+    refuses(scanfab.read, grains, contacts=pairs, contact_columns=named, match="column 5")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import warnings
 from pathlib import Path
+from typing import IO
 
 from scanfab.base.errors import ReadError, ScanfabWarning
 from scanfab.io.files import plain
@@ -19,7 +20,10 @@ __all__ = ["index_yaml", "is_yaml", "read_yaml_grains", "yaml_kind"]
 
 START = re.compile(rb"\A(?:\xef\xbb\xbf)?---[ \t]*\r?\ncreator:[ \t]*LAMMPS[ \t]*\r?\n")
 DATA = re.compile(rb"^data:[ \t]*\r?\n", re.MULTILINE)
-END = b"..."
+BEGIN, END = b"---", b"..."
+MARK = b"\xef\xbb\xbf"
+# bytes that are searched at a time
+PIECE = 1 << 20
 # a header never comes near this size
 HEADER_BYTES = 1 << 16
 
@@ -36,14 +40,8 @@ def yaml_kind(head: bytes) -> FileKind:
 
 def index_yaml(path: Path) -> list[Snapshot]:
     """The documents; a last one without its end is left out with a warning if there are others."""
-    starts, ends, place = [], [], 0
     with open(plain(path), "rb") as stream:
-        while line := stream.readline(HEADER_BYTES):
-            if line.rstrip() == b"---" or (place == 0 and line.endswith((b"---\n", b"---\r\n"))):
-                starts.append(place)
-            place += len(line)
-            if line.rstrip() == END:
-                ends.append(place)
+        starts, ends = _borders(stream)
         if len(ends) == len(starts) - 1 and ends:
             warnings.warn(
                 f"{path}: the last snapshot, number {len(starts)}, is incomplete and is left out",
@@ -62,6 +60,27 @@ def index_yaml(path: Path) -> list[Snapshot]:
             head = stream.read(min(HEADER_BYTES, max(stop - start, 0)))
             found.append(_snapshot(path, head, start, stop))
     return sorted(found, key=lambda one: one.step or 0)
+
+
+def _borders(stream: IO[bytes]) -> tuple[list[int], list[int]]:
+    """First bytes of the lines that begin documents, and those behind the lines that end them."""
+    found: dict[bytes, list[int]] = {BEGIN: [], END: []}
+    place = 0
+    # whole lines, so that no border is cut in two
+    while piece := stream.read(PIECE) + stream.readline(HEADER_BYTES):
+        data = b"\n" + piece
+        if place == 0 and piece.startswith(MARK + BEGIN):
+            data = b"\n" * (1 + len(MARK)) + piece.removeprefix(MARK)
+        for word, places in found.items():
+            at = data.find(b"\n" + word)
+            while at >= 0:
+                end = data.find(b"\n", at + 1)
+                end = len(data) if end < 0 else end + 1
+                if data[at + 1 : end].rstrip() == word:
+                    places.append(place + (at if word == BEGIN else end - 1))
+                at = data.find(b"\n" + word, end - 1)
+        place += len(piece)
+    return found[BEGIN], found[END]
 
 
 def read_yaml_grains(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
@@ -115,7 +134,7 @@ def _snapshot(path: Path, head: bytes, start: int, stop: int) -> Snapshot:
 
 def _plain(rows: bytes) -> bytes:
     """Entries such as ``- [ 1, 0.5, ]``, one a line, without their brackets and commas."""
-    return rows.replace(b"- [", b"").replace(b"]", b"").replace(b",", b"")
+    return rows.replace(b"- [", b"").translate(None, b"],")
 
 
 def _value(head: bytes, key: bytes) -> str:

@@ -149,6 +149,9 @@ class TableReader:
                 f'them with `contact_columns="id1=NAME,id2=NAME"`'
             )
         columns = read_table(path, options.skip, *_needed(found))
+        for name in found.values():
+            if name not in columns:
+                raise ReadError(f"{path}: expected numbers in the column {name}, which is empty")
         return join_table(path, grains, {what: columns[name] for what, name in found.items()})
 
     def _find(self, path: Path, names: Sequence[str], *, contacts: bool) -> dict[str, str]:
@@ -206,7 +209,8 @@ class TableReader:
             position, size = np.column_stack(part[:3]).astype(float), part[3].astype(float)
             if touch(position, size):
                 fits.append(begin)
-            large = large or touch(position, 0.5 * size)
+            elif not fits:
+                large = large or touch(position, 0.5 * size)
         if len(fits) != 1:
             lacks = (
                 f"fewer than {TOO_FEW} grains prove nothing"

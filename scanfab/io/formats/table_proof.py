@@ -47,8 +47,12 @@ def touch(position: FloatArray, radius: FloatArray) -> bool:
         return False
     chosen = np.unique(np.linspace(0, len(radius) - 1, LOOKED_AT).astype(np.int64))
     count = min(NEIGHBOURS, len(radius) - 1)
-    distance, other = KDTree(position).query(position[chosen], k=count + 1)
-    ratio = distance / (radius[chosen, None] + radius[other])
+    # a tree for few questions
+    distance, other = KDTree(position, compact_nodes=False, balanced_tree=False).query(
+        position[chosen], k=count + 1
+    )
+    with np.errstate(over="ignore"):
+        ratio = distance / (radius[chosen, None] + radius[other])
     ratio[other == chosen[:, None]] = np.inf
     nearest = ratio.min(axis=1)
     touching = np.mean(np.abs(nearest - 1.0) < CONTACT)

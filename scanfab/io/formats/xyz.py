@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import os
 import re
 from pathlib import Path
 from typing import IO, Any
@@ -13,6 +15,8 @@ from scanfab.base.errors import PackingError, ReadError
 from scanfab.io.files import check_memory, first_bytes, plain
 from scanfab.io.formats.columns import grain_table, has_radius
 from scanfab.io.parse.counted_rows import leave_out_last, skip_rows
+from scanfab.io.parse.number_rows import ROUNDED
+from scanfab.io.parse.text_table import parse_rows
 from scanfab.io.reader import (
     Carries,
     FileKind,
@@ -87,9 +91,10 @@ class XyzReader:
         with open(plain(path), "rb") as stream:
             stream.seek(snapshot.start)
             head = _head(path, stream)
-            check_memory(path, 12.0 * ((snapshot.stop or stream.tell()) - stream.tell()))
-            rows = [stream.readline() for _ in range(head.count)]
-        columns = _columns(path, head, rows)
+            stop = os.fstat(stream.fileno()).st_size if snapshot.stop is None else snapshot.stop
+            check_memory(path, 12.0 * (stop - stream.tell()))
+            data = stream.read(max(stop - stream.tell(), 0))
+        columns = _numbers(head, data) or _columns(path, head, data)
         named = next((name for name in columns if name.lower() in POSITIONS), None)
         if named is not None:
             columns["position"] = columns.pop(named)
@@ -216,9 +221,33 @@ def _head_or_end(path: Path, stream: IO[bytes]) -> _Head | None:
     return _Head(path, int(count[1]), line.decode("utf-8", "replace"), start)
 
 
-def _columns(path: Path, head: _Head, rows: list[bytes]) -> dict[str, npt.NDArray[Any]]:
+def _numbers(head: _Head, data: bytes) -> dict[str, npt.NDArray[Any]] | None:
+    """The columns of a long frame, parsed at once; None if they are not all plain numbers."""
+    places, whole = {}, set()
+    total = 0
+    for name, kind, width in head.properties:
+        places[name] = range(total, total + width)
+        whole |= set(places[name]) if kind == "I" else set()
+        total += width
+    if not {kind for _, kind, _ in head.properties} <= {"I", "R"}:
+        return None
+    table = parse_rows(data, 0, len(data), whole)
+    if table is None or table.shape != (head.count, total):
+        return None
+    if any(not np.all(np.abs(table[:, k]) < ROUNDED) for k in whole):
+        return None
+    return {
+        name: np.array(table[:, where[0]] if len(where) == 1 else table[:, where], KINDS[kind])
+        for (name, kind, _), where in zip(head.properties, places.values(), strict=True)
+    }
+
+
+def _columns(path: Path, head: _Head, data: bytes) -> dict[str, npt.NDArray[Any]]:
     """The columns, each of one or several values in a row."""
     total = sum(width for _, _, width in head.properties)
+    rows = io.BytesIO(data).readlines()[: head.count]
+    if len(rows) < head.count:
+        raise ReadError(f"{path}: expected {head.count} rows, found {len(rows)}: it is incomplete")
     words = [row.split() for row in rows]
     for number, row in enumerate(words):
         if len(row) != total or not rows[number].endswith(b"\n"):

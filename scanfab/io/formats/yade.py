@@ -15,6 +15,7 @@ from scanfab.io.formats.columns import grain_table
 from scanfab.io.formats.vtk import VtkReader, vectors
 from scanfab.io.formats.yade_save import is_binary_save, is_save, read_save, snapshot_of_save
 from scanfab.io.parse.number_rows import rows_of_numbers
+from scanfab.io.parse.text_table import FILLED, parse_rows
 from scanfab.io.parse.vtk_data import FlawError, Mesh
 from scanfab.io.parse.vtk_xml import count_rows
 from scanfab.io.reader import (
@@ -33,8 +34,6 @@ __all__ = ["YadeReader"]
 
 # legacy VTK by VTKExporter: VTK itself writes no dot behind the version
 EXPORTER_HEAD = b"# vtk DataFile Version 3.0.\n"
-# as numpy has them
-BLANKS = b" \t\n\r\v\f\x1c\x1d\x1e\x1f\x85\xa0"
 PERIODIC_HEAD = b"##PERIODIC::"
 TEXT_HEADS = (b"#format ", PERIODIC_HEAD)
 
@@ -129,9 +128,10 @@ def _numbers(path: Path) -> FloatArray:
     check_memory(path, 6.0 * plain(path).stat().st_size)
     check_lines(path, plain(path))
     data = plain(path).read_bytes()
-    if all(not line.partition(b"#")[0].strip(BLANKS) for line in data.split(b"\n")):
+    if FILLED.search(data) is None:
         return np.zeros((0, 0))  # an empty frame
-    return rows_of_numbers(path, data)
+    rows = parse_rows(data, 0, len(data))
+    return rows_of_numbers(path, data) if rows is None else rows
 
 
 def _text_columns(path: Path, lines: list[str], count: int | None) -> tuple[list[str], Cell | None]:

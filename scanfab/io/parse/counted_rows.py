@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import warnings
 from pathlib import Path
 from typing import IO
@@ -13,18 +12,16 @@ from scanfab.base.errors import ReadError, ScanfabWarning
 from scanfab.base.typing import FloatArray
 from scanfab.io.files import check_memory, plain
 from scanfab.io.parse.number_rows import rows_of_numbers
-from scanfab.io.parse.text_table import parse_regular
+from scanfab.io.parse.text_table import FILLED, parse_rows
 from scanfab.io.reader import Snapshot
 from scanfab.io.unpacking import check_lines
 
 __all__ = ["counted_rows", "leave_out_last", "lines_above", "skip_rows", "spelt", "text_of"]
 
-# bytes of a table for which polars is worth loading, and that are read at a time
-LONG, PIECE = 2 << 20, 1 << 20
+# bytes that are read at a time
+PIECE = 1 << 20
 # times its size in memory: the text, its numbers, and the columns made of them
 IN_MEMORY = 6.0
-# a line that is not blank or a comment, as numpy has them
-FILLED = re.compile(rb"^[ \t\r\f\v\x1c-\x1f\x85\xa0]*[^#\s\x1c-\x1f\x85\xa0]", re.MULTILINE)
 
 
 def text_of(snapshot: Snapshot) -> bytes:
@@ -91,7 +88,7 @@ def counted_rows(
         # blanks behind the last line end do no harm
         if not data[max(begin, end - PIECE) : end].rstrip(b" \t\r").endswith(b"\n"):
             raise ReadError(f"{path}: the last line has no end: the file is incomplete")
-        large = _large(data, begin, end)
+        large = parse_rows(data, begin, end)
         if large is None:
             above = lines_above(snapshot) if snapshot.start else 0
             large = rows_of_numbers(path, data, begin, end, above)
@@ -102,18 +99,6 @@ def counted_rows(
         expected = " or ".join(map(str, widths))
         raise ReadError(f"{path}: expected {expected} columns of {names}, found {values.shape[1]}")
     return values
-
-
-def _large(data: bytes, begin: int, end: int) -> FloatArray | None:
-    """The rows of a long table, by a faster parser that wants single blanks; None if it fails."""
-    if end - begin < LONG:
-        return None
-    first = FILLED.search(data, begin, end)
-    text = data[begin if first is None else first.start() : end].rstrip(b"\n") + b"\n"
-    while b"  " in text:
-        text = text.replace(b"  ", b" ")
-    text = text.lstrip(b" ").replace(b"\n ", b"\n").replace(b" \n", b"\n")
-    return parse_regular(text, len(text[: text.find(b"\n")].split()))
 
 
 def skip_rows(stream: IO[bytes], count: int) -> int:

@@ -10,7 +10,7 @@ from scanfab.base.jit import kernel
 __all__ = ["count_spaces", "single_blanks"]
 
 # white space is what is not above a blank
-BLANK, LINE_END = 32, 10
+BLANK, LINE_END, TAB, RETURN = 32, 10, 9, 13
 # so many can be counted in a byte, of which vector instructions take more at a time
 PIECE = 240
 
@@ -43,7 +43,8 @@ def single_blanks(text: npt.NDArray[np.uint8], out: npt.NDArray[np.uint8]) -> in
     """
     Copy a text with one blank between two words of a line, and none around them.
 
-    Returns how many bytes that makes; empty lines stay.
+    Returns how many bytes that makes; empty lines stay. -1 if there are other bytes below a blank
+    than tabs and line ends, which no parser takes for blanks.
     """
     size = np.int64(0)
     waits = False
@@ -54,6 +55,11 @@ def single_blanks(text: npt.NDArray[np.uint8], out: npt.NDArray[np.uint8]) -> in
             size += 1
             waits = False
         elif byte <= BLANK:
+            # of the ends of lines of Windows
+            behind = text[k + 1] if k + 1 < text.size else LINE_END
+            is_return = byte == RETURN and behind in (RETURN, LINE_END)
+            if byte not in (BLANK, TAB) and not is_return:
+                return -1
             waits = bool(size > 0 and out[size - 1] != LINE_END)
         else:
             if waits:

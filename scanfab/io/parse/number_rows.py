@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
 
-__all__ = ["exact_column", "plain_reason", "rows_of_numbers"]
+__all__ = ["ROUNDED", "exact_column", "plain_reason", "rows_of_numbers"]
 
 # whole numbers from here on may be rounded as decimals
 ROUNDED = 2.0**53

@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
 from scanfab.io.parse.sheet_layout import Layout, fields_of
+from scanfab.io.parse.text_table import squeezed
 
 __all__ = ["read_columns"]
 
@@ -66,7 +67,7 @@ def read_columns(
     if not body:
         return {place: np.zeros(0) for place in range(layout.width)}
     if layout.separator == " ":
-        body = _single_blanks(body)
+        body = squeezed(body) or body
         found = None if layout.has_commas else _regular(body, layout, numbers, whole)
         if found is not None:
             return found
@@ -96,15 +97,6 @@ def _check_lines(path: Path, body: bytes, layout: Layout) -> None:
             f"{path}, line {line}: expected rows to the end, {what}: one file holds one table of "
             f"one frame"
         )
-
-
-def _single_blanks(body: bytes) -> bytes:
-    """Rows with one blank between two words, and none around them."""
-    from scanfab.io.parse.kernels import single_blanks
-
-    text = np.frombuffer(body, np.uint8)
-    out = np.empty_like(text)
-    return out[: single_blanks(text, out)].tobytes()
 
 
 def _parsed(

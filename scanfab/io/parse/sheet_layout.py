@@ -24,7 +24,7 @@ HEAD = 1 << 18
 # rows that are looked at to tell how the others are written
 SAMPLE = 20
 NUMBER = re.compile(
-    r"[-+]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eEdD][-+]?[0-9]+)?|(?:nan|inf|infinity))\Z",
+    r"[-+]?(?:(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eEdD][-+]?[0-9]+)?|(?:nan|inf|infinity))\Z",
     re.IGNORECASE,
 )
 COMMENTS = ("#", "%", "//", "!")

@@ -1,13 +1,14 @@
 """
 Long tables of text with one blank between two words: parsed by polars, and only where it is needed.
 
-What is not regular (runs of blanks, tabs, words, lines of another width) is left to the tolerant
-parser of the format, which reads it or says what is wrong in which line.
+What is not regular (words, lines of another width) is left to the tolerant parser of the format,
+which reads it or says what is wrong in which line.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Collection, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -21,7 +22,7 @@ import numpy.typing as npt
 from scanfab.base.memory import free_memory
 from scanfab.base.threads import in_order
 
-__all__ = ["LARGE", "TextTable", "parse_regular", "read_regular"]
+__all__ = ["FILLED", "LARGE", "TextTable", "parse_rows", "read_regular", "squeezed"]
 
 # bytes; a smaller table is parsed before polars is loaded
 LARGE = 8 << 20
@@ -30,6 +31,11 @@ PIECE = 16 << 20
 # pieces under way: while polars parses one in several threads, another is counted, read or copied
 WORKERS = 4
 
+
+# bytes of rows in memory for which polars is worth loading, and that tell how they are written
+LONG, PEEK = 2 << 20, 1 << 16
+# a line that is not blank or a comment, as numpy has them
+FILLED = re.compile(rb"^[ \t\r\f\v\x1c-\x1f\x85\xa0]*[^#\s\x1c-\x1f\x85\xa0]", re.MULTILINE)
 
 # bytes that polars may need with all these pieces; without them it ends the process
 ROOM = 3 << 29
@@ -82,16 +88,56 @@ def read_regular(table: TextTable, columns: Mapping[int, npt.NDArray[Any]]) -> b
     return rows == table.count
 
 
-def parse_regular(text: bytes, width: int) -> npt.NDArray[np.float64] | None:
+def parse_rows(
+    data: bytes, begin: int, end: int, whole: Collection[int] = ()
+) -> npt.NDArray[np.float64] | None:
+    """
+    All numbers of the rows between two bytes of a text, shape (N, columns).
+
+    Blanks and tabs may stand around words in any number. None if the rows are few, or not regular
+    otherwise, or if columns that must be whole numbers are not: the tolerant parser is then to read
+    them, or to say what is wrong.
+    """
+    first = FILLED.search(data, begin, end)
+    stop = data.rfind(b"\n", begin, end) + 1
+    if end - begin < LONG or first is None or stop <= first.start() or data[stop:end].strip():
+        return None
+    while data[stop - 2 : stop] == b"\n\n":
+        stop -= 1
+    text = data[first.start() : stop]
+    line = text[: text.find(b"\n")]
+    width, sign = len(line.split()), "\t" if b"\t" in line else " "
+    found = None
+    # elsewhere a second try is the first: words stand apart by more than one sign
+    if line[:1] > b" " and len(line.rstrip(sign.encode()).split(sign.encode())) == width:
+        found = None if b"  " in text[:PEEK] else _parse_all(text, width, sign, whole)
+    if found is None:
+        plain = squeezed(text)
+        found = None if plain is None else _parse_all(plain, width, " ", whole)
+    return found
+
+
+def squeezed(text: bytes) -> bytes | None:
+    """Rows with one blank between two words, and none around them; None if it is no plain text."""
+    from scanfab.io.parse.kernels import single_blanks
+
+    out = np.empty(len(text), np.uint8)
+    size = single_blanks(np.frombuffer(text, np.uint8), out)
+    return None if size < 0 else out[:size].tobytes()
+
+
+def _parse_all(
+    text: bytes, width: int, sign: str, whole: Collection[int]
+) -> npt.NDArray[np.float64] | None:
     """All numbers of a long text, shape (N, width), if it is regular; else None."""
     if free_memory() < ROOM + 2 * len(text):
         return None
-    behind = text[: text.find(b"\n") + 1].endswith(b" \n")
-    kinds = dict.fromkeys(range(width), np.dtype(np.float64))
+    behind = text[: text.find(b"\n") + 1].endswith(f"{sign}\n".encode())
+    kinds = {k: np.dtype(np.int64 if k in whole else np.float64) for k in range(width)}
     frames, start = [], 0
     while start < len(text):
         stop = text.find(b"\n", min(start + PIECE, len(text) - 1)) + 1 or len(text)
-        frame = _parse_piece(text[start:stop], width, kinds, behind)
+        frame = _parse_piece(text[start:stop], width, kinds, behind, sign)
         if frame is None:
             return None
         frames.append(frame)
@@ -140,7 +186,9 @@ def _pieces(file: IO[bytes], table: TextTable) -> Iterator[tuple[int, int]]:
         start = stop
 
 
-def _parse_piece(text: bytes, width: int, kinds: Mapping[int, np.dtype[Any]], behind: bool) -> Any:
+def _parse_piece(
+    text: bytes, width: int, kinds: Mapping[int, np.dtype[Any]], behind: bool, sign: str = " "
+) -> Any:
     """
     The columns of some lines; None if they are not regular.
 
@@ -153,7 +201,7 @@ def _parse_piece(text: bytes, width: int, kinds: Mapping[int, np.dtype[Any]], be
     # a last line without its end may lack digits; a byte order mark would be passed over
     if not text.endswith(b"\n") or not text[:1].isascii():
         return None
-    frame = _parse(text, width, kinds, behind)
+    frame = _parse(text, width, kinds, behind, sign)
     if frame is None:
         return None
     rows = frame.height
@@ -162,7 +210,9 @@ def _parse_piece(text: bytes, width: int, kinds: Mapping[int, np.dtype[Any]], be
     return frame if count_spaces(np.frombuffer(text, np.uint8)) == expected else None
 
 
-def _parse(text: bytes, width: int, kinds: Mapping[int, np.dtype[Any]], behind: bool) -> Any:
+def _parse(
+    text: bytes, width: int, kinds: Mapping[int, np.dtype[Any]], behind: bool, sign: str
+) -> Any:
     """The columns as polars sees them; None if a line has too few, or a word is no such number."""
     import polars
 
@@ -177,7 +227,7 @@ def _parse(text: bytes, width: int, kinds: Mapping[int, np.dtype[Any]], behind: 
             polars.scan_csv(
                 text,
                 has_header=False,
-                separator=" ",
+                separator=sign,
                 quote_char=None,
                 schema=schema,
                 encoding="utf8-lossy",  # numbers are none, and nothing else is kept

@@ -38,6 +38,8 @@ LAYOUTS = {
         (*BASIC, "is_dynamic", "inertia", *ROTATING, "is_rot"),
     )
 }
+# the name of a worker's file
+PART = re.compile(r"(.*_t=\d+_)[1-9]\d*(\.\w+)")
 WORKER = re.compile(rb"\A(?:\xef\xbb\xbf)?\s*(\d{1,15})[ \t]*\r?\n")
 VERSIONS = (b"2", b"3")
 LONGEST = 1 << 20
@@ -71,6 +73,11 @@ class EsysReader:
             return []
         pattern = re.compile(re.escape(match[1]) + r"[1-9]\d*" + re.escape(match[2]))
         return sorted(one for one in path.parent.iterdir() if pattern.fullmatch(one.name))
+
+    def listed_by(self, path: Path) -> Path | None:
+        """The header of a worker's file."""
+        match = PART.fullmatch(path.name)
+        return None if match is None else path.with_name(f"{match[1]}0{match[2]}")
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         """The particles of all workers, one behind the other."""

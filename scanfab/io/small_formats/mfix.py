@@ -36,6 +36,8 @@ LINE = re.compile(
 )
 RULE = re.compile(rb"^=+[ \t]*\r?\n", re.MULTILINE)
 DIGITS = re.compile(rb"(?<=[\d.])[dD](?=[-+\d])")
+NUMERIC = b"0123456789.+-DdEe \t\r\n"
+AS_E = bytes.maketrans(b"Dd", b"ee")
 HEADER_BYTES = 1 << 14
 
 
@@ -151,7 +153,12 @@ def _numbers(
     names: str,
     count: int | None = None,
 ) -> FloatArray:
-    text = data[:begin] + DIGITS.sub(b"e", data[begin:]) if re.search(b"[dD]", data) else data
+    rows = data[begin:]
+    if b"D" in rows or b"d" in rows:
+        # the quick way would spell the words of messages otherwise
+        has_words = bool(rows.translate(None, NUMERIC))
+        rows = DIGITS.sub(b"e", rows) if has_words else rows.translate(AS_E)
+    text = data[:begin] + rows
     return counted_rows(snapshot, text, begin, len(text), widths=widths, names=names, count=count)
 
 

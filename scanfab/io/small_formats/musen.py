@@ -88,16 +88,16 @@ class MusenReader:
 Object = tuple[float, float, tuple[float, float], list["State"]]
 
 
-def _spheres(data: bytes) -> Iterator[bytes]:
-    """The rows of spheres; words stand apart by single blanks."""
+def _spheres(data: bytes) -> Iterator[tuple[bytes, list[bytes]]]:
+    """The rows of spheres, and their words."""
     start = 0
     while start < len(data):
         end = data.find(b"\n", start)
         end = len(data) if end < 0 else end
         line = data[start:end]
-        words = line[:60].split(None, 4)
-        if words[:1] == [ID] and words[2:4] == [TYPE, SPHERE]:
-            yield line
+        words = line.split()
+        if words[2:4] == [TYPE, SPHERE] and words[0] == ID:
+            yield line, words
         start = end + 1
 
 
@@ -121,12 +121,18 @@ class _Layout:
             place += 1 + size
         self.length = len(words)
         self._keys, self._names = itemgetter(*keys), tuple(keys.values())
-        self.wanted = [key for key in keys.values() if key in WANTED]
-        places = [
-            place + k + 1 for place, key in keys.items() if key in WANTED for k in range(SIZES[key])
-        ]
-        self.values = itemgetter(*places, 0)
-        self.ends = place
+        # of the values that are wanted: where each begins among them
+        wanted = [(place, key) for place, key in keys.items() if key in WANTED]
+        first = np.cumsum([0, *(SIZES[key] for _, key in wanted)]).tolist()
+        self.starts = {key: start for (_, key), start in zip(wanted, first, strict=False)}
+        self.states, time = [], None
+        for (_, key), start in zip(wanted, first, strict=False):
+            if key == TIME:
+                time = start
+            elif key == PLACE and time is not None:
+                self.states.append((time, start))
+        self.is_whole = place == len(words) and self.starts.keys() >= {ID, GEOMETRY}
+        self.values = itemgetter(*(at + k + 1 for at, key in wanted for k in range(SIZES[key])), 0)
 
     def fits(self, words: list[bytes]) -> bool:
         """Whether another row has the same properties at the same places."""
@@ -135,8 +141,7 @@ class _Layout:
 
 def _objects(path: Path, data: bytes) -> Iterator[Object]:
     layout: _Layout | None = None
-    for line in _spheres(data):
-        words = line.split()
+    for line, words in _spheres(data):
         if layout is None or not layout.fits(words):
             layout = _Layout(path, words, line)
         yield _object(path, layout, words, line)
@@ -144,31 +149,24 @@ def _objects(path: Path, data: bytes) -> Iterator[Object]:
 
 def _object(path: Path, layout: _Layout, words: list[bytes], line: bytes) -> Object:
     """Id, radius, the times between which it is active, and its places at all times."""
-    radius, id, time = 0.0, -1.0, np.nan
-    active, states = (-np.inf, np.inf), []
-    # a word behind the last wanted one keeps them a tuple
-    numbers = _numbers(path, line, layout.values(words)[:-1]) if layout.ends == len(words) else []
-    place = 0
-    for key in layout.wanted if numbers else ():
-        if key == ID:
-            id = numbers[place]
-        elif key == GEOMETRY:
-            radius = numbers[place]
-        elif key == ACTIVE:
-            active = (numbers[place], numbers[place + 1])
-        elif key == TIME:
-            time = numbers[place]
-        else:
-            states.append((time, numbers[place : place + 3]))
-        place += SIZES[key]
-    if not states or states[0][0] != states[0][0]:
+    if not layout.is_whole or not layout.states:
         raise ReadError(f"{path}: expected 2 TIME 12 X Y Z ... in the row of {spelt(line[:60])}")
-    return id, radius, active, states
+    # a word behind the last wanted one keeps them a tuple
+    numbers = _numbers(path, line, layout.values(words)[:-1])
+    starts = layout.starts
+    active = (-np.inf, np.inf)
+    if ACTIVE in starts:
+        active = (numbers[starts[ACTIVE]], numbers[starts[ACTIVE] + 1])
+    states = [(numbers[time], numbers[place : place + 3]) for time, place in layout.states]
+    if states[0][0] != states[0][0]:
+        raise ReadError(f"{path}: expected 2 TIME 12 X Y Z ... in the row of {spelt(line[:60])}")
+    return numbers[starts[ID]], numbers[starts[GEOMETRY]], active, states
 
 
 def _numbers(path: Path, line: bytes, words: Sequence[bytes]) -> list[float]:
     try:
-        if b"_" in b" ".join(words):
+        # float() takes 1_000 for a number
+        if b"_" in line and b"_" in b" ".join(words):
             raise ValueError
         return list(map(float, words))
     except ValueError:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scanfab.base.errors import ReadError, ScanfabWarning
-from scanfab.io.parse import counted_rows as module
+from scanfab.io.parse import text_table as module
 from scanfab.io.parse.counted_rows import counted_rows, leave_out_last, skip_rows, text_of
 from scanfab.io.reader import Snapshot
 from tests.helpers.dumps import write

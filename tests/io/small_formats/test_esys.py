@@ -38,6 +38,15 @@ def test_headers_are_a_series(tmp_path):
     assert [len(frame.read()) for frame in series] == [3, 3]
 
 
+@pytest.mark.parametrize("source", ["", "snap*"])
+def test_a_folder_of_snapshots_is_their_headers(tmp_path, source):
+    for step in (200, 30, 1000):
+        run(tmp_path, step)
+    series = scanfab.read_series(str(tmp_path / source))
+    assert [frame.step for frame in series] == [30, 200, 1000]
+    assert [len(frame.read()) for frame in series] == [3, 3, 3]
+
+
 @pytest.mark.parametrize(
     ("name", "old", "new", "message"),
     [
