@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import socket
 import subprocess
 import sys
 import threading
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -175,11 +176,9 @@ def fragile(tmp_path):
 def test_workers_that_die_cost_their_frames_again(fragile, folder):
     """Killed in the middle; the frames that they had but queued are no tries."""
     assert compute("dumps", *FAST, output="one.csv") == 0
-    part = Path("t.csv.part")
 
     def kill_some() -> None:
-        while not part.exists() or not part.stat().st_size:
-            time.sleep(0.01)
+        wait_for_a_row()
         for _ in range(2):
             fragile.add()
             fragile.kill()
@@ -210,9 +209,7 @@ def test_the_scheduler_dies_and_the_run_is_resumed(fragile, folder):
     with subprocess.Popen(
         [*words, str(fragile.file)], stderr=subprocess.PIPE, text=True
     ) as process:
-        part = Path("t.csv.part")
-        while not part.exists() or not part.stat().st_size:
-            time.sleep(0.01)
+        wait_for_a_row()
         fragile.kill_scheduler()
         said = process.stderr.read()
         assert process.wait(60) == 1
@@ -225,9 +222,86 @@ def test_the_scheduler_dies_and_the_run_is_resumed(fragile, folder):
     assert Path("t.csv").read_bytes() == Path("one.csv").read_bytes()
 
 
+def wait_for_a_row() -> None:
+    part, end = Path("t.csv.part"), time.monotonic() + 60
+    while not part.exists() or not part.stat().st_size:
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+@pytest.mark.parametrize(
+    ("frames", "kind", "step", "call"),
+    [(":", module._Trial, "send", 5), ("0:1", module._Parts, "map", 1)],
+    ids=["frames", "one frame"],
+)
+def test_a_scheduler_that_hangs_is_left(
+    fragile, folder, capsys, monkeypatch, frames, kind, step, call
+):
+    """It is stopped, and closes no connection; the run goes on when it is there again."""
+    words = ("dumps", *FAST, "--frames", frames)
+    assert compute(*words, output="one.csv") == 0
+    with scanfab.dask_executor(scheduler_file=fragile.file) as executor:
+        while len(executor.client.nthreads()) < 2:
+            time.sleep(0.1)
+    proceed, calls = getattr(kind, step), []
+
+    def hanging(*arguments: Any) -> Any:
+        calls.append(arguments)
+        if len(calls) == call:
+            fragile.scheduler.send_signal(signal.SIGSTOP)
+        return proceed(*arguments)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(connection, "BEAT", 0.2)
+        patch.setattr(connection, "SILENCE", 5.0)
+        patch.setattr(kind, step, hanging)
+        assert compute(*words, "--scheduler-file", str(fragile.file)) == 1
+    said = capsys.readouterr().err
+    assert "s while frames were computed: start it again, and go on with --resume" in said
+    assert "the scheduler has not answered for" in said
+    assert said.count("error") == 1
+    fragile.scheduler.send_signal(signal.SIGCONT)
+    assert compute(*words, "--resume", "--scheduler-file", str(fragile.file)) == 0
+    assert Path("t.csv").read_bytes() == Path("one.csv").read_bytes()
+
+
+@dataclass(frozen=True)
+class Unseen(Slow):
+    """A job whose file lies elsewhere for the workers."""
+
+    source: str = "dumps"
+
+    @property
+    def strict(self) -> Unseen:
+        return replace(self, file=Placed(At(Path("/none/dump_0.txt"))))
+
+    def __call__(self, threads: int) -> int:
+        raise ReadError("cannot be read")
+
+
+@dataclass(frozen=True)
+class Placed:
+    """What stands for a frame in a file."""
+
+    snapshot: Any
+
+
+@dataclass(frozen=True)
+class At:
+    path: Path
+
+
+def test_files_that_workers_who_come_late_do_not_see(executor, folder, monkeypatch):
+    """No try of the frame, which could be passed over: it would be computed elsewhere."""
+    monkeypatch.setattr(executor, "_seen", {"dumps"})
+    job = Unseen(Path("unused"), file=Placed(At(folder / "dumps" / "dump_0.txt")))
+    with pytest.raises(ClusterError, match=r"cannot read .*dump_0.txt: tcp://.* sees / with .* in"):
+        executor.submit(job, 1).result(60)
+
+
 def test_files_that_workers_do_not_see(executor, folder, monkeypatch):
     monkeypatch.setattr(module, "view_there", _blind)
-    monkeypatch.setattr(executor, "_has_seen_files", False)
+    monkeypatch.setattr(executor, "_seen", set())
     with pytest.raises(ClusterError) as told:
         scanfab.compute(scanfab.read_series("dumps"), executor=executor, directions=9)
     assert f"2 workers of 2 cannot read {folder}/dumps/dump_" in str(told.value)
