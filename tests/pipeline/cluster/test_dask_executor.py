@@ -10,21 +10,27 @@ import subprocess
 import sys
 import threading
 import time
+import tracemalloc
+import weakref
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 pytest.importorskip("distributed")
 
 import scanfab
 from scanfab.base.errors import ReadError, ScanfabError
+from scanfab.base.threads import shared_in_order
 from scanfab.cli.main import run
 from scanfab.pipeline.cluster import connection
 from scanfab.pipeline.cluster import dask_executor as module
 from scanfab.pipeline.cluster.dask_executor import ClusterError
 from tests.helpers.dask_cluster import DaskCluster
+from tests.helpers.dumps import shaken_cubic
 from tests.helpers.growing import SAMPLE
 from tests.helpers.interruptions import PROGRAM, write_series
 
@@ -43,7 +49,7 @@ def cluster(tmp_path_factory):
 def executor(cluster):
     with scanfab.dask_executor(cluster.address) as found:
         end = time.monotonic() + 60
-        while len(found.client.nthreads()) < 2:
+        while len(found.workers()) < 2:
             assert time.monotonic() < end
             time.sleep(0.1)
         yield found
@@ -165,6 +171,60 @@ class Slow:
         return threads
 
 
+@dataclass(frozen=True)
+class Heavy(Slow):
+    """A job with a result of some megabytes."""
+
+    def __call__(self, threads: int) -> Any:
+        return np.ones(HEAVY // 8)
+
+
+HEAVY = 4_000_000
+
+
+def peak(work: Callable[[], object]) -> int:
+    """The most bytes that Python and numpy hold at a time."""
+    tracemalloc.start()
+    try:
+        work()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def test_results_do_not_pile_up(executor):
+    """Neither here nor at the workers: those of 60 frames would be 240 MB."""
+    held = []
+
+    def work() -> None:
+        jobs = iter([Heavy(Path("unused")) for _ in range(60)])
+        for result in shared_in_order(executor, jobs, executor.room, executor.share):
+            assert len(result) == HEAVY // 8
+            held.append(sum(name.startswith(executor.name) for name in executor.client.who_has()))
+
+    assert executor.room() == 4
+    assert peak(work) < 12 * HEAVY
+    assert max(held) <= 8
+
+
+def test_packings_do_not_pile_up(executor):
+    """Those of a generator are sent away, and forgotten here."""
+    alive: weakref.WeakSet[scanfab.Packing] = weakref.WeakSet()
+    most = []
+
+    def packings() -> Iterator[scanfab.Packing]:
+        for _ in range(40):
+            grains = shaken_cubic(np.random.default_rng(0), 4)
+            packing = scanfab.Packing(grains.position, grains.radius)
+            alive.add(packing)
+            most.append(len(alive))
+            yield packing
+
+    words = {"variants": "a", "directions": 9, "spacing": "2rmin", "contact_tolerance": 0.01}
+    assert len(scanfab.compute(packings(), executor=executor, **words)) == 40
+    assert max(most) <= executor.room() + 6
+
+
 @pytest.fixture
 def fragile(tmp_path):
     """A cluster whose workers may die."""
@@ -194,7 +254,7 @@ def test_a_frame_that_kills_its_workers_is_given_up(fragile, tmp_path):
     for _ in range(3):
         fragile.add()
     with scanfab.dask_executor(scheduler_file=fragile.file) as executor:
-        while len(executor.client.nthreads()) < 5:
+        while len(executor.workers()) < 5:
             time.sleep(0.1)
         deadly = executor.submit(Slow(tmp_path / "deadly", 99), 1)
         with pytest.raises(ClusterError, match=r"the worker died: .*tried"):
@@ -241,7 +301,7 @@ def test_a_scheduler_that_hangs_is_left(
     words = ("dumps", *FAST, "--frames", frames)
     assert compute(*words, output="one.csv") == 0
     with scanfab.dask_executor(scheduler_file=fragile.file) as executor:
-        while len(executor.client.nthreads()) < 2:
+        while len(executor.workers()) < 2:
             time.sleep(0.1)
     proceed, calls = getattr(kind, step), []
 
