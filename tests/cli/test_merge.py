@@ -230,6 +230,19 @@ def test_unfinished_parts_are_named(parts, refused):
     assert f"{part}: there is no such part" in refused(*parts)
 
 
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_a_part_that_lost_its_end_is_named(series, tmp_path, suffix, capsys):
+    """Copied not quite to its end: the last number of a text would read well."""
+    parts = as_parts(series, tmp_path, 2, suffix=suffix)
+    last = Path(parts[1])
+    last.write_bytes(last.read_bytes()[:-4])
+    assert run(["merge", *parts, "-o", str(tmp_path / "t.csv")]) == 1
+    assert str(last) in capsys.readouterr().err
+    assert not (tmp_path / "t.csv").exists()
+    # nor is it gone on with
+    assert run(["compute", str(series), *FAST, "-o", str(last), "--resume"]) == 1
+
+
 def test_a_file_that_has_changed_between_jobs_is_named(parts, refused):
     path = Path(f"{parts[2]}.manifest.json")
     manifest = json.loads(path.read_text())
