@@ -139,7 +139,7 @@ class DaskExecutor(Executor):
         self._number = 0
         self._seen: set[str] = set()
         self._lock = threading.Lock()
-        with self._gone_if_lost():
+        with self.gone_if_lost():
             self.pulse.start()
 
     def __repr__(self) -> str:
@@ -167,7 +167,8 @@ class DaskExecutor(Executor):
             return self._here.submit(self._spread, job, threads)
         self._check_files(job)
         trial = _Trial(self, job)
-        trial.send()
+        with self.gone_if_lost():
+            trial.send()
         return trial.future
 
     def shutdown(self, wait: bool = False, *, cancel_futures: bool = True) -> None:
@@ -193,7 +194,8 @@ class DaskExecutor(Executor):
         return 0
 
     @contextmanager
-    def _gone_if_lost(self) -> Iterator[None]:
+    def gone_if_lost(self) -> Iterator[None]:
+        """What fails in the block because the scheduler is lost is told as that."""
         try:
             yield
         except ScanfabError:
@@ -206,7 +208,7 @@ class DaskExecutor(Executor):
     def check_versions(self) -> None:
         """ClusterError if workers have other versions than this process."""
         mine = versions_here()
-        with self._gone_if_lost():
+        with self.gone_if_lost():
             found = self.client.run(versions_here, on_error="return")
         for worker, theirs in found.items():
             if isinstance(theirs, OSError | TimeoutError):
@@ -229,7 +231,7 @@ class DaskExecutor(Executor):
         if path is None or job.source in self._seen:
             return
         self._seen.add(job.source)
-        with self._gone_if_lost():
+        with self.gone_if_lost():
             views = self.client.run(view_there, str(path), on_error="return")
         those = {worker: view for worker, view in views.items() if view and isinstance(view, str)}
         if those and path.exists():
@@ -265,7 +267,9 @@ class _Trial:
         """What has become of a try."""
         try:
             if not self.future.cancelled():
-                self._settle(sent)
+                # a result that is ready may still have to come through the scheduler
+                with self.executor.gone_if_lost():
+                    self._settle(sent)
         except InvalidStateError:
             # whoever wanted it has left meanwhile
             return
@@ -332,7 +336,7 @@ class _Parts:
 
     def map(self, function: Callable[..., Any], parts: Sequence[Any]) -> list[Any]:
         """What the function makes of each part, in their order."""
-        with self.executor._gone_if_lost():
+        with self.executor.gone_if_lost():
             for _ in range(TRIES):
                 found = self._tried(Packed.of(function), parts)
                 if found is not None:
