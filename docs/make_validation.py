@@ -136,14 +136,14 @@ def summaries() -> str:
 CLAIMS = (
     claims.experiment, claims.counted, claims.isotropic_start, claims.off_diagonals, claims.rise,
     claims.apart, claims.smoothness, claims.normalised, claims.slopes, claims.predicted,
-    claims.shell_stress, claims.harmonics,
+    claims.shell_stress, claims.harmonics, claims.hysteresis,
 )  # fmt: skip
 NUMBERS = (
     words.start_worst, words.off_share, words.lateral_share, words.contact_share, words.void_share,
     words.lagging,
     words.normalised_worst, words.slope_misses, words.pooled, words.disc_misses, words.disc_ratio,
     words.printed_radius, words.cutoff_slopes, words.predicted_off,
-    words.null_tests,
+    words.null_tests, words.voids_left, words.reversal_pressure,
 )  # fmt: skip
 PARTS: dict[str, Callable[[], str]] = {
     **{claim.__name__: claim for claim in CLAIMS},
@@ -153,6 +153,8 @@ PARTS: dict[str, Callable[[], str]] = {
     **{number.__name__: number for number in NUMBERS},
     "best_cutoff_early": partial(words.best_cutoff, 0.05),
     "best_cutoff": partial(words.best_cutoff, 0.2),
+    "contacts_back": partial(words.strain_back, "c"),
+    "voids_back": partial(words.strain_back, "vs"),
     "order_four_contacts": partial(words.order_four, "c"),
     "order_four_voids": partial(words.order_four, "vs"),
     "order_four_discs": partial(words.order_four, "vs", plane=True),

@@ -6,6 +6,7 @@ import csv
 import math
 from collections.abc import Iterable
 
+import numpy as np
 import paper_tables
 from paper_tables import (
     MAIN,
@@ -217,3 +218,24 @@ def order_four(fabric: str, plane: bool = False) -> str:
             row = row_of(f"{name}_harmonics", usual_variant(name), strain)
             found.append(100 * abs(row[f"{fabric}_a4"] / row[f"{fabric}_a2"]))
     return f"{max(found):.0f}"
+
+
+def strain_back(kind: str) -> str:
+    """How much strain has to be taken back until a fabric of the RV is isotropic, percent."""
+    rows = table("yade_reversal_default").select(variant="c")
+    strain, alpha = rows["strain"], rows[f"alpha_{kind}_axial"]
+    # both fall all the way
+    return f"{100 * (strain[0] - np.interp(0.0, alpha[::-1], strain[::-1])):.1f}"
+
+
+def voids_left() -> str:
+    """Of the void fabric of the RV, what is left when contacts are isotropic again, percent."""
+    rows = table("yade_reversal_default").select(variant="c")
+    contacts, voids = rows["alpha_c_axial"], rows["alpha_vs_axial"]
+    return f"{100 * np.interp(0.0, contacts[::-1], voids[::-1]) / voids[0]:.0f}"
+
+
+def reversal_pressure() -> str:
+    """How far from its target the mean stress was on the way back, percent at the most."""
+    numbers = engine("yade_reversal")
+    return f"{100 * abs(numbers['p'][41:] / 200e3 - 1).max(initial=0.0):.1f}"

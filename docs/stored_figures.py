@@ -92,4 +92,5 @@ def draw_reversal(picture: Path) -> None:
 STORED: dict[str, Callable[[Path], None]] = {
     "rv_size": draw_rv_size,
     "paper-spectrum": draw_spectrum,
+    "paper-reversal": draw_reversal,
 }
