@@ -437,3 +437,17 @@ def test_a_column_without_name_and_numbers_that_the_user_names(tmp_path, rows):
     pairs = write(tmp_path / "p1.csv", f"id1,id2,fx,fy,\n{rows}")
     named = "id1=id1,id2=id2,fx2=fx,fy2=fy,fz2=5"
     refuses(scanfab.read, grains, contacts=pairs, contact_columns=named, match="column 5")
+
+
+def test_tables_by_an_ending_that_says_doubles(tmp_path):
+    """Arrays of NumPy in an .xyzd file were read as such, and then held for x y z d."""
+    with open(tmp_path / "a.xyzd", "wb") as file:
+        np.savez(file, radius=np.ones(12), other=np.ones(12))
+    refuses(scanfab.read, tmp_path / "a.xyzd", format="table")
+
+
+def test_doubles_that_begin_as_an_archive_does(tmp_path):
+    rows = np.column_stack([np.arange(12.0), np.zeros((12, 2)), np.ones(12)]).astype("<f8")
+    rows[0, 0] = np.frombuffer(b"PK" + bytes(6), "<f8")[0]
+    (tmp_path / "a.xyzd").write_bytes(rows.tobytes())
+    assert len(scanfab.read(tmp_path / "a.xyzd")) == 12

@@ -32,12 +32,13 @@ Columns = dict[str, npt.NDArray[Any]]
 def names_of(path: Path, skip: int) -> tuple[list[str] | None, int]:
     """The names of the columns, None if there are none, and their number."""
     head = first_bytes(path, 8)
-    if head.startswith(IS_PARQUET):
+    # doubles may begin as any other file does
+    if is_xyzd(path):
+        names = ["x", "y", "z", "diameter"]
+    elif head.startswith(IS_PARQUET):
         names = parquet_names(path)
     elif head.startswith(IS_NPZ):
         names = [part for name, shape in npz_shapes(path).items() for part in _parts(name, shape)]
-    elif is_xyzd(path):
-        names = ["x", "y", "z", "diameter"]
     else:
         layout = layout_of(path, read_text(path, HEAD), skip)
         return (None if layout.names is None else list(layout.names)), layout.width
@@ -59,12 +60,12 @@ def has_ids(path: Path, skip: int, found: Mapping[str, str]) -> bool:
 def read_table(path: Path, skip: int, numbers: Sequence[str], whole: Sequence[str]) -> Columns:
     """All columns by their names, or by their numbers if they have none."""
     head = first_bytes(path, 8)
+    if is_xyzd(path):
+        return dict(read_xyzd_columns(path))
     if head.startswith(IS_PARQUET):
         return _checked(path, read_parquet(path), numbers)
     if head.startswith(IS_NPZ):
         return _checked(path, _unfolded(read_npz(path)), numbers)
-    if is_xyzd(path):
-        return dict(read_xyzd_columns(path))
     data = read_text(path)
     layout = layout_of(path, data, skip)
     names = _keys(layout)
