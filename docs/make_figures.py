@@ -7,7 +7,6 @@ makes these again, without drawing, and says which pictures are no longer what t
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 import os
@@ -26,11 +25,10 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
+from stored_figures import STORED
 
 from scanfab.cli.main import run
 from scanfab.viz import window3d as view
-from scanfab.viz.figures.style import COLOURS as INKS
-from scanfab.viz.figures.style import WIDTH, new_figure
 
 ROOT = Path(__file__).parents[1]
 PICTURES = ROOT / "docs" / "figures"
@@ -41,17 +39,9 @@ SCAN = ["--tolerance", "2e-4"]
 TABLE_FIGURES = ("evolution", "normalised", "correlation")
 FRAME_FIGURES = ("rose", "projection", "histogram", "cutoffs")
 VIEWS: dict[str, list[str]] = {"view": [], "cut": ["--cut"]}
-# those of the paper's experiment in docs/validation.md, once its runs are measured
+# those of the paper's experiment in docs/validation.md
 PAPER = ROOT / "sample_data" / "paper" / "yade_1_default.csv"
-PAPER_FIGURES = {f"paper-{name}": name for name in TABLE_FIGURES} if PAPER.exists() else {}
-# stored numbers of tests/campaigns/edges.py, in docs/validation.md, too
-STORED = {"rv_size": ROOT / "docs" / "rv_size.csv"}
-# colour and marker of each rule, and how far beside the radius its errors stand
-RULES = {
-    "clip": ("vermilion", "s", -0.06),
-    "start": ("blue", "o", 0.0),
-    "ends": ("green", "^", 0.06),
-}
+PAPER_FIGURES = {f"paper-{name}": name for name in TABLE_FIGURES}
 COVER_HEIGHT = 480
 COLOURS = 200
 KEY = "drawn from"
@@ -83,37 +73,10 @@ def made(folder: Path, draw: bool = True) -> dict[str, Content]:
         words = ["--frame", "-1", *more, "--screenshot", folder / f"{name}.png"]
         with watched(draw) as found[name]:
             scanfab("view", *SAMPLE, *words)
-    for name, numbers in STORED.items():
+    for name, draw_stored in STORED.items():
         with watched(draw) as found[name]:
-            draw_rv_size(numbers, folder / f"{name}.png")
+            draw_stored(folder / f"{name}.png")
     return {**found, "picture": [*found["cut"], *found["evolution"]]}
-
-
-def draw_rv_size(numbers: Path, picture: Path) -> None:
-    """Mean length and anisotropy by each rule over the radius of the RV, beside the known ones."""
-    with numbers.open(encoding="utf-8") as lines:
-        rows = list(csv.DictReader(lines))
-    known = next(row for row in rows if row["rule"] == "medium")
-    with new_figure(WIDTH, 2.5) as figure:
-        titles = {"mean_length": "mean length ℓ / $r_{mean}$", "alpha": "axial anisotropy α"}
-        for axes, (column, title) in zip(figure.subplots(1, 2), titles.items(), strict=True):
-            for rule, (colour, marker, aside) in RULES.items():
-                of_rule = [row for row in rows if row["rule"] == rule]
-                radius, value, error = (
-                    np.array([float(row[name]) for row in of_rule])
-                    for name in ("radius", column, f"{column}_se")
-                )
-                looks = {"color": INKS[colour], "marker": marker, "label": rule}
-                axes.errorbar(radius + aside, value, error, **looks)
-            axes.axhline(
-                float(known[column]), color="0.3", linestyle="--", label="without a window"
-            )
-            axes.set_xlabel("radius of the RV / $r_{mean}$")
-            axes.set_ylabel(title)
-        # room for the legend
-        figure.axes[0].set_ylim(bottom=1.2)
-        figure.axes[0].legend()
-        figure.savefig(picture, dpi=300)
 
 
 def scanfab(*words: str | Path) -> None:

@@ -8,6 +8,7 @@ import math
 import pkgutil
 import re
 import shutil
+import sys
 import warnings
 from importlib import import_module
 from pathlib import Path
@@ -36,6 +37,9 @@ MODULES = [
 
 
 def script(name: str) -> ModuleType:
+    """A script of the docs, as a module; as when it runs, it finds the modules beside it."""
+    if str(DOCS) not in sys.path:
+        sys.path.append(str(DOCS))
     spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None

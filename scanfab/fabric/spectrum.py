@@ -5,7 +5,7 @@ In a medium that is the same everywhere the mean length of void segments is
 
     ℓ(n; c) = c + L / N,    N(n; c) = (Σ π r² - Σ 2 π R* |μ| (c |μ| + δ)⁺) / V,
 
-with N the number of gaps of at least c along n, a volume and line's cross-section, and
+with N the number of gaps of at least c along n, per volume and per cross-section of a line, and
 L = φ - ∫ N dc from 0 to c the share of the volume in which a segment of length c along n may begin,
 φ the porosity. The second sum goes over pairs of grains whose surfaces are near: μ = n·m with the
 normal m, overlap δ (below 0: a gap), R* = r1 r2 / (r1 + r2), x⁺ = max(x, 0). An overlap removes

@@ -50,5 +50,5 @@ def refuse_other_space(position: FloatArray, decided: Space) -> None:
         raise PackingError(
             f"all its centres lie in {found}, but the first frame that has grains lies in "
             f"{decided}: the frames of a series are all discs in one plane, or all spheres; "
-            f"`dim=3` reads these as spheres, too"
+            f"`dim=2` reads all as discs, `dim=3` all as spheres"
         )

@@ -281,6 +281,8 @@ class _Follower:
         if found is not None:
             return self._take(found)
         if self.seconds is not None and time.monotonic() - self._since >= self.seconds:
+            # what is left is taken at once: nothing more is waited for
+            self.seconds = 0.0
             found = self._last(number, waiting)
             self.is_over = found is None
         return found

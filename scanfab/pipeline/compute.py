@@ -200,7 +200,8 @@ class _FrameJob:
         """What is to be had of a frame that cannot be computed; raises if it is to stop the run."""
         if not self.skips_damaged:
             raise error
-        return _Computed(self.number, notes=(Note(SKIPPED, str(error)),))
+        text = str(error).removeprefix(f"frame {self.number}: ")
+        return _Computed(self.number, notes=(Note(SKIPPED, text),))
 
     def _computed(self, plan: Plan) -> _Computed:
         begun = time.perf_counter()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,7 +22,15 @@ from scanfab.pipeline.variant_columns import VariantColumns, no_columns
 from scanfab.table.columns import complete_row
 from scanfab.table.row import Row
 
-__all__ = ["OTHER_CUTOFFS", "FrameResult", "as_sample", "compute_frame", "frame_values"]
+__all__ = [
+    "OTHER_CUTOFFS",
+    "FrameResult",
+    "as_sample",
+    "check_space",
+    "compute_frame",
+    "frame_values",
+    "naming_frame",
+]
 
 OTHER_CUTOFFS = "error_at_other_cutoffs"
 """The code of a note: the scan is fine enough for its cut-off, but not for another."""
@@ -81,14 +90,21 @@ def compute_frame(
         If the frame cannot be read or measured.
     """
     sample = as_sample(frame, plan)
-    try:
+    with naming_frame(number):
         return _computed(sample, plan, number, source)
+
+
+@contextmanager
+def naming_frame(number: int) -> Iterator[None]:
+    """In the block errors of a packing begin with the frame."""
+    try:
+        yield
     except PackingError as error:
         raise PackingError(f"frame {number}: {error}") from None
 
 
 def _computed(frame: Sample, plan: Plan, number: int, source: str) -> FrameResult:
-    _check_space(frame, plan)
+    check_space(frame, plan)
     known = frame_values(frame, plan, number, source)
     if not frame.grains.any():
         return FrameResult(source, number, frame, (), list(_empty_rows(known, plan)))
@@ -114,7 +130,7 @@ def _computed(frame: Sample, plan: Plan, number: int, source: str) -> FrameResul
     return FrameResult(source, number, frame, measurements, rows, tuple(notes))
 
 
-def _check_space(sample: Sample, plan: Plan) -> None:
+def check_space(sample: Sample, plan: Plan) -> None:
     """PackingError if the frame lies in another space than the series."""
     packing = sample.packing
     if not sample.grains.any():

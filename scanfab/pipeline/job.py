@@ -27,6 +27,7 @@ from scanfab.pipeline.manifest import (
 from scanfab.pipeline.resume import FinishedTable, InputsOfRows, check_part, finished_table
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.told import Told
+from scanfab.table.reading import read_rows
 from scanfab.table.result_file import ResultFile
 from scanfab.table.row import Row
 from scanfab.table.writing import ALL
@@ -194,6 +195,11 @@ class Job:
                     replaces = False
                 result.record(self._inputs_of_rows.new(row))
                 writer.write(row)
+            if replaces and read_rows(result.path):
+                raise SettingsError(
+                    f"{result.path}: this run has no rows, and the table that is there stays as it "
+                    f"is: choose frames that there are (`frames`), or another file"
+                )
 
     def save_manifests(self, more: Mapping[str, Any] | None = None) -> None:
         """Write the manifest beside the file, and where it was asked for, with some ``more``."""

@@ -190,12 +190,21 @@ def _block_rule(solids: Solids) -> DirectionRule:
 
 def _block_spacing(solids: Solids, rule: DirectionRule, sums: ScanSums, plan: Plan) -> float:
     """As close as is of use, but no closer than the sample's scatter is worth."""
+    most = min(max(CHORDS_A_GRAIN * len(solids.grain_radius), FEWEST_CHORDS), MOST_CHORDS)
+    return coarse_spacing(solids, BLOCK_REPLICATES * len(rule), sums, plan, most)
+
+
+def coarse_spacing(solids: Solids, axes: int, before: ScanSums, plan: Plan, most: float) -> float:
+    """
+    Of a scan for errors: as close as is of use, but of so many chords at the most.
+
+    ``axes`` are those of all its replicates. What following lines through a periodic medium takes
+    is known from the scan ``before``.
+    """
     if not len(solids.grain_radius):
         return solids.reach
     spacing = NOISE[solids.space.dimension].close * float(solids.grain_radius.mean())
-    axes = BLOCK_REPLICATES * len(rule)
-    steps = plan.space.lines(float(sums.steps.mean()) / len(plan.rule), spacing / plan.spacing)
+    steps = plan.space.lines(float(before.steps.mean()) / len(plan.rule), spacing / plan.spacing)
     # a line costs as much as a chord, also if it meets nothing
     chords = axes * (solids.chords(spacing) + most_lines(solids, spacing) + steps)
-    most = min(max(CHORDS_A_GRAIN * len(solids.grain_radius), FEWEST_CHORDS), MOST_CHORDS)
     return spacing * plan.space.apart(max(chords / most, 1.0))

@@ -16,7 +16,7 @@ from scanfab.pipeline.frames import chosen_frames
 from scanfab.pipeline.manifest import Inputs, default_settings, strain_file, surface_file
 from scanfab.pipeline.repeat import read_manifest
 from scanfab.pipeline.settings import Settings
-from scanfab.table.reading import read_rows
+from scanfab.table.reading import read_finished_rows
 from scanfab.table.result_file import differing_settings
 from scanfab.table.row import Row
 
@@ -125,7 +125,7 @@ def finished_table(
     differing = differing_settings(before, dict(asked), FREE)
     if differing:
         raise _refused(path, f"it was made with other settings ({', '.join(differing)})")
-    rows = read_rows(path)
+    rows = read_finished_rows(path)
     if rows and not {"source", "frame"} <= set(rows[0]):
         raise _refused(path, "it lacks the columns source and frame, which tell its frames")
     found = _by_frame(path, rows, series, settings)

@@ -314,7 +314,7 @@ class Settings(WindowSettings):
         chosen = [
             f"{one.name}={as_written(getattr(self, one.name))!r}"
             for one in options_of(type(self))
-            if getattr(self, one.name) != one.parse(one.name, one.default)
+            if as_written(getattr(self, one.name)) != as_written(one.parse(one.name, one.default))
         ]
         return f"{type(self).__name__}({', '.join(chosen)})"
 

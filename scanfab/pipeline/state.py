@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample, Variant
 from scanfab.packing.walls import WallForces
 from scanfab.packing.window import Window
+from scanfab.scan.directions import direction_rule, plane_rule
 
 __all__ = ["contact_forces", "doubts_of_state", "refuse_without_forces", "sample_state"]
 
@@ -193,7 +195,7 @@ def _void_ratio(sample: Sample, window: Window | None) -> float | None:
     # in a clump what several spheres share is there once
     share = np.ones_like(radius)
     if packing.bodies is not None:
-        share = own_shares(packing, _points_in_ball(packing.space))[sample.grains]
+        share = own_shares(packing, partial(_rays, space=packing.space))[sample.grains]
     if window is None:
         solid = float(np.sum(packing.space.volume(radius) * share))
     else:
@@ -240,6 +242,13 @@ def cut_volumes(
         inside = shape.contains(spread.reshape(-1, 3)).reshape(-1, len(points))
         found[rows] = inside.mean(axis=1)
     return space.volume(radius, found)
+
+
+def _rays(count: int, space: Space = SPACE) -> FloatArray:
+    """Directions that are spread evenly, and their opposites, shape (P, 3)."""
+    half = count // 2
+    rule = plane_rule(half, space) if space.is_plane else direction_rule(f"fibonacci:{half}")
+    return np.concatenate([rule.axes, -rule.axes])
 
 
 def _points_in_ball(space: Space = SPACE) -> FloatArray:

@@ -23,7 +23,7 @@ from scanfab.scan.kernels.bins import Bins
 from scanfab.scan.kernels.sweep import TALLY_SIZE
 from scanfab.scan.lines import drawn_lines
 from scanfab.scan.scan import ScanSums, in_parts, sums_of
-from scanfab.scan.solids import Solids, check_spacing, shortest_gap
+from scanfab.scan.solids import Solids, check_space, check_spacing, shortest_gap
 from scanfab.scan.tallies import tally_triads
 
 __all__ = ["GapSums", "scan_gaps"]
@@ -116,10 +116,12 @@ def scan_gaps(
     Raises
     ------
     SettingsError
-        If the spacing asks for more lines than can be scanned in reasonable time, or following
-        lines through a periodic medium takes more steps than allowed.
+        If the spacing asks for more lines than can be scanned in reasonable time, if following
+        lines through a periodic medium takes more steps than allowed, or if the axes do not lie in
+        the plane of the solids.
     """
     check_spacing(solids, spacing)
+    check_space(solids, rule)
     triads, offsets = drawn_lines(rule, seed, replicates)
     least = np.maximum(np.array(cutoffs, dtype=np.float64), shortest_gap(solids))
     lines = _BinnedLines(solids, spacing, least, blocks, variants, Following(most_steps))

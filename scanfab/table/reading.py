@@ -17,6 +17,7 @@ __all__ = [
     "is_of_discs",
     "number_of",
     "numbers_of",
+    "read_finished_rows",
     "read_rows",
     "total_error",
     "variant_of",
@@ -55,6 +56,26 @@ def read_rows(path: Path | str) -> list[dict[str, Any]]:
     except OSError as error:
         raise ReadError(f"{path}: cannot be read: {error.strerror}") from None
     return reading_format(Path(path), data).read(data, str(path))
+
+
+def read_finished_rows(path: Path) -> list[dict[str, Any]]:
+    """
+    The rows of a table that a run has written and that is gone on with.
+
+    Raises
+    ------
+    ReadError
+        If the file cannot be read as a table, or has lost its end: a number at the end of a text
+        reads well without its last digits.
+    """
+    rows = read_rows(path)
+    data = path.read_bytes()
+    if data and reading_format(path, data).is_text and not data.endswith(b"\n"):
+        raise ReadError(
+            f"{path}: its last line has no end, expected the whole table as it was written: was it "
+            f"cut off when it was copied? Copy it again, or remove it and run its command again"
+        )
+    return rows
 
 
 def is_number(value: object) -> bool:

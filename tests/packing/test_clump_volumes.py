@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
+from scipy.stats import qmc
 
 from scanfab import Cell, ContactList, Packing
 from scanfab.packing.clump_volumes import own_shares
 from scanfab.packing.sample import VARIANTS, Sample
-from scanfab.pipeline.state import _points_in_ball, contact_forces, sample_state
+from scanfab.pipeline.state import _rays, contact_forces, sample_state
 
-POINTS = _points_in_ball()
 BALL = 4.0 / 3.0 * np.pi
 
 
 def shares(position, radius, number, **options):
-    return own_shares(Packing(position, radius, bodies=number, **options), POINTS)
+    return own_shares(Packing(position, radius, bodies=number, **options), _rays)
 
 
 def test_what_two_spheres_of_a_clump_share_counts_once():
@@ -35,14 +37,31 @@ def test_a_sphere_in_a_sphere_and_many_at_one_place_are_the_largest():
     assert found @ [0.125, 1.0] == pytest.approx(1.0, rel=1e-12)
 
 
+@pytest.mark.parametrize("axis", [[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.6, 0.48, 0.64]])
+def test_a_rod_of_overlapping_spheres(axis):
+    """Equal spheres in a row share what neighbours share, and no more: n V - (n - 1) lenses."""
+    d, n = 0.6, 5
+    lens = np.pi * (2 - d) ** 2 * (d * d + 4 * d) / (12 * d)
+    found = shares(d * np.outer(np.arange(n), axis), 1.0, np.ones(n, int))
+    assert found.sum() == pytest.approx((n * BALL - (n - 1) * lens) / BALL, rel=1e-12)
+
+
+def test_a_row_of_overlapping_discs():
+    d = 0.6
+    lens = 2 * np.arccos(d / 2) - d / 2 * np.sqrt(4 - d * d)
+    row = Packing(d * np.outer(np.arange(4), [0.6, 0.8, 0]), 1.0, bodies=np.ones(4, int), dim=2)
+    found = own_shares(row, partial(_rays, space=row.space))
+    assert found.sum() == pytest.approx((4 * np.pi - 3 * lens) / np.pi, rel=1e-12)
+
+
 def test_what_three_spheres_share_counts_once():
-    """In one another's middle: by points at random in their box."""
+    """In one another's middle: by points that fill their box evenly."""
     position, radius = np.array([[0, 0, 0], [1, 0, 0], [0.5, 0.8, 0.1]]), np.array([1.0, 0.9, 0.8])
-    points = np.random.default_rng(0).uniform([-1, -1, -1], [2, 1.7, 1], (400_000, 3))
+    points = [-1, -1, -1] + [3.0, 2.7, 2.0] * qmc.Sobol(3, seed=0).random(1 << 19)
     inside = (np.linalg.norm(points[:, None] - position, axis=2) < radius).any(axis=1)
     union = inside.mean() * 3.0 * 2.7 * 2.0
     found = shares(position, radius, [1, 1, 1])
-    assert BALL * found @ radius**3 == pytest.approx(union, rel=4e-3)
+    assert BALL * found @ radius**3 == pytest.approx(union, rel=4e-4)
 
 
 def test_spheres_of_different_clumps_cover_nothing():

@@ -121,6 +121,25 @@ def test_solid_fraction_is_that_of_a_lattice_and_empty_at_an_open_surface(kind):
     assert np.all(np.abs(table["solid_fraction"][~outer] - expected) < within)
 
 
+def test_dilute_blocks_within_a_surface_have_no_solid_fraction():
+    """Void segments are longer than shells are thick: their middles gather in the innermost."""
+    places = np.random.default_rng(2).uniform(0, 20, (1500, 3))
+    options = {"shells": 3, "directions": 11, "spacing": 0.8}
+    table, _ = mapped(Packing(places, 0.6), variants="ac", **options)
+    assert np.isnan(table["solid_fraction"]).all()
+    # a periodic medium has no surface
+    periodic = Packing(places, 0.6, cell=Cell([20.0] * 3))
+    table, _ = mapped(periodic, variants="a", **options)
+    assert not np.isnan(table["solid_fraction"]).any()
+
+
+def test_a_frame_of_discs_among_spheres_is_refused():
+    random = np.random.default_rng(0)
+    frames = [Packing(random.uniform(0, 10, (200, k)), 0.3) for k in (3, 2)]
+    with pytest.raises(scanfab.PackingError, match="frame 1: all its centres lie in the plane x-y"):
+        mapped(frames, slices=2)
+
+
 def test_blocks_in_the_middle_of_an_open_sample_lose_no_segments():
     """Overlapping spheres: their mean length is known, and lower where segments leave."""
     random = np.random.default_rng(4)

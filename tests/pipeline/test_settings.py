@@ -436,6 +436,12 @@ def test_settings_made_of_settings_are_the_same():
     assert dataclasses.replace(again, seed=0) == settings
 
 
+def test_an_axis_that_is_named_is_shown_even_if_it_is_that_of_spheres():
+    """Of discs in x-y the default is another."""
+    assert repr(Settings(axis="z")) == "Settings(axis='z')"
+    assert repr(Settings()) == "Settings()"
+
+
 def test_settings_with_the_same_directions_are_equal():
     assert Settings(directions=13) == Settings(directions=13)
     assert Settings(directions=13) != Settings(directions=25)

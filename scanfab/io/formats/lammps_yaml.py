@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-import warnings
 from pathlib import Path
 from typing import IO
 
-from scanfab.base.errors import ReadError, ScanfabWarning
+from scanfab.base.errors import ReadError
 from scanfab.io.files import plain
 from scanfab.io.formats.columns import grain_table, has_radius
 from scanfab.io.parse.counted_rows import counted_rows, text_of
+from scanfab.io.parse.growing import warn_incomplete
 from scanfab.io.parse.lammps_box import dump_cell
 from scanfab.io.parse.number_rows import exact_column
 from scanfab.io.reader import FileKind, GrainTable, ReadOptions, Snapshot
@@ -43,10 +43,8 @@ def index_yaml(path: Path) -> list[Snapshot]:
     with open(plain(path), "rb") as stream:
         starts, ends = _borders(stream)
         if len(ends) == len(starts) - 1 and ends:
-            warnings.warn(
-                f"{path}: the last snapshot, number {len(starts)}, is incomplete and is left out",
-                ScanfabWarning,
-                stacklevel=2,
+            warn_incomplete(
+                f"{path}: the last snapshot, number {len(starts)}, is incomplete and is left out"
             )
             starts.pop()
         if not starts or len(starts) != len(ends):

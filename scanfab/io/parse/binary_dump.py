@@ -25,7 +25,7 @@ from scanfab.packing.cell import Cell
 __all__ = ["BinaryDump", "index_binary", "is_binary", "names_of_binary", "read_binary"]
 
 MAGIC = (b"DUMPCUSTOM", b"DUMPATOM")
-# what dump atom has in its columns, where it does not say so itself
+# no sound header says more: what does is damaged, and would only take memory
 MOST_COLUMNS, MOST_TEXT = 1000, 1 << 16
 MOST_BLOCKS = 1 << 20
 MOST_STEP = 1 << 62

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 from typing import IO
 
 import numpy as np
 
-from scanfab.base.errors import ReadError, ScanfabWarning
+from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray
 from scanfab.io.files import check_memory, plain
+from scanfab.io.parse.growing import warn_incomplete
 from scanfab.io.parse.number_rows import rows_of_numbers
 from scanfab.io.parse.text_table import FILLED, parse_rows
 from scanfab.io.reader import Snapshot
@@ -124,11 +124,8 @@ def leave_out_last(path: Path, complete: int, reason: str) -> None:
     """
     if complete == 0:
         raise ReadError(f"{path}: {reason}: the file is incomplete")
-    warnings.warn(
-        f"{path}: the last snapshot, number {complete + 1}, is incomplete and is left out: "
-        f"{reason}",
-        ScanfabWarning,
-        stacklevel=3,
+    warn_incomplete(
+        f"{path}: the last snapshot, number {complete + 1}, is incomplete and is left out: {reason}"
     )
 
 

@@ -57,20 +57,26 @@ class LfDemReader:
         head = first_bytes(path, HEADER_BYTES)
         found: list[tuple[int, float]] = []
         check_lines(path, plain(path))
-        end = b""
+        end, rows = b"", 0
         with open(plain(path), "rb") as stream:
             place = 0
             for line in stream:
                 match = FRAME.match(line)
                 if match is not None:
                     found.append((place, float(_number(path, match[1]))))
+                    rows = 0
+                # other lines above the frames, and blank ones, are no rows
+                rows += not line.startswith(b"#") and not line.isspace()
                 place += len(line)
                 end = line
         if not found:
             raise ReadError(f"{path}: expected lines '# strain shear_disp rate', found none")
-        count = COUNT.search(head)
-        if not end.endswith(b"\n") or (self.kind(path) == "grains" and count is None):
-            leave_out_last(path, len(found) - 1, "its last line has no end")
+        lack = "" if end.endswith(b"\n") else "its last line has no end"
+        if self.kind(path) == "grains":
+            count = _particles(path, head)
+            lack = lack or (f"{rows} rows of {count}" if rows < count else "")
+        if lack:
+            leave_out_last(path, len(found) - 1, lack)
             place = found.pop()[0]
         stops = [start for start, _ in found[1:]] + [place]
         return [

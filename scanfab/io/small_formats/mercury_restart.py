@@ -146,8 +146,9 @@ def _with_contacts(path: Path, grains: GrainTable, rows: Rows | None) -> GrainTa
         ids.append(_behind(path, row, b"particleIds", 2))
         force.append(_behind(path, row, b"force", 3))
     pairs = _whole(path, ids)
-    if np.any(pairs[:, 0] == pairs[:, 1]):
-        raise ReadError(f"{path}: an interaction names the grain {pairs[0, 0]} twice")
+    twice = pairs[:, 0] == pairs[:, 1]
+    if twice.any():
+        raise ReadError(f"{path}: an interaction names the grain {pairs[twice][0, 0]} twice")
     forces = -np.array(force, dtype=np.float64).reshape(-1, 3)
     if not np.all(np.isfinite(forces)):
         raise ReadError(f"{path}: expected finite numbers as forces of interactions")

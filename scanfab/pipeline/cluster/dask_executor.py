@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import threading
-import time
 import uuid
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -19,10 +18,13 @@ from scanfab.base.threads import spread_over
 from scanfab.io.grain_files import PathLike
 from scanfab.pipeline.cluster.connection import (
     ClusterError,
+    Pulse,
     address_in,
+    blind,
     check_that_one_listens,
     connected,
     outdated,
+    unloadable,
 )
 from scanfab.pipeline.cluster.on_worker import (
     Failed,
@@ -39,8 +41,6 @@ __all__ = ["ClusterError", "DaskExecutor", "dask_executor"]
 NEEDS = "a Dask cluster needs the package distributed: pip install 'scanfab[cluster]'"
 # of a frame that raises errors, or takes its worker down
 TRIES = 3
-# seconds for which the number of workers is taken for what it was
-RECENT = 2.0
 
 
 class FrameJob(Protocol):
@@ -135,11 +135,12 @@ class DaskExecutor(Executor):
         self.address = address
         self.name = f"scanfab-{uuid.uuid4().hex[:12]}"
         self._here = ThreadPoolExecutor(4)
-        self._threads: dict[str, int] = {}
-        self._asked = -RECENT
+        self.pulse = Pulse(client, address)
         self._number = 0
-        self._has_seen_files = False
+        self._seen: set[str] = set()
         self._lock = threading.Lock()
+        with self.gone_if_lost():
+            self.pulse.start()
 
     def __repr__(self) -> str:
         workers = self.workers()
@@ -147,11 +148,7 @@ class DaskExecutor(Executor):
 
     def workers(self) -> dict[str, int]:
         """The threads of each worker, as they were a moment ago."""
-        if time.monotonic() - self._asked >= RECENT:
-            with self._gone_if_lost():
-                self._threads = dict(self.client.nthreads())
-            self._asked = time.monotonic()
-        return self._threads
+        return self.pulse.threads
 
     def room(self) -> int:
         """How many frames may be under way: one for each thread, and for each worker the next."""
@@ -170,11 +167,13 @@ class DaskExecutor(Executor):
             return self._here.submit(self._spread, job, threads)
         self._check_files(job)
         trial = _Trial(self, job)
-        trial.send()
+        with self.gone_if_lost():
+            trial.send()
         return trial.future
 
     def shutdown(self, wait: bool = False, *, cancel_futures: bool = True) -> None:
         """Leave what is under way; the cluster goes on for others."""
+        self.pulse.stop()
         self._here.shutdown(wait=wait, cancel_futures=cancel_futures)
 
     def send(self, function: Callable[..., Any], *args: Any, but: Sequence[str] = ()) -> Any:
@@ -194,38 +193,29 @@ class DaskExecutor(Executor):
             return sum(told == key for _, told in self.client.get_events(self.name))
         return 0
 
-    def gone(self) -> ClusterError:
-        """The error for a scheduler that is lost."""
-        return ClusterError(
-            f"{self.address}: the scheduler has gone while frames were computed: start it again, "
-            f"and go on with `resume`"
-        )
-
     @contextmanager
-    def _gone_if_lost(self) -> Iterator[None]:
+    def gone_if_lost(self) -> Iterator[None]:
+        """What fails in the block because the scheduler is lost is told as that."""
         try:
             yield
         except ScanfabError:
             raise
         except Exception as error:
             if isinstance(error, OSError | TimeoutError) or self.client.status != "running":
-                raise self.gone() from None
+                raise self.pulse.gone() from None
             raise
 
     def check_versions(self) -> None:
         """ClusterError if workers have other versions than this process."""
         mine = versions_here()
-        with self._gone_if_lost():
+        with self.gone_if_lost():
             found = self.client.run(versions_here, on_error="return")
         for worker, theirs in found.items():
             if isinstance(theirs, OSError | TimeoutError):
                 # it is ending just now
                 continue
             if isinstance(theirs, BaseException):
-                raise ClusterError(
-                    f"{worker}: this worker cannot load scanfab ({theirs}): it needs the same "
-                    f"packages as this process (scanfab {mine['scanfab']})"
-                )
+                raise unloadable(worker, theirs, mine["scanfab"])
             if theirs != mine:
                 raise outdated(worker, theirs, mine)
         if not found:
@@ -236,21 +226,17 @@ class DaskExecutor(Executor):
             )
 
     def _check_files(self, job: Any) -> None:
-        """ClusterError if workers do not see the file of the first frame that is sent."""
-        file = getattr(job, "file", None)
-        if self._has_seen_files or file is None:
+        """ClusterError if workers do not see the file of the first frame of a series."""
+        path = _file_of(job)
+        if path is None or job.source in self._seen:
             return
-        self._has_seen_files = True
-        path = file.snapshot.path.absolute()
-        with self._gone_if_lost():
+        self._seen.add(job.source)
+        with self.gone_if_lost():
             views = self.client.run(view_there, str(path), on_error="return")
-        blind = {worker: view for worker, view in views.items() if view and isinstance(view, str)}
-        if blind and path.exists():
-            worker, view = next(iter(blind.items()))
-            raise ClusterError(
-                f"{counted(len(blind), 'worker')} of {len(views)} cannot read {path}: {worker} "
-                f"sees {view}: workers need the same files by the same paths as this process"
-            )
+        those = {worker: view for worker, view in views.items() if view and isinstance(view, str)}
+        if those and path.exists():
+            who = f"{counted(len(those), 'worker')} of {len(views)}"
+            raise blind(who, path, *next(iter(those.items())))
 
     def _spread(self, job: Any, threads: int) -> Any:
         """Compute a frame here, whose scans are done there."""
@@ -281,7 +267,9 @@ class _Trial:
         """What has become of a try."""
         try:
             if not self.future.cancelled():
-                self._settle(sent)
+                # a result that is ready may still have to come through the scheduler
+                with self.executor.gone_if_lost():
+                    self._settle(sent)
         except InvalidStateError:
             # whoever wanted it has left meanwhile
             return
@@ -299,6 +287,10 @@ class _Trial:
         if not isinstance(found, Failed):
             self.future.set_result(found)
             return
+        path = _file_of(self.job)
+        if found.view and path is not None and path.exists():
+            # it came after all were asked, and other frames would fail there too
+            raise blind("a worker", path, found.worker, found.view)
         self.failures.append((found.worker, found.error))
         self._try_again()
 
@@ -314,10 +306,13 @@ class _Trial:
             self.failures += [(worker, died)] * self.executor.starts(sent.key)
             self._try_again()
         elif error is not None:
+            if isinstance(error, ImportError):
+                # it came after all were asked
+                error = unloadable("a worker", error, versions_here()["scanfab"])
             self.failures.append(("a worker", error))
             self._try_again()
         else:
-            raise self.executor.gone()
+            raise self.executor.pulse.gone()
 
     def _try_again(self) -> None:
         if len(self.failures) < TRIES:
@@ -341,7 +336,7 @@ class _Parts:
 
     def map(self, function: Callable[..., Any], parts: Sequence[Any]) -> list[Any]:
         """What the function makes of each part, in their order."""
-        with self.executor._gone_if_lost():
+        with self.executor.gone_if_lost():
             for _ in range(TRIES):
                 found = self._tried(Packed.of(function), parts)
                 if found is not None:
@@ -364,7 +359,7 @@ class _Parts:
             elif isinstance(error, ScanfabError):
                 raise error
             elif self.executor.client.status != "running":
-                raise self.executor.gone()
+                raise self.executor.pulse.gone()
             else:
                 return None
         return found
@@ -387,4 +382,12 @@ def computed_there(job: Any, versions: dict[str, str], topic: str) -> Any:
     try:
         return job(1)
     except Exception as error:
-        return Failed(worker.address, sendable(error))
+        path = _file_of(job)
+        view = "" if path is None else view_there(str(path))
+        return Failed(worker.address, sendable(error), view)
+
+
+def _file_of(job: Any) -> Path | None:
+    """Where a frame is read from, if it lies in a file."""
+    file = getattr(job, "file", None)
+    return None if file is None else file.snapshot.path.absolute()

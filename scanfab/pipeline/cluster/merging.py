@@ -20,7 +20,7 @@ from scanfab.pipeline.repeat import read_manifest, restored_settings
 from scanfab.pipeline.resume import written_row
 from scanfab.pipeline.settings import Settings
 from scanfab.table.formats.registry import format_of
-from scanfab.table.reading import read_rows
+from scanfab.table.reading import read_finished_rows
 from scanfab.table.result_file import ResultFile, differing_settings
 from scanfab.table.row import Row
 from scanfab.table.table import Table
@@ -210,7 +210,7 @@ def _read(path: Path) -> _Part:
         settings = restored_settings(asked)
     except SettingsError as error:
         raise ReadError(f"{path}: {error}") from None
-    rows = read_rows(path)
+    rows = read_finished_rows(path)
     if rows and not {"source", "frame"} <= set(rows[0]):
         raise ReadError(f"{path}: lacks the columns source and frame, which tell its rows apart")
     columns = frozenset(rows[0]) if rows else None

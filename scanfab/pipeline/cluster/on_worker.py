@@ -36,6 +36,8 @@ class Failed:
 
     worker: str
     error: Exception
+    view: str = ""
+    """What the worker sees in place of the frame's file, if it does not see that."""
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from scanfab.base.note import Note, joined
+from scanfab.base.space import SPACE
 from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.blocks import jackknife_errors, ratio_jackknife
@@ -19,7 +20,13 @@ from scanfab.fabric.homogeneity import homogeneity_of
 from scanfab.fabric.tensor import FabricTensor, axial, tensor_values
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import VARIANTS, Sample, Variant
-from scanfab.pipeline.frame import FrameResult, as_sample, frame_values
+from scanfab.pipeline.frame import (
+    FrameResult,
+    as_sample,
+    check_space,
+    frame_values,
+    naming_frame,
+)
 from scanfab.pipeline.frames import Readable
 from scanfab.pipeline.maps.measurement import MapMeasurement, measure_map
 from scanfab.pipeline.maps.region import Region
@@ -67,8 +74,14 @@ def map_frame(
     ScanfabError
         If the frame cannot be read or measured.
     """
-    assert plan.map_settings is not None
     sample = as_sample(frame, plan)
+    with naming_frame(number):
+        return _mapped(sample, plan, number, source)
+
+
+def _mapped(sample: Sample, plan: Plan, number: int, source: str) -> MapResult:
+    assert plan.map_settings is not None
+    check_space(sample, plan)
     known = frame_values(sample, plan, number, source)
     columns = plan.map_settings.columns
     if not sample.grains.any():
@@ -162,8 +175,12 @@ class BlocksOfVariant:
         volumes = self.region.volumes
         void, every = self.parts.void, volumes.sum(axis=1)
         known = every > 0
-        # beyond an open sample nobody knows what is void
-        known &= True if self.variant.in_window else ~self.region.at_surface
+        if not self.variant.in_window:
+            # beyond an open sample nobody knows what is void
+            known &= ~self.region.at_surface
+        if self.variant.in_window or self.region.at_surface.any():
+            # a surface takes segments that reach it, and long ones have their middles far inside
+            known &= self._void_length() <= self.blocks.heights.min()
         share = void.sum(axis=2).mean(axis=0) / np.where(known, every, 1.0)
         parts = volumes > 0
         rest = np.where(parts, every[:, None] - volumes, 1.0)
@@ -173,6 +190,15 @@ class BlocksOfVariant:
             "solid_fraction": np.where(known, 1.0 - share, np.nan),
             "solid_fraction_se": np.where(known, errors, np.nan),
         }
+
+    def _void_length(self) -> float:
+        """The mean length of void segments without a cut-off, roughly, from the grains' volumes."""
+        radius = self.sample.packing.radius[self.sample.grains]
+        volume = float(np.sum(self._grains["grains"]) * np.mean(SPACE.volume(radius)))
+        if volume == 0.0:
+            return math.inf
+        chord = 4.0 * float(np.sum(radius**3) / (3.0 * np.sum(radius**2)))
+        return chord * max(float(self.region.volumes.sum()) - volume, 0.0) / volume
 
     @cached_property
     def _grains(self) -> dict[str, Any]:

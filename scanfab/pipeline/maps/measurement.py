@@ -14,7 +14,8 @@ from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.blocks import BlockFabrics, WithoutParts
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.maps.blocks import splits_of
-from scanfab.pipeline.plan import NOISE, Plan
+from scanfab.pipeline.measurement import coarse_spacing
+from scanfab.pipeline.plan import Plan
 from scanfab.pipeline.solids import solids_of
 from scanfab.pipeline.tolerance import Errors, scan_to_tolerance
 from scanfab.scan.blocks import Blocks
@@ -22,7 +23,7 @@ from scanfab.scan.directions import DirectionRule, design_of
 from scanfab.scan.edges import CLIP, START
 from scanfab.scan.gaps import GapSums, scan_gaps
 from scanfab.scan.scan import ScanSums
-from scanfab.scan.solids import Solids, most_lines
+from scanfab.scan.solids import Solids
 
 __all__ = ["MapMeasurement", "MapSums", "PartSums", "measure_map"]
 
@@ -157,7 +158,8 @@ def _part_sums(
     """Along fewer lines, each block in eight parts, for the sample's scatter and for its void."""
     finer = blocks[0].finer(splits[0]), blocks[1].finer(splits[1])
     rule = design_of(PART_AXES)
-    spacing = _part_spacing(solids, rule, plan, before)
+    most = min(MOST_CHORDS, plan.max_chords)
+    spacing = coarse_spacing(solids, PART_REPLICATES * len(rule), before, plan, most)
     found: dict[str, list[PartSums]] = {name: [] for name in plan.variants}
     # by the rule start, segments count with what is outside the window, too
     clipped = replace(solids, edge=CLIP) if solids.edge == START else None
@@ -191,19 +193,6 @@ def _order(blocks: Blocks, splits: tuple[int, int, int]) -> IntArray:
     """The finer blocks in the order of their blocks, and of the parts of these."""
     block, part = blocks.of_finer(splits)
     return np.asarray(np.lexsort((part, block)), np.int64)
-
-
-def _part_spacing(solids: Solids, rule: DirectionRule, plan: Plan, before: ScanSums) -> float:
-    """As close as is of use, but no closer than can be waited for."""
-    if not len(solids.grain_radius):
-        return plan.spacing
-    spacing = NOISE[solids.space.dimension].close * float(solids.grain_radius.mean())
-    # what following lines through a periodic medium takes is known from the scan before
-    steps = float(before.steps.mean()) / len(plan.rule) * (plan.spacing / spacing) ** 2
-    # a line costs as much as a chord, also if it meets nothing
-    chords = solids.chords(spacing) + most_lines(solids, spacing) + steps
-    chords *= PART_REPLICATES * len(rule)
-    return spacing * math.sqrt(max(chords / min(MOST_CHORDS, plan.max_chords), 1.0))
 
 
 def _chunks(

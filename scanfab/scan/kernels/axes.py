@@ -28,7 +28,6 @@ from scanfab.scan.kernels.strips import (
     MOST_LINES,
     STATE_SIZE,
     Edge,
-    Sphere,
     Strip,
     begin,
     measure_from,
@@ -40,29 +39,6 @@ __all__ = ["scan_axes", "scan_cell"]
 
 
 SMALLEST = 5e-324
-
-
-@inner()
-def visit_started(
-    lines: FloatArray,
-    strip: Strip,
-    sphere: Sphere,
-    kept: float,
-    section: Section,
-    least: float,
-    tally: FloatArray,
-    second: Flag,
-    window: Edge,
-) -> None:
-    """Visit the chords of a sphere by the rule ``start``, and do only what its place asks for."""
-    away = np.sqrt(sphere.u * sphere.u + sphere.v * sphere.v + sphere.depth * sphere.depth)
-    if away - sphere.radius > section.reach:
-        tally[0, CHORDS] += visit_beyond(lines, strip, sphere, kept, second)
-    elif away + sphere.radius < section.core:
-        inside = Edge(None, True, window.margin, True)
-        visit(lines, strip, sphere, kept, least, tally, second, None, inside, None)
-    else:
-        visit(lines, strip, sphere, kept, least, tally, second, None, window, None)
 
 
 @inner()

@@ -290,7 +290,8 @@ class _Lattice:
             expected = rest[0] + np.arange(len(rest))[:, None] * step
             off = np.linalg.norm(rest - expected, axis=1) > 0.01 * np.linalg.norm(step)
             count = int(np.argmax(off)) if off.any() else len(rest)
-            axis = int(np.argmax(np.abs(step)))
+            free = [axis for axis in range(3) if self.strides[axis] == 1 and self.counts[axis] == 1]
+            axis = max(free, key=lambda one: abs(float(step[one])))
             self.counts[axis], self.strides[axis], self.steps[axis] = count, stride, step
             stride *= count
         # an axis with one block has no step: as wide as the others

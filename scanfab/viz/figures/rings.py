@@ -11,6 +11,7 @@ import numpy as np
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.contact import contact_fabric
+from scanfab.fabric.invariants import fabric_deviator
 
 if TYPE_CHECKING:
     from scanfab.viz.scanned_frames import ScannedFrame
@@ -149,8 +150,7 @@ def contact_ring(normals: FloatArray, phi: float, space: Space = SPACE) -> Ring:
     expected = len(both) * share * CONTACT_STEP / 360.0
     tensor = contact_fabric(normals, space)
     assert tensor is not None
-    isotropic = np.diag([1.0 / space.dimension if k in space.along else 0.0 for k in range(3)])
-    deviator = (4.0 if space.is_plane else 7.5) * (tensor.matrix - isotropic)
+    deviator = fabric_deviator(tensor.matrix, space)
 
     def density(theta: FloatArray) -> FloatArray:
         """Second-order density of the contact fabric, after Kanatani (1984)."""

@@ -47,7 +47,6 @@ def test_a_plane_does_not_repeat_across(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("# np 3", "# np 4", "the header counts 4 particles, found 3"),
         ("# Lz 6", "# Lz", "expected lines '# Lx'"),
         ("#2: radius", "#2: size", "no reader knows|expected points with a radius"),
         ("0 1 0 0 2.5 9", "0 1 0 0 2.5 9 9", "the number of columns changed"),
@@ -62,8 +61,18 @@ def test_what_is_wrong(tmp_path, old, new, message):
         scanfab.read_series(write(tmp_path / "par_a.dat", text.replace(old, new)))[1].read()
 
 
-def test_a_last_frame_that_is_cut_is_left_out(tmp_path):
-    path = write(tmp_path / "par_a.dat", grains_text()[:-3])
+def test_a_count_that_no_frame_has(tmp_path):
+    path = write(tmp_path / "par_a.dat", grains_text().replace("# np 3", "# np 4"))
+    with pytest.warns(ScanfabWarning, match="is left out: 3 rows of 4"):
+        first = scanfab.read_series(path)[0]
+    with pytest.raises(scanfab.ScanfabError, match="the header counts 4 particles, found 3"):
+        first.read()
+
+
+@pytest.mark.parametrize("lost", [3, len(grains_text().splitlines()[-1]) + 1])
+def test_a_last_frame_that_is_cut_is_left_out(tmp_path, lost):
+    """In a row, and between two."""
+    path = write(tmp_path / "par_a.dat", grains_text()[:-lost])
     with pytest.warns(ScanfabWarning, match="number 2, is incomplete"):
         assert len(reader_named("lf-dem").snapshots(path)) == 1
 

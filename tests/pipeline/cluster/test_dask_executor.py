@@ -4,26 +4,33 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import socket
 import subprocess
 import sys
 import threading
 import time
-from dataclasses import dataclass
+import tracemalloc
+import weakref
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 pytest.importorskip("distributed")
 
 import scanfab
 from scanfab.base.errors import ReadError, ScanfabError
+from scanfab.base.threads import shared_in_order
 from scanfab.cli.main import run
 from scanfab.pipeline.cluster import connection
 from scanfab.pipeline.cluster import dask_executor as module
 from scanfab.pipeline.cluster.dask_executor import ClusterError
 from tests.helpers.dask_cluster import DaskCluster
+from tests.helpers.dumps import shaken_cubic
 from tests.helpers.growing import SAMPLE
 from tests.helpers.interruptions import PROGRAM, write_series
 
@@ -42,7 +49,7 @@ def cluster(tmp_path_factory):
 def executor(cluster):
     with scanfab.dask_executor(cluster.address) as found:
         end = time.monotonic() + 60
-        while len(found.client.nthreads()) < 2:
+        while len(found.workers()) < 2:
             assert time.monotonic() < end
             time.sleep(0.1)
         yield found
@@ -164,6 +171,60 @@ class Slow:
         return threads
 
 
+@dataclass(frozen=True)
+class Heavy(Slow):
+    """A job with a result of some megabytes."""
+
+    def __call__(self, threads: int) -> Any:
+        return np.ones(HEAVY // 8)
+
+
+HEAVY = 4_000_000
+
+
+def peak(work: Callable[[], object]) -> int:
+    """The most bytes that Python and numpy hold at a time."""
+    tracemalloc.start()
+    try:
+        work()
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+
+
+def test_results_do_not_pile_up(executor):
+    """Neither here nor at the workers: those of 60 frames would be 240 MB."""
+    held = []
+
+    def work() -> None:
+        jobs = iter([Heavy(Path("unused")) for _ in range(60)])
+        for result in shared_in_order(executor, jobs, executor.room, executor.share):
+            assert len(result) == HEAVY // 8
+            held.append(sum(name.startswith(executor.name) for name in executor.client.who_has()))
+
+    assert executor.room() == 4
+    assert peak(work) < 12 * HEAVY
+    assert max(held) <= 8
+
+
+def test_packings_do_not_pile_up(executor):
+    """Those of a generator are sent away, and forgotten here."""
+    alive: weakref.WeakSet[scanfab.Packing] = weakref.WeakSet()
+    most = []
+
+    def packings() -> Iterator[scanfab.Packing]:
+        for _ in range(40):
+            grains = shaken_cubic(np.random.default_rng(0), 4)
+            packing = scanfab.Packing(grains.position, grains.radius)
+            alive.add(packing)
+            most.append(len(alive))
+            yield packing
+
+    words = {"variants": "a", "directions": 9, "spacing": "2rmin", "contact_tolerance": 0.01}
+    assert len(scanfab.compute(packings(), executor=executor, **words)) == 40
+    assert max(most) <= executor.room() + 6
+
+
 @pytest.fixture
 def fragile(tmp_path):
     """A cluster whose workers may die."""
@@ -175,11 +236,9 @@ def fragile(tmp_path):
 def test_workers_that_die_cost_their_frames_again(fragile, folder):
     """Killed in the middle; the frames that they had but queued are no tries."""
     assert compute("dumps", *FAST, output="one.csv") == 0
-    part = Path("t.csv.part")
 
     def kill_some() -> None:
-        while not part.exists() or not part.stat().st_size:
-            time.sleep(0.01)
+        wait_for_a_row()
         for _ in range(2):
             fragile.add()
             fragile.kill()
@@ -195,7 +254,7 @@ def test_a_frame_that_kills_its_workers_is_given_up(fragile, tmp_path):
     for _ in range(3):
         fragile.add()
     with scanfab.dask_executor(scheduler_file=fragile.file) as executor:
-        while len(executor.client.nthreads()) < 5:
+        while len(executor.workers()) < 5:
             time.sleep(0.1)
         deadly = executor.submit(Slow(tmp_path / "deadly", 99), 1)
         with pytest.raises(ClusterError, match=r"the worker died: .*tried"):
@@ -210,9 +269,7 @@ def test_the_scheduler_dies_and_the_run_is_resumed(fragile, folder):
     with subprocess.Popen(
         [*words, str(fragile.file)], stderr=subprocess.PIPE, text=True
     ) as process:
-        part = Path("t.csv.part")
-        while not part.exists() or not part.stat().st_size:
-            time.sleep(0.01)
+        wait_for_a_row()
         fragile.kill_scheduler()
         said = process.stderr.read()
         assert process.wait(60) == 1
@@ -225,9 +282,86 @@ def test_the_scheduler_dies_and_the_run_is_resumed(fragile, folder):
     assert Path("t.csv").read_bytes() == Path("one.csv").read_bytes()
 
 
+def wait_for_a_row() -> None:
+    part, end = Path("t.csv.part"), time.monotonic() + 60
+    while not part.exists() or not part.stat().st_size:
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+@pytest.mark.parametrize(
+    ("frames", "kind", "step", "call"),
+    [(":", module._Trial, "send", 5), ("0:1", module._Parts, "map", 1)],
+    ids=["frames", "one frame"],
+)
+def test_a_scheduler_that_hangs_is_left(
+    fragile, folder, capsys, monkeypatch, frames, kind, step, call
+):
+    """It is stopped, and closes no connection; the run goes on when it is there again."""
+    words = ("dumps", *FAST, "--frames", frames)
+    assert compute(*words, output="one.csv") == 0
+    with scanfab.dask_executor(scheduler_file=fragile.file) as executor:
+        while len(executor.workers()) < 2:
+            time.sleep(0.1)
+    proceed, calls = getattr(kind, step), []
+
+    def hanging(*arguments: Any) -> Any:
+        calls.append(arguments)
+        if len(calls) == call:
+            fragile.scheduler.send_signal(signal.SIGSTOP)
+        return proceed(*arguments)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(connection, "BEAT", 0.2)
+        patch.setattr(connection, "SILENCE", 5.0)
+        patch.setattr(kind, step, hanging)
+        assert compute(*words, "--scheduler-file", str(fragile.file)) == 1
+    said = capsys.readouterr().err
+    assert "s while frames were computed: start it again, and go on with --resume" in said
+    assert "the scheduler has not answered for" in said
+    assert said.count("error") == 1
+    fragile.scheduler.send_signal(signal.SIGCONT)
+    assert compute(*words, "--resume", "--scheduler-file", str(fragile.file)) == 0
+    assert Path("t.csv").read_bytes() == Path("one.csv").read_bytes()
+
+
+@dataclass(frozen=True)
+class Unseen(Slow):
+    """A job whose file lies elsewhere for the workers."""
+
+    source: str = "dumps"
+
+    @property
+    def strict(self) -> Unseen:
+        return replace(self, file=Placed(At(Path("/none/dump_0.txt"))))
+
+    def __call__(self, threads: int) -> int:
+        raise ReadError("cannot be read")
+
+
+@dataclass(frozen=True)
+class Placed:
+    """What stands for a frame in a file."""
+
+    snapshot: Any
+
+
+@dataclass(frozen=True)
+class At:
+    path: Path
+
+
+def test_files_that_workers_who_come_late_do_not_see(executor, folder, monkeypatch):
+    """No try of the frame, which could be passed over: it would be computed elsewhere."""
+    monkeypatch.setattr(executor, "_seen", {"dumps"})
+    job = Unseen(Path("unused"), file=Placed(At(folder / "dumps" / "dump_0.txt")))
+    with pytest.raises(ClusterError, match=r"cannot read .*dump_0.txt: tcp://.* sees / with .* in"):
+        executor.submit(job, 1).result(60)
+
+
 def test_files_that_workers_do_not_see(executor, folder, monkeypatch):
     monkeypatch.setattr(module, "view_there", _blind)
-    monkeypatch.setattr(executor, "_has_seen_files", False)
+    monkeypatch.setattr(executor, "_seen", set())
     with pytest.raises(ClusterError) as told:
         scanfab.compute(scanfab.read_series("dumps"), executor=executor, directions=9)
     assert f"2 workers of 2 cannot read {folder}/dumps/dump_" in str(told.value)

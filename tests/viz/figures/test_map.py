@@ -7,7 +7,8 @@ import pytest
 
 import scanfab
 from scanfab import Cell, Packing
-from scanfab.viz.figures.map import Map
+from scanfab.scan.blocks import Blocks
+from scanfab.viz.figures.map import Map, _Lattice
 from scanfab.viz.figures.page import drawn_page
 from tests.helpers.lattices import shaken_cubic
 
@@ -39,6 +40,12 @@ def test_a_value_that_one_block_alone_has_is_of_one_colour_in_all_planes(packing
         assert len(planes) == 3
         assert len(colours) == 1
         assert planes[0].norm.vmin < 0.6 < planes[0].norm.vmax
+
+
+def test_a_cell_that_leans_more_than_it_is_high_has_all_its_blocks():
+    edges = np.array([[20.0, 0, 0], [0, 8.0, 0], [9.0, 0, 8.0]])
+    middles = Blocks.of_edges(edges, np.zeros(3), (2, 2, 2)).middles
+    assert _Lattice(middles).counts == [2, 2, 2]
 
 
 @pytest.mark.parametrize("blocks", [{"grid": (2, 2, 2)}, {"slices": 2}, {"shells": 2}])
