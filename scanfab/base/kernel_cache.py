@@ -9,12 +9,9 @@ from __future__ import annotations
 
 import gc
 import hashlib
-import os
 import pickle
-import secrets
 from collections.abc import Callable
-from contextlib import suppress
-from functools import cache, partial
+from functools import cache
 from inspect import getfile
 from pathlib import Path
 from typing import Any
@@ -24,12 +21,10 @@ from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
-from scanfab.base.ending import undone_at_end
-from scanfab.base.kernel_folder import is_private, kernel_folder
+from scanfab.base.kept_files import read_kept, write_kept
+from scanfab.base.kernel_folder import kernel_folder
 
 __all__ = ["KernelCache", "when_compiling"]
-
-CHECKSUM = 32
 
 
 class KernelCache(NullCache):
@@ -42,7 +37,7 @@ class KernelCache(NullCache):
         """The form for these types of arguments; None if it is not there, or not as it was."""
         target_context.refresh()
         path = self._path(sig, target_context.codegen())
-        content = None if path is None else _read(path)
+        content = None if path is None else read_kept(path)
         if content is None:
             return None
         try:
@@ -55,7 +50,7 @@ class KernelCache(NullCache):
         """Keep a form, if there is a place for it."""
         path = self._path(sig, data.codegen)
         if path is not None and not data.lifted and not data.library.has_dynamic_globals:
-            _write(path, dumps(data._reduce()))  # type: ignore[no-untyped-call]
+            write_kept(path, dumps(data._reduce()))  # type: ignore[no-untyped-call]
 
     def _path(self, sig: Any, codegen: Any) -> Path | None:
         folder = kernel_folder().path
@@ -71,31 +66,6 @@ class KernelCache(NullCache):
 def _source(file: str) -> bytes:
     """What tells one version of a function's file from another."""
     return hashlib.sha256(Path(file).read_bytes()).digest()
-
-
-def _read(path: Path) -> bytes | None:
-    """What a file holds; None if it is not whole, or if others could have written it."""
-    try:
-        with open(path, "rb") as file:
-            if not is_private(os.fstat(file.fileno())):
-                return None
-            checksum, content = file.read(CHECKSUM), file.read()
-    except OSError:
-        return None
-    return content if hashlib.sha256(content).digest() == checksum else None
-
-
-def _write(path: Path, content: bytes) -> None:
-    """Whole or not at all; a full disk is no reason to stop."""
-    part = path.with_suffix(f".{secrets.token_hex(4)}")
-    remove = partial(part.unlink, missing_ok=True)
-    with suppress(OSError), undone_at_end(remove):
-        try:
-            with open(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
-                file.write(hashlib.sha256(content).digest() + content)
-            os.replace(part, path)
-        finally:
-            remove()
 
 
 def when_compiling(tell: Callable[[], None]) -> None:

@@ -11,7 +11,9 @@ from pathlib import Path
 
 import numba
 
-__all__ = ["Folder", "is_private", "kernel_folder"]
+from scanfab.base.kept_files import is_private, make_private, user_folder
+
+__all__ = ["Folder", "kernel_folder"]
 
 # bytes that compiled kernels need at most
 ROOM = 16 << 20
@@ -29,12 +31,12 @@ class Folder:
 def kernel_folder() -> Folder:
     """The folder of this user and of these kernels, which is made if it can be."""
     given = os.environ.get("NUMBA_CACHE_DIR")
-    base = Path(given) if given else _usual_base()
+    base = Path(given) if given else user_folder()
     if base is None:
         return Folder(None, "there is no home folder")
     folder = base / _version()
     try:
-        _make(folder)
+        make_private(folder)
     except OSError as error:
         return Folder(None, f"{error.filename}: {error.strerror}")
     for one in (base, folder):
@@ -44,28 +46,6 @@ def kernel_folder() -> Folder:
     if not _has_room(folder):
         return Folder(None, f"{folder} cannot be written to")
     return Folder(folder)
-
-
-def is_private(status: os.stat_result) -> bool:
-    """Whether nobody but the user, or the system itself, can have written to a file or folder."""
-    if os.name != "posix":
-        return True
-    return status.st_uid in (0, os.getuid()) and not status.st_mode & 0o022
-
-
-def _usual_base() -> Path | None:
-    """scanfab's folder in the user's cache; None if there is no home."""
-    try:
-        home = Path.home()
-    except RuntimeError:
-        return None
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
-    elif sys.platform == "darwin":
-        base = home / "Library" / "Caches"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache")
-    return base / "scanfab"
 
 
 def kernel_files() -> list[Path]:
@@ -91,13 +71,6 @@ def _version() -> str:
     for file in kernel_files():
         sources.update(file.read_bytes())
     return f"numba-{numba.__version__}-{sources.hexdigest()[:16]}"
-
-
-def _make(folder: Path) -> None:
-    """Make a folder, and those above it, for the user alone."""
-    if not folder.is_dir():
-        _make(folder.parent)
-        folder.mkdir(mode=0o700, exist_ok=True)
 
 
 def _has_room(folder: Path) -> bool:

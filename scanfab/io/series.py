@@ -19,6 +19,7 @@ from scanfab.io.dimension import decided_space, refuse_other_space
 from scanfab.io.families import Family
 from scanfab.io.frame import Frame
 from scanfab.io.frame_csv import FrameFile
+from scanfab.io.kept_index import snapshots_of
 from scanfab.io.moments import of_moment
 from scanfab.io.reader import ReadOptions, Snapshot
 from scanfab.io.unpacking import unpacking_up_to
@@ -255,7 +256,7 @@ class Series:
         problem: ReadError | None = None
         try:
             with unpacking_up_to(self.options.max_unpacked):
-                snapshots = self.grains.reader.snapshots(path)
+                snapshots = snapshots_of(self.grains.reader, path)
             told = read_frame(path) if len(snapshots) == 1 else None
             if told is not None:
                 snapshots = [replace(snapshots[0], step=told.step, time=told.time)]
@@ -312,7 +313,7 @@ class Series:
         if path not in self._contact_snapshots:
             assert family.reader is not None
             with unpacking_up_to(self.options.max_unpacked):
-                self._contact_snapshots[path] = family.reader.snapshots(path)
+                self._contact_snapshots[path] = snapshots_of(family.reader, path)
         numbered = None not in family.files and step is not None
         sure = named or not numbered or bool({name_step, step} & set(family.files))
         return of_moment(self._contact_snapshots[path], grains, sure)
@@ -395,6 +396,5 @@ class Series:
 
 def _stamp(path: Path) -> _Stamp:
     with suppress(OSError):
-        found = path.stat()
-        return found.st_size, found.st_mtime_ns
+        return (found := path.stat()).st_size, found.st_mtime_ns
     return None

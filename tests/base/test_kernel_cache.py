@@ -14,7 +14,7 @@ import numba
 import pytest
 
 import scanfab.scan.kernels.sweep
-from scanfab.base import ending
+from scanfab.base import ending, kept_files
 from scanfab.base import jit as compiled
 from scanfab.base import kernel_cache as cache
 from scanfab.base import kernel_folder as folder
@@ -260,7 +260,7 @@ def test_what_belongs_to_another_user_is_not_trusted(tmp_path, monkeypatch):
 def test_no_folder_is_made_for_others_to_write_to(tmp_path):
     before = os.umask(0)
     try:
-        folder._make(tmp_path / "one" / "two")
+        folder.make_private(tmp_path / "one" / "two")
     finally:
         os.umask(before)
     assert folder.is_private((tmp_path / "one").stat())
@@ -303,7 +303,7 @@ def test_a_disk_that_fills_later_is_no_reason_to_stop(kept, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(cache.os, "replace", full)
+    monkeypatch.setattr(kept_files.os, "replace", full)
     assert compiled_anew()
     assert list(kept.iterdir()) == []
 
@@ -313,7 +313,7 @@ def test_what_is_interrupted_leaves_no_half_a_kernel(tmp_path, monkeypatch, erro
     def fail(*_):
         raise error
 
-    monkeypatch.setattr(cache.os, "replace", fail)
+    monkeypatch.setattr(kept_files.os, "replace", fail)
     with pytest.raises(error):
         cache._write(tmp_path / "one.kernel", b"code")
     assert list(tmp_path.iterdir()) == []
@@ -327,7 +327,7 @@ def test_a_process_that_ends_at_once_leaves_no_half_a_kernel(tmp_path, monkeypat
         left.extend(tmp_path.iterdir())
 
     monkeypatch.setattr(ending, "_steps", [])
-    monkeypatch.setattr(cache.os, "replace", end)
+    monkeypatch.setattr(kept_files.os, "replace", end)
     with pytest.raises(ValueError, match="not in list"):  # the process would be gone
         cache._write(tmp_path / "one.kernel", b"code")
     assert left == []
