@@ -315,7 +315,7 @@ def test_what_is_interrupted_leaves_no_half_a_kernel(tmp_path, monkeypatch, erro
 
     monkeypatch.setattr(kept_files.os, "replace", fail)
     with pytest.raises(error):
-        cache._write(tmp_path / "one.kernel", b"code")
+        kept_files.write_kept(tmp_path / "one.kernel", b"code")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -329,5 +329,5 @@ def test_a_process_that_ends_at_once_leaves_no_half_a_kernel(tmp_path, monkeypat
     monkeypatch.setattr(ending, "_steps", [])
     monkeypatch.setattr(kept_files.os, "replace", end)
     with pytest.raises(ValueError, match="not in list"):  # the process would be gone
-        cache._write(tmp_path / "one.kernel", b"code")
+        kept_files.write_kept(tmp_path / "one.kernel", b"code")
     assert left == []
