@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from scanfab.base.errors import ScanfabNote, SettingsError
+from scanfab.base.errors import ReadError, ScanfabNote, SettingsError
 from scanfab.base.files import check_folder
 from scanfab.io.following import FollowedSeries
 from scanfab.io.series import Series
@@ -228,7 +228,7 @@ class Job:
                 frames = self.table.with_frames(series, self.settings.frames)
                 self.settings = replace(self.settings, frames=frames)
                 self.asked = with_frames(self.asked, frames)
-            except SettingsError:
+            except (SettingsError, ReadError):
                 if not result.has_part:
                     raise
                 self.table = None

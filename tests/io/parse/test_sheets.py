@@ -35,21 +35,23 @@ def read(text, skip=0, numbers=(0, 1, 2, 3), whole=(0,)):
     return layout, read_columns(PATH, data, layout, numbers, whole)
 
 
+# a comma cannot be both
+SPELLINGS = [(one, False) for one in (",", ";", "\t", " ", "  ", "\t ", ", ")]
+SPELLINGS += [(one, True) for one in (";", "\t", " ", "  ", "\t ")]
+
+
 def assert_right(found):
     assert found[0].dtype == np.int64
     for place, expected in enumerate(zip(*ROWS, strict=True)):
         np.testing.assert_array_equal(found[place], expected)
 
 
-@pytest.mark.parametrize("comma", [False, True])
 @pytest.mark.parametrize("end", ["\n", "\r\n", " \n"])
 @pytest.mark.parametrize("names", [NAMES, None])
-@pytest.mark.parametrize("separator", [",", ";", "\t", " ", "  ", "\t ", ", "])
+@pytest.mark.parametrize(("separator", "comma"), SPELLINGS)
 def test_all_separators_decimal_signs_and_line_ends_give_the_same_numbers(
     separator, names, end, comma
 ):
-    if comma and "," in separator:
-        pytest.skip("nobody can read that")
     layout, found = read(table(separator, names, end=end, comma=comma))
     assert layout.names == (None if names is None else tuple(names))
     assert layout.has_commas == comma
