@@ -143,7 +143,8 @@ NUMBERS = (
     words.lagging,
     words.normalised_worst, words.slope_misses, words.pooled, words.disc_misses, words.disc_ratio,
     words.printed_radius, words.cutoff_slopes, words.predicted_off,
-    words.null_tests, words.voids_left, words.reversal_pressure,
+    words.null_tests, words.voids_left, words.reversal_pressure, words.slope_back,
+    words.offset_back,
 )  # fmt: skip
 PARTS: dict[str, Callable[[], str]] = {
     **{claim.__name__: claim for claim in CLAIMS},

@@ -44,7 +44,7 @@ def start_worst() -> str:
 
 def off_share() -> str:
     """The largest off-diagonal term over the final anisotropy, percent."""
-    return f"{100 * max(_shares(('xy', 'xz', 'yz'))):.0f}"
+    return f"{100 * max(_shares(('xy', 'xz', 'yz'))):.1f}"
 
 
 def lateral_share() -> str:
@@ -138,7 +138,11 @@ def pooled() -> str:
     found = [fits(f"{one}_default")["c"] for one in runs() if "biaxial" not in one]
     mean = sum(one.slope for one in found) / len(found)
     error = math.sqrt(sum(one.slope_se**2 for one in found)) / len(found)
-    return f"{mean:.3f} ± {error:.3f}"
+    apart = np.std([one.slope for one in found], ddof=1) / math.sqrt(len(found))
+    return (
+        f"{mean:.3f}, with a standard error of {error:.3f} from the octants of each, and of "
+        f"{apart:.3f} from how far they are apart"
+    )
 
 
 def disc_ratio() -> str:
@@ -239,3 +243,20 @@ def reversal_pressure() -> str:
     """How far from its target the mean stress was on the way back, percent at the most."""
     numbers = engine("yade_reversal")
     return f"{100 * abs(numbers['p'][41:] / 200e3 - 1).max(initial=0.0):.1f}"
+
+
+def _line_back() -> tuple[float, float]:
+    """Slope and intercept of the RV's voids over its contacts on the way back."""
+    rows = table("yade_reversal_default").select(variant="c")
+    slope, intercept = np.polyfit(rows["alpha_c_axial"], rows["alpha_vs_axial"], 1)
+    return float(slope), float(intercept)
+
+
+def slope_back() -> str:
+    """Of the line on the way back."""
+    return f"{_line_back()[0]:.3f}"
+
+
+def offset_back() -> str:
+    """The void anisotropy where that line has none of the contacts."""
+    return f"{_line_back()[1]:.4f}"

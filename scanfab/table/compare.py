@@ -23,6 +23,9 @@ from scanfab.table.table import Table
 
 __all__ = ["compare_tables"]
 
+# a frame at 12 % may say 0.1200012, as boxes have rounded numbers
+SAME_STRAIN = 1e-5
+
 
 TURNED = (
     "the loading axis is not the axis of the contact fabric, as in simple shear: alpha_vs_axial, "
@@ -112,14 +115,14 @@ def _tell_of_strains(rows: Sequence[Mapping[str, Any]], strain_max: float | None
     strains = numbers_of(rows, strain_column(rows) or "strain")
     if not strains:
         warnings.warn("`strain_max`: no frame has a strain, so none is fitted", ScanfabWarning, 3)
-    elif min(strains) > strain_max:
+    elif not _within(min(strains), strain_max):
         warnings.warn(
             f"strain_max: {strain_max:g} leaves out all frames, so none is fitted: their strains "
             f"lie between {min(strains):.3g} and {max(strains):.3g} (positive in compression)",
             ScanfabWarning,
             stacklevel=3,
         )
-    elif max(strains) <= strain_max:
+    elif _within(max(strains), strain_max):
         warnings.warn(
             f"strain_max: {strain_max:g} leaves out no frame: strains are fractions (5 % is 0.05), "
             f"and lie between {min(strains):.3g} and {max(strains):.3g}",
@@ -136,7 +139,7 @@ def _tell_of_few_frames(rows: Sequence[Mapping[str, Any]], strain_max: float) ->
     for source, own in groupby(sorted(rows, key=_source), key=_source):
         of_frames = {row["frame"]: number_of(row, column) for row in own}
         strains = sorted(strain for strain in of_frames.values() if strain is not None)
-        beyond = [strain for strain in strains if strain > strain_max]
+        beyond = [strain for strain in strains if not _within(strain, strain_max)]
         left = len(strains) - len(beyond)
         if left < FEWEST_FRAMES and beyond:
             warnings.warn(
@@ -282,7 +285,7 @@ def _blocks(group: Sequence[Mapping[str, Any]]) -> int:
 
 def _within(strain: float | None, strain_max: float | None) -> bool:
     """Whether a frame belongs to the fit; without a strain nobody can tell, so it does not."""
-    return strain_max is None or (strain is not None and strain <= strain_max)
+    return strain_max is None or (strain is not None and strain <= strain_max + SAME_STRAIN)
 
 
 def _fit(x: FloatArray, y: FloatArray) -> tuple[float | None, float | None, float | None]:

@@ -139,6 +139,18 @@ def test_frames_beyond_the_largest_strain_are_out_of_the_fit_alone():
     assert len(compare_tables(curve(), strain_max=0.02).frames) == 5
 
 
+def test_a_frame_at_the_largest_strain_belongs_to_the_fit_but_for_rounding():
+    """Boxes of six digits make 0.1200012 of 12 %."""
+    rows = [dict(row) for row in curve()]
+    inside = summary_of(rows, strain_max=0.03).frames
+    for row in rows:
+        row["strain"] += 2e-6
+    assert summary_of(rows, strain_max=0.03).frames == inside
+    for row in rows:
+        row["strain"] += 2e-5
+    assert summary_of(rows, strain_max=0.03).frames == inside - 1
+
+
 def test_frames_without_a_strain_are_out_of_a_fit_up_to_a_strain():
     rows = [{**row, "strain": None} for row in curve()]
     assert summary_of(rows).frames == 5
