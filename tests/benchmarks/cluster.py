@@ -35,7 +35,7 @@ from tests.helpers.dumps import cubic_rows, dump_text, shaken_cubic, write
 
 SCAN = {"spacing": "0.3rmin", "cutoff": "0.2rmin"}
 MANY: dict[str, Any] = {"directions": 100, **SCAN}
-HUGE: dict[str, Any] = {"directions": 32, **SCAN}
+HUGE: dict[str, Any] = {"directions": 200, "spacing": "0.2rmin", "cutoff": "0.2rmin"}
 Ways = dict[str, Callable[..., "Times"]]
 
 
