@@ -19,7 +19,7 @@ from typing import Any
 import paper_claims as claims
 import paper_tables
 import paper_words as words
-from paper_tables import MAIN, UP_TO, VARIANTS, fits, has, markdown, runs, table
+from paper_tables import MAIN, UP_TO, VARIANTS, errors_from_null, fits, has, markdown, runs, table
 
 from scanfab.cli.main import run
 
@@ -85,12 +85,7 @@ def others() -> str:
             solid = float(first["solid_fraction"])
             # equal spheres that do not overlap: the void over what all lines meet of the surfaces
             exact = 4 * (1 - solid) / (3 * solid) * float(last["cutoff"])
-            ratios = [
-                abs(float(row[f"alpha_vs_{axis}"]) / float(row[f"alpha_vs_{axis}_se"]))
-                for row in cut
-                for axis in "xyz"
-                if row[f"alpha_vs_{axis}_se"]
-            ]
+            ratios = errors_from_null(cut)
             lines.append(
                 [
                     name,

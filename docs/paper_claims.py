@@ -10,7 +10,6 @@ from paper_tables import (
     RUNS,
     SLOPE,
     SLOPE_2D,
-    UP_TO,
     VARIANTS,
     engine,
     fits,
@@ -18,6 +17,7 @@ from paper_tables import (
     has,
     interval,
     markdown,
+    normalised_gaps,
     row_of,
     runs,
     table,
@@ -147,13 +147,7 @@ def normalised() -> str:
     """How far the two curves, each divided by its own largest value, are apart."""
     lines = []
     for name in runs():
-        cells = []
-        for variant in VARIANTS:
-            rows = table(f"{name}_default").select(variant=variant)
-            curves = [rows[f"alpha_{kind}_axial"] for kind in ("vs", "c")]
-            void, contact = (curve / abs(curve).max() for curve in curves)
-            early = rows["strain"] <= UP_TO
-            cells += [f"{(void - contact)[part].mean():+.2f}" for part in (early, ~early)]
+        cells = [f"{gap:+.2f}" for one in VARIANTS for gap in normalised_gaps(name, one)]
         lines.append([f"`{name}`", *cells])
     head = [f"{one}, {part} 12 %" for one in VARIANTS for part in ("up to", "beyond")]
     return markdown(["mean of void less contact, normalised", *head], lines)

@@ -56,6 +56,25 @@ def row_of(name: str, variant: str, strain: float) -> Any:
     return min(rows, key=lambda row: abs(row["strain"] - strain))
 
 
+def normalised_gaps(name: str, variant: str) -> list[float]:
+    """Mean of void less contact, each over its own largest value, up to 12 % strain and beyond."""
+    rows = table(f"{name}_default").select(variant=variant)
+    curves = [rows[f"alpha_{kind}_axial"] for kind in ("vs", "c")]
+    void, contact = (curve / abs(curve).max() for curve in curves)
+    early = rows["strain"] <= UP_TO
+    return [float((void - contact)[part].mean()) for part in (early, ~early)]
+
+
+def errors_from_null(rows: Iterable[dict[str, str]]) -> list[float]:
+    """Of packings of others: how many of its errors each anisotropy is from 0."""
+    return [
+        abs(float(row[f"alpha_vs_{axis}"]) / float(row[f"alpha_vs_{axis}_se"]))
+        for row in rows
+        for axis in "xyz"
+        if row[f"alpha_vs_{axis}_se"]
+    ]
+
+
 def usual_variant(name: str) -> str:
     """The RV of a sample in a shell; a periodic medium as a whole has no edge."""
     return "c" if name.startswith("yade") else "a"

@@ -12,12 +12,13 @@ from paper_tables import (
     MAIN,
     SLOPE,
     SLOPE_2D,
-    UP_TO,
     VARIANTS,
     engine,
+    errors_from_null,
     fits,
     half_width,
     has,
+    normalised_gaps,
     row_of,
     runs,
     table,
@@ -90,17 +91,9 @@ def _at_ten(column: str) -> list[float]:
 
 def normalised_worst() -> str:
     """The largest mean difference of the normalised curves of spheres."""
-    found = []
-    for name in [one for one in runs() if "biaxial" not in one]:
-        for variant in VARIANTS:
-            rows = table(f"{name}_default").select(variant=variant)
-            void, contact = (
-                rows[f"alpha_{kind}_axial"] / abs(rows[f"alpha_{kind}_axial"]).max()
-                for kind in ("vs", "c")
-            )
-            early = rows["strain"] <= UP_TO
-            found += [abs((void - contact)[part].mean()) for part in (early, ~early)]
-    return f"{max(found):.2f}"
+    spheres = [one for one in runs() if "biaxial" not in one]
+    gaps = [gap for name in spheres for one in VARIANTS for gap in normalised_gaps(name, one)]
+    return f"{max(map(abs, gaps)):.2f}"
 
 
 def left_by_ends(strain: float) -> str:
@@ -201,12 +194,7 @@ def null_tests() -> str:
     """Anisotropies of hard spheres, and how many are more than 1, 2 and 3 errors from 0."""
     with (paper_tables.TABLES / "others.csv").open(encoding="utf-8", newline="") as file:
         rows = [row for row in csv.DictReader(file) if row["sample"].startswith("hs")]
-    ratios = [
-        abs(float(row[f"alpha_vs_{axis}"]) / float(row[f"alpha_vs_{axis}_se"]))
-        for row in rows
-        for axis in "xyz"
-        if row[f"alpha_vs_{axis}_se"]
-    ]
+    ratios = errors_from_null(rows)
     beyond = [sum(one > errors for one in ratios) for errors in (1, 2, 3)]
     return (
         f"Of {len(ratios)} anisotropies of hard spheres {beyond[0]} are more than one error from "

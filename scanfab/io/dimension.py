@@ -9,7 +9,7 @@ from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
 from scanfab.packing.plane import flat_space, space_of, spelt_plane
 
-__all__ = ["decided_space", "refuse_other_space"]
+__all__ = ["decided_space", "other_space", "refuse_other_space"]
 
 
 def decided_space(name: str, position: FloatArray, dim: str | int) -> Space:
@@ -48,7 +48,13 @@ def refuse_other_space(position: FloatArray, decided: Space) -> None:
     found = space_of(position)
     if found.is_plane and not decided.is_plane:
         raise PackingError(
-            f"all its centres lie in {found}, but the first frame that has grains lies in "
-            f"{decided}: the frames of a series are all discs in one plane, or all spheres; "
-            f"`dim=2` reads all as discs, `dim=3` all as spheres"
+            f"{other_space(found, decided)}; `dim=2` reads all as discs, `dim=3` all as spheres"
         )
+
+
+def other_space(found: Space, decided: Space) -> str:
+    """What is said of a frame that lies in another space than its series."""
+    return (
+        f"all its centres lie in {found}, but the first frame that has grains lies in {decided}: "
+        f"the frames of a series are all discs in one plane, or all spheres"
+    )

@@ -11,6 +11,7 @@ from scanfab.base.errors import PackingError
 from scanfab.base.note import Note, joined
 from scanfab.base.spelling import spelt_apart
 from scanfab.fabric.state import VOLUMETRIC_STRAIN
+from scanfab.io.dimension import other_space
 from scanfab.packing.columns import RV_COLUMN
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import VARIANTS, Sample
@@ -136,11 +137,7 @@ def check_space(sample: Sample, plan: Plan) -> None:
     if not sample.grains.any():
         return
     if packing.space != plan.space:
-        raise PackingError(
-            f"all its centres lie in {packing.space}, but the first frame that has grains lies in "
-            f"{plan.space}: the frames of a series are all discs in one plane, or all spheres "
-            f"(`dim`)"
-        )
+        raise PackingError(f"{other_space(packing.space, plan.space)} (`dim`)")
 
 
 def _empty_rows(known: Mapping[str, Any], plan: Plan) -> Iterator[Row]:

@@ -50,12 +50,17 @@ def read_rows(path: Path | str) -> list[dict[str, Any]]:
     >>> rows[0]["contacts"]
     2076
     """
+    data = _content(path)
+    return reading_format(Path(path), data).read(data, str(path))
+
+
+def _content(path: str | Path) -> bytes:
+    """The bytes of a table, or of what is piped in."""
     check_file_or_pipe(Path(path))
     try:
-        data = sys.stdin.buffer.read() if str(path) == "-" else Path(path).read_bytes()
+        return sys.stdin.buffer.read() if str(path) == "-" else Path(path).read_bytes()
     except OSError as error:
         raise ReadError(f"{path}: cannot be read: {error.strerror}") from None
-    return reading_format(Path(path), data).read(data, str(path))
 
 
 def read_finished_rows(path: Path) -> list[dict[str, Any]]:
@@ -68,9 +73,10 @@ def read_finished_rows(path: Path) -> list[dict[str, Any]]:
         If the file cannot be read as a table, or has lost its end: a number at the end of a text
         reads well without its last digits.
     """
-    rows = read_rows(path)
-    data = path.read_bytes()
-    if data and reading_format(path, data).is_text and not data.endswith(b"\n"):
+    data = _content(path)
+    format_ = reading_format(path, data)
+    rows = format_.read(data, str(path))
+    if data and format_.is_text and not data.endswith(b"\n"):
         raise ReadError(
             f"{path}: its last line has no end, expected the whole table as it was written: was it "
             f"cut off when it was copied? Copy it again, or remove it and run its command again"
