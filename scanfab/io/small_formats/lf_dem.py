@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
+import warnings
 from pathlib import Path
 
 import numpy as np
 
-from scanfab.base.errors import PackingError, ReadError
+from scanfab.base.errors import PackingError, ReadError, ScanfabWarning
 from scanfab.base.typing import FloatArray
 from scanfab.io.files import first_bytes, plain
 from scanfab.io.formats.columns import grain_table
@@ -29,6 +30,11 @@ COUNT, *EDGES = (
     for name in (b"np", b"Lx", b"Ly", b"Lz")
 )
 HEADER_BYTES = 1 << 16
+NORMAL = "normal vector, oriented from particle 1 to particle 2"
+PUSH = "norm of the normal part of the contact force"
+TANGENTIAL = "tangential part of the contact force"
+# versions with this title write a push with its sign, whatever the title of the push says
+OF_SIGNED_PUSH = "normal part of the lubrication force"
 
 
 class LfDemReader:
@@ -109,8 +115,8 @@ class LfDemReader:
         """
         The pairs whose contact state is above zero.
 
-        All others are near enough for lubrication, and do not touch. The file has the sizes of
-        contact forces, and not on which grain their tangential part acts: they are left out.
+        All others are near enough for lubrication, and do not touch. Forces are those of contact
+        alone, without lubrication and repulsion.
         """
         path = snapshot.path
         head = first_bytes(path, HEADER_BYTES)
@@ -123,7 +129,36 @@ class LfDemReader:
         ids = np.column_stack([touching[:, where.start] for where in both if where is not None])
         if not (np.all(ids == np.rint(ids)) and np.all(np.abs(ids) < 2.0**53)):
             raise ReadError(f"{path}: expected whole numbers as labels of particles")
-        return join_ids(path, grains, ids.astype(np.int64), None, walls=False)
+        force = _contact_forces(path, legend, touching)
+        return join_ids(path, grains, ids.astype(np.int64), force, walls=False)
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def _contact_forces(
+    path: Path, legend: dict[str, range], touching: FloatArray
+) -> FloatArray | None:
+    """
+    The forces on particle 2 of each pair, shape (M, 3); None if the legend lacks a part of them.
+
+    In the program's source contact forces act on particle 1. There a push is against the normal,
+    which points to particle 2; the file has it as a number, and the tangential part as it is.
+    """
+    places = [legend.get(name, range(0)) for name in (NORMAL, PUSH, TANGENTIAL)]
+    if [len(where) for where in places] != [3, 1, 3]:
+        return None
+    normal, push, tangential = (touching[:, where.start : where.stop] for where in places)
+    force: FloatArray = push * normal - tangential
+    if not np.all(np.isfinite(force)):
+        raise ReadError(f"{path}: expected finite numbers as contact forces and normals")
+    if len(force) and OF_SIGNED_PUSH not in legend and np.all(push >= 0):
+        warnings.warn(
+            f"{path}: versions of LF_DEM of August 2016 and later write normal contact forces "
+            f"without their sign: where the dashpot pulls two grains together, its force is taken "
+            f"for a push",
+            ScanfabWarning,
+            stacklevel=2,
+        )
+    return force
 
 
 def _legend(head: bytes) -> dict[str, range]:

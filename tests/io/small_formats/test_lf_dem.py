@@ -10,7 +10,16 @@ from scanfab import ReadError, ScanfabWarning
 from scanfab.io.registry import reader_named
 from scanfab.testing import check_reader
 from tests.helpers.dumps import write
-from tests.helpers.made.lf_dem import HEAD, grains_text, pairs_text
+from tests.helpers.made.lf_dem import (
+    HEAD,
+    RUN_VISCOSITY,
+    THROUGH,
+    UNSIGNED,
+    chain_texts,
+    grains_text,
+    pairs_text,
+    run_texts,
+)
 
 
 @pytest.fixture
@@ -31,6 +40,58 @@ def test_images_above_are_shifted(run):
     assert packing.contacts.pairs.tolist() == [[0, 1]]
     np.testing.assert_allclose(packing.contacts.normal, [[0, 0, 1]])
     assert packing.contacts.force is None
+
+
+def read_chain(folder, **others):
+    grains, pairs = chain_texts(**others)
+    path = write(folder / "par_a.dat", grains)
+    return scanfab.read(path, contacts=str(write(folder / "int_a.dat", pairs)))
+
+
+@pytest.mark.parametrize("pairs", [((0, 1), (1, 2)), ((1, 0), (2, 1)), ((1, 2), (1, 0))])
+def test_a_grain_at_rest_between_two(tmp_path, pairs):
+    """Its forces add up to nothing only with the right sign of each part, on the right grain."""
+    contacts = read_chain(tmp_path, pairs=pairs).contacts
+    on_middle = {
+        frozenset(pair): force if pair[1] == 1 else -force
+        for pair, force in zip(contacts.pairs.tolist(), contacts.force, strict=True)
+    }
+    np.testing.assert_allclose(on_middle[frozenset((0, 1))], THROUGH, atol=1e-15)
+    np.testing.assert_allclose(on_middle[frozenset((1, 2))], -THROUGH, atol=1e-15)
+    # both contacts are pushed together
+    assert np.all(contacts.force_n > 0)
+
+
+def test_what_the_program_says_its_contacts_add_to_the_viscosity(tmp_path):
+    """3 pi (r_x f_z + r_z f_x) with the force on particle 1, in its units; friction matters."""
+    grains, pairs = run_texts()
+    path = write(tmp_path / "par_a.dat", grains)
+    packing = scanfab.read(path, contacts=str(write(tmp_path / "int_a.dat", pairs)))
+    contacts = packing.contacts
+    branch = contacts.normal * packing.radius[contacts.pairs].sum(axis=1)[:, None]
+    on_first = -contacts.force
+    added = 3 * np.pi * (branch[:, 0] * on_first[:, 2] + branch[:, 2] * on_first[:, 0])
+    np.testing.assert_allclose(np.sort(added), np.sort(RUN_VISCOSITY), rtol=2e-3)
+
+
+def test_a_pull_keeps_its_sign(tmp_path):
+    contacts = read_chain(tmp_path, push=lambda size: -size).contacts
+    assert np.all(contacts.force_n < 0)
+
+
+def test_a_push_whose_sign_may_be_lost_is_told(tmp_path):
+    with pytest.warns(ScanfabWarning, match="write normal contact forces without their sign"):
+        contacts = read_chain(tmp_path, lubrication=UNSIGNED).contacts
+    assert np.all(contacts.force_n > 0)
+    # a file with a pull has signs
+    assert np.all(
+        read_chain(tmp_path, lubrication=UNSIGNED, push=lambda f: -f).contacts.force_n < 0
+    )
+
+
+def test_a_force_that_is_no_number(tmp_path):
+    with pytest.raises(ReadError, match="finite numbers as contact forces"):
+        read_chain(tmp_path, push=lambda size: np.inf)
 
 
 def test_contacts_go_by_the_strain(run):
