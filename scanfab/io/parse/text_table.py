@@ -8,7 +8,7 @@ which reads it or says what is wrong in which line.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -22,7 +22,15 @@ import numpy.typing as npt
 from scanfab.base.memory import free_memory
 from scanfab.base.threads import in_order
 
-__all__ = ["FILLED", "LARGE", "TextTable", "parse_rows", "read_regular", "squeezed"]
+__all__ = [
+    "FILLED",
+    "LARGE",
+    "TextTable",
+    "parse_rows",
+    "parse_some",
+    "read_regular",
+    "squeezed",
+]
 
 # bytes; a smaller table is parsed before polars is loaded
 LARGE = 8 << 20
@@ -107,14 +115,31 @@ def parse_rows(
     text = data[first.start() : stop]
     line = text[: text.find(b"\n")]
     width, sign = len(line.split()), "\t" if b"\t" in line else " "
+    kinds = _kinds(range(width), whole)
     found = None
     # elsewhere a second try is the first: words stand apart by more than one sign
     if line[:1] > b" " and len(line.rstrip(sign.encode()).split(sign.encode())) == width:
-        found = None if b"  " in text[:PEEK] else _parse_all(text, width, sign, whole)
+        found = None if b"  " in text[:PEEK] else _parse_all(text, width, sign, kinds)
     if found is None:
         plain = squeezed(text)
-        found = None if plain is None else _parse_all(plain, width, " ", whole)
+        found = None if plain is None else _parse_all(plain, width, " ", kinds)
     return found
+
+
+def parse_some(
+    text: bytes, width: int, places: Sequence[int], whole: Collection[int]
+) -> npt.NDArray[np.float64] | None:
+    """
+    Some columns of rows of words with one blank between them, shape (N, columns).
+
+    None if the rows are few, or if one is not regular or has no such number there: words of other
+    columns may be anything.
+    """
+    return None if len(text) < LONG else _parse_all(text, width, " ", _kinds(places, whole))
+
+
+def _kinds(places: Iterable[int], whole: Collection[int]) -> dict[int, np.dtype[Any]]:
+    return {k: np.dtype(np.int64 if k in whole else np.float64) for k in places}
 
 
 def squeezed(text: bytes) -> bytes | None:
@@ -127,13 +152,12 @@ def squeezed(text: bytes) -> bytes | None:
 
 
 def _parse_all(
-    text: bytes, width: int, sign: str, whole: Collection[int]
+    text: bytes, width: int, sign: str, kinds: Mapping[int, np.dtype[Any]]
 ) -> npt.NDArray[np.float64] | None:
-    """All numbers of a long text, shape (N, width), if it is regular; else None."""
+    """Columns of a long text, each at its place in the mapping, if it is regular; else None."""
     if free_memory() < ROOM + 2 * len(text):
         return None
     behind = text[: text.find(b"\n") + 1].endswith(f"{sign}\n".encode())
-    kinds = {k: np.dtype(np.int64 if k in whole else np.float64) for k in range(width)}
     frames, start = [], 0
     while start < len(text):
         stop = text.find(b"\n", min(start + PIECE, len(text) - 1)) + 1 or len(text)
@@ -143,8 +167,8 @@ def _parse_all(
         frames.append(frame)
         start = stop
     # by columns, as they are used
-    values = np.empty((width, sum(frame.height for frame in frames)))
-    for place, column in enumerate(values):
+    values = np.empty((len(kinds), sum(frame.height for frame in frames)))
+    for place, column in zip(kinds, values, strict=True):
         _put([part for frame in frames for part in frame[f"{place}"].get_chunks()], column)
     return values.T
 

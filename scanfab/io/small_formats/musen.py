@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
-from operator import itemgetter
+from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from scanfab.base.typing import FloatArray
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.columns import grain_table
 from scanfab.io.parse.counted_rows import spelt, text_of
+from scanfab.io.parse.text_table import parse_some
 from scanfab.io.reader import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
 from scanfab.packing.cell import Cell
 
@@ -21,17 +23,17 @@ __all__ = ["MusenReader"]
 
 # id, type, and for a sphere two numbers as its geometry, radius and contact radius
 FIRST = re.compile(rb"\A(?:\xef\xbb\xbf)?0 \d{1,15} 1 (?:1|9|13|14) 5 ")
-ID, TYPE, TIME, GEOMETRY, PLACE, ACTIVE = b"0", b"1", b"2", b"5", b"12", b"24"
-SPHERE = b"1"
+ID, TIME, GEOMETRY, PLACE, ACTIVE = b"0", b"2", b"5", b"12", b"24"
+# the rows of spheres: id, type, and the type of a sphere
+SPHERES = re.compile(
+    rb"^[ \t\r\f\v]*0[ \t\r\f\v]+\S+[ \t\r\f\v]+1[ \t\r\f\v]+1(?:[ \t\r\f\v].*)?$", re.MULTILINE
+)
 PERIODIC = re.compile(rb"^28[ \t]+([01])((?:[ \t]+\S+){9})[ \t]*\r?$", re.MULTILINE)
 # how many values follow the number of a property
 SIZES = {
-    ID: 1, TYPE: 1, TIME: 1, GEOMETRY: 2, b"10": 3, b"11": 3, PLACE: 3, b"15": 3, b"16": 3,
+    ID: 1, b"1": 1, TIME: 1, GEOMETRY: 2, b"10": 3, b"11": 3, PLACE: 3, b"15": 3, b"16": 3,
     b"17": 3, b"18": 1, b"19": 3, b"20": 3, b"23": 1, ACTIVE: 2, b"31": 4, b"36": 9, b"37": 1,
 }  # fmt: skip
-
-
-WANTED = (ID, TIME, GEOMETRY, PLACE, ACTIVE)
 
 
 class MusenReader:
@@ -51,10 +53,7 @@ class MusenReader:
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """One for each time of the first sphere; ``start`` of a snapshot is its number."""
-        first = next(_objects(path, text_of(Snapshot(path))), None)
-        if first is None:
-            raise ReadError(f"{path}: expected spheres (0 ID 1 1 5 RADIUS ...), found none")
-        times = [time for time, _ in first[3]]
+        times = _export(path).states[0, :, 0].tolist()
         return [
             Snapshot(path, time=time, start=number, stop=number + 1)
             for number, time in enumerate(times)
@@ -62,21 +61,18 @@ class MusenReader:
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         """The spheres that are active at the time; objects of other kinds are passed over."""
-        path, data = snapshot.path, text_of(Snapshot(snapshot.path))
-        if not data.endswith(b"\n"):
-            raise ReadError(f"{path}: the last line has no end: the file is incomplete")
-        rows = []
-        for id, radius, (begin, end), states in _objects(path, data):
-            if len(states) <= snapshot.start or states[snapshot.start][0] != snapshot.time:
-                raise ReadError(
-                    f"{path}: the sphere {id:g} has no state at the time {snapshot.time}: export "
-                    f"all objects at the same times"
-                )
-            if begin <= states[snapshot.start][0] <= end:
-                rows.append((id, radius, *states[snapshot.start][1]))
-        table = np.array(rows, dtype=np.float64).reshape(-1, 5)
-        columns = dict(zip(("id", "radius", "x", "y", "z"), table.T, strict=True))
-        return grain_table(path, columns, _cell(path, data), options)
+        path, export = snapshot.path, _export(snapshot.path)
+        time, place = np.split(export.states[:, snapshot.start], [1], axis=1)
+        lacking = np.flatnonzero(time[:, 0] != snapshot.time)
+        if len(lacking):
+            raise ReadError(
+                f"{path}: the sphere {export.id[lacking[0]]:g} has no state at the time "
+                f"{snapshot.time}: export all objects at the same times"
+            )
+        is_there = np.all((export.active[:, :1] <= time) & (time <= export.active[:, 1:]), axis=1)
+        columns = {"id": export.id, "radius": export.radius, "position": place}
+        there = {name: values[is_there] for name, values in columns.items()}
+        return grain_table(path, there, export.cell, options)
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
@@ -85,82 +81,112 @@ class MusenReader:
         raise ReadError(f"{snapshot.path}: MUSEN's export holds bonds, but no contacts")
 
 
-Object = tuple[float, float, tuple[float, float], list["State"]]
+class _Export(NamedTuple):
+    """All spheres of a file."""
+
+    id: FloatArray
+    radius: FloatArray
+    active: FloatArray
+    """From when and until when each is there, shape (N, 2)."""
+    states: FloatArray
+    """Time and place at each time of the first sphere, shape (N, times, 4); NaN if it has fewer."""
+    cell: Cell | None
 
 
-def _spheres(data: bytes) -> Iterator[tuple[bytes, list[bytes]]]:
-    """The rows of spheres, and their words."""
-    start = 0
-    while start < len(data):
-        end = data.find(b"\n", start)
-        end = len(data) if end < 0 else end
-        line = data[start:end]
-        words = line.split()
-        if words[2:4] == [TYPE, SPHERE] and words[0] == ID:
-            yield line, words
-        start = end + 1
+def _export(path: Path) -> _Export:
+    """The spheres of a file, which is read once for all its frames."""
+    file = path.stat()
+    return _export_of(path, file.st_size, file.st_mtime_ns)
 
 
-State = tuple[float, list[float]]
+@lru_cache(maxsize=1)
+def _export_of(path: Path, size: int, changed: int) -> _Export:
+    """What a file holds that had this size and time of change, which tell it from later ones."""
+    data = text_of(Snapshot(path))
+    rows = [row[0] for row in SPHERES.finditer(data)]
+    if not rows:
+        raise ReadError(f"{path}: expected spheres (0 ID 1 1 5 RADIUS ...), found none")
+    if not data.endswith(b"\n"):
+        raise ReadError(f"{path}: the last line has no end: the file is incomplete")
+    table = _regular(path, rows)
+    table = _row_by_row(path, rows) if table is None else table
+    unknown = np.flatnonzero(np.isnan(table[:, 5]))
+    if len(unknown):
+        raise _no_state(path, rows[unknown[0]])
+    states = table[:, 5:].reshape(len(table), -1, 4)
+    return _Export(table[:, 0], table[:, 1], table[:, 3:5], states, _cell(path, data))
 
 
 class _Layout:
     """Where which property stands in a row: the same in all rows that have the same ones."""
 
-    def __init__(self, path: Path, words: list[bytes], line: bytes) -> None:
-        keys: dict[int, bytes] = {}
-        place = 0
+    def __init__(self, path: Path, row: bytes) -> None:
+        words = row.split()
+        self.width, place = len(words), 0
+        self.keys: dict[int, bytes] = {}
         while place < len(words):
-            keys[place] = words[place]
+            self.keys[place] = words[place]
             size = SIZES.get(words[place])
             if size is None:
                 raise ReadError(
                     f"{path}: expected the number of a property, found {spelt(words[place])} in "
-                    f"the row that begins {spelt(line[:60])}"
+                    f"the row that begins {spelt(row[:60])}"
                 )
             place += 1 + size
-        self.length = len(words)
-        self._keys, self._names = itemgetter(*keys), tuple(keys.values())
-        # of the values that are wanted: where each begins among them
-        wanted = [(place, key) for place, key in keys.items() if key in WANTED]
-        first = np.cumsum([0, *(SIZES[key] for _, key in wanted)]).tolist()
-        self.starts = {key: start for (_, key), start in zip(wanted, first, strict=False)}
-        self.states, time = [], None
-        for (_, key), start in zip(wanted, first, strict=False):
+        states, time = [], None
+        for key_place, key in self.keys.items():
             if key == TIME:
-                time = start
+                time = key_place
             elif key == PLACE and time is not None:
-                self.states.append((time, start))
-        self.is_whole = place == len(words) and self.starts.keys() >= {ID, GEOMETRY}
-        self.values = itemgetter(*(at + k + 1 for at, key in wanted for k in range(SIZES[key])), 0)
+                states += [time + 1, key_place + 1, key_place + 2, key_place + 3]
+        found = {key: key_place for key_place, key in self.keys.items()}
+        if place != len(words) or not states or not {ID, GEOMETRY} <= found.keys():
+            raise _no_state(path, row)
+        self.has_active = ACTIVE in found
+        own = [key for key in (ID, GEOMETRY, ACTIVE) if key in found]
+        self.places = [found[key] + k + 1 for key in own for k in range(SIZES[key])] + states
 
     def fits(self, words: list[bytes]) -> bool:
         """Whether another row has the same properties at the same places."""
-        return len(words) == self.length and self._keys(words) == self._names
+        same = len(words) == self.width
+        return same and all(words[place] == key for place, key in self.keys.items())
+
+    def table(self, values: FloatArray) -> FloatArray:
+        """Id, two radii, from when and until when, and states; of some times without an end."""
+        if self.has_active:
+            return values
+        always = np.broadcast_to((-np.inf, np.inf), (len(values), 2))
+        return np.hstack([values[:, :3], always, values[:, 3:]])
 
 
-def _objects(path: Path, data: bytes) -> Iterator[Object]:
-    layout: _Layout | None = None
-    for line, words in _spheres(data):
-        if layout is None or not layout.fits(words):
-            layout = _Layout(path, words, line)
-        yield _object(path, layout, words, line)
+def _regular(path: Path, rows: list[bytes]) -> FloatArray | None:
+    """The table of many rows that all have the layout of the first; else None."""
+    layout = _Layout(path, rows[0])
+    keys, places = len(layout.keys), [*layout.keys, *layout.places]
+    found = parse_some(b"\n".join([*rows, b""]), layout.width, places, whole=layout.keys)
+    if found is None or np.any(found[:, :keys] != [int(key) for key in layout.keys.values()]):
+        return None
+    return layout.table(found[:, keys:])
 
 
-def _object(path: Path, layout: _Layout, words: list[bytes], line: bytes) -> Object:
-    """Id, radius, the times between which it is active, and its places at all times."""
-    if not layout.is_whole or not layout.states:
-        raise ReadError(f"{path}: expected 2 TIME 12 X Y Z ... in the row of {spelt(line[:60])}")
-    # a word behind the last wanted one keeps them a tuple
-    numbers = _numbers(path, line, layout.values(words)[:-1])
-    starts = layout.starts
-    active = (-np.inf, np.inf)
-    if ACTIVE in starts:
-        active = (numbers[starts[ACTIVE]], numbers[starts[ACTIVE] + 1])
-    states = [(numbers[time], numbers[place : place + 3]) for time, place in layout.states]
-    if states[0][0] != states[0][0]:
-        raise ReadError(f"{path}: expected 2 TIME 12 X Y Z ... in the row of {spelt(line[:60])}")
-    return numbers[starts[ID]], numbers[starts[GEOMETRY]], active, states
+def _row_by_row(path: Path, rows: list[bytes]) -> FloatArray:
+    """The table of rows of which each may have another layout."""
+    layout, parts = _Layout(path, rows[0]), []
+    for row in rows:
+        words = row.split()
+        if not layout.fits(words):
+            layout = _Layout(path, row)
+        numbers = _numbers(path, row, [words[place] for place in layout.places])
+        parts.append(layout.table(np.array([numbers]))[0])
+    table = np.full((len(parts), len(parts[0])), np.nan)
+    for own, part in zip(table, parts, strict=True):
+        known = min(len(own), len(part))
+        own[:known] = part[:known]
+    return table
+
+
+def _no_state(path: Path, row: bytes) -> ReadError:
+    return ReadError(f"{path}: expected 2 TIME 12 X Y Z ... in the row of {spelt(row[:60])}")
 
 
 def _numbers(path: Path, line: bytes, words: Sequence[bytes]) -> list[float]:

@@ -97,7 +97,7 @@ RUN_VISCOSITY = np.array([float(line.split()[-1]) for line in RUN_PAIRS.splitlin
 
 
 def run_texts():
-    """The excerpt as files: lubrication and repulsion are cut off, and of the former a title is left."""
+    """The excerpt as files: of lubrication a title is left, and of repulsion nothing."""
     edges = "# Lx 13.9626\n# Ly 13.9626\n# Lz 13.9626\n"
     head = f"# LF_DEM version v2.0-525-gc482fc8\n# np 12\n# VF 0.45\n{edges}"
     frame = "# 1 13.9626 20 0 1 \n"

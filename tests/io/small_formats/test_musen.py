@@ -7,10 +7,12 @@ import pytest
 
 import scanfab
 from scanfab import ReadError
+from scanfab.io.parse.text_table import LONG
 from scanfab.io.registry import reader_named
+from scanfab.io.small_formats import musen
 from scanfab.testing import check_reader
 from tests.helpers.dumps import write
-from tests.helpers.made.musen import ROWS, STATE, export
+from tests.helpers.made.musen import ROWS, STATE, export, sphere
 
 
 def test_spheres_of_each_time(tmp_path):
@@ -25,6 +27,33 @@ def test_spheres_of_each_time(tmp_path):
     # bonds are no contacts
     assert first.contacts is None
     assert first.cell is None
+
+
+@pytest.mark.parametrize("last", ["", "0 99999 1 1 5 0.25 0.4 2 0 12 7 0 0 2 0.5 12 8 0 0\n"])
+def test_a_long_file(tmp_path, last):
+    """Its rows are parsed together, but for one of another layout: then each by itself."""
+    count = LONG // len(sphere(0, 0)) + 10
+    rows = [sphere(id, 0.125 * id, radius=0.05 + id / 1e6) for id in range(count)]
+    series = scanfab.read_series(write(tmp_path / "a.txt", export(*rows, last)))
+    packing = series[1].read()
+    assert packing.id.tolist() == [*range(count), 99999][: count + bool(last)]
+    np.testing.assert_array_equal(
+        packing.position[:count, 0], [0.125 * id + 0.01 for id in range(count)]
+    )
+    np.testing.assert_array_equal(packing.radius[:count], [0.05 + id / 1e6 for id in range(count)])
+    if last:
+        assert packing.position[-1].tolist() == [8, 0, 0]
+
+
+def test_a_file_is_parsed_once_for_all_its_frames(tmp_path, monkeypatch):
+    read, real = [], musen.text_of
+    monkeypatch.setattr(musen, "text_of", lambda snapshot: read.append(snapshot) or real(snapshot))
+    path = write(tmp_path / "a.txt", export(*ROWS))
+    assert [len(frame.read()) for frame in scanfab.read_series(path)] == [2, 3]
+    assert len(read) == 1
+    # and again when it has changed
+    write(path, export(*ROWS, sphere(9, 0.85)))
+    assert [len(frame.read()) for frame in scanfab.read_series(path)] == [3, 4]
 
 
 def test_the_periodic_domain(tmp_path):
