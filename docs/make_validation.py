@@ -19,7 +19,19 @@ from typing import Any
 import paper_claims as claims
 import paper_tables
 import paper_words as words
-from paper_tables import MAIN, UP_TO, VARIANTS, errors_from_null, fits, has, markdown, runs, table
+from paper_tables import (
+    MAIN,
+    UP_TO,
+    VARIANTS,
+    errors_from_null,
+    fits,
+    has,
+    in_shell,
+    markdown,
+    runs,
+    table,
+    with_half_width,
+)
 
 from scanfab.cli.main import run
 
@@ -36,6 +48,7 @@ CHOICES: dict[str, tuple[str, dict[str, Any]]] = {
     "`--directions 9`": ("few", {}),
     **{f"cut-off {one} r_min": ("cutoffs", {"cutoff": one}) for one in (0, 0.3, 0.5, 1, 1.5, 2, 3)},
     **{f"RV {one}": ("rvs", {"rv": one}) for one in (0.4, 0.5, 0.6)},
+    "RV of the printed 4.5 mm": ("small-rv", {}),
     "`--edge start`": ("start", {}),
     "`--edge ends`": ("ends", {}),
     "`--rattlers recursive`": ("recursive", {}),
@@ -62,9 +75,8 @@ def choices(name: str = MAIN) -> str:
             continue
         rows = chosen_rows(f"{name}_{measure}", chosen)
         early, all_ = (fits(f"{name}_{measure}", limit, **rows) for limit in (UP_TO, None))
-        cells = [
-            f"{fit[one].slope:.3f}" if one in fit else "" for fit in (early, all_) for one in "abcd"
-        ]
+        cells = [with_half_width(early[one], name) if one in early else "" for one in VARIANTS]
+        cells += [f"{all_[one].slope:.3f}" if one in all_ else "" for one in VARIANTS]
         final = [f"{1e3 * early[one].final:.2f}" if one in early else "" for one in "ac"]
         lines.append([label, *cells, *final])
     head = [
@@ -131,7 +143,7 @@ def summaries() -> str:
 CLAIMS = (
     claims.experiment, claims.counted, claims.isotropic_start, claims.off_diagonals, claims.rise,
     claims.apart, claims.smoothness, claims.normalised, claims.slopes, claims.predicted,
-    claims.shell_stress, claims.harmonics, claims.hysteresis,
+    claims.shell_stress, claims.tried, claims.harmonics, claims.hysteresis,
 )  # fmt: skip
 NUMBERS = (
     words.start_worst, words.off_share, words.lateral_share, words.contact_share, words.void_share,
@@ -139,7 +151,7 @@ NUMBERS = (
     words.normalised_worst, words.slope_misses, words.pooled, words.disc_misses, words.disc_ratio,
     words.printed_radius, words.cutoff_slopes, words.predicted_off,
     words.null_tests, words.voids_left, words.reversal_pressure, words.slope_back,
-    words.offset_back,
+    words.offset_back, words.printed_rv_grains, words.spacing_change,
 )  # fmt: skip
 PARTS: dict[str, Callable[[], str]] = {
     **{claim.__name__: claim for claim in CLAIMS},
@@ -147,6 +159,17 @@ PARTS: dict[str, Callable[[], str]] = {
     "summaries": summaries,
     "others": others,
     **{number.__name__: number for number in NUMBERS},
+    **{
+        f"{kind}_{name}": partial(words.shell_shares, names, kind)
+        for kind in ("stress", "contacts")
+        for name, names in (("smooth", in_shell()), ("rough", ["yade_rough"]))
+    },
+    "apart_smooth": partial(words.apart_by_ends, MAIN),
+    "apart_rough": partial(words.apart_by_ends, "yade_rough"),
+    "slope_stiff": partial(words.rv_slope, "yade_printed_default"),
+    "slope_small_rv": partial(words.rv_slope, f"{MAIN}_small-rv"),
+    "overlap_usual": partial(words.overlap, MAIN),
+    "overlap_stiff": partial(words.overlap, "yade_printed"),
     "best_cutoff_early": partial(words.best_cutoff, 0.05),
     "best_cutoff": partial(words.best_cutoff, 0.2),
     "contacts_back": partial(words.strain_back, "c"),

@@ -10,32 +10,43 @@ from paper_tables import (
     RUNS,
     SLOPE,
     SLOPE_2D,
+    TARGET,
+    TARGETS,
+    TRIED,
     VARIANTS,
     engine,
     fits,
     half_width,
     has,
+    in_shell,
     interval,
     markdown,
     normalised_gaps,
+    of_whole,
     row_of,
     runs,
+    stress_of_whole,
     table,
     usual_variant,
     with_error,
 )
 
+from scanfab.table.compare import SAME_STRAIN
+
+# by measure: the rule at the surface
+RULES = {"default": "clip", "paper": "clip, s = r_min/10", "start": "start", "ends": "ends"}
+
 
 def experiment() -> str:
     """The runs, and what the programs say of them."""
     lines = []
-    for name in runs():
+    for name, what in (RUNS | TRIED).items():
         numbers = engine(name)[: len(table(f"{name}_default").select(variant="a"))]
         ratio = numbers["q"] / numbers["p"]
-        target = 400.0 if "biaxial" in name else 200e3
+        target = TARGETS.get(name, TARGET)
         lines.append(
             [
-                f"`{name}`: {RUNS[name]}",
+                f"`{name}`: {what}",
                 f"{numbers['porosity'][0]:.3f}",
                 f"{numbers['coordination'][0]:.2f}",
                 f"{int(numbers['rattlers'][0]):,}",
@@ -53,9 +64,9 @@ def experiment() -> str:
 def counted() -> str:
     """Contacts, rattlers and fabric of scanfab against those of the program, frame by frame."""
     lines = []
-    for name in runs("counts"):
+    for name in [*runs("counts"), "yade_reversal", *TRIED]:
         whole, own = table(f"{name}_counts").select(variant="a"), engine(name)
-        own = own[: len(whole)]
+        own = own[np.isin(own["frame"], whole["frame"])]
         equal = [
             sum(np.asarray(whole[column]) == own[column]) for column in ("contacts", "rattlers")
         ]
@@ -112,14 +123,14 @@ def apart() -> str:
     """Whole against RV, by the rules at the surface."""
     lines = []
     strains = (0.04, 0.08, 0.12, 0.16, 0.2)
-    for name in [one for one in runs() if has(f"{one}_ends")]:
+    for name in in_shell():
         for measure in ("default", "ends"):
             pairs = [
                 [row_of(f"{name}_{measure}", one, strain).alpha_vs_axial for one in "ac"]
                 for strain in strains
             ]
             cells = [f"{1e3 * (a - c):+.2f}" for a, c in pairs]
-            lines.append([f"`{name}`, {'clip' if measure == 'default' else measure}", *cells])
+            lines.append([f"`{name}`, {RULES[measure]}", *cells])
     return markdown(["10³ (α_vs of a - c)", *(f"{one:.0%}" for one in strains)], lines)
 
 
@@ -156,7 +167,7 @@ def normalised() -> str:
 def slopes() -> str:
     lines = []
     for name in runs():
-        for measure in ("default", "start", "ends"):
+        for measure, rule in RULES.items():
             if not has(f"{name}_{measure}"):
                 continue
             early, all_ = fits(f"{name}_{measure}"), fits(f"{name}_{measure}", None)
@@ -164,7 +175,6 @@ def slopes() -> str:
                 expected = SLOPE_2D if "biaxial" in name else SLOPE
                 half = half_width(early[variant], name)
                 holds = abs((early[variant].slope or math.nan) - expected) <= half
-                rule = "clip" if measure == "default" else measure
                 cells = [interval(fit[variant], name) for fit in (early, all_)]
                 cells.append(f"{early[variant].slope_origin:.3f}")
                 lines.append([f"`{name}`", variant, rule, *cells, "yes" if holds else "no"])
@@ -201,15 +211,39 @@ def predicted() -> str:
 
 
 def shell_stress() -> str:
+    """What the whole has of the RV's stress ratio, contact fabric and void fabric."""
     lines = []
-    for name in [one for one in runs() if "q_whole" in (engine(one).dtype.names or ())]:
-        numbers = engine(name)
-        for strain in (0.1, 0.2):
-            row = numbers[np.argmin(abs(numbers["strain"][:41] - strain))]
-            inner, whole = row["q"] / row["p"], row["q_whole"] / row["p_whole"]
-            cells = [f"{strain:.0%}", f"{inner:.3f}", f"{whole:.3f}", f"{whole / inner:.2f}"]
+    for name in [*in_shell(), *TRIED, "periodic_1"]:
+        numbers = engine(name)[:41]
+        for strain in (0.05, 0.1, 0.2):
+            row = numbers[np.argmin(abs(numbers["strain"] - strain))]
+            if abs(row["strain"] - strain) > SAME_STRAIN:
+                continue
+            cells = [f"{strain:.0%}", "-", "-"]
+            if name in (*in_shell(), *TRIED):
+                ratios = row["q"] / row["p"], stress_of_whole(row)
+                cells[1:] = [f"{ratios[0]:.3f}", f"{ratios[1]:.2f}"]
+            cells.append(f"{of_whole(name, 'default', 'alpha_c_axial', strain):.2f}")
+            cells.append(f"{of_whole(name, 'ends', 'alpha_vs_axial', strain):.2f}")
             lines.append([f"`{name}`", *cells])
-    return markdown(["run", "strain", "q/p of the RV", "of the whole", "ratio"], lines)
+    head = ["run", "strain", "q/p of the RV", "the whole's over it", "α_c, a over c"]
+    return markdown([*head, "α_vs by `ends`, a over c"], lines)
+
+
+def tried() -> str:
+    """Runs with a shell that has friction, and with the printed radius, beside the usual one."""
+    lines = []
+    for name in [MAIN, *TRIED]:
+        numbers, fit = engine(name)[:25], fits(f"{name}_default")
+        cells = [f"{100 * numbers['overlap'].mean():.1f} %", f"{numbers['coordination'][0]:.2f}"]
+        cells += [interval(fit[one], name) for one in "ac"]
+        for strain in (0.04, 0.08, 0.12):
+            whole, rv = (row_of(f"{name}_ends", one, strain).alpha_vs_axial for one in "ac")
+            cells.append(f"{1e3 * (whole - rv):+.2f}")
+        lines.append([f"`{name}`", *cells])
+    head = ["run", "mean overlap", "coordination at 0", "slope of a, 12 %", "slope of c, 12 %"]
+    head += [f"10³ (α_vs of a - c) by `ends`, {one} %" for one in (4, 8, 12)]
+    return markdown(head, lines)
 
 
 def harmonics() -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 import numpy as np
 import paper_tables
@@ -18,9 +18,13 @@ from paper_tables import (
     fits,
     half_width,
     has,
+    in_shell,
+    interval,
     normalised_gaps,
+    of_whole,
     row_of,
     runs,
+    stress_of_whole,
     table,
     usual_variant,
 )
@@ -99,7 +103,7 @@ def normalised_worst() -> str:
 def left_by_ends(strain: float) -> str:
     """Of the difference between a and c by clip, what is left by ends, percent."""
     found = []
-    for name in runs("ends"):
+    for name in in_shell():
         clip, ends = (
             row_of(f"{name}_{rule}", "a", strain).alpha_vs_axial
             - row_of(f"{name}_{rule}", "c", strain).alpha_vs_axial
@@ -107,6 +111,39 @@ def left_by_ends(strain: float) -> str:
         )
         found.append(100 * ends / clip)
     return span(found)
+
+
+def shell_shares(names: Collection[str], kind: str) -> str:
+    """What the whole has of the RV's stress ratio or contact fabric, at 5, 10 and 20 % strain."""
+    found = []
+    for name in names:
+        numbers = engine(name)[:41]
+        for strain in (one for one in (0.05, 0.1, 0.2) if one < numbers["strain"][-1] + 0.01):
+            row = numbers[np.argmin(abs(numbers["strain"] - strain))]
+            contacts = of_whole(name, "default", "alpha_c_axial", strain)
+            found.append(stress_of_whole(row) if kind == "stress" else contacts)
+    return span(found, "{:.2f}")
+
+
+def apart_by_ends(name: str) -> str:
+    """The difference between a and c at 12 % strain, in thousandths."""
+    whole, rv = (row_of(f"{name}_ends", one, 0.12).alpha_vs_axial for one in "ac")
+    return f"{1e3 * (whole - rv):.2f}"
+
+
+def rv_slope(name: str) -> str:
+    """The slope of c up to 12 % with its interval."""
+    return interval(fits(name)["c"], name)
+
+
+def overlap(name: str) -> str:
+    """The mean overlap of contacts over the sum of their radii up to 12 %, percent."""
+    return f"{100 * engine(name)['overlap'][:25].mean():.1f}"
+
+
+def printed_rv_grains() -> str:
+    """How many of the grains a ball of the printed 4.5 mm holds."""
+    return f"{13_723 * (4.5 / float(printed_radius())) ** 3:.0f}"
 
 
 def slope_misses() -> str:
@@ -124,6 +161,13 @@ def slope_misses() -> str:
                     found.append(f"`{name}` {variant} by {rule} (by {beyond:.4f})")
     names = ", ".join(found) or "none"
     return f"{count - len(found)} of {count} intervals; the others miss it: {names}"
+
+
+def spacing_change() -> str:
+    """By how much the paper's lines change a slope of spheres up to 12 % at the most."""
+    spheres = [one for one in runs("paper") if "biaxial" not in one]
+    pairs = [(fits(f"{one}_paper"), fits(f"{one}_default")) for one in spheres]
+    return f"{max(abs(a[v].slope - b[v].slope) for a, b in pairs for v in VARIANTS):.3f}"
 
 
 def pooled() -> str:

@@ -28,7 +28,6 @@ R_MIN, R_MAX = 0.5e-3, 1.5e-3  # radii uniform between these
 DENSITY = 2600.0
 STIFFNESS = 2.2e4  # k_n = k_s of every contact, N/m
 FRICTION = 0.5  # coefficient between grains; none with the boundary
-P0 = 200e3  # Pa
 STRAIN_RATE = 1.5  # 1/s, of the strain 1 - L/L0 along z: inertial number 3.4e-4
 
 R_SHELL = 1.0e-3  # of the boundary spheres
@@ -50,6 +49,8 @@ parser = argparse.ArgumentParser(prog='triaxial.py')
 parser.add_argument('--grains', type=int, default=800)
 parser.add_argument('--seed', type=int, default=1)
 parser.add_argument('--compaction', type=float, default=FRICTION, help='friction between grains until the isotropic state is reached; lower is denser')
+parser.add_argument('--shell-friction', type=float, default=0.0, help='friction between grains and boundary')
+parser.add_argument('--pressure', type=float, default=200e3, help='mean stress, Pa')
 parser.add_argument('--strain', type=float, default=0.2, help='axial strain of the last frame')
 parser.add_argument('--frames', type=int, default=41)
 parser.add_argument('--reversal', type=float, default=0.0, help='axial strain that is taken back at the end, by the same steps')
@@ -101,7 +102,7 @@ def make_bodies():
     rng = random.Random(ask.seed)  # not the module's own generator: YADE seeds that one anew whenever it picks a colour
     grain = O.materials.append(
             FrictMat(young=1e7, poisson=0.3, density=DENSITY, frictionAngle=math.atan(ask.compaction), label='grain'))
-    shell = O.materials.append(FrictMat(young=1e7, poisson=0.3, density=DENSITY, frictionAngle=0.0, label='shell'))
+    shell = O.materials.append(FrictMat(young=1e7, poisson=0.3, density=DENSITY, frictionAngle=math.atan(ask.shell_friction), label='shell'))
     radii = np.array([rng.uniform(R_MIN, R_MAX) for _ in range(ask.grains)])
     inside = ((radii**3).sum() / (1 - START_POROSITY))**(1 / 3.)  # radius of the ball that the shell leaves free
     radii *= START_SCALE
@@ -179,10 +180,10 @@ def mean_stress():
 
 # ---------------------------------------------------------------- isotropic state
 def settle():
-    """The shell shrinks or widens until the mean stress in the RV is P0 and the grains rest."""
+    """The shell shrinks or widens until the mean stress in the RV is the one asked for and the grains rest."""
     calm = 0
     for k in range(20000):
-        error = mean_stress() / P0 - 1
+        error = mean_stress() / ask.pressure - 1
         if k % 100 == 99:
             say('mean stress over its target', 1 + error, 'unbalanced force', utils.unbalancedForce())
             save()
@@ -217,7 +218,8 @@ def isotropic():
     utils.setContactFriction(math.atan(FRICTION))  # of the grains and their contacts; fixed bodies keep theirs
     settle()
     for i in O.interactions:
-        assert abs(i.phys.tangensOfFrictionAngle - (0 if max(i.id1, i.id2) >= ask.grains else FRICTION)) < 1e-9
+        expected = min(ask.shell_friction, FRICTION) if max(i.id1, i.id2) >= ask.grains else FRICTION
+        assert abs(i.phys.tangensOfFrictionAngle - expected) < 1e-9
     state.update(length=length(), height=state['stretch'][2], lateral=0.5 * STRAIN_RATE, p_off=0.0)
     say('isotropic: radius inside the shell', semi_axes()[0])
     frame(0, 0.0)
@@ -344,7 +346,7 @@ def compression(k):
     if k == ask.frames:
         state['lateral'] = -state['lateral']
     for _ in range(corrections):
-        error = mean_stress() / P0 - 1
+        error = mean_stress() / ask.pressure - 1
         state['p_off'] = max(state['p_off'], abs(error))
         state['lateral'] += 2500.0 * error * EVERY * O.dt
         side = state['lateral'] + 25.0 * error
@@ -356,7 +358,7 @@ def compression(k):
 def check():
     """Quasi-static, and the mean stress held: at the frames, and between them."""
     rows = np.genfromtxt(where('engine.csv'), delimiter=',', names=True)
-    off = abs(rows['p'] / P0 - 1).max()
+    off = abs(rows['p'] / ask.pressure - 1).max()
     say('inertial number at most %.2g, p at the frames within %.2f %%, ever within %.2f %%' %
         (rows['inertial_number'].max(), 100 * off, 100 * rows['p_off'].max()))
     if off > 0.02 or rows['inertial_number'].max() > 1e-3:

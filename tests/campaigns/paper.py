@@ -80,18 +80,21 @@ MEASURES = {
     "ends": Measure(("--edge", "ends")),
     "cutoffs": Measure(
         ("--cutoffs", "0,0.1rmin,0.3rmin,0.5rmin,0.75rmin,1rmin,1.5rmin,2rmin,3rmin", *SWEEP),
-        (*CURVES, "cutoff", "alpha_vs_axial_contacts"),
+        (*CURVES, "cutoff", "alpha_vs_axial_contacts", *OCTANTS),
     ),
-    "rvs": Measure(("--rv", "0.4,0.5,0.6", "--variants", "cd", *SWEEP), (*CURVES, "rv")),
-    "recursive": Measure(("--rattlers", "recursive", "--variants", "bd", *SWEEP), (*CURVES,)),
-    "four": Measure(("--min-contacts", "4", "--variants", "bd", *SWEEP), (*CURVES,)),
-    "coarse": Measure(("--spacing", "4rmin", "--directions", "lebedev:15"), (*CURVES,)),
-    "few": Measure(("--spacing", "0.4rmin", "--directions", "9"), (*CURVES,)),
+    "rvs": Measure(("--rv", "0.4,0.5,0.6", "--variants", "cd", *SWEEP), (*CURVES, "rv", *OCTANTS)),
+    # the printed RV of 4.5 mm in a sample of 30.3 mm
+    "small-rv": Measure(("--rv", "0.1485", "--variants", "cd", *SWEEP)),
+    "recursive": Measure(("--rattlers", "recursive", "--variants", "bd", *SWEEP)),
+    "four": Measure(("--min-contacts", "4", "--variants", "bd", *SWEEP)),
+    "coarse": Measure(("--spacing", "4rmin", "--directions", "lebedev:15")),
+    "few": Measure(("--spacing", "0.4rmin", "--directions", "9")),
     "literal": Measure(
-        ("--directions", "equal-angle:10", "--spacing", "0.5rmin"), (*CURVES, "gvs_xz")
+        ("--directions", "equal-angle:10", "--spacing", "0.5rmin"), (*CURVES, "gvs_xz", *OCTANTS)
     ),
     "half-sphere": Measure(
-        ("--directions", "equal-angle-full:10", "--spacing", "0.5rmin"), (*CURVES, "gvs_xz")
+        ("--directions", "equal-angle-full:10", "--spacing", "0.5rmin"),
+        (*CURVES, "gvs_xz", *OCTANTS),
     ),
     "harmonics": Measure(
         ("--with", "harmonics", "--variants", "ac"), ("frame", "strain", "variant", *HARMONICS)
@@ -103,16 +106,17 @@ MEASURES = {
     ),
 }
 SHELL = ("--boundary", "mask=3")
-SWEEPS = ("cutoffs", "rvs", "recursive", "four", "coarse", "few", "literal", "half-sphere")
+SWEEPS = ("cutoffs", "rvs", "small-rv", "recursive", "four", "coarse", "few")
+READINGS = ("literal", "half-sphere")
 RUNS = {
-    "yade_1": Run("yade_1", SHELL, measures=(*Run.measures, *SWEEPS, "harmonics")),
+    "yade_1": Run("yade_1", SHELL, measures=(*Run.measures, *SWEEPS, *READINGS, "harmonics")),
     "yade_2": Run("yade_2", SHELL),
     "yade_dense": Run("yade_dense", SHELL),
-    "yade_reversal": Run("yade_1", SHELL, "40:", ("default", "start")),
-    "periodic_1": Run(
-        "periodic_1", measures=("default", "start", "counts", "cutoffs", "harmonics")
-    ),
-    "biaxial_1": Run("biaxial_1", measures=("default", "counts", "cutoffs", "harmonics")),
+    "yade_reversal": Run("yade_1", SHELL, "40:", ("default", "start", "counts")),
+    "yade_rough": Run("yade_rough", SHELL, "0:25", ("default", "ends", "counts")),
+    "yade_printed": Run("yade_printed", SHELL, "0:25", ("default", "ends", "counts")),
+    "periodic_1": Run("periodic_1", measures=(*Run.measures, "cutoffs", "harmonics")),
+    "biaxial_1": Run("biaxial_1", measures=(*Run.measures, "cutoffs", "harmonics")),
 }
 
 
