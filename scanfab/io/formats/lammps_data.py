@@ -35,8 +35,8 @@ NO_SPHERES = ("ellipsoids", "lines", "triangles", "bodies")
 # YADE writes this first line, and radii in the column of diameters
 OF_YADE = b"LIGGGHTS Description"
 
-# a section is a line that starts with a word, behind the header; with the end of the line before it,
-# for which Python looks ten times as fast as for the beginnings of lines
+# a section is a line that starts with a word, behind the header; found with the end of the line
+# before it, for which Python looks much faster than for the beginnings of lines
 SECTION = re.compile(rb"\n[ \t]*([A-Z][A-Za-z ]*?)[ \t]*(?:#[ \t]*(\S+)[^\n]*)?\r?$", re.MULTILINE)
 
 
