@@ -15,7 +15,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from scanfab.base.errors import ReadError, ScanfabError, ScanfabWarning
+from scanfab.base.errors import ReadError, ScanfabError, ScanfabNote, ScanfabWarning
 from scanfab.base.typing import IntArray
 from scanfab.io.reader import FileKind, GrainTable, Reader, ReadOptions, Snapshot
 from scanfab.packing.packing import Packing
@@ -253,7 +253,7 @@ def _quiet(path: Path) -> Iterator[None]:
         yield
     assert not out.getvalue(), f"{path.name}: the reader prints {out.getvalue()[:100]!r}"
     for one in caught:
-        assert issubclass(one.category, ScanfabWarning), (
+        assert issubclass(one.category, (ScanfabWarning, ScanfabNote)), (
             f"{path.name}: draws a {one.category.__name__}: {one.message}"
         )
 

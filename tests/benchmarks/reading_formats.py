@@ -7,6 +7,7 @@ Processor time, which is best compared in one thread: POLARS_MAX_THREADS=1.
 
 from __future__ import annotations
 
+import os
 import tempfile
 import time
 import warnings
@@ -66,11 +67,17 @@ def make_tables(folder: Path, rows: Rows) -> dict[str, Made]:
 
 
 def make_dumps(folder: Path, rows: Rows) -> dict[str, Made]:
-    """YADE's text, LAMMPS' yaml and its data file."""
+    """YADE's text, LAMMPS' dumps and its data file."""
     made = {}
     path = folder / "yade.txts" / "yade.txt"
     _write(path, "#format x_y_z_r\n", ("%g\t%g\t%g\t%g\n" % row[1:] for row in rows))  # noqa: UP031
     made["YADE `export.text`"] = Made(path, "\t", [(1, len(rows), 4, ())])
+    path = folder / "lammps.texts" / "dump.lammpstrj"
+    bounds = "0.0000000000000000e+00 1.0000000000000000e+00\n" * 3
+    head = f"ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n{len(rows)}\nITEM: BOX BOUNDS ff ff ff\n"
+    head += bounds + "ITEM: ATOMS id type x y z radius\n"
+    _write(path, head, ("%d 1 %g %g %g %g\n" % row for row in rows))  # noqa: UP031
+    made["LAMMPS text dump"] = Made(path, " ", [(9, len(rows), 6, ())])
     path = folder / "lammps.yamls" / "lammps.yaml"
     text = (
         YAML.format(step=0, rows="@")
@@ -216,6 +223,8 @@ def read(made: Made) -> object:
     path = made.path
     if path.parent.name == "esys":
         path = path.with_name("snap_t=30_0.txt")
+    # what is kept of a file that did not change would not be read again
+    os.utime(path)
     return scanfab.read(path)
 
 

@@ -256,6 +256,8 @@ def _once(
 
 def _box(bounds: list[float]) -> Cell | None:
     """The domain, of which nothing is known to repeat; None if it is no box."""
+    if not np.all(np.isfinite(bounds)):
+        return None
     half = len(bounds) // 2
     low, high = np.zeros(3), np.zeros(3)
     low[:half], high[:half] = bounds[:half], bounds[half:]

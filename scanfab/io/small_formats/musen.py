@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.base.errors import PackingError, ReadError
+from scanfab.base.errors import PackingError, ReadError, ScanfabNote
 from scanfab.base.typing import FloatArray
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.columns import grain_table
@@ -28,6 +29,8 @@ ID, TIME, GEOMETRY, PLACE, ACTIVE = b"0", b"2", b"5", b"12", b"24"
 SPHERES = re.compile(
     rb"^[ \t\r\f\v]*0[ \t\r\f\v]+\S+[ \t\r\f\v]+1[ \t\r\f\v]+1(?:[ \t\r\f\v].*)?$", re.MULTILINE
 )
+# solid and liquid ones
+BOND = re.compile(rb"\n0 \S+ 1 (?:9|13) ")
 PERIODIC = re.compile(rb"^28[ \t]+([01])((?:[ \t]+\S+){9})[ \t]*\r?$", re.MULTILINE)
 # how many values follow the number of a property
 SIZES = {
@@ -62,6 +65,13 @@ class MusenReader:
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         """The spheres that are active at the time; objects of other kinds are passed over."""
         path, export = snapshot.path, _export(snapshot.path)
+        if export.has_bonds:
+            warnings.warn(
+                "MUSEN's bonds are not read: bonded grains need not touch, and contacts are found "
+                "by geometry",
+                ScanfabNote,
+                stacklevel=2,
+            )
         time, place = np.split(export.states[:, snapshot.start], [1], axis=1)
         lacking = np.flatnonzero(time[:, 0] != snapshot.time)
         if len(lacking):
@@ -91,6 +101,7 @@ class _Export(NamedTuple):
     states: FloatArray
     """Time and place at each time of the first sphere, shape (N, times, 4); NaN if it has fewer."""
     cell: Cell | None
+    has_bonds: bool
 
 
 def _export(path: Path) -> _Export:
@@ -114,7 +125,14 @@ def _export_of(path: Path, size: int, changed: int) -> _Export:
     if len(unknown):
         raise _no_state(path, rows[unknown[0]])
     states = table[:, 5:].reshape(len(table), -1, 4)
-    return _Export(table[:, 0], table[:, 1], table[:, 3:5], states, _cell(path, data))
+    return _Export(
+        table[:, 0],
+        table[:, 1],
+        table[:, 3:5],
+        states,
+        _cell(path, data),
+        BOND.search(data) is not None,
+    )
 
 
 class _Layout:

@@ -176,3 +176,10 @@ def test_the_kit(tmp_path):
     ]
     check_reader(reader_named("mercurydpm"), files[:1], tmp_path / "damaged")
     check_reader(reader_named("mercurydpm"), files[1:], tmp_path / "damaged", counts=True)
+
+
+@pytest.mark.filterwarnings("error")
+def test_bounds_without_an_end_are_no_box(tmp_path):
+    """Found by fuzzing: their difference made NumPy warn."""
+    text = "1 0.5 inf 0 inf 2 \n0.1 1 9 9 0.1 0 0 0\n"
+    assert scanfab.read(write(tmp_path / "a.data", text)).cell is None

@@ -7,6 +7,7 @@ import pytest
 
 import scanfab
 from scanfab import ReadError
+from scanfab.base.errors import ScanfabNote
 from scanfab.io.parse.text_table import LONG
 from scanfab.io.registry import reader_named
 from scanfab.io.small_formats import musen
@@ -24,7 +25,6 @@ def test_spheres_of_each_time(tmp_path):
     assert second.id.tolist() == [3, 1, 2]
     np.testing.assert_array_equal(first.radius, 0.1)
     np.testing.assert_allclose(second.position[:, 0], [0.21, 0.385, 0.61])
-    # bonds are no contacts
     assert first.contacts is None
     assert first.cell is None
 
@@ -54,6 +54,12 @@ def test_a_file_is_parsed_once_for_all_its_frames(tmp_path, monkeypatch):
     # and again when it has changed
     write(path, export(*ROWS, sphere(9, 0.85)))
     assert [len(frame.read()) for frame in scanfab.read_series(path)] == [3, 4]
+
+
+def test_bonds_are_no_contacts_and_it_is_told(tmp_path):
+    with pytest.warns(ScanfabNote, match="bonds are not read"):
+        packing = scanfab.read(write(tmp_path / "a.txt", export(*ROWS)))
+    assert packing.contacts is None
 
 
 def test_the_periodic_domain(tmp_path):
