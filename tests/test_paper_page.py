@@ -28,7 +28,7 @@ def page(tmp_path, monkeypatch):
     folder = tmp_path / "sample_data" / "paper"
     folder.mkdir(parents=True)
     for name, run in paper.RUNS.items():
-        write(folder / f"{name}_engine.csv", engine_rows("biaxial" in name))
+        write(folder / f"{name}_engine.csv", engine_rows(run))
         for measure in run.measures:
             write(folder / f"{name}_{measure}.csv", table_rows(run, measure))
     shutil.copy(paper.TABLES / "others.csv", folder)
@@ -55,11 +55,17 @@ def tensor(frame: int) -> dict[str, float]:
     return {"gc_xx": (1 - axial) / 3, "gc_yy": (1 - axial) / 3, "gc_zz": (1 + 2 * axial) / 3}
 
 
-def engine_rows(plane: bool) -> list[dict]:
-    p = 400.0 if plane else 200e3
+def step_of(run: paper.Run, frame: int) -> int:
+    """A run that goes on from frame 40 goes back."""
+    return 40 - frame if run.frames == "40:" else frame
+
+
+def engine_rows(run: paper.Run) -> list[dict]:
+    p = 400.0 if run.is_plane else 200e3
     stress = {"p": p, "p_whole": p, "rv_radius": 0.02}
     rows = [
-        {"frame": k, "strain": 0.005 * k, **ENGINE, **stress, **tensor(k)} for k in range(FRAMES)
+        {"frame": k, "strain": 0.005 * k, **ENGINE, **stress, **tensor(step_of(run, k))}
+        for k in range(FRAMES)
     ]
     return [{**row, "q": 0.7 * p, "q_whole": 0.5 * p} for row in rows]
 
@@ -73,11 +79,12 @@ def table_rows(run: paper.Run, measure: str) -> list[dict]:
     kind = next((one for one in several if one in columns), None)
     rows = []
     for frame in range(FRAMES):
+        step = step_of(run, frame)
         for variant in "abcd":
             for value in several.get(kind, [0]):
                 row = dict.fromkeys(columns, 0.0) | {"source": run.folder, "frame": frame}
-                row |= {"strain": 0.005 * frame, "variant": variant, **ENGINE, **tensor(frame)}
-                level = contact(frame) * WHOLE.get((variant, measure), 1.0)
+                row |= {"strain": 0.005 * step, "variant": variant, **ENGINE, **tensor(step)}
+                level = contact(step) * WHOLE.get((variant, measure), 1.0)
                 row |= {name: level for name in columns if name.startswith("alpha_c")}
                 row |= {name: SLOPE * level for name in columns if is_void(name)}
                 row |= {name: 1e-4 for name in columns if name.endswith("_se")}
