@@ -10,6 +10,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -102,7 +103,7 @@ class TableReader:
             return self._kind_of(path, names)
         if self.options.columns or self.options.contact_columns:
             return self._kind_of(path, [f"{place + 1}" for place in range(width)])
-        self._guess(path, read_unnamed(path, self.options.skip))
+        _guess(path, self.options.skip)
         return "grains"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
@@ -118,12 +119,9 @@ class TableReader:
         path, reader = snapshot.path, replace(self, options=options)
         names, width = names_of(path, options.skip)
         own = names or [f"{place + 1}" for place in range(width)]
-        found = reader._find(path, own, contacts=False)
-        if names is None and not options.columns:
-            columns = read_unnamed(path, options.skip)
-            found = reader._guess(path, columns)
-        else:
-            columns = read_table(path, options.skip, *_needed(found))
+        is_guess = names is None and not options.columns
+        found = _guess(path, options.skip) if is_guess else reader._find(path, own, contacts=False)
+        columns = read_table(path, options.skip, *_needed(found))
         if names is not None:
             _refuse_frames(path, columns)
         if is_xyzd(path) and not options.columns:
@@ -195,36 +193,6 @@ class TableReader:
                 f"(id1, id2), found {', '.join(names)}: {ASK}"
             )
         )
-
-    def _guess(self, path: Path, columns: Columns) -> dict[str, str]:
-        """Columns without names: ``x y z r`` or ``id x y z r``, if the grains then touch."""
-        places = list(columns.values())
-        fits, large = [], False
-        for begin in (0, 1):
-            part = places[begin : begin + 4]
-            if len(part) < 4 or any(column.dtype.kind not in "iuf" for column in part):
-                continue
-            if begin and not _may_be_ids(places[0]):
-                continue
-            position, size = np.column_stack(part[:3]).astype(float), part[3].astype(float)
-            if touch(position, size):
-                fits.append(begin)
-            elif not fits:
-                large = large or touch(position, 0.5 * size)
-        if len(fits) != 1:
-            lacks = (
-                f"fewer than {TOO_FEW} grains prove nothing"
-                if places and len(places[0]) < TOO_FEW
-                else "the fourth is a diameter, it seems"
-                if large
-                else "as x y z r or id x y z r its grains do not touch"
-            )
-            raise ReadError(
-                f"{path}: the {len(places)} columns have no names, and what they are cannot be "
-                f"told ({lacks}): {ASK}"
-            )
-        names = ["x", "y", "z", "radius"] if fits[0] == 0 else ["id", "x", "y", "z", "radius"]
-        return {name: f"{place + 1}" for place, name in enumerate(names)}
 
 
 @dataclass(frozen=True)
@@ -307,6 +275,44 @@ def _radii_of_volumes(columns: Columns, name: str) -> Columns:
         stacklevel=3,
     )
     return {**columns, "radius": np.cbrt(0.75 / np.pi * columns[name].astype(np.float64))}
+
+
+def _guess(path: Path, skip: int) -> dict[str, str]:
+    """Columns without names: ``x y z r`` or ``id x y z r``, if the grains then touch."""
+    file = path.stat()
+    names = _proved_names(path, skip, file.st_size, file.st_mtime_ns)
+    return {name: f"{place + 1}" for place, name in enumerate(names)}
+
+
+@lru_cache
+def _proved_names(path: Path, skip: int, size: int, changed: int) -> tuple[str, ...]:
+    """Of a file that had this size and time of change, so that it is proved once."""
+    places = list(read_unnamed(path, skip).values())
+    fits, large = [], False
+    for begin in (0, 1):
+        part = places[begin : begin + 4]
+        if len(part) < 4 or any(column.dtype.kind not in "iuf" for column in part):
+            continue
+        if begin and not _may_be_ids(places[0]):
+            continue
+        position, radius = np.column_stack(part[:3]).astype(float), part[3].astype(float)
+        if touch(position, radius):
+            fits.append(begin)
+        elif not fits:
+            large = large or touch(position, 0.5 * radius)
+    if len(fits) != 1:
+        lacks = (
+            f"fewer than {TOO_FEW} grains prove nothing"
+            if places and len(places[0]) < TOO_FEW
+            else "the fourth is a diameter, it seems"
+            if large
+            else "as x y z r or id x y z r its grains do not touch"
+        )
+        raise ReadError(
+            f"{path}: the {len(places)} columns have no names, and what they are cannot be "
+            f"told ({lacks}): {ASK}"
+        )
+    return ("x", "y", "z", "radius") if fits[0] == 0 else ("id", "x", "y", "z", "radius")
 
 
 def _tell_guess(

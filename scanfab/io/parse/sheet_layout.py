@@ -28,7 +28,7 @@ NUMBER = re.compile(
     re.IGNORECASE,
 )
 COMMENTS = ("#", "%", "//", "!")
-CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f]")
+CONTROL = bytes([*range(0x09), *range(0x0E, 0x20)])
 # a blank stands for any run of blanks and tabs
 SEPARATORS = ("\t", ";", ",", " ")
 
@@ -74,8 +74,12 @@ def read_text(path: Path, size: int = -1) -> bytes:
     with open(file, "rb") as stream:
         data = stream.read(size)
     data = _decoded(path, data, size >= 0)
-    found = CONTROL.search(data[:HEAD]) or (b"\0" in data and re.search(b"\0", data))
-    if found:
+    head = data[:HEAD]
+    # ten times as fast as to search for them where there are none
+    are_in_head = len(head.translate(None, CONTROL)) < len(head)
+    if are_in_head or b"\0" in data:
+        found = re.search(b"[" + re.escape(CONTROL) + b"]", head) or re.search(b"\0", data)
+        assert found is not None
         line = data.count(b"\n", 0, found.start()) + 1
         raise ReadError(
             f"{path}, line {line}: expected text, found the byte {found[0][0]}: this is no table "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import pickle
 import re
 import warnings
@@ -12,6 +13,7 @@ import pytest
 
 import scanfab
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
+from scanfab.io.formats import table
 from scanfab.io.registry import reader_for
 from tests.helpers.dumps import dump_text, pairs_text, write
 from tests.helpers.truth import FLOOR, csv_rows
@@ -104,6 +106,22 @@ def test_any_column_can_be_given_a_name(tmp_path):
     path = rows(tmp_path / "grains.txt", POSITION, RADIUS, ID)
     packing = read(path, columns="x=1,y=2,z=3,radius=4,type=5")
     np.testing.assert_array_equal(packing.columns["type"], ID)
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.ScanfabNote")
+def test_a_table_without_names_is_proved_once_and_anew_when_it_changed(tmp_path, monkeypatch):
+    proved = []
+    prove = table.touch
+    monkeypatch.setattr(table, "touch", lambda *words: proved.append(1) or prove(*words))
+    path = rows(tmp_path / "grains.txt", POSITION, RADIUS)
+    assert_right(read(path))
+    assert len(proved) == 1
+    # of the same size: the fourth column is now a diameter
+    changed = path.read_text("utf-8").replace(" 0.5\n", " 1.0\n")
+    path.write_text(changed, encoding="utf-8")
+    os.utime(path, ns=(0, 0))
+    with pytest.raises(ReadError, match="the fourth is a diameter"):
+        read(path)
 
 
 def test_a_diameter_that_the_user_names_comes_before_a_radius_of_the_file(tmp_path):
