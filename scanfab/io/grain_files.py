@@ -69,7 +69,7 @@ def files_of(path: Path) -> list[Path]:
             raise ReadError(f"{path}: there is no such file, folder or glob")
         return [path]
     files = files_in(path)
-    for one in sorted(path.iterdir()):
+    for one in sorted(set(path.iterdir()).difference(files)):
         if (kind := kind_of(one)) is not None:
             text = f"passed over: {one} is {kind}, expected a file"
             warnings.warn(text, ScanfabNote, stacklevel=3)
