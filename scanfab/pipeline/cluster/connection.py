@@ -101,16 +101,16 @@ def _answer(ask: Callable[[], Any], seconds: float) -> Any:
 
 class Pulse:
     """
-    Asks a scheduler for its workers every few seconds; one that stays silent is left.
+    Asks a scheduler for its workers every few seconds, and calls back; leaves one that is silent.
 
     One that is stopped, or lies behind a network that swallows what is sent, closes no connection,
     so that whoever waits for a frame would wait without an end.
     """
 
-    def __init__(self, client: Any, address: str) -> None:
+    def __init__(self, client: Any, address: str, call: Callable[[], object]) -> None:
         self.threads: dict[str, int] = {}
         """Of each worker."""
-        self._client, self._address = client, address
+        self._client, self._address, self._call = client, address, call
         self._is_silent = False
         self._is_over = threading.Event()
 
@@ -135,6 +135,7 @@ class Pulse:
         while not self._is_over.wait(BEAT):
             try:
                 self._ask()
+                self._call()
             except Exception as error:
                 self._is_silent = isinstance(error, TimeoutError)
                 # all that is waited for ends with it

@@ -1,4 +1,4 @@
-"""dask_executor(): frames go to the workers of a Dask cluster; the one file that knows Dask."""
+"""dask_executor(): frames go to the workers of a Dask cluster."""
 
 from __future__ import annotations
 
@@ -6,11 +6,13 @@ import logging
 import threading
 import uuid
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import Executor, Future, InvalidStateError, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Protocol
+from weakref import WeakSet
 
 from scanfab.base.errors import ScanfabError, ScanfabNote, SettingsError
 from scanfab.base.spelling import counted
@@ -29,8 +31,9 @@ from scanfab.pipeline.cluster.connection import (
 from scanfab.pipeline.cluster.on_worker import (
     Failed,
     Outdated,
+    computed_there,
+    file_of,
     scanned_there,
-    sendable,
     versions_here,
     view_there,
 )
@@ -135,11 +138,14 @@ class DaskExecutor(Executor):
         self.address = address
         self.name = f"scanfab-{uuid.uuid4().hex[:12]}"
         self._here = ThreadPoolExecutor(4)
-        self.pulse = Pulse(client, address)
+        self.pulse = Pulse(client, address, self._move_on)
         self._number = 0
         self._seen: set[str] = set()
+        self._starts: Counter[str] = Counter()
+        self._trials: WeakSet[_Trial] = WeakSet()
         self._lock = threading.Lock()
         with self.gone_if_lost():
+            client.subscribe_topic(self.name, self._note_start)
             self.pulse.start()
 
     def __repr__(self) -> str:
@@ -167,6 +173,8 @@ class DaskExecutor(Executor):
             return self._here.submit(self._spread, job, threads)
         self._check_files(job)
         trial = _Trial(self, job)
+        with self._lock:
+            self._trials.add(trial)
         with self.gone_if_lost():
             trial.send()
         return trial.future
@@ -176,22 +184,30 @@ class DaskExecutor(Executor):
         self.pulse.stop()
         self._here.shutdown(wait=wait, cancel_futures=cancel_futures)
 
-    def send(self, function: Callable[..., Any], *args: Any, but: Sequence[str] = ()) -> Any:
-        """A future of Dask; it is not computed by some workers if there are others."""
+    def send(self, function: Callable[..., Any], *args: Any, among: Collection[str] = ()) -> Any:
+        """A future of Dask; one of some workers computes it, if they are there."""
         with self._lock:
             self._number += 1
             key = f"{self.name}-{self._number}"
-        others = [one for one in self.workers() if one not in but] if but else None
         return self.client.submit(
-            function, *args, key=key, pure=False, workers=others or None,
-            allow_other_workers=bool(others),
+            function, *args, key=key, pure=False, workers=list(among) or None,
+            allow_other_workers=bool(among),
         )  # fmt: skip
 
+    def _move_on(self) -> None:
+        """Frames bound to workers that are gone: Dask would never give them to later ones."""
+        with self._lock:
+            trials = list(self._trials)
+        for trial in trials:
+            trial.move_on()
+
+    def _note_start(self, event: tuple[float, str]) -> None:
+        """A worker has begun with what a future of this key stands for."""
+        self._starts[event[1]] += 1
+
     def starts(self, key: str) -> int:
-        """How many workers have begun with what a future stands for."""
-        with suppress(Exception):
-            return sum(told == key for _, told in self.client.get_events(self.name))
-        return 0
+        """How many workers have begun with what a future stood for; then that is forgotten."""
+        return self._starts.pop(key, 0)
 
     @contextmanager
     def gone_if_lost(self) -> Iterator[None]:
@@ -227,7 +243,7 @@ class DaskExecutor(Executor):
 
     def _check_files(self, job: Any) -> None:
         """ClusterError if workers do not see the file of the first frame of a series."""
-        path = _file_of(job)
+        path = file_of(job)
         if path is None or job.source in self._seen:
             return
         self._seen.add(job.source)
@@ -253,20 +269,31 @@ class _Trial:
         self.future: Future[Any] = Future()
         self.failures: list[tuple[str, Exception]] = []
         """Worker and error of each try."""
+        self._among: set[str] = set()
+        """The workers that it is bound to while one of them is there; none for any."""
         self._sent: Any = None
 
     def send(self) -> None:
         """Try it, on a worker that has not failed with it, if there is one."""
         executor = self.executor
-        but = [worker for worker, _ in self.failures]
-        topic, versions = executor.name, versions_here()
-        self._sent = executor.send(computed_there, self.job.strict, versions, topic, but=but)
+        failed = {worker for worker, _ in self.failures}
+        self._among = set(executor.workers()) - failed if failed else set()
+        words = (self.job.strict, versions_here(), executor.name)
+        self._sent = executor.send(computed_there, *words, among=self._among)
         self._sent.add_done_callback(self._done)
+
+    def move_on(self) -> None:
+        """Send it again if it is bound to workers that are all gone."""
+        if not self._among or self._among & set(self.executor.workers()) or self.future.done():
+            return
+        left = self._sent
+        self.send()
+        left.release()
 
     def _done(self, sent: Any) -> None:
         """What has become of a try."""
         try:
-            if not self.future.cancelled():
+            if sent is self._sent and not self.future.cancelled():
                 # a result that is ready may still have to come through the scheduler
                 with self.executor.gone_if_lost():
                     self._settle(sent)
@@ -278,8 +305,9 @@ class _Trial:
                 self.future.set_exception(error)
 
     def _settle(self, sent: Any) -> None:
+        starts = self.executor.starts(sent.key)
         if sent.status != "finished":
-            self._lost(sent)
+            self._lost(sent, starts)
             return
         found = sent.result()
         if isinstance(found, Outdated):
@@ -287,15 +315,15 @@ class _Trial:
         if not isinstance(found, Failed):
             self.future.set_result(found)
             return
-        path = _file_of(self.job)
+        path = file_of(self.job)
         if found.view and path is not None and path.exists():
             # it came after all were asked, and other frames would fail there too
             raise blind("a worker", path, found.worker, found.view)
         self.failures.append((found.worker, found.error))
         self._try_again()
 
-    def _lost(self, sent: Any) -> None:
-        """Its workers have died, or the scheduler has."""
+    def _lost(self, sent: Any, starts: int) -> None:
+        """Its workers have died, so many of which had begun with it, or the scheduler has."""
         from distributed.scheduler import KilledWorker
 
         error = sent.exception() if sent.status == "error" else None
@@ -303,7 +331,7 @@ class _Trial:
             # those that had it but queued have not tried it
             worker = str(getattr(error.last_worker, "address", error.last_worker))
             died = ClusterError("the worker died: had it too little memory?")
-            self.failures += [(worker, died)] * self.executor.starts(sent.key)
+            self.failures += [(worker, died)] * starts
             self._try_again()
         elif error is not None:
             if isinstance(error, ImportError):
@@ -369,25 +397,3 @@ class _Parts:
             scatter = self.executor.client.scatter
             self._held[name] = what, scatter(what, broadcast=True, hash=False)
         return self._held[name][1]
-
-
-def computed_there(job: Any, versions: dict[str, str], topic: str) -> Any:
-    """A frame's results, or why there are none."""
-    from distributed import get_worker
-
-    worker = get_worker()
-    if versions_here() != versions:
-        return Outdated(worker.address, versions_here())
-    worker.log_event(topic, worker.get_current_task())
-    try:
-        return job(1)
-    except Exception as error:
-        path = _file_of(job)
-        view = "" if path is None else view_there(str(path))
-        return Failed(worker.address, sendable(error), view)
-
-
-def _file_of(job: Any) -> Path | None:
-    """Where a frame is read from, if it lies in a file."""
-    file = getattr(job, "file", None)
-    return None if file is None else file.snapshot.path.absolute()

@@ -18,6 +18,8 @@ from scanfab.pipeline.cluster.packed import unpacked
 __all__ = [
     "Failed",
     "Outdated",
+    "computed_there",
+    "file_of",
     "scanned_there",
     "sendable",
     "versions_here",
@@ -81,6 +83,30 @@ def sendable(error: Exception) -> Exception:
     except Exception:
         return ScanfabError(f"{type(error).__name__}: {error}")
     return error
+
+
+def computed_there(job: Any, versions: dict[str, str], topic: str) -> Any:
+    """A frame's results, or why there are none."""
+    from distributed import get_worker
+    from distributed.utils import sync
+
+    worker = get_worker()
+    if versions_here() != versions:
+        return Outdated(worker.address, versions_here())
+    # the scheduler has it before the frame can take this worker down
+    sync(worker.loop, worker.scheduler.log_event, topic=topic, msg=worker.get_current_task())
+    try:
+        return job(1)
+    except Exception as error:
+        path = file_of(job)
+        view = "" if path is None else view_there(str(path))
+        return Failed(worker.address, sendable(error), view)
+
+
+def file_of(job: Any) -> Path | None:
+    """Where a frame is read from, if it lies in a file."""
+    file = getattr(job, "file", None)
+    return None if file is None else file.snapshot.path.absolute()
 
 
 def scanned_there(light: bytes, heavy: dict[str, Any], part: Any) -> Any:

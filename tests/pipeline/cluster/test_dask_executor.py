@@ -48,10 +48,7 @@ def cluster(tmp_path_factory):
 @pytest.fixture(scope="module")
 def executor(cluster):
     with scanfab.dask_executor(cluster.address) as found:
-        end = time.monotonic() + 60
-        while len(found.workers()) < 2:
-            assert time.monotonic() < end
-            time.sleep(0.1)
+        wait_until(lambda: len(found.workers()) == 2)
         yield found
 
 
@@ -149,10 +146,9 @@ def test_a_frame_that_fails_is_tried_on_other_workers_and_skipped(
 
 @dataclass(frozen=True)
 class Slow:
-    """A job that leaves a mark where it begins, and may take its worker down."""
+    """A job that leaves a mark where it begins."""
 
     mark: Path
-    deaths: int = 0
     file: Any = None
 
     @property
@@ -166,9 +162,44 @@ class Slow:
         with open(self.mark, "a") as stream:
             stream.write(f"{os.getpid()}\n")
         time.sleep(0.3)
-        if len(self.mark.read_text().splitlines()) <= self.deaths:
-            os._exit(9)
         return threads
+
+
+@dataclass(frozen=True)
+class Deadly(Slow):
+    """A job that takes its worker down in its first moment."""
+
+    def __call__(self, threads: int) -> int:
+        os._exit(9)
+
+
+@dataclass(frozen=True)
+class Long(Slow):
+    """A job that goes on until a file is there."""
+
+    end: Path = Path("end")
+
+    def __call__(self, threads: int) -> int:
+        super().__call__(threads)
+        while not self.end.exists():
+            time.sleep(0.05)
+        return threads
+
+    @property
+    def starts(self) -> int:
+        """How often it was begun."""
+        return len(self.mark.read_text().splitlines()) if self.mark.exists() else 0
+
+
+@dataclass(frozen=True)
+class Fickle(Long):
+    """A long job that fails on its first try."""
+
+    def __call__(self, threads: int) -> int:
+        if not self.mark.exists():
+            self.mark.write_text("failed\n")
+            raise ReadError("not yet")
+        return super().__call__(threads)
 
 
 @dataclass(frozen=True)
@@ -254,13 +285,54 @@ def test_a_frame_that_kills_its_workers_is_given_up(fragile, tmp_path):
     for _ in range(3):
         fragile.add()
     with scanfab.dask_executor(scheduler_file=fragile.file) as executor:
-        while len(executor.workers()) < 5:
-            time.sleep(0.1)
-        deadly = executor.submit(Slow(tmp_path / "deadly", 99), 1)
+        wait_until(lambda: len(executor.workers()) == 5)
+        deadly = executor.submit(Deadly(tmp_path / "deadly"), 1)
         with pytest.raises(ClusterError, match=r"the worker died: .*tried"):
             deadly.result(60)
         # the others go on
         assert executor.submit(Slow(tmp_path / "other"), 1).result(60) == 1
+
+
+def test_frames_that_a_dead_worker_had_but_queued_have_not_been_tried(tmp_path, monkeypatch):
+    """Three die in a row, each with one frame begun and the others queued."""
+    # of a frame's first death already we are told, and all frames are sent to the one worker
+    monkeypatch.setenv("DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES", "0")
+    monkeypatch.setenv("DASK_DISTRIBUTED__SCHEDULER__WORKER_SATURATION", "inf")
+    jobs = [Long(tmp_path / str(number), end=tmp_path / "end") for number in range(4)]
+    with (
+        DaskCluster(tmp_path, workers=1) as cluster,
+        scanfab.dask_executor(scheduler_file=cluster.file) as executor,
+    ):
+        futures = [executor.submit(job, 1) for job in jobs]
+        for deaths in (1, 2, 3):
+            wait_until(lambda: sum(job.starts for job in jobs) == deaths)  # noqa: B023
+            # one that was bound to the worker before comes with the next look for workers
+            wait_until(lambda: len(*executor.client.processing().values()) == len(jobs))
+            cluster.kill()
+            tries = [job.starts for job in jobs]
+            cluster.add()
+        (tmp_path / "end").touch()
+        assert sum(tries) == 3
+        for future, number in zip(futures, tries, strict=True):
+            if number < 3:
+                assert future.result(60) == 1
+            else:
+                with pytest.raises(ClusterError, match="tried 3 times"):
+                    future.result(60)
+
+
+def test_a_frame_bound_to_workers_that_are_gone_goes_to_later_ones(fragile, tmp_path):
+    """After its first try it is for the other worker; both die, and another one comes."""
+    job = Fickle(tmp_path / "fickle", end=tmp_path / "end")
+    with scanfab.dask_executor(scheduler_file=fragile.file) as executor:
+        wait_until(lambda: len(executor.workers()) == 2)
+        future = executor.submit(job, 1)
+        wait_until(lambda: job.starts == 2)
+        fragile.kill()
+        fragile.kill()
+        fragile.add()
+        job.end.touch()
+        assert future.result(60) == 1
 
 
 def test_the_scheduler_dies_and_the_run_is_resumed(fragile, folder):
@@ -282,11 +354,16 @@ def test_the_scheduler_dies_and_the_run_is_resumed(fragile, folder):
     assert Path("t.csv").read_bytes() == Path("one.csv").read_bytes()
 
 
-def wait_for_a_row() -> None:
-    part, end = Path("t.csv.part"), time.monotonic() + 60
-    while not part.exists() or not part.stat().st_size:
+def wait_until(is_so: Callable[[], bool]) -> None:
+    end = time.monotonic() + 60
+    while not is_so():
         assert time.monotonic() < end
         time.sleep(0.01)
+
+
+def wait_for_a_row() -> None:
+    part = Path("t.csv.part")
+    wait_until(lambda: part.exists() and part.stat().st_size > 0)
 
 
 @pytest.mark.parametrize(
@@ -301,8 +378,7 @@ def test_a_scheduler_that_hangs_is_left(
     words = ("dumps", *FAST, "--frames", frames)
     assert compute(*words, output="one.csv") == 0
     with scanfab.dask_executor(scheduler_file=fragile.file) as executor:
-        while len(executor.workers()) < 2:
-            time.sleep(0.1)
+        wait_until(lambda: len(executor.workers()) == 2)
     proceed, calls = getattr(kind, step), []
 
     def hanging(*arguments: Any) -> Any:
