@@ -142,7 +142,7 @@ def summaries() -> str:
 
 CLAIMS = (
     claims.experiment, claims.counted, claims.isotropic_start, claims.off_diagonals, claims.rise,
-    claims.apart, claims.smoothness, claims.normalised, claims.slopes, claims.predicted,
+    claims.parting, claims.smoothness, claims.normalised, claims.slopes, claims.predicted,
     claims.shell_stress, claims.tried, claims.harmonics, claims.hysteresis,
 )  # fmt: skip
 NUMBERS = (
@@ -151,7 +151,7 @@ NUMBERS = (
     words.normalised_worst, words.slope_misses, words.pooled, words.disc_misses, words.disc_ratio,
     words.printed_radius, words.cutoff_slopes, words.predicted_off,
     words.null_tests, words.voids_left, words.reversal_pressure, words.slope_back,
-    words.offset_back, words.printed_rv_grains, words.spacing_change,
+    words.offset_back, words.printed_rv_grains, words.spacing_change, words.rv_contacts,
 )  # fmt: skip
 PARTS: dict[str, Callable[[], str]] = {
     **{claim.__name__: claim for claim in CLAIMS},
@@ -164,9 +164,6 @@ PARTS: dict[str, Callable[[], str]] = {
         for kind in ("stress", "contacts")
         for name, names in (("smooth", in_shell()), ("rough", ["yade_rough"]))
     },
-    "apart_smooth": partial(words.apart_by_ends, MAIN),
-    "apart_rough": partial(words.apart_by_ends, "yade_rough"),
-    "slope_stiff": partial(words.rv_slope, "yade_printed_default"),
     "slope_small_rv": partial(words.rv_slope, f"{MAIN}_small-rv"),
     "overlap_usual": partial(words.overlap, MAIN),
     "overlap_stiff": partial(words.overlap, "yade_printed"),

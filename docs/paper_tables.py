@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Iterable, Sequence
 from functools import cache
@@ -79,6 +80,15 @@ def of_whole(name: str, measure: str, column: str, strain: float) -> float:
 def stress_of_whole(row: Any) -> float:
     """The stress ratio of the whole over that of the RV."""
     return float(row["q_whole"] / row["p_whole"] / (row["q"] / row["p"]))
+
+
+def apart(name: str, measure: str, strain: float) -> tuple[float, float]:
+    """Void anisotropy of a less that of c, and its error by leaving out the octants of both."""
+    whole, rv = (row_of(f"{name}_{measure}", one, strain) for one in "ac")
+    names = [f"alpha_vs_axial_without_{block}" for block in range(1, 9)]
+    without = np.array([whole[one] - rv[one] for one in names])
+    error = math.sqrt(7.0 * without.var())
+    return whole.alpha_vs_axial - rv.alpha_vs_axial, error
 
 
 def normalised_gaps(name: str, variant: str) -> list[float]:

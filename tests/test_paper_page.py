@@ -18,6 +18,7 @@ SLOPE = 0.1
 WHOLE = {("a", "default"): 0.25, ("a", "ends"): 0.5}
 ENGINE = {
     "porosity": 0.39, "coordination": 4.7, "rattlers": 100, "overlap": 0.018, "contacts": 9000,
+    "contacts_rv": 9000,
     "inertial_number": 3.4e-4, "gc_xy": 0.0, "gc_xz": 0.0, "gc_yz": 0.0,
 }  # fmt: skip
 
