@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import csv
 import os
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, suppress
+from functools import cache
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -24,8 +26,10 @@ from scanfab.io.beside import (
     is_contacts_file,
     is_frame_file,
 )
+from scanfab.io.files import COMPRESSED_SUFFIXES, bare_name
 from scanfab.io.opening import READING, read_series
 from scanfab.io.options import parse_frames
+from scanfab.io.registry import installed_readers
 from scanfab.io.series import Series
 from scanfab.io.writer import Writer
 from scanfab.io.writers.registry import installed_writers, writer_for, writer_named
@@ -209,9 +213,11 @@ def save_packing(packing: Packing, path: Path, writer: Writer | None = None) -> 
             beside[frame_file(path)] = frame_csv(packing)
         if left.columns:
             beside[columns_file(path)] = columns_csv(packing, _columns(packing, left.columns))
+        is_shared = _is_shared(path, packing, beside)
         for file, data in beside.items():
             files.enter_context(whole_file(file)).write_bytes(data)
-    _remove_others(path, set(beside))
+    if not is_shared:
+        _remove_others(path, set(beside))
     notes = list(left.notes)
     if packing.wall_forces is not None:
         notes.append("the forces of contacts with walls are left out: no format has them")
@@ -227,13 +233,67 @@ def _columns(packing: Packing, names: Iterable[str]) -> dict[str, Any]:
     return {part: split[part] for name in names for part in parts.get(name, [name])}
 
 
+def _is_shared(path: Path, packing: Packing, beside: dict[Path, bytes]) -> bool:
+    """
+    Whether another file of this name lies there, to which what lies beside belongs as well.
+
+    Raises
+    ------
+    SettingsError
+        If that is of another packing: it would be lost, or taken for this one's.
+    """
+    stem = Path(bare_name(path)).stem
+    there = [*filter(Path.is_file, beside), *_left_behind(path, set(beside))]
+    others = (path.with_name(f"{stem}{ending}") for ending in _grain_endings())
+    other = next((one for one in others if there and one != path and one.is_file()), None)
+    if other is None:
+        return False
+    own = {frame_file(path): frame_csv(packing)}
+    if packing.contacts is not None:
+        own[contacts_file(path)] = contacts_csv(packing)
+    if columns_file(path) in there:
+        own[columns_file(path)] = _same_columns(packing, columns_file(path))
+    own |= beside
+    lost = [file.name for file in there if file.read_bytes() != own.get(file)]
+    if lost:
+        raise SettingsError(
+            f"{path}: {other.name} of the same name lies there, whose {' and '.join(lost)} would "
+            f"be lost or taken for those of {path.name}: choose another name or folder"
+        )
+    return True
+
+
+def _same_columns(packing: Packing, file: Path) -> bytes:
+    """The packing's columns of the names that a file has; nothing if it lacks one of them."""
+    names = next(csv.reader(file.read_text("utf-8", "replace").splitlines()[:1]), [])[1:]
+    with suppress(KeyError):
+        return columns_csv(packing, _columns(packing, names))
+    return b""
+
+
+@cache
+def _grain_endings() -> list[str]:
+    """Of files that may hold grains, packed or not."""
+    formats = [*installed_writers().values(), *installed_readers().values()]
+    endings = {ending for one in formats for ending in one.plugin.extensions}
+    return sorted(ending + packed for ending in endings for packed in ("", *COMPRESSED_SUFFIXES))
+
+
+def _left_behind(path: Path, written: set[Path]) -> list[Path]:
+    """What an earlier packing of this name left beside it, and would be taken for this one's."""
+    kinds = {
+        contacts_file(path): is_contacts_file,
+        frame_file(path): is_frame_file,
+        columns_file(path): is_columns_file,
+    }
+    return [
+        file
+        for file, is_ours in kinds.items()
+        if file not in written and file.is_file() and is_ours(file)
+    ]
+
+
 def _remove_others(path: Path, written: set[Path]) -> None:
-    """What an earlier packing of this name left beside it would be taken for this one's."""
-    for file, is_ours in (
-        (contacts_file(path), is_contacts_file),
-        (frame_file(path), is_frame_file),
-        (columns_file(path), is_columns_file),
-    ):
-        if file not in written and file.is_file() and is_ours(file):
-            with suppress(OSError):
-                file.unlink()
+    for file in _left_behind(path, written):
+        with suppress(OSError):
+            file.unlink()

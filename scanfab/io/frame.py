@@ -13,7 +13,7 @@ import numpy as np
 
 from scanfab.base.errors import PackingError, ReadError, ScanfabNote, ScanfabWarning
 from scanfab.base.typing import FloatArray
-from scanfab.io.beside import frame_file, read_frame, with_columns
+from scanfab.io.beside import frame_file, is_contacts_file, read_frame, with_columns
 from scanfab.io.bodies import body_numbers
 from scanfab.io.families import Family, nearest
 from scanfab.io.reader import (
@@ -133,6 +133,7 @@ class Frame:
                 f'{self.snapshot.path}: `contacts="file"` was asked for, but there is no '
                 "contact file"
             )
+        with_walls = with_own or self._are_walls_with_grains(grains)
         with _named(self.snapshot.path):
             return Packing(
                 grains.position,
@@ -141,13 +142,19 @@ class Frame:
                 columns=grains.columns,
                 bodies=body_numbers(self.snapshot.path, grains, options.bodies),
                 contacts=listed[0] if listed else None,
-                wall_contacts=_wall_contacts(grains, joined, with_own),
-                wall_forces=_wall_forces(grains, joined, with_own),
+                wall_contacts=_wall_contacts(grains, joined, with_walls),
+                wall_forces=_wall_forces(grains, joined, with_walls),
                 cell=grains.cell,
                 step=self.step,
                 time=self.snapshot.time,
                 dim=self.series.space_of(self.number, grains.position),
             )
+
+    def _are_walls_with_grains(self, grains: GrainTable) -> bool:
+        """Whether the contacts are those that a conversion left beside: none is a wall's."""
+        if grains.wall_contacts is None:
+            return False
+        return any(is_contacts_file(snapshot.path) for _, snapshot in self._contact_files())
 
     def centres(self) -> FloatArray:
         """

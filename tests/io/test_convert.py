@@ -63,6 +63,38 @@ def test_the_command_finds_what_lies_beside(tmp_path, name):
     assert differences(EVERYTHING, scanfab.read(tmp_path / "again.npz")) == []
 
 
+@pytest.mark.parametrize("name", WRITERS)
+def test_contacts_with_walls_are_there_however_the_contacts_are_named(tmp_path, name):
+    path = written(EVERYTHING, tmp_path, name)
+    assert EVERYTHING.wall_contacts.any()
+    for contacts in ("auto", "file", tmp_path / "a.contacts.csv"):
+        if contacts not in ("auto", "file") and not contacts.exists():
+            continue
+        packing = scanfab.read(path, contacts=contacts)
+        np.testing.assert_array_equal(packing.wall_contacts, EVERYTHING.wall_contacts)
+
+
+def test_what_lies_beside_another_file_of_the_name_is_not_lost(tmp_path):
+    path = written(EVERYTHING, tmp_path, "csv")
+    before = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
+    assert {"a.contacts.csv", "a.frame.csv"} <= before.keys()
+    # without contacts: a format that holds all would remove those beside, others leave them
+    without = scanfab.read(path, contacts="geometric")
+    for ending in (".npz", ".xyz", ".tsv"):
+        with pytest.raises(SettingsError, match=r"a\.csv of the same name lies there, whose a\.co"):
+            scanfab.convert(without, tmp_path / f"a{ending}")
+    assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == before
+
+
+def test_one_packing_in_several_formats_may_share_what_lies_beside(tmp_path):
+    names = ["csv", "npz", "vtp", "parquet", "tsv"]
+    for name in names:
+        written(EVERYTHING, tmp_path, name)
+    for name in names:
+        path = tmp_path / f"a{WRITERS[name].extensions[0]}"
+        assert differences(EVERYTHING, scanfab.read(path)) == [], name
+
+
 def test_from_format_to_format_nothing_gets_lost(tmp_path):
     path = written(EVERYTHING, tmp_path, "vtp")
     for place, name in enumerate(WRITERS):
