@@ -5,8 +5,10 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -25,8 +27,8 @@ def script(words: str) -> str:
 
 
 @pytest.fixture
-def call(tmp_path):
-    """Runs a command in a folder with the program on its path."""
+def variables(tmp_path):
+    """Those of a shell that has the program on its path."""
     program = tmp_path / "bin" / "scanfab"
     program.parent.mkdir()
     program.write_text(
@@ -34,12 +36,16 @@ def call(tmp_path):
     )
     program.chmod(0o755)
     root = str(Path(__file__).parents[1])
-    usual = {"PATH": f"{program.parent}:{os.environ['PATH']}", "PYTHONPATH": root}
+    return {**os.environ, "PATH": f"{program.parent}:{os.environ['PATH']}", "PYTHONPATH": root}
 
-    def call(*command: str, **variables: str) -> str:
-        words = {**os.environ, **usual, **variables}
+
+@pytest.fixture
+def call(tmp_path, variables):
+    """Runs a command in a folder, to its end."""
+
+    def call(*command: str, **more: str) -> str:
         done = subprocess.run(
-            command, cwd=tmp_path, env=words, capture_output=True, text=True, check=False
+            command, cwd=tmp_path, env={**variables, **more}, capture_output=True, text=True
         )
         assert done.returncode == 0, done.stderr
         return done.stdout + done.stderr
@@ -47,20 +53,38 @@ def call(tmp_path):
     return call
 
 
+@pytest.fixture
+def interrupt(tmp_path, variables):
+    """Starts a command, and sends it and all its children a signal when a file is there."""
+
+    def interrupt(sent: signal.Signals, pattern: str, *command: str, **more: str) -> None:
+        with subprocess.Popen(
+            command, cwd=tmp_path, env={**variables, **more}, start_new_session=True,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        ) as process:  # fmt: skip
+            end = time.monotonic() + 60
+            while not any(tmp_path.glob(pattern)):
+                assert time.monotonic() < end
+                time.sleep(0.005)
+            os.killpg(process.pid, sent)
+            assert process.wait(60) != 0
+
+    return interrupt
+
+
 def whole(call, folder: Path, *sources: str) -> bytes:
     call("scanfab", "compute", *sources, "--tolerance", "1e-3", "-o", "whole.csv")
     return (folder / "whole.csv").read_bytes()
 
 
-def test_the_array_of_slurm(call, tmp_path):
-    write_series(tmp_path / "dumps", 3)
-    for task in range(4):
-        variables = {
-            "SLURM_ARRAY_TASK_ID": str(task),
-            "SLURM_ARRAY_TASK_COUNT": "4",
-            "SLURM_CPUS_PER_TASK": "1",
-        }
-        call("bash", "-c", script("#SBATCH --array"), **variables)
+def test_the_array_of_slurm(call, interrupt, tmp_path):
+    """One task finds no frame, and another one is preempted and submitted again."""
+    write_series(tmp_path / "dumps", 2)
+    command = "bash", "-c", script("#SBATCH --array")
+    shared = {"SLURM_ARRAY_TASK_COUNT": "3", "SLURM_CPUS_PER_TASK": "1"}
+    interrupt(signal.SIGKILL, "parts/*.part", *command, **shared, SLURM_ARRAY_TASK_ID="0")
+    for task in range(3):
+        call(*command, **shared, SLURM_ARRAY_TASK_ID=str(task))
     call("bash", "-c", script("scanfab merge parts/"))
     assert (tmp_path / "fabric.csv").read_bytes() == whole(call, tmp_path, "dumps/")
 
@@ -75,11 +99,14 @@ def test_the_array_of_pbs(call, tmp_path):
 
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
-def test_the_makefile(call, tmp_path):
+def test_the_makefile(call, interrupt, tmp_path):
+    """Interrupted, killed, run to its end; and again when there is another dump."""
     (tmp_path / "tests").mkdir()
     for name in ("dense", "loose"):
         write_series(tmp_path / "tests" / name, 2)
     (tmp_path / "Makefile").write_text(script("FOLDERS"), encoding="utf-8")
+    interrupt(signal.SIGINT, "tests/*.part", "make", "-j", "2")
+    interrupt(signal.SIGKILL, "tests/*.csv", "make", "-j", "2")
     call("make", "-j", "2")
     assert (tmp_path / "fabric.csv").read_bytes() == whole(
         call, tmp_path, "tests/dense/", "tests/loose/"

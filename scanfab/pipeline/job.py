@@ -188,7 +188,7 @@ class Job:
         assert result is not None
         # it loses its manifest when it is replaced
         replaces = result.has_table and not self.resume
-        with result.writer(self.asked, self.resume) as writer:
+        with result.writer(self.asked, self.resume, self._save_manifest) as writer:
             for row in self.rows(advance):
                 if replaces:
                     _note_replaced(result.path)
@@ -203,12 +203,15 @@ class Job:
 
     def save_manifests(self, more: Mapping[str, Any] | None = None) -> None:
         """Write the manifest beside the file, and where it was asked for, with some ``more``."""
+        for path in self._manifests:
+            self._save_manifest(path, more)
+
+    def _save_manifest(self, path: Path, more: Mapping[str, Any] | None = None) -> None:
         # what was told of the rows that an earlier run has finished
         before = [] if self.table is None else self.table.warnings
         texts = [*dict.fromkeys([*before, *self._told.warnings])]
-        for path in self._manifests:
-            found = manifest(self.asked, self.series, texts, self._told.notes, self._inputs)
-            write_manifest(path, {**found, **(more or {})})
+        found = manifest(self.asked, self.series, texts, self._told.notes, self._inputs)
+        write_manifest(path, {**found, **(more or {})})
 
     @property
     def _there(self) -> list[Series]:

@@ -17,6 +17,7 @@ from scanfab.io.series import Series
 from scanfab.pipeline.manifest import asked_for
 from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings, is_map
 from scanfab.pipeline.settings import Settings
+from scanfab.table.result_file import manifest_of
 
 __all__ = [
     "read_manifest",
@@ -36,7 +37,7 @@ def read_manifest(table: Path) -> dict[str, Any] | None:
     ReadError
         If it is not a manifest.
     """
-    path = table.with_name(table.name + ".manifest.json")
+    path = manifest_of(table)
     if not path.is_file():
         return None
     try:

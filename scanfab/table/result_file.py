@@ -8,6 +8,8 @@ at the end. What was asked for stands beside it in FILE.manifest.json.part, and 
 the frames held, so that nobody goes on with other settings or other files: JSON lines, as entries
 come with the frames. No finished row is ever lost: a part that a new run does not go on with is
 kept under another name, and one that another run writes to is left alone.
+The manifest of FILE is written before FILE, as FILE.manifest.json.new, so that no run that is
+killed in its last moment leaves a table of which nobody knows what made it.
 """
 
 from __future__ import annotations
@@ -17,8 +19,8 @@ import os
 import shutil
 import sys
 import warnings
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO, Any
 
@@ -33,7 +35,7 @@ from scanfab.table.formats.registry import RowWriter, format_of
 from scanfab.table.reading import read_rows
 from scanfab.table.writing import ALL, Excerpt, row_writer, write_rows
 
-__all__ = ["ResultFile", "differing_settings"]
+__all__ = ["ResultFile", "differing_settings", "manifest_of"]
 
 
 class ResultFile:
@@ -63,7 +65,7 @@ class ResultFile:
         self.excerpt = excerpt
         self.suffix = path.suffix.lower()
         self.part = path.with_name(path.name + ".part")
-        self.manifest = path.with_name(path.name + ".manifest.json")
+        self.manifest, self._coming = _manifests(path)
         self._record = path.with_name(self.manifest.name + ".part")
         self._lock: IO[bytes] | None = None
         for one in (self.part, self._record):
@@ -91,6 +93,7 @@ class ResultFile:
         if self._lock is not None:
             yield
             return
+        self._settle_manifest()
         with locked(self.part) as self._lock, undone_at_end(self._remove_empty_part):
             try:
                 yield
@@ -141,7 +144,12 @@ class ResultFile:
         return self._recorded()[1]
 
     @contextmanager
-    def writer(self, asked: dict[str, Any], resume: bool = False) -> Iterator[RowWriter]:
+    def writer(
+        self,
+        asked: dict[str, Any],
+        resume: bool = False,
+        save_manifest: Callable[[Path], object] = lambda path: None,
+    ) -> Iterator[RowWriter]:
         """Write rows to FILE.part, behind those that are there if resumed; then make FILE of it."""
         with self.alone():
             going_on = resume and self.has_part
@@ -149,6 +157,7 @@ class ResultFile:
             if not going_on:
                 # before its settings are overwritten: rows of others must not look like these
                 self._put_part_aside()
+            self._coming.unlink(missing_ok=True)
             self._begin_record(asked, inputs)
             with self._open_part() as stream:
                 columns = columns_of(self.kind)
@@ -157,6 +166,7 @@ class ResultFile:
                 yield writer
                 # of a table without rows the names of its columns
                 writer.close()
+            save_manifest(self._coming)
             # what stands there is of the table that was FILE before
             self.manifest.unlink(missing_ok=True)
             if self._part_suffix == self.suffix:
@@ -164,6 +174,7 @@ class ResultFile:
                 os.replace(self.part, self.path)
             else:
                 self._convert()
+            self._settle_manifest()
             self._record.unlink(missing_ok=True)
 
     def save(self, rows: Iterable[Mapping[str, Any]]) -> None:
@@ -217,6 +228,13 @@ class ResultFile:
         with named_errors(self.part), open(self.part, "a", newline="", encoding="utf-8") as stream:
             yield stream
 
+    def _settle_manifest(self) -> None:
+        """Give the manifest of FILE its name."""
+        # another process may do it at the same time
+        with suppress(FileNotFoundError):
+            if manifest_of(self.path) != self.manifest:
+                os.replace(self._coming, self.manifest)
+
     def _let_go(self) -> None:
         """Windows moves and removes no file that is open."""
         if sys.platform == "win32" and self._lock is not None:
@@ -268,6 +286,20 @@ class ResultFile:
         write_rows(self.path, self._rows(), columns_of(self.kind), self.excerpt)
         self._let_go()
         self.part.unlink()
+
+
+def manifest_of(table: Path) -> Path:
+    """Where the manifest of a table is, if it has one: it may still wait for its name."""
+    settled, coming = _manifests(table)
+    # as long as there is FILE.part, FILE is the table from before
+    is_of_table = table.exists() and not table.with_name(table.name + ".part").exists()
+    return coming if is_of_table and coming.exists() and not settled.exists() else settled
+
+
+def _manifests(table: Path) -> tuple[Path, Path]:
+    """The manifest of a table, and the one of the table that is being made."""
+    settled = table.with_name(table.name + ".manifest.json")
+    return settled, settled.with_name(settled.name + ".new")
 
 
 def differing_settings(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import json
+import os
 import shutil
 from pathlib import Path
 
@@ -441,3 +442,34 @@ def test_a_cell_beside_the_grains_is_an_input(compute, tmp_path, capsys, grains,
     # the first bytes are those of the step, without which a saved state is none
     assert compute(table, *words, "--resume", sources=(folder / grains,)) == (2, 0)
     assert f"{cells[0]} " in capsys.readouterr().err
+
+
+def test_a_run_killed_before_its_manifest_has_its_name_is_complete(compute, dumps, tmp_path):
+    """FILE stands, and is gone on with and merged; beside FILE.part it would be the one before."""
+    table, merged = tmp_path / "t.csv", tmp_path / "m.csv"
+    settled, coming = (tmp_path / f"t.csv.manifest.json{ending}" for ending in ("", ".new"))
+    assert compute(table) == (0, 3)
+    settled.rename(coming)
+    assert run(["merge", str(table), "-o", str(merged)]) == 0
+    assert merged.read_bytes() == table.read_bytes()
+    part = tmp_path / "t.csv.part"
+    part.touch()
+    assert read_manifest(table) is None
+    part.unlink()
+    assert compute(table, "--resume") == (0, 0)
+    assert settled.exists()
+    assert not coming.exists()
+    assert merged.read_bytes() == table.read_bytes()
+
+
+def test_the_manifest_is_there_before_its_table(compute, tmp_path, monkeypatch):
+    replace, found = os.replace, []
+
+    def noted(source, target):
+        if Path(target).name == "t.csv":
+            found.append(json.loads((tmp_path / "t.csv.manifest.json.new").read_text())["settings"])
+        replace(source, target)
+
+    monkeypatch.setattr(os, "replace", noted)
+    assert compute(tmp_path / "t.csv") == (0, 3)
+    assert found == [read_manifest(tmp_path / "t.csv")["settings"]]

@@ -93,7 +93,7 @@ def test_blocks_of_a_homogeneous_medium_agree_with_the_whole():
     random = np.random.default_rng(3)
     count = random.poisson(0.15 * 20**3)
     position, radius = random.uniform(0, 20, (count, 3)), random.uniform(0.5, 1.5, count)
-    packing = Packing(position, radius, cell=Cell([20.0] * 3))
+    packing = Packing(position, radius, cell=Cell([13.9] * 3))
     beta = 0.15 * np.pi * 13 / 12
     for kind in ({"grid": (2, 2, 2)}, {"slices": 4}, {"shells": 2}):
         table, told = mapped(packing, spacing=0.3, **kind)
@@ -123,12 +123,12 @@ def test_solid_fraction_is_that_of_a_lattice_and_empty_at_an_open_surface(kind):
 
 def test_dilute_blocks_within_a_surface_have_no_solid_fraction():
     """Void segments are longer than shells are thick: their middles gather in the innermost."""
-    places = np.random.default_rng(2).uniform(0, 20, (1500, 3))
+    places = np.random.default_rng(2).uniform(0, 13.9, (500, 3))
     options = {"shells": 3, "directions": 11, "spacing": 0.8}
     table, _ = mapped(Packing(places, 0.6), variants="ac", **options)
     assert np.isnan(table["solid_fraction"]).all()
     # a periodic medium has no surface
-    periodic = Packing(places, 0.6, cell=Cell([20.0] * 3))
+    periodic = Packing(places, 0.6, cell=Cell([13.9] * 3))
     table, _ = mapped(periodic, variants="a", **options)
     assert not np.isnan(table["solid_fraction"]).any()
 
@@ -276,9 +276,9 @@ def test_an_option_that_does_not_exist_is_named():
 
 
 def test_blocks_without_segments_are_empty_and_said():
-    position, radius = simple_cubic(10)
-    kept = position[:, 2] < 5
-    lower, cell = position[kept], Cell([10.0] * 3, (True, True, False))
+    position, radius = simple_cubic(6)
+    kept = position[:, 2] < 3
+    lower, cell = position[kept], Cell([6.0] * 3, (True, True, False))
     frames = [
         Packing(lower, 0.49 * radius[kept] / 0.5, cell=cell),
         Packing(lower * [1, 1, 0.5], 0.24 * radius[kept] / 0.5, cell=cell),
