@@ -33,6 +33,7 @@ from scanfab.io.formats.table_names import (
     PFC,
     TABLE,
     Names,
+    check_one_unit,
     find_columns,
     is_contacts,
 )
@@ -57,7 +58,7 @@ OF_GRAINS = ("x", "y", "z", "radius", "diameter", "id")
 FRAMES = ("step", "timestep", "frame", "time")
 ASK = (
     'name them, for instance `columns="x=1,y=2,z=3,radius=4"` (or diameter=4; numbers of columns '
-    "count from 1)"
+    "count from 1); discs have a column z, too, with one value"
 )
 
 
@@ -146,6 +147,7 @@ class TableReader:
                 f"{path}: expected two columns of ids, id1 and id2, found {', '.join(own)}: name "
                 f'them with `contact_columns="id1=NAME,id2=NAME"`'
             )
+        check_one_unit(path, "forces", found, [one for one in found if one.startswith("f")])
         columns = read_table(path, options.skip, *_needed(found))
         for name in found.values():
             if name not in columns:

@@ -54,7 +54,7 @@ def join_table(path: Path, grains: GrainTable, found: Columns) -> JoinedContacts
     known = bool((rows >= 0).all())
     force = _force(path, grains, rows, found, ~walls) if known else None
     force_n = _normal_force(path, found, ~walls) if force is None else None
-    image = _image(path, found, ~walls)
+    image = _image(path, grains, found, ~walls)
     joined = join_ids(path, grains, ids, force, walls=False, image=image, force_n=force_n)
     touched = rows_of_ids(grains, ids_of_walls)
     count = count_walls(touched.max(axis=1)[touched.max(axis=1) >= 0], len(grains.radius))
@@ -97,17 +97,31 @@ def _numbered(grains: GrainTable, base: int) -> GrainTable:
     return grains._replace(id=np.arange(base, base + len(grains.radius)))
 
 
-def _vectors(path: Path, found: Columns, names: str, kept: BoolArray) -> FloatArray | None:
-    columns = [found[name] for name in names.split() if name in found]
-    if len(columns) < 3:
+def _vectors(
+    path: Path, grains: GrainTable, found: Columns, names: str, kept: BoolArray
+) -> FloatArray | None:
+    """One vector a contact; what has no column is 0 where all grains lie at one place along it."""
+    wanted = names.split()
+    lacking = [name for name in wanted if name not in found]
+    if len(lacking) == 3:
         return None
+    flat = np.ptp(grains.position, axis=0) == 0 if len(grains.radius) else np.ones(3, bool)
+    if not all(flat[wanted.index(name)] for name in lacking):
+        warnings.warn(
+            f"{path}: {', '.join(name for name in wanted if name in found)} are left out, since "
+            f"there is no {' and no '.join(lacking)}",
+            ScanfabWarning,
+            stacklevel=2,
+        )
+        return None
+    columns = [found.get(name, np.zeros(len(kept))) for name in wanted]
     if any(column.dtype.kind not in "biuf" for column in columns):
         raise ReadError(f"{path}: expected numbers in the columns {names}, found text")
     return np.column_stack(columns).astype(np.float64)[kept]
 
 
-def _image(path: Path, found: Columns, kept: BoolArray) -> IntArray | None:
-    image = _vectors(path, found, "ix iy iz", kept)
+def _image(path: Path, grains: GrainTable, found: Columns, kept: BoolArray) -> IntArray | None:
+    image = _vectors(path, grains, found, "ix iy iz", kept)
     return None if image is None else whole_numbers(path, image.ravel()).reshape(-1, 3)
 
 
@@ -115,16 +129,16 @@ def _force(
     path: Path, grains: GrainTable, rows: IntArray, found: Columns, kept: BoolArray
 ) -> FloatArray | None:
     """The force on the second grain; None if there is none, or its sign cannot be told."""
-    second = _vectors(path, found, "fx2 fy2 fz2", kept)
+    second = _vectors(path, grains, found, "fx2 fy2 fz2", kept)
     if second is not None:
         return second
-    first = _vectors(path, found, "fx1 fy1 fz1", kept)
+    first = _vectors(path, grains, found, "fx1 fy1 fz1", kept)
     if first is not None:
         return -first
-    force = _vectors(path, found, "fx fy fz", kept)
+    force = _vectors(path, grains, found, "fx fy fz", kept)
     if force is None:
-        normal = _vectors(path, found, "fnx fny fnz", kept)
-        tangential = _vectors(path, found, "ftx fty ftz", kept)
+        normal = _vectors(path, grains, found, "fnx fny fnz", kept)
+        tangential = _vectors(path, grains, found, "ftx fty ftz", kept)
         if normal is None or tangential is None:
             return None
         force = normal + tangential

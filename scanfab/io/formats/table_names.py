@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from scanfab.base.errors import ReadError
 from scanfab.io.formats.columns import DIAMETER_NAMES, ID_NAMES, RADIUS_NAMES
 
-__all__ = ["CONTACTS", "EDEM", "PFC", "TABLE", "Names", "find_columns", "is_contacts", "unique"]
+__all__ = [
+    "CONTACTS",
+    "EDEM",
+    "PFC",
+    "TABLE",
+    "Names",
+    "check_one_unit",
+    "find_columns",
+    "is_contacts",
+    "unique",
+]
 
 Names = Mapping[str, tuple[str, ...]]
 """The names that a column may have, by what it is; as :func:`plain_name` has them."""
@@ -166,8 +176,21 @@ def _column(path: Path, names: Sequence[str], own: str, standard: str, option: s
 
 def _check_units(path: Path, found: Mapping[str, str]) -> None:
     """Lengths of one table have one unit."""
-    lengths = [found[one] for one in ("x", "y", "z", "radius", "diameter") if one in found]
-    units = {name: match[1] for name in lengths if (match := UNIT.search(name))}
+    check_one_unit(path, "lengths", found, ("x", "y", "z", "radius", "diameter"))
+
+
+def check_one_unit(
+    path: Path, what: str, found: Mapping[str, str], standard: Collection[str]
+) -> None:
+    """
+    Whether what is of one kind has one unit, where its names say any.
+
+    Raises
+    ------
+    ReadError
+        If there are two.
+    """
+    names = [found[one] for one in standard if one in found]
+    units = {name: match[1] for name in names if (match := UNIT.search(name))}
     if len(set(units.values())) > 1:
-        listed = ", ".join(units)
-        raise ReadError(f"{path}: lengths of one unit are expected, found {listed}")
+        raise ReadError(f"{path}: {what} of one unit are expected, found {', '.join(units)}")

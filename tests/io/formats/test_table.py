@@ -240,6 +240,27 @@ def test_forces_keep_the_sign_that_their_name_says(tmp_path, end, sign):
     assert np.all(packing.contacts.force_n < 0)
 
 
+def test_forces_in_a_plane_need_no_third_component(tmp_path):
+    flat = POSITION * [1, 1, 0]
+    grains = rows(tmp_path / "g.csv", ID, flat, RADIUS, names=["id", *"xyz", "r"], separator=",")
+    contacts = contacts_file(tmp_path, ["fx2", "fy2"], FORCE[:, :2])
+    force = scanfab.read(grains, contacts=contacts).contacts.force
+    np.testing.assert_array_equal(force, FORCE * [1, 1, 0])
+
+
+def test_forces_that_lack_a_component_in_space_are_left_out_and_told(tmp_path):
+    contacts = contacts_file(tmp_path, ["fx2", "fy2"], FORCE[:, :2])
+    with pytest.warns(ScanfabWarning, match="fx2, fy2 are left out, since there is no fz2"):
+        packing = scanfab.read(grains_file(tmp_path), contacts=contacts)
+    assert packing.contacts.force is None
+
+
+def test_forces_of_two_units_are_refused(tmp_path):
+    contacts = contacts_file(tmp_path, ["fx2 [N]", "fy2 [N]", "fz2 [kN]"], FORCE)
+    with pytest.raises(ReadError, match=r"forces of one unit .* fx2 \[N\], .* fz2 \[kN\]"):
+        scanfab.read(grains_file(tmp_path), contacts=contacts)
+
+
 def test_forces_of_both_signs_are_left_out_and_told(tmp_path):
     signs = np.where(np.arange(len(PAIRS)) % 3, 1.0, -1.0)[:, None]
     contacts = contacts_file(tmp_path, ["fx", "fy", "fz"], signs * FORCE)
