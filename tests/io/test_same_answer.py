@@ -212,7 +212,7 @@ def comma_table(folder, source):
     def save(path, columns):
         rows = zip(*(values.tolist() for values in columns.values()), strict=True)
         lines = [";".join(map(repr, row)).replace(".", ",") for row in rows]
-        write(path.with_suffix(".csv"), ";".join(columns) + "\n" + "\n".join(lines))
+        write(path.with_suffix(".csv"), ";".join(columns) + "\n" + "\n".join(lines) + "\n")
 
     return table(folder, source, save)
 

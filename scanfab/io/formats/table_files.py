@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.errors import ReadError
+from scanfab.base.errors import ReadError, ScanfabWarning
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.table_names import unique
 from scanfab.io.formats.xyzd import is_xyzd, read_xyzd_columns
@@ -67,6 +68,13 @@ def read_table(path: Path, skip: int, numbers: Sequence[str], whole: Sequence[st
     if head.startswith(IS_NPZ):
         return _checked(path, _unfolded(read_npz(path)), numbers)
     data = read_text(path)
+    if not data.endswith((b"\n", b"\r")):
+        warnings.warn(
+            f"{path}: the last line has no end: if the file was cut, rows are missing, and its "
+            f"last number may be cut, too",
+            ScanfabWarning,
+            stacklevel=2,
+        )
     layout = layout_of(path, data, skip)
     names = _keys(layout)
     places = {name: place for place, name in enumerate(names)}

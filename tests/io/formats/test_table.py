@@ -199,6 +199,13 @@ def test_a_table_without_rows_is_an_empty_frame(tmp_path):
     assert len(read(write(tmp_path / "g.csv", "id,x,y,z,radius\n"))) == 0
 
 
+def test_a_last_line_without_an_end_is_told(tmp_path):
+    path = rows(tmp_path / "g.csv", POSITION, RADIUS, names=["x", "y", "z", "r"], separator=",")
+    path.write_bytes(path.read_bytes()[:-1])
+    with pytest.warns(ScanfabWarning, match=r"g\.csv: the last line has no end: if the file was"):
+        assert_right(read(path))
+
+
 def test_points_need_a_radius(tmp_path):
     path = rows(tmp_path / "g.csv", POSITION, names=["x", "y", "z"], separator=",")
     with pytest.raises(ReadError, match="no radius"):
