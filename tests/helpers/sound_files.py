@@ -328,7 +328,8 @@ def _packings(endings: tuple[str, ...], folder: Path) -> list[Path]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             for ending in (".data", ".npz", ".vtkhdf", ".xyz"):
-                convert(packing, folder / f"p{place}{ending}")
+                # each beside files of its own
+                convert(packing, folder / f"{ending[1:]}{place}{ending}")
     return [path for path in sorted(folder.iterdir()) if path.name.endswith(endings)]
 
 

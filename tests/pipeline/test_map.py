@@ -93,7 +93,7 @@ def test_blocks_of_a_homogeneous_medium_agree_with_the_whole():
     random = np.random.default_rng(3)
     count = random.poisson(0.15 * 20**3)
     position, radius = random.uniform(0, 20, (count, 3)), random.uniform(0.5, 1.5, count)
-    packing = Packing(position, radius, cell=Cell([13.9] * 3))
+    packing = Packing(position, radius, cell=Cell([20.0] * 3))
     beta = 0.15 * np.pi * 13 / 12
     for kind in ({"grid": (2, 2, 2)}, {"slices": 4}, {"shells": 2}):
         table, told = mapped(packing, spacing=0.3, **kind)
