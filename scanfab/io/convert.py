@@ -213,11 +213,13 @@ def save_packing(packing: Packing, path: Path, writer: Writer | None = None) -> 
             beside[frame_file(path)] = frame_csv(packing)
         if left.columns:
             beside[columns_file(path)] = columns_csv(packing, _columns(packing, left.columns))
-        is_shared = _is_shared(path, packing, beside)
+        behind = _left_behind(path, set(beside))
+        is_shared = _is_shared(path, packing, beside, behind)
         for file, data in beside.items():
             files.enter_context(whole_file(file)).write_bytes(data)
-    if not is_shared:
-        _remove_others(path, set(beside))
+    for file in () if is_shared else behind:
+        with suppress(OSError):
+            file.unlink()
     notes = list(left.notes)
     if packing.wall_forces is not None:
         notes.append("the forces of contacts with walls are left out: no format has them")
@@ -233,7 +235,9 @@ def _columns(packing: Packing, names: Iterable[str]) -> dict[str, Any]:
     return {part: split[part] for name in names for part in parts.get(name, [name])}
 
 
-def _is_shared(path: Path, packing: Packing, beside: dict[Path, bytes]) -> bool:
+def _is_shared(
+    path: Path, packing: Packing, beside: dict[Path, bytes], behind: Iterable[Path]
+) -> bool:
     """
     Whether another file of this name lies there, to which what lies beside belongs as well.
 
@@ -243,7 +247,7 @@ def _is_shared(path: Path, packing: Packing, beside: dict[Path, bytes]) -> bool:
         If that is of another packing: it would be lost, or taken for this one's.
     """
     stem = Path(bare_name(path)).stem
-    there = [*filter(Path.is_file, beside), *_left_behind(path, set(beside))]
+    there = [*filter(Path.is_file, beside), *behind]
     others = (path.with_name(f"{stem}{ending}") for ending in _grain_endings())
     other = next((one for one in others if there and one != path and one.is_file()), None)
     if other is None:
@@ -291,9 +295,3 @@ def _left_behind(path: Path, written: set[Path]) -> list[Path]:
         for file, is_ours in kinds.items()
         if file not in written and file.is_file() and is_ours(file)
     ]
-
-
-def _remove_others(path: Path, written: set[Path]) -> None:
-    for file in _left_behind(path, written):
-        with suppress(OSError):
-            file.unlink()
