@@ -54,6 +54,10 @@ __all__ = ["EdemReader", "PfcReader", "TableReader"]
 NUMBERS = ("x", "y", "z", "radius", "diameter", "volume", "id", "id1", "id2")
 WHOLE = ("id", "id1", "id2")
 OF_GRAINS = ("x", "y", "z", "radius", "diameter", "id")
+# path, lines to skip, size and time of change of a table
+Stamp = tuple[Path, int, int, int]
+# the columns of the table whose names were guessed last, until it is read
+_guessed: dict[Stamp, Columns] = {}
 # names of columns that tell frames of one file apart
 FRAMES = ("step", "timestep", "frame", "time")
 ASK = (
@@ -122,7 +126,8 @@ class TableReader:
         own = names or [f"{place + 1}" for place in range(width)]
         is_guess = names is None and not options.columns
         found = _guess(path, options.skip) if is_guess else reader._find(path, own, contacts=False)
-        columns = read_table(path, options.skip, *_needed(found))
+        guessed = _guessed.pop(_stamp(path, options.skip), None) if is_guess else None
+        columns = guessed or read_table(path, options.skip, *_needed(found))
         if names is not None:
             _refuse_frames(path, columns)
         if is_xyzd(path) and not options.columns:
@@ -279,17 +284,31 @@ def _radii_of_volumes(columns: Columns, name: str) -> Columns:
     return {**columns, "radius": np.cbrt(0.75 / np.pi * columns[name].astype(np.float64))}
 
 
+def _stamp(path: Path, skip: int) -> Stamp:
+    """What tells a table from another, and from itself when it was changed."""
+    file = path.stat()
+    return path, skip, file.st_size, file.st_mtime_ns
+
+
 def _guess(path: Path, skip: int) -> dict[str, str]:
     """Columns without names: ``x y z r`` or ``id x y z r``, if the grains then touch."""
-    file = path.stat()
-    names = _proved_names(path, skip, file.st_size, file.st_mtime_ns)
+    names = _proved_names(_stamp(path, skip))
     return {name: f"{place + 1}" for place, name in enumerate(names)}
 
 
 @lru_cache
-def _proved_names(path: Path, skip: int, size: int, changed: int) -> tuple[str, ...]:
-    """Of a file that had this size and time of change, so that it is proved once."""
-    places = list(read_unnamed(path, skip).values())
+def _proved_names(stamp: Stamp) -> tuple[str, ...]:
+    """Of a table as it stood at that time, so that it is proved once."""
+    path, skip, *_ = stamp
+    columns = read_unnamed(path, skip)
+    names = _names_by_touch(path, list(columns.values()))
+    _guessed.clear()
+    _guessed[stamp] = columns
+    return names
+
+
+def _names_by_touch(path: Path, places: Sequence[npt.NDArray[Any]]) -> tuple[str, ...]:
+    """What columns must be, for grains to touch one another; ReadError if that cannot be told."""
     fits, large = [], False
     for begin in (0, 1):
         part = places[begin : begin + 4]
@@ -297,7 +316,9 @@ def _proved_names(path: Path, skip: int, size: int, changed: int) -> tuple[str, 
             continue
         if begin and not _may_be_ids(places[0]):
             continue
-        position, radius = np.column_stack(part[:3]).astype(float), part[3].astype(float)
+        position, radius = (
+            np.asarray(one, np.float64) for one in (np.column_stack(part[:3]), part[3])
+        )
         if touch(position, radius):
             fits.append(begin)
         elif not fits:

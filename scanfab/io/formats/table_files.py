@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -41,9 +42,16 @@ def names_of(path: Path, skip: int) -> tuple[list[str] | None, int]:
     elif head.startswith(IS_NPZ):
         names = [part for name, shape in npz_shapes(path).items() for part in _parts(name, shape)]
     else:
-        layout = layout_of(path, read_text(path, HEAD), skip)
+        status = path.stat()
+        layout = _layout_by_head(path, skip, status.st_size, status.st_mtime_ns)
         return (None if layout.names is None else list(layout.names)), layout.width
     return names, len(names)
+
+
+@lru_cache
+def _layout_by_head(path: Path, skip: int, size: int, changed: int) -> Layout:
+    """Of a file that had this size and time of change, which is asked for several times."""
+    return layout_of(path, read_text(path, HEAD), skip)
 
 
 def has_ids(path: Path, skip: int, found: Mapping[str, str]) -> bool:

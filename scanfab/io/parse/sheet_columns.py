@@ -135,7 +135,8 @@ def _regular(
         else polars.String
         for place in range(layout.width)
     }
-    if b'"' in body:
+    # a number with a quotation mark is none, and refused as such
+    if not all(layout.are_numbers) and b'"' in body:
         return None
     frame = _parsed(body, layout.separator, schema, has_quotes=False, skip=skip)
     # a row with too many words is an error of polars, one with too few has empty ones at its end

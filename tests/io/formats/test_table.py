@@ -13,7 +13,7 @@ import pytest
 
 import scanfab
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
-from scanfab.io.formats import table
+from scanfab.io.formats import table, table_files, table_proof
 from scanfab.io.registry import reader_for
 from tests.helpers.dumps import dump_text, pairs_text, write
 from tests.helpers.truth import FLOOR, csv_rows
@@ -122,6 +122,30 @@ def test_a_table_without_names_is_proved_once_and_anew_when_it_changed(tmp_path,
     os.utime(path, ns=(0, 0))
     with pytest.raises(ReadError, match="the fourth is a diameter"):
         read(path)
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.ScanfabNote")
+def test_a_table_without_names_is_parsed_once(tmp_path, monkeypatch):
+    parsed, parse = [], table_files.read_columns
+    monkeypatch.setattr(table_files, "read_columns", lambda *how: parsed.append(1) or parse(*how))
+    path = rows(tmp_path / "grains.txt", POSITION, RADIUS)
+    assert_right(read(path))
+    assert len(parsed) == 1
+    assert_right(read(path))
+    assert len(parsed) == 2  # its columns are not kept
+
+
+@pytest.mark.parametrize("away", [0, 100])
+def test_a_large_packing_is_told_by_the_grains_around_its_middle(away):
+    place = np.indices((32, 32, 32)).reshape(3, -1).T.astype(float)
+    place = np.random.default_rng(2).permutation(place)
+    place[:away] += 1e9  # thrown out of the sample
+    radius = np.full(len(place), 0.5)
+    assert table_proof.touch(place, radius)
+    assert not table_proof.touch(place, 2 * radius)
+    assert not table_proof.touch(place, 0.5 * radius)
+    assert not table_proof.touch(place[:, [0, 1, 1]], radius)
+    assert not table_proof.touch(np.random.default_rng(3).permuted(place, axis=0), radius / 2)
 
 
 def test_a_diameter_that_the_user_names_comes_before_a_radius_of_the_file(tmp_path):
