@@ -20,7 +20,7 @@ import scanfab
 from scanfab.base.errors import ReadError
 from scanfab.io import files
 from scanfab.io.formats import yade_save
-from scanfab.io.parse import text_dump as dump
+from scanfab.io.parse import counted_rows, text_dump
 from scanfab.io.parse.vtk_data import FlawError
 from scanfab.io.parse.vtk_xml import read_xml
 from tests.helpers.dumps import dump_text, write
@@ -137,11 +137,38 @@ def test_elements_that_are_not_looked_at_are_let_go():
 
 
 def test_far_more_text_than_rows_is_not_read(tmp_path, monkeypatch):
-    monkeypatch.setattr(dump, "MUCH_TEXT", 10_000)
+    monkeypatch.setattr(text_dump, "MUCH_TEXT", 10_000)
     text = dump_text() + " " * 20_000 + "\n"
     path = tmp_path / "dump.gz"
     path.write_bytes(gzip.compress(text.encode()))
     with pytest.raises(ReadError, match=r"the header counts \d+ rows, but 20,\d+ bytes follow"):
+        scanfab.read(path)
+
+
+DUMP = dump_text().partition("ITEM: ATOMS")[0].replace("\n3\n", "\n99999999999\n") + "ITEM: {}\n"
+ROWS = b"1 0 0 0 1\n" * 300_000
+DATA = "LAMMPS data file\n\n{} atoms\n\n0 1 xlo xhi\n0 1 ylo yhi\n0 1 zlo zhi\n\nAtoms # sphere\n\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "told"),
+    [
+        ("dump", DUMP.format("ATOMS id x y z radius"), "after 300000 complete lines"),
+        ("dump", DUMP.format("ATOMS"), "after 300000 complete lines"),
+        ("a.data", DATA.format(99999999999), "counts 99999999999 atoms, found 30000. lines"),
+        ("a.data", DATA.format(3), "counts 3 atoms, found 30000. lines"),
+    ],
+)
+def test_rows_that_cannot_be_those_counted_are_not_parsed(tmp_path, monkeypatch, name, text, told):
+    def parsed(*_, **__):
+        raise AssertionError("rows were parsed")
+
+    for module in (text_dump, counted_rows):
+        for function in ("read_regular", "_tolerant", "_values", "parse_rows", "rows_of_numbers"):
+            monkeypatch.setattr(module, function, parsed, raising=False)
+    path = tmp_path / f"{name}.gz"
+    path.write_bytes(gzip.compress(text.encode() + ROWS))
+    with pytest.raises(ReadError, match=told):
         scanfab.read(path)
 
 

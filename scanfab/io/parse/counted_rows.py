@@ -12,7 +12,7 @@ from scanfab.base.typing import FloatArray
 from scanfab.io.files import check_memory, plain
 from scanfab.io.parse.growing import warn_incomplete
 from scanfab.io.parse.number_rows import rows_of_numbers
-from scanfab.io.parse.text_table import FILLED, parse_rows
+from scanfab.io.parse.text_table import FILLED, LONG, parse_rows
 from scanfab.io.reader import Snapshot
 from scanfab.io.unpacking import check_lines
 
@@ -22,6 +22,8 @@ __all__ = ["counted_rows", "leave_out_last", "lines_above", "skip_rows", "spelt"
 PIECE = 1 << 20
 # times its size in memory: the text, its numbers, and the columns made of them
 IN_MEMORY = 6.0
+# lines for each row, of which the others are empty, and rows of a text of any number of lines
+MOST_LINES, ANYWAY = 10, 1000
 
 
 def text_of(snapshot: Snapshot) -> bytes:
@@ -82,6 +84,8 @@ def counted_rows(
     """
     path = snapshot.path
     end = min(end, len(data))
+    if count is not None and end - begin > LONG:
+        _check_lines_of(path, data.count(b"\n", begin, end), count, names)
     if FILLED.search(data, begin, end) is None:
         values: FloatArray = np.zeros((0, widths[0]))
     else:
@@ -99,6 +103,12 @@ def counted_rows(
         expected = " or ".join(map(str, widths))
         raise ReadError(f"{path}: expected {expected} columns of {names}, found {values.shape[1]}")
     return values
+
+
+def _check_lines_of(path: Path, lines: int, count: int, names: str) -> None:
+    """ReadError if there cannot be so many rows, before the lines are parsed: a count may lie."""
+    if lines < count or lines > MOST_LINES * (count + ANYWAY):
+        raise ReadError(f"{path}: the header counts {count} {names}, found {lines} lines")
 
 
 def skip_rows(stream: IO[bytes], count: int) -> int:

@@ -21,6 +21,7 @@ import numpy.typing as npt
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray
 from scanfab.io.files import check_memory, plain
+from scanfab.io.parse.counted_rows import lines_above
 from scanfab.io.parse.growing import warn_incomplete
 from scanfab.io.parse.lammps_box import dump_cell
 from scanfab.io.parse.number_rows import exact_column, plain_reason
@@ -137,11 +138,11 @@ def read_columns(
     """
     where, sections, body = _header(snapshot)
     count, cell = _count(where, sections), dump_cell(where, sections)
+    table, load = _long_table(snapshot, body, count), partial(_read_column, snapshot)
     if not body.names:
         values = _tolerant(snapshot, body, count)
         own = {f"{place + 1}": column for place, column in enumerate(values.T)}
         return LazyColumns(list(own), own, own.__getitem__), cell
-    table, load = _long_table(snapshot, body, count), partial(_read_column, snapshot)
     if table is not None:
         filled, ready = room(body.names, count)
         places = {body.names.index(name): column for name, column in filled.items()}
@@ -201,14 +202,16 @@ def _regular(
 
 
 def _long_table(snapshot: Snapshot, body: _Body, count: int) -> TextTable | None:
-    """Where the rows of a large snapshot stand; None if it is small or cannot have so many."""
+    """Where the rows of a large snapshot stand; None if it is small, ReadError if it is cut."""
     path = plain(snapshot.path)
     stop = path.stat().st_size if snapshot.stop is None else snapshot.stop
     start = snapshot.start + body.start
     _check_size(snapshot, stop - start, len(body.names), count)
     # a row has at least a digit and a blank for each column
-    possible = body.names and 2 * count * len(body.names) <= stop - start
-    if not possible or stop - start < LARGE:
+    if 2 * count * max(len(body.names), 1) > stop - start:
+        with open(path, "rb") as stream:
+            raise _incomplete(snapshot, count, _line_ends(stream, start, stop))
+    if not body.names or stop - start < LARGE:
         return None
     return TextTable(path, start, stop, len(body.names), count)
 
@@ -282,11 +285,23 @@ def _is_complete(stream: IO[bytes], start: int, stop: int) -> bool:
         count = _count("", sections)
     except ReadError:
         return False
-    place, rows = stream.seek(start + body.start), 0
+    return _line_ends(stream, start + body.start, stop) >= count
+
+
+def _line_ends(stream: IO[bytes], start: int, stop: int) -> int:
+    """How many lines end between two bytes, in the memory of a few of them."""
+    place, lines = stream.seek(start), 0
     while place < stop and (piece := stream.read(min(PIECE, stop - place))):
-        rows += piece.count(b"\n")
+        lines += piece.count(b"\n")
         place += len(piece)
-    return rows >= count
+    return lines
+
+
+def _incomplete(snapshot: Snapshot, count: int, lines: int) -> ReadError:
+    return ReadError(
+        f"{snapshot.path}, step {snapshot.step}: the header counts {count} rows, but the file ends "
+        f"after {lines} complete lines: the snapshot is incomplete"
+    )
 
 
 def _sections(where: str, block: bytes) -> tuple[dict[str, list[str]], _Body]:
@@ -326,10 +341,7 @@ def _values(path: Path, snapshot: Snapshot, block: bytes, body: _Body, count: in
         return np.zeros((0, len(body.names)))
     available = block.count(b"\n", body.start)
     if count > available:
-        raise ReadError(
-            f"{path}, step {snapshot.step}: the header counts {count} rows, but the file ends "
-            f"after {available} complete lines: the snapshot is incomplete"
-        )
+        raise _incomplete(snapshot, count, available)
     # a line without an end may lack digits; numpy warns of lines without a word
     rows = BLANK.sub(b"", block[body.start : block.rfind(b"\n") + 1])
     if not rows.strip():
@@ -382,14 +394,5 @@ def _text_columns(block: bytes, body: _Body) -> list[int]:
 def _locate(path: Path, snapshot: Snapshot, block: bytes, body: _Body, reason: str) -> str:
     """A message with the line of the file, from numpy's with the row of the block."""
     reason, row = plain_reason(reason)
-    line = _lines_before(snapshot) + block.count(b"\n", 0, body.start) + 1 + (row or 0)
+    line = lines_above(snapshot) + block.count(b"\n", 0, body.start) + 1 + (row or 0)
     return f"{path}, line {line}: {reason}"
-
-
-def _lines_before(snapshot: Snapshot) -> int:
-    lines, left = 0, snapshot.start
-    with open(plain(snapshot.path), "rb") as stream:
-        while part := stream.read(min(left, HEADER_BYTES)):
-            lines += part.count(b"\n")
-            left -= len(part)
-    return lines

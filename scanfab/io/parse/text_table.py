@@ -25,6 +25,7 @@ from scanfab.base.threads import in_order
 __all__ = [
     "FILLED",
     "LARGE",
+    "LONG",
     "TextTable",
     "parse_rows",
     "parse_some",

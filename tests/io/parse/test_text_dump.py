@@ -330,7 +330,7 @@ def test_a_file_that_was_cut_meanwhile_is_no_endless_search_for_its_lines(tmp_pa
     path.write_text(text[:20])
     with pytest.raises(ReadError, match="the header is incomplete"):
         read_block(second)
-    assert dump._lines_before(second) == text[:20].count("\n")
+    assert dump.lines_above(second) == text[:20].count("\n")
 
 
 @pytest.mark.parametrize("piece", [1, 7, 64, 1000])
