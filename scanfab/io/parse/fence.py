@@ -13,6 +13,7 @@ import os
 import subprocess
 import sys
 import threading
+import time
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
@@ -31,11 +32,15 @@ __all__ = ["fenced", "needed"]
 # seconds for a file, and bytes that are read in one more; and for the process to start
 SECONDS, PER_SECOND = 8.0, 10e6
 SECONDS_TO_START = 120.0
+# for so long a file that the process did not survive is not tried again: to read one takes several
+# questions, and each would take its seconds
+SECONDS_REFUSED = 60.0
 # a file may be unpacked to so many times its size, and a small one to so many bytes
 MOST_UNPACKED, SMALL = 1000, 16 << 20
 # bytes of the libraries themselves
 OWN = 512 << 20
 
+GONE = "its library crashed, or took too long or too much"
 Arrays = dict[str, npt.NDArray[Any]]
 
 
@@ -74,7 +79,7 @@ class _Process:
                 self.process.stdin.flush()
                 return self._answer()
             except (OSError, EOFError, ValueError):
-                raise GoneError("its library crashed, or took too long or too much") from None
+                raise GoneError(GONE) from None
 
     def _answer(self) -> tuple[Arrays, dict[str, Any]]:
         assert self.process.stdout is not None
@@ -122,6 +127,8 @@ def _read(stream: IO[bytes], size: int) -> bytes:
 
 _lock = threading.Lock()
 _running: list[_Process] = []
+# files, as they stood, that the process did not survive, and when
+_deadly: dict[tuple[Path, int, int], float] = {}
 
 
 def needed(path: Path, module: str, extra: str) -> None:
@@ -156,12 +163,14 @@ def fenced(reader: str, file: Path, path: Path, **more: Any) -> tuple[Arrays, di
     ReadError
         If the library cannot read it, crashed, took too long, or would take too much memory.
     """
-    size = file.stat().st_size
+    status = file.stat()
+    size, stamp = status.st_size, (file, status.st_size, status.st_mtime_ns)
     check_memory(path, 2.0 * size)
     most = int(min(MOST_UNPACKED * size + SMALL, free_memory() / 3))
     request = {"reader": reader, "path": str(file.resolve()), "most": most, "own": OWN, **more}
     with _lock:
         try:
+            _refuse_deadly(stamp)
             if not _running:
                 _running.append(_Process())
                 at_end(_end)
@@ -169,6 +178,7 @@ def fenced(reader: str, file: Path, path: Path, **more: Any) -> tuple[Arrays, di
         except FencedError as error:
             if isinstance(error, GoneError):
                 _end()
+                _deadly[stamp] = time.monotonic()
             raise ReadError(f"{path}: cannot be read: {error}") from None
         except (OSError, EOFError, ValueError) as error:
             _end()
@@ -179,6 +189,15 @@ def fenced(reader: str, file: Path, path: Path, **more: Any) -> tuple[Arrays, di
             # interrupted between question and answer: the next one would get this answer
             _end()
             raise
+
+
+def _refuse_deadly(stamp: tuple[Path, int, int]) -> None:
+    """FencedError for a file that the process did not survive a moment ago."""
+    now = time.monotonic()
+    for one in [one for one, when in _deadly.items() if now - when > SECONDS_REFUSED]:
+        del _deadly[one]
+    if stamp in _deadly:
+        raise FencedError(GONE)
 
 
 def _end() -> None:

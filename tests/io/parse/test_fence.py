@@ -27,6 +27,11 @@ def read(path):
     return arrays["x"].tolist()
 
 
+def another(path):
+    """The same file under another name."""
+    return path.rename(path.with_name("b.h5"))
+
+
 def test_arrays_come_through(path):
     assert read(path) == [0, 1, 2, 3, 4]
 
@@ -36,7 +41,7 @@ def test_a_process_that_died_is_told_and_replaced(path):
     fence._running[0].process.send_signal(signal.SIGKILL)
     with pytest.raises(ReadError, match=r"a\.h5: cannot be read: its library crashed"):
         read(path)
-    assert read(path) == [0, 1, 2, 3, 4]
+    assert read(another(path)) == [0, 1, 2, 3, 4]
 
 
 def test_a_process_that_hangs_is_told_and_replaced(path, monkeypatch):
@@ -46,7 +51,30 @@ def test_a_process_that_hangs_is_told_and_replaced(path, monkeypatch):
     with pytest.raises(ReadError, match="took too long"):
         read(path)
     monkeypatch.undo()
+    assert read(another(path)) == [0, 1, 2, 3, 4]
+
+
+def test_what_was_not_survived_is_not_tried_again_at_once(path):
+    read(path)
+    process = fence._running[0].process
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    for _ in range(3):
+        with pytest.raises(ReadError, match=r"a\.h5: cannot be read: its library crashed"):
+            read(path)
+        assert not fence._running  # no process was asked
+    os.utime(path, (0, 0))  # it was written anew
     assert read(path) == [0, 1, 2, 3, 4]
+
+
+def test_after_a_while_it_is_tried_again(path, monkeypatch):
+    read(path)
+    fence._running[0].process.send_signal(signal.SIGKILL)
+    with pytest.raises(ReadError, match="crashed"):
+        read(path)
+    monkeypatch.setattr(fence, "SECONDS_REFUSED", 0.0)
+    assert read(path) == [0, 1, 2, 3, 4]
+    assert not fence._deadly
 
 
 def test_threads_wait_for_each_other(path):
