@@ -26,6 +26,7 @@ from scanfab.io.beside import (
     is_contacts_file,
     is_frame_file,
 )
+from scanfab.io.families import names_a_step
 from scanfab.io.files import COMPRESSED_SUFFIXES, bare_name
 from scanfab.io.opening import READING, read_series
 from scanfab.io.options import parse_frames
@@ -209,8 +210,9 @@ def save_packing(packing: Packing, path: Path, writer: Writer | None = None) -> 
         left = writer.write(packing, part)
         if left.contacts and packing.contacts is not None:
             beside[contacts_file(path)] = contacts_csv(packing)
-        if left.frame:
-            beside[frame_file(path)] = frame_csv(packing)
+        is_numbered = left.no_step and packing.step is None and names_a_step(path)
+        if left.frame or is_numbered or contacts_file(path) in beside:
+            beside[frame_file(path)] = frame_csv(packing, with_contacts=left.contacts)
         if left.columns:
             beside[columns_file(path)] = columns_csv(packing, _columns(packing, left.columns))
         behind = _left_behind(path, set(beside))
@@ -258,7 +260,7 @@ def _is_shared(
     if columns_file(path) in there:
         own[columns_file(path)] = _same_columns(packing, columns_file(path))
     own |= beside
-    lost = [file.name for file in there if file.read_bytes() != own.get(file)]
+    lost = sorted(file.name for file in there if file.read_bytes() != own.get(file))
     if lost:
         raise SettingsError(
             f"{path}: {other.name} of the same name lies there, whose {' and '.join(lost)} would "

@@ -21,6 +21,7 @@ __all__ = [
     "contacts_beside",
     "families_beside",
     "files_in",
+    "names_a_step",
     "nearest",
     "own_contacts",
     "set_tables_aside",
@@ -251,6 +252,11 @@ def _kinship(one: Family, two: Family) -> tuple[int, bool]:
     words = list(zip(_stem(one), _stem(two), strict=False))
     common = next((k for k, (a, b) in enumerate(words) if a != b), len(words))
     return common, _ending(one) == _ending(two)
+
+
+def names_a_step(file: Path) -> bool:
+    """Whether a number in a file's name is taken for its step, if the file has none itself."""
+    return bool(_numbers(file))
 
 
 @lru_cache(1 << 16)

@@ -95,6 +95,8 @@ class Snapshot:
     """Where it starts in the (decompressed) file, in bytes."""
     stop: int | None = None
     """Where it ends; None: the end of the file."""
+    stepless: bool = False
+    """Whether the file says that there is no step, so that a number in its name is none."""
 
 
 class GrainTable(NamedTuple):

@@ -17,6 +17,8 @@ class Left(NamedTuple):
     """Pairs, images and forces, into ``STEM.contacts.csv``."""
     frame: bool = False
     """Cell, step and time, into ``STEM.frame.csv``."""
+    no_step: bool = True
+    """That there is no step, likewise, if a number in the name would be taken for one."""
     columns: tuple[str, ...] = ()
     """Columns of the grains, into ``STEM.columns.csv``."""
     notes: tuple[str, ...] = ()
