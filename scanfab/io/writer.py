@@ -17,12 +17,12 @@ class Left(NamedTuple):
     """Pairs, images and forces, into ``STEM.contacts.csv``."""
     frame: bool = False
     """Cell, step and time, into ``STEM.frame.csv``."""
-    no_step: bool = True
-    """That there is no step, likewise, if a number in the name would be taken for one."""
     columns: tuple[str, ...] = ()
     """Columns of the grains, into ``STEM.columns.csv``."""
     notes: tuple[str, ...] = ()
     """What lies nowhere, or in another way than it was, in sentences."""
+    no_step: bool = True
+    """That there is no step, into ``STEM.frame.csv`` if its name has a number to take for one."""
 
 
 class Writer(Protocol):
