@@ -170,6 +170,7 @@ def _packings(source: Any, chosen: slice, reading: dict[str, Any]) -> Iterator[t
     elif reading:
         raise SettingsError(f"`{next(iter(reading))}` is for files that are yet to be read")
     if isinstance(source, Series):
+        _tell_left_out(source)
         part = source[chosen]
         return ((frame.number, frame.read()) for frame in part)
     packings = [source] if isinstance(source, Packing) else source
@@ -180,6 +181,21 @@ def _packings(source: Any, chosen: slice, reading: dict[str, Any]) -> Iterator[t
         # counted from the end, which has to come first
         return iter(list(_numbered(packings))[chosen])
     return islice(_numbered(packings), *bounds)
+
+
+def _tell_left_out(series: Series) -> None:
+    """A note for each kind of contact files: contacts have no columns but those of a packing."""
+    for family in series.contacts:
+        ask = getattr(family.reader, "left_out", None)
+        file = next(iter(family.files.values()))
+        names = ["whatever else stands there"] if ask is None else ask(file)
+        if names:
+            warnings.warn(
+                f"{family.pattern}: contacts are kept as pairs, images and forces; left out: "
+                f"{', '.join(names)}",
+                ScanfabNote,
+                stacklevel=3,
+            )
 
 
 def _numbered(packings: Iterable[Any]) -> Iterator[tuple[int, Packing]]:

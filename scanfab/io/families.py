@@ -156,14 +156,16 @@ def set_tables_aside(
     grains : Family, optional
         Those that are sure, if the families are others.
     """
+    own = [] if grains is None else [grains]
     sure = [
         family
-        for family in [*families, *([] if grains is None else [grains])]
+        for family in [*families, *own]
         if family.kind in ("grains", "index") and not _is_table(family)
     ]
     if not sure:
         return list(families)
-    stems = {bare_name(file).rpartition(".")[0] for one in sure for file in one.files.values()}
+    files = [file for one in [*sure, *own] for file in one.files.values()]
+    stems = {bare_name(file).rpartition(".")[0] for file in files}
     return [
         family
         if not _is_table(family)

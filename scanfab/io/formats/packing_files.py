@@ -97,6 +97,10 @@ class PackingReader(NpzWriter):
         grains = grain_table(path, {**columns, **own}, _cell(path, arrays), options)
         return grains._replace(contacts=_contacts(path, arrays))
 
+    def left_out(self, path: Path) -> list[str]:
+        """Of what scanfab writes nothing."""
+        return []
+
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
     ) -> JoinedContacts:

@@ -36,6 +36,8 @@ from scanfab.io.formats.table_names import (
     check_one_unit,
     find_columns,
     is_contacts,
+    is_of_contacts,
+    unique,
 )
 from scanfab.io.formats.table_proof import TOO_FEW, touch
 from scanfab.io.formats.xyzd import is_xyzd, prove_xyzd
@@ -153,6 +155,15 @@ class TableReader:
             if name not in columns:
                 raise ReadError(f"{path}: expected numbers in the column {name}, which is empty")
         return join_table(path, grains, {what: columns[name] for what, name in found.items()})
+
+    def left_out(self, path: Path) -> list[str]:
+        """The columns of a table of contacts that no packing has a place for."""
+        names, _ = names_of(path, self.options.skip)
+        if names is None:
+            return []
+        found = self._find(path, names, contacts=True)
+        used = {own for what, own in found.items() if is_of_contacts(what)}
+        return [name for name in unique(names) if name not in used]
 
     def _find(self, path: Path, names: Sequence[str], *, contacts: bool) -> dict[str, str]:
         """The columns of grains, or those of contacts, by what they are."""

@@ -18,6 +18,7 @@ __all__ = [
     "check_one_unit",
     "find_columns",
     "is_contacts",
+    "is_of_contacts",
     "unique",
 ]
 
@@ -103,6 +104,11 @@ def unique(names: Sequence[str]) -> list[str]:
         name if name and name not in names[:place] else f"{place + 1}"
         for place, name in enumerate(names)
     ]
+
+
+def is_of_contacts(standard: str) -> bool:
+    """Whether a column says something of a contact that a packing has: its grains, image, force."""
+    return standard in (*IDS, "kind", "ix", "iy", "iz") or standard.startswith("f")
 
 
 def is_contacts(found: Mapping[str, str]) -> bool:
