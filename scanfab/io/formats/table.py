@@ -38,6 +38,7 @@ from scanfab.io.formats.table_names import (
     is_contacts,
     is_of_contacts,
     unique,
+    warn_of_lacking_unit,
 )
 from scanfab.io.formats.table_proof import TOO_FEW, touch
 from scanfab.io.formats.xyzd import is_xyzd, prove_xyzd
@@ -127,6 +128,7 @@ class TableReader:
         columns = read_table(path, options.skip, *_needed(found))
         if names is not None:
             _refuse_frames(path, columns)
+            warn_of_lacking_unit(path, found)
         if is_xyzd(path) and not options.columns:
             prove_xyzd(path, columns)
         if "volume" in found and not found.keys() & {"radius", "diameter"}:
@@ -172,8 +174,9 @@ class TableReader:
             return find_columns(path, names, self.names, pairs, "contact_columns")
         named = self.options.columns
         found = find_columns(path, names, self.names, named, "columns")
-        if "diameter" in named and "radius" not in named:
-            found.pop("radius", None)
+        for size, other in (("diameter", "radius"), ("radius", "diameter")):
+            if size in named and other not in named:
+                found.pop(other, None)
         return found
 
     def _kind_of(self, path: Path, names: Sequence[str]) -> FileKind:
@@ -256,7 +259,8 @@ def _named_contacts(path: Path, text: str | None) -> dict[str, str]:
     if text is None:
         return {}
     pairs = [part.partition("=") for part in text.split(",")]
-    if not all(key.strip() and equals and own.strip() for key, equals, own in pairs):
+    is_sound = all(key.strip() and equals and own.strip() for key, equals, own in pairs)
+    if not is_sound or len({key.strip() for key, _, _ in pairs}) < len(pairs):
         raise ReadError(
             f"{path}: `contact_columns`: expected id1=NAME,id2=NAME, and fx1, fy1, fz1 or fx2, "
             f"fy2, fz2 for the force on the first or second grain, found {text!r}"
