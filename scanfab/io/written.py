@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from scanfab.io.bodies import numbers_in_columns
 from scanfab.io.formats.columns import DIAMETER_NAMES
-from scanfab.io.formats.sizes import other_size
 from scanfab.io.reader import BODIES, WALLS
+from scanfab.io.sizes import other_size
 from scanfab.packing.bodies import bodies_of
 from scanfab.packing.packing import Packing
 

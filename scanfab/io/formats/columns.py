@@ -13,9 +13,9 @@ import numpy.typing as npt
 from scanfab.base.errors import ReadError
 from scanfab.base.lengths import all_within
 from scanfab.base.typing import FloatArray
-from scanfab.io.formats.sizes import refuse_other_size
 from scanfab.io.formats.superquadrics import refuse_superquadrics
 from scanfab.io.reader import BODIES, WALLS, GrainTable, ReadOptions
+from scanfab.io.sizes import refuse_other_size
 from scanfab.packing.bodies import CLUMP_COLUMNS, MOLECULE_COLUMNS
 from scanfab.packing.boundary import CLASS_COLUMNS
 from scanfab.packing.cell import Cell

@@ -7,7 +7,7 @@ import pytest
 
 import scanfab
 from scanfab.base.errors import ReadError
-from scanfab.io.formats.sizes import other_size
+from scanfab.io.sizes import other_size
 from scanfab.io.writers.registry import installed_writers
 from tests.helpers.dumps import write
 
