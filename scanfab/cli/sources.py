@@ -78,7 +78,7 @@ def open_series(sources: tuple[str, ...], reading: dict[str, Any]) -> list[Serie
         raise click.UsageError("standard input needs --format NAME")
     if len(sources) > 1:
         raise click.UsageError("standard input is a series of its own: name no other source")
-    copy = temporary_copy(sys.stdin.buffer, "standard-input")
+    copy = temporary_copy(sys.stdin.buffer, "standard input")
     if copy.stat().st_size == 0:
         raise ReadError("standard input: expected a dump, found nothing")
     return [replace(read_series(copy, **reading), name="-")]

@@ -120,7 +120,9 @@ def _listening(show: Callable[[str], None] | None) -> Iterator[_Latest]:
 
 
 def _say(text: str) -> None:
-    click.echo(f"scanfab: {text}", err=True)
+    from scanfab.io.files import without_temporary
+
+    click.echo(f"scanfab: {without_temporary(text)}", err=True)
 
 
 class _Work:

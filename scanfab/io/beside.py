@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import csv
 import io
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -19,12 +20,13 @@ from scanfab.base.errors import PackingError, ReadError
 from scanfab.io.files import bare_name, check_memory, first_bytes, plain
 from scanfab.io.formats.columns import whole_numbers
 from scanfab.io.formats.join import join_ids
-from scanfab.io.reader import BODIES, WALLS, GrainTable, JoinedContacts
+from scanfab.io.reader import BODIES, WALLS, GrainTable, JoinedContacts, Snapshot
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 
 __all__ = [
     "FrameData",
+    "check_contacts_are_there",
     "columns_csv",
     "columns_file",
     "contacts_csv",
@@ -48,6 +50,8 @@ FORCE_N = ("fn",)
 CONTACTS = tuple(",".join((*IDS, *IMAGE, *force)) for force in ((), FORCE, FORCE_N))
 VECTORS = tuple(f"{vector}{axis}" for vector in "abco" for axis in "xyz")
 FRAME = ",".join(("step", "time", *VECTORS, "periodic"))
+# how many there are, which earlier versions did not write
+COUNTED = f"{FRAME},grains,contacts"
 # letters by which it is known, also where the rest is missing
 FRAME_WORDS = len("step,time,ax,")
 # the first column of columns, which no other file has
@@ -57,11 +61,18 @@ OF_TEXT = 12.0
 
 
 class FrameData(NamedTuple):
-    """Cell, step and time of a frame."""
+    """Cell, step and time of a frame, and how much there is of it."""
 
     step: int | None
     time: float | None
     cell: Cell | None
+    grains: int | None
+    contacts: int | None
+    """None: it does not say; no contacts need lie beside."""
+
+    def moment_of(self, snapshot: Snapshot) -> Snapshot:
+        """The snapshot at this step and time; without a step the number in its name is none."""
+        return replace(snapshot, step=self.step, time=self.time, stepless=self.step is None)
 
 
 def _named(path: Path, what: str) -> Path:
@@ -114,8 +125,8 @@ def contacts_csv(packing: Packing) -> bytes:
     return _csv(dict(zip(named, [*ids.T, *contacts.image.T, *force], strict=True)))
 
 
-def frame_csv(packing: Packing) -> bytes:
-    """Cell, step and time of a packing."""
+def frame_csv(packing: Packing, *, with_contacts: bool = True) -> bytes:
+    """Cell, step and time of a packing, its number of grains, and of the contacts beside."""
     cell = packing.cell
     numbers = [""] * len(VECTORS)
     along = ""
@@ -124,7 +135,9 @@ def frame_csv(packing: Packing) -> bytes:
         along = "".join(x for x, repeats in zip("xyz", cell.periodic, strict=True) if repeats)
     step = "" if packing.step is None else str(packing.step)
     time = "" if packing.time is None else repr(packing.time)
-    return f"{FRAME}\n{','.join((step, time, *numbers, along))}\n".encode()
+    contacts = packing.contacts if with_contacts else None
+    counts = str(len(packing)), "" if contacts is None else str(len(contacts))
+    return f"{COUNTED}\n{','.join((step, time, *numbers, along, *counts))}\n".encode()
 
 
 def columns_csv(packing: Packing, columns: dict[str, npt.NDArray[Any]]) -> bytes:
@@ -149,7 +162,8 @@ def read_contacts(path: Path, grains: GrainTable) -> JoinedContacts:
     Raises
     ------
     ReadError
-        If a line is not as it should be, or names a grain that does not exist.
+        If a line is not as it should be, or names a grain that does not exist; or if there are
+        fewer or more than the file of the frame beside it says.
     """
     if _first_line(path) not in CONTACTS:
         raise ReadError(f"{path}: expected one of the lines {'; '.join(CONTACTS)}")
@@ -167,6 +181,9 @@ def read_contacts(path: Path, grains: GrainTable) -> JoinedContacts:
             table = np.loadtxt(io.BytesIO(rows), kinds, delimiter=",", ndmin=1, comments=None)
         except (ValueError, OverflowError) as error:
             raise ReadError(f"{path}: expected numbers as {', '.join(names)}: {error}") from None
+    told = read_frame(_grains_of(path))
+    if told is not None:
+        _check_count(path, len(table), "contacts", told.contacts, frame_file(_grains_of(path)))
     ids = np.column_stack([table[name] for name in IDS])
     image = np.column_stack([table[name] for name in IMAGE])
     force = force_n = None
@@ -177,6 +194,50 @@ def read_contacts(path: Path, grains: GrainTable) -> JoinedContacts:
     if grains.id is None:
         grains = grains._replace(id=np.arange(len(grains.radius)))
     return join_ids(path, grains, ids, force, walls=False, image=image, force_n=force_n)
+
+
+def _grains_of(contacts: Path) -> Path:
+    """A file of grains that these contacts lie beside."""
+    return contacts.with_name(f"{bare_name(contacts).removesuffix('.contacts.csv')}.csv")
+
+
+def _check_count(path: Path, found: int, what: str, expected: int | None, frame: Path) -> None:
+    """ReadError if a file has lost rows on its way, or belongs to another frame."""
+    if expected not in (None, found):
+        raise ReadError(
+            f"{path}: holds {found} {what}, expected {expected} by {frame.name} beside it: it was "
+            f"cut, or belongs to another frame (rows that you took out yourself: empty that number)"
+        )
+
+
+def check_contacts_are_there(path: Path, told: FrameData | None) -> None:
+    """
+    Whether grains that are read without contacts have none beside them that are lost.
+
+    Parameters
+    ----------
+    path : Path
+        The file of grains.
+    told : FrameData, optional
+        What lies beside it.
+
+    Raises
+    ------
+    ReadError
+        If the file of its contacts is empty, or is not there although there were some.
+    """
+    file = contacts_file(path)
+    is_there = file.is_file()
+    expected = None if told is None else told.contacts
+    if expected is None and not (is_there and file.stat().st_size == 0):
+        return
+    found = "something else" if is_there else "no such file"
+    if is_there and file.stat().st_size == 0:
+        found = "an empty file"
+    raise ReadError(
+        f"{file}: expected the {'' if expected is None else f'{expected} '}contacts of "
+        f'{path.name}, found {found}: copy it again, or choose `contacts="geometric"`'
+    )
 
 
 def read_frame(path: Path) -> FrameData | None:
@@ -194,14 +255,16 @@ def read_frame(path: Path) -> FrameData | None:
     text = first_bytes(file, 1 << 14).decode("utf-8", "replace")
     rows = list(csv.reader(text.splitlines()))
     try:
-        if ",".join(rows[0]) != FRAME:
-            raise ValueError(f"expected the line {FRAME}")
+        if ",".join(rows[0]) not in (FRAME, COUNTED):
+            raise ValueError(f"expected the line {COUNTED}")
         if len(rows) != 2 or len(rows[1]) != len(rows[0]) or not text.endswith("\n"):
             raise ValueError("expected one row")
         words = dict(zip(rows[0], rows[1], strict=True))
-        step = int(words["step"]) if words["step"] else None
+        step, grains, contacts = (
+            int(words[name]) if words.get(name) else None for name in ("step", "grains", "contacts")
+        )
         time = float(words["time"]) if words["time"] else None
-        return FrameData(step, time, _cell(words))
+        return FrameData(step, time, _cell(words), grains, contacts)
     except (ValueError, PackingError) as error:
         raise ReadError(f"{file}: cannot be read as cell, step and time: {error}") from None
 
@@ -216,15 +279,18 @@ def _cell(words: dict[str, str]) -> Cell | None:
     return Cell(numbers[:3], ("x" in along, "y" in along, "z" in along), numbers[3])
 
 
-def with_columns(path: Path, grains: GrainTable) -> GrainTable:
+def with_columns(path: Path, grains: GrainTable, told: FrameData | None) -> GrainTable:
     """
     Grains with the columns that lie beside their file.
 
     Raises
     ------
     ReadError
-        If these are of other grains, or damaged.
+        If these are of other grains, or damaged; or if there are fewer or more grains than lies
+        beside.
     """
+    if told is not None:
+        _check_count(path, len(grains.radius), "grains", told.grains, frame_file(path))
     file = columns_file(path)
     if not file.is_file() or not is_columns_file(file):
         return grains

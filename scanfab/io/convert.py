@@ -26,6 +26,7 @@ from scanfab.io.beside import (
     is_contacts_file,
     is_frame_file,
 )
+from scanfab.io.families import names_a_step
 from scanfab.io.files import COMPRESSED_SUFFIXES, bare_name
 from scanfab.io.opening import READING, read_series
 from scanfab.io.options import parse_frames
@@ -169,6 +170,7 @@ def _packings(source: Any, chosen: slice, reading: dict[str, Any]) -> Iterator[t
     elif reading:
         raise SettingsError(f"`{next(iter(reading))}` is for files that are yet to be read")
     if isinstance(source, Series):
+        _tell_left_out(source)
         part = source[chosen]
         return ((frame.number, frame.read()) for frame in part)
     packings = [source] if isinstance(source, Packing) else source
@@ -179,6 +181,21 @@ def _packings(source: Any, chosen: slice, reading: dict[str, Any]) -> Iterator[t
         # counted from the end, which has to come first
         return iter(list(_numbered(packings))[chosen])
     return islice(_numbered(packings), *bounds)
+
+
+def _tell_left_out(series: Series) -> None:
+    """A note for each kind of contact files: contacts have no columns but those of a packing."""
+    for family in series.contacts:
+        ask = getattr(family.reader, "left_out", None)
+        file = next(iter(family.files.values()))
+        names = ["whatever else stands there"] if ask is None else ask(file)
+        if names:
+            warnings.warn(
+                f"{family.pattern}: contacts are kept as pairs, images and forces; left out: "
+                f"{', '.join(names)}",
+                ScanfabNote,
+                stacklevel=3,
+            )
 
 
 def _numbered(packings: Iterable[Any]) -> Iterator[tuple[int, Packing]]:
@@ -209,8 +226,9 @@ def save_packing(packing: Packing, path: Path, writer: Writer | None = None) -> 
         left = writer.write(packing, part)
         if left.contacts and packing.contacts is not None:
             beside[contacts_file(path)] = contacts_csv(packing)
-        if left.frame:
-            beside[frame_file(path)] = frame_csv(packing)
+        is_numbered = left.no_step and packing.step is None and names_a_step(path)
+        if left.frame or is_numbered or contacts_file(path) in beside:
+            beside[frame_file(path)] = frame_csv(packing, with_contacts=left.contacts)
         if left.columns:
             beside[columns_file(path)] = columns_csv(packing, _columns(packing, left.columns))
         behind = _left_behind(path, set(beside))
@@ -258,7 +276,7 @@ def _is_shared(
     if columns_file(path) in there:
         own[columns_file(path)] = _same_columns(packing, columns_file(path))
     own |= beside
-    lost = [file.name for file in there if file.read_bytes() != own.get(file)]
+    lost = sorted(file.name for file in there if file.read_bytes() != own.get(file))
     if lost:
         raise SettingsError(
             f"{path}: {other.name} of the same name lies there, whose {' and '.join(lost)} would "

@@ -21,6 +21,7 @@ __all__ = [
     "contacts_beside",
     "families_beside",
     "files_in",
+    "names_a_step",
     "nearest",
     "own_contacts",
     "set_tables_aside",
@@ -155,14 +156,16 @@ def set_tables_aside(
     grains : Family, optional
         Those that are sure, if the families are others.
     """
+    own = [] if grains is None else [grains]
     sure = [
         family
-        for family in [*families, *([] if grains is None else [grains])]
+        for family in [*families, *own]
         if family.kind in ("grains", "index") and not _is_table(family)
     ]
     if not sure:
         return list(families)
-    stems = {bare_name(file).rpartition(".")[0] for one in sure for file in one.files.values()}
+    files = [file for one in [*sure, *own] for file in one.files.values()]
+    stems = {bare_name(file).rpartition(".")[0] for file in files}
     return [
         family
         if not _is_table(family)
@@ -251,6 +254,11 @@ def _kinship(one: Family, two: Family) -> tuple[int, bool]:
     words = list(zip(_stem(one), _stem(two), strict=False))
     common = next((k for k, (a, b) in enumerate(words) if a != b), len(words))
     return common, _ending(one) == _ending(two)
+
+
+def names_a_step(file: Path) -> bool:
+    """Whether a number in a file's name is taken for its step, if the file has none itself."""
+    return bool(_numbers(file))
 
 
 @lru_cache(1 << 16)

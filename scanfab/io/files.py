@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import shutil
 import tempfile
 from collections import OrderedDict
@@ -36,6 +37,7 @@ __all__ = [
     "plain",
     "temporary_copy",
     "unpacked",
+    "without_temporary",
 ]
 
 # decompressed copies of the files used last, for each thread that reads: a frame needs few
@@ -45,6 +47,8 @@ PART = 4 << 20
 RESERVE = 1 << 30
 # a copy up to this size is no reason to ask how full the disk is
 SMALL = 64 << 20
+# of the folder that holds the copies of a process
+PREFIX = "scanfab-"
 # path, time and size of a file
 _Key = tuple[str, int, int]
 _copies: OrderedDict[_Key, Path] = OrderedDict()
@@ -178,11 +182,26 @@ def temporary_copy(stream: Readable, name: str) -> Path:
     return copy
 
 
+def without_temporary(text: str) -> str:
+    """
+    A text in which temporary copies go by the names of what they are copies of.
+
+    Examples
+    --------
+    >>> from io import BytesIO
+    >>> from scanfab.io.files import temporary_copy, without_temporary
+    >>> without_temporary(f"{temporary_copy(BytesIO(), 'standard input')}: no grains")
+    'standard input: no grains'
+    """
+    folder = re.escape(os.path.join(_temporary(), PREFIX))
+    return re.sub(rf"{folder}\w+[/\\]tmp\w+[/\\]", "", text)
+
+
 def _new_folder(name: str) -> Path:
     """An empty folder for the copy of this name."""
     with _of_copy(name):
         if not _folder:
-            _folder.append(tempfile.mkdtemp(prefix="scanfab-"))
+            _folder.append(tempfile.mkdtemp(prefix=PREFIX))
             at_end(_remove_copies)
         return Path(tempfile.mkdtemp(dir=_folder[0]))
 

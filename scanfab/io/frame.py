@@ -13,7 +13,13 @@ import numpy as np
 
 from scanfab.base.errors import PackingError, ReadError, ScanfabNote, ScanfabWarning
 from scanfab.base.typing import FloatArray
-from scanfab.io.beside import frame_file, is_contacts_file, read_frame, with_columns
+from scanfab.io.beside import (
+    check_contacts_are_there,
+    frame_file,
+    is_contacts_file,
+    read_frame,
+    with_columns,
+)
 from scanfab.io.bodies import body_numbers
 from scanfab.io.families import Family, nearest
 from scanfab.io.reader import (
@@ -120,7 +126,9 @@ class Frame:
             return self._packing(options)
 
     def _packing(self, options: ReadOptions) -> Packing:
-        grains = with_columns(self.snapshot.path, self.reader.read_grains(self.snapshot, options))
+        path = self.snapshot.path
+        told = read_frame(path)
+        grains = with_columns(path, self.reader.read_grains(self.snapshot, options), told)
         with_own = self.series.contacts_from in ("auto", "beside", "grains")
         own = grains.contacts if with_own else None
         beside = self.series.contacts_from == "beside"
@@ -128,19 +136,20 @@ class Frame:
         listed = [part.contacts for part in joined if part.contacts is not None]
         if own is not None:
             listed.append(own)
+        if not listed and self.series.contacts_from in ("auto", "beside", "grains"):
+            check_contacts_are_there(path, told)
         if self.series.contacts_from == "grains" and not listed:
             raise ReadError(
-                f'{self.snapshot.path}: `contacts="file"` was asked for, but there is no '
-                "contact file"
+                f'{path}: `contacts="file"` was asked for, but there is no contact file'
             )
         with_walls = with_own or self._are_walls_with_grains(grains)
-        with _named(self.snapshot.path):
+        with _named(path):
             return Packing(
                 grains.position,
                 grains.radius,
                 id=grains.id,
                 columns=grains.columns,
-                bodies=body_numbers(self.snapshot.path, grains, options.bodies),
+                bodies=body_numbers(path, grains, options.bodies),
                 contacts=listed[0] if listed else None,
                 wall_contacts=_wall_contacts(grains, joined, with_walls),
                 wall_forces=_wall_forces(grains, joined, with_walls),
@@ -239,8 +248,9 @@ class Frame:
 
     @property
     def step(self) -> int | None:
-        """That of the dump, else the one in the file's name."""
-        return self.name_step if self.snapshot.step is None else self.snapshot.step
+        """That of the dump, else the one in the file's name, unless the dump says it has none."""
+        from_name = None if self.snapshot.stepless else self.name_step
+        return from_name if self.snapshot.step is None else self.snapshot.step
 
     @property
     def carries(self) -> Carries:
@@ -286,8 +296,9 @@ class Frame:
         if not found and series.contacts:
             patterns = ", ".join(family.pattern for family in series.contacts)
             moment = f"step {self.step}"
-            if self.step is None and self.snapshot.time is not None:
-                moment = f"time {self.snapshot.time:g}"
+            if self.step is None:
+                time = self.snapshot.time
+                moment = f"frame {self.number}" if time is None else f"time {time:g}"
             message = f"{self.snapshot.path}: no contact file for {moment} among {patterns}"
             if series.contacts_from == "path":
                 raise ReadError(message)

@@ -47,7 +47,7 @@ def snapshots_of(reader: Reader, path: Path) -> list[Snapshot]:
     size = path.stat().st_size
     plain = all(type(one) is Snapshot and one.path == path for one in snapshots)
     if plain and max((one.stop or 0 for one in snapshots), default=0) == size:
-        rows = [(one.step, one.time, one.start, one.stop) for one in snapshots]
+        rows = [(one.step, one.time, one.start, one.stop, one.stepless) for one in snapshots]
         with suppress(OSError):
             make_private(kept.parent)
             write_kept(kept, json.dumps({"stamp": stamp, "snapshots": rows}).encode())

@@ -213,6 +213,13 @@ def _series(
                 f'{name}: `contacts="file"` was asked for, but there is no contact file'
             )
         return series((), "grains")
+    if not own and options.contact_columns and not getattr(grains.reader, "lists_contacts", False):
+        warnings.warn(
+            f"{name}: `contact_columns` are named, but there is no file of contacts with such "
+            f"columns: contacts are found by geometry",
+            ScanfabWarning,
+            stacklevel=3,
+        )
     return series(own, "path" if contacts == "file" else "beside" if beside else "auto")
 
 

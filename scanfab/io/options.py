@@ -52,6 +52,8 @@ def parse_columns(name: str, value: Any) -> dict[str, str] | None:
         standard, equals, own = part.partition("=")
         if not (equals and standard.strip() and own.strip()):
             raise unusable(name, 'NAME=COLUMN such as "radius=c_rad,x=px"', part)
+        if standard.strip() in names:
+            raise unusable(name, f"one column as {standard.strip()}", value)
         names[standard.strip()] = own.strip()
     return names
 

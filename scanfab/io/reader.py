@@ -95,6 +95,8 @@ class Snapshot:
     """Where it starts in the (decompressed) file, in bytes."""
     stop: int | None = None
     """Where it ends; None: the end of the file."""
+    stepless: bool = False
+    """Whether the file says that there is no step, so that a number in its name is none."""
 
 
 class GrainTable(NamedTuple):
@@ -145,7 +147,9 @@ class Reader(Protocol):
     lists a file, or None: in a folder the listed ones are no frames. One that cannot
     know what a file holds without what users tell of it (the columns of a table) has a method
     ``told(options)`` that answers with a reader that does know. One of tables that may hold
-    anything says ``is_table = True``: in a folder they count only where there are no dumps.
+    anything says ``is_table = True``: in a folder they count only where there are no dumps. One
+    whose contact files have columns that no packing has a place for may have a method
+    ``left_out(path)`` that answers with their names, for ``convert`` to tell.
     """
 
     name: str

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 from typing import Any, Literal, SupportsIndex, overload
@@ -257,9 +257,8 @@ class Series:
         try:
             with unpacking_up_to(self.options.max_unpacked):
                 snapshots = snapshots_of(self.grains.reader, path)
-            told = read_frame(path) if len(snapshots) == 1 else None
-            if told is not None:
-                snapshots = [replace(snapshots[0], step=told.step, time=told.time)]
+            if len(snapshots) == 1 and (told := read_frame(path)) is not None:
+                snapshots = [told.moment_of(snapshots[0])]
         except ReadError as error:
             stamp, snapshots, problem = None, [Snapshot(path)], error
         self._met[path] = stamp, snapshots

@@ -21,6 +21,8 @@ class Left(NamedTuple):
     """Columns of the grains, into ``STEM.columns.csv``."""
     notes: tuple[str, ...] = ()
     """What lies nowhere, or in another way than it was, in sentences."""
+    no_step: bool = True
+    """That there is no step, into ``STEM.frame.csv`` if its name has a number to take for one."""
 
 
 class Writer(Protocol):

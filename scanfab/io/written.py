@@ -10,7 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.io.bodies import numbers_in_columns
+from scanfab.io.formats.columns import DIAMETER_NAMES
 from scanfab.io.reader import BODIES, WALLS
+from scanfab.io.sizes import other_size
 from scanfab.packing.bodies import bodies_of
 from scanfab.packing.packing import Packing
 
@@ -83,7 +85,8 @@ def own_columns(packing: Packing) -> tuple[Columns, list[str]]:
         if plain.dtype.kind not in "biufU":
             notes.append(f"the column {name} is left out: it holds {plain.dtype}")
             continue
-        free = _free_name(name, [*found, *packing.columns])
+        disagrees = name.lower() in DIAMETER_NAMES and other_size(packing.radius, plain) is not None
+        free = _free_name(name, [*found, *packing.columns], is_taken=disagrees)
         if free != name:
             notes.append(f"the column {name} is called {free}: {name} is what grains are read from")
         found[free] = plain
@@ -94,9 +97,9 @@ def _text(value: Any) -> str:
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 
-def _free_name(name: str, used: Iterable[str]) -> str:
+def _free_name(name: str, used: Iterable[str], *, is_taken: bool) -> str:
     plain = re.sub(r"[^a-z0-9]", "", name.lower())
-    if plain not in TAKEN and name not in (BODIES, WALLS):
+    if not is_taken and plain not in TAKEN and name not in (BODIES, WALLS):
         return name
     free = f"{name}_of_dump"
     while free in used:

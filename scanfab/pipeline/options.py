@@ -8,6 +8,7 @@ from pathlib import Path
 from scanfab.base.column import DEFAULT_DIGITS
 from scanfab.base.errors import SettingsError
 from scanfab.base.option import Option, options_of
+from scanfab.io.files import without_temporary
 from scanfab.io.options import READING_OPTIONS
 from scanfab.pipeline.maps.settings import MapSettings
 from scanfab.pipeline.settings import Settings
@@ -174,6 +175,7 @@ def as_options(told: str | Exception) -> str:
     """
     What the library tells, which speaks of its arguments, in the words of the command line.
 
+    What came by standard input is called that, and not by the file that it was copied to.
     The argument whose value is wrong stands in front of a SettingsError. Any other text may begin
     with the name of a file, which may be that of an option too.
 
@@ -183,7 +185,7 @@ def as_options(told: str | Exception) -> str:
     >>> as_options('choose another `rv_center`, or name the `cell=(LX, LY, LZ)`')
     'choose another --rv-center, or name the --cell LX LY LZ'
     """
-    text = str(told)
+    text = without_temporary(str(told))
     if isinstance(told, SettingsError):
         text = re.sub(rf"^({NAMES}): ", r"`\1`: ", text)
     return re.sub(rf"`({NAMES})(?:=([^`]*))?`", _as_option, text)

@@ -52,7 +52,7 @@ def check_writer(
             continue
         own = folder / f"{number}"
         own.mkdir()
-        path = own / f"packing{writer.extensions[0]}"
+        path = own / f"packing_7{writer.extensions[0]}"
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ScanfabNote)
             save_packing(packing, path, writer)

@@ -346,3 +346,34 @@ def test_contacts_cut_within_their_first_line_are_an_error(tmp_path):
     (tmp_path / "a.contacts.csv").write_text("id1,id2,ix,iy,iz")
     with pytest.raises(ReadError, match="the last line has no end"):
         scanfab.read(tmp_path / "a.xyz")
+
+
+def notes(source, out, **reading):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        scanfab.convert(source, out, **reading)
+    return [str(one.message) for one in caught if "left out" in str(one.message)]
+
+
+def test_columns_of_contacts_that_have_no_place_are_named_once(tmp_path):
+    for step in (1, 2):
+        write(tmp_path / f"g{step}.csv", "id,x,y,z,radius\n1,0,0,0,1\n2,1.9,0,0,1\n")
+        write(tmp_path / f"g{step}.contacts.csv", "id1,id2,fn,area,x,fn2\n1,2,3.5,7,8,1\n")
+    source = scanfab.read_series([tmp_path / f"g{step}.csv" for step in (1, 2)])
+    (told,) = notes(source, tmp_path / "{step}.npz")
+    assert told.endswith("*.contacts.csv: contacts are kept as pairs, images and forces; left out: "
+                         "area, x, fn2")  # fmt: skip
+    assert scanfab.read(tmp_path / "2.npz").contacts.force_n == [3.5]
+    # what is used, by whatever name, is not left out; nor is anything of contacts that are not read
+    named = {"contact_columns": "id1=id1,id2=id2,fn=fn2"}
+    (told,) = notes(tmp_path / "g1.csv", tmp_path / "a.npz", **named)
+    assert told.endswith("left out: fn, area, x")
+    assert notes(tmp_path / "g1.csv", tmp_path / "a.npz", contacts="geometric") == []
+
+
+def test_of_other_contact_files_it_is_told_that_there_may_be_more(tmp_path):
+    source = series(tmp_path / "dumps")
+    (told,) = notes(source, tmp_path / "out", to="csv")
+    assert "pairs_*.txt: contacts are kept as pairs, images and forces" in told
+    # what scanfab writes has nothing else
+    assert notes(tmp_path / "out", tmp_path / "again", to="npz") == []

@@ -6,6 +6,7 @@ import gzip
 
 import pytest
 
+import scanfab
 from scanfab.base.errors import ReadError, UnknownFormatError
 from scanfab.io.families import sort_into_families
 from tests.helpers.dumps import dump_text, pairs_text, write
@@ -146,3 +147,12 @@ def test_the_named_reader_is_used_for_all(tmp_path):
 def test_a_reader_that_does_not_exist_is_an_error(tmp_path):
     with pytest.raises(UnknownFormatError, match="no reader called 'rocky'"):
         families_of(tmp_path, ["dump_1.txt"], format="rocky")
+
+
+def test_contacts_of_a_table_are_its_own_also_where_a_dump_lies_beside(tmp_path):
+    (tmp_path / "g.csv").write_text("id,x,y,z,radius\n1,0,0,0,1\n2,1.9,0,0,1\n")
+    (tmp_path / "g.contacts.csv").write_text("id1,id2,area\n1,2,7\n")
+    write(tmp_path / "other.txt", dump_text())
+    with pytest.warns(scanfab.ScanfabNote, match="contacts are read from .*g.contacts.csv"):
+        packing = scanfab.read(tmp_path / "g.csv")
+    assert len(packing.contacts) == 1

@@ -15,6 +15,7 @@ from scanfab.base.lengths import all_within
 from scanfab.base.typing import FloatArray
 from scanfab.io.formats.superquadrics import refuse_superquadrics
 from scanfab.io.reader import BODIES, WALLS, GrainTable, ReadOptions
+from scanfab.io.sizes import refuse_other_size
 from scanfab.packing.bodies import CLUMP_COLUMNS, MOLECULE_COLUMNS
 from scanfab.packing.boundary import CLASS_COLUMNS
 from scanfab.packing.cell import Cell
@@ -26,6 +27,7 @@ __all__ = [
     "RADIUS_NAMES",
     "grain_table",
     "has_radius",
+    "refuse_named_twice",
     "room_for_columns",
     "user_cell",
     "whole_numbers",
@@ -170,11 +172,40 @@ def user_cell(path: Path, cell: Cell | None, options: ReadOptions) -> Cell | Non
     return Cell(cell.vectors, periodic, cell.origin)
 
 
+def refuse_named_twice(path: Path, named: Mapping[str, str], option: str) -> None:
+    """
+    One column serves as one thing.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    named : mapping of str to str
+        What the user says: the file's own name or number of each column, by what it is.
+    option : str
+        The argument by which the user says it.
+
+    Raises
+    ------
+    ReadError
+        If two of them are the same column.
+    """
+    places: dict[str, str] = {}
+    for standard, own in named.items():
+        if own in places:
+            raise ReadError(
+                f"{path}: the column {own!r} is named twice in `{option}`, as {places[own]} and as "
+                f"{standard}: expected one column for each"
+            )
+        places[own] = standard
+
+
 def _named_by_user(
     path: Path, rest: MutableMapping[str, Any], options: ReadOptions
 ) -> dict[str, Any]:
     """Columns that the user named, taken out of the rest."""
     named = {}
+    refuse_named_twice(path, options.columns, "columns")
     for standard, own in options.columns.items():
         if own not in rest:
             raise ReadError(
@@ -244,13 +275,22 @@ def _radius(
                 f"leave it out"
             )
         return np.full(count, options.radius)
+    own = options.columns
     if "radius" in named:
-        return _lengths(path, named["radius"], "a radius", where)
-    if "diameter" in options.columns:
+        radius = _lengths(path, named["radius"], "a radius", where)
+        if "diameter" in own:
+            pair = own["radius"], own["diameter"]
+            refuse_other_size(path, radius, rest["diameter"], pair, where)
+        return radius
+    if "diameter" in own:
         return 0.5 * _lengths(path, rest.pop("diameter"), "a diameter", where)
-    radius = _take(rest, RADIUS_NAMES)
-    if radius is not None:
-        return _lengths(path, radius, "a radius", where)
+    name = _first_of(RADIUS_NAMES, list(rest))
+    if name is not None:
+        radius = _lengths(path, rest.pop(name), "a radius", where)
+        other = _first_of(DIAMETER_NAMES, list(rest))
+        if other is not None:
+            refuse_other_size(path, radius, rest[other], (name, other), where)
+        return radius
     diameter = _take(rest, DIAMETER_NAMES)
     if diameter is not None:
         return 0.5 * _lengths(path, diameter, "a diameter", where)

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray, IntArray
+from scanfab.io.formats.columns import refuse_named_twice
 from scanfab.io.formats.join import rows_of_ids
 from scanfab.io.parse.text_dump import DumpBlock
 from scanfab.io.reader import GrainTable
@@ -68,12 +69,13 @@ def named_places(path: Path, text: str | None, block: DumpBlock) -> dict[str, in
     pairs = [part.partition("=") for part in text.split(",")]
     named = {key.strip(): own.strip() for key, _, own in pairs}
     known = ({*IDS}, {*IDS, *FORCE}, {*IDS, *FORCE, *TANGENTIAL})
-    if set(named) not in known or not all(named.values()):
+    if set(named) not in known or not all(named.values()) or len(named) < len(pairs):
         raise ReadError(
             f"{path}: `contact_columns`: expected id1=NAME,id2=NAME, and fx, fy, fz (with tx, ty, "
             f"tz) for the force on the first grain, found {text!r}; "
             f"the columns are {', '.join(block.names)}"
         )
+    refuse_named_twice(path, {key: named[key] for key in IDS}, "contact_columns")
     for own in named.values():
         if own not in block.names:
             raise ReadError(

@@ -68,6 +68,7 @@ class OnDemReader:
                 path,
                 int(step) if isinstance(step, int) else None,
                 float(time) if isinstance(time, int | float) else None,
+                stepless="scanfab" in scene and step is None,
             )
         ]
 

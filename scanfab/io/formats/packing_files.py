@@ -68,6 +68,7 @@ class PackingReader(NpzWriter):
                 path,
                 None if step is None else int(_one(path, "step", step)),
                 None if time is None else float(_one(path, "time", time)),
+                stepless=step is None,
             )
         ]
 
@@ -96,11 +97,15 @@ class PackingReader(NpzWriter):
         grains = grain_table(path, {**columns, **own}, _cell(path, arrays), options)
         return grains._replace(contacts=_contacts(path, arrays))
 
+    def left_out(self, path: Path) -> list[str]:
+        """Of what scanfab writes nothing."""
+        return []
+
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
     ) -> JoinedContacts:
         """Those that lie beside a file of grains."""
-        if not is_contacts_file(snapshot.path):
+        if first_bytes(snapshot.path, 2) == IS_NPZ:
             raise ReadError(
                 f"{snapshot.path}: expected contacts, found a packing: read it by itself"
             )

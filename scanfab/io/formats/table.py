@@ -36,6 +36,9 @@ from scanfab.io.formats.table_names import (
     check_one_unit,
     find_columns,
     is_contacts,
+    is_of_contacts,
+    unique,
+    warn_of_lacking_unit,
 )
 from scanfab.io.formats.table_proof import TOO_FEW, touch
 from scanfab.io.formats.xyzd import is_xyzd, prove_xyzd
@@ -130,6 +133,7 @@ class TableReader:
         columns = guessed or read_table(path, options.skip, *_needed(found))
         if names is not None:
             _refuse_frames(path, columns)
+            warn_of_lacking_unit(path, found)
         if is_xyzd(path) and not options.columns:
             prove_xyzd(path, columns)
         if "volume" in found and not found.keys() & {"radius", "diameter"}:
@@ -159,6 +163,15 @@ class TableReader:
                 raise ReadError(f"{path}: expected numbers in the column {name}, which is empty")
         return join_table(path, grains, {what: columns[name] for what, name in found.items()})
 
+    def left_out(self, path: Path) -> list[str]:
+        """The columns of a table of contacts that no packing has a place for."""
+        names, _ = names_of(path, self.options.skip)
+        if names is None:
+            return []
+        found = self._find(path, names, contacts=True)
+        used = {own for what, own in found.items() if is_of_contacts(what)}
+        return [name for name in unique(names) if name not in used]
+
     def _find(self, path: Path, names: Sequence[str], *, contacts: bool) -> dict[str, str]:
         """The columns of grains, or those of contacts, by what they are."""
         if contacts:
@@ -166,8 +179,9 @@ class TableReader:
             return find_columns(path, names, self.names, pairs, "contact_columns")
         named = self.options.columns
         found = find_columns(path, names, self.names, named, "columns")
-        if "diameter" in named and "radius" not in named:
-            found.pop("radius", None)
+        for size, other in (("diameter", "radius"), ("radius", "diameter")):
+            if size in named and other not in named:
+                found.pop(other, None)
         return found
 
     def _kind_of(self, path: Path, names: Sequence[str]) -> FileKind:
@@ -250,7 +264,8 @@ def _named_contacts(path: Path, text: str | None) -> dict[str, str]:
     if text is None:
         return {}
     pairs = [part.partition("=") for part in text.split(",")]
-    if not all(key.strip() and equals and own.strip() for key, equals, own in pairs):
+    is_sound = all(key.strip() and equals and own.strip() for key, equals, own in pairs)
+    if not is_sound or len({key.strip() for key, _, _ in pairs}) < len(pairs):
         raise ReadError(
             f"{path}: `contact_columns`: expected id1=NAME,id2=NAME, and fx1, fy1, fz1 or fx2, "
             f"fy2, fz2 for the force on the first or second grain, found {text!r}"

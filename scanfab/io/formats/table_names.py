@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
-from scanfab.base.errors import ReadError
-from scanfab.io.formats.columns import DIAMETER_NAMES, ID_NAMES, RADIUS_NAMES
+from scanfab.base.errors import ReadError, ScanfabWarning
+from scanfab.io.formats.columns import DIAMETER_NAMES, ID_NAMES, RADIUS_NAMES, refuse_named_twice
 
 __all__ = [
     "CONTACTS",
@@ -18,12 +19,16 @@ __all__ = [
     "check_one_unit",
     "find_columns",
     "is_contacts",
+    "is_of_contacts",
     "unique",
+    "warn_of_lacking_unit",
 ]
 
 Names = Mapping[str, tuple[str, ...]]
 """The names that a column may have, by what it is; as :func:`plain_name` has them."""
 
+# what has one unit in a table of grains
+LENGTHS = ("x", "y", "z", "radius", "diameter")
 # what a contact table must have, and what it may
 IDS = ("id1", "id2")
 FORCES = {
@@ -105,6 +110,11 @@ def unique(names: Sequence[str]) -> list[str]:
     ]
 
 
+def is_of_contacts(standard: str) -> bool:
+    """Whether a column says something of a contact that a packing has: its grains, image, force."""
+    return standard in (*IDS, "kind", "ix", "iy", "iz") or standard.startswith("f")
+
+
 def is_contacts(found: Mapping[str, str]) -> bool:
     """Whether columns are of a contact table: both ids, and not a grain's place and size."""
     is_grain = {"x", "y", "z"} <= found.keys() and found.keys() & {"radius", "diameter", "volume"}
@@ -133,13 +143,14 @@ def find_columns(
     Raises
     ------
     ReadError
-        If the user names a column that is not there, two columns have a name that matters, or
-        lengths have different units.
+        If the user names a column that is not there or twice, two columns have a name that
+        matters, or lengths have different units.
     """
     found: dict[str, str] = {}
     keys = unique(names)
     for standard, own in named.items():
         found[standard] = _column(path, names, str(own), standard, option)
+    refuse_named_twice(path, found, option)
     plain = [plain_name(name) for name in names]
     for standard, usual in known.items():
         if standard in found:
@@ -176,7 +187,21 @@ def _column(path: Path, names: Sequence[str], own: str, standard: str, option: s
 
 def _check_units(path: Path, found: Mapping[str, str]) -> None:
     """Lengths of one table have one unit."""
-    check_one_unit(path, "lengths", found, ("x", "y", "z", "radius", "diameter"))
+    check_one_unit(path, "lengths", found, LENGTHS)
+
+
+def warn_of_lacking_unit(path: Path, found: Mapping[str, str]) -> None:
+    """Tell of lengths without a unit beside others with one: it is taken for the same."""
+    names = [found[one] for one in LENGTHS if one in found]
+    with_unit = [name for name in names if UNIT.search(name)]
+    without = [name for name in names if name not in with_unit]
+    if with_unit and without:
+        warnings.warn(
+            f"{path}: {', '.join(with_unit)} name a unit, {', '.join(without)} none: all are taken "
+            f"to be in the same one",
+            ScanfabWarning,
+            stacklevel=3,
+        )
 
 
 def check_one_unit(

@@ -10,10 +10,16 @@ import numpy as np
 from scanfab.base.errors import ReadError
 from scanfab.base.lengths import MOST
 from scanfab.base.typing import FloatArray
-from scanfab.io.files import bare_name, file_inside, first_bytes, plain
+from scanfab.io.files import bare_name, file_inside, plain
 from scanfab.io.formats.columns import grain_table, has_radius, whole_numbers
 from scanfab.io.formats.join import join_ids, join_positions
-from scanfab.io.formats.vtp_packing import cell_of, contacts_of, is_packing, moment_of
+from scanfab.io.formats.vtp_packing import (
+    cell_of,
+    contacts_of,
+    is_packing,
+    moment_of,
+    says_all,
+)
 from scanfab.io.formats.yade_cells import cell_beside, cell_file, is_cell_file
 from scanfab.io.parse.vtk_mesh import Mesh, elements, form_of, listed, read_bounds, read_mesh
 from scanfab.io.reader import (
@@ -95,7 +101,8 @@ class VtkReader:
         """One, and hardly more than its name says which step it is; those that a ``.pvd`` lists."""
         if form_of(path) == "Collection":
             return self._listed(path)
-        return [Snapshot(path, *moment_of(path))]
+        step, time = moment_of(path)
+        return [Snapshot(path, step, time, stepless=step is None and says_all(path))]
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         """Points and their arrays, with the box of LIGGGHTS or the cell of YADE beside them."""
@@ -133,7 +140,7 @@ class VtkReader:
 
     def carries(self, path: Path) -> Carries:
         """LIGGGHTS writes a box beside its files; VTK itself has no cell."""
-        if b"scanfab_contacts" in first_bytes(path, 1 << 14):
+        if says_all(path):
             return "cell"
         return "nothing" if _box_beside(path) is None else "box"
 

@@ -15,22 +15,29 @@ from scanfab.io.parse.vtk_mesh import Mesh
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import ContactList
 
-__all__ = ["cell_of", "contacts_of", "is_packing", "moment_of"]
+__all__ = ["cell_of", "contacts_of", "is_packing", "moment_of", "says_all"]
 
 KNOWN = "scanfab_contacts"
 MOMENT = re.compile(
     rb'Name="(TimeValue|scanfab_step)"[^>]*format="ascii"[^>]*>\s*([-+.\deE]{1,30})\s*<'
 )
+# the field data stand within so many bytes
+HEAD = 1 << 14
 
 
 def moment_of(path: Path) -> tuple[int | None, float | None]:
     """Step and time, where the head of an XML file names them as text."""
-    found = dict(MOMENT.findall(first_bytes(path, 1 << 14)))
+    found = dict(MOMENT.findall(first_bytes(path, HEAD)))
     try:
         step = int(found[b"scanfab_step"]) if b"scanfab_step" in found else None
         return step, float(found[b"TimeValue"]) if b"TimeValue" in found else None
     except ValueError:
         return None, None
+
+
+def says_all(path: Path) -> bool:
+    """Whether the head of a file is that of a packing, of which nothing else need be asked."""
+    return KNOWN.encode() in first_bytes(path, HEAD)
 
 
 def is_packing(mesh: Mesh) -> bool:

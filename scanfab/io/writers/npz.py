@@ -54,4 +54,4 @@ class NpzWriter:
                 arrays["force_n"] = contacts.force_n
         with open(path, "wb") as stream:
             np.savez_compressed(stream, **arrays)
-        return Left(notes=tuple(notes))
+        return Left(no_step=False, notes=tuple(notes))

@@ -41,7 +41,7 @@ def write_on_dem(packing: Packing, path: Path) -> Left:
         _write_scene(file.create_group(SCENE), packing)
         if packing.contacts is not None:
             _write_contacts(file.create_group("ONDEM/Interactions"), packing)
-    return Left(notes=tuple(notes))
+    return Left(no_step=False, notes=tuple(notes))
 
 
 def _write_points(group: Any, packing: Packing, own: dict[str, Any]) -> None:

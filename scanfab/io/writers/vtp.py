@@ -68,7 +68,7 @@ class VtpWriter:
             "</Piece>",
         ]
         file.write(path, body)
-        return Left(notes=tuple(notes))
+        return Left(no_step=False, notes=tuple(notes))
 
 
 def _field(packing: Packing) -> list[str]:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Protocol
 from weakref import WeakSet
 
-from scanfab.base.errors import ScanfabError, ScanfabNote, SettingsError
+from scanfab.base.errors import ScanfabError, ScanfabWarning, SettingsError
 from scanfab.base.spelling import counted
 from scanfab.base.threads import spread_over
 from scanfab.io.grain_files import PathLike
@@ -236,8 +236,9 @@ class DaskExecutor(Executor):
                 raise outdated(worker, theirs, mine)
         if not found:
             warnings.warn(
-                f"{self.address}: the scheduler has no workers yet: frames wait for them",
-                ScanfabNote,
+                f"{self.address}: the scheduler has no workers yet: frames wait for them, "
+                f"without a limit: start some with `dask worker {self.address}`",
+                ScanfabWarning,  # also with --quiet: nothing else tells why nothing happens
                 stacklevel=4,
             )
 

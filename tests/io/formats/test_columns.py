@@ -91,7 +91,15 @@ def test_a_diameter_is_halved(name):
 
 
 def test_a_radius_comes_before_a_diameter():
-    grains = table(columns(diameter=7 * RADIUS))
+    grains = table(columns(diameter=2 * RADIUS))
+    np.testing.assert_array_equal(grains.radius, RADIUS)
+    np.testing.assert_array_equal(grains.columns["diameter"], 2 * RADIUS)
+
+
+def test_a_radius_and_a_diameter_that_say_different_sizes_are_an_error():
+    with pytest.raises(ReadError, match="'radius' and 'diameter' contradict each other"):
+        table(columns(diameter=7 * RADIUS))
+    grains = table(columns(diameter=7 * RADIUS), columns={"radius": "radius"})
     np.testing.assert_array_equal(grains.radius, RADIUS)
     np.testing.assert_array_equal(grains.columns["diameter"], 7 * RADIUS)
 

@@ -36,7 +36,11 @@ from tests.helpers.interruptions import PROGRAM, write_series
 
 FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin")
 YADE = ("--boundary", "mask=3")
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
+pytestmark = [
+    pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX"),
+    # those of a cluster that has just been started may come in a moment
+    pytest.mark.filterwarnings("ignore:.*the scheduler has no workers yet"),
+]
 
 
 @pytest.fixture(scope="module")
@@ -480,14 +484,17 @@ class _Stays:
         return getattr, (on_worker, "versions_here")
 
 
-def test_workers_that_come_later_are_waited_for(tmp_path, folder):
+def test_workers_that_come_later_are_waited_for_and_that_is_told(tmp_path, folder, capsys):
     (tmp_path / "late").mkdir()
     with DaskCluster(tmp_path / "late", workers=0) as late:
         timer = threading.Timer(1.0, late.add)
         timer.start()
-        code = compute("dumps", *FAST, "--scheduler", late.address)
+        code = compute("dumps", *FAST, "--quiet", "--scheduler", late.address)
         timer.join()
         assert code == 0
+    told = capsys.readouterr().err
+    assert "scanfab: warning: " in told
+    assert "has no workers yet: frames wait for them, without a limit" in told
 
 
 def test_no_scheduler_is_one_clear_message(folder, capsys):
