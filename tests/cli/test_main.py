@@ -67,12 +67,17 @@ def test_help_imports_no_heavy_package() -> None:
         ),
     ],
 )
-def test_wrong_usage_is_exit_code_2_and_one_message(args: list[str], message: str) -> None:
-    answer = scanfab("compute", YADE, *args)
-    assert answer.returncode == 2
-    assert message in answer.stderr
-    assert answer.stdout == ""
-    assert "Traceback" not in answer.stderr
+def test_wrong_usage_is_exit_code_2_and_one_message(
+    args: list[str], message: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """In this process; one that ends with this code is that of the missing source."""
+    from scanfab.cli.main import run
+
+    assert run(["compute", str(YADE), *args]) == 2
+    said = capfd.readouterr()
+    assert message in said.err
+    assert said.out == ""
+    assert "Traceback" not in said.err
 
 
 @pytest.mark.parametrize(
@@ -95,6 +100,8 @@ def test_missing_source_is_wrong_usage() -> None:
     answer = scanfab("compute", "nowhere")
     assert answer.returncode == 2
     assert "nowhere" in answer.stderr
+    assert answer.stdout == ""
+    assert "Traceback" not in answer.stderr
 
 
 def test_unreadable_source_is_exit_code_1(tmp_path: Path) -> None:
