@@ -56,7 +56,7 @@ HEADS = (
 FEW = settings(
     max_examples=50,  # of each reader and test; tests/campaigns/fuzz_readers.py runs many thousand
     deadline=None,
-    derandomize=True,  # others are left to tests/fuzz: a crash would end all tests
+    derandomize=True,  # others are left to the campaign: a crash would end all tests
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 
