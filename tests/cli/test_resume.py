@@ -82,14 +82,13 @@ def stopped(compute, monkeypatch, tmp_path):
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")
 def test_runs_stopped_by_signals_at_random_moments_give_the_same_bytes(tool, tmp_path):
     expected, seconds = tool.whole(tmp_path / "whole.csv")
-    # tests/campaigns/interrupt.py repeats it many times
-    for attempt in range(2):
+    for attempt in range(5):
         place = tmp_path / str(attempt)
         place.mkdir()
         assert tool.interrupted(place / "table.csv", seconds, 2) == expected
     known = {0, 130, 143, *(-sent for sent in signal.Signals)}
     assert set(tool.codes) <= known
-    assert sum(tool.codes.values()) >= 2
+    assert sum(tool.codes.values()) >= 5
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".tsv", ".json", ".jsonl", ".parquet"])

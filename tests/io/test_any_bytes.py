@@ -54,9 +54,9 @@ HEADS = (
     b"\xff\xfe",
 )
 FEW = settings(
-    max_examples=50,  # of each reader and test; tests/campaigns/fuzz_readers.py runs many thousand
+    max_examples=150,
     deadline=None,
-    derandomize=True,  # others are left to the campaign: a crash would end all tests
+    derandomize=True,  # others are left to tests/fuzz: a crash would end all tests
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 
