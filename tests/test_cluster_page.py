@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from scanfab.cli.main import run
 from tests.helpers.interruptions import write_series
 
 PAGE = (Path(__file__).parents[1] / "docs" / "cluster.md").read_text(encoding="utf-8")
@@ -72,12 +73,19 @@ def interrupt(tmp_path, variables):
     return interrupt
 
 
-def whole(call, folder: Path, *sources: str) -> bytes:
-    call("scanfab", "compute", *sources, "--tolerance", "1e-3", "-o", "whole.csv")
-    return (folder / "whole.csv").read_bytes()
+@pytest.fixture
+def whole(tmp_path, monkeypatch):
+    """The table of some sources by one run, in this process."""
+    monkeypatch.chdir(tmp_path)
+
+    def whole(*sources: str) -> bytes:
+        assert run(["compute", *sources, "--tolerance", "1e-3", "-o", "whole.csv"]) == 0
+        return (tmp_path / "whole.csv").read_bytes()
+
+    return whole
 
 
-def test_the_array_of_slurm(call, interrupt, tmp_path):
+def test_the_array_of_slurm(call, interrupt, whole, tmp_path):
     """One task finds no frame, and another one is preempted and submitted again."""
     write_series(tmp_path / "dumps", 2)
     command = "bash", "-c", script("#SBATCH --array")
@@ -86,20 +94,20 @@ def test_the_array_of_slurm(call, interrupt, tmp_path):
     for task in range(3):
         call(*command, **shared, SLURM_ARRAY_TASK_ID=str(task))
     call("bash", "-c", script("scanfab merge parts/"))
-    assert (tmp_path / "fabric.csv").read_bytes() == whole(call, tmp_path, "dumps/")
+    assert (tmp_path / "fabric.csv").read_bytes() == whole("dumps/")
 
 
-def test_the_array_of_pbs(call, tmp_path):
+def test_the_array_of_pbs(call, whole, tmp_path):
     write_series(tmp_path / "dumps", 2)
     text = script("#PBS -J").replace("JOBS=8", "JOBS=2")
     for task in range(2):
         call("bash", "-c", text, PBS_ARRAY_INDEX=str(task), PBS_O_WORKDIR=str(tmp_path))
     call("bash", "-c", script("scanfab merge parts/"))
-    assert (tmp_path / "fabric.csv").read_bytes() == whole(call, tmp_path, "dumps/")
+    assert (tmp_path / "fabric.csv").read_bytes() == whole("dumps/")
 
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
-def test_the_makefile(call, interrupt, tmp_path):
+def test_the_makefile(call, interrupt, whole, tmp_path):
     """Interrupted, killed, run to its end; and again when there is another dump."""
     (tmp_path / "tests").mkdir()
     for name in ("dense", "loose"):
@@ -108,15 +116,11 @@ def test_the_makefile(call, interrupt, tmp_path):
     interrupt(signal.SIGINT, "tests/*.part", "make", "-j", "2")
     interrupt(signal.SIGKILL, "tests/*.csv", "make", "-j", "2")
     call("make", "-j", "2")
-    assert (tmp_path / "fabric.csv").read_bytes() == whole(
-        call, tmp_path, "tests/dense/", "tests/loose/"
-    )
+    assert (tmp_path / "fabric.csv").read_bytes() == whole("tests/dense/", "tests/loose/")
     assert "up to date" in call("make")
     # another dump is added to its table, and that to the one of all
     source = tmp_path / "tests" / "loose"
     text = (source / "dump_100.txt").read_text().replace("TIMESTEP\n100\n", "TIMESTEP\n200\n")
     (source / "dump_200.txt").write_text(text)
     assert "dense/" not in call("make")
-    assert (tmp_path / "fabric.csv").read_bytes() == whole(
-        call, tmp_path, "tests/dense/", "tests/loose/"
-    )
+    assert (tmp_path / "fabric.csv").read_bytes() == whole("tests/dense/", "tests/loose/")

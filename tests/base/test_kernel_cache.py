@@ -29,6 +29,22 @@ PROGRAM = [
 ]
 SAID = "scanfab: compiling what no earlier run has needed"
 NOWHERE = "/proc/none"
+# prints what a small kernel gives, and how often it was compiled; others write while it does
+SMALL = """
+import os, time
+from scanfab.base.jit import kernel
+
+replace = os.replace
+os.replace = lambda *paths: (time.sleep(0.5), replace(*paths))
+
+def twice(x):
+    return 2 * x
+
+compiled = kernel(twice)
+print("ready", flush=True)
+input()
+print(compiled(21), sum(compiled.stats.cache_misses.values()))
+"""
 
 
 @pytest.fixture
@@ -123,12 +139,31 @@ def test_commands_of_one_process_share_a_listener():
 
 
 @only_linux
-def test_eight_processes_that_start_cold_all_succeed(dump, tmp_path):
-    home = tmp_path / "cache"
-    processes = [start(dump, home) for _ in range(8)]
+def test_eight_processes_that_start_cold_all_succeed(tmp_path):
+    """They meet before they compile one kernel, and all write it to the same place."""
+    (tmp_path / "small.py").write_text(SMALL, encoding="utf-8")
+    words = [sys.executable, "small.py"]
+    variables = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": str(ROOT)}
+    processes = [
+        subprocess.Popen(
+            words, cwd=tmp_path, env=variables, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        )
+        for _ in range(8)
+    ]
+    # each says that it is there, and waits to be answered
+    assert [process.stdout.readline() for process in processes] == [b"ready\n"] * 8
     for process in processes:
-        words_of(process)
-    assert SAID not in words_of(start(dump, home))
+        process.stdin.write(b"go\n")
+        process.stdin.flush()
+    found = [process.communicate(timeout=60)[0].split() for process in processes]
+    assert [process.returncode for process in processes] == [0] * 8
+    assert all(value == b"42" for value, _ in found)
+    assert len(kept_in(tmp_path / "cache")) == 1
+    assert list((tmp_path / "cache").rglob("*.kernel")) == [
+        path for path in (tmp_path / "cache").rglob("*") if path.is_file()
+    ]
+    later = subprocess.run(words, cwd=tmp_path, env=variables, input=b"go\n", capture_output=True)
+    assert later.stdout.split() == [b"ready", b"42", b"0"]
 
 
 @only_linux

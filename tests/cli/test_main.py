@@ -67,12 +67,17 @@ def test_help_imports_no_heavy_package() -> None:
         ),
     ],
 )
-def test_wrong_usage_is_exit_code_2_and_one_message(args: list[str], message: str) -> None:
-    answer = scanfab("compute", YADE, *args)
-    assert answer.returncode == 2
-    assert message in answer.stderr
-    assert answer.stdout == ""
-    assert "Traceback" not in answer.stderr
+def test_wrong_usage_is_exit_code_2_and_one_message(
+    args: list[str], message: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """In this process; one that ends with this code is that of the missing source."""
+    from scanfab.cli.main import run
+
+    assert run(["compute", str(YADE), *args]) == 2
+    said = capfd.readouterr()
+    assert message in said.err
+    assert said.out == ""
+    assert "Traceback" not in said.err
 
 
 @pytest.mark.parametrize(
@@ -95,6 +100,8 @@ def test_missing_source_is_wrong_usage() -> None:
     answer = scanfab("compute", "nowhere")
     assert answer.returncode == 2
     assert "nowhere" in answer.stderr
+    assert answer.stdout == ""
+    assert "Traceback" not in answer.stderr
 
 
 def test_unreadable_source_is_exit_code_1(tmp_path: Path) -> None:
@@ -139,20 +146,23 @@ def test_output_file_is_complete_or_untouched(tmp_path: Path) -> None:
     assert {path.name for path in tmp_path.iterdir()} == {"table.csv", "table.csv.manifest.json"}
 
 
-def test_cell_takes_three_or_six_numbers(tmp_path: Path) -> None:
+def test_cell_takes_three_or_six_numbers(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     import pyvista
+
+    from scanfab.cli.main import run
 
     dump = tmp_path / "spheres.vtk"
     cloud = pyvista.PolyData([[1.0, 1, 1], [3, 3, 3]])
     cloud["radius"] = [1.0, 1.0]
     cloud.save(str(dump))
-    three = scanfab("compute", "--cell", "4", "4", "4", dump, "--variants", "c", *FAST[:4])
-    assert three.returncode == 0, three.stderr
-    six = scanfab(
-        "compute", "--cell", "4", "4", "4", "1", "0", "0", dump, "--variants", "c", *FAST[:4]
-    )
-    assert six.returncode == 0, six.stderr
-    assert six.stdout != three.stdout
+    tables = []
+    for cell in (["4", "4", "4"], ["4", "4", "4", "1", "0", "0"]):
+        assert run(["compute", "--cell", *cell, str(dump), "--variants", "c", *FAST[:4]]) == 0
+        tables.append(capsys.readouterr().out)
+    assert [len(table.splitlines()) for table in tables] == [2, 2]
+    assert tables[0] != tables[1]
 
 
 def test_a_closed_pipe_ends_quietly() -> None:

@@ -109,6 +109,15 @@ def test_other_frames_join_those_of_the_table(compute, tmp_path, first, then, ev
     assert compute(table, "--resume", f"--frames={then}") == (0, computed)
     assert compute(whole, f"--frames={every}")[0] == 0
     assert table.read_bytes() == whole.read_bytes()
+    chosen, expected = (read_manifest(one)["settings"].pop("frames") for one in (table, whole))
+    assert range(3)[slice(*chosen)] == range(3)[slice(*expected)]
+
+
+def test_a_report_is_made_of_frames_that_joined_those_of_a_table(compute, tmp_path):
+    """Which are not all that the source has."""
+    table = tmp_path / "table.csv"
+    assert compute(table, "--frames=-1:")[0] == 0
+    assert compute(table, "--resume", "--frames=-2:") == (0, 1)
     assert run(["report", str(table), "-o", str(tmp_path / "report.html")]) == 0
 
 

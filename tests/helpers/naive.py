@@ -1,7 +1,7 @@
 """Slow, obvious twins of every kernel and formula: what the fast ones must equal."""
 
 from itertools import pairwise, product
-from math import ceil, floor, sqrt
+from math import ceil, floor
 from typing import NamedTuple
 
 import numpy as np
@@ -41,13 +41,22 @@ class Tally(NamedTuple):
 
 def chords(position, radius, point, direction):
     """Where the line through a point meets the spheres: list of (entry, exit) along it."""
-    relative = position - point
+    return chords_of_lines(position, radius, point[None], direction)[0]
+
+
+def chords_of_lines(position, radius, points, direction):
+    """The same of parallel lines, through a point each: one list for every line."""
+    relative = position - points[:, None]
     depth = relative @ direction
-    across = relative - np.outer(depth, direction)
-    half2 = radius**2 - np.sum(across**2, axis=1)
+    across = relative - depth[..., None] * direction
+    half2 = radius**2 - np.sum(across**2, axis=2)
     half = np.sqrt(np.maximum(half2, 0.0))
     hit = half2 > 0
-    return list(zip((depth - half)[hit].tolist(), (depth + half)[hit].tolist(), strict=True))
+    found = [[] for _ in points]
+    lines, ends = np.nonzero(hit)[0], ((depth - half)[hit], (depth + half)[hit])
+    for line, entry, leave in zip(lines.tolist(), *(end.tolist() for end in ends), strict=True):
+        found[line].append((entry, leave))
+    return found
 
 
 def union(intervals):
@@ -79,55 +88,64 @@ def lengths(intervals):
 
 
 def grid_lines(position, radius, triad, offset, spacing, window):
-    """The lines of a square grid along the third row of a triad (rows u, v, n): x, y, solids."""
+    """
+    The lines of a square grid along the third row of a triad (rows u, v, n), row by row.
+
+    Of each its foot, its solids, and where it enters and leaves the window.
+    """
     u, v, direction = triad
     surfaces = np.linalg.norm(position, axis=1) + radius
     reach = window.reach if isinstance(window, Convex) else window
     number = ceil(max([reach, *surfaces]) / spacing) + 1
-    for i, j in product(range(-number, number + 1), repeat=2):
-        x, y = (i + offset[0]) * spacing, (j + offset[1]) * spacing
-        yield x, y, union(chords(position, radius, x * u + y * v, direction))
+    places = np.arange(-number, number + 1)
+    for x in (places + offset[0]) * spacing:
+        feet = x * u + ((places + offset[1]) * spacing)[:, None] * v
+        solids = map(union, chords_of_lines(position, radius, feet, direction))
+        yield from zip(feet, solids, *within(window, feet, direction), strict=True)
 
 
-def within(window, foot, direction):
+def within(window, feet, direction):
     """
-    Where a line enters and leaves a window, a sphere of this radius or a region as data.
+    Where lines enter and leave a window, a sphere of this radius or a region as data.
 
-    The line is foot + t * direction; what it enters behind where it leaves, it misses.
+    A line is foot + t * direction; what it enters behind where it leaves, it misses. Of one foot or
+    of many, shape (..., 3).
     """
     if not isinstance(window, Convex):
-        half2 = window**2 - foot @ foot
-        return (-sqrt(half2), sqrt(half2)) if half2 > 0 else (0.0, 0.0)
+        half = np.sqrt(np.maximum(window**2 - np.sum(feet**2, axis=-1), 0.0))
+        return -half, half
+    isotropic, deviator, level = window.quadric
+    matrix = isotropic * np.eye(3) + deviator
 
     def rise(t):
-        place, (isotropic, deviator, level) = foot + t * direction, window.quadric
-        return place @ (isotropic * np.eye(3) + deviator) @ place - level
+        places = feet + t * direction
+        return np.sum(places @ matrix * places, axis=-1) - level
 
     # the parabola through three of its points
-    one, half_slope = 0.5 * (rise(1) + rise(-1)) - rise(0), 0.25 * (rise(1) - rise(-1))
-    if abs(one) < 1e-12:
-        low, high = (-np.inf, np.inf) if rise(0) < 0 else (0.0, 0.0)
-    else:
-        root = sqrt(max(half_slope**2 - one * rise(0), 0.0))
-        low, high = (-half_slope - root) / one, (-half_slope + root) / one
+    before, here, behind = rise(-1), rise(0), rise(1)
+    one, half_slope = 0.5 * (behind + before) - here, 0.25 * (behind - before)
+    root = np.sqrt(np.maximum(half_slope**2 - one * here, 0.0))
+    straight, inside = np.abs(one) < 1e-12, np.where(here < 0, np.inf, 0.0)
+    divisor = np.where(straight, 1.0, one)
+    low = np.where(straight, -inside, (-half_slope - root) / divisor)
+    high = np.where(straight, inside, (-half_slope + root) / divisor)
     for *normal, distance in window.planes:
-        steepness, rest = direction @ normal, distance - foot @ normal
+        steepness, rest = direction @ normal, distance - feet @ normal
         if abs(steepness) < 1e-12:
-            high = high if rest > 0 else low
+            high = np.where(rest > 0, high, low)
         elif steepness > 0:
-            high = min(high, rest / steepness)
+            high = np.minimum(high, rest / steepness)
         else:
-            low = max(low, rest / steepness)
-    return low, high
+            low = np.maximum(low, rest / steepness)
+    return low[()], high[()]
 
 
 def scan(position, radius, triad, offset, spacing, clip):
     """All gaps on the square grid of lines along the third row of a triad (rows u, v, n)."""
     whole, whole_lines, window, window_lines, line_length = [], 0, [], 0, 0.0
-    for x, y, solids in grid_lines(position, radius, triad, offset, spacing, clip):
+    for _, solids, low, high in grid_lines(position, radius, triad, offset, spacing, clip):
         whole += lengths(gaps_between(solids))
         whole_lines += bool(solids)
-        low, high = within(clip, x * triad[0] + y * triad[1], triad[2])
         if low < high:
             window += lengths(gaps_within(solids, low, high))
             window_lines += 1
@@ -162,17 +180,14 @@ def edge_sums(solids, enters, leaves, cutoff, rule):
 
 def void_segments(position, radius, triad, offset, spacing, clip):
     """The void segments on a grid of lines: those of the whole sample, those of the window."""
-    u, v, direction = triad
     whole, window = [], []
-    for x, y, solids in grid_lines(position, radius, triad, offset, spacing, clip):
-        low, high = within(clip, x * u + y * v, direction)
+    for foot, solids, low, high in grid_lines(position, radius, triad, offset, spacing, clip):
         kinds = [(whole, gaps_between(solids))]
         if low < high:
             kinds.append((window, gaps_within(solids, low, high)))
         for found, gaps in kinds:
             for start, end in gaps:
-                middle = x * u + y * v + 0.5 * (start + end) * direction
-                found.append(Segment(end - start, middle))
+                found.append(Segment(end - start, foot + 0.5 * (start + end) * triad[2]))
     return whole, window
 
 
@@ -297,18 +312,27 @@ def axial(tensor, axis):
     return along - (1 - along) / 2
 
 
+def distinct(rows):
+    """Rows of three whole numbers, each once."""
+    low = rows.min(axis=0)
+    seen = np.zeros(np.ptp(rows, axis=0) + 1, bool)
+    seen[tuple((rows - low).T)] = True
+    return np.argwhere(seen) + low
+
+
 def periodic_solids(position, radius, vectors, periods, foot, direction, low, high):
     """The union of the solids on a line through a periodic medium, from low to high and around."""
     heights = 1 / np.linalg.norm(np.linalg.inv(vectors), axis=0)
+    # a place of the line lies within a cell of one that is looked at, and grains of as many around
     around = [
-        np.arange(-n, n + 1) if period else np.zeros(1)
-        for n, period in zip(np.ceil(radius.max() / heights).astype(int) + 2, periods, strict=True)
+        np.arange(-n, n + 1) if period else np.zeros(1, int)
+        for n, period in zip(np.ceil(radius.max() / heights).astype(int) + 1, periods, strict=True)
     ]
     steps = np.arange(low, high, 0.5 * heights.min())
     cells = np.floor((foot + steps[:, None] * direction - position[0]) @ np.linalg.inv(vectors))
-    cells = np.unique(np.where(periods, cells, 0.0), axis=0)
+    cells = distinct(np.where(periods, cells, 0.0).astype(int))
     spread = np.array(list(product(*around)))
-    shifts = np.unique((cells[:, None] + spread).reshape(-1, 3), axis=0)
+    shifts = distinct((cells[:, None] + spread).reshape(-1, 3))
     turns = np.floor((position - position[0]) @ np.linalg.inv(vectors))
     home = position - np.where(periods, turns, 0.0) @ vectors
     images = (home[None] + (shifts @ vectors)[:, None]).reshape(-1, 3)

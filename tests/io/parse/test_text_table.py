@@ -102,7 +102,8 @@ def number(generator):
 
 def test_every_number_is_the_nearest_double(tmp_path):
     generator = random.Random(0)
-    words = [number(generator) for _ in range(3 * 20_000)]
+    # a number is parsed in the same way in pieces of any size: small ones cut elsewhere
+    words = [number(generator) for _ in range(3 * (20_000 if regular.PIECE > 100 else 1_000))]
     rows = [" ".join(words[k : k + 3]) for k in range(0, len(words), 3)]
     found = columns_of(tmp_path / "a", ("\n".join(rows) + "\n").encode(), (0, 1, 2), len(rows))
     right = np.array([float(word) for word in words]).reshape(-1, 3).T

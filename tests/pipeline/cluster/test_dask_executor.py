@@ -353,7 +353,7 @@ def test_the_scheduler_dies_and_the_run_is_resumed(fragile, folder):
     assert "the scheduler has gone while frames were computed" in said
     assert said.count("error") == 1
     (folder / "next").mkdir()
-    with DaskCluster(folder / "next") as other:
+    with DaskCluster(folder / "next", workers=1) as other:
         assert compute("dumps", *FAST, "--scheduler-file", str(other.file), "--resume") == 0
     assert Path("t.csv").read_bytes() == Path("one.csv").read_bytes()
 
