@@ -70,10 +70,10 @@ class _Process:
         with _Limit(self.process, SECONDS_TO_START):
             self._answer()
 
-    def ask(self, request: dict[str, Any], seconds: float) -> tuple[Arrays, dict[str, Any]]:
+    def ask(self, request: dict[str, Any]) -> tuple[Arrays, dict[str, Any]]:
         """Arrays and words that answer a request."""
         assert self.process.stdin is not None
-        with _Limit(self.process, seconds):
+        with _Limit(self.process, request["seconds"]):
             try:
                 self.process.stdin.write(json.dumps(request).encode() + b"\n")
                 self.process.stdin.flush()
@@ -167,14 +167,21 @@ def fenced(reader: str, file: Path, path: Path, **more: Any) -> tuple[Arrays, di
     size, stamp = status.st_size, (file, status.st_size, status.st_mtime_ns)
     check_memory(path, 2.0 * size)
     most = int(min(MOST_UNPACKED * size + SMALL, free_memory() / 3))
-    request = {"reader": reader, "path": str(file.resolve()), "most": most, "own": OWN, **more}
+    request = {
+        "reader": reader,
+        "path": str(file.resolve()),
+        "most": most,
+        "own": OWN,
+        "seconds": SECONDS + size / PER_SECOND,
+        **more,
+    }
     with _lock:
         try:
             _refuse_deadly(stamp)
             if not _running:
                 _running.append(_Process())
                 at_end(_end)
-            return _running[0].ask(request, SECONDS + size / PER_SECOND)
+            return _running[0].ask(request)
         except FencedError as error:
             if isinstance(error, GoneError):
                 _end()

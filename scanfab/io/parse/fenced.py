@@ -8,7 +8,9 @@ the arrays. Whatever a library prints goes nowhere.
 from __future__ import annotations
 
 import json
+import math
 import os
+import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -18,6 +20,8 @@ import numpy as np
 
 __all__ = ["main"]
 
+# seconds that are left to whoever asks to end this process; it may be gone
+SPARE = 2
 Answer = tuple[dict[str, Any], dict[str, Any]]
 
 
@@ -71,9 +75,12 @@ def main() -> None:
         request = json.loads(line)
         try:
             _limit_memory(request["most"] + request["own"])
+            _limit_time(request["seconds"] + SPARE)
             arrays, words = READERS[request["reader"]](request)
+            _limit_time(0)
         # libraries raise whatever their parsing meets, and exit for what they do not know
         except (Exception, SystemExit) as error:
+            _limit_time(0)
             text = (str(error).splitlines() or [""])[0] or type(error).__name__
             _put(out, {"error": text})
         else:
@@ -94,6 +101,13 @@ def _limit_memory(more: int) -> None:
     if hard != resource.RLIM_INFINITY:
         most = min(most, hard)
     resource.setrlimit(resource.RLIMIT_AS, (most, hard))
+
+
+def _limit_time(seconds: float) -> None:
+    """Have the system end this process then, also while a library hangs; 0: never."""
+    if hasattr(signal, "alarm"):
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)  # it may have been ignored by our parent
+        signal.alarm(math.ceil(seconds))
 
 
 def _send(out: IO[bytes], arrays: dict[str, Any], words: dict[str, Any]) -> None:

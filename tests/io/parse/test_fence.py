@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import threading
@@ -75,6 +76,18 @@ def test_after_a_while_it_is_tried_again(path, monkeypatch):
     monkeypatch.setattr(fence, "SECONDS_REFUSED", 0.0)
     assert read(path) == [0, 1, 2, 3, 4]
     assert not fence._deadly
+
+
+@pytest.mark.skipif(not hasattr(signal, "alarm"), reason="needs SIGALRM")
+def test_a_process_that_hangs_ends_also_when_nobody_is_left_to_end_it(tmp_path):
+    os.mkfifo(tmp_path / "a.h5")  # opening it waits for a writer
+    process = fence._Process().process
+    request = {"reader": "hdf", "path": str(tmp_path / "a.h5"), "with_data": True, "seconds": 0.1}
+    process.stdin.write(json.dumps({**request, "most": 1 << 20, "own": fence.OWN}).encode() + b"\n")
+    process.stdin.flush()
+    assert process.wait(timeout=60) == -signal.SIGALRM
+    process.stdin.close()
+    process.stdout.close()
 
 
 def test_threads_wait_for_each_other(path):
