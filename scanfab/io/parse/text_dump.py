@@ -25,7 +25,7 @@ from scanfab.io.parse.counted_rows import lines_above
 from scanfab.io.parse.growing import warn_incomplete
 from scanfab.io.parse.lammps_box import dump_cell
 from scanfab.io.parse.number_rows import exact_column, plain_reason
-from scanfab.io.parse.text_table import LARGE, TextTable, read_regular
+from scanfab.io.parse.text_table import LARGE, LONG, TextTable, read_regular
 from scanfab.io.reader import Snapshot
 from scanfab.io.unpacking import check_lines
 from scanfab.packing.cell import Cell
@@ -202,16 +202,17 @@ def _regular(
 
 
 def _long_table(snapshot: Snapshot, body: _Body, count: int) -> TextTable | None:
-    """Where the rows of a large snapshot stand; None if it is small, ReadError if it is cut."""
+    """Where the rows of a large snapshot stand; None if it is small; a long one may be cut."""
     path = plain(snapshot.path)
     stop = path.stat().st_size if snapshot.stop is None else snapshot.stop
     start = snapshot.start + body.start
     _check_size(snapshot, stop - start, len(body.names), count)
     # a row has at least a digit and a blank for each column
-    if 2 * count * max(len(body.names), 1) > stop - start:
+    possible = 2 * count * max(len(body.names), 1) <= stop - start
+    if not possible and stop - start > LONG:
         with open(path, "rb") as stream:
             raise _incomplete(snapshot, count, _line_ends(stream, start, stop))
-    if not body.names or stop - start < LARGE:
+    if not (possible and body.names) or stop - start < LARGE:
         return None
     return TextTable(path, start, stop, len(body.names), count)
 
