@@ -95,7 +95,9 @@ class Frame:
             grains = _of_step(grains, self.name_step, self.step)
         other = replace(series, grains=grains, contacts=tuple(families))
         vars(other)["_spaces"] = list(series._spaces)
-        return replace(self, series=other, snapshot=replace(self.snapshot, path=path.absolute()))
+        parts = tuple(part.absolute() for part in self.snapshot.parts)
+        snapshot = replace(self.snapshot, path=path.absolute(), parts=parts)
+        return replace(self, series=other, snapshot=snapshot)
 
     @property
     def reader(self) -> Reader:

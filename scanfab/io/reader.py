@@ -97,6 +97,8 @@ class Snapshot:
     """Where it ends; None: the end of the file."""
     stepless: bool = False
     """Whether the file says that there is no step, so that a number in its name is none."""
+    parts: tuple[Path, ...] = ()
+    """Other files, with the rest of its grains."""
 
 
 class GrainTable(NamedTuple):

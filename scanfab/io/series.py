@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any, Literal, SupportsIndex, overload
 
@@ -342,8 +342,8 @@ class Series:
         """The dumps of an index that are there; a frame that is not has been told of."""
         assert self.grains.reader is not None
         with suppress(ReadError):
-            paths = dict.fromkeys(one.path for one in self.grains.reader.snapshots(index))
-            return [path for path in paths if path.is_file()]
+            files = [(one.path, *one.parts) for one in self.grains.reader.snapshots(index)]
+            return [path for path in dict.fromkeys(chain(*files)) if path.is_file()]
         return []
 
     def files_through(self, number: int) -> Iterator[tuple[Path, bool]]:

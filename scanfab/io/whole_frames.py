@@ -113,7 +113,8 @@ class Wholeness:
         series, path = frame.series, frame.snapshot.path
         found = [self.contacts(series, frame, family) for family in series.contacts]
         beside = [] if series.grains.kind == "index" else series.beside(path)
-        return [path, *beside, *(one for one in found if one is not None)]
+        parts = frame.snapshot.parts
+        return [path, *parts, *beside, *(one for one in found if one is not None)]
 
     def has_contacts(self, frame: Frame) -> bool:
         """Whether the frame has a file in each family of contacts."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -108,9 +109,10 @@ class VtkReader:
         """Points and their arrays, with the box of LIGGGHTS or the cell of YADE beside them."""
         if form_of(snapshot.path) in BLOCKS:
             return self._read_blocks(snapshot, options)
-        mesh = read_mesh(snapshot.path)
+        mesh = read_mesh(snapshot.path, snapshot.parts)
         columns = {**mesh.point_arrays, "position": mesh.points}
         if is_packing(mesh):
+            _refuse_parts(snapshot, "a packing that scanfab wrote")
             own = grain_table(snapshot.path, columns, cell_of(snapshot.path, mesh), options)
             return own._replace(contacts=contacts_of(snapshot.path, mesh))
         if len(mesh.points) == 0:
@@ -159,6 +161,7 @@ class VtkReader:
 
     def _read_blocks(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         """The grains of the one file that has some, with the contacts of the one that has some."""
+        _refuse_parts(snapshot, "a list of files itself")
         index, blocks = snapshot.path, self._blocks(snapshot.path)
         grains, contacts = blocks.get("grains", []), blocks.get("contacts", [])
         if len(grains) != 1 or len(contacts) > 1:
@@ -173,25 +176,24 @@ class VtkReader:
         return table
 
     def _listed(self, index: Path) -> list[Snapshot]:
-        """The grain files of a ``.pvd``, in its order."""
-        try:
-            entries = [
-                (file_inside(index, entry.attrib["file"]), float(entry.attrib["timestep"]))
-                for entry in elements(index).iter("DataSet")
-            ]
-        except (LookupError, ValueError) as error:
-            raise ReadError(f"{index}: cannot be read as a list of VTK files: {error}") from None
-        kinds: dict[str, FileKind] = {}
-        found = []
-        for path, time in entries:
-            # parts of one name hold the same; some are boxes and contacts
-            family = re.sub(r"\d+", "*", path.name)
-            kinds.setdefault(family, "other")
-            if kinds[family] == "other":
+        """The frames of a ``.pvd``, in its order: the parts of one time are one frame."""
+        kinds: dict[tuple[str, ...], FileKind] = {}
+        frames: dict[float | None, dict[tuple[str, ...], Path]] = {}
+        for path, time, part in _entries(index):
+            # files of one name hold the same; some are boxes and contacts
+            family = (re.sub(r"\d+", "*", path.name), *part)
+            if kinds.get(family, "other") == "other":
                 kinds[family] = self.kind(path)
-            if kinds[family] in ("grains", "points"):
-                found.append(Snapshot(path, step=_last_number(path), time=time))
-        return found
+            if kinds[family] not in ("grains", "points"):
+                continue
+            other = frames.setdefault(time, {}).setdefault(part, path)
+            if other is not path:
+                raise ReadError(
+                    f"{index}: {other.name} and {path.name} have {_moment(time)} and the same part "
+                    f"and group: expected another time, or another part of one frame"
+                )
+        _refuse_unlike(index, kinds)
+        return [_frame(list(parts.values()), time) for time, parts in frames.items()]
 
     def force_on_second(self, mesh: Mesh) -> FloatArray | None:
         """Force on the second grain, shape (M, 3); None: which one it acts on is not known."""
@@ -210,9 +212,50 @@ def vectors(mesh: Mesh, name: str) -> FloatArray | None:
     return np.asarray(values, dtype=np.float64)
 
 
-def _last_number(path: Path) -> int | None:
-    numbers = re.findall(r"\d+", Path(bare_name(path)).stem)
-    return int(numbers[-1]) if numbers else None
+def _entries(index: Path) -> list[tuple[Path, float | None, tuple[str, ...]]]:
+    """The files of a ``.pvd``, their times, and which group and part of a frame each is."""
+    try:
+        return [
+            (
+                file_inside(index, entry.attrib["file"]),
+                float(entry.attrib["timestep"]) if "timestep" in entry.attrib else None,
+                (entry.get("group", ""), entry.get("part", "0")),
+            )
+            for entry in elements(index).iter("DataSet")
+        ]
+    except (LookupError, ValueError) as error:
+        raise ReadError(f"{index}: cannot be read as a list of VTK files: {error}") from None
+
+
+def _moment(time: float | None) -> str:
+    return "no timestep" if time is None else f"the timestep {time:g}"
+
+
+def _frame(files: Sequence[Path], time: float | None) -> Snapshot:
+    """Its step is the last number of the names that all parts have in common."""
+    numbers = zip(*(re.findall(r"\d+", Path(bare_name(file)).stem) for file in files), strict=False)
+    same = [int(one[0]) for one in numbers if len(set(one)) == 1]
+    return Snapshot(files[0], same[-1] if same else None, time, parts=tuple(files[1:]))
+
+
+def _refuse_unlike(index: Path, kinds: Mapping[tuple[str, ...], FileKind]) -> None:
+    """Points without a radius are no part of grains that have one."""
+    found = {kind: family[0] for family, kind in kinds.items() if kind in ("grains", "points")}
+    if len(found) > 1:
+        raise ReadError(
+            f"{index}: {found['points']} are points without a radius beside the grains in "
+            f"{found['grains']}: take them out of the list, or name the files as the source"
+        )
+
+
+def _refuse_parts(snapshot: Snapshot, what: str) -> None:
+    """ReadError if a file that says all of a frame is one of several of its parts."""
+    if snapshot.parts:
+        names = ", ".join(part.name for part in snapshot.parts)
+        raise ReadError(
+            f"{snapshot.path}: is {what}, and cannot be joined with {names} of the same timestep: "
+            f"name one as the source"
+        )
 
 
 def _box_beside(path: Path) -> Cell | None:

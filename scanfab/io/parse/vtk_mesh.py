@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -49,9 +49,16 @@ def form_of(path: Path) -> str | None:
     return "Xdmf" if re.search(rb"<Xdmf\b", head) else None
 
 
-def read_mesh(path: Path) -> Mesh:
+def read_mesh(path: Path, parts: Sequence[Path] = ()) -> Mesh:
     """
     Read a VTK file, or the pieces that it lists.
+
+    Parameters
+    ----------
+    path : Path
+        Of the file.
+    parts : sequence of Path, optional
+        Files with more of the same mesh, which come behind it.
 
     Raises
     ------
@@ -59,7 +66,7 @@ def read_mesh(path: Path) -> Mesh:
         If it is damaged, incomplete, or of another form.
     """
     with _named_flaws(path):
-        return mesh_of(_content(path))
+        return mesh_of(joined([_content(path), *map(_named_content, parts)]))
 
 
 @contextmanager
@@ -95,6 +102,10 @@ def _content(path: Path) -> Content:
 def _piece(path: Path) -> Content:
     if form_of(path) in PIECES:
         raise FlawError(f"its piece {path.name} lists pieces itself")
+    return _named_content(path)
+
+
+def _named_content(path: Path) -> Content:
     with _named_flaws(path):
         return _content(path)
 

@@ -99,3 +99,72 @@ def test_definitions_are_refused(tmp_path, text):
     path.write_bytes(text.encode() + path.read_bytes())
     with pytest.raises(ReadError, match="definitions"):
         VtkReader().kind(path)
+
+
+def collection(path, *entries):
+    """A ``.pvd`` of files with their attributes."""
+    rows = "".join(f'<DataSet {more} file="{name}"/>' for name, more in entries)
+    return write(path, f'<VTKFile type="Collection"><Collection>{rows}</Collection></VTKFile>')
+
+
+@pytest.mark.parametrize("one", ['part="{}"', 'group="{}"', 'group="a{}" part="0"'])
+@pytest.mark.parametrize("name", ["f/out_{1}_{0}.vtp", "f/out_{0}_{1}.vtp"])
+def test_the_parts_of_one_time_are_one_frame(tmp_path, one, name):
+    rows = {(5, 0): [0, 1], (5, 1): [2, 3], (6, 0): [3], (6, 1): [2, 1, 0]}
+    for (step, part), own in rows.items():
+        cloud(tmp_path / name.format(step, part), own)
+    entries = [
+        (name.format(step, part), f'timestep="{step / 2}" {one.format(part)}')
+        for step, part in rows
+    ]
+    path = collection(tmp_path / "run.pvd", *entries)
+    series = scanfab.read_series(path)
+    packings = [frame.read() for frame in series]
+    assert [(one.step, one.time) for one in packings] == [(5, 2.5), (6, 3.0)]
+    for packing, ids in zip(packings, [[0, 1, 2, 3], [3, 2, 1, 0]], strict=True):
+        np.testing.assert_array_equal(packing.id, ids)
+        np.testing.assert_array_equal(packing.position, POSITION[ids])
+    assert {file.name for file in series.files()} >= {name.split("/")[-1] for name, _ in entries}
+    alone = series[1].alone()
+    assert all(file.is_absolute() for file in (alone.snapshot.path, *alone.snapshot.parts))
+    np.testing.assert_array_equal(alone.read().id, packings[1].id)
+
+
+def test_parts_that_number_their_grains_alike_are_refused(tmp_path):
+    names = [cloud(tmp_path / f"{part}.vtp", [0, 1]).name for part in "ab"]
+    entries = [(name, f'timestep="1" part="{k}"') for k, name in enumerate(names)]
+    with pytest.raises(scanfab.ScanfabError, match=r"ids|twice"):
+        scanfab.read(collection(tmp_path / "run.pvd", *entries))
+
+
+@pytest.mark.parametrize("more", ['timestep="5"', 'timestep="5" part="1"', 'group="g"'])
+def test_one_part_of_one_time_is_listed_once(tmp_path, more):
+    names = [cloud(tmp_path / f"{part}.vtp", [0, 1]).name for part in "ab"]
+    path = collection(tmp_path / "run.pvd", *((name, more) for name in names))
+    with pytest.raises(ReadError, match=r"a\.vtp and b\.vtp have .* the same part and group"):
+        scanfab.read(path)
+
+
+@pytest.mark.parametrize("more", ["", 'part="0"', 'group="" part="0" timestep="7"'])
+def test_a_list_of_one_file_is_a_frame(tmp_path, more):
+    cloud(tmp_path / "a_3.vtp", [0, 1, 2])
+    packing = scanfab.read(collection(tmp_path / "run.pvd", ("a_3.vtp", more)))
+    assert (len(packing), packing.step) == (3, 3)
+    assert packing.time == (7.0 if "timestep" in more else None)
+
+
+def test_a_part_that_says_all_of_a_frame_is_joined_with_no_other(tmp_path):
+    for part in range(2):
+        packing = scanfab.Packing(POSITION, 1.0, id=np.arange(4) + 10 * part, contacts=[[0, 1]])
+        scanfab.convert(packing, tmp_path / f"p{part}.vtp")
+    entries = [(f"p{part}.vtp", f'timestep="0" part="{part}"') for part in range(2)]
+    with pytest.raises(ReadError, match=r"cannot be joined with p1\.vtp of the same timestep"):
+        scanfab.read(collection(tmp_path / "run.pvd", *entries))
+
+
+def test_points_without_a_radius_are_no_part_of_a_frame(tmp_path):
+    cloud(tmp_path / "grains.vtp", [0, 1])
+    pyvista.PolyData(POSITION).save(tmp_path / "points.vtp")
+    entries = [(f"{name}.vtp", f'part="{name}"') for name in ("grains", "points")]
+    with pytest.raises(ReadError, match=r"points\.vtp are points without a radius"):
+        scanfab.read(collection(tmp_path / "run.pvd", *entries))
