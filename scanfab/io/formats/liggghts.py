@@ -76,6 +76,7 @@ class LiggghtsVtkReader(VtkReader):
 
     # a contact list names grains only
     walls = False
+    says_sign = True
 
     def force_on_second(self, mesh: Mesh) -> FloatArray | None:
         """The file has the force on the first grain, at times its normal and tangential part."""

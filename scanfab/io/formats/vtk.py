@@ -14,6 +14,7 @@ from scanfab.base.typing import FloatArray
 from scanfab.io.files import bare_name, file_inside, plain
 from scanfab.io.formats.columns import grain_table, has_radius, whole_numbers
 from scanfab.io.formats.join import join_ids, join_positions
+from scanfab.io.formats.proved_force import proved_force, tell_left_out
 from scanfab.io.formats.vtp_packing import (
     cell_of,
     contacts_of,
@@ -74,6 +75,8 @@ class VtkReader:
     lists_contacts = True
     # whether one end of a contact may be a wall, which is not in the grain file
     walls = True
+    # whether the format says on which grain of a contact its force acts
+    says_sign = False
 
     def recognises(self, path: Path) -> bool:
         """By the first line of legacy VTK, or the root element of the XML formats."""
@@ -125,20 +128,39 @@ class VtkReader:
             return grains
         # lines between the grains' own points
         force, force_n = self.force_on_second(mesh), self.normal_force(mesh)
-        return grains._replace(contacts=ContactList(mesh.lines, force=force, force_n=force_n))
+        contacts = ContactList(mesh.lines, force=force, force_n=force_n)
+        return grains._replace(contacts=self._proved(snapshot.path, grains, contacts, mesh))
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
     ) -> JoinedContacts:
         """Lines; by the arrays id1 and id2 where grains have ids, else by their ends."""
         mesh = read_mesh(snapshot.path)
+        joined = self._joined(snapshot.path, mesh, grains)
+        assert joined.contacts is not None
+        contacts = self._proved(snapshot.path, grains, joined.contacts, mesh)
+        return joined._replace(contacts=contacts)
+
+    def _joined(self, path: Path, mesh: Mesh, grains: GrainTable) -> JoinedContacts:
         force, force_n = self.force_on_second(mesh), self.normal_force(mesh)
         ids = [mesh.line_arrays.get(name) for name in ("id1", "id2")]
-        named = [whole_numbers(snapshot.path, values) for values in ids if values is not None]
+        named = [whole_numbers(path, values) for values in ids if values is not None]
         if grains.id is not None and len(named) == 2:
             pairs = np.column_stack(named)
-            return join_ids(snapshot.path, grains, pairs, force, walls=self.walls, force_n=force_n)
-        return join_positions(snapshot.path, grains, mesh.points[mesh.lines], force, force_n)
+            return join_ids(path, grains, pairs, force, walls=self.walls, force_n=force_n)
+        return join_positions(path, grains, mesh.points[mesh.lines], force, force_n)
+
+    def _proved(
+        self, path: Path, grains: GrainTable, contacts: ContactList, mesh: Mesh
+    ) -> ContactList:
+        """The contacts with a force whose sign the format says, or the forces themselves."""
+        if self.says_sign:
+            return contacts
+        tell_left_out(path, mesh.line_arrays)
+        if contacts.force is None:
+            return contacts
+        rows, force = np.asarray(contacts.pairs), np.asarray(contacts.force, np.float64)
+        return contacts._replace(force=proved_force(path, grains, rows, force))
 
     def carries(self, path: Path) -> Carries:
         """LIGGGHTS writes a box beside its files; VTK itself has no cell."""
@@ -196,8 +218,8 @@ class VtkReader:
         return [_frame(list(parts.values()), time) for time, parts in frames.items()]
 
     def force_on_second(self, mesh: Mesh) -> FloatArray | None:
-        """Force on the second grain, shape (M, 3); None: which one it acts on is not known."""
-        return None
+        """Force, shape (M, 3): on the second grain, unless the format does not say on which."""
+        return vectors(mesh, "force")
 
     def normal_force(self, mesh: Mesh) -> FloatArray | None:
         """The normal part: shape (M,), compression positive, or (M, 3), on the second grain."""
@@ -207,7 +229,7 @@ class VtkReader:
 def vectors(mesh: Mesh, name: str) -> FloatArray | None:
     """An array of the lines that holds a vector for each, shape (M, 3); None without it."""
     values = mesh.line_arrays.get(name)
-    if values is None or values.shape != (len(mesh.lines), 3):
+    if values is None or values.shape != (len(mesh.lines), 3) or values.dtype.kind not in "iuf":
         return None
     return np.asarray(values, dtype=np.float64)
 

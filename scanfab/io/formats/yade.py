@@ -45,6 +45,7 @@ class YadeReader(VtkReader):
     description = "YADE export.VTKExporter, VTKRecorder, export.text, export.textExt, O.save (XML)"
     extensions = (".vtk", ".vtu", ".vtp", ".txt", ".xml", ".yade")
     generic = False
+    says_sign = True
 
     def recognises(self, path: Path) -> bool:
         """YADE's own first lines, or the arrays of VTKRecorder's interactions."""

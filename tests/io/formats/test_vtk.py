@@ -8,7 +8,7 @@ import pytest
 import pyvista
 
 import scanfab
-from scanfab.base.errors import ReadError
+from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.io.formats.liggghts import LiggghtsReader
 from scanfab.io.formats.vtk import VtkReader
 from scanfab.io.parse import vtk_data
@@ -346,11 +346,50 @@ def test_a_file_that_is_no_vtk_is_refused(tmp_path):
         read_mesh(write(tmp_path / "a.vtk", "hello"))
 
 
+def push():
+    """Forces on the second grain that push it off the first."""
+    return (POSITION[LINES[:, 1]] - POSITION[LINES[:, 0]]) * np.arange(1.0, len(LINES) + 1)[:, None]
+
+
+@pytest.mark.parametrize(("sign", "grain"), [(1, "second"), (-1, "first")])
+def test_forces_act_on_the_grain_that_they_push_off_the_other(tmp_path, sign, grain):
+    spheres = polydata(tmp_path / "spheres.vtp", radius=RADIUS)
+    contacts = lines_of_points(tmp_path / "lines.vtp", force=sign * push())
+    with pytest.warns(ScanfabNote, match=rf"lines\.vtp: the forces act on the {grain} grain"):
+        packing = scanfab.read(spheres, contacts=contacts)
+    np.testing.assert_array_equal(packing.contacts.force, push())
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_so_they_do_where_one_file_holds_grains_and_contacts(tmp_path, sign):
+    path = lines_of_points(tmp_path / "both.vtp", force=sign * push())
+    mesh = pyvista.read(path)
+    mesh.point_data["radius"] = RADIUS
+    mesh.save(path)
+    np.testing.assert_array_equal(scanfab.read(path).contacts.force, push())
+
+
 def test_which_grain_a_force_acts_on_is_not_guessed(tmp_path):
-    contacts = lines_of_points(tmp_path / "lines.vtp", force=np.ones((3, 3)))
+    force = push()
+    force[1] *= -1
+    contacts = lines_of_points(tmp_path / "lines.vtp", force=force)
     grains = GrainTable(POSITION, RADIUS, None, {}, None)
-    joined = VtkReader().read_contacts(Snapshot(contacts), ReadOptions(), grains)
+    with pytest.warns(ScanfabWarning, match=r"lines\.vtp: the forces are left out: 67% of them"):
+        joined = VtkReader().read_contacts(Snapshot(contacts), ReadOptions(), grains)
     assert joined.contacts.force is None
+
+
+def test_other_arrays_of_forces_are_named(tmp_path):
+    spheres = polydata(tmp_path / "spheres.vtp", radius=RADIUS)
+    arrays = {
+        "normal_force": np.ones(len(LINES)),
+        "ContactForce": push(),
+        "kn": np.ones(len(LINES)),
+    }
+    contacts = lines_of_points(tmp_path / "lines.vtp", **arrays)
+    with pytest.warns(ScanfabNote, match=r"left out of the contacts: \w+, \w+: a force is taken"):
+        packing = scanfab.read(spheres, contacts=contacts)
+    assert packing.contacts.force is None
 
 
 def test_the_box_beside_a_dump_is_told(tmp_path):
