@@ -115,7 +115,8 @@ def families_beside(
     """
     Other families in the folders of some grain files, with the files of the same steps only.
 
-    Their files go by the same keys as the grain files.
+    Their files go by the same keys as the grain files. ``STEM.contacts.csv`` is of the file STEM,
+    whatever number in it differs from those of others.
     """
     keys: dict[Path, dict[Path, int | None]] = defaultdict(dict)
     for key, file in grains.files.items():
@@ -127,8 +128,13 @@ def families_beside(
         wanted = {
             step: own[file] for group in groups for step, file in _by_step(group) if file in own
         }
+        stems = {_own_stem(file): key for file, key in own.items()}
         for group in groups:
             same = [(wanted[step], file) for step, file in _by_step(group) if step in wanted]
+            # a name that says whose contacts they are goes before the numbers in it
+            named = [(stems[stem], file) for file in group if (stem := _owner(file)) in stems]
+            if not set(named) <= set(same):
+                same, group = named, [file for _, file in named]
             if same and not own.keys() & set(group):
                 found[_glob(group, files)] += same
     return [
@@ -169,7 +175,7 @@ def set_tables_aside(
     return [
         family
         if not _is_table(family)
-        or any(file in named or _belongs(file, stems) for file in family.files.values())
+        or any(file in named or _owner(file) in stems for file in family.files.values())
         else replace(family, kind="other")
         for family in families
     ]
@@ -179,9 +185,17 @@ def _is_table(family: Family) -> bool:
     return bool(getattr(family.reader, "is_table", False))
 
 
-def _belongs(file: Path, stems: Collection[str]) -> bool:
+def _own_stem(file: Path) -> str:
+    """The stem by which contacts name a file; dumps called dump.100 and dump.200 share no stem."""
+    name = bare_name(file)
+    stem, _, ending = name.rpartition(".")
+    return name if ending.isdigit() else stem or name
+
+
+def _owner(file: Path) -> str | None:
+    """The stem of the file whose contacts these are by their name; None if it does not say so."""
     stem, ending, _ = bare_name(file).rpartition(CONTACTS_ENDING)
-    return bool(ending) and stem in stems
+    return stem if ending else None
 
 
 def contacts_beside(
@@ -217,12 +231,17 @@ def own_contacts(
     Which families of contact files belong to a family of grains, and of which it is in doubt.
 
     Where no other grains lie beside, all do. Else those whose names begin with as many of the same
-    words as the grains' and with more than those of the others have in common with them.
+    words as the grains' and with more than those of the others have in common with them; and those
+    that are called ``STEM.contacts.csv``, by the grain files' own names.
     """
     own: list[Family] = []
     doubtful: list[Family] = []
     others = [rival for rival in rivals if _stem(rival) != _stem(grains)]
+    stems = set(map(_own_stem, grains.files.values()))
     for family in contacts:
+        if stems >= set(map(_owner, family.files.values())):
+            own.append(family)
+            continue
         kin = _kinship(grains, family)
         closest = max((_kinship(rival, family) for rival in others), default=(-1, False))
         if kin > closest:

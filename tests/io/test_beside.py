@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import scanfab
@@ -146,3 +147,33 @@ def test_rows_that_users_take_out_are_theirs_to_tell(tmp_path):
     frame = tmp_path / "a.frame.csv"
     frame.write_text(frame.read_text().replace(",40,", ",,"))
     assert len(scanfab.read(path)) == 39
+
+
+@pytest.mark.parametrize("count", [0, 1])
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["run1_700.data", "run2_700.xyz"],
+        # the number of the second run is the step of the first
+        ["run1_2.data", "run2_2.xyz", "run3_2.csv"],
+        ["g0_700.xyz", "g1_700.csv"],
+        ["a.data", "a_fine.xyz"],
+    ],
+)
+def test_each_file_finds_its_own_contacts_whatever_lies_beside(tmp_path, names, count):
+    pairs = [np.array([[0, 1 + k]])[:count].reshape(-1, 2) for k in range(len(names))]
+    packings = [scanfab.Packing(np.eye(4, 3), 1.0, contacts=one) for one in pairs]
+    for name, packing in zip(names, packings, strict=True):
+        scanfab.convert(packing, tmp_path / name)
+    for name, packing in zip(names, packings, strict=True):
+        again = scanfab.read(tmp_path / name)
+        np.testing.assert_array_equal(again.contacts.pairs, packing.contacts.pairs)
+    path = write(tmp_path / "grains", (tmp_path / names[0]).read_text())
+    assert scanfab.read(path).contacts is None
+
+
+def test_contacts_of_another_file_are_not_taken_for_its_own(tmp_path):
+    contacts_of = {"run1_2.data": None, "run2_2.xyz": [[0, 1]], "run3_2.csv": [[1, 2]]}
+    for name, contacts in contacts_of.items():
+        scanfab.convert(scanfab.Packing(np.eye(3), 1.0, contacts=contacts), tmp_path / name)
+    assert scanfab.read(tmp_path / "run1_2.data").contacts is None
