@@ -30,11 +30,13 @@ from scanfab.io.unpacking import (
 
 __all__ = [
     "COMPRESSED_SUFFIXES",
+    "Stamp",
     "bare_name",
     "check_memory",
     "file_inside",
     "first_bytes",
     "plain",
+    "stamp_of",
     "temporary_copy",
     "unpacked",
     "without_temporary",
@@ -49,11 +51,11 @@ RESERVE = 1 << 30
 SMALL = 64 << 20
 # of the folder that holds the copies of a process
 PREFIX = "scanfab-"
-# path, time and size of a file
-_Key = tuple[str, int, int]
-_copies: OrderedDict[_Key, Path] = OrderedDict()
+Stamp = tuple[str, int, int, int]
+"""What tells a file from others, and from itself when it was changed."""
+_copies: OrderedDict[Stamp, Path] = OrderedDict()
 # files that were unpacked once, and whose copies may have been removed since
-_sound: set[_Key] = set()
+_sound: set[Stamp] = set()
 _threads: set[int] = set()
 _lock = Lock()
 _folder: list[str] = []
@@ -88,13 +90,18 @@ def first_bytes(path: Path, count: int = 4096) -> bytes:
         raise ReadError(f"{path}: cannot be read: {_reason(error)}") from None
 
 
+def stamp_of(path: Path) -> Stamp:
+    """Place, number, size and time of change; a relative path may come to mean another file."""
+    status = path.stat()
+    return os.path.abspath(path), status.st_ino, status.st_size, status.st_mtime_ns
+
+
 def plain(path: Path) -> Path:
     """The file itself, or a decompressed temporary copy that keeps its bare name."""
     opener = _opener(path)
     if opener is open:
         return path
-    status = path.stat()
-    key = (str(path), status.st_mtime_ns, status.st_size)
+    key = stamp_of(path)
     with _lock:
         _threads.add(get_ident())
         if key in _copies:

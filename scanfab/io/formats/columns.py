@@ -27,6 +27,7 @@ __all__ = [
     "RADIUS_NAMES",
     "grain_table",
     "has_radius",
+    "refuse_cylindrical",
     "refuse_named_twice",
     "room_for_columns",
     "user_cell",
@@ -41,6 +42,7 @@ DIAMETER_NAMES = ("diameter", "diam")
 ID_NAMES = ("id", "ids", "particle_id", "particleid", "body_id", "bodyid")
 # other names that a radius may have, such as c_rad and f_r[1]
 LIKE_A_RADIUS = re.compile(r"(?i)rad(i|$|[^a-z])|(^|_)r($|\[)")
+ANGLES = ("theta", "phi", "azimuth")
 # coordinates in the order of preference, and whether they are fractions of the box
 POSITION_NAMES = (("x y z", False), ("xu yu zu", False), ("xs ys zs", True), ("xsu ysu zsu", True))
 
@@ -286,6 +288,7 @@ def _radius(
         return 0.5 * _lengths(path, rest.pop("diameter"), "a diameter", where)
     name = _first_of(RADIUS_NAMES, list(rest))
     if name is not None:
+        refuse_cylindrical(path, name, list(rest), where)
         radius = _lengths(path, rest.pop(name), "a radius", where)
         other = _first_of(DIAMETER_NAMES, list(rest))
         if other is not None:
@@ -301,6 +304,16 @@ def _radius(
         f"{'' if like == '...' else ' (if that is one)'}, or give one radius for all grains with "
         f"`radius`"
     )
+
+
+def refuse_cylindrical(path: Path, name: str, names: Sequence[str], where: str = "") -> None:
+    """ReadError for an r that stands beside an angle: it may be the distance from an axis."""
+    angle = _first_of(ANGLES, names)
+    if name.lower() == "r" and angle is not None:
+        raise ReadError(
+            f"{path}{where}: the column {name} may be a radius of grains or, beside {angle}, the "
+            f'distance from an axis: say which column is the radius, by `columns={{"radius": ...}}`'
+        )
 
 
 def _take(rest: MutableMapping[str, Any], names: Sequence[str], keep: bool = False) -> Any:

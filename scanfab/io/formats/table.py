@@ -17,7 +17,8 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.errors import ReadError, ScanfabNote
+from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
+from scanfab.io.files import Stamp, stamp_of
 from scanfab.io.formats.columns import grain_table
 from scanfab.io.formats.table_contacts import join_table
 from scanfab.io.formats.table_files import (
@@ -30,13 +31,16 @@ from scanfab.io.formats.table_files import (
 from scanfab.io.formats.table_names import (
     CONTACTS,
     EDEM,
+    PERHAPS_FRAMES,
     PFC,
     TABLE,
     Names,
     check_one_unit,
     find_columns,
     is_contacts,
+    is_frame_name,
     is_of_contacts,
+    plain_name,
     unique,
     warn_of_lacking_unit,
 )
@@ -57,12 +61,8 @@ __all__ = ["EdemReader", "PfcReader", "TableReader"]
 NUMBERS = ("x", "y", "z", "radius", "diameter", "volume", "id", "id1", "id2")
 WHOLE = ("id", "id1", "id2")
 OF_GRAINS = ("x", "y", "z", "radius", "diameter", "id")
-# path, lines to skip, size and time of change of a table
-Stamp = tuple[Path, int, int, int]
-# the columns of the table whose names were guessed last, until it is read
-_guessed: dict[Stamp, Columns] = {}
-# names of columns that tell frames of one file apart
-FRAMES = ("step", "timestep", "frame", "time")
+# the columns of the table whose names were guessed last, until it is read; and lines to skip
+_guessed: dict[tuple[Stamp, int], Columns] = {}
 ASK = (
     'name them, for instance `columns="x=1,y=2,z=3,radius=4"` (or diameter=4; numbers of columns '
     "count from 1); discs have a column z, too, with one value"
@@ -129,7 +129,7 @@ class TableReader:
         own = names or [f"{place + 1}" for place in range(width)]
         is_guess = names is None and not options.columns
         found = _guess(path, options.skip) if is_guess else reader._find(path, own, contacts=False)
-        guessed = _guessed.pop(_stamp(path, options.skip), None) if is_guess else None
+        guessed = _guessed.pop((stamp_of(path), options.skip), None) if is_guess else None
         columns = guessed or read_table(path, options.skip, *_needed(found))
         if names is not None:
             _refuse_frames(path, columns)
@@ -276,10 +276,23 @@ def _named_contacts(path: Path, text: str | None) -> dict[str, str]:
 def _refuse_frames(path: Path, columns: Columns) -> None:
     """Several frames one below the other would be read as one packing."""
     for name, values in columns.items():
-        if name.lower() in FRAMES and values.dtype.kind in "iuf" and len(np.unique(values)) > 1:
+        may_be = plain_name(name) in PERHAPS_FRAMES
+        if values.dtype.kind not in "iuf" or not (may_be or is_frame_name(name)):
+            continue
+        count = len(np.unique(values))
+        if count > 1 and not may_be:
             raise ReadError(
-                f"{path}: the column {name} has {len(np.unique(values))} values: expected one "
-                f"frame in a file: write each to a file of its own"
+                f"{path}: the column {name} has {count} values: expected one frame in a file: "
+                f"write each to a file of its own"
+            )
+        blocks = np.count_nonzero(np.diff(values)) + 1
+        if 1 < count == blocks <= len(values) / 2:
+            warnings.warn(
+                f"{path}: the column {name} has {count} values, each in rows that follow each "
+                f"other: if these are frames, they are read as one packing: write each to a file "
+                f"of its own",
+                ScanfabWarning,
+                stacklevel=3,
             )
 
 
@@ -299,26 +312,19 @@ def _radii_of_volumes(columns: Columns, name: str) -> Columns:
     return {**columns, "radius": np.cbrt(0.75 / np.pi * columns[name].astype(np.float64))}
 
 
-def _stamp(path: Path, skip: int) -> Stamp:
-    """What tells a table from another, and from itself when it was changed."""
-    file = path.stat()
-    return path, skip, file.st_size, file.st_mtime_ns
-
-
 def _guess(path: Path, skip: int) -> dict[str, str]:
     """Columns without names: ``x y z r`` or ``id x y z r``, if the grains then touch."""
-    names = _proved_names(_stamp(path, skip))
+    names = _proved_names(path, skip, stamp_of(path))
     return {name: f"{place + 1}" for place, name in enumerate(names)}
 
 
 @lru_cache
-def _proved_names(stamp: Stamp) -> tuple[str, ...]:
-    """Of a table as it stood at that time, so that it is proved once."""
-    path, skip, *_ = stamp
+def _proved_names(path: Path, skip: int, stamp: Stamp) -> tuple[str, ...]:
+    """Of a table as it stood then, so that it is proved once."""
     columns = read_unnamed(path, skip)
     names = _names_by_touch(path, list(columns.values()))
     _guessed.clear()
-    _guessed[stamp] = columns
+    _guessed[stamp, skip] = columns
     return names
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import ReadError, ScanfabWarning
-from scanfab.io.files import first_bytes
+from scanfab.io.files import Stamp, first_bytes, stamp_of
 from scanfab.io.formats.table_names import unique
 from scanfab.io.formats.xyzd import is_xyzd, read_xyzd_columns
 from scanfab.io.parse.sheet_binary import (
@@ -24,7 +24,14 @@ from scanfab.io.parse.sheet_binary import (
     read_parquet,
 )
 from scanfab.io.parse.sheet_columns import read_columns
-from scanfab.io.parse.sheet_layout import HEAD, Layout, first_rows, layout_of, read_text
+from scanfab.io.parse.sheet_layout import (
+    HEAD,
+    Layout,
+    check_width,
+    first_rows,
+    layout_of,
+    read_text,
+)
 
 __all__ = ["Columns", "has_ids", "names_of", "read_table", "read_unnamed"]
 
@@ -42,15 +49,15 @@ def names_of(path: Path, skip: int) -> tuple[list[str] | None, int]:
     elif head.startswith(IS_NPZ):
         names = [part for name, shape in npz_shapes(path).items() for part in _parts(name, shape)]
     else:
-        status = path.stat()
-        layout = _layout_by_head(path, skip, status.st_size, status.st_mtime_ns)
+        layout = _layout_by_head(path, skip, stamp_of(path))
         return (None if layout.names is None else list(layout.names)), layout.width
+    check_width(path, len(names))
     return names, len(names)
 
 
 @lru_cache
-def _layout_by_head(path: Path, skip: int, size: int, changed: int) -> Layout:
-    """Of a file that had this size and time of change, which is asked for several times."""
+def _layout_by_head(path: Path, skip: int, stamp: Stamp) -> Layout:
+    """Of a file as it stood then, which is asked for several times."""
     return layout_of(path, read_text(path, HEAD), skip)
 
 

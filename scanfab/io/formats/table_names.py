@@ -3,23 +3,33 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 import warnings
 from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 
 from scanfab.base.errors import ReadError, ScanfabWarning
-from scanfab.io.formats.columns import DIAMETER_NAMES, ID_NAMES, RADIUS_NAMES, refuse_named_twice
+from scanfab.io.formats.columns import (
+    DIAMETER_NAMES,
+    ID_NAMES,
+    RADIUS_NAMES,
+    refuse_cylindrical,
+    refuse_named_twice,
+)
 
 __all__ = [
     "CONTACTS",
     "EDEM",
+    "PERHAPS_FRAMES",
     "PFC",
     "TABLE",
     "Names",
     "check_one_unit",
     "find_columns",
     "is_contacts",
+    "is_frame_name",
     "is_of_contacts",
+    "plain_name",
     "unique",
     "warn_of_lacking_unit",
 ]
@@ -27,6 +37,10 @@ __all__ = [
 Names = Mapping[str, tuple[str, ...]]
 """The names that a column may have, by what it is; as :func:`plain_name` has them."""
 
+# columns that tell frames of one file apart
+FRAME_NAMES = ("step", "timestep", "time.step", "frame", "time", "time.s", "time.ms")
+# those that may, and may be a property of grains, too
+PERHAPS_FRAMES = ("t", "iteration", "iter", "cycle", "cycles", "snapshot", "increment")
 # what has one unit in a table of grains
 LENGTHS = ("x", "y", "z", "radius", "diameter")
 # what a contact table must have, and what it may
@@ -47,10 +61,13 @@ FORCES = {
     "iz": ("iz", "image.z"),
     "kind": ("contact.type", "kind"),
 }
+# normal and tangential part
+PARTS = {f"{part}{axis}": (f"{part}{axis}",) for part in ("fn", "ft") for axis in "xyz"}
 CONTACTS: Names = {
     "id1": ("id1", "id.1", "grain1", "particle1", "particle.1", "body1", "geoa", "i"),
     "id2": ("id2", "id.2", "grain2", "particle2", "particle.2", "body2", "geob", "j"),
     **FORCES,
+    **PARTS,
 }
 TABLE: Names = {
     **{
@@ -104,8 +121,9 @@ def plain_name(name: str) -> str:
 
 def unique(names: Sequence[str]) -> list[str]:
     """Names of columns; one that is empty, or there before, is the number of its column."""
+    first = {name: place for place, name in reversed(list(enumerate(names)))}
     return [
-        name if name and name not in names[:place] else f"{place + 1}"
+        name if name and first[name] == place else f"{place + 1}"
         for place, name in enumerate(names)
     ]
 
@@ -113,6 +131,18 @@ def unique(names: Sequence[str]) -> list[str]:
 def is_of_contacts(standard: str) -> bool:
     """Whether a column says something of a contact that a packing has: its grains, image, force."""
     return standard in (*IDS, "kind", "ix", "iy", "iz") or standard.startswith("f")
+
+
+def unit_of(name: str) -> str | None:
+    """The unit in brackets behind the name of a column, spelt in one way."""
+    match = UNIT.search(name)
+    # two letters look alike and mean micro
+    return unicodedata.normalize("NFKC", match[1]).strip() if match else None
+
+
+def is_frame_name(name: str) -> bool:
+    """Whether a column tells frames of one file apart."""
+    return plain_name(name) in FRAME_NAMES
 
 
 def is_contacts(found: Mapping[str, str]) -> bool:
@@ -166,6 +196,8 @@ def find_columns(
             )
         if places and keys[places[0]] not in found.values():
             found[standard] = keys[places[0]]
+            if standard == "radius" and not named.keys() & {"radius", "diameter"}:
+                refuse_cylindrical(path, names[places[0]], names)
     _check_units(path, found)
     return found
 
@@ -188,12 +220,21 @@ def _column(path: Path, names: Sequence[str], own: str, standard: str, option: s
 def _check_units(path: Path, found: Mapping[str, str]) -> None:
     """Lengths of one table have one unit."""
     check_one_unit(path, "lengths", found, LENGTHS)
+    if "volume" not in found or found.keys() & {"radius", "diameter"}:
+        return
+    unit = next((unit_of(found[one]) for one in "xyz" if one in found), None)
+    cube = unit_of(found["volume"])
+    if unit and cube and cube not in (f"{unit}^3", f"{unit}3", f"{unit}**3", f"cu {unit}"):
+        raise ReadError(
+            f"{path}: volumes in the cube of the unit of lengths, {unit}, are expected, found "
+            f"{found['volume']}"
+        )
 
 
 def warn_of_lacking_unit(path: Path, found: Mapping[str, str]) -> None:
     """Tell of lengths without a unit beside others with one: it is taken for the same."""
-    names = [found[one] for one in LENGTHS if one in found]
-    with_unit = [name for name in names if UNIT.search(name)]
+    names = [found[one] for one in (*LENGTHS, "volume") if one in found]
+    with_unit = [name for name in names if unit_of(name)]
     without = [name for name in names if name not in with_unit]
     if with_unit and without:
         warnings.warn(
@@ -216,6 +257,6 @@ def check_one_unit(
         If there are two.
     """
     names = [found[one] for one in standard if one in found]
-    units = {name: match[1] for name in names if (match := UNIT.search(name))}
+    units = {name: unit for name in names if (unit := unit_of(name))}
     if len(set(units.values())) > 1:
         raise ReadError(f"{path}: {what} of one unit are expected, found {', '.join(units)}")

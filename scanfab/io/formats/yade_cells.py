@@ -18,7 +18,7 @@ import numpy as np
 
 from scanfab.base.errors import PackingError, ReadError, ScanfabNote, ScanfabWarning
 from scanfab.base.typing import FloatArray
-from scanfab.io.files import COMPRESSED_SUFFIXES, bare_name
+from scanfab.io.files import COMPRESSED_SUFFIXES, Stamp, bare_name, stamp_of
 from scanfab.io.formats.yade_save import is_save, read_save, snapshot_of_save
 from scanfab.io.parse.vtk_mesh import read_mesh
 from scanfab.io.reader import ReadOptions
@@ -78,20 +78,20 @@ def cell_beside(path: Path, position: FloatArray) -> Cell | None:
 def cell_file(path: Path) -> Path | None:
     """The file that has the cell of a file of spheres; None if there is none, or a doubt."""
     folder, name = path.parent, bare_name(path)
-    changed = folder.stat().st_mtime_ns
+    stamp = stamp_of(folder)
     if exported := EXPORTED.fullmatch(name):
         # its number counts files; that of a saved state is a step
-        return _exported_cells(folder, exported[1], changed).get(int(exported[2]))
+        return _exported_cells(folder, exported[1], stamp).get(int(exported[2]))
     recorded = RECORDED.fullmatch(name)
     if recorded is None:
         return None
     beside = _with_any_packing(path.with_name(f"{recorded[1]}pericell.{recorded[2]}.vtu"))
-    return beside or _saved_state(_saves(folder, recorded[1], changed), int(recorded[2]))
+    return beside or _saved_state(_saves(folder, recorded[1], stamp), int(recorded[2]))
 
 
 # listed once for all files of a folder, as long as none comes or goes
 @lru_cache(maxsize=8)
-def _exported_cells(folder: Path, base: str, changed: int) -> dict[int, Path]:
+def _exported_cells(folder: Path, base: str, stamp: Stamp) -> dict[int, Path]:
     """The cells by the numbers of the spheres; none if there is a doubt which is whose."""
     spheres, cells = (_numbered(folder, f"{base}-{kind}-") for kind in ("spheres", "periCell"))
     # behind the interactions of its frame a cell has the next number, before them the same one
@@ -102,7 +102,7 @@ def _exported_cells(folder: Path, base: str, changed: int) -> dict[int, Path]:
 
 
 @lru_cache(maxsize=8)
-def _saves(folder: Path, base: str, changed: int) -> list[Path]:
+def _saves(folder: Path, base: str, stamp: Stamp) -> list[Path]:
     """Files that may be saved states, as their names begin alike."""
     return sorted(folder.glob(f"{glob.escape(base)}*.xml*"))
 

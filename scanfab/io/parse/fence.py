@@ -25,7 +25,7 @@ import numpy.typing as npt
 from scanfab.base.ending import at_end
 from scanfab.base.errors import ReadError
 from scanfab.base.memory import free_memory
-from scanfab.io.files import check_memory
+from scanfab.io.files import Stamp, check_memory, stamp_of
 
 __all__ = ["fenced", "needed"]
 
@@ -128,7 +128,7 @@ def _read(stream: IO[bytes], size: int) -> bytes:
 _lock = threading.Lock()
 _running: list[_Process] = []
 # files, as they stood, that the process did not survive, and when
-_deadly: dict[tuple[Path, int, int], float] = {}
+_deadly: dict[Stamp, float] = {}
 
 
 def needed(path: Path, module: str, extra: str) -> None:
@@ -163,8 +163,7 @@ def fenced(reader: str, file: Path, path: Path, **more: Any) -> tuple[Arrays, di
     ReadError
         If the library cannot read it, crashed, took too long, or would take too much memory.
     """
-    status = file.stat()
-    size, stamp = status.st_size, (file, status.st_size, status.st_mtime_ns)
+    size, stamp = file.stat().st_size, stamp_of(file)
     check_memory(path, 2.0 * size)
     most = int(min(MOST_UNPACKED * size + SMALL, free_memory() / 3))
     request = {
@@ -198,7 +197,7 @@ def fenced(reader: str, file: Path, path: Path, **more: Any) -> tuple[Arrays, di
             raise
 
 
-def _refuse_deadly(stamp: tuple[Path, int, int]) -> None:
+def _refuse_deadly(stamp: Stamp) -> None:
     """FencedError for a file that the process did not survive a moment ago."""
     now = time.monotonic()
     for one in [one for one, when in _deadly.items() if now - when > SECONDS_REFUSED]:

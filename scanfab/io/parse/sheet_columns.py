@@ -27,6 +27,9 @@ Arrays = dict[int, npt.NDArray[Any]]
 LIKE_PACKED = (b"x\x01", b"x^", b"x\x9c", b"x\xda", b"(\xb5")
 EMPTY_LINE = re.compile(rb"\n[ \t\r]*(?=\n)|\n[ \t]*(?:#|%|//|!)|\A[ \t\r]*\n")
 LONGEST_WORD = 60
+WITH_COMMA = r"^[-+0-9.eEdD\s]*,[-+0-9.,eEdD\s]*$"
+# a number whose commas may stand before thousands: no decimal number has two, or begins with 0
+THOUSANDS = r"^\s*[-+]?[1-9][0-9]{0,2}(,[0-9]{3})+\s*$"
 
 
 def read_columns(
@@ -169,10 +172,27 @@ def _word_by_word(
         _check_widths(path, body, layout)
     if frame is None or frame.height != rows:
         raise ReadError(f"{path}: cannot be read as a table of {layout.width} columns")
+    if layout.has_commas:
+        _refuse_thousands(path, frame)
     return {
         place: _column(path, frame[f"{place}"], layout, place, place in numbers, place in whole)
         for place in range(layout.width)
     }
+
+
+def _refuse_thousands(path: Path, frame: Any) -> None:
+    """ReadError if each comma of a table may as well be a sign of thousands."""
+    found = None
+    for words in frame.iter_columns():
+        commas = words.filter(words.str.contains(WITH_COMMA))
+        if not commas.str.contains(THOUSANDS).all():
+            return
+        found = commas[0] if found is None and len(commas) else found
+    if found is not None:
+        raise ReadError(
+            f"{path}: {found.strip()!r} may be a decimal number or have a sign of thousands, as "
+            f"may all numbers with a comma: write them with a point, without signs of thousands"
+        )
 
 
 def _column(

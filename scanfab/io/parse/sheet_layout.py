@@ -17,12 +17,23 @@ from scanfab.base.errors import ReadError
 from scanfab.io.files import check_memory, plain
 from scanfab.io.unpacking import check_lines
 
-__all__ = ["HEAD", "Layout", "fields_of", "first_rows", "is_number", "layout_of", "read_text"]
+__all__ = [
+    "HEAD",
+    "Layout",
+    "check_width",
+    "fields_of",
+    "first_rows",
+    "is_number",
+    "layout_of",
+    "read_text",
+]
 
 # of a file, in which the names and the first rows stand
 HEAD = 1 << 18
 # rows that are looked at to tell how the others are written
 SAMPLE = 20
+# bytes of such a row, of which at least two fit into what is looked at; and its columns
+LONGEST_ROW, MOST_COLUMNS = HEAD // 4, 4096
 NUMBER = re.compile(
     r"[-+]?(?:(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eEdD][-+]?[0-9]+)?|(?:nan|inf|infinity))\Z",
     re.IGNORECASE,
@@ -138,7 +149,7 @@ def layout_of(path: Path, data: bytes, skip: int) -> Layout:
         comment = lines.pop(0)[2]
     if not lines:
         raise ReadError(f"{path}: expected a table, found no row")
-    separator, has_commas = _separator([text for _, _, text in lines])
+    separator, has_commas = _separator(path, [text for _, _, text in lines])
     rows = [fields_of(text, separator) for _, _, text in lines]
     names: tuple[str, ...] | None = None
     # a name beside a number is no header: "P 0.3 1.2 4.1" is a row whose first column is a word
@@ -196,6 +207,11 @@ def _lines(path: Path, data: bytes, skip: int) -> list[tuple[int, int, str]]:
     while place < len(data) and filled <= SAMPLE:
         end = data.find(b"\n", place)
         end = len(data) if end < 0 else end
+        if end - place > LONGEST_ROW:
+            raise ReadError(
+                f"{path}, line {number}: expected a row of at most {LONGEST_ROW} bytes, found "
+                f"{end - place if end < len(data) else 'more'}: is this a table of grains?"
+            )
         text = _as_text(data[place:end]).rstrip("\r")
         found.append((number, place, text))
         filled += bool(text.strip()) and not text.lstrip().startswith(COMMENTS)
@@ -227,13 +243,20 @@ def _is_value(word: str, has_commas: bool) -> bool:
     return is_number(word.replace(",", ".", 1) if has_commas and "." not in word else word)
 
 
-def _separator(lines: Sequence[str]) -> tuple[str, bool]:
+def check_width(path: Path, width: int) -> None:
+    """ReadError for more columns than any table of grains has: each would take its time."""
+    if width > MOST_COLUMNS:
+        raise ReadError(f"{path}: expected at most {MOST_COLUMNS} columns, found {width}")
+
+
+def _separator(path: Path, lines: Sequence[str]) -> tuple[str, bool]:
     """What stands between columns, and whether a comma is the decimal sign."""
     best, choice = 0.0, (" ", False)
     for separator in SEPARATORS:
         if not any(separator in line.strip() for line in lines):
             continue
         rows = [fields_of(line, separator) for line in lines]
+        check_width(path, max(map(len, rows)))
         # names of columns say nothing, but where there is nothing else
         rows = rows[1:] or rows
         words = [word for row in rows for word in row]

@@ -13,7 +13,7 @@ import numpy as np
 
 from scanfab.base.errors import PackingError, ReadError, ScanfabNote
 from scanfab.base.typing import FloatArray
-from scanfab.io.files import first_bytes
+from scanfab.io.files import Stamp, first_bytes, stamp_of
 from scanfab.io.formats.columns import grain_table
 from scanfab.io.parse.counted_rows import spelt, text_of
 from scanfab.io.parse.text_table import parse_some
@@ -106,13 +106,12 @@ class _Export(NamedTuple):
 
 def _export(path: Path) -> _Export:
     """The spheres of a file, which is read once for all its frames."""
-    file = path.stat()
-    return _export_of(path, file.st_size, file.st_mtime_ns)
+    return _export_of(path, stamp_of(path))
 
 
 @lru_cache(maxsize=1)
-def _export_of(path: Path, size: int, changed: int) -> _Export:
-    """What a file holds that had this size and time of change, which tell it from later ones."""
+def _export_of(path: Path, stamp: Stamp) -> _Export:
+    """What a file holds, as it stood then."""
     data = text_of(Snapshot(path))
     rows = [row[0] for row in SPHERES.finditer(data)]
     if not rows:

@@ -533,3 +533,107 @@ def test_options_that_users_write_into_the_settings_file(tmp_path, capsys):
     )
     assert run(["inspect", str(tmp_path / "g.txt"), "--json"]) == 0
     assert '"grains": 64' in capsys.readouterr().out
+
+
+# what a trial by a fresh reader found
+
+
+@pytest.mark.filterwarnings("ignore::scanfab.ScanfabNote")
+def test_a_relative_path_may_come_to_mean_another_file(tmp_path, monkeypatch):
+    for number in (0, 7):
+        folder = tmp_path / f"run{number}"
+        folder.mkdir()
+        text = "".join(f"{x + number:10.5f} {y:.5f} {z:.5f} 0.5\n" for x, y, z in POSITION)
+        os.utime(write(folder / "g.txt", text), ns=(0, 0))
+    monkeypatch.chdir(tmp_path / "run0")
+    scanfab.read_series("g.txt")
+    monkeypatch.chdir(tmp_path / "run7")
+    assert read("g.txt").position[:, 0].min() > 6.9
+
+
+@pytest.mark.parametrize("name", ["Time [s]", "time_s", "Time Step", "FRAME", "timestep"])
+def test_frames_one_below_the_other_are_refused_whatever_their_name(tmp_path, name):
+    frames = np.repeat([1.0, 2.0], 32)
+    names = [name, "x", "y", "z", "radius"]
+    path = rows(tmp_path / "a.csv", frames, POSITION, RADIUS, names=names, separator=",")
+    with pytest.raises(ReadError, match="has 2 values: expected one frame"):
+        read(path)
+
+
+def test_what_may_be_frames_is_told(tmp_path):
+    names = ["t", "x", "y", "z", "radius"]
+    frames = np.repeat([1.0, 2.0], 32)
+    path = rows(tmp_path / "a.csv", frames, POSITION, RADIUS, names=names, separator=",")
+    with pytest.warns(ScanfabWarning, match="column t has 2 values, each in rows that follow"):
+        read(path)
+    # temperatures
+    path = rows(tmp_path / "b.csv", frames[ID % 64], POSITION, RADIUS, names=names, separator=",")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        read(path)
+
+
+def test_signs_of_thousands_are_no_decimal_commas(tmp_path):
+    text = "x\ty\tz\tradius\n120\t840\t1,080\t60\n240\t1,200\t10\t60\n"
+    with pytest.raises(ReadError, match=r"'1,200' may be a decimal number or have a sign of thous"):
+        read(write(tmp_path / "a.tsv", text))
+    # one that can be nothing else shows what they are
+    packing = read(write(tmp_path / "b.tsv", text.replace("840", "0,840")))
+    np.testing.assert_array_equal(packing.position, [[120, 0.84, 1.08], [240, 1.2, 10]])
+
+
+def test_volumes_have_the_cube_of_the_unit_of_lengths(tmp_path):
+    names = [f"Particle Position {axis} (mm)" for axis in "XYZ"]
+    for unit, is_right in (("m^3", False), ("mm^3", True), ("mm\xb3", True)):
+        path = rows(
+            tmp_path / "a.csv",
+            *(POSITION, 4 / 3 * np.pi * RADIUS**3),
+            names=[*names, f"Particle Volume ({unit})"],
+            separator=",",
+        )
+        if is_right:
+            with pytest.warns(ScanfabNote, match="radii are those of spheres"):
+                np.testing.assert_allclose(read(path, format="edem").radius, RADIUS)
+        else:
+            with pytest.raises(ReadError, match=r"the cube of the unit of lengths, mm, .* found P"):
+                read(path, format="edem")
+
+
+def test_two_letters_for_micro_are_one_unit(tmp_path):
+    names = ["x (\xb5m)", "y (\u03bcm)", "z (\xb5m)", "r (\u03bcm)"]
+    assert_right(read(rows(tmp_path / "a.csv", POSITION, RADIUS, names=names, separator=",")))
+
+
+def test_a_radius_beside_an_angle_is_asked(tmp_path):
+    distance = np.hypot(*POSITION[:, :2].T)
+    angle = np.arctan2(*POSITION[:, :2].T)
+    names = ["r", "theta", "x", "y", "z", "size"]
+    columns = distance, angle, POSITION, RADIUS
+    path = rows(tmp_path / "a.csv", *columns, names=names, separator=",")
+    with pytest.raises(ReadError, match="the column r may be a radius of grains or, beside theta"):
+        read(path)
+    assert_right(read(path, columns="radius=size"))
+
+
+def test_normal_and_tangential_forces_of_any_table_are_added(tmp_path):
+    rows(tmp_path / "g.csv", POSITION, RADIUS, names=["x", "y", "z", "radius"], separator=",")
+    names = ["id1", "id2", *(f"{part}{axis}" for part in ("fn", "ft") for axis in "xyz")]
+    normal, tangential = FORCE - 0.25, np.full(FORCE.shape, 0.25)
+    path = rows(tmp_path / "c.csv", PAIRS, normal, tangential, names=names, separator=",")
+    with pytest.warns(ScanfabNote, match="act on the second grain"):
+        packing = scanfab.read(tmp_path / "g.csv", contacts=path)
+    np.testing.assert_allclose(packing.contacts.force, FORCE)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("x,y,z,radius\n" + "1," * 75_000 + "1\n", "line 2: expected a row of at most 65536 bytes"),
+        ("x,y,z,radius\n" + "1," * 300_000 + "1\n", "at most 65536 bytes, found more"),
+        (",".join(f"c{k}" for k in range(5000)) + "\n", "at most 4096 columns, found 5000"),
+        ("1 " * 5000 + "\n", "at most 4096 columns, found 5000"),
+    ],
+)
+def test_no_table_of_grains_has_thousands_of_columns(tmp_path, text, told):
+    with pytest.raises(ReadError, match=told):
+        read(write(tmp_path / "a.csv", text))
