@@ -16,7 +16,7 @@ from scanfab.io.sizes import other_size
 from scanfab.packing.bodies import bodies_of
 from scanfab.packing.packing import Packing
 
-__all__ = ["flat", "more_columns", "own_columns", "parts_of", "standard_columns"]
+__all__ = ["flat", "free_name", "more_columns", "own_columns", "parts_of", "standard_columns"]
 
 Columns = dict[str, npt.NDArray[Any]]
 
@@ -101,6 +101,11 @@ def _free_name(name: str, used: Iterable[str], *, is_taken: bool) -> str:
     plain = re.sub(r"[^a-z0-9]", "", name.lower())
     if not is_taken and plain not in TAKEN and name not in (BODIES, WALLS):
         return name
+    return free_name(name, used)
+
+
+def free_name(name: str, used: Iterable[str]) -> str:
+    """Another name for a column whose own one a reader would misunderstand."""
     free = f"{name}_of_dump"
     while free in used:
         free += "_"

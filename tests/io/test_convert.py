@@ -269,6 +269,25 @@ def test_a_name_that_means_something_else_is_told(tmp_path):
     assert again.columns["x_of_dump"] == [3.0]
 
 
+@pytest.mark.parametrize("name", ["time", "Step", "frame", "TimeStep", "Time [s]", "t", "cycle"])
+@pytest.mark.parametrize("ending", [".csv", ".tsv", ".parquet", ".npz", ".vtp", ".xyz"])
+def test_a_column_that_would_tell_frames_apart_comes_back(tmp_path, name, ending):
+    values = np.array([1.5, 1.5, 3.0])
+    packing = scanfab.Packing(np.eye(3), 0.5, columns={name: values, f"{name}_of_dump": 2 * values})
+    (path,) = scanfab.convert(packing, tmp_path / f"a{ending}")
+    own = scanfab.read(path).columns
+    found = [one for one in own if np.array_equal(own[one], values)]
+    assert len(own) == 2 and found[0].startswith(name)
+
+
+def test_so_its_other_name_is_told_and_one_of_one_value_stays(tmp_path):
+    columns = {"time": [1.0, 2.0, 3.0], "step": [7, 7, 7]}
+    packing = scanfab.Packing(np.eye(3), 0.5, columns=columns)
+    with pytest.warns(ScanfabNote, match="the column time is called time_of_dump: time tells"):
+        scanfab.convert(packing, tmp_path / "a.csv")
+    assert set(scanfab.read(tmp_path / "a.csv").columns) == {"time_of_dump", "step"}
+
+
 def test_clumps_that_were_left_apart_stay_apart(tmp_path):
     packing = scanfab.Packing(
         [[0, 0, 0], [1, 0, 0]], 1.0, columns={"clump": [4, 4]}, bodies=None, contacts=[[0, 1]]

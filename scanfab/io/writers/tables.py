@@ -5,11 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.io.formats.table_names import is_frame_name
 from scanfab.io.writer import Left
-from scanfab.io.written import flat, own_columns, standard_columns
+from scanfab.io.written import flat, free_name, own_columns, standard_columns
 from scanfab.packing.packing import Packing
 
 __all__ = ["CsvWriter", "ParquetWriter", "TsvWriter", "table_of"]
+
+Columns = dict[str, npt.NDArray[Any]]
 
 
 class _TableWriter:
@@ -64,9 +70,28 @@ def table_of(packing: Packing) -> tuple[Any, list[str]]:
     standard = standard_columns(packing)
     own, notes = own_columns(packing)
     columns, more = flat(own)
+    columns, told = _of_one_frame(columns)
     place = dict(zip("xyz", packing.position.T, strict=True))
     ordered = {"id": standard.pop("id"), **place, "radius": packing.radius, **standard, **columns}
     return polars.DataFrame({name: values.copy() for name, values in ordered.items()}), [
         *notes,
         *more,
+        *told,
     ]
+
+
+def _of_one_frame(columns: Columns) -> tuple[Columns, list[str]]:
+    """The columns, none of them called as if its values told frames apart; and what was changed."""
+    found: Columns = {}
+    notes = []
+    for name, values in columns.items():
+        is_number = values.dtype.kind in "iuf"
+        if is_number and is_frame_name(name) and len(np.unique(values)) > 1:
+            free = free_name(name, [*found, *columns])
+            notes.append(
+                f"the column {name} is called {free}: {name} tells frames of a table apart"
+            )
+            found[free] = values
+        else:
+            found[name] = values
+    return found, notes
