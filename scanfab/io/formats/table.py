@@ -20,6 +20,7 @@ import numpy.typing as npt
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.io.files import Stamp, stamp_of
 from scanfab.io.formats.columns import grain_table
+from scanfab.io.formats.proof import TOO_FEW, touch
 from scanfab.io.formats.table_contacts import join_table
 from scanfab.io.formats.table_files import (
     Columns,
@@ -44,7 +45,6 @@ from scanfab.io.formats.table_names import (
     unique,
     warn_of_lacking_unit,
 )
-from scanfab.io.formats.table_proof import TOO_FEW, touch
 from scanfab.io.formats.xyzd import is_xyzd, prove_xyzd
 from scanfab.io.reader import (
     Carries,

@@ -14,7 +14,7 @@ from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.io.formats.columns import whole_numbers
 from scanfab.io.formats.join import count_walls, join_ids, rows_of_ids
-from scanfab.io.formats.table_proof import NEARLY_ALL, row_base, share_of_push
+from scanfab.io.formats.proof import NEARLY_ALL, proved_force, row_base
 from scanfab.io.reader import GrainTable, JoinedContacts
 
 __all__ = ["join_table"]
@@ -142,24 +142,11 @@ def _force(
         if normal is None or tangential is None:
             return None
         force = normal + tangential
-    share = share_of_push(grains, rows, force)
-    if share is not None and 1 - NEARLY_ALL < share < NEARLY_ALL:
-        warnings.warn(
-            f"{path}: the forces are left out: {share:.0%} of them push the second grain off the "
-            f"first, so it cannot be told on which of both they act: name them as fx1, fy1, fz1 "
-            f"(on the first) or fx2, fy2, fz2 (on the second) with `contact_columns`",
-            ScanfabWarning,
-            stacklevel=2,
-        )
-        return None
-    on_second = share is None or share >= NEARLY_ALL
-    warnings.warn(
-        f"the forces in the table act on the {'second' if on_second else 'first'} grain of each "
-        f"contact, since they push the grains apart",
-        ScanfabNote,
-        stacklevel=2,
+    cure = (
+        ": name them as fx1, fy1, fz1 (on the first) or fx2, fy2, fz2 (on the second) with "
+        "`contact_columns`"
     )
-    return force if on_second else -force
+    return proved_force(path, grains, rows, force, cure)
 
 
 def _normal_force(path: Path, found: Columns, kept: BoolArray) -> FloatArray | None:

@@ -14,7 +14,7 @@ from scanfab.base.typing import FloatArray
 from scanfab.io.files import bare_name, file_inside, plain
 from scanfab.io.formats.columns import grain_table, has_radius, whole_numbers
 from scanfab.io.formats.join import join_ids, join_positions
-from scanfab.io.formats.proved_force import proved_force, tell_left_out
+from scanfab.io.formats.proof import proved_force, tell_left_out
 from scanfab.io.formats.vtp_packing import (
     cell_of,
     contacts_of,
@@ -156,7 +156,7 @@ class VtkReader:
         """The contacts with a force whose sign the format says, or the forces themselves."""
         if self.says_sign:
             return contacts
-        tell_left_out(path, mesh.line_arrays)
+        tell_left_out(mesh.line_arrays)
         if contacts.force is None:
             return contacts
         rows, force = np.asarray(contacts.pairs), np.asarray(contacts.force, np.float64)

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from scanfab.base.errors import ReadError, ScanfabNote
 from scanfab.io.files import bare_name
-from scanfab.io.formats.table_proof import touch
+from scanfab.io.formats.proof import touch
 from scanfab.io.parse.sheet_binary import read_xyzd
 
 __all__ = ["is_xyzd", "prove_xyzd", "read_xyzd_columns"]

@@ -13,7 +13,7 @@ import pytest
 
 import scanfab
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
-from scanfab.io.formats import table, table_files, table_proof
+from scanfab.io.formats import proof, table, table_files
 from scanfab.io.registry import reader_for
 from tests.helpers.dumps import dump_text, pairs_text, write
 from tests.helpers.truth import FLOOR, csv_rows
@@ -141,11 +141,11 @@ def test_a_large_packing_is_told_by_the_grains_around_its_middle(away):
     place = np.random.default_rng(2).permutation(place)
     place[:away] += 1e9  # thrown out of the sample
     radius = np.full(len(place), 0.5)
-    assert table_proof.touch(place, radius)
-    assert not table_proof.touch(place, 2 * radius)
-    assert not table_proof.touch(place, 0.5 * radius)
-    assert not table_proof.touch(place[:, [0, 1, 1]], radius)
-    assert not table_proof.touch(np.random.default_rng(3).permuted(place, axis=0), radius / 2)
+    assert proof.touch(place, radius)
+    assert not proof.touch(place, 2 * radius)
+    assert not proof.touch(place, 0.5 * radius)
+    assert not proof.touch(place[:, [0, 1, 1]], radius)
+    assert not proof.touch(np.random.default_rng(3).permuted(place, axis=0), radius / 2)
 
 
 def test_a_diameter_that_the_user_names_comes_before_a_radius_of_the_file(tmp_path):
@@ -255,7 +255,7 @@ def contacts_file(folder, names, *columns):
 def test_forces_push_grains_apart_whichever_they_act_on(tmp_path, sign, which):
     grains = grains_file(tmp_path)
     contacts = contacts_file(tmp_path, ["fx", "fy", "fz"], sign * FORCE)
-    with pytest.warns(ScanfabNote, match=f"the forces in the table act on the {which} grain"):
+    with pytest.warns(ScanfabNote, match=f"the forces act on the {which} grain"):
         packing = scanfab.read(grains, contacts=contacts)
     assert packing.contacts.source == "file"
     assert np.all(packing.contacts.force_n > 0)

@@ -1,14 +1,23 @@
-"""Proof that columns without names are what they are taken for: the grains must touch."""
+"""
+Proof of what files do not say: what columns without names are, and on which grain a force acts.
+
+The grains must touch, and forces push them apart.
+"""
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Iterable
+from pathlib import Path
+
 import numpy as np
 
+from scanfab.base.errors import ScanfabNote, ScanfabWarning
 from scanfab.base.lengths import LEAST, MOST, all_within
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.reader import GrainTable
 
-__all__ = ["TOO_FEW", "row_base", "share_of_push", "touch"]
+__all__ = ["TOO_FEW", "proved_force", "row_base", "tell_left_out", "touch"]
 
 # grains by which nothing can be proved
 TOO_FEW = 10
@@ -37,7 +46,7 @@ def touch(position: FloatArray, radius: FloatArray) -> bool:
     Examples
     --------
     >>> import numpy as np
-    >>> from scanfab.io.formats.table_proof import touch
+    >>> from scanfab.io.formats.proof import touch
     >>> row = np.column_stack([np.arange(20.0), np.zeros(20), np.zeros(20)])
     >>> touch(row, np.full(20, 0.5)), touch(row, np.full(20, 1.0)), touch(row, np.full(20, 0.25))
     (True, False, False)
@@ -106,8 +115,63 @@ def row_base(grains: GrainTable, ids: IntArray) -> int | None:
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def share_of_push(grains: GrainTable, rows: IntArray, force: FloatArray) -> float | None:
+def _share_of_push(grains: GrainTable, rows: IntArray, force: FloatArray) -> float | None:
     """Of the contacts with a force, those whose force pushes the second grain off the first."""
     along = np.sum(_branches(grains, rows) * force, axis=1)
     along = along[along != 0]
     return float(np.mean(along > 0)) if len(along) else None
+
+
+def proved_force(
+    path: Path, grains: GrainTable, rows: IntArray, force: FloatArray, cure: str = ""
+) -> FloatArray | None:
+    """
+    The force on the second grain: the sign by which nearly all forces push the grains apart.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    grains : GrainTable
+        Of the same step.
+    rows : ndarray, shape (M, 2)
+        Both grains of each contact.
+    force : ndarray, shape (M, 3)
+        On one of both, the same for all contacts.
+    cure : str, optional
+        What the user can do where that cannot be told, for the warning.
+
+    Returns
+    -------
+    ndarray, shape (M, 3), or None
+        None, with a warning, where the forces speak for neither.
+    """
+    share = _share_of_push(grains, rows, force)
+    if share is not None and 1 - NEARLY_ALL < share < NEARLY_ALL:
+        warnings.warn(
+            f"{path}: the forces are left out: {share:.0%} of them push the second grain off the "
+            f"first, so it cannot be told on which of both they act{cure}",
+            ScanfabWarning,
+            stacklevel=2,
+        )
+        return None
+    on_second = share is None or share >= NEARLY_ALL
+    warnings.warn(
+        f"the forces act on the {'second' if on_second else 'first'} grain of each "
+        f"contact, since they push the grains apart",
+        ScanfabNote,
+        stacklevel=2,
+    )
+    return force if on_second else -force
+
+
+def tell_left_out(names: Iterable[str]) -> None:
+    """A note of arrays that may be forces too, but by no name that is known."""
+    left_out = ", ".join(name for name in names if "force" in name.lower() and name != "force")
+    if left_out:
+        warnings.warn(
+            f"left out of the contacts: {left_out}: a force is taken from an array `force` with "
+            f"three components",
+            ScanfabNote,
+            stacklevel=2,
+        )
