@@ -277,7 +277,8 @@ def test_a_column_that_would_tell_frames_apart_comes_back(tmp_path, name, ending
     (path,) = scanfab.convert(packing, tmp_path / f"a{ending}")
     own = scanfab.read(path).columns
     found = [one for one in own if np.array_equal(own[one], values)]
-    assert len(own) == 2 and found[0].startswith(name)
+    assert len(own) == 2
+    assert found[0].startswith(name)
 
 
 def test_so_its_other_name_is_told_and_one_of_one_value_stays(tmp_path):

@@ -1,20 +1,22 @@
-"""Contacts to rows of the grain table: by ids, or by the positions of both centres."""
+"""Contacts to rows of the grain table, by ids or both centres; and on which grain a force acts."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.errors import ReadError
+from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.base.lengths import MOST
 from scanfab.base.typing import FloatArray, IntArray
+from scanfab.io.formats.table_proof import NEARLY_ALL, share_of_push
 from scanfab.io.reader import GrainTable, JoinedContacts
 from scanfab.packing.packing import ContactList
 
-__all__ = ["count_walls", "join_ids", "join_positions", "rows_of_ids"]
+__all__ = ["count_walls", "join_ids", "join_positions", "proved_force", "rows_of_ids"]
 
 
 # an end of a contact within this fraction of a radius from a centre belongs to that grain
@@ -156,6 +158,47 @@ def _refuse_images(path: Path, grains: GrainTable, rows: IntArray, ends: FloatAr
             f"{path}: {image.sum()} contacts end at periodic images of grains, but the sample has "
             f"no cell: name it with `cell=(LX, LY, LZ)` (and `periodic`)"
         )
+
+
+def proved_force(
+    path: Path, grains: GrainTable, rows: IntArray, force: FloatArray
+) -> FloatArray | None:
+    """
+    The force on the second grain: the sign by which nearly all forces push the grains apart.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    grains : GrainTable
+        Of the same step.
+    rows : ndarray, shape (M, 2)
+        Both grains of each contact.
+    force : ndarray, shape (M, 3)
+        On one of both, the same for all contacts.
+
+    Returns
+    -------
+    ndarray, shape (M, 3), or None
+        None, with a warning, where the forces speak for neither.
+    """
+    share = share_of_push(grains, rows, force)
+    if share is not None and 1 - NEARLY_ALL < share < NEARLY_ALL:
+        warnings.warn(
+            f"{path}: the forces are left out: {share:.0%} of them push the second grain off the "
+            f"first, so it cannot be told on which of both they act",
+            ScanfabWarning,
+            stacklevel=2,
+        )
+        return None
+    on_second = share is None or share >= NEARLY_ALL
+    warnings.warn(
+        f"{path.name}: the forces act on the {'second' if on_second else 'first'} grain of each "
+        f"contact, since they push the grains apart",
+        ScanfabNote,
+        stacklevel=2,
+    )
+    return force if on_second else -force
 
 
 def count_walls(rows: IntArray, count: int) -> IntArray:

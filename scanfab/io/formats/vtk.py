@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from scanfab.base.errors import ReadError
+from scanfab.base.errors import ReadError, ScanfabNote
 from scanfab.base.lengths import MOST
 from scanfab.base.typing import FloatArray
 from scanfab.io.files import bare_name, file_inside, plain
 from scanfab.io.formats.columns import grain_table, has_radius, whole_numbers
-from scanfab.io.formats.join import join_ids, join_positions
-from scanfab.io.formats.proved_force import proved_force, tell_left_out
+from scanfab.io.formats.join import join_ids, join_positions, proved_force
 from scanfab.io.formats.vtp_packing import (
     cell_of,
     contacts_of,
@@ -156,7 +156,7 @@ class VtkReader:
         """The contacts with a force whose sign the format says, or the forces themselves."""
         if self.says_sign:
             return contacts
-        tell_left_out(path, mesh.line_arrays)
+        _tell_left_out(path, mesh.line_arrays)
         if contacts.force is None:
             return contacts
         rows, force = np.asarray(contacts.pairs), np.asarray(contacts.force, np.float64)
@@ -232,6 +232,18 @@ def vectors(mesh: Mesh, name: str) -> FloatArray | None:
     if values is None or values.shape != (len(mesh.lines), 3) or values.dtype.kind not in "iuf":
         return None
     return np.asarray(values, dtype=np.float64)
+
+
+def _tell_left_out(path: Path, names: Iterable[str]) -> None:
+    """A note of arrays that may be forces too, but by no name that is known."""
+    left_out = ", ".join(name for name in names if "force" in name.lower() and name != "force")
+    if left_out:
+        warnings.warn(
+            f"{path.name}: left out of the contacts: {left_out}: a force is taken from an array "
+            f"`force` with three components",
+            ScanfabNote,
+            stacklevel=2,
+        )
 
 
 def _entries(index: Path) -> list[tuple[Path, float | None, tuple[str, ...]]]:

@@ -81,7 +81,7 @@ def table_of(packing: Packing) -> tuple[Any, list[str]]:
 
 
 def _of_one_frame(columns: Columns) -> tuple[Columns, list[str]]:
-    """The columns, none of them called as if its values told frames apart; and what was changed."""
+    """The columns, none called as if its values told frames of a table apart; what was changed."""
     found: Columns = {}
     notes = []
     for name, values in columns.items():
