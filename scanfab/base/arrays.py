@@ -12,10 +12,16 @@ import numpy.typing as npt
 from scanfab.base.errors import PackingError
 from scanfab.base.typing import IntArray
 
-__all__ = ["cast", "concatenated", "grains_named"]
+__all__ = ["cast", "concatenated", "doubles", "grains_named"]
 
 Arrays = TypeVar("Arrays")
 """A dataclass all of whose fields are arrays."""
+
+
+def doubles(values: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+    """Numbers of eight bytes, without a word of what is no number: of four bytes there are more."""
+    with np.errstate(invalid="ignore"):
+        return values.astype(np.float64, copy=False)
 
 
 def cast(

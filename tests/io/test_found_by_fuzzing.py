@@ -338,6 +338,20 @@ def test_blank_lines_between_rows_draw_no_warning(tmp_path):
         assert len(scanfab.read(write(tmp_path / "a.txt", text))) == len(ROWS)
 
 
+def test_a_float_that_signals_that_it_is_no_number_is_none(tmp_path):
+    points, radius = np.array([0x7FA00001, 0, 0], ">u4"), np.array([0.5], ">f4")
+    path = tmp_path / "a.vtk"
+    path.write_bytes(
+        b"# vtk DataFile Version 3.0\nx\nBINARY\nDATASET POLYDATA\nPOINTS 1 float\n"
+        + points.tobytes()
+        + b"\nPOINT_DATA 1\nSCALARS radius float 1\nLOOKUP_TABLE default\n"
+        + radius.tobytes()
+        + b"\n"
+    )
+    with only_scanfabs_warnings(), pytest.raises(PackingError, match="must be finite numbers"):
+        scanfab.read(path)
+
+
 def test_blank_lines_are_no_rows(tmp_path):
     text = dump_text(ROWS[:1]).replace("1 1 0.2 0.5 0.5 0.1", "")
     refuses(scanfab.read, write(tmp_path / "a.txt", text), match="counts 1 rows, found none")

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.arrays import doubles
 from scanfab.base.errors import ReadError
 from scanfab.base.lengths import all_within
 from scanfab.base.typing import FloatArray
@@ -356,4 +357,4 @@ def _lengths(path: Path, values: npt.ArrayLike, what: str, where: str) -> FloatA
     array = np.asarray(values)
     if array.dtype.kind not in "biuf":
         raise ReadError(f"{path}{where}: expected numbers for {what}, found {array.dtype}")
-    return array.astype(np.float64, copy=False)
+    return doubles(array)

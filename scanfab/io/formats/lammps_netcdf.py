@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.arrays import doubles
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.typing import FloatArray
 from scanfab.io.files import plain
@@ -95,7 +96,7 @@ def read_netcdf_grains(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
             continue
         if position.shape[1:] != (3,):
             raise ReadError(f"{path}: {name}: expected three numbers for each atom")
-        place = position[there].astype(np.float64)
+        place = doubles(position[there])
         if scaled:
             if cell is None:
                 raise ReadError(f"{path}: {name} are fractions of a box, but there is no box")
@@ -130,7 +131,7 @@ def _cell(path: Path, arrays: dict[str, npt.NDArray[Any]]) -> Cell | None:
     """Three edges and angles; along an edge of length 0 the sample does not repeat."""
     if not all(arrays.get(name, np.zeros(0)).shape == (3,) for name in CELL):
         return None
-    origin, edges, angles = (arrays[name].astype(np.float64) for name in CELL)
+    origin, edges, angles = (doubles(arrays[name]) for name in CELL)
     periodic = edges > 0
     if not periodic.any():
         return None

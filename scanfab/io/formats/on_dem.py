@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.arrays import doubles
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.typing import FloatArray
 from scanfab.io.files import first_bytes
@@ -119,7 +120,7 @@ def _bodies(path: Path, file: HdfFile, mesh: Mesh) -> dict[str, npt.NDArray[Any]
     if id is not None:
         id = whole_numbers(path, id)
         arrays = {**_more(file, id), **arrays}
-    spheres = ~np.isnan(radius.astype(np.float64))
+    spheres = ~np.isnan(doubles(radius))
     # their place again
     arrays.pop("position", None)
     columns = {name.replace(STROKE, "/"): values[spheres] for name, values in arrays.items()}
@@ -230,7 +231,7 @@ def _real(path: Path, own: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray
 def _force(path: Path, file: HdfFile, table: dict[str, npt.NDArray[Any]]) -> FloatArray | None:
     """The force on the second body; as YADE's exporter writes it, or whole, as scanfab does."""
     if "force" in table:
-        return table["force"].astype(np.float64)
+        return doubles(table["force"])
     if not {"normal", "normal_force", "shear_force"} <= table.keys():
         return None
     normal = _sign(path, file) * table["normal_force"][:, None] * table["normal"]

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.arrays import doubles
 from scanfab.base.typing import IntArray
 from scanfab.io.files import plain
 from scanfab.io.parse.fence import fenced
@@ -88,7 +89,7 @@ def _block(file: HdfFile, group: str) -> Content:
     own = file.below(group)
     if "Points" not in own or own["Points"].shape[1:] != (3,):
         raise FlawError(f"{group}: expected Points of three coordinates")
-    points = own["Points"].astype(np.float64)
+    points = doubles(own["Points"])
     counts = own.get("NumberOfPoints", np.array([len(points)]))
     if counts.dtype.kind not in "iu" or int(counts.sum()) != len(points):
         raise FlawError(f"{group}: {len(points)} points, but NumberOfPoints are {counts.tolist()}")

@@ -10,6 +10,7 @@ from urllib.parse import unquote
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.arrays import doubles
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.parse.vtk_data import Arrays, Cells, Content, FlawError, numbers
 
@@ -148,9 +149,9 @@ class _Walk:
             raise FlawError("POINTS stand there twice")
         values = self._values(words[0], COORDINATES[key] * count, _word(words, 2))
         if key == "points":
-            self.points = values.reshape(-1, 3).astype(np.float64)
+            self.points = doubles(values.reshape(-1, 3))
         else:
-            self.axes.append(values.astype(np.float64))
+            self.axes.append(doubles(values))
 
     def _attributes(self, key: str, words: list[str]) -> None:
         """The number of rows of the attributes that follow."""

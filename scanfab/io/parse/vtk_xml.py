@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.arrays import doubles
 from scanfab.base.typing import IntArray
 from scanfab.io.parse.vtk_arrays import LARGE, StoredArray, XmlFile, arrays_in
 from scanfab.io.parse.vtk_data import Arrays, Cells, Content, FlawError, joined
@@ -114,7 +115,7 @@ class _Piece:
                 raise FlawError("there are no Points")
             if flat[0].shape[1:] != (3,):
                 raise FlawError("Points need three components")
-            points = flat[0][: self.points].astype(np.float64)
+            points = doubles(flat[0][: self.points])
         cells = tuple(self._cells(kind) for kind in CELLS if kind in self.found)
         rows = sum(len(one.offsets) - 1 for one in cells)
         return Content(
