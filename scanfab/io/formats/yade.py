@@ -35,6 +35,7 @@ __all__ = ["YadeReader"]
 # legacy VTK by VTKExporter: VTK itself writes no dot behind the version
 EXPORTER_HEAD = b"# vtk DataFile Version 3.0.\n"
 PERIODIC_HEAD = b"##PERIODIC::"
+COMMENTS = re.compile(rb"(?:#[^\n]*\n)*")
 TEXT_HEADS = (b"#format ", PERIODIC_HEAD)
 
 
@@ -128,11 +129,18 @@ def _is_text(path: Path) -> bool:
 def _numbers(path: Path) -> FloatArray:
     check_memory(path, 6.0 * plain(path).stat().st_size)
     check_lines(path, plain(path))
-    data = plain(path).read_bytes()
+    # a long text need not be copied where it begins with a row
+    with open(plain(path), "rb", buffering=0) as stream:
+        above = COMMENTS.match(stream.read(1 << 12))
+        assert above is not None
+        stream.seek(above.end())
+        data = stream.readall()
     if FILLED.search(data) is None:
         return np.zeros((0, 0))  # an empty frame
     rows = parse_rows(data, 0, len(data))
-    return rows_of_numbers(path, data) if rows is None else rows
+    if rows is None:
+        rows = rows_of_numbers(path, data, above=above[0].count(b"\n"))
+    return rows
 
 
 def _text_columns(path: Path, lines: list[str], count: int | None) -> tuple[list[str], Cell | None]:
