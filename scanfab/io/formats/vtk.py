@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from scanfab.base.arrays import doubles
 from scanfab.base.errors import ReadError
 from scanfab.base.lengths import MOST
 from scanfab.base.typing import FloatArray
@@ -231,7 +232,7 @@ def vectors(mesh: Mesh, name: str) -> FloatArray | None:
     values = mesh.line_arrays.get(name)
     if values is None or values.shape != (len(mesh.lines), 3) or values.dtype.kind not in "iuf":
         return None
-    return np.asarray(values, dtype=np.float64)
+    return doubles(values)
 
 
 def _entries(index: Path) -> list[tuple[Path, float | None, tuple[str, ...]]]:
