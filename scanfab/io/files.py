@@ -81,11 +81,14 @@ def bare_name(path: Path) -> str:
 
 def first_bytes(path: Path, count: int = 4096) -> bytes:
     """The first bytes of the decompressed file; ReadError if it cannot be opened."""
-    opener = _opener(path)
+    head = _head(path, max(count, MAGIC_BYTES))
+    opener = opener_for(head)
+    if opener is open:
+        return head[:count]
     try:
         with opener(path, "rb") as stream:
-            head: bytes = stream.read(count)
-            return head
+            unpacked: bytes = stream.read(count)
+            return unpacked
     except unpacking_errors(opener) as error:
         raise ReadError(f"{path}: cannot be read: {_reason(error)}") from None
 
@@ -263,13 +266,17 @@ def _remove_copies() -> None:
 
 
 def _opener(path: Path) -> Callable[..., Any]:
+    return opener_for(_head(path, MAGIC_BYTES))
+
+
+def _head(path: Path, count: int) -> bytes:
+    """The first bytes as they stand there."""
     check_file(path)
     try:
         with open(path, "rb") as stream:
-            magic = stream.read(MAGIC_BYTES)
+            return stream.read(count)
     except OSError as error:
         raise ReadError(f"{path}: cannot be read: {_reason(error)}") from None
-    return opener_for(magic)
 
 
 def _reason(error: Exception) -> str:

@@ -56,10 +56,10 @@ def snapshots_of(reader: Reader, path: Path) -> list[Snapshot]:
 
 def _place(reader: Reader, path: Path) -> Path | None:
     """Where the index of a file would be kept; None if it is not."""
-    folder = user_folder()
     own = type(reader).__module__.startswith("scanfab.")
     large = path.is_file() and path.stat().st_size >= LARGE
-    if folder is None or not own or not large:
+    folder = user_folder() if own and large else None
+    if folder is None:
         return None
     name = hashlib.sha256(str(path.resolve()).encode(errors="surrogateescape")).hexdigest()
     return folder / "indexes" / f"{name[:24]}.json"

@@ -176,9 +176,10 @@ class Packing:
         self.radius: FloatArray = cast(
             "radius", np.full(count, radii) if radii.ndim == 0 else radii, np.float64, (count,)
         )
-        self.id: IntArray = cast("id", np.arange(count) if id is None else id, np.int64, (count,))
+        self.id: IntArray = _numbers(count) if id is None else cast("id", id, np.int64, (count,))
         check_lengths(centres, self.radius, self.id)
-        _check_ids(self.id)
+        if id is not None:
+            _check_ids(self.id)
         self.space: Space = _space_of(centres, dim)
         if cell is not None and self.space.is_plane:
             cell = cell_in_plane(cell, self.space)
@@ -329,6 +330,13 @@ def check_lengths(position: FloatArray, radius: FloatArray, id: IntArray) -> Non
     )
 
 
+def _numbers(count: int) -> IntArray:
+    """The ids of grains that have none."""
+    numbers = np.arange(count, dtype=np.int64)
+    numbers.flags.writeable = False
+    return numbers
+
+
 def _check_ids(id: IntArray) -> None:
     """PackingError if an id occurs twice."""
     if not _are_unique(id):
@@ -348,7 +356,7 @@ def _values(position: FloatArray, radius: FloatArray, wrong: npt.NDArray[np.bool
 
 def _are_unique(id: IntArray) -> bool:
     """Whether no number occurs twice; without sorting if they lie close together, as ids do."""
-    if id.size == 0:
+    if np.all(id[1:] > id[:-1]):
         return True
     low, high = int(id.min()), int(id.max())
     if high - low >= 8 * id.size:

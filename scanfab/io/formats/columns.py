@@ -130,8 +130,9 @@ def grain_table(
     cell = user_cell(path, cell, options)
     position = _position(path, rest, named, cell, where)
     _refuse_far(path, position, cell, where)
-    position.flags.writeable = False  # so that the packing need not copy it
     radius = _radius(path, rest, named, len(position), options, where)
+    for array in (position, radius):
+        array.flags.writeable = False  # so that the packing need not copy it
     id = named.get("id", _take(rest, ID_NAMES))
     refuse_superquadrics(path, rest, radius, where)
     own = {name: rest.pop(name) for name in (BODIES, WALLS) if name in rest}

@@ -17,6 +17,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.arrays import doubles
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.io.files import Stamp, stamp_of
 from scanfab.io.formats.columns import grain_table
@@ -337,13 +338,11 @@ def _names_by_touch(path: Path, places: Sequence[npt.NDArray[Any]]) -> tuple[str
             continue
         if begin and not _may_be_ids(places[0]):
             continue
-        position, radius = (
-            np.asarray(one, np.float64) for one in (np.column_stack(part[:3]), part[3])
-        )
-        if touch(position, radius):
+        x, y, z, radius = map(doubles, part)
+        if touch(x, y, z, radius):
             fits.append(begin)
         elif not fits:
-            large = large or touch(position, 0.5 * radius)
+            large = large or touch(x, y, z, 0.5 * radius)
     if len(fits) != 1:
         lacks = (
             f"fewer than {TOO_FEW} grains prove nothing"

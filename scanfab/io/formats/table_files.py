@@ -65,11 +65,10 @@ def has_ids(path: Path, skip: int, found: Mapping[str, str]) -> bool:
     """Whether the first rows of a table of text have whole numbers where ids should be."""
     if first_bytes(path, 8).startswith((IS_PARQUET, IS_NPZ)) or is_xyzd(path):
         return True
-    data = read_text(path, HEAD)
-    layout = layout_of(path, data, skip)
+    layout = _layout_by_head(path, skip, stamp_of(path))
     names = _keys(layout)
     places = [names.index(found[one]) for one in ("id1", "id2")]
-    rows = first_rows(data, layout)
+    rows = first_rows(read_text(path, HEAD), layout)
     return all(row[place].strip().isdigit() for row in rows for place in places)
 
 
@@ -105,8 +104,7 @@ def read_table(path: Path, skip: int, numbers: Sequence[str], whole: Sequence[st
 
 def read_unnamed(path: Path, skip: int) -> Columns:
     """The columns of a table without names; the first may be ids, which stay exact."""
-    data = read_text(path, HEAD)
-    rows = first_rows(data, layout_of(path, data, skip))
+    rows = first_rows(read_text(path, HEAD), _layout_by_head(path, skip, stamp_of(path)))
     whole = ["1"] if all(row[0].strip().isdigit() for row in rows) else []
     return read_table(path, skip, (), whole)
 

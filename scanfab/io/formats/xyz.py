@@ -15,8 +15,7 @@ from scanfab.base.errors import PackingError, ReadError
 from scanfab.io.files import check_memory, first_bytes, plain
 from scanfab.io.formats.columns import grain_table, has_radius
 from scanfab.io.parse.counted_rows import leave_out_last, skip_rows
-from scanfab.io.parse.number_rows import ROUNDED
-from scanfab.io.parse.text_table import parse_rows
+from scanfab.io.parse.text_table import parse_columns
 from scanfab.io.reader import (
     Carries,
     FileKind,
@@ -231,14 +230,12 @@ def _numbers(head: _Head, data: bytes) -> dict[str, npt.NDArray[Any]] | None:
         total += width
     if not {kind for _, kind, _ in head.properties} <= {"I", "R"}:
         return None
-    table = parse_rows(data, 0, len(data), whole)
-    if table is None or table.shape != (head.count, total):
-        return None
-    if any(not np.all(np.abs(table[:, k]) < ROUNDED) for k in whole):
+    columns = parse_columns(data, 0, len(data), whole)
+    if columns is None or (len(columns[0]), len(columns)) != (head.count, total):
         return None
     return {
-        name: np.array(table[:, where[0]] if len(where) == 1 else table[:, where], KINDS[kind])
-        for (name, kind, _), where in zip(head.properties, places.values(), strict=True)
+        name: columns[where[0]] if len(where) == 1 else np.column_stack([columns[k] for k in where])
+        for name, where in places.items()
     }
 
 

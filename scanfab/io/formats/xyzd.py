@@ -47,8 +47,8 @@ def read_xyzd_columns(path: Path) -> dict[str, npt.NDArray[Any]]:
 
 def prove_xyzd(path: Path, columns: Mapping[str, npt.NDArray[Any]]) -> None:
     """ReadError if the grains do not touch, so that the file may be something else."""
-    position = np.column_stack([columns[axis] for axis in "xyz"])
-    if len(position) and not touch(position, 0.5 * columns["diameter"]):
+    x, y, z, diameter = (columns[name] for name in ("x", "y", "z", "diameter"))
+    if len(x) and not touch(x, y, z, 0.5 * diameter):
         raise ReadError(
             f"{path}: as x y z d, in little-endian doubles, its grains do not touch: the file is "
             f"something else, or packing.nfo with the porosities, by which PackingGeneration "

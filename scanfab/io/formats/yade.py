@@ -15,7 +15,7 @@ from scanfab.io.formats.columns import grain_table
 from scanfab.io.formats.vtk import VtkReader, vectors
 from scanfab.io.formats.yade_save import is_binary_save, is_save, read_save, snapshot_of_save
 from scanfab.io.parse.number_rows import rows_of_numbers
-from scanfab.io.parse.text_table import FILLED, parse_rows
+from scanfab.io.parse.text_table import FILLED, parse_columns
 from scanfab.io.parse.vtk_data import FlawError, Mesh
 from scanfab.io.parse.vtk_xml import count_rows
 from scanfab.io.reader import (
@@ -81,11 +81,10 @@ class YadeReader(VtkReader):
             return super().read_grains(snapshot, options)
         path = snapshot.path
         lines = first_bytes(path, 1 << 14).decode("utf-8", "replace").splitlines()
-        values = _numbers(path)
-        names, cell = _text_columns(path, lines, values.shape[1] if values.size else None)
-        values = values.reshape(-1, len(names))
-        columns = dict(zip(names, values.T, strict=True))
-        return grain_table(path, columns, cell, options)
+        columns = _columns(path)
+        names, cell = _text_columns(path, lines, len(columns) or None)
+        columns = columns or [np.zeros(0)] * len(names)
+        return grain_table(path, dict(zip(names, columns, strict=True)), cell, options)
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
@@ -126,7 +125,8 @@ def _is_text(path: Path) -> bool:
     return first_bytes(path).startswith(TEXT_HEADS)
 
 
-def _numbers(path: Path) -> FloatArray:
+def _columns(path: Path) -> list[FloatArray]:
+    """The numbers of a text by columns; none of an empty frame."""
     check_memory(path, 6.0 * plain(path).stat().st_size)
     check_lines(path, plain(path))
     # a long text need not be copied where it begins with a row
@@ -136,11 +136,11 @@ def _numbers(path: Path) -> FloatArray:
         stream.seek(above.end())
         data = stream.readall()
     if FILLED.search(data) is None:
-        return np.zeros((0, 0))  # an empty frame
-    rows = parse_rows(data, 0, len(data))
-    if rows is None:
-        rows = rows_of_numbers(path, data, above=above[0].count(b"\n"))
-    return rows
+        return []
+    columns = parse_columns(data, 0, len(data))
+    if columns is None:
+        return list(rows_of_numbers(path, data, above=above[0].count(b"\n")).T)
+    return columns
 
 
 def _text_columns(path: Path, lines: list[str], count: int | None) -> tuple[list[str], Cell | None]:

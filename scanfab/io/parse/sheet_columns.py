@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
-from scanfab.io.parse.sheet_layout import Layout, fields_of
-from scanfab.io.parse.text_table import squeezed
+from scanfab.io.parse.sheet_layout import Layout, fields_of, refuse_control
+from scanfab.io.parse.text_table import as_array, squeezed
 
 __all__ = ["read_columns"]
 
@@ -61,11 +61,14 @@ def read_columns(
     ReadError
         If a row has more or fewer columns than the first, or a word is no number; names the line.
     """
+    if not all(layout.are_numbers):
+        _refuse_zeros(path, data)
     if not layout.has_commas:
         # runs of blanks are empty words to polars, which then refuses the row or has gaps in it
         found = _regular(data, layout, numbers, whole, skip=layout.first_line - 1)
         if found is not None:
             return found
+    _refuse_zeros(path, data)
     body = _body(data, layout)
     if not body:
         return {place: np.zeros(0) for place in range(layout.width)}
@@ -76,6 +79,12 @@ def read_columns(
             return found
     _check_lines(path, body, layout)
     return _word_by_word(path, body, layout, numbers, whole)
+
+
+def _refuse_zeros(path: Path, data: bytes) -> None:
+    """ReadError for a byte of zero among words, which no number has."""
+    if b"\0" in data:
+        refuse_control(path, data)
 
 
 def _body(data: bytes, layout: Layout) -> bytes:
@@ -152,7 +161,7 @@ def _regular(
 def _as_array(series: Any) -> npt.NDArray[Any]:
     """Numbers with NaN for what is empty; text."""
     if series.dtype.is_numeric():
-        return np.asarray(series.to_numpy())
+        return as_array([series])
     return np.array(series.fill_null("").to_list(), dtype=np.str_)
 
 

@@ -26,6 +26,7 @@ __all__ = [
     "is_number",
     "layout_of",
     "read_text",
+    "refuse_control",
 ]
 
 # of a file, in which the names and the first rows stand
@@ -76,7 +77,7 @@ def read_text(path: Path, size: int = -1) -> bytes:
     Raises
     ------
     ReadError
-        If it holds bytes that no text has.
+        If it begins with bytes that no text has.
     """
     file = plain(path)
     if size < 0:
@@ -85,20 +86,25 @@ def read_text(path: Path, size: int = -1) -> bytes:
     with open(file, "rb") as stream:
         data = stream.read(size)
     data = _decoded(path, data, size >= 0)
-    head = data[:HEAD]
-    # ten times as fast as to search for them where there are none
-    are_in_head = len(head.translate(None, CONTROL)) < len(head)
-    if are_in_head or b"\0" in data:
-        found = re.search(b"[" + re.escape(CONTROL) + b"]", head) or re.search(b"\0", data)
-        assert found is not None
-        line = data.count(b"\n", 0, found.start()) + 1
-        raise ReadError(
-            f"{path}, line {line}: expected text, found the byte {found[0][0]}: this is no table "
-            f"of text"
-        )
+    refuse_control(path, data, HEAD)
     if b"\r" in data[:HEAD] and b"\n" not in data[:HEAD]:
         data = data.replace(b"\r", b"\n")
     return data
+
+
+def refuse_control(path: Path, data: bytes, size: int | None = None) -> None:
+    """ReadError if a text, or its first bytes, holds bytes that no text has."""
+    head = data[:size]
+    # ten times as fast as to search for them where there are none
+    if len(head.translate(None, CONTROL)) == len(head):
+        return
+    found = re.search(b"[" + re.escape(CONTROL) + b"]", head)
+    assert found is not None
+    line = data.count(b"\n", 0, found.start()) + 1
+    raise ReadError(
+        f"{path}, line {line}: expected text, found the byte {found[0][0]}: this is no table of "
+        f"text"
+    )
 
 
 def _decoded(path: Path, data: bytes, is_part: bool) -> bytes:
@@ -183,9 +189,10 @@ def layout_of(path: Path, data: bytes, skip: int) -> Layout:
 
 def first_rows(data: bytes, layout: Layout) -> list[list[str]]:
     """The words of the first rows, of which the text holds the beginning."""
-    lines = _as_text(data[layout.start :]).splitlines()[:SAMPLE]
-    whole = lines if len(data) < HEAD else lines[:-1] or lines
-    rows = [fields_of(line, layout.separator) for line in whole if line.strip()]
+    lines = data[layout.start :].split(b"\n", SAMPLE)
+    whole = lines[:SAMPLE] if len(data) < HEAD else lines[:-1] or lines
+    texts = [_as_text(line).rstrip("\r") for line in whole]
+    rows = [fields_of(text, layout.separator) for text in texts if text.strip()]
     return [row for row in rows if len(row) == layout.width]
 
 

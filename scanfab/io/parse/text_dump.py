@@ -43,6 +43,8 @@ PIECE = 1 << 18
 WORD_BYTES = 100
 MUCH_TEXT = 16 << 20
 STEP_KEY = b"ITEM: TIMESTEP"
+# bytes above that key in which LAMMPS' units and time may stand, and those with a part of the key
+ABOVE, TAIL = 300, 320
 COUNT_KEY = re.compile(rb"^ITEM: NUMBER OF (\S+)[ \t]*\r?$", re.MULTILINE)
 
 # also spaces of latin1, as numpy has them
@@ -247,18 +249,20 @@ def _check_size(snapshot: Snapshot, size: int, columns: int, count: int) -> None
 def _starts(stream: IO[bytes]) -> tuple[list[int], int]:
     """Where snapshots begin (UNITS and TIME may stand before TIMESTEP), and where the file ends."""
     starts, end, before = [], 0, b"\n"
-    # whole lines, so that no key is cut in two
-    while piece := stream.read(PIECE) + stream.readline(HEADER_BYTES):
-        data, first = before + piece, end - len(before)
-        place = data.find(STEP_KEY, len(before))
-        while place >= 0:
-            # some files begin with a byte order mark
-            if data[place - 1 : place] in (b"\n", b"\xbf"):
-                above = BEFORE_STEP.search(data[max(place - 300, 0) : place])
-                starts.append(first + place - (len(above[0]) if above else 0))
-            place = data.find(STEP_KEY, place + 1)
+    while piece := stream.read(PIECE):
+        # most pieces are numbers alone, and a letter is found faster than a word; a key may begin
+        # in one piece and end in the next
+        if b"I" in piece or b"I" in before[-len(STEP_KEY) :]:
+            data, first = before + piece, end - len(before)
+            place = data.find(STEP_KEY, max(len(before) - len(STEP_KEY) + 1, 0))
+            while place >= 0:
+                # some files begin with a byte order mark
+                if data[place - 1 : place] in (b"\n", b"\xbf"):
+                    above = BEFORE_STEP.search(data[max(place - ABOVE, 0) : place])
+                    starts.append(first + place - (len(above[0]) if above else 0))
+                place = data.find(STEP_KEY, place + 1)
         end += len(piece)
-        before = data[-300:]
+        before = (before + piece[-TAIL:])[-TAIL:]
     return starts, end
 
 
@@ -351,7 +355,8 @@ def _values(path: Path, snapshot: Snapshot, block: bytes, body: _Body, count: in
             f"the snapshot is incomplete"
         )
     text = _text_columns(block, body)
-    converters: dict[int | str, Callable[[str], float]] = dict.fromkeys(text, _nan)
+    converters: dict[int | str, Callable[[str], float]]
+    converters = dict.fromkeys(text, lambda _: float("nan"))
     try:
         values: FloatArray = np.loadtxt(
             io.BytesIO(rows),
@@ -375,10 +380,6 @@ def _values(path: Path, snapshot: Snapshot, block: bytes, body: _Body, count: in
             f"one of both is damaged"
         )
     return values
-
-
-def _nan(_: str) -> float:
-    return float("nan")
 
 
 def _text_columns(block: bytes, body: _Body) -> list[int]:

@@ -27,6 +27,8 @@ __all__ = [
     "LARGE",
     "LONG",
     "TextTable",
+    "as_array",
+    "parse_columns",
     "parse_rows",
     "parse_some",
     "read_regular",
@@ -97,15 +99,15 @@ def read_regular(table: TextTable, columns: Mapping[int, npt.NDArray[Any]]) -> b
     return rows == table.count
 
 
-def parse_rows(
+def parse_columns(
     data: bytes, begin: int, end: int, whole: Collection[int] = ()
-) -> npt.NDArray[np.float64] | None:
+) -> list[npt.NDArray[Any]] | None:
     """
-    All numbers of the rows between two bytes of a text, shape (N, columns).
+    All columns of the rows of numbers between two bytes of a text, each of shape (N,).
 
-    Blanks and tabs may stand around words in any number. None if the rows are few, or not regular
-    otherwise, or if columns that must be whole numbers are not: the tolerant parser is then to read
-    them, or to say what is wrong.
+    Those that must be whole numbers are int64, the others float64. Blanks and tabs may stand around
+    words in any number. None if the rows are few, or not regular otherwise, or if columns that must
+    be whole numbers are not: the tolerant parser is then to read them, or to say what is wrong.
     """
     first = FILLED.search(data, begin, end)
     stop = data.rfind(b"\n", begin, end) + 1
@@ -127,6 +129,12 @@ def parse_rows(
     return found
 
 
+def parse_rows(data: bytes, begin: int, end: int) -> npt.NDArray[np.float64] | None:
+    """The same as one array, shape (N, columns)."""
+    columns = parse_columns(data, begin, end)
+    return None if columns is None else np.array(columns).T
+
+
 def parse_some(
     text: bytes, width: int, places: Sequence[int], whole: Collection[int]
 ) -> npt.NDArray[np.float64] | None:
@@ -136,7 +144,9 @@ def parse_some(
     None if the rows are few, or if one is not regular or has no such number there: words of other
     columns may be anything.
     """
-    return None if len(text) < LONG else _parse_all(text, width, " ", _kinds(places, whole))
+    kinds = _kinds(places, whole)
+    columns = None if len(text) < LONG else _parse_all(text, width, " ", kinds)
+    return None if columns is None else np.array(columns, np.float64).T
 
 
 def _kinds(places: Iterable[int], whole: Collection[int]) -> dict[int, np.dtype[Any]]:
@@ -154,8 +164,8 @@ def squeezed(text: bytes) -> bytes | None:
 
 def _parse_all(
     text: bytes, width: int, sign: str, kinds: Mapping[int, np.dtype[Any]]
-) -> npt.NDArray[np.float64] | None:
-    """Columns of a long text, each at its place in the mapping, if it is regular; else None."""
+) -> list[npt.NDArray[Any]] | None:
+    """Columns of a long text in the order of the mapping, if it is regular; else None."""
     if free_memory() < ROOM + 2 * len(text):
         return None
     behind = text[: text.find(b"\n") + 1].endswith(f"{sign}\n".encode())
@@ -167,15 +177,18 @@ def _parse_all(
             return None
         frames.append(frame)
         start = stop
-    # by columns, as they are used
-    values = np.empty((len(kinds), sum(frame.height for frame in frames)))
-    for place, column in zip(kinds, values, strict=True):
-        _put([part for frame in frames for part in frame[f"{place}"].get_chunks()], column)
-    return values.T
+    return [as_array([frame[f"{place}"] for frame in frames]) for place in kinds]
 
 
-def _put(parts: list[Any], column: npt.NDArray[Any]) -> None:
-    """Series of polars one behind the other into an array."""
+def as_array(columns: Sequence[Any]) -> npt.NDArray[Any]:
+    """Series of polars, without gaps, one behind the other as an array that is no view of them."""
+    kind = np.int64 if columns[0].dtype.is_integer() else np.float64
+    array = np.empty(sum(map(len, columns)), kind)
+    _put([part for column in columns for part in column.get_chunks()], array)
+    return array
+
+
+def _put(parts: Sequence[Any], column: npt.NDArray[Any]) -> None:
     start = 0
     for part in parts:
         column[start : start + len(part)] = part.to_numpy()
@@ -217,9 +230,10 @@ def _parse_piece(
     """
     The columns of some lines; None if they are not regular.
 
-    If no two blanks stand together but at the end of each line, the words that polars sees are
-    those of the line. If besides there are just as many as there should be, and no line lacks its
-    last word, no line has a word more either.
+    Where all columns are wanted, polars refuses a line with more words, and has gaps in one with
+    fewer. Where only some are, it must be told not to look at the ends of lines: but if no two
+    blanks stand together except there, the words that it sees are those of the line, and if there
+    are just as many as there should be, and no line lacks its last word, no line has a word more.
     """
     from scanfab.io.parse.kernels import count_spaces
 
@@ -227,8 +241,8 @@ def _parse_piece(
     if not text.endswith(b"\n") or not text[:1].isascii():
         return None
     frame = _parse(text, width, kinds, behind, sign)
-    if frame is None:
-        return None
+    if frame is None or len(kinds) == width:
+        return frame
     rows = frame.height
     blanks_at_ends = rows * behind
     expected = rows * (width + behind), blanks_at_ends, blanks_at_ends
@@ -246,7 +260,8 @@ def _parse(
     schema |= {names[place]: polars.Int64 for place, kind in kinds.items() if kind == np.int64}
     if behind:
         schema["behind"] = polars.String
-    wanted = list(dict.fromkeys([*(names[place] for place in kinds), names[-1]]))
+    are_all = len(kinds) == width
+    wanted = list(schema) if are_all else list({names[place]: 0 for place in [*kinds, -1]})
     try:
         frame = (
             polars.scan_csv(
@@ -256,7 +271,7 @@ def _parse(
                 quote_char=None,
                 schema=schema,
                 encoding="utf8-lossy",  # numbers are none, and nothing else is kept
-                truncate_ragged_lines=True,  # blanks are counted elsewhere
+                truncate_ragged_lines=not are_all,  # blanks are then counted elsewhere
                 glob=False,
             )
             .select(wanted)
@@ -264,4 +279,6 @@ def _parse(
         )
     except (polars.exceptions.PolarsError, OSError):  # the latter: like a compressed file
         return None
-    return None if any(frame.null_count().row(0)) else frame
+    gaps = dict(zip(wanted, frame.null_count().row(0), strict=True))
+    is_full = gaps.pop("behind", frame.height) == frame.height and not any(gaps.values())
+    return frame if is_full else None

@@ -141,11 +141,11 @@ def test_a_large_packing_is_told_by_the_grains_around_its_middle(away):
     place = np.random.default_rng(2).permutation(place)
     place[:away] += 1e9  # thrown out of the sample
     radius = np.full(len(place), 0.5)
-    assert proof.touch(place, radius)
-    assert not proof.touch(place, 2 * radius)
-    assert not proof.touch(place, 0.5 * radius)
-    assert not proof.touch(place[:, [0, 1, 1]], radius)
-    assert not proof.touch(np.random.default_rng(3).permuted(place, axis=0), radius / 2)
+    assert proof.touch(*place.T, radius)
+    assert not proof.touch(*place.T, 2 * radius)
+    assert not proof.touch(*place.T, 0.5 * radius)
+    assert not proof.touch(*place.T[[0, 1, 1]], radius)
+    assert not proof.touch(*np.random.default_rng(3).permuted(place, axis=0).T, radius / 2)
 
 
 def test_a_diameter_that_the_user_names_comes_before_a_radius_of_the_file(tmp_path):

@@ -145,6 +145,13 @@ def test_what_is_no_text_is_told(tmp_path, byte):
         read_text(path)
 
 
+@pytest.mark.parametrize("word", ["1", "grain"])
+def test_a_byte_of_zero_behind_the_first_rows_is_told(word):
+    rows = f"1,2,3,4,{word}\n" * 20_000
+    with pytest.raises(ReadError, match="line 20002: expected text, found the byte 0"):
+        read(f"x,y,z,radius,kind\n{rows}1,2,3,4,{word}\0\n", whole=())
+
+
 def test_names_are_not_read_as_others_where_a_row_has_an_empty_word_at_its_end():
     layout, found = read(table().replace("\n", ",\n", 1))
     assert layout.names == tuple(NAMES)
