@@ -29,6 +29,35 @@ FILES = {
     "blanks.txt": "#format x_y_z_r\n0 0  0 1\n 2.5 0\t-1e-3 1 \n\n",
     "comments.txt": "#format x_y_z_r\n0 0 0 1 # the first\n# another\n2.5 0 -1e-3 1\n",
 }
+ROWS = "3,0.5,1e-3,-.25,1\n9007199254740993,2.5,0,0,1\n1,5,0,0,1\n"
+TABLES = {
+    "a.csv": "id,x,y,z,radius\n" + ROWS,
+    "mark.csv": "\ufeffid,x,y,z,radius\n" + ROWS,
+    "a.tsv": "# of a program\nid\tx\ty\tz\tradius\n" + ROWS.replace(",", "\t"),
+    "blank.txt": "id x y z radius\n" + ROWS.replace(",", " "),
+    "blanks.txt": "id x y z radius\n" + ROWS.replace(",", "  "),
+    "windows.csv": "id,x,y,z,radius\r\n" + ROWS.replace("\n", "\r\n"),
+    "open.csv": "id,x,y,z,radius,\n" + ROWS.replace("\n", ",\n"),
+    "semicolons.csv": "id;x;y;z;radius\n" + ROWS.replace(",", ";").replace(".", ","),
+    "double.csv": "id,x,y,z,radius\n" + ROWS.replace("1e-3", "1D-3"),
+    "words.csv": "id,x,y,z,radius,kind\n" + ROWS.replace("\n", ",sand\n"),
+    "gaps.csv": "id,x,y,z,radius,force\n" + ROWS.replace("\n", ",7\n").replace(",7", ",", 1),
+    "ends.csv": "id,x,y,z,radius\n" + ROWS + "\n\n",
+}
+
+
+@pytest.fixture(params=["LONG", "PIECE"])
+def lengths(request, monkeypatch):
+    """Sets what is long for the quick parser: a text in memory, or one that is read by pieces."""
+
+    def both(read):
+        found = []
+        for length in (1 << 30, 0 if request.param == "LONG" else 10):
+            monkeypatch.setattr(text_table, request.param, length)
+            found.append(read())
+        return found
+
+    return both
 
 
 def content(source):
@@ -42,25 +71,20 @@ def content(source):
     ]
 
 
-@pytest.mark.parametrize("name", FILES)
-def test_short_and_long_files_have_the_same_grains(tmp_path, monkeypatch, name):
+@pytest.mark.filterwarnings("ignore::scanfab.ScanfabWarning")
+@pytest.mark.parametrize("name", [*FILES, *TABLES])
+def test_short_and_long_files_have_the_same_grains(tmp_path, lengths, name):
     path = tmp_path / name
-    path.write_text(FILES[name])
-    found = []
-    for length in (1 << 30, 0):
-        monkeypatch.setattr(text_table, "LONG", length)
-        found.append(content(path))
-    assert repr(found[0]) == repr(found[1])
-    assert len(found[0][0][0]) > 1
+    path.write_text((FILES | TABLES)[name], "utf-8", newline="")
+    short, long = lengths(lambda: content(path))
+    assert repr(short) == repr(long)
+    assert len(short[0][0]) > 1
 
 
-def test_workers_of_esys(tmp_path, monkeypatch):
+def test_workers_of_esys(tmp_path, lengths):
     path = esys.run(tmp_path)
-    found = []
-    for length in (1 << 30, 0):
-        monkeypatch.setattr(text_table, "LONG", length)
-        found.append(content(path))
-    assert repr(found[0]) == repr(found[1])
+    short, long = lengths(lambda: content(path))
+    assert repr(short) == repr(long)
 
 
 @pytest.mark.parametrize(
@@ -74,19 +98,31 @@ def test_workers_of_esys(tmp_path, monkeypatch):
         ("run.data", "0.29", "0.2\x019"),
         ("run.data", "0.29", "0.29\x0b"),
         ("particle_input.dat", "0.5D-1", "0.5D"),
+        ("a.csv", "2.5,0", "2.5,0,0"),
+        ("a.csv", "2.5,0", "2.5"),
+        ("a.csv", "2.5,0", "2.5,x"),
+        ("a.csv", "2.5,0", "2.5,"),
+        ("a.csv", "2.5,0", "2.5,\0"),
+        ("a.csv", "\n1,5", "\n\n1,5"),
+        ("a.csv", "\n1,5", "\n# 1,5"),
+        ("a.csv", "\n1,5", "\n1.5,5"),
+        ("a.csv", "5,0,0,1\n", "5,0,0,1"),
+        ("a.csv", "2.5,0", '"2.5",0'),
+        ("blank.txt", "2.5 0", "2.5\t0"),
+        ("blank.txt", "\n1 5", "\n 1 5"),
     ],
 )
-def test_what_is_wrong_in_a_short_file_is_wrong_in_a_long_one(
-    tmp_path, monkeypatch, name, old, new
-):
-    assert old in FILES[name]
+def test_what_is_wrong_in_a_short_file_is_wrong_in_a_long_one(tmp_path, lengths, name, old, new):
+    text = (FILES | TABLES)[name]
+    assert old in text
     path = tmp_path / name
-    path.write_text(FILES[name].replace(old, new, 1))
-    said = []
-    for length in (1 << 30, 0):
-        monkeypatch.setattr(text_table, "LONG", length)
+    path.write_text(text.replace(old, new, 1), "utf-8", newline="")
+
+    def said():
         try:
-            said.append(repr(content(path)))
+            return repr(content(path))
         except scanfab.ScanfabError as error:
-            said.append(str(error))
-    assert said[0] == said[1]
+            return str(error)
+
+    short, long = lengths(said)
+    assert short == long

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import ReadError, ScanfabWarning
-from scanfab.io.files import Stamp, first_bytes, stamp_of
+from scanfab.io.files import Stamp, first_bytes, plain, stamp_of
 from scanfab.io.formats.table_names import unique
 from scanfab.io.formats.xyzd import is_xyzd, read_xyzd_columns
 from scanfab.io.parse.sheet_binary import (
@@ -23,7 +23,7 @@ from scanfab.io.parse.sheet_binary import (
     read_npz,
     read_parquet,
 )
-from scanfab.io.parse.sheet_columns import read_columns
+from scanfab.io.parse.sheet_columns import Arrays, read_columns
 from scanfab.io.parse.sheet_layout import (
     HEAD,
     Layout,
@@ -32,6 +32,8 @@ from scanfab.io.parse.sheet_layout import (
     layout_of,
     read_text,
 )
+from scanfab.io.parse.text_table import read_to_end
+from scanfab.io.unpacking import check_lines
 
 __all__ = ["Columns", "has_ids", "names_of", "read_table", "read_unnamed"]
 
@@ -81,6 +83,34 @@ def read_table(path: Path, skip: int, numbers: Sequence[str], whole: Sequence[st
         return _checked(path, read_parquet(path), numbers)
     if head.startswith(IS_NPZ):
         return _checked(path, _unfolded(read_npz(path)), numbers)
+    layout, columns = _large(path, skip, whole) or _whole_text(path, skip, numbers, whole)
+    return {
+        name: columns[place]
+        for place, name in enumerate(_keys(layout))
+        if layout.names is None or layout.names[place] or not _is_empty(columns[place])
+    }
+
+
+def _large(path: Path, skip: int, whole: Sequence[str]) -> tuple[Layout, Arrays] | None:
+    """How a large table of numbers is written, and its columns by their places; None: otherwise."""
+    stamp, file = stamp_of(path), plain(path)
+    layout = _layout_by_head(path, skip, stamp)
+    with open(file, "rb") as stream:
+        is_decoded = stream.read(HEAD) != read_text(path, HEAD)
+    if is_decoded or layout.has_commas or not all(layout.are_numbers):
+        return None
+    check_lines(path, file)
+    places = [place for place, name in enumerate(_keys(layout)) if name in whole]
+    columns = read_to_end(file, layout.start, layout.separator, places)
+    if columns is None or len(columns) != layout.width or stamp_of(path) != stamp:
+        return None
+    return layout, dict(enumerate(columns))
+
+
+def _whole_text(
+    path: Path, skip: int, numbers: Sequence[str], whole: Sequence[str]
+) -> tuple[Layout, Arrays]:
+    """The same of any table of text; ReadError if it is none."""
     data = read_text(path)
     if not data.endswith((b"\n", b"\r")):
         warnings.warn(
@@ -90,16 +120,9 @@ def read_table(path: Path, skip: int, numbers: Sequence[str], whole: Sequence[st
             stacklevel=2,
         )
     layout = layout_of(path, data, skip)
-    names = _keys(layout)
-    places = {name: place for place, name in enumerate(names)}
-    columns = read_columns(
-        path, data, layout, [places[one] for one in numbers], [places[one] for one in whole]
-    )
-    return {
-        name: columns[place]
-        for name, place in places.items()
-        if layout.names is None or layout.names[place] or not _is_empty(columns[place])
-    }
+    places = {name: place for place, name in enumerate(_keys(layout))}
+    needed, ids = ([places[one] for one in some] for some in (numbers, whole))
+    return layout, read_columns(path, data, layout, needed, ids)
 
 
 def read_unnamed(path: Path, skip: int) -> Columns:

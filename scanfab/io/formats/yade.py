@@ -15,7 +15,7 @@ from scanfab.io.formats.columns import grain_table
 from scanfab.io.formats.vtk import VtkReader, vectors
 from scanfab.io.formats.yade_save import is_binary_save, is_save, read_save, snapshot_of_save
 from scanfab.io.parse.number_rows import rows_of_numbers
-from scanfab.io.parse.text_table import FILLED, parse_columns
+from scanfab.io.parse.text_table import FILLED, parse_columns, read_to_end
 from scanfab.io.parse.vtk_data import FlawError, Mesh
 from scanfab.io.parse.vtk_xml import count_rows
 from scanfab.io.reader import (
@@ -133,6 +133,9 @@ def _columns(path: Path) -> list[FloatArray]:
     with open(plain(path), "rb", buffering=0) as stream:
         above = COMMENTS.match(stream.read(1 << 12))
         assert above is not None
+        columns = read_to_end(plain(path), above.end())
+        if columns is not None:
+            return columns
         stream.seek(above.end())
         data = stream.readall()
     if FILLED.search(data) is None:

@@ -19,7 +19,7 @@ from scanfab.base.errors import ReadError
 from scanfab.io.parse.sheet_layout import Layout, fields_of, refuse_control
 from scanfab.io.parse.text_table import as_array, squeezed
 
-__all__ = ["read_columns"]
+__all__ = ["Arrays", "read_columns"]
 
 Arrays = dict[int, npt.NDArray[Any]]
 

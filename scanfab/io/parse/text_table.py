@@ -32,6 +32,7 @@ __all__ = [
     "parse_rows",
     "parse_some",
     "read_regular",
+    "read_to_end",
     "squeezed",
 ]
 
@@ -89,14 +90,42 @@ def read_regular(table: TextTable, columns: Mapping[int, npt.NDArray[Any]]) -> b
     """
     if free_memory() < ROOM:
         return False
-    rows = 0
-    for frame in _parsed(table, {place: column.dtype for place, column in columns.items()}):
-        if frame is None or rows + frame.height > table.count:
-            return False
-        for place, column in columns.items():
-            _put(frame[f"{place}"].get_chunks(), column[rows : rows + frame.height])
-        rows += frame.height
+    rows, kinds = 0, {place: column.dtype for place, column in columns.items()}
+    # opened once: the file may be replaced by another while it is read
+    with open(table.path, "rb") as file:
+        for frame in _parsed(file, table.start, table.stop, table.width, " ", kinds):
+            if frame is None or rows + frame.height > table.count:
+                return False
+            for place, column in columns.items():
+                _put(frame[f"{place}"].get_chunks(), column[rows : rows + frame.height])
+            rows += frame.height
     return rows == table.count
+
+
+def read_to_end(
+    path: Path, start: int, separator: str | None = None, whole: Collection[int] = ()
+) -> list[npt.NDArray[Any]] | None:
+    """
+    All columns of the rows from a byte of an uncompressed file to its end, each of shape (N,).
+
+    As :func:`parse_columns` has them, but only some pieces of the text are in memory, and one is
+    parsed while another is read. Two words stand apart by one sign: that of the user, or a tab or
+    blank. None if the text is short, or not regular.
+    """
+    with open(path, "rb") as file:
+        stop = file.seek(0, 2)
+        if stop - start <= PIECE or free_memory() < ROOM + 2 * (stop - start):
+            return None
+        file.seek(start)
+        line = file.readline().rstrip(b"\r\n")
+        sign = _sign(line) if separator is None else separator
+        width = len(line.removesuffix(sign.encode()).split(sign.encode()))
+        kinds, frames = _kinds(range(width), whole), []
+        for frame in _parsed(file, start, stop, width, sign, kinds):
+            if frame is None:
+                return None
+            frames.append(frame)
+    return _columns_of(frames, kinds)
 
 
 def parse_columns(
@@ -117,7 +146,7 @@ def parse_columns(
         stop -= 1
     text = data[first.start() : stop]
     line = text[: text.find(b"\n")]
-    width, sign = len(line.split()), "\t" if b"\t" in line else " "
+    width, sign = len(line.split()), _sign(line)
     kinds = _kinds(range(width), whole)
     found = None
     # elsewhere a second try is the first: words stand apart by more than one sign
@@ -149,6 +178,10 @@ def parse_some(
     return None if columns is None else np.array(columns, np.float64).T
 
 
+def _sign(line: bytes) -> str:
+    return "\t" if b"\t" in line else " "
+
+
 def _kinds(places: Iterable[int], whole: Collection[int]) -> dict[int, np.dtype[Any]]:
     return {k: np.dtype(np.int64 if k in whole else np.float64) for k in places}
 
@@ -177,6 +210,12 @@ def _parse_all(
             return None
         frames.append(frame)
         start = stop
+    return _columns_of(frames, kinds)
+
+
+def _columns_of(
+    frames: Sequence[Any], kinds: Mapping[int, np.dtype[Any]]
+) -> list[npt.NDArray[Any]]:
     return [as_array([frame[f"{place}"] for frame in frames]) for place in kinds]
 
 
@@ -195,37 +234,41 @@ def _put(parts: Sequence[Any], column: npt.NDArray[Any]) -> None:
         start += len(part)
 
 
-def _parsed(table: TextTable, kinds: Mapping[int, np.dtype[Any]]) -> Iterator[Any]:
-    """The data frames of the table's pieces, in their order; None for one that is not regular."""
-    # opened once: the file may be replaced by another while it is read
-    with open(table.path, "rb") as file, ThreadPoolExecutor(WORKERS) as pool:
-        file.seek(table.start)
-        # polars sees an empty word behind such a line
-        behind = file.readline().endswith(b" \n")
-        pieces, lock = list(_pieces(file, table)), Lock()
+def _parsed(
+    file: IO[bytes],
+    start: int,
+    stop: int,
+    width: int,
+    separator: str,
+    kinds: Mapping[int, np.dtype[Any]],
+) -> Iterator[Any]:
+    """The data frames of a table's pieces, in their order; None for one that is not regular."""
+    file.seek(start)
+    # polars sees an empty word behind such a line
+    behind = file.readline().endswith(f"{separator}\n".encode())
+    pieces, lock = list(_pieces(file, start, stop)), Lock()
 
-        def parse(start: int, stop: int) -> Any:
-            with lock:
-                file.seek(start)
-                text = file.read(stop - start)
-            return _parse_piece(text, table.width, kinds, behind)
+    def parse(begin: int, end: int) -> Any:
+        with lock:
+            file.seek(begin)
+            text = file.read(end - begin)
+        return _parse_piece(text, width, kinds, behind, separator)
 
-        jobs = (partial(parse, *piece) for piece in pieces)
-        yield from in_order(pool, jobs, 2 * WORKERS)
+    with ThreadPoolExecutor(WORKERS) as pool:
+        yield from in_order(pool, (partial(parse, *piece) for piece in pieces), 2 * WORKERS)
 
 
-def _pieces(file: IO[bytes], table: TextTable) -> Iterator[tuple[int, int]]:
-    """First bytes, and those behind the last, of parts of the table that are whole lines."""
-    start = table.start
-    while start < table.stop:
+def _pieces(file: IO[bytes], start: int, stop: int) -> Iterator[tuple[int, int]]:
+    """First bytes, and those behind the last, of parts of a table that are whole lines."""
+    while start < stop:
         place = file.seek(start + PIECE)
-        stop = min(place + len(file.readline()), table.stop)
-        yield start, stop
-        start = stop
+        end = min(place + len(file.readline()), stop)
+        yield start, end
+        start = end
 
 
 def _parse_piece(
-    text: bytes, width: int, kinds: Mapping[int, np.dtype[Any]], behind: bool, sign: str = " "
+    text: bytes, width: int, kinds: Mapping[int, np.dtype[Any]], behind: bool, sign: str
 ) -> Any:
     """
     The columns of some lines; None if they are not regular.
