@@ -16,7 +16,16 @@ from importlib.metadata import version
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-GROUPS = ("chords", "windows", "periodic", "scaling", "startup", "reading", "reading_formats")
+GROUPS = (
+    "chords",
+    "windows",
+    "periodic",
+    "scaling",
+    "startup",
+    "reading",
+    "reading_formats",
+    "reading_large",
+)
 PACKAGES = ("scanfab", "numpy", "numba", "polars")
 
 

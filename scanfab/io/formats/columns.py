@@ -91,7 +91,7 @@ def room_for_columns(
         if len(chosen) < 3:
             continue
         named = not set(own.values()) <= set(names) - set(chosen) or own.keys() & set("xyz")
-        if scaled or named:
+        if scaled or named or "position" in names:
             break
         position = np.empty((count, 3))
         filled = columns | dict(zip(chosen, position.T, strict=True))
@@ -225,7 +225,8 @@ def _named_by_user(
 def _position(
     path: Path, rest: MutableMapping[str, Any], named: dict[str, Any], cell: Cell | None, where: str
 ) -> FloatArray:
-    if "position" in rest:
+    # a column of a dump may have that name, too
+    if "position" in rest and rest["position"].ndim == 2:
         return _lengths(path, rest.pop("position"), "a coordinate", where)
     for names, scaled in POSITION_NAMES:
         found = [

@@ -278,14 +278,14 @@ def _parse_piece(
     blanks stand together except there, the words that it sees are those of the line, and if there
     are just as many as there should be, and no line lacks its last word, no line has a word more.
     """
-    from scanfab.io.parse.kernels import count_spaces
-
     # a last line without its end may lack digits; a byte order mark would be passed over
     if not text.endswith(b"\n") or not text[:1].isascii():
         return None
     frame = _parse(text, width, kinds, behind, sign)
     if frame is None or len(kinds) == width:
         return frame
+    from scanfab.io.parse.kernels import count_spaces
+
     rows = frame.height
     blanks_at_ends = rows * behind
     expected = rows * (width + behind), blanks_at_ends, blanks_at_ends

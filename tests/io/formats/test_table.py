@@ -14,6 +14,7 @@ import pytest
 import scanfab
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.io.formats import proof, table, table_files
+from scanfab.io.parse import text_table
 from scanfab.io.registry import reader_for
 from tests.helpers.dumps import dump_text, pairs_text, write
 from tests.helpers.truth import FLOOR, csv_rows
@@ -133,6 +134,20 @@ def test_a_table_without_names_is_parsed_once(tmp_path, monkeypatch):
     assert len(parsed) == 1
     assert_right(read(path))
     assert len(parsed) == 2  # its columns are not kept
+
+
+def test_a_table_that_is_replaced_while_it_is_read_is_read_as_it_is_then(tmp_path, monkeypatch):
+    monkeypatch.setattr(text_table, "PIECE", 10)
+    path, read_to_end = tmp_path / "grains.csv", table_files.read_to_end
+    path.write_text("x,y,z,radius\n1,2,3,4\n5,6,7,8\n")
+
+    def replaced(*how):
+        found = read_to_end(*how)
+        path.write_text("radius,x,y,z\n4,1,2,3\n88,55,66,77\n")
+        return found
+
+    monkeypatch.setattr(table_files, "read_to_end", replaced)
+    assert read(path).position.tolist() == [[1, 2, 3], [55, 66, 77]]
 
 
 @pytest.mark.parametrize("away", [0, 100])
