@@ -49,6 +49,11 @@ LONG, PEEK = 2 << 20, 1 << 16
 # a line that is not blank or a comment, as numpy has them
 FILLED = re.compile(rb"^[ \t\r\f\v\x1c-\x1f\x85\xa0]*[^#\s\x1c-\x1f\x85\xa0]", re.MULTILINE)
 
+# the name of what polars sees behind a separator at the end of a line
+BEHIND = "behind"
+# data frames of polars, whose columns are called by their places
+Frames = list[Any]
+
 # bytes that polars may need with all these pieces; without them it ends the process
 ROOM = 3 << 29
 
@@ -119,13 +124,12 @@ def read_to_end(
         file.seek(start)
         line = file.readline().rstrip(b"\r\n")
         sign = _sign(line) if separator is None else separator
-        width = len(line.removesuffix(sign.encode()).split(sign.encode()))
-        kinds, frames = _kinds(range(width), whole), []
-        for frame in _parsed(file, start, stop, width, sign, kinds):
-            if frame is None:
-                return None
-            frames.append(frame)
-    return _columns_of(frames, kinds)
+        words = line.removesuffix(sign.encode()).split(sign.encode())
+        if not all(words):
+            return None
+        kinds = _kinds(range(len(words)), whole)
+        frames = _all_of(_parsed(file, start, stop, len(words), sign, kinds))
+    return None if frames is None else _columns_of(frames)
 
 
 def parse_columns(
@@ -138,6 +142,31 @@ def parse_columns(
     words in any number. None if the rows are few, or not regular otherwise, or if columns that must
     be whole numbers are not: the tolerant parser is then to read them, or to say what is wrong.
     """
+    frames = _frames_of(data, begin, end, whole)
+    return None if frames is None else _columns_of(frames)
+
+
+def parse_rows(data: bytes, begin: int, end: int) -> npt.NDArray[np.float64] | None:
+    """The same as one array, shape (N, columns)."""
+    frames = _frames_of(data, begin, end)
+    return None if frames is None else _stacked(frames, range(_width(frames)))
+
+
+def parse_some(
+    text: bytes, width: int, places: Sequence[int], whole: Collection[int]
+) -> npt.NDArray[np.float64] | None:
+    """
+    Some columns of rows of words with one blank between them, shape (N, columns).
+
+    None if the rows are few, or if one is not regular or has no such number there: words of other
+    columns may be anything.
+    """
+    long = len(text) >= LONG
+    frames = _parse_all(text, width, " ", _kinds(places, whole)) if long else None
+    return None if frames is None else _stacked(frames, places)
+
+
+def _frames_of(data: bytes, begin: int, end: int, whole: Collection[int] = ()) -> Frames | None:
     first = FILLED.search(data, begin, end)
     stop = data.rfind(b"\n", begin, end) + 1
     if end - begin < LONG or first is None or stop <= first.start() or data[stop:end].strip():
@@ -156,26 +185,6 @@ def parse_columns(
         plain = squeezed(text)
         found = None if plain is None else _parse_all(plain, width, " ", kinds)
     return found
-
-
-def parse_rows(data: bytes, begin: int, end: int) -> npt.NDArray[np.float64] | None:
-    """The same as one array, shape (N, columns)."""
-    columns = parse_columns(data, begin, end)
-    return None if columns is None else np.array(columns).T
-
-
-def parse_some(
-    text: bytes, width: int, places: Sequence[int], whole: Collection[int]
-) -> npt.NDArray[np.float64] | None:
-    """
-    Some columns of rows of words with one blank between them, shape (N, columns).
-
-    None if the rows are few, or if one is not regular or has no such number there: words of other
-    columns may be anything.
-    """
-    kinds = _kinds(places, whole)
-    columns = None if len(text) < LONG else _parse_all(text, width, " ", kinds)
-    return None if columns is None else np.array(columns, np.float64).T
 
 
 def _sign(line: bytes) -> str:
@@ -197,26 +206,45 @@ def squeezed(text: bytes) -> bytes | None:
 
 def _parse_all(
     text: bytes, width: int, sign: str, kinds: Mapping[int, np.dtype[Any]]
-) -> list[npt.NDArray[Any]] | None:
-    """Columns of a long text in the order of the mapping, if it is regular; else None."""
+) -> Frames | None:
+    """The data frames of a long text one behind the other, if it is regular; else None."""
     if free_memory() < ROOM + 2 * len(text):
         return None
     behind = text[: text.find(b"\n") + 1].endswith(f"{sign}\n".encode())
-    frames, start = [], 0
-    while start < len(text):
-        stop = text.find(b"\n", min(start + PIECE, len(text) - 1)) + 1 or len(text)
-        frame = _parse_piece(text[start:stop], width, kinds, behind, sign)
+
+    def pieces() -> Iterator[Any]:
+        start = 0
+        while start < len(text):
+            stop = text.find(b"\n", min(start + PIECE, len(text) - 1)) + 1 or len(text)
+            yield _parse_piece(text[start:stop], width, kinds, behind, sign)
+            start = stop
+
+    return _all_of(pieces())
+
+
+def _all_of(frames: Iterator[Any]) -> Frames | None:
+    """All of them; None if one is."""
+    found = []
+    for frame in frames:
         if frame is None:
             return None
-        frames.append(frame)
-        start = stop
-    return _columns_of(frames, kinds)
+        found.append(frame)
+    return found
 
 
-def _columns_of(
-    frames: Sequence[Any], kinds: Mapping[int, np.dtype[Any]]
-) -> list[npt.NDArray[Any]]:
-    return [as_array([frame[f"{place}"] for frame in frames]) for place in kinds]
+def _width(frames: Frames) -> int:
+    return sum(name != BEHIND for name in frames[0].columns)
+
+
+def _columns_of(frames: Frames) -> list[npt.NDArray[Any]]:
+    return [as_array([frame[f"{k}"] for frame in frames]) for k in range(_width(frames))]
+
+
+def _stacked(frames: Frames, places: Sequence[int]) -> npt.NDArray[np.float64]:
+    values = np.empty((len(places), sum(frame.height for frame in frames)))
+    for place, column in zip(places, values, strict=True):
+        _put([part for frame in frames for part in frame[f"{place}"].get_chunks()], column)
+    return values.T
 
 
 def as_array(columns: Sequence[Any]) -> npt.NDArray[Any]:
@@ -302,7 +330,7 @@ def _parse(
     schema: dict[str, Any] = dict.fromkeys(names, polars.Float64)
     schema |= {names[place]: polars.Int64 for place, kind in kinds.items() if kind == np.int64}
     if behind:
-        schema["behind"] = polars.String
+        schema[BEHIND] = polars.String
     are_all = len(kinds) == width
     wanted = list(schema) if are_all else list({names[place]: 0 for place in [*kinds, -1]})
     try:
@@ -323,5 +351,5 @@ def _parse(
     except (polars.exceptions.PolarsError, OSError):  # the latter: like a compressed file
         return None
     gaps = dict(zip(wanted, frame.null_count().row(0), strict=True))
-    is_full = gaps.pop("behind", frame.height) == frame.height and not any(gaps.values())
+    is_full = gaps.pop(BEHIND, frame.height) == frame.height and not any(gaps.values())
     return frame if is_full else None
