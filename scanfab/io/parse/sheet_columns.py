@@ -69,11 +69,12 @@ def read_columns(
         if found is not None:
             return found
     _refuse_zeros(path, data)
-    body = _body(data, layout)
-    if not body:
+    rows = _rows(data, layout)
+    if not rows:
         return {place: np.zeros(0) for place in range(layout.width)}
+    plain = squeezed(rows) if layout.separator == " " else None
+    body = bytes(rows) if plain is None else plain
     if layout.separator == " ":
-        body = squeezed(body) or body
         found = None if layout.has_commas else _regular(body, layout, numbers, whole)
         if found is not None:
             return found
@@ -87,15 +88,17 @@ def _refuse_zeros(path: Path, data: bytes) -> None:
         refuse_control(path, data)
 
 
-def _body(data: bytes, layout: Layout) -> bytes:
+def _rows(data: bytes, layout: Layout) -> memoryview:
     """The rows, each with the end of its line."""
     end = len(data)
     while end > layout.start and data[end - 1] in b" \t\r\n":
         end -= 1
-    if end == layout.start:
-        return b""
     line_end = data.find(b"\n", end)
-    return data[layout.start :] + b"\n" if line_end < 0 else data[layout.start : line_end + 1]
+    if end == layout.start:
+        return memoryview(b"")
+    if line_end < 0:
+        return memoryview(data[layout.start :] + b"\n")
+    return memoryview(data)[layout.start : line_end + 1]
 
 
 def _check_lines(path: Path, body: bytes, layout: Layout) -> None:

@@ -195,7 +195,7 @@ def _kinds(places: Iterable[int], whole: Collection[int]) -> dict[int, np.dtype[
     return {k: np.dtype(np.int64 if k in whole else np.float64) for k in places}
 
 
-def squeezed(text: bytes) -> bytes | None:
+def squeezed(text: bytes | memoryview) -> bytes | None:
     """Rows with one blank between two words, and none around them; None if it is no plain text."""
     from scanfab.io.parse.kernels import single_blanks
 
