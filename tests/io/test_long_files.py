@@ -31,11 +31,12 @@ FILES = {
 }
 ROWS = "3,0.5,1e-3,-.25,1\n9007199254740993,2.5,0,0,1\n1,5,0,0,1\n"
 TABLES = {
+    "aligned.txt": "id x y z radius\n" + "  " + ROWS.replace(",", "  ").replace("\n1", "\n  1"),
     "a.csv": "id,x,y,z,radius\n" + ROWS,
     "mark.csv": "\ufeffid,x,y,z,radius\n" + ROWS,
     "a.tsv": "# of a program\nid\tx\ty\tz\tradius\n" + ROWS.replace(",", "\t"),
     "blank.txt": "id x y z radius\n" + ROWS.replace(",", " "),
-    "blanks.txt": "id x y z radius\n" + ROWS.replace(",", "  "),
+    "runs.txt": "id x y z radius\n" + ROWS.replace(",", "  "),
     "windows.csv": "id,x,y,z,radius\r\n" + ROWS.replace("\n", "\r\n"),
     "open.csv": "id,x,y,z,radius,\n" + ROWS.replace("\n", ",\n"),
     "semicolons.csv": "id;x;y;z;radius\n" + ROWS.replace(",", ";").replace(".", ","),

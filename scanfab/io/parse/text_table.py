@@ -8,7 +8,7 @@ which reads it or says what is wrong in which line.
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -98,7 +98,11 @@ def read_regular(table: TextTable, columns: Mapping[int, npt.NDArray[Any]]) -> b
     rows, kinds = 0, {place: column.dtype for place, column in columns.items()}
     # opened once: the file may be replaced by another while it is read
     with open(table.path, "rb") as file:
-        for frame in _parsed(file, table.start, table.stop, table.width, " ", kinds):
+        file.seek(table.start)
+        # polars sees an empty word behind such a line
+        behind = file.readline().endswith(b" \n")
+        parse = partial(_parse_piece, width=table.width, kinds=kinds, behind=behind, sign=" ")
+        for frame in _parsed(file, table.start, table.stop, parse):
             if frame is None or rows + frame.height > table.count:
                 return False
             for place, column in columns.items():
@@ -114,22 +118,33 @@ def read_to_end(
     All columns of the rows from a byte of an uncompressed file to its end, each of shape (N,).
 
     As :func:`parse_columns` has them, but only some pieces of the text are in memory, and one is
-    parsed while another is read. Two words stand apart by one sign: that of the user, or a tab or
-    blank. None if the text is short, or not regular.
+    parsed while another is read. Words stand apart by the separator, or by blanks and tabs. None if
+    the text is short, or not regular.
     """
     with open(path, "rb") as file:
         stop = file.seek(0, 2)
         if stop - start <= PIECE or free_memory() < ROOM + 2 * (stop - start):
             return None
         file.seek(start)
-        line = file.readline().rstrip(b"\r\n")
-        sign = _sign(line) if separator is None else separator
-        words = line.removesuffix(sign.encode()).split(sign.encode())
-        if not all(words):
-            return None
-        kinds = _kinds(range(len(words)), whole)
-        frames = _all_of(_parsed(file, start, stop, len(words), sign, kinds))
+        parse = _how_to_parse(file.readline(), separator, whole)
+        frames = None if parse is None else _all_of(_parsed(file, start, stop, parse))
     return None if frames is None else _columns_of(frames)
+
+
+def _how_to_parse(
+    line: bytes, separator: str | None, whole: Collection[int]
+) -> Callable[[bytes], Any] | None:
+    """What makes data frames of pieces of a text, by its first line; None if a word is empty."""
+    sign = _sign(line) if separator is None else separator
+    words = line.rstrip(b"\r\n").removesuffix(sign.encode()).split(sign.encode())
+    if all(words):
+        behind = line.endswith(f"{sign}\n".encode())
+        kinds = _kinds(range(len(words)), whole)
+        return partial(_parse_piece, width=len(words), kinds=kinds, behind=behind, sign=sign)
+    if not sign.isspace():
+        return None
+    width = len(line.split())
+    return partial(_parse_squeezed, width=width, kinds=_kinds(range(width), whole))
 
 
 def parse_columns(
@@ -262,28 +277,18 @@ def _put(parts: Sequence[Any], column: npt.NDArray[Any]) -> None:
         start += len(part)
 
 
-def _parsed(
-    file: IO[bytes],
-    start: int,
-    stop: int,
-    width: int,
-    separator: str,
-    kinds: Mapping[int, np.dtype[Any]],
-) -> Iterator[Any]:
+def _parsed(file: IO[bytes], start: int, stop: int, parse: Callable[[bytes], Any]) -> Iterator[Any]:
     """The data frames of a table's pieces, in their order; None for one that is not regular."""
-    file.seek(start)
-    # polars sees an empty word behind such a line
-    behind = file.readline().endswith(f"{separator}\n".encode())
     pieces, lock = list(_pieces(file, start, stop)), Lock()
 
-    def parse(begin: int, end: int) -> Any:
+    def parse_piece(begin: int, end: int) -> Any:
         with lock:
             file.seek(begin)
             text = file.read(end - begin)
-        return _parse_piece(text, width, kinds, behind, separator)
+        return parse(text)
 
     with ThreadPoolExecutor(WORKERS) as pool:
-        yield from in_order(pool, (partial(parse, *piece) for piece in pieces), 2 * WORKERS)
+        yield from in_order(pool, (partial(parse_piece, *piece) for piece in pieces), 2 * WORKERS)
 
 
 def _pieces(file: IO[bytes], start: int, stop: int) -> Iterator[tuple[int, int]]:
@@ -293,6 +298,11 @@ def _pieces(file: IO[bytes], start: int, stop: int) -> Iterator[tuple[int, int]]
         end = min(place + len(file.readline()), stop)
         yield start, end
         start = end
+
+
+def _parse_squeezed(text: bytes, width: int, kinds: Mapping[int, np.dtype[Any]]) -> Any:
+    plain = squeezed(text)
+    return None if plain is None else _parse_piece(plain, width, kinds, behind=False, sign=" ")
 
 
 def _parse_piece(
