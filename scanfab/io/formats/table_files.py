@@ -146,7 +146,10 @@ def _keys(layout: Layout) -> list[str]:
 
 def _is_empty(values: npt.NDArray[Any]) -> bool:
     """Whether a column is what a separator at the end of each row leaves."""
-    return not np.any(values != "" if values.dtype.kind == "U" else ~np.isnan(values))
+    if values.dtype.kind == "U":
+        return not np.any(values != "")
+    # the first row tells it of most columns
+    return bool(np.all(np.isnan(values[:1])) and np.all(np.isnan(values)))
 
 
 def _parts(name: str, shape: tuple[int, ...]) -> list[str]:
