@@ -7,7 +7,7 @@ import pytest
 
 import scanfab
 from scanfab.io.parse import text_table
-from tests.helpers.made import esys, kratos, lf_dem, mercurydpm, mfix
+from tests.helpers.made import esys, kratos, lf_dem, mercurydpm, mfix, musen
 from tests.helpers.made.data_files import data_file
 from tests.helpers.made.lammps import yaml_text
 
@@ -24,6 +24,7 @@ FILES = {
     "two.dat": mfix.version_2(),
     "a.mdpa": kratos.MDPA,
     "a.data": data_file(),
+    "musen.txt": musen.export(*musen.ROWS),
     "a.yaml": yaml_text(100) + yaml_text(200),
     "yade.txt": "#format x_y_z_r\n0\t0\t0\t1\n2.5\t0\t-1e-3\t1\n",
     "blanks.txt": "#format x_y_z_r\n0 0  0 1\n 2.5 0\t-1e-3 1 \n\n",
@@ -98,6 +99,7 @@ def test_workers_of_esys(tmp_path, lengths):
         ("run.data", "0.29", "0.2\x019"),
         ("run.data", "0.29", "0.29\x0b"),
         ("particle_input.dat", "0.5D-1", "0.5D"),
+        ("musen.txt", " 12 0.6 0.5 0.5 15", " 12 0.6 0.5 0.5 015"),
         ("run.data", "0.29", "0.29\r"),
         ("particle_input.dat", "7 8\n", "7  8\r\r\n"),
         ("yade.txt", "2.5\t0", "2.5\r\t0"),
