@@ -129,8 +129,8 @@ def _counted() -> list[None]:
     found: list[None] = []
 
     def counting(parse: Callable[..., Any]) -> Callable[..., Any]:
-        def parsed(*given: Any) -> Any:
-            answer = parse(*given)
+        def parsed(*given: Any, **named: Any) -> Any:
+            answer = parse(*given, **named)
             if answer is not None:
                 found.append(None)
             return answer
