@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
 
-__all__ = ["ROUNDED", "exact_column", "plain_reason", "rows_of_numbers"]
+__all__ = ["ROUNDED", "exact_column", "number_or_nan", "plain_reason", "rows_of_numbers"]
 
 # whole numbers from here on may be rounded as decimals
 ROUNDED = 2.0**53
@@ -66,6 +66,14 @@ def exact_column(values: npt.NDArray[np.float64], rows: bytes, place: int) -> np
         return column  # 1e17 and the like
 
 
+def number_or_nan(word: str) -> float:
+    """A word of a column of text: names of kinds may be numbers, too."""
+    try:
+        return float(word)
+    except ValueError:
+        return float("nan")
+
+
 def plain_reason(reason: str) -> tuple[str, int | None]:
     """What numpy says of a row, without its number, and that, from 0 and without empty lines."""
     match = re.search(r"at row (\d+)", reason)
@@ -73,6 +81,8 @@ def plain_reason(reason: str) -> tuple[str, int | None]:
     if match is not None:
         row = int(match[1]) - ("changed" in reason)
         reason = reason[: match.start()].rstrip(" ;,")
+    if "embedded newline" in reason:
+        reason = "expected the end of the line behind a carriage return, found none"
     reason = reason.replace("could not convert string", "expected a number, found")
     return reason.replace(" to float64", ""), row
 

@@ -24,7 +24,7 @@ from scanfab.io.files import check_memory, plain
 from scanfab.io.parse.counted_rows import lines_above
 from scanfab.io.parse.growing import warn_incomplete
 from scanfab.io.parse.lammps_box import dump_cell
-from scanfab.io.parse.number_rows import exact_column, plain_reason
+from scanfab.io.parse.number_rows import exact_column, number_or_nan, plain_reason
 from scanfab.io.parse.text_table import LARGE, LONG, TextTable, read_regular
 from scanfab.io.reader import Snapshot
 from scanfab.io.unpacking import check_lines
@@ -341,7 +341,7 @@ def _count(where: str, sections: dict[str, list[str]]) -> int:
 
 
 def _values(path: Path, snapshot: Snapshot, block: bytes, body: _Body, count: int) -> FloatArray:
-    """The numbers of the body; columns of text come out as NaN."""
+    """The numbers of the body; words of columns of text come out as NaN."""
     if count == 0 and not block[body.start :].strip():
         return np.zeros((0, len(body.names)))
     available = block.count(b"\n", body.start)
@@ -356,7 +356,7 @@ def _values(path: Path, snapshot: Snapshot, block: bytes, body: _Body, count: in
         )
     text = _text_columns(block, body)
     converters: dict[int | str, Callable[[str], float]]
-    converters = dict.fromkeys(text, lambda _: float("nan"))
+    converters = dict.fromkeys(text, number_or_nan)
     try:
         values: FloatArray = np.loadtxt(
             io.BytesIO(rows),

@@ -197,7 +197,7 @@ def _frames_of(data: bytes, begin: int, end: int, whole: Collection[int] = ()) -
     if line[:1] > b" " and len(line.rstrip(sign.encode()).split(sign.encode())) == width:
         found = None if b"  " in text[:PEEK] else _parse_all(text, width, sign, kinds)
     if found is None:
-        plain = squeezed(text)
+        plain = None if _has_lone_returns(text) else squeezed(text)
         found = None if plain is None else _parse_all(plain, width, " ", kinds)
     return found
 
@@ -208,6 +208,11 @@ def _sign(line: bytes) -> str:
 
 def _kinds(places: Iterable[int], whole: Collection[int]) -> dict[int, np.dtype[Any]]:
     return {k: np.dtype(np.int64 if k in whole else np.float64) for k in places}
+
+
+def _has_lone_returns(text: bytes) -> bool:
+    """Whether a carriage return ends no line: polars passes over one behind a number."""
+    return b"\r" in text and text.count(b"\r") != text.count(b"\r\n")
 
 
 def squeezed(text: bytes | memoryview) -> bytes | None:
@@ -317,7 +322,7 @@ def _parse_piece(
     are just as many as there should be, and no line lacks its last word, no line has a word more.
     """
     # a last line without its end may lack digits; a byte order mark would be passed over
-    if not text.endswith(b"\n") or not text[:1].isascii():
+    if not text.endswith(b"\n") or not text[:1].isascii() or _has_lone_returns(text):
         return None
     frame = _parse(text, width, kinds, behind, sign)
     if frame is None or len(kinds) == width:

@@ -29,6 +29,7 @@ ID, TIME, GEOMETRY, PLACE, ACTIVE = b"0", b"2", b"5", b"12", b"24"
 SPHERES = re.compile(
     rb"^[ \t\r\f\v]*0[ \t\r\f\v]+\S+[ \t\r\f\v]+1[ \t\r\f\v]+1(?:[ \t\r\f\v].*)?$", re.MULTILINE
 )
+WHOLE = re.compile(rb"[-+]?\d{1,99}")
 # solid and liquid ones
 BOND = re.compile(rb"\n0 \S+ 1 (?:9|13) ")
 PERIODIC = re.compile(rb"^28[ \t]+([01])((?:[ \t]+\S+){9})[ \t]*\r?$", re.MULTILINE)
@@ -142,8 +143,11 @@ class _Layout:
         self.width, place = len(words), 0
         self.keys: dict[int, bytes] = {}
         while place < len(words):
-            self.keys[place] = words[place]
-            size = SIZES.get(words[place])
+            is_whole = WHOLE.fullmatch(words[place]) is not None
+            # 015 is 15, as in files that are parsed at once
+            key = b"%d" % int(words[place]) if is_whole else words[place]
+            self.keys[place] = key
+            size = SIZES.get(key)
             if size is None:
                 raise ReadError(
                     f"{path}: expected the number of a property, found {spelt(words[place])} in "

@@ -235,6 +235,12 @@ def test_words_in_the_element_column_are_no_error(tmp_path):
     np.testing.assert_array_equal(block.values, [[1, np.nan, 2.0]])
 
 
+def test_numbers_in_the_element_column_are_numbers_as_in_a_large_table(tmp_path):
+    rows = [(1, "1", 2.0), (2, "Si", 3.0)]
+    block = block_of(tmp_path, dump_text(rows=rows, names="id element x"))
+    np.testing.assert_array_equal(block.values, [[1, 1.0, 2.0], [2, np.nan, 3.0]])
+
+
 def test_a_word_among_numbers_names_file_and_line(tmp_path):
     rows = [ROWS[0], (2, 1, "oops", 0.5, 0.5, 0.1), ROWS[2]]
     with pytest.raises(ReadError, match=r"dump, line 11: expected a number, found 'oops'"):
