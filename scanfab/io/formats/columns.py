@@ -130,9 +130,8 @@ def grain_table(
     cell = user_cell(path, cell, options)
     position = _position(path, rest, named, cell, where)
     _refuse_far(path, position, cell, where)
+    position.flags.writeable = False  # so that the packing need not copy it
     radius = _radius(path, rest, named, len(position), options, where)
-    for array in (position, radius):
-        array.flags.writeable = False  # so that the packing need not copy it
     id = named.get("id", _take(rest, ID_NAMES))
     refuse_superquadrics(path, rest, radius, where)
     own = {name: rest.pop(name) for name in (BODIES, WALLS) if name in rest}
@@ -226,7 +225,7 @@ def _position(
     path: Path, rest: MutableMapping[str, Any], named: dict[str, Any], cell: Cell | None, where: str
 ) -> FloatArray:
     # a column of a dump may have that name, too
-    if "position" in rest and rest["position"].ndim == 2:
+    if "position" in rest and np.ndim(rest["position"]) == 2:
         return _lengths(path, rest.pop("position"), "a coordinate", where)
     for names, scaled in POSITION_NAMES:
         found = [

@@ -23,8 +23,8 @@ __all__ = ["TOO_FEW", "proved_force", "row_base", "tell_left_out", "touch"]
 TOO_FEW = 10
 # grains around the middle among which neighbours are sought, those of them that are looked at, and
 # neighbours of each
-AROUND = 5000
-LOOKED_AT = 500
+AROUND = 20_000
+LOOKED_AT = 2000
 NEIGHBOURS = 12
 # of r1 + r2: a distance that is a contact's, and one that is no overlap of grains any more
 CONTACT = 0.05

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import ReadError, ScanfabWarning
-from scanfab.io.files import Stamp, first_bytes, plain, stamp_of
+from scanfab.io.files import Stamp, check_memory, first_bytes, plain, stamp_of
 from scanfab.io.formats.table_names import unique
 from scanfab.io.formats.xyzd import is_xyzd, read_xyzd_columns
 from scanfab.io.parse.sheet_binary import (
@@ -26,6 +26,7 @@ from scanfab.io.parse.sheet_binary import (
 from scanfab.io.parse.sheet_columns import Arrays, read_columns
 from scanfab.io.parse.sheet_layout import (
     HEAD,
+    IN_MEMORY,
     Layout,
     check_width,
     first_rows,
@@ -99,6 +100,7 @@ def _large(path: Path, skip: int, whole: Sequence[str]) -> tuple[Layout, Arrays]
         is_decoded = stream.read(HEAD) != read_text(path, HEAD)
     if is_decoded or layout.has_commas or not all(layout.are_numbers):
         return None
+    check_memory(path, IN_MEMORY * file.stat().st_size)
     check_lines(path, file)
     places = [place for place, name in enumerate(_keys(layout)) if name in whole]
     columns = read_to_end(file, layout.start, layout.separator, places)

@@ -19,6 +19,7 @@ from scanfab.io.unpacking import check_lines
 
 __all__ = [
     "HEAD",
+    "IN_MEMORY",
     "Layout",
     "check_width",
     "fields_of",
@@ -31,6 +32,8 @@ __all__ = [
 
 # of a file, in which the names and the first rows stand
 HEAD = 1 << 18
+# times the size of a text that it takes with its numbers
+IN_MEMORY = 8.0
 # rows that are looked at to tell how the others are written
 SAMPLE = 20
 # bytes of such a row, of which at least two fit into what is looked at; and its columns
@@ -81,7 +84,7 @@ def read_text(path: Path, size: int = -1) -> bytes:
     """
     file = plain(path)
     if size < 0:
-        check_memory(path, 8.0 * file.stat().st_size)
+        check_memory(path, IN_MEMORY * file.stat().st_size)
         check_lines(path, file)
     with open(file, "rb") as stream:
         data = stream.read(size)

@@ -56,6 +56,9 @@ Frames = list[Any]
 
 # bytes that polars may need with all these pieces; without them it ends the process
 ROOM = 3 << 29
+# times the size of a text that its numbers may take, as polars has them and as arrays: two bytes
+# may be a number
+NUMBERS = 8
 
 
 @dataclass(frozen=True)
@@ -123,7 +126,7 @@ def read_to_end(
     """
     with open(path, "rb") as file:
         stop = file.seek(0, 2)
-        if stop - start <= PIECE or free_memory() < ROOM + 2 * (stop - start):
+        if stop - start <= PIECE or free_memory() < ROOM + NUMBERS * (stop - start):
             return None
         file.seek(start)
         parse = _how_to_parse(file.readline(), separator, whole)
@@ -134,16 +137,16 @@ def read_to_end(
 def _how_to_parse(
     line: bytes, separator: str | None, whole: Collection[int]
 ) -> Callable[[bytes], Any] | None:
-    """What makes data frames of pieces of a text, by its first line; None if a word is empty."""
+    """What makes data frames of pieces of a text, by its first line; None if it is not regular."""
     sign = _sign(line) if separator is None else separator
     words = line.rstrip(b"\r\n").removesuffix(sign.encode()).split(sign.encode())
     if all(words):
         behind = line.endswith(f"{sign}\n".encode())
         kinds = _kinds(range(len(words)), whole)
         return partial(_parse_piece, width=len(words), kinds=kinds, behind=behind, sign=sign)
-    if not sign.isspace():
-        return None
     width = len(line.split())
+    if not sign.isspace() or width == 0:
+        return None
     return partial(_parse_squeezed, width=width, kinds=_kinds(range(width), whole))
 
 
@@ -306,7 +309,7 @@ def _pieces(file: IO[bytes], start: int, stop: int) -> Iterator[tuple[int, int]]
 
 
 def _parse_squeezed(text: bytes, width: int, kinds: Mapping[int, np.dtype[Any]]) -> Any:
-    plain = squeezed(text)
+    plain = None if _has_lone_returns(text) else squeezed(text)
     return None if plain is None else _parse_piece(plain, width, kinds, behind=False, sign=" ")
 
 
@@ -322,11 +325,11 @@ def _parse_piece(
     are just as many as there should be, and no line lacks its last word, no line has a word more.
     """
     # a last line without its end may lack digits; a byte order mark would be passed over
-    if not text.endswith(b"\n") or not text[:1].isascii() or _has_lone_returns(text):
+    if not text.endswith(b"\n") or not text[:1].isascii():
         return None
     frame = _parse(text, width, kinds, behind, sign)
     if frame is None or len(kinds) == width:
-        return frame
+        return None if _has_lone_returns(text) else frame
     from scanfab.io.parse.kernels import count_spaces
 
     rows = frame.height

@@ -16,6 +16,7 @@ from scanfab.io.formats.columns import (
 )
 from scanfab.io.reader import ReadOptions
 from scanfab.packing.cell import Cell
+from scanfab.packing.packing import Packing
 
 PATH = Path("dump.txt")
 POSITION = np.array([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]])
@@ -74,8 +75,17 @@ def test_room_is_made_for_all_columns_whatever_they_are_called(own):
 
 
 def test_a_column_of_vectors_is_a_position():
-    found = {"position": POSITION, "radius": RADIUS}
-    np.testing.assert_array_equal(table(found).position, POSITION)
+    for position in (POSITION, POSITION.tolist()):
+        found = {"position": position, "radius": RADIUS}
+        np.testing.assert_array_equal(table(found).position, POSITION)
+
+
+def test_radii_stay_those_of_the_reader_that_hands_them_over():
+    radius = RADIUS.copy()
+    found = table(columns(radius=radius))
+    packing = Packing(found.position, found.radius)
+    radius[0] = 99
+    np.testing.assert_array_equal(packing.radius, RADIUS)
 
 
 def test_users_may_name_coordinates():

@@ -12,7 +12,7 @@ import scanfab
 from scanfab.base.errors import ReadError
 from scanfab.io.parse import text_dump as dump
 from scanfab.io.parse import text_table as regular
-from scanfab.io.parse.text_table import TextTable, read_regular
+from scanfab.io.parse.text_table import TextTable, read_regular, read_to_end
 from tests.helpers.dumps import ROWS, dump_text, write
 
 WIDTH = 3
@@ -215,3 +215,15 @@ def test_a_count_beyond_the_file_is_refused_at_once(tmp_path, count):
     text = dump_text().replace("ATOMS\n3\n", f"ATOMS\n{count}\n")
     with pytest.raises(ReadError, match=f"counts {count} rows.*incomplete"):
         scanfab.read(write(tmp_path / "a.dump", text))
+
+
+def test_a_text_whose_numbers_may_not_fit_into_memory_is_not_parsed_by_pieces(
+    tmp_path, monkeypatch
+):
+    path = tmp_path / "a"
+    path.write_text("1 1\n" * 1000)
+    monkeypatch.setattr(regular, "PIECE", 100)
+    for lacks in (0, 1):
+        free = regular.ROOM + regular.NUMBERS * 4000 - lacks
+        monkeypatch.setattr(regular, "free_memory", lambda free=free: free)
+        assert (read_to_end(path, 0) is None) == bool(lacks)
