@@ -53,10 +53,8 @@ def touch(x: FloatArray, y: FloatArray, z: FloatArray, radius: FloatArray) -> bo
     """
     from scipy.spatial import KDTree
 
-    sound = all(all_within(one, -MOST, MOST) for one in (x, y, z)) and all_within(
-        radius, LEAST, MOST
-    )
-    if len(radius) < TOO_FEW or not sound:
+    are_lengths = all(all_within(one, -MOST, MOST) for one in (x, y, z))
+    if len(radius) < TOO_FEW or not are_lengths or not all_within(radius, LEAST, MOST):
         return False
     rows, inner = _around_middle(x, y, z)
     position, radius = np.column_stack([one[rows] for one in (x, y, z)]), radius[rows]

@@ -33,7 +33,7 @@ from scanfab.io.parse.sheet_layout import (
     layout_of,
     read_text,
 )
-from scanfab.io.parse.text_table import read_to_end
+from scanfab.io.parse.text_table import has_pieces, read_to_end
 from scanfab.io.unpacking import check_lines
 
 __all__ = ["Columns", "has_ids", "names_of", "read_table", "read_unnamed"]
@@ -95,9 +95,10 @@ def read_table(path: Path, skip: int, numbers: Sequence[str], whole: Sequence[st
 def _large(path: Path, skip: int, whole: Sequence[str]) -> tuple[Layout, Arrays] | None:
     """How a large table of numbers is written, and its columns by their places; None: otherwise."""
     stamp, file = stamp_of(path), plain(path)
+    if not has_pieces(file):
+        return None
     layout = _layout_by_head(path, skip, stamp)
-    with open(file, "rb") as stream:
-        is_decoded = stream.read(HEAD) != read_text(path, HEAD)
+    is_decoded = first_bytes(path, HEAD) != read_text(path, HEAD)
     if is_decoded or layout.has_commas or not all(layout.are_numbers):
         return None
     check_memory(path, IN_MEMORY * file.stat().st_size)

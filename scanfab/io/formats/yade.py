@@ -15,7 +15,7 @@ from scanfab.io.formats.columns import grain_table
 from scanfab.io.formats.vtk import VtkReader, vectors
 from scanfab.io.formats.yade_save import is_binary_save, is_save, read_save, snapshot_of_save
 from scanfab.io.parse.number_rows import rows_of_numbers
-from scanfab.io.parse.text_table import FILLED, parse_columns, read_to_end
+from scanfab.io.parse.text_table import FILLED, has_pieces, parse_columns, read_to_end
 from scanfab.io.parse.vtk_data import FlawError, Mesh
 from scanfab.io.parse.vtk_xml import count_rows
 from scanfab.io.reader import (
@@ -133,7 +133,7 @@ def _columns(path: Path) -> list[FloatArray]:
     with open(plain(path), "rb", buffering=0) as stream:
         above = COMMENTS.match(stream.read(1 << 12))
         assert above is not None
-        columns = read_to_end(plain(path), above.end())
+        columns = read_to_end(plain(path), above.end()) if has_pieces(plain(path)) else None
         if columns is not None:
             return columns
         stream.seek(above.end())

@@ -28,6 +28,7 @@ __all__ = [
     "LONG",
     "TextTable",
     "as_array",
+    "has_pieces",
     "parse_columns",
     "parse_rows",
     "parse_some",
@@ -114,6 +115,11 @@ def read_regular(table: TextTable, columns: Mapping[int, npt.NDArray[Any]]) -> b
     return rows == table.count
 
 
+def has_pieces(path: Path) -> bool:
+    """Whether an uncompressed file is so long that :func:`read_to_end` is faster than the whole."""
+    return path.stat().st_size > PIECE
+
+
 def read_to_end(
     path: Path, start: int, separator: str | None = None, whole: Collection[int] = ()
 ) -> list[npt.NDArray[Any]] | None:
@@ -122,11 +128,11 @@ def read_to_end(
 
     As :func:`parse_columns` has them, but only some pieces of the text are in memory, and one is
     parsed while another is read. Words stand apart by the separator, or by blanks and tabs. None if
-    the text is short, or not regular.
+    the text is not regular, or memory is short.
     """
     with open(path, "rb") as file:
         stop = file.seek(0, 2)
-        if stop - start <= PIECE or free_memory() < ROOM + NUMBERS * (stop - start):
+        if free_memory() < ROOM + NUMBERS * (stop - start):
             return None
         file.seek(start)
         parse = _how_to_parse(file.readline(), separator, whole)
@@ -200,7 +206,7 @@ def _frames_of(data: bytes, begin: int, end: int, whole: Collection[int] = ()) -
     if line[:1] > b" " and len(line.rstrip(sign.encode()).split(sign.encode())) == width:
         found = None if b"  " in text[:PEEK] else _parse_all(text, width, sign, kinds)
     if found is None:
-        plain = None if _has_lone_returns(text) else squeezed(text)
+        plain = _plain(text)
         found = None if plain is None else _parse_all(plain, width, " ", kinds)
     return found
 
@@ -216,6 +222,10 @@ def _kinds(places: Iterable[int], whole: Collection[int]) -> dict[int, np.dtype[
 def _has_lone_returns(text: bytes) -> bool:
     """Whether a carriage return ends no line: polars passes over one behind a number."""
     return b"\r" in text and text.count(b"\r") != text.count(b"\r\n")
+
+
+def _plain(text: bytes) -> bytes | None:
+    return None if _has_lone_returns(text) else squeezed(text)
 
 
 def squeezed(text: bytes | memoryview) -> bytes | None:
@@ -309,7 +319,7 @@ def _pieces(file: IO[bytes], start: int, stop: int) -> Iterator[tuple[int, int]]
 
 
 def _parse_squeezed(text: bytes, width: int, kinds: Mapping[int, np.dtype[Any]]) -> Any:
-    plain = None if _has_lone_returns(text) else squeezed(text)
+    plain = _plain(text)
     return None if plain is None else _parse_piece(plain, width, kinds, behind=False, sign=" ")
 
 
