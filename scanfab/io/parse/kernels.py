@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.jit import kernel
+from scanfab.base.jit import inner, kernel
 
 __all__ = ["count_spaces", "single_blanks"]
 
@@ -46,26 +46,41 @@ def single_blanks(text: npt.NDArray[np.uint8], out: npt.NDArray[np.uint8]) -> in
     Returns how many bytes that makes; empty lines stay. -1 if there are other bytes below a blank
     than tabs and line ends, which no parser takes for blanks.
     """
-    size = np.int64(0)
-    waits = False
-    for k in range(text.size):
-        byte = text[k]
-        if byte == LINE_END:
-            out[size] = byte
-            size += 1
-            waits = False
-        elif byte <= BLANK:
-            # of the ends of lines of Windows
-            behind = text[k + 1] if k + 1 < text.size else LINE_END
-            is_return = byte == RETURN and behind in (RETURN, LINE_END)
-            if byte not in (BLANK, TAB) and not is_return:
-                return -1
-            waits = bool(size > 0 and out[size - 1] != LINE_END)
+    # numbers without a sign, which are not looked at for places from the end
+    place, size, one = np.uint64(0), np.uint64(0), np.uint64(1)
+    stop = np.uint64(text.size)
+    has_words = False
+    while True:
+        place = _behind_blanks(text, place)
+        if place >= stop:
+            return int(np.int64(size))
+        if text[place] == LINE_END:
+            out[size] = LINE_END
+            size, place = size + one, place + one
+            has_words = False
+        elif text[place] < BLANK:
+            return -1
         else:
-            if waits:
+            if has_words:
                 out[size] = BLANK
-                size += 1
-                waits = False
-            out[size] = byte
-            size += 1
-    return int(size)
+                size += one
+            has_words = True
+            while place < stop and text[place] > BLANK:
+                out[size] = text[place]
+                size, place = size + one, place + one
+
+
+@inner()
+def _behind_blanks(text: npt.NDArray[np.uint8], place: np.uint64) -> np.uint64:
+    """The first byte from a place on that is no blank, tab or return before a line end."""
+    stop, one = np.uint64(text.size), np.uint64(1)
+    while place < stop:
+        byte = text[place]
+        if byte == RETURN:
+            behind = text[place + one] if place + one < stop else LINE_END
+            if behind not in (RETURN, LINE_END):
+                return place
+        elif byte not in (BLANK, TAB):
+            return place
+        place += one
+    return place

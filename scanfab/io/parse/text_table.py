@@ -106,7 +106,7 @@ def read_regular(table: TextTable, columns: Mapping[int, npt.NDArray[Any]]) -> b
         # polars sees an empty word behind such a line
         behind = file.readline().endswith(b" \n")
         parse = partial(_parse_piece, width=table.width, kinds=kinds, behind=behind, sign=" ")
-        for frame in _parsed(file, table.start, table.stop, parse):
+        for frame in _parsed(file, table.start, table.stop, parse, PIECE):
             if frame is None or rows + frame.height > table.count:
                 return False
             for place, column in columns.items():
@@ -135,25 +135,31 @@ def read_to_end(
         if free_memory() < ROOM + NUMBERS * (stop - start):
             return None
         file.seek(start)
-        parse = _how_to_parse(file.readline(), separator, whole)
-        frames = None if parse is None else _all_of(_parsed(file, start, stop, parse))
+        way = _way_to_parse(file.readline(), separator, whole)
+        frames = None if way is None else _all_of(_parsed(file, start, stop, *way))
     return None if frames is None else _columns_of(frames)
 
 
-def _how_to_parse(
+def _way_to_parse(
     line: bytes, separator: str | None, whole: Collection[int]
-) -> Callable[[bytes], Any] | None:
-    """What makes data frames of pieces of a text, by its first line; None if it is not regular."""
+) -> tuple[Callable[[bytes], Any], int] | None:
+    """
+    What makes data frames of pieces of a text, by its first line, and how many bytes one has.
+
+    None if the line is not regular.
+    """
     sign = _sign(line) if separator is None else separator
     words = line.rstrip(b"\r\n").removesuffix(sign.encode()).split(sign.encode())
     if all(words):
         behind = line.endswith(f"{sign}\n".encode())
         kinds = _kinds(range(len(words)), whole)
-        return partial(_parse_piece, width=len(words), kinds=kinds, behind=behind, sign=sign)
+        parse = partial(_parse_piece, width=len(words), kinds=kinds, behind=behind, sign=sign)
+        return parse, PIECE
     width = len(line.split())
     if not sign.isspace() or width == 0:
         return None
-    return partial(_parse_squeezed, width=width, kinds=_kinds(range(width), whole))
+    # two copies more of each are under way, and larger ones would not find their memory again
+    return partial(_parse_squeezed, width=width, kinds=_kinds(range(width), whole)), PIECE // 2
 
 
 def parse_columns(
@@ -295,9 +301,11 @@ def _put(parts: Sequence[Any], column: npt.NDArray[Any]) -> None:
         start += len(part)
 
 
-def _parsed(file: IO[bytes], start: int, stop: int, parse: Callable[[bytes], Any]) -> Iterator[Any]:
+def _parsed(
+    file: IO[bytes], start: int, stop: int, parse: Callable[[bytes], Any], size: int
+) -> Iterator[Any]:
     """The data frames of a table's pieces, in their order; None for one that is not regular."""
-    pieces, lock = list(_pieces(file, start, stop)), Lock()
+    pieces, lock = list(_pieces(file, start, stop, size)), Lock()
 
     def parse_piece(begin: int, end: int) -> Any:
         with lock:
@@ -309,10 +317,10 @@ def _parsed(file: IO[bytes], start: int, stop: int, parse: Callable[[bytes], Any
         yield from in_order(pool, (partial(parse_piece, *piece) for piece in pieces), 2 * WORKERS)
 
 
-def _pieces(file: IO[bytes], start: int, stop: int) -> Iterator[tuple[int, int]]:
+def _pieces(file: IO[bytes], start: int, stop: int, size: int) -> Iterator[tuple[int, int]]:
     """First bytes, and those behind the last, of parts of a table that are whole lines."""
     while start < stop:
-        place = file.seek(start + PIECE)
+        place = file.seek(start + size)
         end = min(place + len(file.readline()), stop)
         yield start, end
         start = end
