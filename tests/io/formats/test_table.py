@@ -13,7 +13,7 @@ import pytest
 
 import scanfab
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
-from scanfab.io.formats import proof, table, table_files
+from scanfab.io.formats import table, table_files
 from scanfab.io.parse import text_table
 from scanfab.io.registry import reader_for
 from tests.helpers.dumps import dump_text, pairs_text, write
@@ -148,19 +148,6 @@ def test_a_table_that_is_replaced_while_it_is_read_is_read_as_it_is_then(tmp_pat
 
     monkeypatch.setattr(table_files, "read_to_end", replaced)
     assert read(path).position.tolist() == [[1, 2, 3], [55, 66, 77]]
-
-
-@pytest.mark.parametrize("away", [0, 100])
-def test_a_large_packing_is_told_by_the_grains_around_its_middle(away):
-    place = np.indices((32, 32, 32)).reshape(3, -1).T.astype(float)
-    place = np.random.default_rng(2).permutation(place)
-    place[:away] += 1e9  # thrown out of the sample
-    radius = np.full(len(place), 0.5)
-    assert proof.touch(*place.T, radius)
-    assert not proof.touch(*place.T, 2 * radius)
-    assert not proof.touch(*place.T, 0.5 * radius)
-    assert not proof.touch(*place.T[[0, 1, 1]], radius)
-    assert not proof.touch(*np.random.default_rng(3).permuted(place, axis=0).T, radius / 2)
 
 
 def test_a_diameter_that_the_user_names_comes_before_a_radius_of_the_file(tmp_path):
