@@ -24,6 +24,7 @@ HEADER = re.compile(
     rb"Dimension\s+([23])[dD]\s+(.*)\Z",
     re.DOTALL,
 )
+BEGINNING = re.compile(rb"(?:\xef\xbb\xbf)?V\s")
 # centre, radius, id, tag, mass; first and last centre, velocity, force, shift through the box
 FIRST_WORDS = "x y z radius id tag mass x0 y0 z0 xo yo zo vx vy vz fx fy fz sx sy sz"
 BASIC = tuple(FIRST_WORDS.split())
@@ -54,7 +55,9 @@ class EsysReader:
 
     def recognises(self, path: Path) -> bool:
         """By the first words of a header."""
-        return HEADER.match(first_bytes(path, LONGEST)) is not None
+        # a header may be long, but few files begin as one does
+        begins = BEGINNING.match(first_bytes(path)) is not None
+        return begins and HEADER.match(first_bytes(path, LONGEST)) is not None
 
     def kind(self, path: Path) -> FileKind:
         """Headers list the files of a frame."""
