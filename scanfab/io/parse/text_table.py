@@ -276,7 +276,10 @@ def _width(frames: Frames) -> int:
 
 
 def _columns_of(frames: Frames) -> list[npt.NDArray[Any]]:
-    return [as_array([frame[f"{k}"] for frame in frames]) for k in range(_width(frames))]
+    # out of the frames, so that their memory serves the next column
+    return [
+        as_array([frame.drop_in_place(f"{k}") for frame in frames]) for k in range(_width(frames))
+    ]
 
 
 def _stacked(frames: Frames, places: Sequence[int]) -> npt.NDArray[np.float64]:
