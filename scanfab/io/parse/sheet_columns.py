@@ -25,6 +25,8 @@ Arrays = dict[int, npt.NDArray[Any]]
 
 # how compressed files begin that are text at their first byte: polars would unpack them
 LIKE_PACKED = (b"x\x01", b"x^", b"x\x9c", b"x\xda", b"(\xb5")
+# at the beginning of a row, where it may be the heading of another table
+COMMENT = r"^\s*(#|%|//|!)"
 EMPTY_LINE = re.compile(rb"\n[ \t\r]*(?=\n)|\n[ \t]*(?:#|%|//|!)|\A[ \t\r]*\n")
 LONGEST_WORD = 60
 WITH_COMMA = r"^[-+0-9.eEdD\s]*,[-+0-9.,eEdD\s]*$"
@@ -139,7 +141,11 @@ def _parsed(
 def _regular(
     body: bytes, layout: Layout, numbers: Collection[int], whole: Collection[int], skip: int = 0
 ) -> Arrays | None:
-    """The columns as polars reads them; None unless all rows surely have all words."""
+    """
+    The columns as polars reads them; None unless all rows surely have all words.
+
+    Words of columns that need not be numbers may be empty, as behind a separator at the end.
+    """
     import polars
 
     schema = {
@@ -154,18 +160,37 @@ def _regular(
     if not all(layout.are_numbers) and b'"' in body:
         return None
     frame = _parsed(body, layout.separator, schema, has_quotes=False, skip=skip)
-    # a row with too many words is an error of polars, one with too few has empty ones at its end
-    if frame is None or frame.height == 0 or any(frame.null_count().row(0)):
+    if frame is None or frame.height == 0:
+        return None
+    if not layout.are_numbers[0] and frame["0"].str.contains(COMMENT).any():
+        return None
+    gaps = {place for place, count in enumerate(frame.null_count().row(0)) if count}
+    # what has nothing in its first column may be a row of tabs
+    if gaps and not (
+        gaps.isdisjoint([0, *numbers, *whole]) and _has_all_signs(body, layout, frame)
+    ):
         return None
     found = {place: _as_array(frame[f"{place}"]) for place in range(layout.width)}
     return None if any(found[place].dtype.kind not in "if" for place in numbers) else found
+
+
+def _has_all_signs(body: bytes, layout: Layout, frame: Any) -> bool:
+    """
+    Whether gaps of a data frame are empty words between two signs, and no row lacks a word.
+
+    Of too many words in a row polars makes an error.
+    """
+    if layout.separator == " " or not all(layout.are_numbers):
+        return False
+    signs = body.count(layout.separator.encode(), layout.start)
+    return bool(signs == frame.height * (layout.width - 1))
 
 
 def _as_array(series: Any) -> npt.NDArray[Any]:
     """Numbers with NaN for what is empty; text."""
     if series.dtype.is_numeric():
         return as_array([series])
-    return np.array(series.fill_null("").to_list(), dtype=np.str_)
+    return np.array(series.fill_null("").str.strip_chars().to_list(), dtype=np.str_)
 
 
 def _word_by_word(

@@ -150,8 +150,10 @@ def _way_to_parse(
     """
     sign = _sign(line) if separator is None else separator
     words = line.rstrip(b"\r\n").removesuffix(sign.encode()).split(sign.encode())
+    behind = line.endswith(f"{sign}\n".encode())
+    if behind and separator not in (None, " "):
+        return None  # an empty word is a column, which another row may lack
     if all(words):
-        behind = line.endswith(f"{sign}\n".encode())
         kinds = _kinds(range(len(words)), whole)
         parse = partial(_parse_piece, width=len(words), kinds=kinds, behind=behind, sign=sign)
         return parse, PIECE

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from scanfab.base.errors import ReadError
+from scanfab.io.parse import sheet_columns
 from scanfab.io.parse.kernels import single_blanks
 from scanfab.io.parse.sheet_columns import read_columns
 from scanfab.io.parse.sheet_layout import SAMPLE, layout_of, read_text
@@ -190,6 +191,46 @@ def test_blanks_are_made_single(text):
     # returns stand at the end of a line, or no parser takes them for blanks
     assert (size < 0) == bool(re.search(r"[\v\0]|\r(?![\r\n]|\Z)", text))
     assert size < 0 or out[:size].tobytes() == squeezed(text.encode())
+
+
+def outcome(text, numbers, whole):
+    try:
+        _, found = read(text, numbers=numbers, whole=whole)
+    except ReadError as error:
+        return str(error)
+    return {place: (str(values.dtype), str(values.tolist())) for place, values in found.items()}
+
+
+# most are numbers, or nothing
+WORDS = ["", "1", "2.5", "-3e2", "nan"] * 5 + [" 4", "x", "1,5", "1d3", '"6"', "7\r", "#", "8 "]
+
+
+@settings(max_examples=400, deadline=None, derandomize=True)
+@given(
+    rows=st.lists(st.lists(st.sampled_from(WORDS), min_size=4, max_size=5), max_size=5),
+    separator=st.sampled_from([",", ";", "\t", " "]),
+    end=st.sampled_from(["\n", "\n", "\r\n", "\n\n"]),
+    whole=st.sampled_from([(), (), (0,)]),
+    numbers=st.sampled_from([(), (0,), (0, 1, 2)]),
+    has_end=st.booleans(),
+)
+def test_gaps_are_the_same_by_polars_and_word_by_word(
+    rows, separator, end, whole, numbers, has_end
+):
+    sound = [["1", "2.5", "3", "4", "", ""][: 4 + has_end]] * 2
+    text = "".join(separator.join(row) + end for row in [*sound, *rows])
+    quick = outcome(text, numbers, whole)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sheet_columns, "_regular", lambda *given, **named: None)
+        assert quick == outcome(text, numbers, whole)
+
+
+def test_a_long_table_with_an_empty_word_at_each_end_is_read_by_polars(monkeypatch):
+    monkeypatch.setattr(sheet_columns, "_word_by_word", None)
+    layout, found = read("id,x,y,radius,\n" + "1,0.5,2.5,3,\n" * 50)
+    assert layout.names == ("id", "x", "y", "radius", "")
+    assert found[3].tolist() == [3.0] * 50
+    assert np.isnan(found[4]).all()
 
 
 def test_blanks_are_made_single_without_the_compiler():
