@@ -7,8 +7,9 @@ The grains must touch, and forces push them apart.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from scanfab.base.errors import ScanfabNote, ScanfabWarning
 from scanfab.base.lengths import LEAST, MOST, all_within
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.io.reader import GrainTable
+
+if TYPE_CHECKING:
+    from scipy.spatial import KDTree
 
 __all__ = ["TOO_FEW", "proved_force", "row_base", "tell_left_out", "touch"]
 
@@ -32,12 +36,10 @@ OVERLAP = 0.75
 # of the grains, which touch another at least, and which overlap another at most
 MOST_TOUCH = 0.5
 FEW_OVERLAP = 0.01
-# a part of them comes first, which tells it of nearly all packings: where so many of it touch, and
-# none overlaps
+# every so many of those that are looked at come first, and tell it where so many of them touch, and
+# none overlaps: the others can then hardly say anything else
 PART = 4
 CLEARLY_MOST = 0.6
-# grains that tell where the middle is
-SAMPLE = 2000
 # grains that are looked at together, for which the processor's own memory is enough
 BLOCK = 1 << 16
 # of the contacts, which speak for a sign, or for the number of the first row
@@ -59,13 +61,26 @@ def touch(x: FloatArray, y: FloatArray, z: FloatArray, radius: FloatArray) -> bo
     >>> [touch(*row, np.full(20, radius)) for radius in (0.5, 1.0, 0.25)]
     [True, False, False]
     """
+    from scipy.spatial import KDTree
+
     are_lengths = all(all_within(one, -MOST, MOST) for one in (x, y, z))
     if len(radius) < TOO_FEW or not are_lengths or not all_within(radius, LEAST, MOST):
         return False
-    nearest = _nearest((x, y, z), radius, AROUND // PART, LOOKED_AT // PART)
-    if np.mean(_is_contact(nearest)) >= CLEARLY_MOST and not np.any(nearest < OVERLAP):
-        return True
-    nearest = _nearest((x, y, z), radius, AROUND, LOOKED_AT)
+    rows, inner = _around_middle(x, y, z)
+    radius = radius[rows]
+    # a tree for few questions
+    tree = KDTree(
+        np.column_stack([one[rows] for one in (x, y, z)]),
+        leafsize=32,
+        compact_nodes=False,
+        balanced_tree=False,
+    )
+    chosen = _spread(inner)
+    if len(chosen) == LOOKED_AT:
+        nearest = _nearest(tree, radius, chosen[::PART])
+        if np.mean(_is_contact(nearest)) >= CLEARLY_MOST and not np.any(nearest < OVERLAP):
+            return True
+    nearest = _nearest(tree, radius, chosen)
     touching, overlapping = np.mean(_is_contact(nearest)), np.mean(nearest < OVERLAP)
     return bool(touching >= MOST_TOUCH and overlapping <= FEW_OVERLAP)
 
@@ -74,18 +89,22 @@ def _is_contact(ratio: FloatArray) -> BoolArray:
     return np.abs(ratio - 1.0) < CONTACT
 
 
-def _nearest(
-    coordinates: Sequence[FloatArray], radius: FloatArray, around: int, looked_at: int
-) -> FloatArray:
-    """The least distance of a neighbour of each of some grains near the middle, in r1 + r2."""
-    from scipy.spatial import KDTree
+def _spread(count: int) -> IntArray:
+    """
+    Some of so many rows, one of each part: all if these are few.
 
-    rows, inner = _around_middle(coordinates, around)
-    position, radius = np.column_stack([one[rows] for one in coordinates]), radius[rows]
-    chosen = np.linspace(0, inner - 1, min(looked_at, inner)).astype(np.int64)
-    # a tree for few questions
-    tree = KDTree(position, leafsize=32, compact_nodes=False, balanced_tree=False)
-    distance, other = tree.query(position[chosen], k=min(NEIGHBOURS, len(radius) - 1) + 1)
+    Which of a part is random: every so many of grains in rows may be the same place of each row.
+    """
+    if count <= LOOKED_AT:
+        return np.arange(count)
+    within = np.random.default_rng(0).random(LOOKED_AT)
+    places: IntArray = ((np.arange(LOOKED_AT) + within) * (count / LOOKED_AT)).astype(np.int64)
+    return places
+
+
+def _nearest(tree: KDTree, radius: FloatArray, chosen: IntArray) -> FloatArray:
+    """The least distance of a neighbour of each of some grains, in r1 + r2."""
+    distance, other = tree.query(tree.data[chosen], k=min(NEIGHBOURS, len(radius) - 1) + 1)
     with np.errstate(over="ignore"):
         ratio = distance / (radius[chosen, None] + radius[other])
     ratio[other == chosen[:, None]] = np.inf
@@ -93,17 +112,16 @@ def _nearest(
     return least
 
 
-def _around_middle(coordinates: Sequence[FloatArray], around: int) -> tuple[IntArray | slice, int]:
+def _around_middle(*coordinates: FloatArray) -> tuple[IntArray | slice, int]:
     """
-    So many grains around the middle, and how many of them have all neighbours here.
+    Grains by which a packing of any size is told, and how many of them have all neighbours here.
 
     The latter come first.
     """
     count = len(coordinates[0])
-    if count <= around:
+    if count <= AROUND:
         return slice(None), count
-    # at random: every so many of grains in rows would be the same part of each row
-    some = np.random.default_rng(0).integers(0, count, SAMPLE)
+    some = _spread(count)
     middle = [np.median(one[some]) for one in coordinates]
 
     def away(rows: IntArray | slice) -> FloatArray:
@@ -115,17 +133,17 @@ def _around_middle(coordinates: Sequence[FloatArray], around: int) -> tuple[IntA
         return x
 
     # those that may be among them, by the sample: sorting all would take most of the time
-    reach = np.quantile(away(some), min(2 * around / count, 1.0))
+    reach = np.quantile(away(some), min(2 * AROUND / count, 1.0))
     near = np.concatenate(
         [
             start + np.flatnonzero(away(slice(start, start + BLOCK)) <= reach)
             for start in range(0, count, BLOCK)
         ]
     )
-    if len(near) < around:
+    if len(near) < AROUND:
         near = np.arange(count)
-    first = np.argpartition(away(near), (around // 2, around - 1))[:around]
-    return near[first], around // 2
+    first = np.argpartition(away(near), (AROUND // 2, AROUND - 1))[:AROUND]
+    return near[first], AROUND // 2
 
 
 @np.errstate(over="ignore", invalid="ignore")

@@ -46,3 +46,45 @@ def test_most_grains_touch_another_in_loose_packings(edge, share, are_told):
     is_small = np.random.default_rng(4).random((edge, edge)) < share
     radius[is_small[tuple(place[:, 1:].astype(int).T)]] = 0.2
     assert proof.touch(*place.T, radius) == are_told
+
+
+def block(*edges: int) -> np.ndarray:
+    """Centres of grains of diameter 1 that touch, row by row."""
+    return np.indices(edges).reshape(len(edges), -1).T.astype(float)
+
+
+def test_frames_one_below_the_other_are_no_packing():
+    # a column that is filled: only its lower part lies in that of the early frame
+    late = block(12, 12, 70)
+    both = np.vstack([late[late[:, 2] < 17], late + np.array([0.3, 0.3, 0])])
+    assert not proof.touch(*both.T, np.full(len(both), 0.5))
+
+
+def test_grains_that_two_workers_wrote_are_seen():
+    whole = block(80, 12, 12)
+    parts = [
+        (whole[:, 0] >= a - 1) & (whole[:, 0] < b + 1) for a, b in ((0, 26), (26, 54), (54, 80))
+    ]
+    ghosts = np.vstack([whole[part] for part in parts])
+    assert not proof.touch(*ghosts.T, np.full(len(ghosts), 0.5))
+
+
+@pytest.mark.parametrize("count", [1498, 1999 * 3 + 1, 40_001])
+def test_a_regular_order_of_grains_hides_none(count):
+    # in threes: one of a chain of grains that touch, and two that lie in others
+    place = np.zeros((count, 3))
+    kind = np.arange(count) % 3
+    place[:, 0] = np.arange(count) // 3
+    place[:, 1] = np.where(kind > 0, 9, 0)
+    place[:, 2] = 0.5 * kind
+    assert not proof.touch(*place.T, np.full(count, 0.5))
+
+
+@pytest.mark.parametrize("share", [0.5, 0.51])
+def test_the_middle_of_a_bed_below_a_gas_is_that_of_the_bed(share):
+    count = int(60_000 * share)
+    bed = block(40, 40, 40)
+    bed = bed[np.argsort(bed[:, 2], kind="stable")][:count]
+    gas = np.random.default_rng(0).random((60_000 - count, 3)) * [40, 40, 400] + [0, 0, 100]
+    place = np.vstack([bed, gas])
+    assert proof.touch(*place.T, np.full(len(place), 0.5))
