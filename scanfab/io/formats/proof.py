@@ -36,7 +36,7 @@ OVERLAP = 0.75
 # of the grains, which touch another at least, and which overlap another at most
 MOST_TOUCH = 0.5
 FEW_OVERLAP = 0.01
-# every so many of those that are looked at come first, and tell it where so many of them touch, and
+# this part of those that are looked at comes first, and tells it where so many of it touch, and
 # none overlaps: the others can then hardly say anything else
 PART = 4
 CLEARLY_MOST = 0.6
@@ -77,7 +77,9 @@ def touch(x: FloatArray, y: FloatArray, z: FloatArray, radius: FloatArray) -> bo
     )
     chosen = _spread(inner)
     if len(chosen) == LOOKED_AT:
-        nearest = _nearest(tree, radius, chosen[::PART])
+        # at random again: rows may be in any regular order
+        first = np.random.default_rng(1).choice(chosen, LOOKED_AT // PART, replace=False)
+        nearest = _nearest(tree, radius, first)
         if np.mean(_is_contact(nearest)) >= CLEARLY_MOST and not np.any(nearest < OVERLAP):
             return True
     nearest = _nearest(tree, radius, chosen)

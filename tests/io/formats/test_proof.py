@@ -80,6 +80,15 @@ def test_a_regular_order_of_grains_hides_none(count):
     assert not proof.touch(*place.T, np.full(count, 0.5))
 
 
+@pytest.mark.parametrize("period", [4, 8, 12, 20, 40])
+def test_a_part_of_each_row_that_lies_in_itself_is_seen(period):
+    # as many rows as are looked at first: the beginning of each may not stand for all of it
+    place = block(25, 20, period)[:, ::-1].copy()
+    far = place[:, 0] >= period // 4
+    place[far, 0] = period // 4 + 0.5 * (place[far, 0] - period // 4)
+    assert not proof.touch(*place.T, np.full(len(place), 0.5))
+
+
 @pytest.mark.parametrize("share", [0.5, 0.51])
 def test_the_middle_of_a_bed_below_a_gas_is_that_of_the_bed(share):
     count = int(60_000 * share)

@@ -202,7 +202,8 @@ def outcome(text, numbers, whole):
 
 
 # most are numbers, or nothing
-WORDS = ["", "1", "2.5", "-3e2", "nan"] * 5 + [" 4", "x", "1,5", "1d3", '"6"', "7\r", "#", "8 "]
+WORDS = ["", "1", "2.5", "-3e2", "nan"] * 5
+WORDS += [" 4", "x", "1,5", "1d3", '"6"', "7\r", "#", "8 ", "\t"]
 
 
 @settings(max_examples=400, deadline=None, derandomize=True)
@@ -213,16 +214,29 @@ WORDS = ["", "1", "2.5", "-3e2", "nan"] * 5 + [" 4", "x", "1,5", "1d3", '"6"', "
     whole=st.sampled_from([(), (), (0,)]),
     numbers=st.sampled_from([(), (0,), (0, 1, 2)]),
     has_end=st.booleans(),
+    cut=st.sampled_from([0, 0, 1, 2]),
 )
-def test_gaps_are_the_same_by_polars_and_word_by_word(
-    rows, separator, end, whole, numbers, has_end
-):
+def test_gaps_are_the_same_word_by_word(rows, separator, end, whole, numbers, has_end, cut):
     sound = [["1", "2.5", "3", "4", "", ""][: 4 + has_end]] * 2
     text = "".join(separator.join(row) + end for row in [*sound, *rows])
+    text = text[: len(text) - cut]
     quick = outcome(text, numbers, whole)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sheet_columns, "_regular", lambda *given, **named: None)
         assert quick == outcome(text, numbers, whole)
+
+
+def test_a_word_more_at_the_end_does_not_hide_a_row_that_lacks_one():
+    rows = "1,0,1,0.5,7,\n" * 25 + "1,0,1,0.5,\n" + "2,0,7,3.0,0.5,7,"
+    with pytest.raises(ReadError, match="line 27: expected 6 columns, found 5"):
+        read("y,z,x,radius,a,\n" + rows)
+
+
+@pytest.mark.parametrize("separator", [",", ";"])
+def test_an_id_that_is_a_tab_is_none(separator):
+    rows = "id,x,y,radius\n\t,1,0,0.5\n2,2,0,0.5\n".replace(",", separator)
+    with pytest.raises(ReadError, match="line 2: expected a number in the column id"):
+        read(rows)
 
 
 def test_a_long_table_with_an_empty_word_at_each_end_is_read_by_polars(monkeypatch):
