@@ -184,7 +184,7 @@ def layout_of(path: Path, data: bytes, skip: int) -> Layout:
     if names is not None:
         names = _checked_names(path, names, rows, lines[0][0])
     kinds = tuple(
-        all(not word or _is_value(word, has_commas) for word in column)
+        all(not word.strip() or _is_value(word, has_commas) for word in column)
         for column in zip(*rows, strict=True)
     )
     return Layout(separator, has_commas, names, width, lines[0][0], lines[0][1], kinds)
