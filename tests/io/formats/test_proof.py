@@ -8,16 +8,19 @@ import pytest
 from scanfab.io.formats import proof
 
 
+def block(*edges: int) -> np.ndarray:
+    """Centres of grains of diameter 1 that touch, row by row."""
+    return np.indices(edges).reshape(len(edges), -1).T.astype(float)
+
+
 def lattice(edge: int) -> np.ndarray:
-    """Centres of grains of diameter 1 that touch, in no order."""
-    place = np.indices((edge, edge, edge)).reshape(3, -1).T.astype(float)
-    return np.random.default_rng(2).permutation(place)
+    """The same of a cube, in no order."""
+    return np.random.default_rng(2).permutation(block(edge, edge, edge))
 
 
 @pytest.mark.parametrize("away", [0, 100])
 def test_a_large_packing_is_told_by_the_grains_around_its_middle(away):
-    place = np.indices((32, 32, 32)).reshape(3, -1).T.astype(float)
-    place = np.random.default_rng(2).permutation(place)
+    place = lattice(32)
     place[:away] += 1e9  # thrown out of the sample
     radius = np.full(len(place), 0.5)
     assert proof.touch(*place.T, radius)
@@ -46,11 +49,6 @@ def test_most_grains_touch_another_in_loose_packings(edge, share, are_told):
     is_small = np.random.default_rng(4).random((edge, edge)) < share
     radius[is_small[tuple(place[:, 1:].astype(int).T)]] = 0.2
     assert proof.touch(*place.T, radius) == are_told
-
-
-def block(*edges: int) -> np.ndarray:
-    """Centres of grains of diameter 1 that touch, row by row."""
-    return np.indices(edges).reshape(len(edges), -1).T.astype(float)
 
 
 def test_frames_one_below_the_other_are_no_packing():
