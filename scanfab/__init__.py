@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from scanfab.io.opening import read, read_series
     from scanfab.io.series import Series
     from scanfab.packing.cell import Cell
-    from scanfab.packing.packing import ContactList, Contacts, Packing
+    from scanfab.packing.contacts import ContactList, Contacts
+    from scanfab.packing.packing import Packing
     from scanfab.packing.sample import Sample
     from scanfab.packing.search import find_contacts
     from scanfab.packing.window import Window
@@ -62,8 +63,8 @@ _HOME = {
     "Cell": "packing.cell",
     "Column": "base.column",
     "Comparison": "table.comparison_rows",
-    "ContactList": "packing.packing",
-    "Contacts": "packing.packing",
+    "ContactList": "packing.contacts",
+    "Contacts": "packing.contacts",
     "Convex": "base.convex",
     "DirectionRule": "scan.directions",
     "FabricTensor": "fabric.tensor",

@@ -12,8 +12,6 @@ import numpy.typing as npt
 from scanfab.base.errors import PackingError
 from scanfab.base.typing import IntArray
 
-__all__ = ["cast", "concatenated", "doubles", "grains_named"]
-
 Arrays = TypeVar("Arrays")
 """A dataclass all of whose fields are arrays."""
 

@@ -21,21 +21,6 @@ import numpy as np
 
 from scanfab.base.typing import FloatArray
 
-__all__ = [
-    "BALL",
-    "BLOCK",
-    "COLUMN",
-    "DISC",
-    "SQUARE",
-    "Ball",
-    "Block",
-    "Body",
-    "Column",
-    "Disc",
-    "Hull",
-    "Square",
-]
-
 # of a curved surface that is to be looked at
 POINTS, POINTS_OF_A_RIM = 2000, 128
 # of a hull: planes that cut lines, all directions together, and the lines along each direction

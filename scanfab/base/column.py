@@ -10,16 +10,6 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 from scanfab.base.errors import ScanfabError
 
-__all__ = [
-    "ALL_DIGITS",
-    "DEFAULT_DIGITS",
-    "LENGTH",
-    "Column",
-    "NoColumnError",
-    "columns_of_fields",
-    "no_column",
-]
-
 ALL_DIGITS = 17
 """With so many significant digits every number that is written reads back the same."""
 DEFAULT_DIGITS = ALL_DIGITS

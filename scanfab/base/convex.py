@@ -12,8 +12,6 @@ from scanfab.base.bodies import BALL, DISC, SQUARE, Body
 from scanfab.base.option import number
 from scanfab.base.typing import BoolArray, FloatArray
 
-__all__ = ["EVERYWHERE", "Convex", "Quadric", "image_of", "sphere"]
-
 # steps towards the nearest place of a region, and what of a distance is rounding
 STEPS, ROUNDING = 200, 1e-12
 # directions over which a shadow is averaged, for plans

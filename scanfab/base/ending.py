@@ -8,8 +8,6 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
-__all__ = ["at_end", "finish", "undone_at_end"]
-
 Step = Callable[[], object]
 _steps: list[Step] = []
 

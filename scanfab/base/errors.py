@@ -2,19 +2,6 @@
 
 from __future__ import annotations
 
-__all__ = [
-    "DimensionError",
-    "NoFrameError",
-    "PackingError",
-    "ReadError",
-    "ScanfabError",
-    "ScanfabNote",
-    "ScanfabWarning",
-    "SettingsError",
-    "SkippedFrameWarning",
-    "UnknownFormatError",
-]
-
 
 class ScanfabError(Exception):
     """Base of all errors that scanfab raises on purpose; the message is written for users."""

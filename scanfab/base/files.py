@@ -12,8 +12,6 @@ from pathlib import Path
 from scanfab.base.ending import undone_at_end
 from scanfab.base.errors import SettingsError
 
-__all__ = ["check_folder", "named_errors", "whole_file"]
-
 
 def check_folder(path: Path) -> None:
     """SettingsError if there is no folder that a file of this name can be written to."""

@@ -11,8 +11,6 @@ from llvmlite.binding import get_host_cpu_name
 
 from scanfab.base.kernel_cache import KernelCache
 
-__all__ = ["LANES", "ONE", "REORDERED", "ZERO", "Flag", "inner", "kernel"]
-
 # numbers that the compiler's vector instructions take at a time: 256 bits of them, also on
 # processors that have wider ones, but for these
 LANES = 8 if get_host_cpu_name() in ("znver4", "znver5") else 4

@@ -12,8 +12,6 @@ from pathlib import Path
 
 from scanfab.base.ending import undone_at_end
 
-__all__ = ["is_private", "make_private", "read_kept", "user_folder", "write_kept"]
-
 CHECKSUM = 32
 
 

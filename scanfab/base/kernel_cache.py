@@ -24,8 +24,6 @@ from numba.core.serialize import dumps
 from scanfab.base.kept_files import read_kept, write_kept
 from scanfab.base.kernel_folder import kernel_folder
 
-__all__ = ["KernelCache", "when_compiling"]
-
 
 class KernelCache(NullCache):
     """What Numba asks for the compiled forms of one function, and gives them to."""

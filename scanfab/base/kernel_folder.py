@@ -13,8 +13,6 @@ import numba
 
 from scanfab.base.kept_files import is_private, make_private, user_folder
 
-__all__ = ["Folder", "kernel_folder"]
-
 # bytes that compiled kernels need at most
 ROOM = 16 << 20
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["LEAST", "MOST", "all_within"]
-
 # the cubes of these are still numbers
 LEAST, MOST = 1e-100, 1e100
 

@@ -12,8 +12,6 @@ from typing import IO
 from scanfab.base.errors import ScanfabError
 from scanfab.base.files import named_errors
 
-__all__ = ["locked"]
-
 # on Windows nobody can read what is locked: a byte that no table is long enough to have
 FAR = 1 << 40
 

@@ -6,8 +6,6 @@ import re
 import sys
 from pathlib import Path
 
-__all__ = ["address_space", "free_memory"]
-
 GROUP = Path("/sys/fs/cgroup")
 
 

@@ -8,8 +8,6 @@ from dataclasses import dataclass, replace
 
 from scanfab.base.errors import ScanfabWarning, SkippedFrameWarning
 
-__all__ = ["SKIPPED", "Note", "joined", "tell"]
-
 SKIPPED = "skipped"
 """The code of a frame that was left out because it could not be read."""
 

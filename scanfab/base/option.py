@@ -13,23 +13,6 @@ from typing import Any, ParamSpec, TypeVar
 
 from scanfab.base.errors import SettingsError
 
-__all__ = [
-    "GROUPS",
-    "Option",
-    "as_given",
-    "changed",
-    "flag_of",
-    "number",
-    "one_of",
-    "option",
-    "optional",
-    "options_of",
-    "refuse_unknown",
-    "takes_options",
-    "unusable",
-    "whole",
-]
-
 Parse = Callable[[str, Any], Any]
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -9,8 +9,6 @@ from typing import Any, NamedTuple
 
 from scanfab.base.errors import ScanfabError, ScanfabWarning
 
-__all__ = ["Offer", "having", "load_offers", "load_plugins"]
-
 
 class Offer(NamedTuple):
     """An object that a package offers."""

@@ -14,17 +14,6 @@ from scanfab.base.errors import SettingsError
 from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray, IntArray
 
-__all__ = [
-    "box",
-    "circle",
-    "cylinder",
-    "ellipse",
-    "ellipsoid",
-    "polyhedron",
-    "rectangle",
-    "turned_ellipse",
-]
-
 # Of the size of a surface, or of its distance from the origin, whichever is larger: what 4 bytes a
 # number, as STL has them, cannot tell apart.
 TOLERANCE = 1e-6

@@ -10,8 +10,6 @@ import numpy as np
 
 from scanfab.base.typing import FloatArray
 
-__all__ = ["SPACE", "Space"]
-
 
 @dataclass(frozen=True)
 class Space:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-__all__ = ["counted", "shortest", "spelt_apart", "spelt_place", "spelt_range", "spelt_time"]
-
 
 def counted(number: int, one: str, several: str = "") -> str:
     """

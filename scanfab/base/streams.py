@@ -8,8 +8,6 @@ from pathlib import Path
 
 from scanfab.base.errors import ReadError
 
-__all__ = ["check_file", "check_file_or_pipe", "kind_of"]
-
 KINDS = {
     stat.S_IFIFO: "a pipe",
     stat.S_IFSOCK: "a socket",

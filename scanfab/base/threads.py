@@ -9,8 +9,6 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any, Generic, Protocol, TypeVar
 
-__all__ = ["Spread", "in_order", "in_threads", "shared_in_order", "spread_over"]
-
 Part = TypeVar("Part")
 Result = TypeVar("Result")
 Job = TypeVar("Job")

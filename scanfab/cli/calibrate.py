@@ -30,7 +30,6 @@ from scanfab.pipeline.options import as_options
 if TYPE_CHECKING:
     from scanfab.pipeline.calibration_ladders import StepRow
 
-__all__ = ["calibrate"]
 
 # what compute has no use for, or what is recommended instead
 OWN = (

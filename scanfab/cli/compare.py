@@ -9,8 +9,6 @@ import click
 from scanfab.cli.options import EXCERPT, OF_SEVERAL, check_plot, options, usage_errors
 from scanfab.cli.talk import talk_options
 
-__all__ = ["compare"]
-
 
 @click.command()
 @click.argument(

@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from scanfab.table.comparison_rows import Comparison
     from scanfab.table.row import Row
 
-__all__ = ["print_comparison"]
 
 BARS = " ▁▂▃▄▅▆▇█"
 LONGEST_BARS = 30

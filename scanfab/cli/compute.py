@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from scanfab.io.series import Series
     from scanfab.pipeline.job import Job
 
-__all__ = ["OF_THE_LINE", "compute"]
 
 # of data that there are figures of
 KINDS = ("table", "frames")

@@ -18,16 +18,8 @@ from scanfab.cli.tables import Column, print_columns, spelt
 from scanfab.cli.talk import Level, level
 from scanfab.pipeline.options import as_options
 from scanfab.pipeline.told import Told
-from scanfab.table.table import Row
+from scanfab.table.row import Row
 from scanfab.table.writing import Excerpt
-
-__all__ = [
-    "announce_compiling",
-    "is_readable",
-    "print_csv",
-    "print_table",
-    "reported_warnings",
-]
 
 # titles of the columns that a terminal always shows, and of those for which there may be room, the
 # most telling first

@@ -12,8 +12,6 @@ from scanfab.cli.settings_file import fill_from_file
 from scanfab.cli.sources import SourceCommand, open_series, reading_arguments
 from scanfab.cli.talk import talk_options, tell_inputs, working
 
-__all__ = ["convert"]
-
 
 def _complete(ctx: click.Context, parameter: click.Parameter, text: str) -> list[CompletionItem]:
     """The names of the formats."""

@@ -6,8 +6,6 @@ from typing import Any
 
 import click
 
-__all__ = ["formats"]
-
 
 @click.command()
 def formats() -> None:

@@ -7,8 +7,6 @@ from importlib import import_module
 
 import click
 
-__all__ = ["COMMANDS", "cli"]
-
 # one module a command, imported only when the command runs: --help stays fast
 COMMANDS = {
     "compute": "the fabric table: one row per frame and variant",

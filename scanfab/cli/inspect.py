@@ -18,8 +18,6 @@ from scanfab.pipeline.options import as_options
 if TYPE_CHECKING:
     from scanfab.pipeline.inspection import FrameReport
 
-__all__ = ["inspect"]
-
 
 @click.command(cls=SourceCommand)
 @sources_argument

@@ -9,8 +9,6 @@ from __future__ import annotations
 import signal
 import sys
 
-__all__ = ["main", "run"]
-
 # bytes of addresses: with fewer left, whatever fails does so for them
 LITTLE = 200_000_000
 # bars of a curve become those that a keyboard has

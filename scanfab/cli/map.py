@@ -15,7 +15,6 @@ from scanfab.pipeline.options import MAP_OPTIONS
 if TYPE_CHECKING:
     from scanfab.pipeline.job import Job
 
-__all__ = ["map"]
 
 # in the order of the help
 ORDER = ("output", "sample", "reading", "window", "scan", "fabric")

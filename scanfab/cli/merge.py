@@ -9,8 +9,6 @@ import click
 from scanfab.cli.options import options, usage_errors
 from scanfab.cli.talk import talk_options
 
-__all__ = ["merge"]
-
 
 @click.command()
 @click.argument(

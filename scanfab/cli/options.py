@@ -15,23 +15,6 @@ from click.shell_completion import CompletionItem
 from scanfab.base.option import GROUPS, Option
 from scanfab.pipeline.options import DECLARED, as_options
 
-__all__ = [
-    "AS_CSV",
-    "EXCERPT",
-    "OF_SEVERAL",
-    "READING",
-    "SAMPLE",
-    "WINDOW",
-    "GroupedOption",
-    "SourceType",
-    "check_plot",
-    "click_option",
-    "options",
-    "sources_argument",
-    "usage_errors",
-    "write_groups",
-]
-
 Command = Callable[..., Any]
 Completion = Callable[[click.Context, click.Parameter, str], list[CompletionItem]]
 

@@ -9,8 +9,6 @@ import click
 from scanfab.cli.options import OF_SEVERAL, options, usage_errors
 from scanfab.cli.talk import talk_options, working
 
-__all__ = ["report"]
-
 
 @click.command()
 @click.argument(

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from scanfab.table.result_file import ResultFile
     from scanfab.table.writing import Excerpt
 
-__all__ = ["finished_job"]
-
 
 def finished_job(
     ctx: click.Context,

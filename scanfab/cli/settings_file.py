@@ -14,8 +14,6 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-__all__ = ["SettingsFile", "fill_from_file", "read_settings_file"]
-
 SECTION = "compute"
 
 
@@ -86,7 +84,7 @@ def fill_from_file(
 
 def _path_beside(sources: tuple[str, ...]) -> Path | None:
     """The settings file beside the dumps; a usage error if the sources have different ones."""
-    from scanfab.io.opening import SETTINGS_FILE
+    from scanfab.io.families import SETTINGS_FILE
 
     folders = {Path(s) if Path(s).is_dir() else Path(s).parent for s in sources if s != "-"}
     found = [folder / SETTINGS_FILE for folder in sorted(folders)]

@@ -11,16 +11,6 @@ from types import FrameType
 
 from scanfab.base.ending import finish
 
-__all__ = [
-    "catch_signals",
-    "ending_in_order",
-    "flush_streams",
-    "ignore_signals",
-    "interrupted_words",
-    "leave_at_once",
-    "telling",
-]
-
 ENDED: dict[int, str] = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 # clear the line of progress, and show the cursor that it hides
 PLAIN_LINE = "\r\x1b[2K\x1b[?25h"

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from scanfab.io.following import FollowedSeries
     from scanfab.io.series import Series
 
-__all__ = ["SourceCommand", "follow_one", "open_series", "reading_arguments"]
 
 # numbers that may stand apart behind an option, as users write them
 COUNTS = {"--cell": (3, 6), "--rv-center": (3,), "--rv-size": (2, 3)}

@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-__all__ = ["GAP", "Column", "print_columns", "spelt", "width_of"]
-
 # characters between columns
 GAP = 2
 

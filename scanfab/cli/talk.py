@@ -18,7 +18,6 @@ from scanfab.base.spelling import spelt_time
 if TYPE_CHECKING:
     from scanfab.io.series import Series
 
-__all__ = ["Level", "level", "talk_options", "tell_inputs", "working"]
 
 # where standard error is no terminal there is a line of progress after so many seconds
 EVERY = 60.0

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from scanfab.io.series import Series
     from scanfab.pipeline.settings import Settings
 
-__all__ = ["view"]
 
 # letters of the source in a title, which has frame and strain behind it
 LONGEST_SOURCE = 60

@@ -15,8 +15,6 @@ import numpy as np
 from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.fabric.tensor import COMPONENTS
 
-__all__ = ["BlockFabrics", "WithoutParts", "jackknife_errors", "ratio_jackknife"]
-
 # of the replicates' axes without a segment: with more the filled ones would look isotropic
 MOST_FILLED = 0.05
 # parts of a block without which there is no telling how much they differ

@@ -19,8 +19,6 @@ from scanfab.fabric.tensor import FabricTensor, tensor_columns, tensor_values
 if TYPE_CHECKING:
     from scanfab.fabric.measured import Measured
 
-__all__ = ["Contact", "axial_error", "contact_fabric"]
-
 
 def contact_fabric(normals: npt.ArrayLike, space: Space = SPACE) -> FabricTensor | None:
     """

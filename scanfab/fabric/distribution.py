@@ -19,16 +19,6 @@ from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.directions import direction_rule
 
-__all__ = [
-    "EvenFunction",
-    "direction_points",
-    "fit_even",
-    "harmonics_of",
-    "mean_length_function",
-    "sphere_points",
-]
-
-
 HIGHEST_DEGREE = 6
 # around a circle
 POINTS = 180

@@ -34,15 +34,6 @@ from scanfab.fabric.tensor import COMPONENTS, FabricTensor
 if TYPE_CHECKING:
     from scanfab.fabric.measured import Measured
 
-__all__ = [
-    "ContactForces",
-    "DirectionalMean",
-    "Forces",
-    "branch_fabric",
-    "doubts_of_forces",
-    "normal_force_fabric",
-    "tangential_force_fabric",
-]
 
 # of a tangential to the mean normal force: what remains of it where only digits are left
 NO_FRICTION = 1e-4

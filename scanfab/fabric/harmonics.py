@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from scanfab.fabric.measured import Measured
     from scanfab.fabric.void import VoidFabric
 
-__all__ = ["Harmonics", "harmonic", "legendre", "tensor4"]
 
 ORDERS = (2, 4)
 

@@ -13,8 +13,6 @@ import numpy as np
 
 from scanfab.base.typing import FloatArray
 
-__all__ = ["Homogeneity", "homogeneity_of"]
-
 # blocks that a test is of
 FEWEST = 3
 

@@ -23,7 +23,6 @@ from scanfab.fabric.tensor import FabricTensor
 if TYPE_CHECKING:
     from scanfab.fabric.measured import Measured
 
-__all__ = ["Invariants", "fabric_deviator", "intensity"]
 
 # By dimension: components of a tensor's deviator, and the variance of each of n⊗n, of a unit vector
 # n that has any direction alike.

@@ -25,19 +25,6 @@ from scanfab.fabric.void import void_fabric
 if TYPE_CHECKING:
     from scanfab.fabric.measured import Measured
 
-__all__ = [
-    "BLOCKS",
-    "BlockedSums",
-    "Halves",
-    "Jackknife",
-    "Scatter",
-    "blocks_of",
-    "contact_jackknife",
-    "jackknife_error",
-    "variance_without_noise",
-    "void_jackknife",
-]
-
 
 # octants, and columns of the table; in a plane the first four, which are quadrants
 BLOCKS = 8

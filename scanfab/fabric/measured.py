@@ -14,8 +14,6 @@ from scanfab.fabric.state import SampleState
 from scanfab.fabric.tensor import FabricTensor
 from scanfab.fabric.void import VoidFabric, void_fabric
 
-__all__ = ["Measured"]
-
 
 @dataclass(frozen=True, eq=False)
 class Measured:

@@ -10,8 +10,6 @@ from scanfab.fabric.tensor import FabricTensor
 if TYPE_CHECKING:
     from scanfab.fabric.measured import Measured
 
-__all__ = ["Orientation"]
-
 
 def _axis_columns(prefix: str, what: str) -> tuple[Column, ...]:
     meaning = f"direction of the {what}'s largest principal value, a unit vector"

@@ -26,8 +26,6 @@ from scanfab.fabric.orientation import Orientation
 from scanfab.fabric.state import State
 from scanfab.fabric.void import Void
 
-__all__ = ["GROUPS", "OWN_FABRICS", "Fabric", "Measured", "checked_values", "load_fabrics"]
-
 GROUP = "scanfab.fabrics"
 
 

@@ -27,8 +27,6 @@ from scanfab.fabric.tensor import axial
 from scanfab.packing.near import NearPairs
 from scanfab.scan.directions import rule_of
 
-__all__ = ["LONGEST_GAP", "PREDICTED_ALPHA", "predicted_alpha"]
-
 # in smallest radii: for longer ones the surfaces are no parabolas
 LONGEST_GAP = 0.3
 # of the integral over all directions

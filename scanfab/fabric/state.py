@@ -27,7 +27,6 @@ from scanfab.fabric.tensor import COMPONENTS, FabricTensor
 if TYPE_CHECKING:
     from scanfab.fabric.measured import Measured
 
-__all__ = ["VOLUMETRIC_STRAIN", "SampleState", "State", "love_weber"]
 
 # of √(3/2 s:s), s the stress's deviator, to p, below which the stress has no direction
 LEAST_RATIO = 0.02

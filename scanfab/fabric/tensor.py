@@ -13,15 +13,6 @@ from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import spelt_place
 from scanfab.base.typing import FloatArray
 
-__all__ = [
-    "COMPONENTS",
-    "FabricTensor",
-    "axial",
-    "tensor_columns",
-    "tensor_values",
-]
-
-
 COMPONENTS = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 
 

@@ -23,8 +23,6 @@ from scanfab.fabric.tensor import FabricTensor, axial, tensor_columns, tensor_va
 if TYPE_CHECKING:
     from scanfab.fabric.measured import Measured
 
-__all__ = ["Void", "VoidFabric", "void_fabric"]
-
 
 MOST_FILLED = 0.5
 # By dimension, the highest degree of a polynomial in the direction that mean lengths are held

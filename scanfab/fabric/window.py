@@ -21,8 +21,6 @@ from scanfab.base.typing import FloatArray
 from scanfab.fabric.tensor import axial
 from scanfab.fabric.void import VoidFabric
 
-__all__ = ["WINDOW_ALPHA", "window_alpha"]
-
 WINDOW_ALPHA = Column(
     "window_alpha_vs_axial",
     float,

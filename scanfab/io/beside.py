@@ -24,23 +24,6 @@ from scanfab.io.reader import BODIES, WALLS, GrainTable, JoinedContacts, Snapsho
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 
-__all__ = [
-    "FrameData",
-    "check_contacts_are_there",
-    "columns_csv",
-    "columns_file",
-    "contacts_csv",
-    "contacts_file",
-    "frame_csv",
-    "frame_file",
-    "is_columns_file",
-    "is_contacts_file",
-    "is_frame_file",
-    "read_contacts",
-    "read_frame",
-    "with_columns",
-]
-
 IDS = ("id1", "id2")
 IMAGE = ("ix", "iy", "iz")
 FORCE = ("fx2", "fy2", "fz2")

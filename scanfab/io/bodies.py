@@ -14,8 +14,6 @@ from scanfab.base.typing import IntArray
 from scanfab.io.reader import GrainTable
 from scanfab.packing.bodies import CLUMP_COLUMNS, MOLECULE_COLUMNS
 
-__all__ = ["body_numbers", "numbers_in_columns"]
-
 
 def body_numbers(path: Path, grains: GrainTable, named: str | None) -> IntArray | None:
     """

@@ -27,17 +27,16 @@ from scanfab.io.beside import (
     is_frame_file,
 )
 from scanfab.io.families import names_a_step
-from scanfab.io.files import COMPRESSED_SUFFIXES, bare_name
+from scanfab.io.files import bare_name
 from scanfab.io.opening import READING, read_series
 from scanfab.io.options import parse_frames
 from scanfab.io.registry import installed_readers
 from scanfab.io.series import Series
+from scanfab.io.unpacking import COMPRESSED_SUFFIXES
 from scanfab.io.writer import Writer
 from scanfab.io.writers.registry import installed_writers, writer_for, writer_named
 from scanfab.io.written import more_columns, own_columns, parts_of
 from scanfab.packing.packing import Packing
-
-__all__ = ["convert", "save_packing"]
 
 PathLike = str | os.PathLike[str]
 STEP = "{step}"

@@ -9,8 +9,6 @@ from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
 from scanfab.packing.plane import flat_space, space_of, spelt_plane
 
-__all__ = ["decided_space", "other_space", "refuse_other_space"]
-
 
 def decided_space(name: str, position: FloatArray, dim: str | int) -> Space:
     """

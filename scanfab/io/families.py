@@ -15,19 +15,6 @@ from scanfab.io.files import bare_name
 from scanfab.io.reader import FileKind, Reader, ReadOptions
 from scanfab.io.registry import installed_readers, reader_for, reader_named
 
-__all__ = [
-    "SETTINGS_FILE",
-    "Family",
-    "contacts_beside",
-    "families_beside",
-    "files_in",
-    "names_a_step",
-    "nearest",
-    "own_contacts",
-    "set_tables_aside",
-    "sort_into_families",
-]
-
 # options of the command line, beside the dumps
 SETTINGS_FILE = "scanfab.toml"
 # of a table with the contacts of the grains in the file of the same name without it

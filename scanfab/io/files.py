@@ -28,20 +28,6 @@ from scanfab.io.unpacking import (
     unpacking_up_to,
 )
 
-__all__ = [
-    "COMPRESSED_SUFFIXES",
-    "Stamp",
-    "bare_name",
-    "check_memory",
-    "file_inside",
-    "first_bytes",
-    "plain",
-    "stamp_of",
-    "temporary_copy",
-    "unpacked",
-    "without_temporary",
-]
-
 # decompressed copies of the files used last, for each thread that reads: a frame needs few
 KEPT = 4
 # bytes that are copied at a time, and those that are left to other programs

@@ -22,8 +22,6 @@ from scanfab.io.parse.growing import growing
 from scanfab.io.series import Series
 from scanfab.io.whole_frames import QUIET, Watch, WholeFrame, Wholeness
 
-__all__ = ["FollowedSeries", "follow_series"]
-
 # seconds between two looks, or times what a look takes
 PAUSE, PAUSES = 0.2, 3.0
 

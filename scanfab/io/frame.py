@@ -37,8 +37,6 @@ from scanfab.packing.walls import ListedWallForces
 if TYPE_CHECKING:
     from scanfab.io.series import Series
 
-__all__ = ["Frame"]
-
 
 @dataclass(frozen=True)
 class Frame:

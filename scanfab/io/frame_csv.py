@@ -9,8 +9,6 @@ from pathlib import Path
 
 from scanfab.base.errors import ReadError
 
-__all__ = ["FrameFile"]
-
 
 class FrameFile:
     """

@@ -15,8 +15,6 @@ from scanfab.io.files import first_bytes
 from scanfab.io.reader import FileKind, ReadOptions
 from scanfab.io.registry import why_not
 
-__all__ = ["PathLike", "choose_grains", "expanded", "files_of", "named_once", "series_below"]
-
 PathLike = str | os.PathLike[str]
 
 # sub-folders that are looked into for the advice in an error

@@ -19,7 +19,6 @@ from scanfab.io.reader import Snapshot
 if TYPE_CHECKING:
     from scanfab.io.reader import Reader
 
-__all__ = ["snapshots_of"]
 
 # bytes: smaller files are looked through as fast as their index is found
 LARGE = 64 << 20

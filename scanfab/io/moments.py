@@ -6,8 +6,6 @@ from collections.abc import Sequence
 
 from scanfab.io.reader import Snapshot
 
-__all__ = ["of_moment"]
-
 # of the time: programs write it with six digits or more
 ROUNDING = 2e-6
 

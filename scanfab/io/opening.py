@@ -11,7 +11,6 @@ from typing import Any
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.base.option import refuse_unknown, takes_options, unusable
 from scanfab.io.families import (
-    SETTINGS_FILE,
     Family,
     contacts_beside,
     set_tables_aside,
@@ -32,8 +31,6 @@ from scanfab.io.reader import ReadOptions
 from scanfab.io.series import ContactsFrom, Series
 from scanfab.io.unpacking import unpacking_up_to
 from scanfab.packing.packing import Packing
-
-__all__ = ["READING", "SETTINGS_FILE", "as_text", "open_sources", "read", "read_series"]
 
 READING = tuple(one.name for one in READING_OPTIONS)
 """The options of :func:`read_series`, by which commands and manifests know them too."""

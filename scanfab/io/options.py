@@ -10,18 +10,6 @@ from typing import Any
 
 from scanfab.base.option import Option, number, optional, unusable, whole
 
-__all__ = [
-    "READING_OPTIONS",
-    "parse_cell",
-    "parse_columns",
-    "parse_frames",
-    "parse_max_unpacked",
-    "parse_periodic",
-    "parse_radius",
-    "parse_skip",
-    "take_reading",
-]
-
 
 def _reader_names() -> Iterable[str]:
     from scanfab.io.registry import installed_readers

@@ -18,21 +18,8 @@ from scanfab.io.options import (
     parse_skip,
 )
 from scanfab.packing.cell import Cell
-from scanfab.packing.packing import ContactList
+from scanfab.packing.contacts import ContactList
 from scanfab.packing.walls import ListedWallForces
-
-__all__ = [
-    "BODIES",
-    "WALLS",
-    "Carries",
-    "FileKind",
-    "GrainTable",
-    "JoinedContacts",
-    "ReadOptions",
-    "Reader",
-    "Snapshot",
-]
-
 
 BODIES = "scanfab_bodies"
 """A column of this name is the number of each sphere's body, whatever other columns say."""

@@ -13,8 +13,6 @@ from scanfab.base.plugins import Offer, having, load_offers
 from scanfab.io.files import bare_name
 from scanfab.io.reader import Reader, ReadOptions
 
-__all__ = ["installed_readers", "lacking", "reader_for", "reader_named", "why_not"]
-
 GROUP = "scanfab.readers"
 
 

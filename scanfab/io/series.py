@@ -24,8 +24,6 @@ from scanfab.io.moments import of_moment
 from scanfab.io.reader import ReadOptions, Snapshot
 from scanfab.io.unpacking import unpacking_up_to
 
-__all__ = ["ENDLESS", "ContactsFrom", "Series"]
-
 # size and time of a file, which change with its content; None if nobody can tell
 _Stamp = tuple[int, int] | None
 # more frames than there can be: the end of frames that nobody has counted

@@ -12,8 +12,6 @@ import numpy.typing as npt
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray
 
-__all__ = ["other_size", "refuse_other_size"]
-
 # rows that show with how many digits a column was printed, the least exact printing that is
 # believed, and the rounding of numbers of four bytes; the latter relative
 PRINTED, MOST_PRINTED, SINGLE = 1000, 0.05, 1e-6

@@ -16,19 +16,6 @@ from typing import Any, Protocol
 
 from scanfab.base.errors import ReadError
 
-__all__ = [
-    "COMPRESSED_SUFFIXES",
-    "LONGEST_LINE",
-    "MAGIC_BYTES",
-    "Readable",
-    "bounded",
-    "check_lines",
-    "check_times",
-    "opener_for",
-    "unpacking_errors",
-    "unpacking_up_to",
-]
-
 COMPRESSED_SUFFIXES = (".gz", ".bz2", ".xz", ".zst", ".lz4")
 MAGIC_BYTES = 6
 # part of Python since 3.14

@@ -16,8 +16,6 @@ from scanfab.io.parse.growing import growing
 from scanfab.io.series import Series
 from scanfab.packing.packing import Packing
 
-__all__ = ["QUIET", "Watch", "WholeFrame", "Wholeness"]
-
 # a file that has been as it is for so many seconds is whole, if it can be read to its end
 QUIET = 1.0
 # one that was written so long ago need not be watched, whatever the clock of its server says

@@ -7,8 +7,6 @@ from typing import NamedTuple, Protocol
 
 from scanfab.packing.packing import Packing
 
-__all__ = ["Left", "Writer"]
-
 
 class Left(NamedTuple):
     """What of a packing a file of grains does not hold: it is written beside the file."""

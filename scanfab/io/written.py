@@ -16,8 +16,6 @@ from scanfab.io.sizes import other_size
 from scanfab.packing.bodies import bodies_of
 from scanfab.packing.packing import Packing
 
-__all__ = ["flat", "free_name", "more_columns", "own_columns", "parts_of", "standard_columns"]
-
 Columns = dict[str, npt.NDArray[Any]]
 
 # names that a reader would take for what scanfab writes under them

@@ -13,7 +13,6 @@ from scanfab.base.typing import BoolArray, FloatArray, IntArray
 if TYPE_CHECKING:
     from scanfab.packing.cell import Cell
 
-__all__ = ["CLUMP_COLUMNS", "MOLECULE_COLUMNS", "Bodies", "bodies_of"]
 
 # columns of dumps, by their names in lower case: these number clumps, whatever the format
 CLUMP_COLUMNS = ("id_multisphere", "clumpid", "clump_id", "clump")

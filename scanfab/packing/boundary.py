@@ -14,9 +14,6 @@ from scanfab.base.errors import SettingsError
 from scanfab.base.typing import BoolArray
 from scanfab.packing.packing import Packing
 
-__all__ = ["BoundaryRule", "enclosing_class", "existing_values", "select_boundary"]
-
-
 OPERATORS = {
     "=": np.equal,
     "!=": np.not_equal,

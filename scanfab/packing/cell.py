@@ -16,8 +16,6 @@ from scanfab.base.spelling import spelt_place
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.lattice import Lattice, reduced_lattice
 
-__all__ = ["Cell"]
-
 
 def _three_truths(periodic: Sequence[bool]) -> tuple[bool, bool, bool]:
     if isinstance(periodic, str) or np.shape(periodic) != (3,):

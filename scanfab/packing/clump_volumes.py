@@ -10,8 +10,6 @@ from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.packing import Packing
 
-__all__ = ["lens_volumes", "own_shares"]
-
 # rays through pairs of spheres of one clump, all together: a second or two
 MOST_RAYS = 1 << 23
 # of a sphere, where clumps are so many that their errors cancel, and where they are few

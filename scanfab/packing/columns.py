@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from scanfab.packing.sample import Sample, Variant
     from scanfab.packing.window import Window
 
-__all__ = ["RV_COLUMN", "SAMPLE_COLUMNS", "sample_values"]
 
 SAMPLE_COLUMNS = (
     Column("grains", int, "", "solid in this variant, centre in the window; a clump is one"),

@@ -16,8 +16,6 @@ from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.packing.bodies import Bodies
 from scanfab.packing.cell import Cell
 
-__all__ = ["ContactList", "Contacts", "Spheres", "resolve_contacts", "warn_of_same_centre"]
-
 ContactSource = Literal["file", "geometric"]
 
 

@@ -14,9 +14,6 @@ from scanfab.packing.periodicity import fitting_periods
 from scanfab.packing.plane import FEWEST, space_of, spelt_plane
 from scanfab.packing.sample import Sample
 
-__all__ = ["cell_doubt", "cell_hint", "doubts_of", "refuse_impossible"]
-
-
 # names of columns that may say which spheres are one body, in lower case
 COLUMNS = (*CLUMP_COLUMNS, *MOLECULE_COLUMNS)
 # a clump is smaller than this part of the sample, or of the period

@@ -12,9 +12,6 @@ from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.packing.packing import Packing
 from scanfab.packing.window import SurfaceBox
 
-__all__ = ["Escaped", "escaped_grains", "told_of_escaped"]
-
-
 # Gap between surfaces from which on grains are far away: so many largest radii, and so many times
 # the gap to the nearest neighbour that all but a part of the grains are below. In dense samples, of
 # boxes, cells and shells, no outer grain was more than 0.5 radii away from the others; in loose

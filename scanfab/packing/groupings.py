@@ -11,8 +11,6 @@ from scanfab.base.spelling import counted
 from scanfab.base.typing import IntArray
 from scanfab.packing.packing import Packing
 
-__all__ = ["Grouping", "Groupings", "grouping_of"]
-
 
 class Grouping(NamedTuple):
     """The spheres of a frame, those of one body by one number."""

@@ -9,8 +9,6 @@ from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
 from scanfab.packing.window import Window
 
-__all__ = ["inner_ellipsoid"]
-
 
 def inner_ellipsoid(position: FloatArray, largest: float, space: Space = SPACE) -> Window | None:
     """

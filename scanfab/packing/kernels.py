@@ -16,18 +16,6 @@ import numpy.typing as npt
 from scanfab.base.jit import inner, kernel
 from scanfab.base.typing import FloatArray, IntArray
 
-__all__ = [
-    "Basis",
-    "Grid",
-    "Pairs",
-    "contact_geometry",
-    "fill_grid",
-    "move_into_basis",
-    "pairs_between",
-    "pairs_within",
-    "sort_pairs",
-]
-
 RowArray = npt.NDArray[np.int32]
 ShiftArray = npt.NDArray[np.int16]
 

@@ -9,9 +9,6 @@ import numpy as np
 
 from scanfab.base.typing import FloatArray, IntArray
 
-__all__ = ["Lattice", "reduced_lattice"]
-
-
 # a step that makes a vector shorter by less is rounding: reducing must come to an end
 SHORTER = 1.0 - 1e-9
 # branches at a time, times their candidates: some tens of megabytes

@@ -12,8 +12,6 @@ from scanfab.packing.sample import Sample, Variant
 from scanfab.packing.search import overlapping_pairs
 from scanfab.packing.window import Window
 
-__all__ = ["NearPairs", "near_pairs"]
-
 
 @dataclass(frozen=True, eq=False)
 class NearPairs:

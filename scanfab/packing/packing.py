@@ -22,16 +22,6 @@ from scanfab.packing.contacts import ContactList, Contacts, Spheres, resolve_con
 from scanfab.packing.plane import cell_in_plane, flat_space, place_of, refuse_outside
 from scanfab.packing.walls import ListedWallForces, WallForces, resolve_wall_forces
 
-__all__ = [
-    "ContactList",
-    "Contacts",
-    "LazyColumns",
-    "Packing",
-    "check_lengths",
-    "lies_within",
-]
-
-
 # rows whose temporary array stays in a cache: a new one for all would take longer to come by
 PART = 1 << 15
 

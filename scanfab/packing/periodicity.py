@@ -8,9 +8,6 @@ import numpy.typing as npt
 from scanfab.base.typing import FloatArray
 from scanfab.packing.packing import Packing
 
-__all__ = ["fitting_periods"]
-
-
 # grains of a face that tell whether it fits
 MOST_GRAINS = 2000
 # in mean radii: lengths that differ by no more are one period, as contacts overlap a little

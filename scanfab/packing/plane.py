@@ -9,16 +9,6 @@ from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.packing.cell import Cell
 
-__all__ = [
-    "FEWEST",
-    "cell_in_plane",
-    "flat_space",
-    "place_of",
-    "refuse_outside",
-    "space_of",
-    "spelt_plane",
-]
-
 # centres below which to lie in one plane may be chance
 FEWEST = 10
 

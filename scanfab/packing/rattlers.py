@@ -22,8 +22,6 @@ from scanfab.base.typing import BoolArray, IntArray
 from scanfab.packing.bodies import Bodies
 from scanfab.packing.contacts import Contacts
 
-__all__ = ["RattlerRule", "Touching", "count", "force", "installed_rules", "recursive"]
-
 GROUP = "scanfab.rattlers"
 
 

@@ -17,13 +17,12 @@ from scanfab.base.note import Note
 from scanfab.base.spelling import counted
 from scanfab.base.typing import BoolArray, IntArray
 from scanfab.packing.boundary import BoundaryRule, select_boundary
+from scanfab.packing.contacts import Contacts
 from scanfab.packing.escaped import Escaped, escaped_grains, told_of_escaped
-from scanfab.packing.packing import Contacts, Packing
+from scanfab.packing.packing import Packing
 from scanfab.packing.rattlers import RattlerRule, Touching, count, installed_rules
 from scanfab.packing.search import find_contacts
 from scanfab.packing.window import Window
-
-__all__ = ["VARIANTS", "Sample", "SampleRule", "Variant"]
 
 
 @dataclass(frozen=True)

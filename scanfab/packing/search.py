@@ -23,9 +23,6 @@ from scanfab.packing.kernels import (
 )
 from scanfab.packing.packing import Packing
 
-__all__ = ["find_contacts", "overlapping_pairs"]
-
-
 # grains of one grid differ by no more than this factor: dust is not sought in bins of boulders
 CLASS_RATIO = 3.5
 # bins are a little larger than the longest contact: rounding moves no grain two bins away

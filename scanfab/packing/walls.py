@@ -12,8 +12,6 @@ from scanfab.base.errors import PackingError
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.cell import Cell
 
-__all__ = ["ListedWallForces", "WallForces", "resolve_wall_forces"]
-
 
 class ListedWallForces(NamedTuple):
     """

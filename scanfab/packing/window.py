@@ -15,8 +15,6 @@ from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 
-__all__ = ["RV_MEANING", "SurfaceBox", "Window"]
-
 # for messages: who writes 70 means per cent
 RV_MEANING = "which is a fraction of half the sample's smallest extent, such as 0.7"
 

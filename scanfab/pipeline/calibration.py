@@ -29,14 +29,13 @@ from scanfab.pipeline.frame import OTHER_CUTOFFS, compute_frame
 from scanfab.pipeline.frames import Frames, Source
 from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.plan import Plan, make_plan
-from scanfab.pipeline.settings import Length, Settings
+from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.tolerance import TOLERANCE_MISSED, missing_work
+from scanfab.pipeline.values import Length
 from scanfab.pipeline.window_settings import SHAPES, settings_in
 from scanfab.scan.directions import DirectionRule, direction_rule, rule_of, usual_rule
 from scanfab.table.plots import Plots
-from scanfab.table.table import Row
-
-__all__ = ["Calibration", "calibrate"]
+from scanfab.table.row import Row
 
 LOGGER = logging.getLogger("scanfab")
 

@@ -11,17 +11,6 @@ from typing import Annotated
 from scanfab.base.column import LENGTH
 from scanfab.table.row import Record
 
-__all__ = [
-    "PAPER_CUTOFF",
-    "PAPER_SPACING",
-    "StepRow",
-    "first_steady",
-    "judged",
-    "largest",
-    "sentence",
-    "sentence_of_recommended",
-]
-
 # of the 2017 paper, in r_min; its RV as fractions of the sample's radius
 PAPER_SPACING = 0.1
 PAPER_CUTOFF = 1.0

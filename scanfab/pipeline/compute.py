@@ -30,9 +30,8 @@ from scanfab.pipeline.settings import MAX_CHORDS, Settings
 from scanfab.pipeline.strain import Flips, Strains
 from scanfab.pipeline.told import heard_by_thread
 from scanfab.scan.directions import DirectionRule
-from scanfab.table.table import Row, Table
-
-__all__ = ["FrameResult", "compute", "compute_rows"]
+from scanfab.table.row import Row
+from scanfab.table.table import Table
 
 LOGGER = logging.getLogger("scanfab")
 

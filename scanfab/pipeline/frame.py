@@ -23,16 +23,6 @@ from scanfab.pipeline.variant_columns import VariantColumns, no_columns
 from scanfab.table.columns import complete_row
 from scanfab.table.row import Row
 
-__all__ = [
-    "OTHER_CUTOFFS",
-    "FrameResult",
-    "as_sample",
-    "check_space",
-    "compute_frame",
-    "frame_values",
-    "naming_frame",
-]
-
 OTHER_CUTOFFS = "error_at_other_cutoffs"
 """The code of a note: the scan is fine enough for its cut-off, but not for another."""
 

@@ -25,18 +25,6 @@ from scanfab.packing.sample import Sample, SampleRule
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import as_written
 
-__all__ = [
-    "Frames",
-    "NoChosenFrameError",
-    "Readable",
-    "Source",
-    "boundary_hints",
-    "chosen_frames",
-    "of_whole",
-    "sample_rule",
-]
-
-
 Source = Packing | Series | Iterable[Packing]
 """One frame, a series that is read frame by frame, or packings from anywhere."""
 

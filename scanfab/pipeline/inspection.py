@@ -22,8 +22,6 @@ from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.window_settings import settings_in
 from scanfab.table.row import Record
 
-__all__ = ["FrameReport", "inspect_series"]
-
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class FrameReport(Record):

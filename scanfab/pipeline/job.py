@@ -32,8 +32,6 @@ from scanfab.table.result_file import ResultFile
 from scanfab.table.row import Row
 from scanfab.table.writing import ALL
 
-__all__ = ["Advance", "Job"]
-
 Advance = Callable[..., object]
 """Called after each finished frame, with ``new=False`` if an earlier run has computed it."""
 

@@ -14,22 +14,11 @@ from typing import Any
 from scanfab.base.files import whole_file
 from scanfab.base.option import options_of
 from scanfab.io.series import Series
-from scanfab.pipeline.settings import STRAIN_MODES, Settings
-from scanfab.pipeline.values import UsualAxis
+from scanfab.pipeline.settings import Settings
+from scanfab.pipeline.values import STRAIN_MODES, UsualAxis
 from scanfab.pipeline.window_settings import SHAPES
 from scanfab.scan.directions import DirectionRule
 from scanfab.table.writing import ALL, Excerpt
-
-__all__ = [
-    "Inputs",
-    "asked_for",
-    "default_settings",
-    "manifest",
-    "strain_file",
-    "surface_file",
-    "with_frames",
-    "write_manifest",
-]
 
 # bytes of a file that are read at a time
 PART = 1 << 20

@@ -23,9 +23,6 @@ from scanfab.scan.gaps import GapSums, scan_gaps
 from scanfab.scan.scan import ScanSums
 from scanfab.scan.solids import Solids, most_lines
 
-__all__ = ["Measurement", "measure"]
-
-
 # Of the scan for the sample's scatter: its noise is known from the replicates, and taken off. Lines
 # at one distance in mean radii make as many segments for each grain of a small sample as of a large
 # one (about 900 in dense packings), so noise and scatter fall together as grains are added.

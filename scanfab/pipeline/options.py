@@ -13,8 +13,6 @@ from scanfab.io.options import READING_OPTIONS
 from scanfab.pipeline.maps.settings import MapSettings
 from scanfab.pipeline.settings import Settings
 
-__all__ = ["DECLARED", "MAP_OPTIONS", "MEANINGS", "OPTIONS", "OUTPUT_OPTIONS", "as_options"]
-
 
 def _figures() -> list[str]:
     """All that compute draws; those of compare are among them."""

@@ -19,12 +19,11 @@ from scanfab.pipeline.frames import sample_rule
 from scanfab.pipeline.maps.blocks import MapBlocks, map_blocks
 from scanfab.pipeline.maps.settings import MapSettings
 from scanfab.pipeline.rv import RV, Deformation, doubts_of_rv, sizes_of, windows_of
-from scanfab.pipeline.settings import Settings, Vector
+from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.strain import Strains
+from scanfab.pipeline.values import Vector
 from scanfab.pipeline.window_settings import settings_in
 from scanfab.scan.directions import DirectionRule, usual_rule
-
-__all__ = ["NOISE", "Plan", "make_plan", "plan_without_grains"]
 
 # replicates of a fixed scan, and at least of an auto scan
 REPLICATES = 16

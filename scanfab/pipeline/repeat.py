@@ -19,14 +19,6 @@ from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings, is_map
 from scanfab.pipeline.settings import Settings
 from scanfab.table.result_file import manifest_of
 
-__all__ = [
-    "read_manifest",
-    "reopen",
-    "repeat_command",
-    "restored_settings",
-    "spelt_settings",
-]
-
 
 def read_manifest(table: Path) -> dict[str, Any] | None:
     """

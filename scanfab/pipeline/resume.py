@@ -20,8 +20,6 @@ from scanfab.table.reading import read_finished_rows
 from scanfab.table.result_file import differing_settings
 from scanfab.table.row import Row
 
-__all__ = ["FinishedTable", "InputsOfRows", "check_part", "finished_table", "written_row"]
-
 # what may differ: inputs are compared by what they hold, and more frames are the point of it
 FREE = ("frames", "sources")
 

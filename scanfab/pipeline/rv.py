@@ -19,10 +19,9 @@ from scanfab.io.parse.surface import read_surface
 from scanfab.packing.plane import spelt_plane
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import RV_MEANING, SurfaceBox, Window
-from scanfab.pipeline.settings import Settings, Vector
+from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.strain import strain_mode
-
-__all__ = ["RV", "Deformation", "doubts_of_rv", "sizes_of", "windows_of"]
+from scanfab.pipeline.values import Vector
 
 # of the smallest grain: what nobody means
 SMALLEST = 1e-9

@@ -9,8 +9,6 @@ from scanfab.packing.sample import Sample
 from scanfab.pipeline.frames import Frames, Source
 from scanfab.pipeline.settings import Settings
 
-__all__ = ["samples"]
-
 
 def samples(source: Source, **options: Any) -> Iterator[tuple[int, Sample]]:
     """

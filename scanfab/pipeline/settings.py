@@ -22,7 +22,6 @@ from scanfab.pipeline.values import (
     STRAIN_MODES,
     Axis,
     Length,
-    Vector,
     as_written,
     check_min_force,
     check_moment,
@@ -49,7 +48,6 @@ if TYPE_CHECKING:
     from scanfab.packing.boundary import BoundaryRule
     from scanfab.scan.directions import DirectionRule
 
-__all__ = ["AXES", "MAX_CHORDS", "STRAIN_MODES", "Length", "Settings", "Vector"]
 
 # of an auto scan of one frame: one to two minutes of one processor, some hundred times what dense
 # packings need for the default tolerance

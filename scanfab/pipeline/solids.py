@@ -9,9 +9,8 @@ from scanfab.packing.inner import inner_ellipsoid
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import Window
 from scanfab.scan.edges import CLIP, ENDS, START
-from scanfab.scan.solids import CellGrains, Inner, Solids, margin_of
-
-__all__ = ["solids_of"]
+from scanfab.scan.kernels.periodic import CellGrains
+from scanfab.scan.solids import Inner, Solids, margin_of
 
 
 def solids_of(

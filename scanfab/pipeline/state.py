@@ -20,8 +20,6 @@ from scanfab.packing.walls import WallForces
 from scanfab.packing.window import Window
 from scanfab.scan.directions import direction_rule, plane_rule
 
-__all__ = ["contact_forces", "doubts_of_state", "refuse_without_forces", "sample_state"]
-
 # points that stand for a grain where the surface of an RV that is no sphere cuts it
 POINTS = 2048
 # grains at a time, times their points: some tens of megabytes

@@ -12,18 +12,8 @@ from scanfab.base.note import Note
 from scanfab.io.frame_csv import FrameFile
 from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
-from scanfab.pipeline.settings import STRAIN_MODES, Settings, Vector
-
-__all__ = [
-    "Flips",
-    "StrainFile",
-    "Strains",
-    "axial_length",
-    "is_flipped",
-    "shear_strain",
-    "strain_mode",
-    "volumetric_strain",
-]
+from scanfab.pipeline.settings import Settings
+from scanfab.pipeline.values import STRAIN_MODES, Vector
 
 # programs that flip their cells do so when it leans by half a length or a little later
 MOST_TILT = 0.61

@@ -12,8 +12,6 @@ from typing import Any
 from scanfab.base.errors import ScanfabNote, ScanfabWarning, SkippedFrameWarning
 from scanfab.pipeline.options import as_options
 
-__all__ = ["Told", "heard_by_thread", "recorded"]
-
 _ears = threading.local()
 
 

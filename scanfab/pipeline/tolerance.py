@@ -21,8 +21,6 @@ from scanfab.scan.following import FollowedTooFarError
 from scanfab.scan.scan import ScanSums, scan_lines
 from scanfab.scan.solids import Solids, is_affordable, most_lines
 
-__all__ = ["TOLERANCE_MISSED", "Errors", "Goal", "missing_work", "scan_to_tolerance"]
-
 LOGGER = logging.getLogger("scanfab")
 
 TOLERANCE_MISSED = "tolerance_missed"

@@ -21,33 +21,6 @@ if TYPE_CHECKING:
     from scanfab.pipeline.settings import Settings
     from scanfab.scan.directions import DirectionRule
 
-__all__ = [
-    "AXES",
-    "GROUP_NAMES",
-    "STRAIN_MODES",
-    "Axis",
-    "Length",
-    "UsualAxis",
-    "Vector",
-    "check_moment",
-    "parse_axis",
-    "parse_boundary",
-    "parse_cutoff",
-    "parse_cutoffs",
-    "parse_directions",
-    "parse_groups",
-    "parse_length",
-    "parse_lengths",
-    "parse_rattlers",
-    "parse_spacing",
-    "parse_strain",
-    "parse_tolerance",
-    "parse_variants",
-    "parse_vector",
-    "parse_workers",
-    "rattler_rules",
-    "words_of",
-]
 
 Vector = tuple[float, float, float]
 STRAIN_MODES = ("auto", "cell", "boundary", "grains")

@@ -13,7 +13,8 @@ from scanfab.base.note import Note
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.forces import doubts_of_forces
 from scanfab.fabric.jackknife import BlockedSums, blocks_of
-from scanfab.fabric.registry import GROUPS, OWN_FABRICS, Measured, checked_values
+from scanfab.fabric.measured import Measured
+from scanfab.fabric.registry import GROUPS, OWN_FABRICS, checked_values
 from scanfab.fabric.spectrum import LONGEST_GAP, PREDICTED_ALPHA, predicted_alpha
 from scanfab.fabric.state import SampleState
 from scanfab.fabric.window import WINDOW_ALPHA, window_alpha
@@ -27,15 +28,6 @@ from scanfab.scan.edges import CLIP, ENDS, START
 from scanfab.scan.scan import ScanSums
 from scanfab.scan.solids import Solids
 from scanfab.table.columns import installed_fabrics, table_columns
-
-__all__ = [
-    "VariantColumns",
-    "doubts_of_lines",
-    "edge_of",
-    "left_out_of",
-    "no_columns",
-]
-
 
 # in smallest radii: a cut-off that nobody means
 ABSURD = 100.0

@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from scanfab.pipeline.settings import Settings
     from scanfab.scan.directions import DirectionRule
 
-__all__ = ["SHAPES", "WindowSettings", "check_window", "settings_in"]
 
 # of a unit vector: what rounding leaves of a component that is 0
 ROUNDING = 1e-9

@@ -13,8 +13,6 @@ from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.scan.kernels.bins import Partition
 from scanfab.scan.lines import line_triads
 
-__all__ = ["Blocks", "partition_of"]
-
 
 @dataclass(frozen=True, eq=False)
 class Blocks:

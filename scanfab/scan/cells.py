@@ -9,8 +9,6 @@ from scanfab.scan.kernels.cells import Cells, fill_cells
 from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.kernels.strips import FAR
 
-__all__ = ["cells_of"]
-
 # A ray through periodic grains that has met nothing along so many periods and mean free paths stays
 # in a channel.
 MOST_PERIODS, MOST_FREE_PATHS = 64.0, 20.0

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from scanfab.base.column import LENGTH, Column
 
-__all__ = ["EDGE_COLUMNS", "SCAN_COLUMNS"]
-
 SCAN_COLUMNS = (
     Column(
         "solid_fraction",

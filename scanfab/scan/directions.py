@@ -17,17 +17,6 @@ from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray
 
-__all__ = [
-    "AUTO_RULE",
-    "DirectionRule",
-    "design_of",
-    "direction_rule",
-    "plane_rule",
-    "rule_of",
-    "usual_rule",
-]
-
-
 # SciPy's Lebedev rules of these degrees have negative weights: they would amplify noise
 NEGATIVE_LEBEDEV = (13, 25, 27)
 LARGEST_PRODUCT = 999

@@ -7,6 +7,4 @@ docs/method.md.
 
 from __future__ import annotations
 
-__all__ = ["CLIP", "EDGES", "ENDS", "START"]
-
 CLIP, START, ENDS = EDGES = ("clip", "start", "ends")

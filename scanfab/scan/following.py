@@ -6,8 +6,6 @@ import threading
 
 from scanfab.base.errors import SettingsError
 
-__all__ = ["MOST_STEPS", "FollowedTooFarError", "Following"]
-
 # steps of following lines through a periodic medium: more take minutes
 MOST_STEPS = 1e10
 

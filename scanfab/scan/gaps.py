@@ -26,8 +26,6 @@ from scanfab.scan.scan import ScanSums, in_parts, sums_of
 from scanfab.scan.solids import Solids, check_space, check_spacing, shortest_gap
 from scanfab.scan.tallies import tally_triads
 
-__all__ = ["GapSums", "scan_gaps"]
-
 
 @dataclass(frozen=True, eq=False)
 class GapSums:

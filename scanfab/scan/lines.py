@@ -11,8 +11,6 @@ from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
 from scanfab.scan.directions import DirectionRule
 
-__all__ = ["drawn_lines", "line_triads", "turned_triads"]
-
 
 def line_triads(axes: FloatArray, space: Space = SPACE) -> FloatArray:
     """

@@ -20,9 +20,6 @@ from scanfab.scan.lines import drawn_lines
 from scanfab.scan.solids import Solids, check_space, check_spacing
 from scanfab.scan.tallies import tally_triads
 
-__all__ = ["ScanSums", "in_parts", "scan_lines", "sums_of"]
-
-
 JOBS_A_THREAD, MOST_AXES = 4, 16
 
 

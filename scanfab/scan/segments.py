@@ -13,8 +13,6 @@ from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.scan.kernels.strips import spans
 from scanfab.scan.solids import clip_of
 
-__all__ = ["Segments", "cut_lines", "grid_points", "sample_segments"]
-
 
 @dataclass(frozen=True, eq=False)
 class Segments:

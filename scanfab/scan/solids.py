@@ -21,20 +21,6 @@ from scanfab.scan.kernels.cells import Cells
 from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.kernels.windows import Clip
 
-__all__ = [
-    "MAX_LINES",
-    "CellGrains",
-    "Inner",
-    "Solids",
-    "check_space",
-    "check_spacing",
-    "clip_of",
-    "is_affordable",
-    "margin_of",
-    "most_lines",
-    "shortest_gap",
-]
-
 # lines of one axis and replicate: more take minutes, even those that meet nothing
 MAX_LINES = 50_000_000
 # Of the smallest radius: what lies between surfaces that coincide but for rounding is no gap.

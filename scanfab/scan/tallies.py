@@ -15,10 +15,9 @@ from scanfab.scan.kernels.axes import scan_axes, scan_cell
 from scanfab.scan.kernels.bins import OF_WHOLE, OF_WINDOW, Bins, no_bins
 from scanfab.scan.kernels.cells import Cells
 from scanfab.scan.kernels.edges import CLIPPED, WEIGHED
+from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.kernels.strips import Edge
-from scanfab.scan.solids import CellGrains, Inner, Solids, clip_of, shortest_gap
-
-__all__ = ["tally_triads"]
+from scanfab.scan.solids import Inner, Solids, clip_of, shortest_gap
 
 # of the spacing and for each variant: spheres of such a radius are scanned as fast row by row as
 # over lists of chords; for the more variants the lists serve, the sooner they pay

@@ -7,15 +7,6 @@ from typing import Any
 
 from scanfab.table.reading import number_of
 
-__all__ = [
-    "STRAINS",
-    "frame_strain_column",
-    "is_ambiguous",
-    "spelt_strain",
-    "strain_column",
-    "why_not_strain",
-]
-
 Rows = Sequence[Mapping[str, Any]]
 
 # columns of strains: in words, and as the symbol of figures

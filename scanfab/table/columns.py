@@ -15,16 +15,6 @@ from scanfab.packing.columns import RV_COLUMN, SAMPLE_COLUMNS
 from scanfab.scan.columns import EDGE_COLUMNS, SCAN_COLUMNS
 from scanfab.table.row import Row
 
-__all__ = [
-    "COLUMNS",
-    "MORE_COLUMNS",
-    "OWN_COLUMNS",
-    "columns_of",
-    "complete_row",
-    "installed_fabrics",
-    "table_columns",
-]
-
 FRAME_COLUMNS = (
     Column("source", str, "", "the series as given: folder, file, or the files' common folder"),
     Column("frame", int, "", "index in the series, from 0"),

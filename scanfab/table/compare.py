@@ -21,8 +21,6 @@ from scanfab.table.reading import number_of, numbers_of, total_error, variant_of
 from scanfab.table.selection import check_rows
 from scanfab.table.table import Table
 
-__all__ = ["compare_tables"]
-
 # a frame at 12 % may say 0.1200012, as boxes have rounded numbers
 SAME_STRAIN = 1e-5
 

@@ -14,13 +14,6 @@ from scanfab.table.row import Record
 if TYPE_CHECKING:
     from scanfab.table.table import Table
 
-__all__ = [
-    "Comparison",
-    "DifferenceRow",
-    "FrameRow",
-    "SummaryRow",
-]
-
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class FrameRow(Record):

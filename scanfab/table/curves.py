@@ -13,16 +13,6 @@ from scanfab.base.typing import FloatArray
 from scanfab.table.abscissa import STRAINS, strain_column
 from scanfab.table.reading import number_of, total_error, variant_of
 
-__all__ = [
-    "Curve",
-    "abscissa_label",
-    "abscissa_words",
-    "curves_of",
-    "is_turned",
-    "middle_out",
-    "short_names",
-]
-
 Rows = Sequence[Mapping[str, Any]]
 
 LONGEST_NAME = 32

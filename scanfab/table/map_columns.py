@@ -13,8 +13,6 @@ from scanfab.scan.columns import EDGE_COLUMNS, SCAN_COLUMNS
 from scanfab.table.columns import FRAME_COLUMNS
 from scanfab.table.row import Row
 
-__all__ = ["BLOCK_COLUMNS", "map_columns", "map_row"]
-
 BLOCK_COLUMNS = (
     Column("block", int, "", "of a map: its number from 0; those along x count fastest"),
     *(Column(name, float, LENGTH, f"of a map: {name} of the block's middle") for name in "xyz"),

@@ -16,8 +16,6 @@ from scanfab.base.column import no_column
 from scanfab.base.option import refuse_unknown
 from scanfab.base.plugins import load_plugins
 
-__all__ = ["Plots", "figures_of", "installed_figures"]
-
 GROUP = "scanfab.figures"
 
 

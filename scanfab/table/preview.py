@@ -9,8 +9,6 @@ from typing import Any
 
 from scanfab.table.reading import number_of, total_error
 
-__all__ = ["as_html", "as_text", "with_error"]
-
 Rows = Sequence[Mapping[str, Any]]
 
 # what of a fabric table is shown, with its title; of other tables the first columns

@@ -12,17 +12,6 @@ from scanfab.base.errors import ReadError
 from scanfab.base.streams import check_file_or_pipe
 from scanfab.table.formats.registry import reading_format
 
-__all__ = [
-    "is_number",
-    "is_of_discs",
-    "number_of",
-    "numbers_of",
-    "read_finished_rows",
-    "read_rows",
-    "total_error",
-    "variant_of",
-]
-
 
 def read_rows(path: Path | str) -> list[dict[str, Any]]:
     """

@@ -35,8 +35,6 @@ from scanfab.table.formats.registry import RowWriter, format_of
 from scanfab.table.reading import read_rows
 from scanfab.table.writing import ALL, Excerpt, row_writer, write_rows
 
-__all__ = ["ResultFile", "differing_settings", "manifest_of"]
-
 
 class ResultFile:
     """

@@ -8,8 +8,6 @@ from typing import Any, NoReturn, Self
 
 from scanfab.base.column import NoColumnError, no_column
 
-__all__ = ["Record", "Row", "spelt_value"]
-
 # of a repr: a name and its value side by side, so many to a line
 NAME_WIDTH, PAIRS = 26, 3
 

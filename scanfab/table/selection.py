@@ -15,8 +15,6 @@ from scanfab.base.errors import ScanfabWarning, SettingsError
 from scanfab.table.columns import MORE_COLUMNS, OWN_COLUMNS
 from scanfab.table.reading import is_number, variant_of
 
-__all__ = ["NEEDED", "check_rows", "choose_rows"]
-
 Rows = list[dict[str, Any]]
 
 NEEDED = ("source", "frame", "strain", "variant", "alpha_vs_axial", "alpha_c_axial")

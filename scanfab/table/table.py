@@ -14,7 +14,7 @@ from scanfab.base.column import DEFAULT_DIGITS, Column, NoColumnError, no_column
 from scanfab.base.errors import SettingsError
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.tensor import COMPONENTS
-from scanfab.table.columns import COLUMNS, MORE_COLUMNS, columns_of, table_columns
+from scanfab.table.columns import MORE_COLUMNS, columns_of, table_columns
 from scanfab.table.plots import Plots
 from scanfab.table.preview import as_html, as_text
 from scanfab.table.reading import read_rows
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     import polars
 
     from scanfab.table.comparison_rows import Comparison
-
-__all__ = ["COLUMNS", "Row", "Table", "load"]
 
 
 def load(path: Path | str) -> Table:

@@ -17,8 +17,6 @@ from scanfab.base.option import unusable, whole
 from scanfab.table.columns import columns_of
 from scanfab.table.formats.registry import RowWriter, TableFormat, format_of
 
-__all__ = ["Excerpt", "open_table", "plain", "row_writer", "write_rows"]
-
 
 @dataclass(frozen=True)
 class Excerpt:

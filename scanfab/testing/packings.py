@@ -8,10 +8,9 @@ import numpy as np
 
 from scanfab.io.written import flat
 from scanfab.packing.cell import Cell
-from scanfab.packing.packing import ContactList, Packing
+from scanfab.packing.contacts import ContactList
+from scanfab.packing.packing import Packing
 from scanfab.packing.search import find_contacts
-
-__all__ = ["differences", "made_up_packings"]
 
 # no decimal number has these ids
 LARGE = 2**60 + 1

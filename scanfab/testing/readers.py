@@ -20,8 +20,6 @@ from scanfab.base.typing import IntArray
 from scanfab.io.reader import FileKind, GrainTable, Reader, ReadOptions, Snapshot
 from scanfab.packing.packing import Packing
 
-__all__ = ["check_reader"]
-
 # seconds that a small file may take
 LONGEST = 10.0
 # damaged files that are made of each

@@ -12,8 +12,6 @@ from scanfab.io.opening import read
 from scanfab.io.writer import Writer
 from scanfab.testing.packings import differences, made_up_packings
 
-__all__ = ["check_writer"]
-
 
 def check_writer(
     writer: Writer, folder: Path, *, format: str | None = None, leave: Iterable[str] = ()

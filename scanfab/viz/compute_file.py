@@ -25,8 +25,6 @@ from scanfab.table.table import Table, load
 from scanfab.table.writing import Excerpt
 from scanfab.viz.paraview import vtk_folders
 
-__all__ = ["compute_file"]
-
 Source = Series | PathLike
 
 

@@ -16,13 +16,12 @@ from scanfab.io.series import Series
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.frames import Frames
 from scanfab.pipeline.plan import Plan, make_plan
-from scanfab.pipeline.settings import STRAIN_MODES, Settings, Vector
+from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.strain import StrainFile, axial_length, shear_strain
+from scanfab.pipeline.values import STRAIN_MODES, Vector
 from scanfab.pipeline.window_settings import settings_in
 from scanfab.table.abscissa import frame_strain_column, is_ambiguous
 from scanfab.viz.scene import Scene, about_window, scene_of
-
-__all__ = ["Look", "look_at"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,6 @@ import numpy as np
 
 from scanfab.base.typing import FloatArray
 
-__all__ = ["SIZE", "Framing", "add_scale", "add_words"]
-
-
 # of the picture, pixels
 SIZE = (1200, 900)
 # of the picture's height: above the sample words, below it the scale

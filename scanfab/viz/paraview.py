@@ -23,12 +23,9 @@ from scanfab.pipeline.settings import Settings
 from scanfab.scan.lines import line_triads
 from scanfab.scan.segments import Segments, sample_segments
 from scanfab.table.reading import number_of
-from scanfab.table.table import Row
+from scanfab.table.row import Row
 from scanfab.viz import vtk_files as vtk
 from scanfab.viz.scene import contact_lines, grains_of
-
-__all__ = ["MapFolder", "VtkFolder", "scan_line_sample", "vtk_folders"]
-
 
 LINES = 120
 TEXT_FIELDS = ("source", "variant", "contacts_from", "edge")

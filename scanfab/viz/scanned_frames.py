@@ -25,8 +25,6 @@ from scanfab.table.plots import Plots
 from scanfab.table.reading import number_of, variant_of
 from scanfab.table.row import Row
 
-__all__ = ["ScannedFrame", "ScannedFrames", "scan_frames"]
-
 Rows = Sequence[Mapping[str, Any]]
 
 

@@ -16,20 +16,6 @@ from scanfab.packing.sample import Sample
 from scanfab.packing.window import Window
 from scanfab.scan.segments import Segments, cut_lines
 
-__all__ = [
-    "SHADES",
-    "ContactLines",
-    "Grains",
-    "Scene",
-    "about_window",
-    "contact_lines",
-    "grains_of",
-    "scene_of",
-    "section_lines",
-    "towards_viewer",
-]
-
-
 # between the lines of a section and the plane across the axis, degrees
 LINE_ANGLE = 30.0
 # of a colour, each of its parts: what tells clumps apart that are neighbours

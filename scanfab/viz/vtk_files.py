@@ -20,21 +20,6 @@ from scanfab.scan.blocks import Blocks
 from scanfab.scan.segments import Segments
 from scanfab.viz.scene import ContactLines, Grains
 
-__all__ = [
-    "Collection",
-    "Folder",
-    "block_mesh",
-    "contact_mesh",
-    "distribution_mesh",
-    "ellipsoid_mesh",
-    "grain_mesh",
-    "line_mesh",
-    "save_mesh",
-    "tensor_points",
-    "window_mesh",
-]
-
-
 SOLID, DROPPED, KEPT = 0, 1, 2
 # cells of a shell, around the axis and from pole to pole
 AZIMUTHS, POLAR = 36, 18

@@ -22,9 +22,6 @@ from scanfab.viz.overlay import SIZE, Framing, add_scale, add_words
 from scanfab.viz.scene import SHADES, Grains, Scene, towards_viewer
 from scanfab.viz.vtk_files import window_mesh
 
-__all__ = ["check_screen", "show_scene"]
-
-
 ADVICE = (
     "install one of them: on Debian or Ubuntu apt-get install libegl1 libgl1 libosmesa6, or "
     "apt-get install xvfb and run the command under xvfb-run"

@@ -18,9 +18,10 @@ from scanfab.scan.blocks import Blocks
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.edges import EDGES, START
 from scanfab.scan.gaps import scan_gaps
+from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.lines import line_triads
 from scanfab.scan.scan import scan_lines
-from scanfab.scan.solids import CellGrains, Solids, margin_of
+from scanfab.scan.solids import Solids, margin_of
 from tests.benchmarks.packings import PAPER, dense
 from tests.benchmarks.timing import interleaved, table
 

@@ -8,8 +8,9 @@ import numpy as np
 
 from scanfab.base.convex import sphere
 from scanfab.scan.directions import direction_rule
+from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.scan import scan_lines
-from scanfab.scan.solids import CellGrains, Solids
+from scanfab.scan.solids import Solids
 from tests.benchmarks.packings import relaxed_cell
 from tests.benchmarks.timing import interleaved, table
 

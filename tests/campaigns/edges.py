@@ -34,9 +34,10 @@ from scanfab.packing.cell import Cell
 from scanfab.packing.inner import inner_ellipsoid
 from scanfab.scan.directions import direction_rule
 from scanfab.scan.edges import EDGES
+from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.lines import line_triads
 from scanfab.scan.scan import ScanSums
-from scanfab.scan.solids import CellGrains, Inner, Solids, margin_of
+from scanfab.scan.solids import Inner, Solids, margin_of
 from tests.benchmarks.packings import relaxed_cell
 from tests.helpers.naive import void_tensor
 from tests.helpers.scanning import Estimate, ratio, scan_triads

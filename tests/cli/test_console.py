@@ -7,7 +7,7 @@ import re
 import pytest
 
 from scanfab.cli.console import KEYS, MORE, print_table
-from scanfab.table.table import Row
+from scanfab.table.row import Row
 from scanfab.table.writing import Excerpt
 from tests.table.test_table import a_row
 

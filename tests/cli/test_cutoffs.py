@@ -11,7 +11,7 @@ import pytest
 from scanfab import Packing, compute, direction_rule, find_contacts
 from scanfab.cli.main import run
 from scanfab.scan.lines import line_triads, turned_triads
-from scanfab.table.table import COLUMNS
+from scanfab.table.columns import COLUMNS
 from tests.helpers import naive
 from tests.helpers.interruptions import interrupted_at_row
 from tests.helpers.lattices import shaken_cubic

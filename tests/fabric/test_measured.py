@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from scanfab.fabric.jackknife import BLOCKS, BlockedSums
-from scanfab.fabric.registry import OWN_FABRICS, Measured
+from scanfab.fabric.measured import Measured
+from scanfab.fabric.registry import OWN_FABRICS
 
 ALONG_X, ALONG_Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 

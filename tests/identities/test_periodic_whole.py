@@ -12,7 +12,7 @@ from scanfab import (
     direction_rule,
     scan_lines,
 )
-from scanfab.scan.solids import CellGrains
+from scanfab.scan.kernels.periodic import CellGrains
 from tests.helpers import naive
 from tests.helpers.scanning import ratio
 

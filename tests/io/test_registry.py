@@ -13,7 +13,7 @@ from scanfab.base.errors import ReadError, ScanfabError, ScanfabWarning, Unknown
 from scanfab.io import registry
 from scanfab.io.reader import GrainTable, JoinedContacts, Snapshot
 from scanfab.io.registry import load_readers, reader_for, reader_named
-from scanfab.packing.packing import ContactList
+from scanfab.packing.contacts import ContactList
 from tests.helpers.dumps import dump_text, write
 from tests.helpers.truth import FLOOR, YADE
 

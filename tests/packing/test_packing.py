@@ -7,7 +7,8 @@ import pytest
 
 from scanfab.base.errors import PackingError, ScanfabWarning
 from scanfab.packing.cell import Cell
-from scanfab.packing.packing import ContactList, Packing
+from scanfab.packing.contacts import ContactList
+from scanfab.packing.packing import Packing
 
 ROW = np.array([[0.0, 0, 0], [1.9, 0, 0], [3.8, 0, 0]])
 

@@ -15,8 +15,8 @@ from scanfab.packing.packing import Packing
 from scanfab.pipeline.compute import compute_rows
 from scanfab.pipeline.frames import Frames
 from scanfab.pipeline.settings import Settings
+from scanfab.table.columns import COLUMNS
 from scanfab.table.formats.text import TextWriter
-from scanfab.table.table import COLUMNS
 from scanfab.viz.frame_view import look_at
 from scanfab.viz.scanned_frames import scan_frames
 from tests.helpers.dumps import dump_text, pairs_text, write, yade_spheres

@@ -11,8 +11,8 @@ from scanfab.base.errors import ReadError, SettingsError
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample
-from scanfab.pipeline.settings import AXES
 from scanfab.pipeline.strain import StrainFile, axial_length
+from scanfab.pipeline.values import AXES
 from tests.helpers.dumps import write
 
 POSITION = np.array([[1.0, 1, 1], [2, 3, 5], [1, 1, 0], [4, 4, 9]])

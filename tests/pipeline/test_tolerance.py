@@ -21,7 +21,8 @@ from scanfab.packing.sample import Sample
 from scanfab.pipeline import tolerance as adaptive
 from scanfab.pipeline.plan import REPLICATES, make_plan
 from scanfab.scan.directions import AUTO_RULE, DirectionRule
-from scanfab.scan.solids import CellGrains, Solids
+from scanfab.scan.kernels.periodic import CellGrains
+from scanfab.scan.solids import Solids
 from tests.helpers.lattices import shaken_cubic
 from tests.helpers.scanning import solids_of
 

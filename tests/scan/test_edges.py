@@ -11,8 +11,9 @@ from scanfab.base.convex import Convex
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.edges import EDGES
 from scanfab.scan.gaps import scan_gaps
+from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.lines import line_triads
-from scanfab.scan.solids import CellGrains, shortest_gap
+from scanfab.scan.solids import shortest_gap
 from tests.helpers import naive
 from tests.helpers.lattices import ball_points, rotation
 from tests.helpers.scanning import ratio, scan_triads

@@ -6,8 +6,8 @@ import pytest
 from scanfab import Cell, Solids, direction_rule, scan_lines, sphere
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.gaps import scan_gaps
+from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.lines import line_triads, turned_triads
-from scanfab.scan.solids import CellGrains
 from tests.helpers import naive
 from tests.helpers.lattices import poisson_spheres
 from tests.helpers.scanning import ratio, solids_of

@@ -12,12 +12,14 @@ import pytest
 
 import scanfab
 from scanfab.base.errors import ReadError, ScanfabError, SettingsError
+from scanfab.table.columns import COLUMNS
 from scanfab.table.compare import compare_tables
 from scanfab.table.formats import registry
 from scanfab.table.formats.registry import OWN_FORMATS
 from scanfab.table.reading import read_rows
 from scanfab.table.result_file import ResultFile
-from scanfab.table.table import COLUMNS, Row, Table, load
+from scanfab.table.row import Row
+from scanfab.table.table import Table, load
 
 # the columns that scripts rely on
 FIXED = """

@@ -14,11 +14,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scanfab.base.errors import SettingsError
+from scanfab.table.columns import COLUMNS
 from scanfab.table.formats.registry import OWN_FORMATS, format_of
 from scanfab.table.formats.text import TextWriter
 from scanfab.table.reading import read_rows
 from scanfab.table.result_file import ResultFile
-from scanfab.table.table import COLUMNS, Row, Table
+from scanfab.table.row import Row
+from scanfab.table.table import Table
 from scanfab.table.writing import Excerpt
 from tests.table.test_table import a_row
 

@@ -9,7 +9,7 @@ import pyvista
 import scanfab
 from scanfab.pipeline.compute import compute_rows
 from scanfab.pipeline.settings import Settings
-from scanfab.table.table import COLUMNS
+from scanfab.table.columns import COLUMNS
 from scanfab.viz.paraview import VtkFolder
 from scanfab.viz.vtk_files import Collection
 from tests.helpers.dumps import cubic_rows, dump_text, write

@@ -22,19 +22,6 @@ from scanfab.packing.boundary import CLASS_COLUMNS
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import LazyColumns, lies_within
 
-__all__ = [
-    "DIAMETER_NAMES",
-    "ID_NAMES",
-    "RADIUS_NAMES",
-    "grain_table",
-    "has_radius",
-    "refuse_cylindrical",
-    "refuse_named_twice",
-    "room_for_columns",
-    "user_cell",
-    "whole_numbers",
-]
-
 Columns = Mapping[str, npt.NDArray[Any]]
 
 # names are compared without regard to case

@@ -16,8 +16,6 @@ from scanfab.io.reader import FileKind, GrainTable, ReadOptions, Snapshot
 # LAMMPS called ids so until 2008
 OLD_ID = "tag"
 
-__all__ = ["binary_kind", "dump_kind", "read_binary_grains", "read_dump_grains"]
-
 
 def dump_kind(head: bytes) -> FileKind:
     """Grains are ATOMS; whatever else a text dump counts are contacts."""

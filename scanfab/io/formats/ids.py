@@ -14,19 +14,6 @@ from scanfab.io.formats.join import rows_of_ids
 from scanfab.io.parse.text_dump import DumpBlock
 from scanfab.io.reader import GrainTable
 
-__all__ = [
-    "IDS",
-    "MOST_ROWS",
-    "are_ids",
-    "are_whole",
-    "gaps",
-    "named_force",
-    "named_places",
-    "refuse_rounded_ids",
-    "touching_pairs",
-]
-
-
 # names of contact_columns: ids, force on the first grain, its tangential part if apart from it
 IDS = ("id1", "id2")
 FORCE = ("fx", "fy", "fz")

@@ -12,10 +12,7 @@ from scanfab.base.errors import ReadError
 from scanfab.base.lengths import MOST
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.reader import GrainTable, JoinedContacts
-from scanfab.packing.packing import ContactList
-
-__all__ = ["count_walls", "join_ids", "join_positions", "rows_of_ids"]
-
+from scanfab.packing.contacts import ContactList
 
 # an end of a contact within this fraction of a radius from a centre belongs to that grain
 SAME_PLACE = 0.01

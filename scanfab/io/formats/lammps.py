@@ -46,9 +46,6 @@ from scanfab.io.reader import (
     Snapshot,
 )
 
-__all__ = ["LammpsReader"]
-
-
 # LIGGGHTS writes neither of these items, and its bounds with six digits
 LAMMPS_ITEMS = re.compile(
     rb"^ITEM: (?:UNITS|TIME)[ \t]*\r?$"

@@ -17,9 +17,6 @@ from scanfab.io.parse.number_rows import exact_column
 from scanfab.io.reader import GrainTable, ReadOptions, Snapshot
 from scanfab.packing.cell import Cell
 
-__all__ = ["is_data_file", "of_liggghts", "read_data_grains", "step_of_data"]
-
-
 FIRST_LINE = re.compile(rb"\A(?:\xef\xbb\xbf)?LAMMPS data file[^\n]*")
 # the first line is a comment; these two must stand below it
 ATOMS = re.compile(rb"^[ \t]*\d{1,15}[ \t]+atoms[ \t]*(?:#[^\n]*)?\r?$", re.MULTILINE)

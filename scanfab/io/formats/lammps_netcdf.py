@@ -17,8 +17,6 @@ from scanfab.io.parse.fence import fenced, needed
 from scanfab.io.reader import FileKind, GrainTable, ReadOptions, Snapshot
 from scanfab.packing.cell import Cell
 
-__all__ = ["index_netcdf", "is_netcdf", "netcdf_kind", "read_netcdf_grains"]
-
 # classic, with long offsets, with long data; HDF5 is told apart by its content
 MAGIC = (b"CDF\x01", b"CDF\x02", b"CDF\x05")
 # AMBER's name of each triple, and whether its values are fractions of the box

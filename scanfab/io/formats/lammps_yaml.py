@@ -16,8 +16,6 @@ from scanfab.io.parse.number_rows import exact_column
 from scanfab.io.reader import FileKind, GrainTable, ReadOptions, Snapshot
 from scanfab.packing.cell import Cell
 
-__all__ = ["index_yaml", "is_yaml", "read_yaml_grains", "yaml_kind"]
-
 START = re.compile(rb"\A(?:\xef\xbb\xbf)?---[ \t]*\r?\ncreator:[ \t]*LAMMPS[ \t]*\r?\n")
 DATA = re.compile(rb"^data:[ \t]*\r?\n", re.MULTILINE)
 BEGIN, END = b"---", b"..."

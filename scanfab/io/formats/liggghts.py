@@ -37,7 +37,7 @@ from scanfab.io.formats.lammps_data import is_data_file, of_liggghts, read_data_
 from scanfab.io.formats.vtk import VtkReader, vectors
 from scanfab.io.parse.binary_dump import index_binary, is_binary, names_of_binary
 from scanfab.io.parse.text_dump import DumpBlock, index_dump, read_block, row_word
-from scanfab.io.parse.vtk_mesh import Mesh
+from scanfab.io.parse.vtk_data import Mesh
 from scanfab.io.reader import (
     Carries,
     FileKind,
@@ -47,9 +47,6 @@ from scanfab.io.reader import (
     Snapshot,
 )
 from scanfab.packing.walls import ListedWallForces
-
-__all__ = ["LiggghtsReader"]
-
 
 # values of compute pair/gran/local in the order in which they are written, and how many
 PAIR_VALUES = {

@@ -34,8 +34,6 @@ from scanfab.io.writers.on_dem import SCENE, STROKE, write_on_dem
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 
-__all__ = ["OnDemReader"]
-
 # what a positive normal force means, by draft: +1 compression
 SIGNS = {"0.1": 1.0, "0.2": -1.0}
 INTERACTIONS = "ONDEM/Interactions"

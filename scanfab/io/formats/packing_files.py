@@ -30,9 +30,7 @@ from scanfab.io.reader import (
 )
 from scanfab.io.writers.npz import COLUMN, MARK, NpzWriter
 from scanfab.packing.cell import Cell
-from scanfab.packing.packing import ContactList
-
-__all__ = ["PackingReader"]
+from scanfab.packing.contacts import ContactList
 
 
 class PackingReader(NpzWriter):

@@ -21,7 +21,6 @@ from scanfab.io.reader import GrainTable
 if TYPE_CHECKING:
     from scipy.spatial import KDTree
 
-__all__ = ["TOO_FEW", "proved_force", "row_base", "tell_left_out", "touch"]
 
 # grains by which nothing can be proved
 TOO_FEW = 10

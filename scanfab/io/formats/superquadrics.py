@@ -12,8 +12,6 @@ import numpy.typing as npt
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray
 
-__all__ = ["refuse_superquadrics"]
-
 # LIGGGHTS' names, the newer and the older: half axes, and exponents
 HALF_AXES = ("shapex", "shapey", "shapez")
 EXPONENTS = ("blockiness1", "blockiness2", "roundness1", "roundness2")

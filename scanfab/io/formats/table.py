@@ -56,8 +56,6 @@ from scanfab.io.reader import (
     Snapshot,
 )
 
-__all__ = ["EdemReader", "PfcReader", "TableReader"]
-
 # what must be a number in each row, and what a whole one
 NUMBERS = ("x", "y", "z", "radius", "diameter", "volume", "id", "id1", "id2")
 WHOLE = ("id", "id1", "id2")

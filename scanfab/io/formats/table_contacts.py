@@ -17,8 +17,6 @@ from scanfab.io.formats.join import count_walls, join_ids, rows_of_ids
 from scanfab.io.formats.proof import NEARLY_ALL, proved_force, row_base
 from scanfab.io.reader import GrainTable, JoinedContacts
 
-__all__ = ["join_table"]
-
 Columns = Mapping[str, npt.NDArray[Any]]
 
 # what programs call a contact of two grains; whatever else is one with a wall

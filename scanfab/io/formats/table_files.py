@@ -36,8 +36,6 @@ from scanfab.io.parse.sheet_layout import (
 from scanfab.io.parse.text_table import has_pieces, read_to_end
 from scanfab.io.unpacking import check_lines
 
-__all__ = ["Columns", "has_ids", "names_of", "read_table", "read_unnamed"]
-
 Columns = dict[str, npt.NDArray[Any]]
 
 

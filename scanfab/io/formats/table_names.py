@@ -17,23 +17,6 @@ from scanfab.io.formats.columns import (
     refuse_named_twice,
 )
 
-__all__ = [
-    "CONTACTS",
-    "EDEM",
-    "PERHAPS_FRAMES",
-    "PFC",
-    "TABLE",
-    "Names",
-    "check_one_unit",
-    "find_columns",
-    "is_contacts",
-    "is_frame_name",
-    "is_of_contacts",
-    "plain_name",
-    "unique",
-    "warn_of_lacking_unit",
-]
-
 Names = Mapping[str, tuple[str, ...]]
 """The names that a column may have, by what it is; as :func:`plain_name` has them."""
 

@@ -24,7 +24,8 @@ from scanfab.io.formats.vtp_packing import (
     says_all,
 )
 from scanfab.io.formats.yade_cells import cell_beside, cell_file, is_cell_file
-from scanfab.io.parse.vtk_mesh import Mesh, elements, form_of, listed, read_bounds, read_mesh
+from scanfab.io.parse.vtk_data import Mesh
+from scanfab.io.parse.vtk_mesh import elements, form_of, listed, read_bounds, read_mesh
 from scanfab.io.reader import (
     Carries,
     FileKind,
@@ -34,10 +35,7 @@ from scanfab.io.reader import (
     Snapshot,
 )
 from scanfab.packing.cell import Cell
-from scanfab.packing.packing import ContactList
-
-__all__ = ["VtkReader", "vectors"]
-
+from scanfab.packing.contacts import ContactList
 
 # other kinds of VTK files are grids and indexes of files
 HOLDING_POINTS = (

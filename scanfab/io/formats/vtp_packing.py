@@ -11,11 +11,9 @@ import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.io.files import first_bytes
-from scanfab.io.parse.vtk_mesh import Mesh
+from scanfab.io.parse.vtk_data import Mesh
 from scanfab.packing.cell import Cell
-from scanfab.packing.packing import ContactList
-
-__all__ = ["cell_of", "contacts_of", "is_packing", "moment_of", "says_all"]
+from scanfab.packing.contacts import ContactList
 
 KNOWN = "scanfab_contacts"
 MOMENT = re.compile(

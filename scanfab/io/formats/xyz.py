@@ -29,8 +29,6 @@ from scanfab.io.written import own_columns, standard_columns
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 
-__all__ = ["XyzReader"]
-
 COUNT = re.compile(rb"\A(?:\xef\xbb\xbf)?[ \t]*([0-9]{1,15})[ \t]*\r?\n")
 # key=value, the value in quotes if it has blanks
 PAIR = re.compile(r"([A-Za-z_][\w.-]*)\s*=\s*(?:\"([^\"]*)\"|([^\s\"]+))")

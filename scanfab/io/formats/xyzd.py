@@ -16,8 +16,6 @@ from scanfab.io.files import bare_name
 from scanfab.io.formats.proof import touch
 from scanfab.io.parse.sheet_binary import read_xyzd
 
-__all__ = ["is_xyzd", "prove_xyzd", "read_xyzd_columns"]
-
 POROSITY = r"(?i)^\s*{}\s*porosity\s*:?\s*([0-9.eE+-]+)"
 
 

@@ -29,9 +29,6 @@ from scanfab.io.reader import (
 from scanfab.io.unpacking import check_lines
 from scanfab.packing.cell import Cell
 
-__all__ = ["YadeReader"]
-
-
 # legacy VTK by VTKExporter: VTK itself writes no dot behind the version
 EXPORTER_HEAD = b"# vtk DataFile Version 3.0.\n"
 PERIODIC_HEAD = b"##PERIODIC::"

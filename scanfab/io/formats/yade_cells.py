@@ -18,14 +18,12 @@ import numpy as np
 
 from scanfab.base.errors import PackingError, ReadError, ScanfabNote, ScanfabWarning
 from scanfab.base.typing import FloatArray
-from scanfab.io.files import COMPRESSED_SUFFIXES, Stamp, bare_name, stamp_of
+from scanfab.io.files import Stamp, bare_name, stamp_of
 from scanfab.io.formats.yade_save import is_save, read_save, snapshot_of_save
 from scanfab.io.parse.vtk_mesh import read_mesh
 from scanfab.io.reader import ReadOptions
+from scanfab.io.unpacking import COMPRESSED_SUFFIXES
 from scanfab.packing.cell import Cell
-
-__all__ = ["cell_beside", "cell_file", "is_cell_file", "refuse_as_numbers"]
-
 
 EXPORTED = re.compile(r"(.*)-spheres-(\d+)\.vtk")
 RECORDED = re.compile(r"(.*)spheres\.(\d+)\.vtu")

@@ -23,9 +23,6 @@ from scanfab.io.unpacking import Readable
 from scanfab.packing.cell import Cell
 from scanfab.packing.walls import ListedWallForces
 
-__all__ = ["is_binary_save", "is_save", "read_save", "snapshot_of_save"]
-
-
 STEP = re.compile(rb"<iter>\s*(\d{1,18})\s*</iter>")
 TIME = re.compile(rb"<time>\s*([-+.\deE]+)\s*</time>")
 

@@ -22,8 +22,6 @@ from scanfab.io.parse.lammps_box import box_of_bounds, box_vectors
 from scanfab.io.reader import Snapshot
 from scanfab.packing.cell import Cell
 
-__all__ = ["BinaryDump", "index_binary", "is_binary", "names_of_binary", "read_binary"]
-
 MAGIC = (b"DUMPCUSTOM", b"DUMPATOM")
 # no sound header says more: what does is damaged, and would only take memory
 MOST_COLUMNS, MOST_TEXT = 1000, 1 << 16

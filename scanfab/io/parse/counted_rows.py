@@ -16,8 +16,6 @@ from scanfab.io.parse.text_table import FILLED, LONG, parse_rows
 from scanfab.io.reader import Snapshot
 from scanfab.io.unpacking import check_lines
 
-__all__ = ["counted_rows", "leave_out_last", "lines_above", "skip_rows", "spelt", "text_of"]
-
 # bytes that are read at a time
 PIECE = 1 << 20
 # times its size in memory: the text, its numbers, and the columns made of them

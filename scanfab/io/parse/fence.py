@@ -27,8 +27,6 @@ from scanfab.base.errors import ReadError
 from scanfab.base.memory import free_memory
 from scanfab.io.files import Stamp, check_memory, stamp_of
 
-__all__ = ["fenced", "needed"]
-
 # seconds for a file, and bytes that are read in one more; and for the process to start
 SECONDS, PER_SECOND = 8.0, 10e6
 SECONDS_TO_START = 120.0

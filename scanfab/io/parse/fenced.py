@@ -18,8 +18,6 @@ from typing import IO, Any
 
 import numpy as np
 
-__all__ = ["main"]
-
 # seconds that are left to whoever asks to end this process; it may be gone
 SPARE = 2
 Answer = tuple[dict[str, Any], dict[str, Any]]

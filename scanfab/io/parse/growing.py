@@ -9,8 +9,6 @@ from contextvars import ContextVar
 
 from scanfab.base.errors import ScanfabWarning
 
-__all__ = ["growing", "warn_incomplete"]
-
 _grows: ContextVar[bool] = ContextVar("grows", default=False)
 
 

@@ -6,8 +6,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["read_gsd"]
-
 STEP = "configuration/step"
 GROUPS = ("particles/", "configuration/", "log/particles/")
 

@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["read_hdf"]
-
 # filters that HDF5 and h5py have themselves: another one would be looked for on the disk, and run
 FILTERS = {1, 2, 3, 4, 5, 6, 32000}  # deflate, shuffle, fletcher32, szip, nbit, scaleoffset, lzf
 MOST_OBJECTS = 100_000

@@ -7,8 +7,6 @@ import numpy.typing as npt
 
 from scanfab.base.jit import inner, kernel
 
-__all__ = ["count_spaces", "single_blanks"]
-
 # white space is what is not above a blank
 BLANK, LINE_END, TAB, RETURN = 32, 10, 9, 13
 # so many can be counted in a byte, of which vector instructions take more at a time

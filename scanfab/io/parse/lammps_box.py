@@ -11,9 +11,6 @@ from scanfab.base.lengths import MOST
 from scanfab.base.typing import FloatArray
 from scanfab.packing.cell import Cell
 
-__all__ = ["box_of_bounds", "box_vectors", "dump_cell"]
-
-
 # of the lower and the upper face
 BOUNDARY = re.compile("pp|[fsm][fsm]")
 

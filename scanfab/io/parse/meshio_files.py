@@ -10,8 +10,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["read_faces", "read_xdmf"]
-
 # VTK's numbers of the cells that may be grains or contacts; any other is a face or a solid
 TYPES = {"vertex": 1, "line": 3}
 OTHER = 7

@@ -12,8 +12,6 @@ import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
 
-__all__ = ["ROUNDED", "exact_column", "number_or_nan", "plain_reason", "rows_of_numbers"]
-
 # whole numbers from here on may be rounded as decimals
 ROUNDED = 2.0**53
 

@@ -16,16 +16,6 @@ from scanfab.base.typing import FloatArray
 from scanfab.io.files import check_memory, plain
 from scanfab.io.unpacking import check_times
 
-__all__ = [
-    "IS_NPZ",
-    "IS_PARQUET",
-    "npz_shapes",
-    "parquet_names",
-    "read_npz",
-    "read_parquet",
-    "read_xyzd",
-]
-
 Arrays = dict[str, npt.NDArray[Any]]
 
 IS_PARQUET = b"PAR1"

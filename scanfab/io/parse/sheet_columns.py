@@ -19,8 +19,6 @@ from scanfab.base.errors import ReadError
 from scanfab.io.parse.sheet_layout import Layout, fields_of, refuse_control
 from scanfab.io.parse.text_table import as_array, squeezed
 
-__all__ = ["Arrays", "read_columns"]
-
 Arrays = dict[int, npt.NDArray[Any]]
 
 # how compressed files begin that are text at their first byte: polars would unpack them

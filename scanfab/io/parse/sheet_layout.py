@@ -17,19 +17,6 @@ from scanfab.base.errors import ReadError
 from scanfab.io.files import check_memory, plain
 from scanfab.io.unpacking import check_lines
 
-__all__ = [
-    "HEAD",
-    "IN_MEMORY",
-    "Layout",
-    "check_width",
-    "fields_of",
-    "first_rows",
-    "is_number",
-    "layout_of",
-    "read_text",
-    "refuse_control",
-]
-
 # of a file, in which the names and the first rows stand
 HEAD = 1 << 18
 # times the size of a text that it takes with its numbers

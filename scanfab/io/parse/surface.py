@@ -12,8 +12,6 @@ from scanfab.io.files import check_memory
 from scanfab.io.parse.fence import fenced
 from scanfab.io.parse.vtk_mesh import read_faces
 
-__all__ = ["SUFFIXES", "read_surface"]
-
 SUFFIXES = (".stl", ".vtp", ".ply", ".obj")
 
 

@@ -31,8 +31,6 @@ from scanfab.io.unpacking import check_lines
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import LazyColumns
 
-__all__ = ["DumpBlock", "index_dump", "read_block", "read_columns", "row_word"]
-
 Columns = dict[str, npt.NDArray[Any]]
 
 # a snapshot's header never comes near this size, whatever the number of columns

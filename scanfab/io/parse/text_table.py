@@ -22,21 +22,6 @@ import numpy.typing as npt
 from scanfab.base.memory import free_memory
 from scanfab.base.threads import in_order
 
-__all__ = [
-    "FILLED",
-    "LARGE",
-    "LONG",
-    "TextTable",
-    "as_array",
-    "has_pieces",
-    "parse_columns",
-    "parse_rows",
-    "parse_some",
-    "read_regular",
-    "read_to_end",
-    "squeezed",
-]
-
 # bytes; a smaller table is parsed before polars is loaded
 LARGE = 8 << 20
 # bytes that are parsed at a time: the memory of one piece serves the next, which is faster than new

@@ -16,9 +16,6 @@ import numpy.typing as npt
 
 from scanfab.io.parse.vtk_data import FlawError, numbers
 
-__all__ = ["LARGE", "StoredArray", "XmlFile", "arrays_in", "elements_of"]
-
-
 TYPES = {
     "Int8": "i1",
     "UInt8": "u1",

@@ -10,8 +10,6 @@ import numpy.typing as npt
 
 from scanfab.base.typing import FloatArray, IntArray
 
-__all__ = ["Arrays", "Cells", "Content", "FlawError", "Mesh", "joined", "mesh_of", "numbers"]
-
 Arrays = dict[str, npt.NDArray[Any]]
 
 VTK_VERTEX, VTK_POLY_VERTEX, VTK_LINE = 1, 2, 3

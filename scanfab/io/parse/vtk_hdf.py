@@ -14,8 +14,6 @@ from scanfab.io.files import plain
 from scanfab.io.parse.fence import fenced
 from scanfab.io.parse.vtk_data import Arrays, Cells, Content, FlawError, joined
 
-__all__ = ["HdfFile", "content_of_hdf", "form_of_hdf", "is_hdf", "read_hdf_file"]
-
 MAGIC = b"\x89HDF\r\n\x1a\n"
 GROUP = "VTKHDF"
 BLOCKS = ("MultiBlockDataSet", "PartitionedDataSetCollection")

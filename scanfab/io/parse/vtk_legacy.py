@@ -14,9 +14,6 @@ from scanfab.base.arrays import doubles
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.parse.vtk_data import Arrays, Cells, Content, FlawError, numbers
 
-__all__ = ["read_legacy"]
-
-
 # numpy's types of VTK's; a binary file has the most significant byte first
 TYPES = {
     "bit": "u1",  # eight to a byte in a binary file

@@ -25,8 +25,6 @@ from scanfab.io.parse.vtk_hdf import content_of_hdf, form_of_hdf, is_hdf
 from scanfab.io.parse.vtk_legacy import read_legacy
 from scanfab.io.parse.vtk_xml import read_xml
 
-__all__ = ["Mesh", "elements", "form_of", "listed", "read_bounds", "read_faces", "read_mesh"]
-
 # bytes for each of a file: its text, the words of a part of it, the numbers that they are
 OF_TEXT = 4.0
 # files that list the pieces of one frame

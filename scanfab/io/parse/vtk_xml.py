@@ -14,8 +14,6 @@ from scanfab.base.typing import IntArray
 from scanfab.io.parse.vtk_arrays import LARGE, StoredArray, XmlFile, arrays_in
 from scanfab.io.parse.vtk_data import Arrays, Cells, Content, FlawError, joined
 
-__all__ = ["count_rows", "read_xml"]
-
 # sections of cells, in the order of the rows of cell arrays
 CELLS = ("Verts", "Lines", "Polys", "Strips", "Cells")
 # cells for each point: grains have no more contacts on average

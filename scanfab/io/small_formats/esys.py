@@ -15,8 +15,6 @@ from scanfab.io.parse.counted_rows import counted_rows, spelt, text_of
 from scanfab.io.reader import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
 from scanfab.packing.cell import Cell
 
-__all__ = ["EsysReader"]
-
 # version of the layout; steps in all, length of a step, step; then the box in words
 HEADER = re.compile(
     rb"\A(?:\xef\xbb\xbf)?V\s+(\d{1,3})\s+(\d{1,18})\s+([-+.\deE]+)\s+(\d{1,18})\s+(?:ESyS|LSM)[^\n]*\n"

@@ -20,8 +20,6 @@ from scanfab.io.parse.fence import fenced, needed
 from scanfab.io.reader import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
 from scanfab.packing.cell import Cell
 
-__all__ = ["GsdReader"]
-
 # the first eight bytes of a file, least first
 MAGIC = (0x65DF65DF65DF65DF).to_bytes(8, "little")
 PARTICLES = "particles/"

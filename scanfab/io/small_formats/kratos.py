@@ -24,8 +24,6 @@ from scanfab.io.reader import (
     Snapshot,
 )
 
-__all__ = ["KratosReader"]
-
 START = re.compile(rb"^[ \t]*Begin[ \t]+(?:ModelPartData|Properties|Nodes|Table)\b", re.MULTILINE)
 COMMENT = re.compile(rb"//[^\n]*")
 # the first and the last line of a block, which may hold others

@@ -18,8 +18,6 @@ from scanfab.io.reader import FileKind, GrainTable, JoinedContacts, ReadOptions,
 from scanfab.io.unpacking import check_lines
 from scanfab.packing.cell import Cell
 
-__all__ = ["LfDemReader"]
-
 HEAD = re.compile(rb"\A(?:\xef\xbb\xbf)?# LF_DEM version")
 # what a column holds, or a range of them
 LEGEND = re.compile(rb"^#(\d{1,3})(?:-(\d{1,3}))?:[ \t]*([^\r\n]*)", re.MULTILINE)

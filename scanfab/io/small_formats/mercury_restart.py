@@ -18,8 +18,6 @@ from scanfab.io.parse.counted_rows import spelt, text_of
 from scanfab.io.reader import GrainTable, ReadOptions, Snapshot
 from scanfab.packing.cell import Cell
 
-__all__ = ["is_restart", "read_restart", "time_of_restart"]
-
 HEAD = re.compile(rb"\A(?:\xef\xbb\xbf)?(?:restart_version|MercuryDPM)[ \t]+[\d.]+")
 SECTION = re.compile(rb"^(Particles|Interactions|Boundaries|Walls)[ \t]+(\d{1,12})[ \t]*\r?$")
 TIME = re.compile(rb"^(?:timeStep|dt)[ \t]+\S+[ \t]+(?:time|t)[ \t]+(\S+)", re.MULTILINE)

@@ -31,8 +31,6 @@ from scanfab.io.reader import (
 from scanfab.io.small_formats.mercury_restart import is_restart, read_restart, time_of_restart
 from scanfab.packing.cell import Cell
 
-__all__ = ["MercuryReader"]
-
 PLANE = ["x", "y", "vx", "vy", "radius", "angle", "omega", "species"]
 TURNS = ["q1", "q2", "q3", "wx", "wy", "wz"]
 SPACE = ["x", "y", "z", "vx", "vy", "vz", "radius", *TURNS, "species"]

@@ -22,8 +22,6 @@ from scanfab.io.reader import (
     Snapshot,
 )
 
-__all__ = ["MfixReader"]
-
 VERSION = re.compile(rb"\A(?:\xef\xbb\xbf)?[ \t]*Version[ \t]+(\d+\.\d+)[ \t]*\r?\n", re.IGNORECASE)
 NAME = re.compile(r"(?i).*particle_input.*\.dat")
 # version 1, in the plane and in space: the third or fourth column is the radius

@@ -20,8 +20,6 @@ from scanfab.io.parse.text_table import parse_some
 from scanfab.io.reader import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
 from scanfab.packing.cell import Cell
 
-__all__ = ["MusenReader"]
-
 # id, type, and for a sphere two numbers as its geometry, radius and contact radius
 FIRST = re.compile(rb"\A(?:\xef\xbb\xbf)?0 \d{1,15} 1 (?:1|9|13|14) 5 ")
 ID, TIME, GEOMETRY, PLACE, ACTIVE = b"0", b"2", b"5", b"12", b"24"

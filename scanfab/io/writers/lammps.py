@@ -16,8 +16,6 @@ from scanfab.io.written import flat, more_columns, own_columns, standard_columns
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 
-__all__ = ["LammpsDataWriter", "LammpsDumpWriter"]
-
 Columns = dict[str, npt.NDArray[Any]]
 
 # words that begin or end what a reader looks for

@@ -11,8 +11,6 @@ from scanfab.io.writer import Left
 from scanfab.io.written import own_columns, standard_columns
 from scanfab.packing.packing import Packing
 
-__all__ = ["COLUMN", "MARK", "NpzWriter"]
-
 # which makes it a packing, and not any arrays; its value is the version of the layout
 MARK = "scanfab_packing"
 # before the names of the columns of the grains

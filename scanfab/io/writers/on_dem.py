@@ -12,8 +12,6 @@ from scanfab.io.writer import Left
 from scanfab.io.written import own_columns, standard_columns
 from scanfab.packing.packing import Packing
 
-__all__ = ["SCENE", "STROKE", "write_on_dem"]
-
 SCENE = "ONDEM/Scene"
 # in the place of / in the names of columns
 STROKE = "\u2215"

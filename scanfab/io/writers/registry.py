@@ -12,8 +12,6 @@ from scanfab.base.plugins import Offer, having, load_offers
 from scanfab.io.registry import lacking
 from scanfab.io.writer import Writer
 
-__all__ = ["installed_writers", "writer_for", "writer_named"]
-
 GROUP = "scanfab.writers"
 
 

@@ -13,8 +13,6 @@ from scanfab.io.writer import Left
 from scanfab.io.written import flat, free_name, own_columns, standard_columns
 from scanfab.packing.packing import Packing
 
-__all__ = ["CsvWriter", "ParquetWriter", "TsvWriter", "table_of"]
-
 Columns = dict[str, npt.NDArray[Any]]
 
 

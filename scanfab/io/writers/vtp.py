@@ -14,8 +14,6 @@ from scanfab.io.writer import Left
 from scanfab.io.written import own_columns, standard_columns
 from scanfab.packing.packing import Packing
 
-__all__ = ["VtpWriter"]
-
 TYPES = {
     "i1": "Int8",
     "u1": "UInt8",

@@ -14,17 +14,6 @@ from typing import Any
 
 from scanfab.base.errors import ScanfabError
 
-__all__ = [
-    "ClusterError",
-    "Pulse",
-    "address_in",
-    "blind",
-    "check_that_one_listens",
-    "connected",
-    "outdated",
-    "unloadable",
-]
-
 # seconds within which a scheduler answers when it is called
 TIMEOUT = 10.0
 # seconds between two questions while frames are computed, and for which it may leave one open

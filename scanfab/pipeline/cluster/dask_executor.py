@@ -39,8 +39,6 @@ from scanfab.pipeline.cluster.on_worker import (
 )
 from scanfab.pipeline.cluster.packed import Packed
 
-__all__ = ["ClusterError", "DaskExecutor", "dask_executor"]
-
 NEEDS = "a Dask cluster needs the package distributed: pip install 'scanfab[cluster]'"
 # of a frame that raises errors, or takes its worker down
 TRIES = 3

@@ -26,8 +26,6 @@ from scanfab.table.row import Row
 from scanfab.table.table import Table
 from scanfab.table.writing import Excerpt
 
-__all__ = ["Merged", "check_output", "merge_tables", "merged"]
-
 # what the parts of one table may differ in: their frames, and of which series these are
 FREE = ("frames", "sources")
 

@@ -15,17 +15,6 @@ from typing import Any
 from scanfab.base.errors import ScanfabError
 from scanfab.pipeline.cluster.packed import unpacked
 
-__all__ = [
-    "Failed",
-    "Outdated",
-    "computed_there",
-    "file_of",
-    "scanned_there",
-    "sendable",
-    "versions_here",
-    "view_there",
-]
-
 # what decides numbers, or reads what is sent
 PACKAGES = ("scanfab", "numpy", "numba", "scipy", "polars", "dask", "distributed")
 # names that tell what a folder holds

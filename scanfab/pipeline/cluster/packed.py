@@ -9,8 +9,6 @@ from typing import Any
 
 from scanfab.scan.solids import Solids
 
-__all__ = ["Packed", "unpacked"]
-
 
 @dataclass(frozen=True)
 class Packed:

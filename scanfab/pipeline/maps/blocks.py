@@ -17,8 +17,6 @@ from scanfab.pipeline.maps.settings import MapSettings
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.lines import line_triads
 
-__all__ = ["MapBlocks", "map_blocks", "splits_of"]
-
 # of a block's thickness, in mean radii: below the one it holds less than a grain, below the other
 # hardly any that its neighbours do not hold a part of
 REFUSED_BELOW, DOUBTED_BELOW = 1.0, 4.0

@@ -12,8 +12,6 @@ from scanfab.pipeline.frames import Source
 from scanfab.pipeline.maps.settings import MapSettings
 from scanfab.table.table import Table
 
-__all__ = ["fabric_map"]
-
 
 def fabric_map(
     source: Source,

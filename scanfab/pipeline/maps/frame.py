@@ -35,8 +35,6 @@ from scanfab.pipeline.variant_columns import doubts_of_lines, edge_of, left_out_
 from scanfab.scan.blocks import Blocks
 from scanfab.table.map_columns import map_row
 
-__all__ = ["HOMOGENEITY", "MapResult", "map_frame"]
-
 HOMOGENEITY = "homogeneity"
 """The code of a note: whether the blocks of a variant scatter more than their errors."""
 # the chance below which a sample is said not to be homogeneous

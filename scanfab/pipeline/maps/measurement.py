@@ -25,8 +25,6 @@ from scanfab.scan.gaps import GapSums, scan_gaps
 from scanfab.scan.scan import ScanSums
 from scanfab.scan.solids import Solids
 
-__all__ = ["MapMeasurement", "MapSums", "PartSums", "measure_map"]
-
 # Of the scan for the sample's scatter in each block: replicates, from which its noise is known, and
 # axes, so many that the choice of them adds little: along 16 the error of a block of a hundred
 # grains would scatter by a quarter of its value.

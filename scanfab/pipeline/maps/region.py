@@ -14,8 +14,6 @@ from scanfab.pipeline.maps.measurement import MapMeasurement
 from scanfab.pipeline.maps.surface import cut_by_hull, cut_by_window, volumes_inside
 from scanfab.scan.edges import ENDS, START
 
-__all__ = ["Region"]
-
 
 class Region:
     """The blocks of the whole sample, of a and b, or of the window, of c and d."""

@@ -13,7 +13,6 @@ from scanfab.pipeline.settings import Settings
 if TYPE_CHECKING:
     from scanfab.base.column import Column
 
-__all__ = ["BLOCK_OPTIONS", "MapSettings", "is_map"]
 
 BLOCK_OPTIONS = ("grid", "slices", "shells")
 

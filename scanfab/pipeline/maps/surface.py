@@ -10,8 +10,6 @@ from scanfab.fabric.distribution import sphere_points
 from scanfab.packing.sample import Sample
 from scanfab.scan.blocks import Blocks
 
-__all__ = ["cut_by_hull", "cut_by_window", "volumes_inside"]
-
 # of the mean radius: blocks further inside lose next to no segments that leave the sample
 DEPTH = 2.0
 # of unit vectors for the ball about a corner, and for the surface of a shell

@@ -35,9 +35,6 @@ from scanfab.scan.kernels.strips import (
 from scanfab.scan.kernels.sweep import CHORDS, NOTHING, STEPS, Measured, settle, visit
 from scanfab.scan.kernels.windows import Clip, Section, section_along
 
-__all__ = ["scan_axes", "scan_cell"]
-
-
 SMALLEST = 5e-324
 
 

@@ -24,8 +24,6 @@ from scanfab.scan.kernels.strips import (
 )
 from scanfab.scan.kernels.sweep import KEPT, LEFT, LENGTH, STEPS, WINDOW
 
-__all__ = ["Beyond", "follow_beyond"]
-
 
 class Beyond(NamedTuple):
     """What lies beyond a window, as the lines along one axis meet it."""

@@ -16,22 +16,6 @@ from scanfab.scan.kernels.edges import listed_to
 from scanfab.scan.kernels.strips import FAR, Edge
 from scanfab.scan.kernels.sweep import Measured
 
-__all__ = [
-    "LENGTH",
-    "NUMBER",
-    "OF_WHOLE",
-    "OF_WINDOW",
-    "SQUARE",
-    "Bins",
-    "Partition",
-    "add_gaps",
-    "bins_along",
-    "list_gap",
-    "no_bins",
-    "room_for_gaps",
-]
-
-
 # what is added up of the gaps of a block and bin
 NUMBER, LENGTH, SQUARE = range(3)
 # whose gaps they are

@@ -22,8 +22,6 @@ LEAST = {"nnan", "nsz", "contract"}
 # of a cell: nearer to the grid than that a ray is in it, but for rounding
 SLIGHT = 1e-9
 
-__all__ = ["Cells", "Ray", "fill_cells", "next_solid", "room_for_ray"]
-
 
 class Cells(NamedTuple):
     """Grains by the cell of a grid."""

@@ -22,8 +22,6 @@ from __future__ import annotations
 from scanfab.base.jit import Flag, inner
 from scanfab.scan.kernels.strips import FAR, Edge
 
-__all__ = ["CLIPPED", "WEIGHED", "ends_inside", "listed_to", "window_gap"]
-
 # Of the margin: segments that reach so far are followed, whatever rounding says of its very end.
 NEARLY = 1.0 - 1e-6
 

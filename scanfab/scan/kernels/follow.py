@@ -16,9 +16,6 @@ from scanfab.scan.kernels.periodic import CellGrains, Prism, cross, dot, shifts
 from scanfab.scan.kernels.strips import END, ENTRY, FAR, SET, Strip
 from scanfab.scan.kernels.sweep import CHANNELS, KEPT, LENGTH, STEPS, VOID, WHOLE
 
-__all__ = ["follow"]
-
-
 # a line that has met nothing along so many cells and mean free paths, and has passed by so many
 # grains, stays in a channel; in media more dilute than any sample one that has passed by many more
 MOST_CELLS = 64

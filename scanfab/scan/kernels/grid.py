@@ -14,8 +14,6 @@ from scanfab.base.jit import inner
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.kernels.strips import Strip
 
-__all__ = ["Grid", "bounds", "cover", "open_grid", "part_of", "sheared_grid", "strip_of"]
-
 
 class Grid(NamedTuple):
     """Lines at (first_u + column * spacing, first_v + row * spacing), low <= column < high."""

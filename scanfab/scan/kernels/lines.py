@@ -21,8 +21,6 @@ from scanfab.scan.kernels.strips import (
 )
 from scanfab.scan.kernels.sweep import Measured, add, counted, is_listed, moved
 
-__all__ = ["solve_closed"]
-
 
 @inner()
 def cut(

@@ -39,17 +39,6 @@ from scanfab.scan.kernels.strips import (
 )
 from scanfab.scan.kernels.sweep import CHORDS, Measured, add, both, is_listed, meet, moved
 
-__all__ = [
-    "LISTED_LINES",
-    "Lists",
-    "bin_last_gaps",
-    "bin_lists",
-    "list_chords",
-    "room_for_lists",
-    "sweep_lists",
-]
-
-
 # lines swept side by side; their lists lie together, first the first chord of each line
 ABREAST = 64
 # chords that a list has room for; as soon as one is in the second half, whose places have a bit of

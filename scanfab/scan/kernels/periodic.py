@@ -20,18 +20,6 @@ from scanfab.scan.kernels.grid import Grid, sheared_grid
 from scanfab.scan.kernels.projection import Spheres, in_order, order_of, range_of, room_for_spheres
 from scanfab.scan.kernels.sweep import Measured
 
-__all__ = [
-    "CellGrains",
-    "Prism",
-    "cell_grid",
-    "cross",
-    "dot",
-    "measured_in",
-    "prism_along",
-    "shifts",
-]
-
-
 # how far beyond the prism solids are listed at once, in mean radii; longer gaps are followed alone
 BEYOND = 16.0
 

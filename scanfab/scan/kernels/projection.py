@@ -11,20 +11,6 @@ from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.scan.kernels.grid import Grid
 from scanfab.scan.kernels.strips import FAR, Edge, Sphere, span
 
-__all__ = [
-    "Spheres",
-    "in_order",
-    "number_from",
-    "order_of",
-    "project",
-    "range_of",
-    "room_for_spheres",
-    "sort_by",
-    "sort_into_strips",
-    "sphere_at",
-]
-
-
 # a bucket with more indices is sorted by itself, and not with all others
 FEW = 16
 

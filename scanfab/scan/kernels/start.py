@@ -31,8 +31,6 @@ from scanfab.scan.kernels.strips import (
     span,
 )
 
-__all__ = ["begins_at", "last_gap", "met_beyond", "reaches_in", "settled_gap", "visit_beyond"]
-
 
 @inner(forceinline=True, error_model="numpy")
 def met_beyond(

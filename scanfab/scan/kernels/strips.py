@@ -16,29 +16,6 @@ from scanfab.base.jit import LANES, Flag, inner, kernel
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.kernels.windows import Clip, Section, section_along
 
-__all__ = [
-    "BEFORE",
-    "BEHIND",
-    "END",
-    "ENTRY",
-    "EXIT",
-    "FAR",
-    "GAP_END",
-    "GAP_START",
-    "MOST_LINES",
-    "SET",
-    "STATE_SIZE",
-    "Edge",
-    "Sphere",
-    "Strip",
-    "begin",
-    "columns_of_row",
-    "measure_from",
-    "span",
-    "spans",
-]
-
-
 # infinity
 FAR = 1e300
 # the state of a strip's lines fits a core's cache; its planes lie at a fixed distance, by which the

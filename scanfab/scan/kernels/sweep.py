@@ -46,29 +46,6 @@ from scanfab.scan.kernels.strips import (
     span,
 )
 
-__all__ = [
-    "CHANNELS",
-    "CHORDS",
-    "KEPT",
-    "LEFT",
-    "LENGTH",
-    "LINES",
-    "LINE_LENGTH",
-    "NOTHING",
-    "STEPS",
-    "TALLY_SIZE",
-    "VOID",
-    "WHOLE",
-    "WINDOW",
-    "Measured",
-    "counted",
-    "is_listed",
-    "moved",
-    "settle",
-    "visit",
-    "whole_gap",
-]
-
 Sums = tuple[float, float, float, float, float, float]
 
 # the compiler leaves out what adds it: unlike 0, it changes no number, not even -0

@@ -9,8 +9,6 @@ import numpy as np
 from scanfab.base.jit import inner
 from scanfab.base.typing import FloatArray
 
-__all__ = ["Clip", "Section", "section_along"]
-
 # Of the quadric's own size: along a line for which it changes less than that by rounding alone, it
 # does not change at all. Such a line, one along a cylinder's axis, leaves it far beyond the planes.
 FLAT, LEAST = 1e-15, 1e-300

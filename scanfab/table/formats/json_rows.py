@@ -10,8 +10,6 @@ from scanfab.base.column import Column
 from scanfab.base.errors import ReadError, SettingsError
 from scanfab.table.formats.text import named_after, text_of
 
-__all__ = ["JsonArray", "JsonLines"]
-
 
 class JsonArray:
     """One array of objects."""

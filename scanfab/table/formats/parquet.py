@@ -9,8 +9,6 @@ from typing import IO, Any
 from scanfab.base.column import Column
 from scanfab.base.errors import ReadError, SettingsError
 
-__all__ = ["Parquet"]
-
 NEEDS = "Parquet files need the package pyarrow: pip install pyarrow"
 
 

@@ -14,15 +14,6 @@ from scanfab.table.formats.json_rows import JsonArray, JsonLines
 from scanfab.table.formats.parquet import Parquet
 from scanfab.table.formats.text import SeparatedText
 
-__all__ = [
-    "OWN_FORMATS",
-    "RowWriter",
-    "TableFormat",
-    "format_of",
-    "known_formats",
-    "reading_format",
-]
-
 GROUP = "scanfab.table_formats"
 
 

@@ -14,8 +14,6 @@ from scanfab.base.errors import ReadError
 from scanfab.base.files import named_errors
 from scanfab.table.columns import MORE_COLUMNS, OWN_COLUMNS
 
-__all__ = ["SeparatedText", "TextWriter", "named_after", "text_of"]
-
 # words that may look like numbers: a source may be called 2024
 TEXT_COLUMNS = {one.name for one in (*OWN_COLUMNS, *MORE_COLUMNS) if one.kind is str}
 

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Page
     from matplotlib.figure import SubFigure
 
-__all__ = ["Ladders"]
 
 # ladder: label of the axis, whether it is logarithmic, and the paper's choice
 PANELS: dict[str, tuple[str, bool, float | None]] = {

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Page
     from matplotlib.figure import SubFigure
 
-__all__ = ["Columns"]
 
 # of the groups of further columns, those that a reader looks at first; two to a row of panels
 FIRST = (

@@ -36,8 +36,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Page
     from matplotlib.figure import SubFigure
 
-__all__ = ["PAPER_SLOPE", "Correlation", "Fit", "fits_of"]
-
 
 # as the 2017 paper prints them, of spheres and of discs
 PAPER_SLOPE, PAPER_SLOPE_2D = 0.096, 0.231

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
     from scanfab.viz.scanned_frames import ScannedFrame
 
-__all__ = ["CutoffCurve", "Cutoffs", "draw_curves"]
-
 
 # in smallest radii
 CUTOFFS = (0.0, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0, 1.25, 1.5, 2.0, 2.5, 3.0)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from scanfab.viz.figures.strain_curves import StrainCurves
 
-__all__ = ["Evolution"]
-
 
 class Evolution(StrainCurves):
     """

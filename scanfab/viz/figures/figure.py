@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
     from scanfab.viz.scanned_frames import ScannedFrame, ScannedFrames
 
-__all__ = ["Figure", "FrameFigure", "one_of"]
-
 
 class Figure:
     """

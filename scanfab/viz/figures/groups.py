@@ -12,8 +12,6 @@ from scanfab.base.errors import SettingsError
 from scanfab.table.curves import Curve, curves_of
 from scanfab.viz.figures.style import COLOURS, LOOKS, plain
 
-__all__ = ["Drawn", "Group", "group_of", "grouped", "groups_of"]
-
 Look = dict[str, Any]
 
 # of curves that are told apart by their sources, or by the sizes of their RVs

@@ -14,15 +14,6 @@ from scanfab.fabric.distribution import direction_points, mean_length_function
 if TYPE_CHECKING:
     from scanfab.viz.scanned_frames import ScannedFrame
 
-__all__ = [
-    "CONCENTRATION",
-    "Hemisphere",
-    "disk",
-    "half_circle",
-    "hemisphere_of",
-    "smoothed_density",
-]
-
 
 # rings and rays of the disk that a hemisphere is projected on
 DISK = (41, 121)

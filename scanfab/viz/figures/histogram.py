@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
     from scanfab.viz.scanned_frames import ScannedFrame
 
-__all__ = ["Histogram", "LengthSample"]
-
 
 LINES = 6_000
 

@@ -17,8 +17,6 @@ from scanfab.viz.figures.hemisphere import CONCENTRATION, Hemisphere
 if TYPE_CHECKING:
     from scanfab.viz.scanned_frames import ScannedFrame
 
-__all__ = ["contact_noise", "noise_notes", "void_noise"]
-
 
 # where nothing but noise is, the largest lobe of a picture is 2 to 3 times its standard error
 CHANCE = 3.0

@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Page
     from matplotlib.figure import SubFigure
 
-__all__ = ["Map"]
-
 
 @dataclass(frozen=True)
 class Quantity:

@@ -17,8 +17,6 @@ from scanfab.viz.figures.style import DPI, check_plot_file, letter, new_figure, 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as Page
 
-__all__ = ["drawn_page", "find_figure", "make_figures", "save_figures"]
-
 
 def find_figure(text: str, *kinds: str) -> tuple[type[Figure], dict[str, Any]]:
     """

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
     from scanfab.viz.scanned_frames import ScannedFrames
 
-__all__ = ["Projection"]
-
 
 DEVIATION = "deviation from the mean in %"
 

@@ -16,8 +16,6 @@ from scanfab.fabric.invariants import fabric_deviator
 if TYPE_CHECKING:
     from scanfab.viz.scanned_frames import ScannedFrame
 
-__all__ = ["Ring", "Rings", "contact_ring", "rings_of"]
-
 
 REPLICATES = 16
 # segments for each direction: mean lengths to about half a per cent

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
     from scanfab.viz.scanned_frames import ScannedFrames
 
-__all__ = ["Rose", "draw_roses"]
-
 
 POLAR_ANGLES = (90.0, 60.0, 30.0)
 EQUATOR = (90.0,)

@@ -33,8 +33,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Page
     from matplotlib.figure import SubFigure
 
-__all__ = ["ROW", "StrainCurves", "set_abscissa"]
-
 
 # of each further row of panels, inches
 ROW = 2.1

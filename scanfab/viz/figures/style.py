@@ -18,34 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = [
-    "COLOURS",
-    "COLUMN",
-    "CONTACT",
-    "CONTACT_AXIAL",
-    "CONTACT_INTENSITY",
-    "CONTACT_UNIT",
-    "DIRECTIONAL",
-    "DPI",
-    "FRAME_LOOKS",
-    "LOOKS",
-    "PLOT_FORMATS",
-    "STYLE",
-    "VOID",
-    "VOID_AXIAL",
-    "VOID_INTENSITY",
-    "VOID_UNIT",
-    "WIDTH",
-    "band",
-    "check_plot_file",
-    "figure_bytes",
-    "letter",
-    "new_figure",
-    "plain",
-    "save_figure",
-    "widen",
-]
-
 
 PLOT_FORMATS = {
     ".png": "pixels, 300 per inch",

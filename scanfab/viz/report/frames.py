@@ -12,7 +12,8 @@ from scanfab.io.series import Series
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import SurfaceBox
 from scanfab.pipeline.repeat import reopen, restored_settings
-from scanfab.pipeline.settings import Length, Settings, Vector
+from scanfab.pipeline.settings import Settings
+from scanfab.pipeline.values import Length, Vector
 from scanfab.table.reading import number_of
 from scanfab.viz.figures.page import make_figures
 from scanfab.viz.frame_view import Look, look_at
@@ -20,8 +21,6 @@ from scanfab.viz.report.inputs import Input
 from scanfab.viz.report.page import Picture, Shown, view_data
 from scanfab.viz.report.pictures import picture_of
 from scanfab.viz.scanned_frames import ScannedFrames
-
-__all__ = ["show_frames"]
 
 # segments of a scan that takes about half a minute: pictures that would need more are rougher
 MOST_SEGMENTS = 3e8

@@ -13,8 +13,6 @@ from scanfab.table.abscissa import spelt_strain, strain_column
 from scanfab.table.reading import numbers_of, read_rows
 from scanfab.table.selection import choose_rows
 
-__all__ = ["Input", "read_inputs"]
-
 
 @dataclass(frozen=True)
 class Input:

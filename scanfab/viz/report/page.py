@@ -19,19 +19,6 @@ from scanfab.base.typing import FloatArray
 from scanfab.viz.figures.style import COLOURS
 from scanfab.viz.scene import SHADES, Scene, towards_viewer
 
-__all__ = [
-    "Content",
-    "Part",
-    "Picture",
-    "Section",
-    "Shown",
-    "check_page_file",
-    "render_page",
-    "save_page",
-    "view_data",
-]
-
-
 # spheres that a browser turns without effort
 MOST_GRAINS = 4_000
 # of balls in the RV, outside, and of rattlers, and paler where a plane cuts them

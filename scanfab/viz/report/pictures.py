@@ -10,9 +10,6 @@ from scanfab.viz.figures.page import drawn_page
 from scanfab.viz.figures.style import figure_bytes
 from scanfab.viz.report.page import Picture
 
-__all__ = ["picture_of"]
-
-
 # CSS pixels an inch
 PIXELS = 96
 # of pictures that are pixels, an inch

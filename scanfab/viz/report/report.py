@@ -33,8 +33,6 @@ from scanfab.viz.report.pictures import picture_of
 from scanfab.viz.report.settings_table import settings_table
 from scanfab.viz.report.tables import frame_table, input_table, overview, results_tables
 
-__all__ = ["Report", "make_report"]
-
 
 @dataclass(frozen=True)
 class Report:

@@ -9,8 +9,6 @@ from scanfab.base.option import flag_of
 from scanfab.pipeline.options import MEANINGS
 from scanfab.pipeline.repeat import spelt_settings
 
-__all__ = ["settings_table"]
-
 
 def settings_table(asked: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     """Name, value and meaning of each setting of a manifest."""

@@ -13,8 +13,6 @@ from scanfab.table.reading import number_of, numbers_of, total_error, variant_of
 from scanfab.table.row import Row as TableRow
 from scanfab.viz.report.page import Part
 
-__all__ = ["frame_table", "input_table", "overview", "results_tables"]
-
 Row = Mapping[str, Any]
 
 # frames of a source and variant that the table shows

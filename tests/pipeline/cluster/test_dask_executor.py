@@ -28,7 +28,7 @@ from scanfab.base.threads import shared_in_order
 from scanfab.cli.main import run
 from scanfab.pipeline.cluster import connection
 from scanfab.pipeline.cluster import dask_executor as module
-from scanfab.pipeline.cluster.dask_executor import ClusterError
+from scanfab.pipeline.cluster.connection import ClusterError
 from tests.helpers.dask_cluster import DaskCluster
 from tests.helpers.dumps import shaken_cubic
 from tests.helpers.growing import SAMPLE
