@@ -1,4 +1,4 @@
-"""What has to be done before the process ends, also where it leaves at once."""
+"""What has to be done before the process ends, also where a signal ends it at once."""
 
 from __future__ import annotations
 
@@ -14,13 +14,9 @@ _steps: list[Step] = []
 
 def at_end(step: Step) -> None:
     """Call a function at the end of the process."""
-    if not _steps and "multiprocessing.process" in sys.modules:
-        from multiprocessing.process import parent_process
-        from multiprocessing.util import Finalize
-
-        if parent_process() is not None:
-            # such a process may leave without calling what atexit knows
-            Finalize(None, finish, exitpriority=0)
+    if util := sys.modules.get("multiprocessing.util"):
+        # a worker that was forked ends without the functions of atexit
+        util.Finalize(None, finish, exitpriority=0)
     _steps.append(step)
 
 

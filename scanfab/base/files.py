@@ -1,9 +1,10 @@
-"""Files that are written whole or not at all."""
+"""Files that are written whole or not at all, and the folder of scanfab in the user's cache."""
 
 from __future__ import annotations
 
 import os
 import secrets
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -34,8 +35,8 @@ def whole_file(path: Path) -> Iterator[Path]:
         with named_errors(path):
             yield path
         return
-    # with the suffix at the end: some libraries tell the format by it; no other process, and no
-    # user, has a file of this name
+    # some libraries tell the format by the suffix, so it stays at the end; the random part keeps
+    # processes that write the same file apart
     part = path.with_name(f"{path.stem[:60]}.{secrets.token_hex(4)}.part{path.suffix}")
     remove = partial(part.unlink, missing_ok=True)
     with named_errors(path, part), undone_at_end(remove):
@@ -48,7 +49,7 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def named_errors(name: Path | str, part: Path | None = None) -> Iterator[None]:
-    """Let errors of the system name a file: those of writing name none, or what stands for it."""
+    """Let errors of the system name this file where they name none, or its unfinished part."""
     try:
         yield
     except OSError as error:
@@ -59,3 +60,25 @@ def named_errors(name: Path | str, part: Path | None = None) -> Iterator[None]:
 
 def _is_stream(path: Path) -> bool:
     return path.exists() and not path.is_file() and not path.is_dir()
+
+
+def user_folder() -> Path | None:
+    """scanfab's folder in the user's cache; None if there is no home."""
+    try:
+        home = Path.home()
+    except RuntimeError:
+        return None
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = home / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache")
+    return base / "scanfab"
+
+
+def make_private(folder: Path) -> None:
+    """Make a folder, and those above it, for the user alone."""
+    if not folder.is_dir():
+        make_private(folder.parent)
+        folder.mkdir(mode=0o700, exist_ok=True)

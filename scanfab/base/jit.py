@@ -9,7 +9,7 @@ import numba
 import numpy as np
 from llvmlite.binding import get_host_cpu_name
 
-from scanfab.base.kernel_cache import KernelCache
+from scanfab.base.kernel_cache import cache_of
 
 # numbers that the compiler's vector instructions take at a time: 256 bits of them, also on
 # processors that have wider ones, but for these
@@ -48,8 +48,7 @@ def inner(**options: Any) -> Callable[[Function], Function]:
 
 
 def _kept(compiled: Any, function: Function) -> Function:
-    """The compiled function with our cache, as Numba's option ``cache`` gives it another."""
     if compiled is not function:  # else Numba is switched off
-        compiled._cache = KernelCache(function)
+        compiled._cache = cache_of(function)
     same: Function = compiled
     return same

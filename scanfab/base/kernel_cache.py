@@ -1,106 +1,140 @@
 """
-Compiled kernels on disk, each a file of its own: one that is damaged is compiled again.
+Compiled kernels, kept by Numba's own cache in a folder that only the user can write to.
 
-Numba's own files have an index, and it trusts both: what is cut or garbage ends in an error, and
-code with a wrong byte is run.
+Numba trusts the files of its cache: it would stop at one that is cut, and run code with a wrong
+byte. Here a damaged file is compiled again.
 """
 
 from __future__ import annotations
 
-import gc
 import hashlib
+import os
 import pickle
+import sys
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
-from inspect import getfile
 from pathlib import Path
 from typing import Any
 
-from numba.core import event
-from numba.core.caching import NullCache
-from numba.core.compiler import CompileResult
+import llvmlite
+import numba
+from numba.core import caching, event
 from numba.core.serialize import dumps
 
-from scanfab.base.kept_files import read_kept, write_kept
-from scanfab.base.kernel_folder import kernel_folder
+from scanfab.base.files import make_private, user_folder
 
 
-class KernelCache(NullCache):
-    """What Numba asks for the compiled forms of one function, and gives them to."""
+@cache
+def kernel_folder() -> tuple[Path | None, str]:
+    """
+    The folder of compiled kernels, which is made if it can be, and why nothing is kept in it.
 
-    def __init__(self, function: Callable[..., Any]) -> None:
-        self.function = function
+    Its name is a hash of all kernels and compilers. Numba alone would look at the file of a kernel,
+    and not see that another file, with a kernel that this one calls, has changed.
+    """
+    given = os.environ.get("NUMBA_CACHE_DIR")
+    base = Path(given) if given else user_folder()
+    if base is None:
+        return None, "there is no home folder"
+    sources = hashlib.sha256(f"{sys.version} {llvmlite.__version__}".encode())
+    for file in kernel_files():
+        sources.update(file.read_bytes())
+    folder = base / f"numba-{numba.__version__}-{sources.hexdigest()[:16]}"
+    try:
+        make_private(folder)
+        states = {one: one.stat() for one in (base, folder)}
+    except OSError as error:
+        return None, f"{error.filename}: {error.strerror}"
+    for one, state in states.items():
+        # the files are code that will be run: only the user and the system may write them
+        if os.name == "posix" and (state.st_uid not in (0, os.getuid()) or state.st_mode & 0o022):
+            return None, f"{one} is not yours, or others can write to it (chmod go-w)"
+    writable = os.access(folder, os.W_OK)
+    return folder, "" if writable else f"{folder} cannot be written to"
+
+
+def kernel_files() -> list[Path]:
+    """The files of all kernels, and those that say how they are compiled."""
+    package = Path(__file__).parents[1]
+    patterns = ("*/kernels.py", "*/*/kernels.py", "*/kernels/*.py", "base/jit.py")
+    return sorted(file for pattern in patterns for file in package.glob(pattern))
+
+
+def cache_of(function: Callable[..., Any]) -> Any:
+    """Numba's cache of one function; one that keeps nothing where there is no safe folder."""
+    return caching.NullCache() if kernel_folder()[0] is None else _Cache(function)  # type: ignore[no-untyped-call]
+
+
+class _Place(caching._SourceFileBackedLocatorMixin, caching._CacheLocator):
+    """Where Numba keeps the compiled forms of one function."""
+
+    def __init__(self, function: Any, file: str) -> None:
+        self._py_file, self._lineno = file, function.__code__.co_firstlineno
+        self._module = function.__module__
+
+    def get_cache_path(self) -> str:
+        return os.path.join(str(kernel_folder()[0]), self._module)
+
+    @classmethod
+    def from_function(cls, py_func: Any, py_file: str) -> Any:
+        return cls(py_func, py_file)
+
+
+class _Checked(caching.CompileResultCacheImpl):
+    """Adds a checksum to each compiled form."""
+
+    _locator_classes = [_Place]  # noqa: RUF012
+
+    def reduce(self, cres: Any) -> Any:
+        content = dumps(super().reduce(cres))  # type: ignore[no-untyped-call]
+        return hashlib.sha256(content).digest(), content
+
+    def rebuild(self, target_context: Any, payload: Any) -> Any:
+        digest, content = payload
+        if hashlib.sha256(content).digest() != digest:
+            raise ValueError("damaged")
+        return super().rebuild(target_context, pickle.loads(content))  # type: ignore[no-untyped-call]
+
+
+class _Cache(caching.FunctionCache):
+    """Numba's cache of a function, for which no file of it is a reason to stop."""
+
+    _impl_class = _Checked
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """The form for these types of arguments; None if it is not there, or not as it was."""
-        target_context.refresh()
-        path = self._path(sig, target_context.codegen())
-        content = None if path is None else read_kept(path)
-        if content is None:
-            return None
         try:
-            parts = pickle.loads(content)
-            return CompileResult._rebuild(target_context, *parts)  # type: ignore[no-untyped-call]
-        except Exception:  # of another version, whatever its name says
+            found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        except Exception:  # a damaged pickle may raise anything
+            with suppress(OSError):
+                self.flush()  # type: ignore[no-untyped-call]
             return None
+        # two processes that first save at the same time may give two forms one file
+        return found if found is None or found.signature.args == tuple(sig) else None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep a form, if there is a place for it."""
-        path = self._path(sig, data.codegen)
-        if path is not None and not data.lifted and not data.library.has_dynamic_globals:
-            write_kept(path, dumps(data._reduce()))  # type: ignore[no-untyped-call]
-
-    def _path(self, sig: Any, codegen: Any) -> Path | None:
-        folder = kernel_folder().path
-        if folder is None:
-            return None
-        function = self.function
-        key = (_source(getfile(function)), function.__qualname__, str(sig), codegen.magic_tuple())
-        name = hashlib.sha256(repr(key).encode()).hexdigest()[:24]
-        return folder / f"{function.__name__}-{name}.kernel"
-
-
-@cache
-def _source(file: str) -> bytes:
-    """What tells one version of a function's file from another."""
-    return hashlib.sha256(Path(file).read_bytes()).digest()
-
-
-def when_compiling(tell: Callable[[], None]) -> None:
-    """
-    Call a function when a kernel is first compiled rather than found; from any thread.
-
-    The garbage collector waits while the compiler works: it would take a sixteenth of the time, and
-    find next to nothing.
-    """
-    _listener().tell = tell
-
-
-@cache
-def _listener() -> _Compiling:
-    """The one of this process: another command in it has other words, but no other listener."""
-    listener = _Compiling()
-    event.register("numba:compile", listener)  # type: ignore[no-untyped-call]
-    return listener
+        with suppress(OSError):  # the disk may be full
+            super().save_overload(sig, data)  # type: ignore[no-untyped-call]
 
 
 class _Compiling(event.Listener):
-    def __init__(self) -> None:
-        self.tell: Callable[[], None] | None = None
-        # a kernel is compiled within the one that calls it
-        self._depth = 0
-        self._collects = True
+    """Calls a function when the first kernel is compiled."""
 
-    def on_start(self, event: event.Event) -> None:
-        if self._depth == 0:
-            self._collects = gc.isenabled()
-        self._depth += 1
-        gc.disable()
+    tell: Callable[[], None] | None = None
+
+    def on_start(self, event: Any) -> None:
         tell, self.tell = self.tell, None
         if tell is not None:
             tell()
 
-    def on_end(self, event: event.Event) -> None:
-        self._depth -= 1
-        if self._depth == 0 and self._collects:
-            gc.enable()
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+_compiling = _Compiling()
+event.register("numba:compile", _compiling)  # type: ignore[no-untyped-call]
+
+
+def when_compiling(tell: Callable[[], None]) -> None:
+    """Call a function when a kernel is first compiled rather than found; from any thread."""
+    _compiling.tell = tell

@@ -8,34 +8,29 @@ from pathlib import Path
 
 from scanfab.base.errors import ReadError
 
-KINDS = {
-    stat.S_IFIFO: "a pipe",
-    stat.S_IFSOCK: "a socket",
-    stat.S_IFCHR: "a device",
-    stat.S_IFBLK: "a device",
-}
+KINDS = {stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}
+KINDS |= {stat.S_IFCHR: "a device", stat.S_IFBLK: "a device"}
 # pipes that a shell or another program has opened for this process
 INHERITED = ("/dev/fd/", "/dev/stdin", "/proc/self/fd/")
 
 
 def check_file(path: Path) -> None:
     """ReadError if a path that exists is no file."""
-    kind = kind_of(path)
-    if kind is not None:
-        raise ReadError(
-            f"{path}: is {kind}, expected a file: what a program writes is read from standard "
-            f"input, by - in place of its name and `format=NAME`"
-        )
+    _refuse(path, kind_of(path), "a file", "by - in place of its name and `format=NAME`")
 
 
 def check_file_or_pipe(path: Path) -> None:
     """ReadError if a path is neither a file nor a pipe that a shell made: ``<(command)``."""
     kind = kind_of(path)
-    ready = kind in ("a pipe", "a socket") and os.fspath(path).startswith(INHERITED)
-    if kind is not None and not ready:
+    if kind not in ("a pipe", "a socket") or not os.fspath(path).startswith(INHERITED):
+        _refuse(path, kind, "a table", "as - in place of its name")
+
+
+def _refuse(path: Path, kind: str | None, expected: str, instead: str) -> None:
+    if kind is not None:
         raise ReadError(
-            f"{path}: is {kind}, expected a table: what a program writes is read from standard "
-            f"input, as - in place of its name"
+            f"{path}: is {kind}, expected {expected}: what a program writes is read from "
+            f"standard input, {instead}"
         )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 Part = TypeVar("Part")
 Result = TypeVar("Result")
@@ -27,7 +27,7 @@ _spread: ContextVar[Spread | None] = ContextVar("spread", default=None)
 
 @contextmanager
 def spread_over(workers: Spread) -> Iterator[None]:
-    """In the block what would be done by threads is done by these workers."""
+    """In the block, these workers do what threads would do."""
     token = _spread.set(workers)
     try:
         yield
@@ -50,11 +50,8 @@ def in_threads(
 
 def in_order(pool: Executor, jobs: Iterator[Callable[[], Result]], most: int) -> Iterator[Result]:
     """The results in the order of the jobs, of which at most so many are under way."""
-
-    def submit(job: Callable[[], Result], threads: int) -> Future[Result]:
-        return pool.submit(job)
-
-    return _in_order(_Work(submit, jobs, lambda: most, lambda number: 1))
+    alone = (lambda threads, job=job: job() for job in jobs)
+    return shared_in_order(pool, alone, lambda: most, lambda number: 1)
 
 
 def shared_in_order(
@@ -64,90 +61,54 @@ def shared_in_order(
     share: Callable[[int], int],
 ) -> Iterator[Result]:
     """
-    The same of jobs that share threads, and that may still be to come.
+    The results of jobs that share threads, in the order of the jobs.
 
     Parameters
     ----------
     pool : Executor
-        Does them.
+        Does the jobs.
     jobs : iterator
-        Each is told how many threads it may use. None where the next one is not there yet: then a
-        result that is ready comes meanwhile. If they end in an error, what is under way comes
-        before it.
+        Each job is told how many threads it may use. None where the next one is not there yet: a
+        result that is ready then comes meanwhile. If the jobs end in an error, the results of those
+        under way come before it.
     most : callable
         How many may be under way.
     share : callable
         How many threads each of so many jobs may use.
     """
-    return _in_order(_Work(pool.submit, jobs, most, share))
-
-
-def _in_order(work: _Work[Any, Result]) -> Iterator[Result]:
+    waiting: deque[Future[Result]] = deque()
+    ready: list[Result] = []
+    over: Exception | None = None
     try:
-        work.begin()
-        while work.waiting or not work.is_over:
-            if work.waiting and (work.waiting[0].done() or work.is_full):
-                result = work.first()
-                # whoever takes the result may be slow
-                work.begin()
-                yield result
-            else:
-                work.begin()
-        if work.error is not None:
-            raise work.error
+        while waiting or ready or over is None:
+            fresh, over = ([], over) if over else _taken(jobs, most() - len(waiting))
+            threads = share(len(waiting) + len(fresh)) if fresh else 1
+            waiting.extend(pool.submit(job, threads) for job in fresh)
+            # the next jobs are begun before this, as whoever takes a result may be slow
+            yield from ready
+            ready.clear()
+            if waiting and (waiting[0].done() or over or len(waiting) >= most()):
+                try:
+                    ready.append(waiting.popleft().result())
+                except Exception:
+                    # where the jobs have failed, this error has the same cause
+                    if over is not None and not isinstance(over, StopIteration):
+                        raise over from None
+                    raise
+        if not isinstance(over, StopIteration):
+            raise over
     finally:
         # the pool may go on for others
-        for job in work.waiting:
-            job.cancel()
+        for future in waiting:
+            future.cancel()
 
 
-class _Work(Generic[Job, Result]):
-    """Jobs under way."""
-
-    def __init__(
-        self,
-        submit: Callable[[Job, int], Future[Result]],
-        jobs: Iterator[Job | None],
-        most: Callable[[], int],
-        share: Callable[[int], int],
-    ) -> None:
-        self.submit, self.jobs, self.most, self.share = submit, jobs, most, share
-        self.waiting: deque[Future[Result]] = deque()
-        self.is_over = False
-        self.error: Exception | None = None
-        """What the jobs ended in."""
-
-    @property
-    def is_full(self) -> bool:
-        """Whether there is nothing to begin before a result has come."""
-        return self.is_over or len(self.waiting) >= self.most()
-
-    def begin(self) -> None:
-        """Begin as many jobs as may be under way, of those that are there."""
-        fresh: list[Job] = []
-        most = self.most()
-        while not self.is_over and len(self.waiting) + len(fresh) < most:
-            job = self._next()
-            if job is None:
-                break
+def _taken(jobs: Iterator[Job | None], room: int) -> tuple[list[Job], Exception | None]:
+    """Jobs that are there, up to some number, and what ended them: StopIteration, or an error."""
+    fresh: list[Job] = []
+    try:
+        while len(fresh) < room and (job := next(jobs)) is not None:
             fresh.append(job)
-        threads = self.share(len(self.waiting) + len(fresh)) if fresh else 1
-        self.waiting.extend(self.submit(job, threads) for job in fresh)
-
-    def _next(self) -> Job | None:
-        try:
-            return next(self.jobs)
-        except StopIteration:
-            self.is_over = True
-        except Exception as error:
-            self.is_over, self.error = True, error
-        return None
-
-    def first(self) -> Result:
-        """The first result; where the jobs have failed, what it lacks has the same cause."""
-        try:
-            return self.waiting.popleft().result()
-        except Exception:
-            if self.error is not None:
-                raise self.error from None
-            raise
+    except Exception as error:
+        return fresh, error
+    return fresh, None

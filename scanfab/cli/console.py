@@ -82,23 +82,16 @@ def is_readable() -> bool:
 
 def announce_compiling() -> None:
     """A line on standard error if something has to be compiled first."""
-    from scanfab.base.kernel_cache import when_compiling
-    from scanfab.base.kernel_folder import kernel_folder
+    from scanfab.base.kernel_cache import kernel_folder, when_compiling
 
-    problem = kernel_folder().problem
+    _, problem = kernel_folder()
     kept = f"it cannot be kept: {problem}" if problem else "it is kept for later runs"
-    quiet = level() is Level.QUIET
-    when_compiling(
-        lambda: (
-            None
-            if quiet
-            else click.echo(
-                f"scanfab: compiling what no earlier run has needed: seconds, or minutes on a "
-                f"busy machine; {kept}",
-                err=True,
-            )
-        )
+    words = (
+        f"scanfab: compiling what no earlier run has needed: seconds, or minutes on a busy "
+        f"machine; {kept}"
     )
+    if level() is not Level.QUIET:
+        when_compiling(lambda: click.echo(words, err=True))
 
 
 def print_csv(

@@ -13,7 +13,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from scanfab.base.kept_files import make_private, read_kept, user_folder, write_kept
+from scanfab.base.files import make_private, user_folder, whole_file
 from scanfab.io.reader import Snapshot
 
 if TYPE_CHECKING:
@@ -37,9 +37,9 @@ def snapshots_of(reader: Reader, path: Path) -> list[Snapshot]:
     if kept is None:
         return reader.snapshots(path)
     stamp = _stamp(reader, path)
-    content = read_kept(kept)
-    if content is not None:
-        found = json.loads(content)
+    # an index that is damaged, or not there, is made again
+    with suppress(OSError, ValueError, LookupError, TypeError):
+        found = json.loads(kept.read_bytes())
         if found["stamp"] == stamp:
             return [Snapshot(path, *of_one) for of_one in found["snapshots"]]
     snapshots = reader.snapshots(path)
@@ -49,7 +49,8 @@ def snapshots_of(reader: Reader, path: Path) -> list[Snapshot]:
         rows = [(one.step, one.time, one.start, one.stop, one.stepless) for one in snapshots]
         with suppress(OSError):
             make_private(kept.parent)
-            write_kept(kept, json.dumps({"stamp": stamp, "snapshots": rows}).encode())
+            with whole_file(kept) as part:
+                part.write_text(json.dumps({"stamp": stamp, "snapshots": rows}), "utf-8")
     return snapshots
 
 
