@@ -36,9 +36,11 @@ def test_rows_say_by_which_rule_they_are(ball):
     assert [row.left_out is None for row in start] == [True, True, False, False]
     ends = compute(ball, edge="ends", rv=0.35, **OPTIONS)
     assert columns(ends, "edge", "left_out") == [["ends", None]] * 4
-    # the whole changes by ends alone, and its grains and contacts never
+    # the whole changes by ends alone, and its grains and contacts never; another kernel rounds
+    # the last digit otherwise on some processors
     clip = compute(ball, rv=0.35, **OPTIONS)
-    assert [row.mean_length for row in start[:2]] == [row.mean_length for row in clip[:2]]
+    lengths = [row.mean_length for row in clip[:2]]
+    assert [row.mean_length for row in start[:2]] == pytest.approx(lengths, rel=1e-14)
     assert all(e.mean_length != c.mean_length for e, c in zip(ends, clip, strict=True))
     for name in ("grains", "contacts", "alpha_c"):
         assert columns(ends, name) == columns(clip, name)
