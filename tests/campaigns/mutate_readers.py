@@ -1,102 +1,187 @@
 """
-Random damage for the readers, without a guide: quicker than fuzz_readers.py, and needs no package.
+What damaged files give: an error, a warning, or other values in silence; by two versions.
 
-    python tests/campaigns/mutate_readers.py [--runs 5000] [READER ...] [--only .bin]
+    python tests/campaigns/mutate_readers.py [--base COMMIT] [--runs 40] [--seed 0] [READER ...]
 
-Small sound files of each format are damaged at random, and read as grains and as contacts.
-Anything but an answer or a ScanfabError is kept in the folder `mutate_findings`, as is what takes
-over 10 s; one line for each reader at the end.
+Each small sound file of each format is cut at random places, and has bytes or words of it changed.
+Each damaged file is read by the base version, checked out as in same_tables.py, and by the version
+beside this interpreter. Counted is what is read without an error and without a warning, with other
+values than the sound file. Tracebacks, crashes and readings of more than 10 s are listed and kept
+in the folder `mutate_findings`. One line for each format and kind of damage; exit code 1 if this
+version reads more in silence than the base, or anything is listed.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
+import shutil
+import signal
+import subprocess
 import sys
 import tempfile
-import time
-import traceback
+import warnings
+from collections import Counter
 from pathlib import Path
 from random import Random
+from typing import Any, NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
-# in the place of this folder, whose coverage.py is not the package of that name
-sys.path[0] = str(ROOT)
+# in the place of this folder, whose coverage.py is not the package of that name; the base's tree
+# where its helpers do the damage
+sys.path[:1] = [str(Path.cwd()), str(ROOT)]
 
-from scanfab.base.errors import ScanfabError  # noqa: E402
-from scanfab.io.reader import GrainTable  # noqa: E402
-from scanfab.io.registry import reader_named  # noqa: E402
-from scanfab.packing.packing import Packing  # noqa: E402
-from tests.helpers import fuzzing, sound_files  # noqa: E402
+from tests.helpers.versions import BASE, installed_base, packed  # noqa: E402
 
-SECONDS = 10.0
+SECONDS = 10
 OUT = Path("mutate_findings")
 
 
+class Damaged(NamedTuple):
+    """A damaged file, and how it is read."""
+
+    path: str
+    sound: str
+    format: str
+    kind: str
+    """cut, bytes or words; or sound."""
+    grains: str | None
+    """The sound grains, if this is a file of contacts."""
+
+
+def task_damage(folder: str, runs: int, seed: int, readers: list[str]) -> list[Damaged]:
+    """Sound and damaged files of each format; run in the tree and environment of the base."""
+    from scanfab.base.errors import ScanfabError
+    from scanfab.io.registry import reader_named
+    from tests.helpers import fuzzing, sound_files
+
+    kinds = {
+        "cut": fuzzing._cut,
+        "bytes": fuzzing._overwrite,
+        "words": fuzzing._replace_word,
+        "numbers": fuzzing._replace_number,
+    }
+    random, made = Random(seed), []
+    for name in readers or fuzzing.READERS:
+        sound = Path(folder) / name
+        sound.mkdir(parents=True)
+        _, family = sound_files.companion_grains(name)
+        companion = next(iter(family.files.values()))
+        for file, content in sound_files.seeds(name, sound):
+            path = sound / file
+            path.write_bytes(content)
+            try:
+                grains = str(companion) if reader_named(name).kind(path) == "contacts" else None
+            except ScanfabError:
+                continue
+            made.append(Damaged(str(path), str(path), name, "sound", grains))
+            for number in range(runs):
+                kind = list(kinds)[number % len(kinds)]
+                own = sound / f"{kind}{number}_{file}"
+                own.write_bytes(kinds[kind](content, random))
+                made.append(Damaged(str(own), str(path), name, kind, grains))
+    return made
+
+
+def task_read(listed: list[list[Any]]) -> None:
+    """Read each file; one line of JSON each: its digest, or how it ended."""
+    import scanfab
+
+    def too_long(*_: object) -> None:
+        raise TimeoutError
+
+    signal.signal(signal.SIGALRM, too_long)
+    for one in map(Damaged._make, listed):
+        signal.alarm(SECONDS)
+        source, options = one.path, {"format": one.format}
+        if one.grains is not None:
+            source, options = one.grains, {"contacts": one.path}
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            try:
+                frames = [packed(frame.read()) for frame in scanfab.read_series(source, **options)]
+                told = any(issubclass(w.category, scanfab.ScanfabWarning) for w in caught)
+                answer = "warned" if told else json.dumps(frames)
+            except scanfab.ScanfabError:
+                answer = "refused"
+            except BaseException as error:
+                answer = f"FAILED {type(error).__name__}: {error}"[:200]
+        signal.alarm(0)
+        print(json.dumps(answer), flush=True)
+
+
+def answers(python: Path, listed: list[Damaged]) -> list[str]:
+    """How each reading ended; a process that dies is followed by another, behind its file."""
+    found: list[str] = []
+    while len(found) < len(listed):
+        done = subprocess.run(
+            [python, __file__, "--task", "read"], input=json.dumps(listed[len(found) :]),
+            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, cwd=ROOT, check=False,
+        )  # fmt: skip
+        found += map(json.loads, done.stdout.splitlines())
+        if done.returncode:
+            found.append(f"FAILED the process ended with {done.returncode}")
+    return found
+
+
 def main() -> None:
-    """Each reader in turn."""
+    """Damage, read by both versions, count."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("readers", nargs="*", default=[])
-    parser.add_argument("--runs", type=int, default=5000)
+    parser.add_argument("readers", nargs="*")
+    parser.add_argument("--base", default=BASE)
+    parser.add_argument("--keep", type=Path, default=ROOT / "build" / "same_tables")
+    parser.add_argument("--runs", type=int, default=40, help="damages of each file")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--only", nargs="+", default=[""], help="endings of the files to damage")
+    parser.add_argument("--task", help=argparse.SUPPRESS)
     given = parser.parse_args()
-    for name in given.readers or fuzzing.READERS:
-        began = time.monotonic()
-        with tempfile.TemporaryDirectory() as folder:
-            findings, answers = damage(
-                name, given.runs, Random(given.seed), Path(folder), tuple(given.only)
-            )
-        print(
-            f"{name}: {given.runs} executions, {time.monotonic() - began:.0f} s, {answers} read, "
-            f"{findings} findings",
-            flush=True,
-        )
+    if given.task == "read":
+        task_read(json.load(sys.stdin))
+        return
+    if given.task == "damage":
+        print(json.dumps(task_damage(*json.load(sys.stdin))))
+        return
+    checkout, base = installed_base(given.base, given.keep.resolve())
+    with tempfile.TemporaryDirectory() as folder:
+        done = subprocess.run(
+            [base, __file__, "--task", "damage"],
+            input=json.dumps([folder, given.runs, given.seed, given.readers]), text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, cwd=checkout, check=True,
+        )  # fmt: skip
+        listed = [Damaged._make(one) for one in json.loads(done.stdout)]
+        before, after = (answers(python, listed) for python in (base, Path(sys.executable)))
+        sys.exit(report(listed, before, after))
 
 
-def damage(
-    name: str, runs: int, random: Random, folder: Path, only: tuple[str, ...] = ("",)
-) -> tuple[int, int]:
-    """How many findings, and how many files that could be read in spite of their damage."""
-    seeds = [one for one in sound_files.seeds(name, folder) if one[0].endswith(only)]
-    companion, _ = sound_files.companion_grains(name)
-    findings = answers = 0
-    for number in range(runs):
-        own, data = random.choice(seeds)
-        # beside sound files, which lists may name; decompressed copies are kept by their names
-        path = folder / f"{number % 50}_{own}"
-        path.write_bytes(fuzzing.mutate(data, random))
-        options = fuzzing.OPTIONS[0] if random.random() < 0.5 else random.choice(fuzzing.OPTIONS)
-        began = time.monotonic()
-        try:
-            with fuzzing.only_scanfabs_warnings():
-                answers += read(path, name, options, companion)
-            if time.monotonic() - began > SECONDS:
-                raise fuzzing.ForbiddenError(f"slow: {time.monotonic() - began:.0f} s")
-        except (Exception, SystemExit):
-            findings += 1
+def report(listed: list[Damaged], before: list[str], after: list[str]) -> bool:
+    """Print the counts; whether this version is worse."""
+    sound = {
+        one.path: pair
+        for one, *pair in zip(listed, before, after, strict=True)
+        if one.kind == "sound"
+    }
+    total, silent, worse = Counter(), (Counter(), Counter()), False
+    for one, *pair in zip(listed, before, after, strict=True):
+        group = one.format, one.kind
+        total[group] += one.kind != "sound"
+        for k, answer in enumerate(pair):
+            is_read = answer[:1] == "["
+            silent[k][group] += is_read and answer != sound[one.sound][k]
+        name = Path(one.path).name
+        if pair[1].startswith("FAILED"):
+            worse = True
+            print(f"{one.format}: {name}: {pair[1]}")
             OUT.mkdir(exist_ok=True)
-            (OUT / f"{name}_{number}_{own}").write_bytes(path.read_bytes())
-            (OUT / f"{name}_{number}_{own}.report").write_text(traceback.format_exc())
-        path.unlink()
-    return findings, answers
-
-
-def read(path: Path, name: str, options, companion: GrainTable) -> bool:
-    """All that a reader is asked of a file; whether there are grains in it."""
-    path = sound_files.entry(name, path)
-    reader = reader_named(name, options)
-    try:
-        reader.recognises(path)
-        if reader.kind(path) == "contacts":
-            for snapshot in reader.snapshots(path)[-1:]:
-                reader.read_contacts(snapshot, options, companion)
-            return True
-        for snapshot in reader.snapshots(path)[-2:]:
-            table = reader.read_grains(snapshot, options)
-            Packing(table.position, table.radius, id=table.id, cell=table.cell)
-    except ScanfabError:
-        return False
-    return True
+            shutil.copy(one.path, OUT / f"{one.format}_{name}")
+        elif one.kind == "cut" and pair[1][:1] == "[" and pair[1] != sound[one.sound][1]:
+            size = Path(one.path).stat().st_size
+            print(f"{one.format}: {name}: cut at {size} and read in silence, before: {pair[0][:7]}")
+    for group in total:
+        if total[group]:
+            one, two = (count[group] for count in silent)
+            worse = worse or two > one
+            print(f"{' '.join(group)}: {total[group]} files, silent {one} -> {two}", flush=True)
+    print(f"all: {total.total()} files, silent {silent[0].total()} -> {silent[1].total()}")
+    return worse
 
 
 if __name__ == "__main__":

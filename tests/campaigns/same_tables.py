@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import argparse
 import csv
-import hashlib
 import json
 import math
 import re
@@ -29,7 +28,12 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
-BASE = "f055af2"
+# in the place of this folder, whose coverage.py is not the package of that name; the base's tree
+# where its helpers make the sound files
+sys.path[:1] = [str(Path.cwd()), str(ROOT)]
+
+from tests.helpers.versions import BASE, installed_base, packed  # noqa: E402
+
 DATA = "sample_data"
 
 WANTED: dict[str, str] = {}
@@ -139,19 +143,6 @@ def unnamed_options(base: Path) -> set[str]:
 MAIN = "from scanfab.cli.main import main; main()"
 
 
-def installed_base(commit: str, kept: Path) -> tuple[Path, Path]:
-    """Checkout of a commit, and the Python of an environment with it; made where they are not."""
-    checkout, python = kept / commit, kept / f"{commit}-env" / "bin" / "python"
-    if not checkout.is_dir():
-        subprocess.run(["git", "clone", "--quiet", ROOT, checkout], check=True)
-        subprocess.run(["git", "-C", checkout, "checkout", "--quiet", commit], check=True)
-    if not python.exists():
-        subprocess.run([sys.executable, "-m", "venv", python.parents[1]], check=True)
-        words = ["-m", "pip", "install", "--quiet", f"{checkout}[test]"]
-        subprocess.run([python, *words], check=True)
-    return checkout, python
-
-
 def in_one_process(python: Path, task: str, *words: str) -> Any:
     """The answer of this file's task in another environment."""
     done = subprocess.run(
@@ -162,34 +153,6 @@ def in_one_process(python: Path, task: str, *words: str) -> Any:
 
 
 # --- the tasks, in the environment of either version
-
-
-def digest(value: Any) -> Any:
-    """An array by its kind, shape and bytes; anything else as it is written."""
-    import numpy as np
-
-    if isinstance(value, np.ndarray):
-        value = value.astype(str) if value.dtype == object else value
-        content = np.ascontiguousarray(value).tobytes()
-        return f"{value.dtype} {value.shape} {hashlib.sha256(content).hexdigest()[:16]}"
-    return repr(value)
-
-
-def packed(packing: Any) -> dict[str, Any]:
-    """All that a packing says, as digests."""
-    contacts, cell = packing.contacts, packing.cell
-    found = {
-        name: digest(getattr(packing, name))
-        for name in ("position", "radius", "id", "wall_contacts", "step", "time", "dimension")
-    }
-    found |= {f"column {name}": digest(packing.columns[name]) for name in sorted(packing.columns)}
-    if contacts is not None:
-        names = ("pairs", "image", "normal", "point", "force", "force_n", "source")
-        found |= {f"contacts {name}": digest(getattr(contacts, name)) for name in names}
-    if cell is not None:
-        names = ("vectors", "origin", "periodic")
-        found |= {f"cell {name}": digest(getattr(cell, name)) for name in names}
-    return found
 
 
 def read_all(source: str, **options: Any) -> Any:
@@ -250,7 +213,6 @@ def task_convert(folder: str, *sources: str) -> None:
 
 def task_sound(folder: str) -> None:
     """The sound files of the tests, each format in a folder of its own; run in the base's tree."""
-    sys.path[0] = str(Path.cwd())
     from tests.helpers import fuzzing, sound_files
 
     files = []
