@@ -1,4 +1,14 @@
-"""Convex regions about the origin, as data: half-spaces and at most one quadric."""
+"""
+Convex regions about the origin, as data: half-spaces and at most one quadric.
+
+Each is the image of a body: a linear map makes every ellipsoid of the ball of radius 1, every
+cylinder of the column of radius 1 between z = -1 and 1, every box of the block from -1 to 1. What
+is known of the body in closed form, the map carries over: a window that deforms with its sample
+needs no formula of its own. The bodies besides the ball stand in :mod:`scanfab.base.shapes`.
+
+A window in a plane is the image of a disc or a square, spanned by the map's first two columns; the
+third is the unit normal. Volumes are areas there, and areas are lengths.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +18,81 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.base.bodies import BALL, DISC, SQUARE, Body
 from scanfab.base.option import number
 from scanfab.base.typing import BoolArray, FloatArray
 
 # steps towards the nearest place of a region, and what of a distance is rounding
 STEPS, ROUNDING = 200, 1e-12
-# directions over which a shadow is averaged, for plans
-AXES = 200
+# of a curved surface that is to be looked at, and directions over which a shadow is averaged
+POINTS, POINTS_OF_A_RIM, AXES = 2000, 128, 200
+
+
+def points_on_a_rim() -> FloatArray:
+    """Points of the circle of radius 1 about z."""
+    turn = np.arange(POINTS_OF_A_RIM) * 2.0 * np.pi / POINTS_OF_A_RIM
+    return np.column_stack([np.cos(turn), np.sin(turn), np.zeros(POINTS_OF_A_RIM)])
+
+
+class Body:
+    """A convex body with the origin inside, by its constants and three functions of its own."""
+
+    planes: FloatArray
+    """Of its flat faces: rows n, d with the body on the side n·x < d, shape (P, 4)."""
+    form: FloatArray
+    """Of its curved face, x·M x < 1: the diagonal of M, shape (3,); zeros without one."""
+    volume: float
+    """With edges and radii of the body itself."""
+    outline: FloatArray
+    """Points of its surface whose hull it is; of a curved one nearly; shape (K, 3)."""
+    is_symmetric: bool = True
+    """Whether with x also -x lies in it."""
+    is_flat: bool = False
+    """Whether it lies in a plane; what lies above and below it counts as inside."""
+
+    def support(self, along: FloatArray) -> FloatArray:
+        """The place in the body that is furthest along each vector, shape (N, 3)."""
+        raise NotImplementedError
+
+    def reach(self, frame: FloatArray) -> float:
+        """No place of its image, frame @ x, is further away from the origin."""
+        return float(np.linalg.norm(self.outline @ frame.T, axis=1).max())
+
+    def overlap(self, shift: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
+        """As :meth:`Convex.overlap`, moved by ``length * shift``, shifts of any length."""
+        raise NotImplementedError
+
+
+class Ball(Body):
+    """Of radius 1 about the origin."""
+
+    planes = np.zeros((0, 4))
+    form = np.ones(3)
+    volume = 4.0 / 3.0 * math.pi
+
+    def __init__(self) -> None:
+        # a spiral, of which all points have a like share of the surface
+        z = 1.0 - (2.0 * np.arange(POINTS) + 1.0) / POINTS
+        turn = np.arange(POINTS) * np.pi * (3.0 - np.sqrt(5.0))
+        across = np.sqrt(1.0 - z**2)
+        self.outline = np.column_stack([across * np.cos(turn), across * np.sin(turn), z])
+
+    def support(self, along: FloatArray) -> FloatArray:
+        """The end of a radius."""
+        unit: FloatArray = along / np.linalg.norm(along, axis=1, keepdims=True)
+        return unit
+
+    def reach(self, frame: FloatArray) -> float:
+        """The largest semi-axis."""
+        return float(np.linalg.svd(frame, compute_uv=False)[0])
+
+    def overlap(self, shift: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
+        """A lens of two equal caps."""
+        step = np.linalg.norm(shift, axis=1)
+        u = np.minimum(length * step, 2.0)
+        return self.volume * (1.0 - 0.75 * u + u**3 / 16.0), np.pi * step * (1.0 - 0.25 * u**2)
+
+
+BALL = Ball()
 
 
 class Quadric(NamedTuple):
@@ -29,6 +106,11 @@ class Quadric(NamedTuple):
     """D, symmetric, shape (3, 3); no eigenvalue of it is below -m."""
     level: float
     """Above 0: the origin lies inside."""
+
+    @property
+    def form(self) -> FloatArray:
+        """The matrix m I + D."""
+        return self.isotropic * np.eye(3) + self.deviator
 
 
 # of a region of planes alone
@@ -82,7 +164,7 @@ class Convex:
     frame: FloatArray
 
     def __repr__(self) -> str:
-        return f"Convex: {self.size} about the origin"
+        return f"Convex: {self} about the origin"
 
     def __str__(self) -> str:
         return self.size
@@ -95,7 +177,7 @@ class Convex:
     @property
     def is_flat(self) -> bool:
         """Whether it is one of a plane, across which the third column of the frame stands."""
-        return self.body in (DISC, SQUARE)
+        return self.body.is_flat
 
     @property
     def volume(self) -> float:
@@ -105,9 +187,9 @@ class Convex:
     @property
     def mean_shadow(self) -> float:
         """Projected area in the mean of all directions, to some per cent; of a plane a length."""
-        axes = BALL.outline[:: len(BALL.outline) // AXES]
+        axes = BALL.outline[:: POINTS // AXES]
         if self.is_flat:
-            axes = DISC.outline[:, :2] @ np.linalg.qr(self.frame[:, :2])[0].T
+            axes = points_on_a_rim()[:, :2] @ np.linalg.qr(self.frame[:, :2])[0].T
         return float(self.overlap(axes, 0.0)[1].mean())
 
     @property
@@ -116,18 +198,7 @@ class Convex:
         return self.body.outline @ self.frame.T
 
     def contains(self, points: FloatArray) -> BoolArray:
-        """
-        Which points lie inside.
-
-        Parameters
-        ----------
-        points : ndarray, shape (N, 3)
-            From the origin of the region.
-
-        Returns
-        -------
-        ndarray of bool, shape (N,)
-        """
+        """Which points lie inside, of shape (N, 3) from the origin of the region."""
         isotropic, deviator, level = self.quadric
         form = isotropic * np.einsum("ij,ij->i", points, points)
         form += np.einsum("ij,ij->i", points @ deviator, points)
@@ -141,45 +212,25 @@ class Convex:
         """
         Which spheres lie inside as a whole; of a quadric that is no sphere not all of them.
 
-        Parameters
-        ----------
-        points : ndarray, shape (N, 3)
-            Their centres, from the origin of the region.
-        radius : ndarray, shape (N,)
-            Their radii.
-
-        Returns
-        -------
-        ndarray of bool, shape (N,)
+        Their centres have shape (N, 3), from the origin of the region, their radii shape (N,).
         """
-        isotropic, deviator, level = self.quadric
-        form = isotropic * np.eye(3) + deviator
+        form = self.quadric.form
         # √(x·form·x) is a norm: that of a sphere's places is at most that of both parts
         most = math.sqrt(max(float(np.linalg.eigvalsh(form)[-1]), 0.0))
         middle = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", points, form, points), 0.0))
-        inside = middle + most * radius < math.sqrt(level)
+        inside = middle + most * radius < math.sqrt(self.quadric.level)
         for plane in self.planes:
             inside &= points @ plane[:3] + radius < plane[3]
         return np.asarray(inside)
 
     def share(self, start: FloatArray, branch: FloatArray) -> FloatArray:
         """
-        Which part of each straight piece lies inside.
+        Which part of each straight piece lies inside: length inside over length, shape (N,).
 
-        Parameters
-        ----------
-        start : ndarray, shape (N, 3)
-            Where it begins, from the origin of the region.
-        branch : ndarray, shape (N, 3)
-            From there to where it ends; not of length 0.
-
-        Returns
-        -------
-        ndarray, shape (N,)
-            Length inside over length, 0 to 1.
+        A piece goes from ``start`` (seen from the origin of the region) to ``start + branch``, both
+        of shape (N, 3); no branch has length 0.
         """
-        isotropic, deviator, level = self.quadric
-        form = isotropic * np.eye(3) + deviator
+        form, level = self.quadric.form, self.quadric.level
         first, last = np.zeros(len(start)), np.ones(len(start))
         if form.any():
             # x·form·x - level = a t² + 2 b t + c along x = start + t branch
@@ -188,7 +239,7 @@ class Convex:
             c = np.einsum("ni,ij,nj->n", start, form, start) - level
             root = np.sqrt(np.maximum(b * b - a * c, 0.0))
             # along the axis of a cylinder a is 0: all of the piece is inside, or none
-            steep = a > ROUNDING * (isotropic * np.einsum("ni,ni->n", branch, branch))
+            steep = a > ROUNDING * (self.quadric.isotropic * np.einsum("ni,ni->n", branch, branch))
             slope = np.where(steep, a, 1.0)
             first = np.where(steep, np.maximum(first, (-b - root) / slope), first)
             last = np.where(steep, np.minimum(last, (root - b) / slope), last)
@@ -206,16 +257,7 @@ class Convex:
         """
         Which spheres reach inside; at times one that all but touches.
 
-        Parameters
-        ----------
-        points : ndarray, shape (N, 3)
-            Their centres, from the origin of the region.
-        radius : ndarray, shape (N,)
-            Their radii.
-
-        Returns
-        -------
-        ndarray of bool, shape (N,)
+        Their centres have shape (N, 3), from the origin of the region, their radii shape (N,).
         """
         near = np.sqrt(np.einsum("ij,ij->i", points, points)) < self.reach + radius
         for plane in self.planes:
@@ -229,18 +271,7 @@ class Convex:
         return np.asarray(near)
 
     def support(self, along: FloatArray) -> FloatArray:
-        """
-        The place that is furthest along each vector.
-
-        Parameters
-        ----------
-        along : ndarray, shape (N, 3)
-            Of any length but 0.
-
-        Returns
-        -------
-        ndarray, shape (N, 3)
-        """
+        """The place that is furthest along each vector, of any length but 0, shape (N, 3)."""
         furthest: FloatArray = self.body.support(along @ self.frame) @ self.frame.T
         return furthest
 
@@ -274,40 +305,18 @@ class Convex:
 
     def overlap(self, axes: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
         """
-        What it shares with itself moved along axes, and how fast that falls.
+        The volume g that it shares with itself moved by a length along axes, and -dg/dlength.
 
-        Parameters
-        ----------
-        axes : ndarray, shape (N, 3)
-            Unit vectors.
-        length : float
-            How far it is moved, dump's length unit.
-
-        Returns
-        -------
-        shared : ndarray, shape (N,)
-            The covariogram g, a volume.
-        slope : ndarray, shape (N,)
-            -dg/dlength, the area of the lines with a piece in it that is at least so long; at
-            length 0 the projected area.
+        Both have shape (N,), the axes are unit vectors of shape (N, 3). The second is the area of
+        the lines with a piece in the region that is at least so long: at length 0 the projected
+        area.
         """
         scale = abs(np.linalg.det(self.frame))
         shared, slope = self.body.overlap(axes @ np.linalg.inv(self.frame).T, length)
         return scale * shared, scale * slope
 
     def meets_itself(self, shift: FloatArray) -> bool:
-        """
-        Whether it overlaps itself moved by a vector.
-
-        Parameters
-        ----------
-        shift : ndarray, shape (3,)
-            Dump's length unit.
-
-        Returns
-        -------
-        bool
-        """
+        """Whether it overlaps itself moved by a vector, shape (3,)."""
         if self.body.is_symmetric:
             # the middle of two places of a symmetric region, x and -x + shift, is half the shift
             return bool(self.contains(0.5 * shift[None])[0])
@@ -322,18 +331,9 @@ class Convex:
 
     def deformed(self, gradient: FloatArray) -> Convex:
         """
-        The image of the region under the map gradient @ x.
+        The image of the region under the map ``gradient @ x``, of shape (3, 3) and not singular.
 
         A sphere becomes an ellipsoid, a box leans: planes and a quadric again.
-
-        Parameters
-        ----------
-        gradient : ndarray, shape (3, 3)
-            Not singular.
-
-        Returns
-        -------
-        Convex
         """
         if np.array_equal(gradient, np.eye(3)):
             return self
@@ -354,9 +354,8 @@ def image_of(body: Body, frame: FloatArray, size: str) -> Convex:
     # the support along x, y, z; those of -x, -y, -z are not its opposites in every body
     along = np.concatenate([np.eye(3), -np.eye(3)])
     ends = np.einsum("ij,ij->i", body.support(along @ frame) @ frame.T, along)
-    return Convex(
-        planes, quadric, -ends[3:], ends[:3], body.reach(frame), size, body, frame
-    )  # fmt: skip
+    reach = body.reach(frame)
+    return Convex(planes, quadric, -ends[3:], ends[:3], reach, size, body, frame)
 
 
 def sphere(radius: float) -> Convex:

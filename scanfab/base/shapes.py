@@ -2,25 +2,161 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.bodies import BALL, BLOCK, COLUMN, DISC, SQUARE, Hull
-from scanfab.base.convex import Convex, image_of, sphere
+from scanfab.base.convex import BALL, Body, Convex, image_of, points_on_a_rim, sphere
 from scanfab.base.errors import SettingsError
 from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray, IntArray
 
-# Of the size of a surface, or of its distance from the origin, whichever is larger: what 4 bytes a
-# number, as STL has them, cannot tell apart.
+# of a hull: planes that cut lines, all directions together, and the lines along each direction
+MOST_CUTS, FEWEST_LINES, MOST_LINES = 40_000_000, 400, 10_000
+# of the size of a surface, or of its distance from the origin, whichever is larger: what 4 bytes a
+# number, as STL has them, cannot tell apart
 TOLERANCE = 1e-6
-# each line is cut by all of them
+# each line is cut by all faces
 MOST_FACES = 1000
 # held against all planes of the hull at a time, so that a surface of many takes little memory
 SOME_FACES = 256
+
+
+class Column(Body):
+    """A cylinder about z, of radius 1 and between z = -1 and 1; in a plane a disc of radius 1."""
+
+    form = np.array([1.0, 1.0, 0.0])
+
+    def __init__(self, is_flat: bool) -> None:
+        rim, ends = points_on_a_rim(), np.array([[0.0, 0.0, 1.0, 1.0], [0.0, 0.0, -1.0, 1.0]])
+        self.is_flat = is_flat
+        self.planes = ends[:0] if is_flat else ends
+        self.volume = math.pi if is_flat else 2.0 * math.pi
+        self.outline = rim if is_flat else np.concatenate([rim + ends[0, :3], rim + ends[1, :3]])
+
+    def support(self, along: FloatArray) -> FloatArray:
+        """A place on a rim, or the middle of an end."""
+        across = np.linalg.norm(along[:, :2], axis=1, keepdims=True)
+        rim = along[:, :2] / np.where(across > 0.0, across, 1.0)
+        height = 0.0 if self.is_flat else 1.0
+        return np.column_stack([rim, np.where(along[:, 2] < 0.0, -height, height)])
+
+    def reach(self, frame: FloatArray) -> float:
+        """Where the axis stands square on the ends, the distance of a rim; else a little more."""
+        widest = np.linalg.svd(frame[:, :2], compute_uv=False)[0]
+        if self.is_flat:
+            return float(widest)
+        square = widest**2 + frame[:, 2] @ frame[:, 2]
+        return float(np.sqrt(square + 2.0 * np.linalg.norm(frame[:, :2].T @ frame[:, 2])))
+
+    def overlap(self, shift: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
+        """The lens of two circles, as high as both columns stand side by side."""
+        across, along = np.linalg.norm(shift[:, :2], axis=1), np.abs(shift[:, 2])
+        q, height = np.minimum(length * across, 2.0), 2.0 - length * along
+        chord = np.sqrt(4.0 - q**2)
+        lens = 2.0 * np.arccos(0.5 * q) - 0.5 * q * chord
+        if self.is_flat:
+            return lens, across * chord
+        slope = along * lens + across * chord * height
+        return np.maximum(height, 0.0) * lens, np.where(height > 0.0, slope, 0.0)
+
+
+class Block(Body):
+    """A cube from -1 to 1; in a plane a square."""
+
+    form = np.zeros(3)
+
+    def __init__(self, dimension: int, corners: Sequence[Sequence[float]]) -> None:
+        axes = np.eye(3)[:dimension]
+        self.is_flat = dimension == 2
+        self.planes = np.column_stack([np.concatenate([axes, -axes]), np.ones(2 * dimension)])
+        self.volume = 2.0**dimension
+        self.outline = np.array(corners)
+
+    def support(self, along: FloatArray) -> FloatArray:
+        """A corner."""
+        return np.where(along < 0.0, -1.0, 1.0) * [1.0, 1.0, 0.0 if self.is_flat else 1.0]
+
+    def overlap(self, shift: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
+        """A smaller block."""
+        step = np.abs(shift[:, : len(self.planes) // 2])
+        edge = np.maximum(2.0 - length * step, 0.0)
+        others = range(1, step.shape[1])
+        slope = sum(
+            math.prod((edge[:, i - k] for k in others), start=step[:, i])
+            for i in range(step.shape[1])
+        )
+        return edge.prod(axis=1), np.where(np.all(edge > 0.0, axis=1), slope, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Hull(Body):
+    """A convex polyhedron about the origin."""
+
+    outline: FloatArray
+    planes: FloatArray
+    areas: FloatArray
+    """Of the face in each plane, shape (P,)."""
+    volume: float
+
+    form = np.zeros(3)
+    is_symmetric = False
+
+    def support(self, along: FloatArray) -> FloatArray:
+        """A corner."""
+        furthest: FloatArray = self.outline[np.argmax(along @ self.outline.T, axis=1)]
+        return furthest
+
+    def overlap(self, shift: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
+        """
+        Of its own chords t: g = V Σ max(0, t - z) / Σ t, and -g' = A #(t ≥ z) / #(t > 0).
+
+        A few hundred lines along each of many directions tell these shares to some 1e-3, and
+        what a sum over the directions needs far better. Volume and projected area are exact, the
+        latter by A = ½ Σ A_f |n·n_f| over the faces.
+        """
+        shadow = 0.5 * np.abs(shift @ self.planes[:, :3].T) @ self.areas
+        if length == 0.0:
+            return np.full(len(shift), self.volume), shadow
+        lines = MOST_CUTS // (len(self.planes) * max(len(shift), 1))
+        lines = min(max(lines, FEWEST_LINES), MOST_LINES)
+        found = [self._long_shares(one, length, lines) for one in shift]
+        shared, number = np.array(found).reshape(-1, 2).T
+        return self.volume * shared, shadow * number
+
+    def _long_shares(self, shift: FloatArray, length: float, lines: int) -> tuple[float, float]:
+        """The share of its chords that is beyond a length, of all together and of their number."""
+        step = float(np.linalg.norm(shift))
+        axis = shift / step
+        u = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
+        sides = np.array([u / np.linalg.norm(u), np.cross(axis, u / np.linalg.norm(u))])
+        across = self.outline @ sides.T
+        low, extent = across.min(axis=0), np.ptp(across, axis=0)
+        # lines at irrational steps: no row of them meets an edge all along
+        number = np.arange(lines)
+        places = np.column_stack([(number + 0.5) / lines, number * 0.6180339887498949 % 1.0])
+        feet = (low + places * extent) @ sides
+        steep = self.planes[:, :3] @ axis
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ends = (self.planes[:, 3] - feet @ self.planes[:, :3].T) / steep
+        flat = np.abs(steep) < 1e-14
+        outside = np.any(feet @ self.planes[flat, :3].T > self.planes[flat, 3], axis=1)
+        leaves = np.min(ends, axis=1, where=steep > 1e-14, initial=np.inf)
+        enters = np.max(ends, axis=1, where=steep < -1e-14, initial=-np.inf)
+        chords = np.where(outside, 0.0, np.maximum(leaves - enters, 0.0))
+        chords = chords[chords > 0.0]
+        long = chords[chords >= length * step]
+        return float(np.sum(long - length * step) / chords.sum()), len(long) / len(chords)
+
+
+COLUMN, DISC = Column(is_flat=False), Column(is_flat=True)
+BLOCK = Block(3, list(product((-1.0, 1.0), repeat=3)))
+# the corners follow one another around it
+SQUARE = Block(2, [(-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (1.0, 1.0, 0.0), (-1.0, 1.0, 0.0)])
 
 
 def box(edges: Sequence[float] | FloatArray, turn: npt.ArrayLike | None = None) -> Convex:
@@ -74,85 +210,23 @@ def ellipsoid(semi_axes: Sequence[float] | FloatArray, turn: npt.ArrayLike | Non
 
 
 def circle(radius: float, plane: Space) -> Convex:
-    """
-    A circle about the origin, of some coordinate plane.
-
-    In the plane it holds what the sphere holds; its volume is an area.
-
-    Parameters
-    ----------
-    radius : float
-        Dump's length unit, above 0.
-    plane : Space
-        In which it lies.
-
-    Returns
-    -------
-    Convex
-
-    Examples
-    --------
-    >>> from scanfab.base.shapes import circle
-    >>> from scanfab.base.space import Space
-    >>> round(circle(2.0, Space(2)).volume, 3)
-    12.566
-    """
+    """A circle about the origin, in a coordinate plane; it holds what the sphere holds there."""
     high = radius * (1.0 - plane.normal)
     frame = np.array([radius, radius, 1.0]) * plane.basis.T
     return replace(sphere(radius), low=-high, high=high, body=DISC, frame=frame)
 
 
 def rectangle(edges: Sequence[float] | FloatArray, plane: Space) -> Convex:
-    """
-    A rectangle about the origin, of some coordinate plane.
-
-    Parameters
-    ----------
-    edges : sequence of 2 floats
-        Full lengths along the plane's coordinates, in the order of the alphabet.
-    plane : Space
-        In which it lies.
-
-    Returns
-    -------
-    Convex
-
-    Examples
-    --------
-    >>> from scanfab.base.shapes import rectangle
-    >>> from scanfab.base.space import Space
-    >>> rectangle([2.0, 3.0], Space(2)).high
-    array([1. , 1.5, 0. ])
-    """
+    """A rectangle about the origin, edges along the plane's coordinates, in alphabetic order."""
     half = 0.5 * np.asarray(edges, dtype=float)[:, None] * np.eye(3)[sorted(plane.along)]
     frame = np.column_stack([*half, plane.normal])
     return image_of(SQUARE, frame, "box {:g} x {:g}".format(*edges))
 
 
 def ellipse(semi_axes: Sequence[float] | FloatArray, plane: Space) -> Convex:
-    """
-    An ellipse about the origin, of some coordinate plane.
-
-    Parameters
-    ----------
-    semi_axes : sequence of 2 floats
-        Half of its diameters along the plane's coordinates, in the order of the alphabet.
-    plane : Space
-        In which it lies.
-
-    Returns
-    -------
-    Convex
-
-    Examples
-    --------
-    >>> from scanfab.base.shapes import ellipse
-    >>> from scanfab.base.space import Space
-    >>> ellipse([2.0, 3.0], Space(2)).high
-    array([2., 3., 0.])
-    """
-    lengths = np.asarray(semi_axes, dtype=float)
-    return turned_ellipse(lengths, np.eye(3)[sorted(plane.along)], plane)
+    """An ellipse about the origin, semi-axes along the plane's coordinates, in alphabetic order."""
+    turn = np.eye(3)[sorted(plane.along)]
+    return turned_ellipse(np.asarray(semi_axes, dtype=float), turn, plane)
 
 
 def turned_ellipse(semi_axes: FloatArray, turn: FloatArray, plane: Space) -> Convex:
@@ -226,10 +300,9 @@ def polyhedron(points: FloatArray, triangles: IntArray) -> tuple[Convex, FloatAr
     from scipy.spatial import ConvexHull, QhullError
 
     points, triangles, tolerance = _merged(points, triangles)
-    if len(points):
-        # of numbers about the middle less is lost by rounding
-        middle = points.mean(axis=0)
-        points = points - middle
+    # numbers about the middle lose less by rounding
+    middle = points.mean(axis=0) if len(points) else np.zeros(3)
+    points = points - middle
     try:
         hull = ConvexHull(points)
     except (QhullError, ValueError):
@@ -237,7 +310,6 @@ def polyhedron(points: FloatArray, triangles: IntArray) -> tuple[Convex, FloatAr
     extent = float(np.ptp(points, axis=0).max())
     if hull.volume < TOLERANCE * extent**3:
         raise SettingsError("the surface encloses no volume: it is flat")
-    _check_closed(triangles)
     planes = _faces(hull.equations, extent)
     _check_convex(points, triangles, planes, tolerance)
     if len(planes) > MOST_FACES:
@@ -245,9 +317,16 @@ def polyhedron(points: FloatArray, triangles: IntArray) -> tuple[Convex, FloatAr
             f"the surface has {len(planes)} faces, more than {MOST_FACES}, and each of them cuts "
             f"every line: make it coarser"
         )
-    centroid = _centroid(points, hull.simplices)
+    # the hull as tetrahedra with the origin, which lies inside
+    corners = points[hull.simplices]
+    volume = np.abs(np.linalg.det(corners))
+    centroid = volume @ corners.sum(axis=1) / (4.0 * volume.sum())
     planes[:, 3] -= planes[:, :3] @ centroid
-    areas = _areas(points[hull.simplices], hull.equations[:, :3], planes)
+    # each of its triangles belongs to the plane that faces its way
+    sides = corners[:, 1:] - corners[:, :1]
+    each = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    face = np.argmax(hull.equations[:, :3] @ planes[:, :3].T, axis=1)
+    areas = np.bincount(face, weights=each, minlength=len(planes)).astype(float)
     body = Hull(points[hull.vertices] - centroid, planes, areas, float(hull.volume))
     return image_of(body, np.eye(3), f"surface of {len(planes)} faces"), middle + centroid
 
@@ -276,20 +355,6 @@ def _merged(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArr
     return points[rows], triangles[(a != b) & (b != c) & (c != a)], tolerance
 
 
-def _check_closed(triangles: IntArray) -> None:
-    """Each edge has a triangle on either side."""
-    edges = np.sort(
-        np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    )
-    _, count = np.unique(edges, axis=0, return_counts=True)
-    wrong = int(np.sum(count != 2))
-    if wrong:
-        raise SettingsError(
-            f"the surface is not closed: {wrong} of its {len(count)} edges are not between two "
-            f"faces"
-        )
-
-
 def _faces(equations: FloatArray, extent: float) -> FloatArray:
     """The planes of a hull's triangles, those that coincide once, the outermost of them."""
     planes = np.column_stack([equations[:, :3], -equations[:, 3]])
@@ -306,7 +371,14 @@ def _faces(equations: FloatArray, extent: float) -> FloatArray:
 def _check_convex(
     points: FloatArray, triangles: IntArray, planes: FloatArray, tolerance: float
 ) -> None:
-    """All of the surface lies on that of its hull."""
+    """Each edge of the surface has a triangle on either side, and all of it lies on its hull."""
+    edges = np.sort(np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)]))
+    _, count = np.unique(edges, axis=0, return_counts=True)
+    if wrong := int(np.sum(count != 2)):
+        raise SettingsError(
+            f"the surface is not closed: {wrong} of its {len(count)} edges are not between two "
+            f"faces"
+        )
     inside = 0
     for first in range(0, len(triangles), SOME_FACES):
         corners = points[triangles[first : first + SOME_FACES]]
@@ -316,20 +388,3 @@ def _check_convex(
         raise SettingsError(
             f"the surface is not convex: {inside} of its {len(triangles)} faces lie inside its hull"
         )
-
-
-def _areas(triangles: FloatArray, normals: FloatArray, planes: FloatArray) -> FloatArray:
-    """Of the faces, from a hull's triangles (T, 3, 3), each in the plane that faces its way."""
-    sides = triangles[:, 1:] - triangles[:, :1]
-    each = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-    face = np.argmax(normals @ planes[:, :3].T, axis=1)
-    areas: FloatArray = np.bincount(face, weights=each, minlength=len(planes)).astype(float)
-    return areas
-
-
-def _centroid(points: FloatArray, triangles: IntArray) -> FloatArray:
-    """Of the hull, as tetrahedra with the origin, which lies inside."""
-    corners = points[triangles]
-    volume = np.abs(np.linalg.det(corners))
-    centroid: FloatArray = volume @ corners.sum(axis=1) / (4.0 * volume.sum())
-    return centroid
