@@ -27,6 +27,8 @@ MANY_CONTACTS = 30
 SOLIDS = 20.0
 # of the period, without any grain
 EMPTY = 0.2
+# sums of two radii: grains whose neighbours are not further apart touch, but for rounding
+CLOSED = 1.01
 # what formats without a cell lack, and what makes up for it
 CELL_LACKS = {
     "nothing": ("this format carries no cell", "`cell=(LX, LY, LZ)`"),
@@ -278,10 +280,14 @@ def _many_contacts(sample: Sample) -> str:
 def _no_contacts(sample: Sample) -> str:
     if sample.contact_numbers[sample.grains].any() or sample.contacts.source == "file":
         return ""
+    nearest = _nearest(sample.packing)
+    # twice the median gap closes most of the gaps
+    tolerance = max(2.0 * (nearest - 1.0), 1e-6)
+    wider = f", or use `contact_tolerance={tolerance:.1g}`" if nearest < CLOSED else ""
     return (
-        f"no contact at all by geometry: the centres of nearest neighbours are "
-        f"{_nearest(sample.packing):.6g} diameters apart (median): right for a gas, else check the "
-        f"units of radius and position, or use `contact_tolerance=1e-4`"
+        f"no contact at all by geometry: the centres of nearest neighbours are {nearest:.6g} "
+        f"diameters apart (median): right for a gas, else check the units of radius and "
+        f"position{wider}"
     )
 
 

@@ -19,6 +19,8 @@ from scanfab.packing.window import SurfaceBox
 RADII, TIMES, LONELY = 1.25, 5.0, 0.05
 # Fewer grains are no crowd that one of them could be far away from.
 FEWEST = 50
+ESCAPED = "escaped"
+"""The code of the note on such grains, which comes once a series."""
 # Grains of the sample that are left out at most, and how many may have flown away together: more of
 # them may be a part of the sample, for the user to decide.
 SHARE, TOGETHER = 0.01, 20

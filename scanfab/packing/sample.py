@@ -18,7 +18,7 @@ from scanfab.base.spelling import counted
 from scanfab.base.typing import BoolArray, IntArray
 from scanfab.packing.boundary import BoundaryRule, select_boundary
 from scanfab.packing.contacts import Contacts
-from scanfab.packing.escaped import Escaped, escaped_grains, told_of_escaped
+from scanfab.packing.escaped import ESCAPED, Escaped, escaped_grains, told_of_escaped
 from scanfab.packing.packing import Packing
 from scanfab.packing.rattlers import RattlerRule, Touching, count, installed_rules
 from scanfab.packing.search import find_contacts
@@ -182,7 +182,7 @@ class Sample:
         if not self.escaped.grains.any():
             return []
         more = self.number(self.escaped.grains) - 1
-        return [Note("escaped", told_of_escaped(self.packing, self.grains, self.escaped, more))]
+        return [Note(ESCAPED, told_of_escaped(self.packing, self.grains, self.escaped, more))]
 
     @cached_property
     def rattlers(self) -> BoolArray:

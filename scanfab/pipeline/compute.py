@@ -19,6 +19,7 @@ from scanfab.base.option import options_of, takes_options, unusable
 from scanfab.base.threads import shared_in_order
 from scanfab.io.frame import Frame
 from scanfab.packing.cell import Cell
+from scanfab.packing.escaped import ESCAPED
 from scanfab.packing.groupings import Grouping, Groupings, grouping_of
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.cluster.dask_executor import DaskExecutor
@@ -236,6 +237,7 @@ class _Run:
         self.has_grains = False
         self._flips = Flips(frames.settings.frames.step)
         self._groupings = Groupings()
+        self._told_of_escaped = False
 
     def jobs(self, done: Container[int], observe: Observer | None) -> Iterator[_FrameJob | None]:
         """The chosen frames that are not done; None where one is still to come."""
@@ -269,7 +271,10 @@ class _Run:
         """Tell what there is to tell of a frame."""
         for warning in computed.heard:
             warnings.warn(warning, stacklevel=3)
-        tell(computed.notes, f"frame {computed.number}")
+        # a grain that flew away goes on flying: once a series is enough
+        notes = [one for one in computed.notes if one.code != ESCAPED or not self._told_of_escaped]
+        self._told_of_escaped |= any(one.code == ESCAPED for one in notes)
+        tell(notes, f"frame {computed.number}")
         tell(self._flips.notes(computed.number, computed.cell))
         grouping = self._groupings.notes(computed.number, computed.grouping)
         tell(grouping, f"frame {computed.number}")

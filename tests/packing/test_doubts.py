@@ -162,11 +162,13 @@ def test_no_contact_at_all_asks_for_the_units(loose):
     assert "check the units of radius and position" in doubt
 
 
-def test_contacts_that_rounding_has_opened_ask_for_a_tolerance():
+@pytest.mark.parametrize(("gap", "words"), [(2e-6, "4e-06"), (8e-4, "0.002"), (25.0, None)])
+def test_a_tolerance_that_closes_the_gaps_is_named_where_they_are_narrow(gap, words):
     grid = np.stack(np.meshgrid(*3 * [np.arange(5.0)]), axis=-1).reshape(-1, 3)
-    (doubt,) = [one.text for one in doubts_of(sample_of(Packing(grid, 0.5 - 1e-6)))]
+    (doubt,) = [one.text for one in doubts_of(sample_of(Packing(grid, 0.5 / (1.0 + gap))))]
     assert "no contact at all" in doubt
-    assert "`contact_tolerance=1e-4`" in doubt
+    assert (f"or use `contact_tolerance={words}`" in doubt) == (words is not None)
+    assert ("contact_tolerance" in doubt) == (words is not None)
 
 
 @pytest.mark.parametrize("factor", [0.5, 0.9])

@@ -509,3 +509,11 @@ def test_the_forms_of_options_are_in_the_help():
     told = " ".join(scanfab.compute.__doc__.split())
     for form in ("stop|skip", "auto|cell|boundary|grains|FILE.csv", "A:B:C", "x|y|z|X,Y,Z"):
         assert f"Written as ``{form}``." in told
+
+
+def test_a_grain_that_flew_away_is_told_of_once_in_a_series():
+    grid = np.stack(np.meshgrid(*3 * [np.arange(5.0)]), axis=-1).reshape(-1, 3)
+    frames = [Packing(np.vstack([grid, [x, 2.0, 2.0]]), 0.5) for x in (20.0, 25.0, 30.0)]
+    with pytest.warns(ScanfabWarning) as told:
+        scanfab.compute(frames, variants="a", directions=9, spacing="2rmin", contact_tolerance=1e-4)
+    assert [str(one.message)[:7] for one in told if "flown away" in str(one.message)] == ["frame 0"]
