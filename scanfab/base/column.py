@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import get_args, get_origin, get_type_hints
 
 from scanfab.base.errors import ScanfabError
 
@@ -89,19 +89,11 @@ def columns_of_fields(kind: type) -> tuple[Column, ...]:
     >>> columns_of_fields(SummaryRow)[2].meaning
     'number of frames that enter the fits'
     """
-    hints = get_type_hints(kind, include_extras=True)
-    return tuple(_column(one.name, hints[one.name]) for one in fields(kind))
-
-
-def _column(name: str, hint: Any) -> Column:
-    meaning, *unit = hint.__metadata__
-    return Column(name, _kind(hint.__origin__), "".join(unit), meaning)
-
-
-def _kind(hint: Any) -> type:
-    """``float`` of ``float | None``, ``list`` of ``list[str]`` and the like."""
-    options = [one for one in get_args(hint) if one is not type(None)]
-    if get_origin(hint) is list:
-        return list
-    kind: type = _kind(options[0]) if options else hint
-    return kind
+    found = []
+    for name, hint in get_type_hints(kind, include_extras=True).items():
+        meaning, *unit = hint.__metadata__
+        # ``float`` of ``float | None``, ``list`` of ``list[str]`` and the like
+        of_value = next((one for one in get_args(hint.__origin__)), hint.__origin__)
+        held = hint.__origin__ if get_origin(hint.__origin__) is list else of_value
+        found.append(Column(name, get_origin(held) or held, "".join(unit), meaning))
+    return tuple(found)

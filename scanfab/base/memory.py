@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 GROUP = Path("/sys/fs/cgroup")
@@ -11,35 +12,20 @@ GROUP = Path("/sys/fs/cgroup")
 
 def free_memory() -> int:
     """Bytes that this process can still get: of the machine, its container and its own limit."""
-    found = [_of_machine(), _of_container(), address_space()]
-    return max(min((one for one in found if one is not None), default=sys.maxsize), 0)
-
-
-def _of_machine() -> int | None:
-    try:
+    found = [sys.maxsize]
+    with suppress(OSError, TypeError):
         text = Path("/proc/meminfo").read_text("ascii")
-    except OSError:
-        return None
-    available = re.search(r"^MemAvailable:\s*(\d+) kB", text, re.MULTILINE)
-    return None if available is None else int(available[1]) << 10
-
-
-def _of_container() -> int | None:
-    try:
-        most, used = ((GROUP / f"memory.{name}").read_text("ascii") for name in ("max", "current"))
-        return int(most) - int(used) + _old_cache()
-    except (OSError, ValueError):  # not in one, or "max": no limit
-        return None
-
-
-def _old_cache() -> int:
-    """Copies of files that the system keeps in the group's memory until someone needs the room."""
-    try:
-        text = (GROUP / "memory.stat").read_text("ascii")
-    except OSError:
-        return 0
-    found = re.search(r"^inactive_file (\d+)$", text, re.MULTILINE)
-    return 0 if found is None else int(found[1])
+        found.append(int(re.search(r"MemAvailable:\s*(\d+) kB", text)[1]) << 10)  # type: ignore[index]
+    # not every process is in a container, and one without a limit has the word "max"
+    with suppress(OSError, ValueError):
+        most, used = (int((GROUP / f"memory.{one}").read_text()) for one in ("max", "current"))
+        # copies of files that the system keeps until someone needs the room
+        state = GROUP / "memory.stat"
+        text = state.read_text("ascii") if state.exists() else ""
+        cache = re.findall(r"(?m)^inactive_file (\d+)$", text)
+        found.append(most - used + sum(map(int, cache)))
+    own = address_space()
+    return max(min(*found, sys.maxsize if own is None else own), 0)
 
 
 def address_space() -> int | None:

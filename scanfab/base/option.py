@@ -8,7 +8,7 @@ import textwrap
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from difflib import get_close_matches
-from functools import cache, wraps
+from functools import wraps
 from typing import Any, ParamSpec, TypeVar
 
 from scanfab.base.errors import SettingsError
@@ -29,10 +29,6 @@ def unusable(name: str, expected: str, found: object) -> SettingsError:
 def as_given(name: str, value: Any) -> Any:
     """For values that are checked where they are used."""
     return value
-
-
-# what a shell is told of options that take numbers and nothing else
-KINDS: dict[str, type] = {"int": int, "float": float}
 
 
 @dataclass(frozen=True)
@@ -74,10 +70,6 @@ class Option:
     first: bool = False
     """Whether it stands among the few that most need."""
 
-    def __post_init__(self) -> None:
-        """A group that does not exist is a slip of the programmer."""
-        assert self.group in GROUPS, self.group
-
     @property
     def flag(self) -> str:
         """As the command line spells it."""
@@ -99,8 +91,9 @@ def flag_of(name: str) -> str:
 
 def option(**declaration: Any) -> Any:
     """A field of a dataclass that declares an option, of the field's name."""
-    declaration.setdefault("kind", KINDS.get(declaration.get("takes", ""), str))
-    declared = Option(**declaration)
+    # a shell is told of options that take a number and nothing else
+    number_only = {"int": int, "float": float}.get(declaration.get("takes", ""), str)
+    declared = Option(**{"kind": number_only, **declaration})
     return field(default=declared.default, metadata={"option": declared})
 
 
@@ -113,11 +106,6 @@ def changed(holder: type, name: str, **changes: Any) -> Any:
 
 def options_of(holder: type) -> tuple[Option, ...]:
     """The options that the fields of a dataclass declare."""
-    return _options_of(holder)
-
-
-@cache
-def _options_of(holder: type) -> tuple[Option, ...]:
     return tuple(replace(one.metadata["option"], name=one.name) for one in fields(holder))
 
 

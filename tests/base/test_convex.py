@@ -8,7 +8,7 @@ import pytest
 from scanfab import SettingsError, box, cylinder, direction_rule, ellipsoid, sphere
 from scanfab.base.shapes import BLOCK, Hull
 from tests.helpers.lattices import rotation
-from tests.helpers.windows import box_by_corners, cut_ball, hull_of, leaning
+from tests.helpers.windows import cut_ball, hull_of, leaning
 
 RANDOM = np.random.default_rng(3)
 POINTS = RANDOM.uniform(-2, 2, (2000, 3))
@@ -102,11 +102,6 @@ def test_spheres_meet_a_region_whose_nearest_place_they_hold(name):
     assert shape.reach < (1.3 if "deformed" in name else 1.03) * reach
 
 
-def test_only_spheres_that_reach_into_a_sphere_meet_it():
-    points = np.array([[0.0, 0.0, 1.4], [0.0, 1.6, 0.0], [0.1, 0.0, 0.0]])
-    assert sphere(1.0).may_meet(points, np.array([0.5, 0.5, 0.0])).tolist() == [True, False, True]
-
-
 def test_a_sphere_beside_the_edge_of_a_box_does_not_meet_it():
     """It reaches past both planes of the edge, but not to where they meet."""
     cube, beside = box([2.0, 2.0, 2.0]), np.array([[1.5, 1.5, 0.0]])
@@ -174,16 +169,6 @@ def test_overlap_with_itself_is_what_points_say(name):
         more, less = (shape.overlap(AXES, length + step)[0] for step in (1e-5, -1e-5))
         assert slope == pytest.approx((less - more) / 2e-5, abs=5e-2 if hull else 1e-4)
     assert not np.any(shape.overlap(AXES, 2.1 * shape.reach))
-
-
-def test_a_box_by_its_corners_has_the_overlap_of_the_box():
-    """Once by a formula, once from chords."""
-    one, other = box(2 * HALF, TURN), box_by_corners(HALF, TURN)
-    for length in (0.0, 0.4):
-        shared, slope = one.overlap(AXES, length)
-        found, falls = other.overlap(AXES, length)
-        assert found == pytest.approx(shared, rel=5e-3)
-        assert falls == pytest.approx(slope, rel=2e-2)
 
 
 @pytest.mark.parametrize("name", SHAPES)

@@ -9,7 +9,6 @@ import pytest
 from scanfab.base import plugins
 from scanfab.base.errors import ScanfabError, ScanfabWarning
 from scanfab.base.plugins import load_plugins
-from scanfab.io.registry import load_readers
 from scanfab.packing import rattlers
 from scanfab.table.columns import installed_fabrics
 from scanfab.table.formats import registry as formats
@@ -63,8 +62,3 @@ def test_what_is_no_plugin_is_a_warning_in_every_group(monkeypatch, group, insta
     with pytest.warns(ScanfabWarning, match="'bad' of made-up cannot be loaded: TypeError: expec"):
         assert list(installed()) == rest
     installed.cache_clear()
-
-
-def test_what_is_no_reader_is_a_warning():
-    with pytest.warns(ScanfabWarning, match="'bad' of one cannot be loaded: TypeError: expected a"):
-        assert load_readers([point("bad", lambda: dict)]) == {}
