@@ -34,8 +34,8 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[0] = str(ROOT)
 
 from scanfab.base.errors import ScanfabError  # noqa: E402
-from scanfab.io.formats import lammps_yaml  # noqa: E402
-from scanfab.io.parse import counted_rows, text_dump, text_table, vtk_data  # noqa: E402
+from scanfab.io.formats import lammps_yaml, text_dump  # noqa: E402
+from scanfab.io.parse import counted_rows, text_table, vtk_data  # noqa: E402
 from scanfab.io.reader import GrainTable, ReadOptions  # noqa: E402
 from scanfab.io.registry import reader_named  # noqa: E402
 from scanfab.packing.cell import Cell  # noqa: E402
@@ -47,7 +47,7 @@ ENDINGS += (".lammpstrj",)
 VTK = (".vtk", ".vtp", ".vtu")
 NEVER, MANY = 1 << 30, 40
 # names of sizes, by module: from which a text is long, and what is read of it at a time
-FROM = ((text_table, "LONG LARGE"), (text_dump, "LONG LARGE"), (counted_rows, "LONG"))
+FROM = ((text_table, "LONG LARGE"), (counted_rows, "LONG"))
 FROM += ((vtk_data, "LONG"),)
 
 WORD = re.compile(rb"(?<![^\s,;])[^\s,;]+")

@@ -19,8 +19,8 @@ import pytest
 import scanfab
 from scanfab.base.errors import ReadError
 from scanfab.io import files
-from scanfab.io.formats import yade_save
-from scanfab.io.parse import counted_rows, text_dump
+from scanfab.io.formats import text_dump, yade_save
+from scanfab.io.parse import counted_rows
 from scanfab.io.parse.vtk_data import FlawError
 from scanfab.io.parse.vtk_xml import read_xml
 from tests.helpers.dumps import dump_text, write
@@ -155,8 +155,8 @@ DATA = "LAMMPS data file\n\n{} atoms\n\n0 1 xlo xhi\n0 1 ylo yhi\n0 1 zlo zhi\n\
     [
         ("dump", DUMP.format("ATOMS id x y z radius"), "after 300000 complete lines"),
         ("dump", DUMP.format("ATOMS"), "after 300000 complete lines"),
-        ("a.data", DATA.format(99999999999), "counts 99999999999 atoms, found 30000. lines"),
-        ("a.data", DATA.format(3), "counts 3 atoms, found 30000. lines"),
+        ("a.data", DATA.format(99999999999), "counts 99999999999 atoms, found 30000"),
+        ("a.data", DATA.format(3), "counts 3 atoms, found 30000"),
     ],
 )
 def test_rows_that_cannot_be_those_counted_are_not_parsed(tmp_path, monkeypatch, name, text, told):

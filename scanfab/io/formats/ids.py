@@ -11,7 +11,7 @@ from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.formats.columns import refuse_named_twice
 from scanfab.io.formats.join import rows_of_ids
-from scanfab.io.parse.text_dump import DumpBlock
+from scanfab.io.formats.text_dump import Dump
 from scanfab.io.reader import GrainTable
 
 # names of contact_columns: ids, force on the first grain, its tangential part if apart from it
@@ -49,7 +49,7 @@ def refuse_rounded_ids(path: Path, values: FloatArray, grains: GrainTable) -> No
         )
 
 
-def named_places(path: Path, text: str | None, block: DumpBlock) -> dict[str, int]:
+def named_places(path: Path, text: str | None, block: Dump) -> dict[str, int]:
     """Columns by their meaning, from ``id1=c_ids[1],id2=c_ids[2],...``; empty without it."""
     if text is None:
         return {}
@@ -72,7 +72,7 @@ def named_places(path: Path, text: str | None, block: DumpBlock) -> dict[str, in
     return {key: block.names.index(own) for key, own in named.items()}
 
 
-def named_force(block: DumpBlock, places: dict[str, int]) -> FloatArray | None:
+def named_force(block: Dump, places: dict[str, int]) -> FloatArray | None:
     """The force on the second grain, where the named columns have that on the first."""
     if FORCE[0] not in places:
         return None

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from scanfab.base.errors import PackingError, ReadError
-from scanfab.base.lengths import MOST
-from scanfab.base.typing import FloatArray
+from scanfab.base.errors import ReadError
+from scanfab.io.files import first_bytes
 from scanfab.io.formats.columns import grain_table
-from scanfab.io.parse.counted_rows import counted_rows, text_of
-from scanfab.io.parse.lammps_box import box_vectors
-from scanfab.io.parse.number_rows import exact_column
+from scanfab.io.formats.lammps_box import box_cell
 from scanfab.io.reader import GrainTable, ReadOptions, Snapshot
+from scanfab.io.text import Layout, read_rows, text_of
 from scanfab.packing.cell import Cell
 
 FIRST_LINE = re.compile(rb"\A(?:\xef\xbb\xbf)?LAMMPS data file[^\n]*")
@@ -22,41 +22,39 @@ FIRST_LINE = re.compile(rb"\A(?:\xef\xbb\xbf)?LAMMPS data file[^\n]*")
 ATOMS = re.compile(rb"^[ \t]*\d{1,15}[ \t]+atoms[ \t]*(?:#[^\n]*)?\r?$", re.MULTILINE)
 BOX = re.compile(rb"^[^\n]*[ \t]xlo[ \t]+xhi\b", re.MULTILINE)
 STEP = re.compile(rb"timestep = (\d{1,18})\b")
+# a section begins with a line of words, at times with a style behind a #; Python finds the end of
+# the line before it much faster than beginnings of lines
+SECTION = re.compile(rb"\n[ \t]*([A-Z][A-Za-z ]*?)[ \t]*(?:#[ \t]*(\S+)[^\n]*)?\r?$", re.MULTILINE)
 # orders of the columns; image flags, and of hybrid styles the columns of others, stand behind
 PLAIN = ("id", "type", "diameter", "density", "x", "y", "z")
 HYBRID = ("id", "type", "x", "y", "z", "diameter", "density")
 FLAGS = ("ix", "iy", "iz")
-MOST_COLUMNS = 40
 # what atoms may be that are no spheres: their third column is a flag, not a diameter
 NO_SPHERES = ("ellipsoids", "lines", "triangles", "bodies")
 # YADE writes this first line, and radii in the column of diameters
 OF_YADE = b"LIGGGHTS Description"
 
-# a section is a line that starts with a word, behind the header; found with the end of the line
-# before it, for which Python looks much faster than for the beginnings of lines
-SECTION = re.compile(rb"\n[ \t]*([A-Z][A-Za-z ]*?)[ \t]*(?:#[ \t]*(\S+)[^\n]*)?\r?$", re.MULTILINE)
+Columns = list[npt.NDArray[Any]]
+Header = dict[str, list[str]]
 
 
 def is_data_file(head: bytes) -> bool:
     """Whether a file starts as data files do."""
     return FIRST_LINE.match(head) is not None or (
-        # most files that are asked about are dumps, in which a search takes longer
-        not head.startswith(b"ITEM:")
-        and ATOMS.search(head) is not None
-        and BOX.search(head) is not None
+        ATOMS.search(head) is not None and BOX.search(head) is not None
     )
 
 
 def of_liggghts(head: bytes) -> bool:
-    """Whether the first line, which is free, names LIGGGHTS."""
-    return b"LIGGGHTS" in head.partition(b"\n")[0].upper()
+    """Whether the first line, which is free, or the version in a restart names LIGGGHTS."""
+    return b"LIGGGHTS" in head.partition(b"\n")[0][:1000].upper()
 
 
-def step_of_data(head: bytes) -> int | None:
-    """The step that the first line names."""
-    first = FIRST_LINE.match(head)
+def index_data(path: Path) -> list[Snapshot]:
+    """The only snapshot of a file, with the step that the first line of LAMMPS names."""
+    first = FIRST_LINE.match(first_bytes(path))
     step = None if first is None else STEP.search(first[0])
-    return None if step is None else int(step[1])
+    return [Snapshot(path, step=None if step is None else int(step[1]))]
 
 
 def read_data_grains(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
@@ -71,54 +69,73 @@ def read_data_grains(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
     path, data = snapshot.path, text_of(snapshot)
     # a header of one line is at most a comment
     sections = list(SECTION.finditer(data, max(data.find(b"\n"), 0)))
-    atoms = next((place for place, one in enumerate(sections) if one[1] == b"Atoms"), None)
-    if atoms is None:
+    place = next((place for place, one in enumerate(sections) if one[1] == b"Atoms"), None)
+    if place is None:
         raise ReadError(f"{path}: expected a section Atoms, found none")
-    header = data[: sections[0].start() + 1].decode("utf-8", "replace").splitlines()
-    begin = sections[atoms].end()
-    end = sections[atoms + 1].start() + 1 if atoms + 1 < len(sections) else len(data)
-    values = counted_rows(
-        snapshot,
-        data,
-        begin,
-        end,
-        count=_counted(path, header),
-        widths=(len(PLAIN), *range(4, MOST_COLUMNS)),
-        names="atoms",
-    )
+    header = _header(data[: sections[0].start()].decode("utf-8", "replace"))
+    count = "".join(header.get("atoms", []))
+    if not re.fullmatch(r"\d{1,15}", count):
+        raise ReadError(f"{path}: expected a line 'N atoms' in the header, found none")
     cell = _cell(path, header)
-    if options.columns and all(f"{own}".isdecimal() for own in options.columns.values()):
-        names = tuple(f"{place + 1}" for place in range(values.shape[1]))
-    else:
-        style = (sections[atoms][2] or b"").decode("utf-8", "replace")
+    begin = sections[place].end()
+    end = sections[place + 1].start() + 1 if place + 1 < len(sections) else len(data)
+    rows = re.sub(rb"[ \t]*#[^\n]*", b"", data[begin:end])
+    width = len(rows.lstrip().partition(b"\n")[0].split()) or len(PLAIN)
+    numbers = tuple(f"{place + 1}" for place in range(width))
+    own = {f"{name}" for name in options.columns.values()}
+    is_numbered = bool(own) and all(name.isdecimal() for name in own)
+    id = f"{options.columns.get('id', 1)}"
+    layout = Layout(numbers, line=data.count(b"\n", 0, begin) + 1, whole=(id,))
+    columns = read_rows(snapshot, rows, layout, count=int(count), what="atoms")
+    if not is_numbered:
+        style = (sections[place][2] or b"").decode("utf-8", "replace")
         _refuse_others(path, style, header, data)
-        names = _names(path, style, values, cell)
-    columns = {name: values[:, place] for place, name in enumerate(names)}
-    id = options.columns.get("id", "id")
-    if id in columns:
-        columns[id] = exact_column(values, data[begin:end], names.index(id))
+        names = _names(path, style, list(columns.values()), cell)
+        columns = dict(zip(names, columns.values(), strict=True))
     return grain_table(path, columns, cell, options)
 
 
-def _counted(path: Path, header: list[str]) -> int:
-    for line in header:
-        words = line.split()
-        if words[1:2] == ["atoms"] and re.fullmatch(r"\d{1,15}", words[0]):
-            return int(words[0])
-    raise ReadError(f"{path}: expected a line 'N atoms' in the header, found none")
+def _header(text: str) -> Header:
+    """The words before each keyword such as ``atoms`` or ``xlo xhi``; the first line is free."""
+    found = {}
+    for line in text.splitlines()[1:]:
+        words = line.partition("#")[0].split()
+        count = next((place for place, word in enumerate(words) if word[0].isalpha()), len(words))
+        found[" ".join(words[count:])] = words[:count]
+    return found
 
 
-def _refuse_others(path: Path, style: str, header: list[str], data: bytes) -> None:
+def _cell(path: Path, header: Header) -> Cell | None:
+    """The box, from its lower and upper bounds and its tilt, or from three vectors."""
+    try:
+        if "avec" in header:
+            vectors = [header["avec"], header["bvec"], header["cvec"]]
+            columns = [*np.transpose(vectors), header["abc origin"]]
+        else:
+            columns = [*np.transpose([header[f"{axis}lo {axis}hi"] for axis in "xyz"])]
+            if "xy xz yz" in header:
+                columns.append(header["xy xz yz"])
+        bounds = np.array(columns, dtype=np.float64).T
+        if bounds.shape not in ((3, 2), (3, 3), (3, 4)):
+            raise ValueError
+    except (KeyError, ValueError):
+        raise ReadError(
+            f"{path}: expected the box in the header: two numbers before each of xlo xhi, ylo yhi "
+            f"and zlo zhi, found {', '.join(filter(None, header)) or 'none'}"
+        ) from None
+    return box_cell(f"{path}", bounds, (False, False, False), is_around=False)
+
+
+def _refuse_others(path: Path, style: str, header: Header, data: bytes) -> None:
     """ReadError for atoms that are no spheres, and for radii among diameters."""
     if style not in ("", "sphere", "granular", "hybrid"):
         raise ReadError(
             f"{path}: expected 'Atoms # sphere' (atom_style sphere), found 'Atoms # {style}': "
             f"write the grains with dump custom ... id type x y z radius"
         )
-    for line in header:
-        words = line.split()
-        if words[1:2] and words[1] in NO_SPHERES and words[0] != "0":
-            raise ReadError(f"{path}: expected spheres, found {line.strip()[:80]!r}")
+    for kind in NO_SPHERES:
+        if header.get(kind, ["0"]) != ["0"]:
+            raise ReadError(f"{path}: expected spheres, found '{header[kind][0]} {kind}'")
     if data.startswith(OF_YADE):
         raise ReadError(
             f"{path}: YADE writes radii in the column of diameters of such files, so LIGGGHTS "
@@ -127,7 +144,7 @@ def _refuse_others(path: Path, style: str, header: list[str], data: bytes) -> No
         )
 
 
-def _names(path: Path, style: str, values: FloatArray, cell: Cell | None) -> tuple[str, ...]:
+def _names(path: Path, style: str, columns: Columns, cell: Cell | None) -> list[str]:
     """
     The names of the columns, of atom_style sphere or of a hybrid with it.
 
@@ -135,84 +152,39 @@ def _names(path: Path, style: str, values: FloatArray, cell: Cell | None) -> tup
     zero, types are whole, and the centres in the box; ReadError if both orders do, or none.
     """
     orders = {"hybrid": (HYBRID,), "": (PLAIN, HYBRID)}.get(style, (PLAIN,))
-    width = values.shape[1]
+    more = len(columns) - len(PLAIN)
     fitting = [
         order
         for order in orders
-        if width >= len(order) and (len(orders) == 1 or _fits(order, values, cell))
+        if (more in (0, len(FLAGS)) if order is PLAIN else more >= 0)
+        and (len(orders) == 1 or _fits(order, columns, cell))
     ]
-    if orders == (PLAIN,) and width not in (len(PLAIN), len(PLAIN) + len(FLAGS)):
-        fitting = []
-    if len(values) == 0:
+    if len(columns[0]) == 0:
         fitting = fitting[:1]
     if len(fitting) != 1:
         found = f"'Atoms # {style}'" if style else "'Atoms' without a style"
         raise ReadError(
             f"{path}: expected the columns {' '.join(PLAIN)} of atom_style sphere (or, in a hybrid "
-            f"style, {' '.join(HYBRID)}), found {found} with {width} columns, which "
+            f"style, {' '.join(HYBRID)}), found {found} with {len(columns)} columns, which "
             f"{'may be both' if fitting else 'are neither'}: name them by their numbers, for "
             f'instance `columns="id=1,type=2,diameter=3,x=5,y=6,z=7"`'
         )
-    more = width - len(PLAIN)
-    numbered = tuple(f"{place + 1}" for place in range(len(PLAIN), width))
-    flags = FLAGS if more >= 3 and _are_flags(values[:, -3:]) else ()
-    rest = numbered[: more - len(flags)]
-    if fitting[0] is HYBRID and rest:
-        rest = ("mol", *rest[1:])
-    return (*fitting[0], *rest, *flags)
-
-
-def _are_flags(values: FloatArray) -> bool:
-    return bool(np.all(values == np.rint(values)))
+    has_flags = more >= 3 and all(np.all(one == np.rint(one)) for one in columns[-3:])
+    rest = [f"{place + 1}" for place in range(len(PLAIN), len(columns) - 3 * has_flags)]
+    if fitting[0] is HYBRID:
+        rest[:1] = ["mol"] * bool(rest)
+    return [*fitting[0], *rest, *FLAGS[: 3 * has_flags]]
 
 
 @np.errstate(invalid="ignore")
-def _fits(order: tuple[str, ...], values: FloatArray, cell: Cell | None) -> bool:
-    column = {name: values[:, place] for place, name in enumerate(order)}
-    if not (np.all(column["diameter"] > 0) and np.all(column["density"] > 0)):
+def _fits(order: tuple[str, ...], columns: Columns, cell: Cell | None) -> bool:
+    """Whether the first columns can be of this order."""
+    column = dict(zip(order, columns, strict=False))
+    type = column["type"]
+    if not all(np.all(column[name] > 0) for name in ("diameter", "density")):
         return False
-    if not np.all(column["type"] == np.rint(column["type"])):
-        return False
-    if order is PLAIN and values.shape[1] not in (len(PLAIN), len(PLAIN) + len(FLAGS)):
-        return False
-    if cell is None:
-        return order is PLAIN
-    centre = np.column_stack([column[axis] for axis in "xyz"])
+    if not np.all(type == np.rint(type)) or cell is None:
+        return order is PLAIN and bool(np.all(type == np.rint(type)))
+    fraction = cell.fractional(np.column_stack([column[axis] for axis in "xyz"]))
     # a grain may reach out of the box, and a periodic one lie there
-    fraction = cell.fractional(centre)
     return bool(np.all((fraction > -0.5) & (fraction < 1.5)))
-
-
-def _cell(path: Path, header: list[str]) -> Cell | None:
-    """The box, from its low and high corner and its tilt, or from three vectors."""
-    found: dict[str, list[float]] = {}
-    for line in header[1:]:
-        numbers = re.match(r"\s*([-+.\deE][-+.\deE\s]*)\s([a-z][a-z ]*)", line)
-        if numbers is not None:
-            try:
-                found[numbers[2].strip()] = [float(word) for word in numbers[1].split()]
-            except ValueError:
-                raise ReadError(f"{path}: expected numbers in the header, found {line!r}") from None
-    try:
-        vectors, origin = _vectors(found)
-        if not (np.all(np.abs(vectors) < MOST) and np.all(np.abs(origin) < MOST)):
-            return None
-        return Cell(vectors, (False, False, False), origin)
-    except (KeyError, ValueError):
-        raise ReadError(
-            f"{path}: expected the box in the header: two numbers before each of xlo xhi, ylo yhi "
-            f"and zlo zhi, found {', '.join(found) or 'none'}"
-        ) from None
-    except PackingError:
-        return None
-
-
-def _vectors(found: dict[str, list[float]]) -> tuple[FloatArray, FloatArray]:
-    if "avec" in found:
-        vectors = np.array([found["avec"], found["bvec"], found["cvec"]], dtype=np.float64)
-        return vectors.reshape(3, 3), np.array(found["abc origin"], dtype=np.float64).reshape(3)
-    bounds = np.array([found[f"{axis}lo {axis}hi"] for axis in "xyz"], dtype=np.float64).reshape(
-        3, 2
-    )
-    tilt = np.array(found.get("xy xz yz", [0.0] * 3), dtype=np.float64).reshape(3)
-    return box_vectors(bounds[:, 0], bounds[:, 1], tilt)

@@ -9,9 +9,9 @@ from typing import IO
 from scanfab.base.errors import ReadError
 from scanfab.io.files import plain
 from scanfab.io.formats.columns import grain_table, has_radius
+from scanfab.io.formats.lammps_box import dump_cell
 from scanfab.io.parse.counted_rows import counted_rows, text_of
 from scanfab.io.parse.growing import warn_incomplete
-from scanfab.io.parse.lammps_box import dump_cell
 from scanfab.io.parse.number_rows import exact_column
 from scanfab.io.reader import FileKind, GrainTable, ReadOptions, Snapshot
 from scanfab.packing.cell import Cell

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.typing import FloatArray
-from scanfab.io.parse.lammps_box import box_of_bounds, box_vectors
+from scanfab.io.formats.lammps_box import box_vectors
 from scanfab.io.writer import Left
 from scanfab.io.written import flat, more_columns, own_columns, standard_columns
 from scanfab.packing.cell import Cell
@@ -143,7 +143,7 @@ def _exact_bounds(cell: Cell) -> FloatArray | None:
     around_low = low + np.array([min(0.0, xy, xz, xy + xz), min(0.0, yz), 0.0])
     around_high = high + np.array([max(0.0, xy, xz, xy + xz), max(0.0, yz), 0.0])
     bounds = np.column_stack([around_low, around_high, tilt])
-    again, origin = box_vectors(*box_of_bounds(bounds))
+    again, origin = box_vectors(bounds)
     if not (np.array_equal(again, vectors) and np.array_equal(origin, low)):
         return None
     return bounds if tilt.any() else bounds[:, :2]

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import struct
+
 import numpy as np
 import pytest
 
 import scanfab
-from scanfab import ReadError
+from scanfab import ReadError, ScanfabWarning
 from scanfab.io.registry import reader_named
 from scanfab.testing import check_reader
-from tests.helpers.dumps import write
+from tests.helpers.dumps import dump_text, write
 from tests.helpers.made.data_files import CENTRES, DIAMETERS, TITLE, data_file
 
 
@@ -61,7 +63,7 @@ def test_both_orders_may_fit(tmp_path):
         ("1 atom types", "1 atom types\n3 ellipsoids", "expected spheres, found '3 ellipsoids'"),
         ("Atoms\n", "Atoms # atomic\n", "found 'Atoms # atomic'"),
         ("3 atoms", "4 atoms", "the header counts 4 atoms, found 3"),
-        ("\nVelocities", "4\n\nVelocities", "the number of columns changed"),
+        ("\nVelocities", "4\n\nVelocities", "counts 3 atoms, found 4"),
         (TITLE, "LIGGGHTS Description", "YADE writes radii in the column of diameters"),
     ],
 )
@@ -78,10 +80,17 @@ def test_radii_of_yade_can_be_named(tmp_path):
     np.testing.assert_array_equal(scanfab.read(path, columns=columns).radius, DIAMETERS)
 
 
-def test_a_file_that_was_cut_is_an_error(tmp_path):
-    text = data_file(velocities=False)
-    with pytest.raises(ReadError, match="the last line has no end"):
-        scanfab.read(write(tmp_path / "a.data", text.rstrip()))
+@pytest.mark.filterwarnings("ignore:.*the last line has no end")
+@pytest.mark.parametrize("cut", [4, 10, 30])
+def test_a_file_that_was_cut_is_an_error(tmp_path, cut):
+    with pytest.raises(ReadError, match=r"a\.data"):
+        scanfab.read(write(tmp_path / "a.data", data_file(velocities=False)[:-cut]))
+
+
+def test_a_last_line_without_its_end_is_read_with_a_warning(tmp_path):
+    path = write(tmp_path / "a.data", data_file(velocities=False)[:-1])
+    with pytest.warns(ScanfabWarning, match="the last line has no end"):
+        assert len(scanfab.read(path)) == 3
 
 
 def test_the_kit(tmp_path):
@@ -90,3 +99,20 @@ def test_the_kit(tmp_path):
         for number, (one, behind) in enumerate(((("plain",), ""), (("hybrid",), " 7")))
     ]
     check_reader(reader_named("liggghts"), files, tmp_path / "damaged", counts=True)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        struct.pack("<ii", 0, 42) + b"Version LIGGGHTS-PUBLIC 3.8.0, compiled ...\0" + bytes(99),
+        b"LammpS RestartT\0" + struct.pack("<ii", 1, 2) + bytes(99),
+    ],
+)
+def test_a_binary_restart_is_named_with_what_to_write(tmp_path, data):
+    path = tmp_path / "restart.1000"
+    path.write_bytes(data)
+    with pytest.raises(ReadError, match=r"a binary restart.*dump custom"):
+        scanfab.read(path)
+    write(tmp_path / "dump.1000", dump_text())
+    with pytest.warns(ScanfabWarning, match="binary restart"):
+        assert len(scanfab.read_series(tmp_path)) == 1

@@ -8,12 +8,9 @@ import struct
 import numpy as np
 import pytest
 
-import scanfab
-from scanfab.base.errors import ReadError
-from scanfab.io.parse import text_dump as dump
 from scanfab.io.parse import text_table as regular
 from scanfab.io.parse.text_table import TextTable, read_regular, read_to_end
-from tests.helpers.dumps import ROWS, dump_text, write
+from tests.helpers.dumps import write
 
 WIDTH = 3
 # polars is told to be strict where all columns are wanted
@@ -150,71 +147,6 @@ def test_damaged_tables_give_the_numbers_of_the_tolerant_parser(tmp_path, seed):
         if found is not None:
             right = np.loadtxt(tmp_path / "a", usecols=places, ndmin=2, max_rows=5, skiprows=1)
             np.testing.assert_array_equal(np.transpose(found), right)
-
-
-@pytest.fixture
-def large(monkeypatch):
-    """All dumps count as large."""
-    monkeypatch.setattr(dump, "LARGE", 0)
-
-
-def counted(monkeypatch):
-    """The columns that are parsed, call by call."""
-    calls = []
-
-    def read(table, columns):
-        calls.append(list(columns))
-        return read_regular(table, columns)
-
-    monkeypatch.setattr(dump, "read_regular", read)
-    return calls
-
-
-@pytest.mark.usefixtures("large")
-def test_other_columns_are_parsed_when_they_are_asked_for(tmp_path, monkeypatch):
-    calls = counted(monkeypatch)
-    rows = [(*row, 0.25 * row[0]) for row in ROWS]
-    text = dump_text(rows, "id type x y z radius vz")
-    source = write(tmp_path / "a.dump", dump_text(step=-1) + text)
-    # without dim the first frame would be read too, to see whether it is one of discs
-    packing = scanfab.read(source, frame=1, dim=3)
-    assert list(packing.columns) == ["type", "vz"]
-    assert calls == [[0, 1, 2, 3, 4, 5]]
-    np.testing.assert_array_equal(packing.columns["vz"], [0.25, 0.5, 0.75])
-    np.testing.assert_array_equal(packing.columns["vz"], [0.25, 0.5, 0.75])
-    assert calls[1:] == [[6]]
-    with pytest.raises(ValueError, match="read-only"):
-        packing.columns["vz"][0] = 1
-
-
-@pytest.mark.usefixtures("large")
-def test_every_snapshot_is_read_from_its_place(tmp_path):
-    grains = [[(id, 1, id, step, 0, 0.5) for id in (1, 2, 3)] for step in range(3)]
-    text = "".join(
-        dump_text(rows, "id type x y z radius", step=step) for step, rows in enumerate(grains)
-    )
-    path = write(tmp_path / "a.dump", text)
-    for step in range(3):
-        assert scanfab.read(path, frame=step).position.tolist() == [
-            [id, step, 0.0] for id in (1, 2, 3)
-        ]
-
-
-@pytest.mark.usefixtures("large")
-def test_a_word_in_a_column_that_is_asked_for_later_names_its_line(tmp_path):
-    rows = [(*ROWS[0], 1.0), (*ROWS[1], "oops"), (*ROWS[2], 1.0)]
-    text = dump_text([(*row[:6], row[6], 0) for row in rows], "id type x y z radius vz c")
-    packing = scanfab.read(write(tmp_path / "a.dump", text))
-    with pytest.raises(ReadError, match=r"line 11: expected a number, found 'oops'"):
-        packing.columns["vz"]
-
-
-@pytest.mark.parametrize("count", [10**15, 10**30])
-@pytest.mark.usefixtures("large")
-def test_a_count_beyond_the_file_is_refused_at_once(tmp_path, count):
-    text = dump_text().replace("ATOMS\n3\n", f"ATOMS\n{count}\n")
-    with pytest.raises(ReadError, match=f"counts {count} rows.*incomplete"):
-        scanfab.read(write(tmp_path / "a.dump", text))
 
 
 def test_a_text_whose_numbers_may_not_fit_into_memory_is_not_parsed_by_pieces(
