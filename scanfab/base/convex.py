@@ -1,14 +1,4 @@
-"""
-Convex regions about the origin, as data: half-spaces and at most one quadric.
-
-Each is the image of a body: a linear map makes every ellipsoid of the ball of radius 1, every
-cylinder of the column of radius 1 between z = -1 and 1, every box of the block from -1 to 1. What
-is known of the body in closed form, the map carries over: a window that deforms with its sample
-needs no formula of its own. The bodies besides the ball stand in :mod:`scanfab.base.shapes`.
-
-A window in a plane is the image of a disc or a square, spanned by the map's first two columns; the
-third is the unit normal. Volumes are areas there, and areas are lengths.
-"""
+"""Convex regions about the origin, as data: half-spaces and at most one quadric."""
 
 from __future__ import annotations
 
@@ -18,81 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from scanfab.base.bodies import BALL, DISC, Body
 from scanfab.base.option import number
 from scanfab.base.typing import BoolArray, FloatArray
 
 # steps towards the nearest place of a region, and what of a distance is rounding
 STEPS, ROUNDING = 200, 1e-12
-# of a curved surface that is to be looked at, and directions over which a shadow is averaged
-POINTS, POINTS_OF_A_RIM, AXES = 2000, 128, 200
-
-
-def points_on_a_rim() -> FloatArray:
-    """Points of the circle of radius 1 about z."""
-    turn = np.arange(POINTS_OF_A_RIM) * 2.0 * np.pi / POINTS_OF_A_RIM
-    return np.column_stack([np.cos(turn), np.sin(turn), np.zeros(POINTS_OF_A_RIM)])
-
-
-class Body:
-    """A convex body with the origin inside, by its constants and three functions of its own."""
-
-    planes: FloatArray
-    """Of its flat faces: rows n, d with the body on the side n·x < d, shape (P, 4)."""
-    form: FloatArray
-    """Of its curved face, x·M x < 1: the diagonal of M, shape (3,); zeros without one."""
-    volume: float
-    """With edges and radii of the body itself."""
-    outline: FloatArray
-    """Points of its surface whose hull it is; of a curved one nearly; shape (K, 3)."""
-    is_symmetric: bool = True
-    """Whether with x also -x lies in it."""
-    is_flat: bool = False
-    """Whether it lies in a plane; what lies above and below it counts as inside."""
-
-    def support(self, along: FloatArray) -> FloatArray:
-        """The place in the body that is furthest along each vector, shape (N, 3)."""
-        raise NotImplementedError
-
-    def reach(self, frame: FloatArray) -> float:
-        """No place of its image, frame @ x, is further away from the origin."""
-        return float(np.linalg.norm(self.outline @ frame.T, axis=1).max())
-
-    def overlap(self, shift: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
-        """As :meth:`Convex.overlap`, moved by ``length * shift``, shifts of any length."""
-        raise NotImplementedError
-
-
-class Ball(Body):
-    """Of radius 1 about the origin."""
-
-    planes = np.zeros((0, 4))
-    form = np.ones(3)
-    volume = 4.0 / 3.0 * math.pi
-
-    def __init__(self) -> None:
-        # a spiral, of which all points have a like share of the surface
-        z = 1.0 - (2.0 * np.arange(POINTS) + 1.0) / POINTS
-        turn = np.arange(POINTS) * np.pi * (3.0 - np.sqrt(5.0))
-        across = np.sqrt(1.0 - z**2)
-        self.outline = np.column_stack([across * np.cos(turn), across * np.sin(turn), z])
-
-    def support(self, along: FloatArray) -> FloatArray:
-        """The end of a radius."""
-        unit: FloatArray = along / np.linalg.norm(along, axis=1, keepdims=True)
-        return unit
-
-    def reach(self, frame: FloatArray) -> float:
-        """The largest semi-axis."""
-        return float(np.linalg.svd(frame, compute_uv=False)[0])
-
-    def overlap(self, shift: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
-        """A lens of two equal caps."""
-        step = np.linalg.norm(shift, axis=1)
-        u = np.minimum(length * step, 2.0)
-        return self.volume * (1.0 - 0.75 * u + u**3 / 16.0), np.pi * step * (1.0 - 0.25 * u**2)
-
-
-BALL = Ball()
+# directions over which a shadow is averaged
+AXES = 200
 
 
 class Quadric(NamedTuple):
@@ -187,9 +110,9 @@ class Convex:
     @property
     def mean_shadow(self) -> float:
         """Projected area in the mean of all directions, to some per cent; of a plane a length."""
-        axes = BALL.outline[:: POINTS // AXES]
+        axes = BALL.outline[:: len(BALL.outline) // AXES]
         if self.is_flat:
-            axes = points_on_a_rim()[:, :2] @ np.linalg.qr(self.frame[:, :2])[0].T
+            axes = DISC.outline[:, :2] @ np.linalg.qr(self.frame[:, :2])[0].T
         return float(self.overlap(axes, 0.0)[1].mean())
 
     @property
@@ -198,7 +121,18 @@ class Convex:
         return self.body.outline @ self.frame.T
 
     def contains(self, points: FloatArray) -> BoolArray:
-        """Which points lie inside, of shape (N, 3) from the origin of the region."""
+        """
+        Which points lie inside.
+
+        Parameters
+        ----------
+        points : ndarray, shape (N, 3)
+            From the origin of the region.
+
+        Returns
+        -------
+        ndarray of bool, shape (N,)
+        """
         isotropic, deviator, level = self.quadric
         form = isotropic * np.einsum("ij,ij->i", points, points)
         form += np.einsum("ij,ij->i", points @ deviator, points)
@@ -212,7 +146,16 @@ class Convex:
         """
         Which spheres lie inside as a whole; of a quadric that is no sphere not all of them.
 
-        Their centres have shape (N, 3), from the origin of the region, their radii shape (N,).
+        Parameters
+        ----------
+        points : ndarray, shape (N, 3)
+            Their centres, from the origin of the region.
+        radius : ndarray, shape (N,)
+            Their radii.
+
+        Returns
+        -------
+        ndarray of bool, shape (N,)
         """
         form = self.quadric.form
         # √(x·form·x) is a norm: that of a sphere's places is at most that of both parts
@@ -225,10 +168,19 @@ class Convex:
 
     def share(self, start: FloatArray, branch: FloatArray) -> FloatArray:
         """
-        Which part of each straight piece lies inside: length inside over length, shape (N,).
+        Which part of each straight piece lies inside.
 
-        A piece goes from ``start`` (seen from the origin of the region) to ``start + branch``, both
-        of shape (N, 3); no branch has length 0.
+        Parameters
+        ----------
+        start : ndarray, shape (N, 3)
+            Where it begins, from the origin of the region.
+        branch : ndarray, shape (N, 3)
+            From there to where it ends; not of length 0.
+
+        Returns
+        -------
+        ndarray, shape (N,)
+            Length inside over length, 0 to 1.
         """
         form, level = self.quadric.form, self.quadric.level
         first, last = np.zeros(len(start)), np.ones(len(start))
@@ -257,7 +209,16 @@ class Convex:
         """
         Which spheres reach inside; at times one that all but touches.
 
-        Their centres have shape (N, 3), from the origin of the region, their radii shape (N,).
+        Parameters
+        ----------
+        points : ndarray, shape (N, 3)
+            Their centres, from the origin of the region.
+        radius : ndarray, shape (N,)
+            Their radii.
+
+        Returns
+        -------
+        ndarray of bool, shape (N,)
         """
         near = np.sqrt(np.einsum("ij,ij->i", points, points)) < self.reach + radius
         for plane in self.planes:
@@ -271,7 +232,18 @@ class Convex:
         return np.asarray(near)
 
     def support(self, along: FloatArray) -> FloatArray:
-        """The place that is furthest along each vector, of any length but 0, shape (N, 3)."""
+        """
+        The place that is furthest along each vector.
+
+        Parameters
+        ----------
+        along : ndarray, shape (N, 3)
+            Of any length but 0.
+
+        Returns
+        -------
+        ndarray, shape (N, 3)
+        """
         furthest: FloatArray = self.body.support(along @ self.frame) @ self.frame.T
         return furthest
 
@@ -305,18 +277,40 @@ class Convex:
 
     def overlap(self, axes: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
         """
-        The volume g that it shares with itself moved by a length along axes, and -dg/dlength.
+        What it shares with itself moved along axes, and how fast that falls.
 
-        Both have shape (N,), the axes are unit vectors of shape (N, 3). The second is the area of
-        the lines with a piece in the region that is at least so long: at length 0 the projected
-        area.
+        Parameters
+        ----------
+        axes : ndarray, shape (N, 3)
+            Unit vectors.
+        length : float
+            How far it is moved, dump's length unit.
+
+        Returns
+        -------
+        shared : ndarray, shape (N,)
+            The covariogram g, a volume.
+        slope : ndarray, shape (N,)
+            -dg/dlength, the area of the lines with a piece in it that is at least so long; at
+            length 0 the projected area.
         """
         scale = abs(np.linalg.det(self.frame))
         shared, slope = self.body.overlap(axes @ np.linalg.inv(self.frame).T, length)
         return scale * shared, scale * slope
 
     def meets_itself(self, shift: FloatArray) -> bool:
-        """Whether it overlaps itself moved by a vector, shape (3,)."""
+        """
+        Whether it overlaps itself moved by a vector.
+
+        Parameters
+        ----------
+        shift : ndarray, shape (3,)
+            Dump's length unit.
+
+        Returns
+        -------
+        bool
+        """
         if self.body.is_symmetric:
             # the middle of two places of a symmetric region, x and -x + shift, is half the shift
             return bool(self.contains(0.5 * shift[None])[0])
@@ -331,9 +325,18 @@ class Convex:
 
     def deformed(self, gradient: FloatArray) -> Convex:
         """
-        The image of the region under the map ``gradient @ x``, of shape (3, 3) and not singular.
+        The image of the region under the map gradient @ x.
 
         A sphere becomes an ellipsoid, a box leans: planes and a quadric again.
+
+        Parameters
+        ----------
+        gradient : ndarray, shape (3, 3)
+            Not singular.
+
+        Returns
+        -------
+        Convex
         """
         if np.array_equal(gradient, np.eye(3)):
             return self

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from itertools import product
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.convex import BALL, Body, Convex, image_of, points_on_a_rim, sphere
+from scanfab.base.bodies import BALL, BLOCK, COLUMN, DISC, SQUARE, Hull
+from scanfab.base.convex import Convex, image_of, sphere
 from scanfab.base.errors import SettingsError
 from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray, IntArray
 
-# of a hull: planes that cut lines, all directions together, and the lines along each direction
-MOST_CUTS, FEWEST_LINES, MOST_LINES = 40_000_000, 400, 10_000
 # of the size of a surface, or of its distance from the origin, whichever is larger: what 4 bytes a
 # number, as STL has them, cannot tell apart
 TOLERANCE = 1e-6
@@ -24,139 +21,6 @@ TOLERANCE = 1e-6
 MOST_FACES = 1000
 # held against all planes of the hull at a time, so that a surface of many takes little memory
 SOME_FACES = 256
-
-
-class Column(Body):
-    """A cylinder about z, of radius 1 and between z = -1 and 1; in a plane a disc of radius 1."""
-
-    form = np.array([1.0, 1.0, 0.0])
-
-    def __init__(self, is_flat: bool) -> None:
-        rim, ends = points_on_a_rim(), np.array([[0.0, 0.0, 1.0, 1.0], [0.0, 0.0, -1.0, 1.0]])
-        self.is_flat = is_flat
-        self.planes = ends[:0] if is_flat else ends
-        self.volume = math.pi if is_flat else 2.0 * math.pi
-        self.outline = rim if is_flat else np.concatenate([rim + ends[0, :3], rim + ends[1, :3]])
-
-    def support(self, along: FloatArray) -> FloatArray:
-        """A place on a rim, or the middle of an end."""
-        across = np.linalg.norm(along[:, :2], axis=1, keepdims=True)
-        rim = along[:, :2] / np.where(across > 0.0, across, 1.0)
-        height = 0.0 if self.is_flat else 1.0
-        return np.column_stack([rim, np.where(along[:, 2] < 0.0, -height, height)])
-
-    def reach(self, frame: FloatArray) -> float:
-        """Where the axis stands square on the ends, the distance of a rim; else a little more."""
-        widest = np.linalg.svd(frame[:, :2], compute_uv=False)[0]
-        if self.is_flat:
-            return float(widest)
-        square = widest**2 + frame[:, 2] @ frame[:, 2]
-        return float(np.sqrt(square + 2.0 * np.linalg.norm(frame[:, :2].T @ frame[:, 2])))
-
-    def overlap(self, shift: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
-        """The lens of two circles, as high as both columns stand side by side."""
-        across, along = np.linalg.norm(shift[:, :2], axis=1), np.abs(shift[:, 2])
-        q, height = np.minimum(length * across, 2.0), 2.0 - length * along
-        chord = np.sqrt(4.0 - q**2)
-        lens = 2.0 * np.arccos(0.5 * q) - 0.5 * q * chord
-        if self.is_flat:
-            return lens, across * chord
-        slope = along * lens + across * chord * height
-        return np.maximum(height, 0.0) * lens, np.where(height > 0.0, slope, 0.0)
-
-
-class Block(Body):
-    """A cube from -1 to 1; in a plane a square."""
-
-    form = np.zeros(3)
-
-    def __init__(self, dimension: int, corners: Sequence[Sequence[float]]) -> None:
-        axes = np.eye(3)[:dimension]
-        self.is_flat = dimension == 2
-        self.planes = np.column_stack([np.concatenate([axes, -axes]), np.ones(2 * dimension)])
-        self.volume = 2.0**dimension
-        self.outline = np.array(corners)
-
-    def support(self, along: FloatArray) -> FloatArray:
-        """A corner."""
-        return np.where(along < 0.0, -1.0, 1.0) * [1.0, 1.0, 0.0 if self.is_flat else 1.0]
-
-    def overlap(self, shift: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
-        """A smaller block."""
-        step = np.abs(shift[:, : len(self.planes) // 2])
-        edge = np.maximum(2.0 - length * step, 0.0)
-        others = range(1, step.shape[1])
-        slope = sum(
-            math.prod((edge[:, i - k] for k in others), start=step[:, i])
-            for i in range(step.shape[1])
-        )
-        return edge.prod(axis=1), np.where(np.all(edge > 0.0, axis=1), slope, 0.0)
-
-
-@dataclass(frozen=True, eq=False)
-class Hull(Body):
-    """A convex polyhedron about the origin."""
-
-    outline: FloatArray
-    planes: FloatArray
-    areas: FloatArray
-    """Of the face in each plane, shape (P,)."""
-    volume: float
-
-    form = np.zeros(3)
-    is_symmetric = False
-
-    def support(self, along: FloatArray) -> FloatArray:
-        """A corner."""
-        furthest: FloatArray = self.outline[np.argmax(along @ self.outline.T, axis=1)]
-        return furthest
-
-    def overlap(self, shift: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
-        """
-        Of its own chords t: g = V Σ max(0, t - z) / Σ t, and -g' = A #(t ≥ z) / #(t > 0).
-
-        A few hundred lines along each of many directions tell these shares to some 1e-3, and
-        what a sum over the directions needs far better. Volume and projected area are exact, the
-        latter by A = ½ Σ A_f |n·n_f| over the faces.
-        """
-        shadow = 0.5 * np.abs(shift @ self.planes[:, :3].T) @ self.areas
-        if length == 0.0:
-            return np.full(len(shift), self.volume), shadow
-        lines = MOST_CUTS // (len(self.planes) * max(len(shift), 1))
-        lines = min(max(lines, FEWEST_LINES), MOST_LINES)
-        found = [self._long_shares(one, length, lines) for one in shift]
-        shared, number = np.array(found).reshape(-1, 2).T
-        return self.volume * shared, shadow * number
-
-    def _long_shares(self, shift: FloatArray, length: float, lines: int) -> tuple[float, float]:
-        """The share of its chords that is beyond a length, of all together and of their number."""
-        step = float(np.linalg.norm(shift))
-        axis = shift / step
-        u = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
-        sides = np.array([u / np.linalg.norm(u), np.cross(axis, u / np.linalg.norm(u))])
-        across = self.outline @ sides.T
-        low, extent = across.min(axis=0), np.ptp(across, axis=0)
-        # lines at irrational steps: no row of them meets an edge all along
-        number = np.arange(lines)
-        places = np.column_stack([(number + 0.5) / lines, number * 0.6180339887498949 % 1.0])
-        feet = (low + places * extent) @ sides
-        steep = self.planes[:, :3] @ axis
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ends = (self.planes[:, 3] - feet @ self.planes[:, :3].T) / steep
-        flat = np.abs(steep) < 1e-14
-        outside = np.any(feet @ self.planes[flat, :3].T > self.planes[flat, 3], axis=1)
-        leaves = np.min(ends, axis=1, where=steep > 1e-14, initial=np.inf)
-        enters = np.max(ends, axis=1, where=steep < -1e-14, initial=-np.inf)
-        chords = np.where(outside, 0.0, np.maximum(leaves - enters, 0.0))
-        chords = chords[chords > 0.0]
-        long = chords[chords >= length * step]
-        return float(np.sum(long - length * step) / chords.sum()), len(long) / len(chords)
-
-
-COLUMN, DISC = Column(is_flat=False), Column(is_flat=True)
-BLOCK = Block(3, list(product((-1.0, 1.0), repeat=3)))
-# the corners follow one another around it
-SQUARE = Block(2, [(-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (1.0, 1.0, 0.0), (-1.0, 1.0, 0.0)])
 
 
 def box(edges: Sequence[float] | FloatArray, turn: npt.ArrayLike | None = None) -> Convex:
