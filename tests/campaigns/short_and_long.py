@@ -35,7 +35,7 @@ sys.path[0] = str(ROOT)
 
 from scanfab.base.errors import ScanfabError  # noqa: E402
 from scanfab.io.formats import lammps_yaml, text_dump  # noqa: E402
-from scanfab.io.parse import counted_rows, text_table, vtk_data  # noqa: E402
+from scanfab.io.parse import counted_rows, text_table  # noqa: E402
 from scanfab.io.reader import GrainTable, ReadOptions  # noqa: E402
 from scanfab.io.registry import reader_named  # noqa: E402
 from scanfab.packing.cell import Cell  # noqa: E402
@@ -48,7 +48,6 @@ VTK = (".vtk", ".vtp", ".vtu")
 NEVER, MANY = 1 << 30, 40
 # names of sizes, by module: from which a text is long, and what is read of it at a time
 FROM = ((text_table, "LONG LARGE"), (counted_rows, "LONG"))
-FROM += ((vtk_data, "LONG"),)
 
 WORD = re.compile(rb"(?<![^\s,;])[^\s,;]+")
 BLANK = re.compile(rb"[ \t,;]|\r?\n")
@@ -137,7 +136,7 @@ def _counted() -> list[None]:
 
         return parsed
 
-    for module, name in ((text_table, "_parse_piece"), (vtk_data, "_fast")):
+    for module, name in ((text_table, "_parse_piece"),):
         setattr(module, name, counting(getattr(module, name)))
     return found
 

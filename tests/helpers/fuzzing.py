@@ -12,7 +12,7 @@ from random import Random
 
 from scanfab.base.errors import ScanfabError, ScanfabNote, ScanfabWarning
 from scanfab.io.families import Family
-from scanfab.io.parse.vtk_mesh import read_bounds
+from scanfab.io.mesh import read_bounds
 from scanfab.io.reader import ReadOptions
 from scanfab.io.registry import reader_for, reader_named
 from scanfab.io.series import Series

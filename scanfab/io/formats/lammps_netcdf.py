@@ -11,9 +11,9 @@ import numpy.typing as npt
 from scanfab.base.arrays import doubles
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.typing import FloatArray
-from scanfab.io.files import plain
+from scanfab.io.fence import fenced, needed
 from scanfab.io.formats.columns import grain_table, has_radius
-from scanfab.io.parse.fence import fenced, needed
+from scanfab.io.parse.netcdf_files import read_netcdf
 from scanfab.io.reader import FileKind, GrainTable, ReadOptions, Snapshot
 from scanfab.packing.cell import Cell
 
@@ -106,7 +106,7 @@ def read_netcdf_grains(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
 
 def _read(path: Path, frame: int | None) -> tuple[dict[str, npt.NDArray[Any]], dict[str, Any]]:
     needed(path, "netCDF4", "netcdf")
-    return fenced("netcdf", plain(path), path, frame=frame)
+    return fenced(read_netcdf, path, 1 << 62, frame)
 
 
 def _written(path: Path, columns: dict[str, npt.NDArray[Any]], count: int) -> npt.NDArray[np.bool_]:

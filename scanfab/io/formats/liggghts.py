@@ -28,7 +28,7 @@ from scanfab.io.formats.lammps import (
 from scanfab.io.formats.lammps_data import is_data_file, of_liggghts
 from scanfab.io.formats.text_dump import is_dump
 from scanfab.io.formats.vtk import VtkReader, vectors
-from scanfab.io.parse.vtk_data import Mesh
+from scanfab.io.mesh import Mesh
 from scanfab.io.reader import (
     Carries,
     FileKind,

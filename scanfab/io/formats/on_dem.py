@@ -19,8 +19,7 @@ from scanfab.base.typing import FloatArray
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.columns import grain_table, whole_numbers
 from scanfab.io.formats.join import join_ids
-from scanfab.io.parse.vtk_data import FlawError, Mesh, mesh_of
-from scanfab.io.parse.vtk_hdf import HdfFile, content_of, is_hdf, read_hdf_file
+from scanfab.io.hdf import HdfFile, is_hdf, read_hdf_file
 from scanfab.io.reader import (
     Carries,
     FileKind,
@@ -34,9 +33,14 @@ from scanfab.io.writers.on_dem import SCENE, STROKE, write_on_dem
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 
+Arrays = dict[str, npt.NDArray[Any]]
+
 # what a positive normal force means, by draft: +1 compression
 SIGNS = {"0.1": 1.0, "0.2": -1.0}
 INTERACTIONS = "ONDEM/Interactions"
+# the columns of interactions that matter, and their values for each
+COLUMNS = {"id1": 1, "id2": 1, "normal_force": 1, "normal": 3, "shear_force": 3, "force": 3}
+COLUMNS |= {"image": 3, "virtual": 1}
 
 
 class OnDemReader:
@@ -80,18 +84,11 @@ class OnDemReader:
         """The bodies with a radius, and the interactions between them."""
         path = snapshot.path
         file = read_hdf_file(path)
-        try:
-            mesh = mesh_of(content_of(file))
-        except FlawError as flaw:
-            raise ReadError(f"{path}: cannot be read as VTKHDF: {flaw}") from None
-        columns = _bodies(path, file, mesh)
-        grains = grain_table(path, columns, _cell(path, file), options)
+        grains = grain_table(path, _spheres(path, file), _cell(path, file), options)
         joined = _contacts(path, file, grains)
         if joined is None:
             return grains
-        walls = joined.wall_contacts
-        if grains.wall_contacts is not None:
-            walls = grains.wall_contacts
+        walls = joined.wall_contacts if grains.wall_contacts is None else grains.wall_contacts
         return grains._replace(contacts=joined.contacts, wall_contacts=walls)
 
     def read_contacts(
@@ -108,45 +105,55 @@ class OnDemReader:
         return write_on_dem(packing, path)
 
 
-def _bodies(path: Path, file: HdfFile, mesh: Mesh) -> dict[str, npt.NDArray[Any]]:
-    """The arrays of the points that are spheres: all others have no radius."""
-    arrays = dict(mesh.point_arrays)
-    radius = arrays.get("radius")
-    if radius is None or radius.dtype.kind not in "iuf" or radius.ndim != 1:
-        raise ReadError(f"{path}: expected numbers as radius in PointData, found {list(arrays)}")
-    id = arrays.pop("body_id", None)
-    if id is not None:
-        id = whole_numbers(path, id)
-        arrays = {**_more(file, id), **arrays}
+def _spheres(path: Path, file: HdfFile) -> Arrays:
+    """The columns of the bodies that have a radius: no other body is a sphere."""
+    blocks = [f"VTKHDF/{name}" for name in file.groups("VTKHDF")]
+    blocks = [one for one in ("VTKHDF", *blocks) if f"{one}/Points" in file.arrays]
+    parts = [_points(path, file, one) for one in blocks]
+    if not parts or not all("radius" in one for one in parts):
+        raise ReadError(f"{path}: expected Points with a radius in PointData, found {blocks}")
+    names = [name for name in parts[0] if all(name in one for one in parts)]
+    columns = {name: np.concatenate([one[name] for one in parts]) for name in names}
+    radius = columns["radius"]
+    if radius.dtype.kind not in "iuf" or radius.ndim != 1:
+        raise ReadError(f"{path}: expected numbers as radius, found {radius.dtype}")
     spheres = ~np.isnan(doubles(radius))
-    # their place again
-    arrays.pop("position", None)
-    columns = {name.replace(STROKE, "/"): values[spheres] for name, values in arrays.items()}
-    columns["position"] = mesh.points[spheres]
-    return columns if id is None else {"id": id[spheres], **columns}
+    columns = {name.replace(STROKE, "/"): values[spheres] for name, values in columns.items()}
+    if "body_id" not in columns:
+        return columns
+    id = whole_numbers(path, columns.pop("body_id"))
+    return {"id": id, **_more(file, id), **columns}
 
 
-def _more(file: HdfFile, id: npt.NDArray[Any]) -> dict[str, npt.NDArray[Any]]:
-    """The columns of the group of spheres (draft 0.2), in the order of the points."""
+def _points(path: Path, file: HdfFile, block: str) -> Arrays:
+    """The arrays of the points of one block, and their position."""
+    if f"{block}/Steps" in file.attributes:
+        raise ReadError(f"{path}: {block} holds steps in time: write one file for each")
+    points = file.arrays[f"{block}/Points"]
+    counts = file.arrays.get(f"{block}/NumberOfPoints", np.array(len(points)))
+    if points.shape[1:] != (3,) or counts.sum() != len(points):
+        raise ReadError(
+            f"{path}: {block}: expected Points of three coordinates and as many as NumberOfPoints "
+            f"({counts.tolist()}), found the shape {points.shape}"
+        )
+    columns = {"position": doubles(points)}
+    for name, values in file.below(f"{block}/PointData").items():
+        if len(values) != len(points):
+            raise ReadError(f"{path}: {block}: {name} has {len(values)} of {len(points)} rows")
+        if name != "position":
+            columns[name] = values[:, 0] if values.shape[1:] == (1,) else values
+    return columns
+
+
+def _more(file: HdfFile, id: npt.NDArray[Any]) -> Arrays:
+    """The columns of the group of spheres (draft 0.2), if it lists them all, in our order."""
     own = file.below("ONDEM/Bodies/sphere")
     listed = own.pop("body_id", np.zeros(0, np.int64))
-    if listed.size == 0 or len(np.unique(listed)) != len(listed):
-        return {}
     order = np.argsort(listed)
-    place = np.minimum(np.searchsorted(listed[order], id), len(listed) - 1)
-    rows = order[place]
-    known = listed[rows] == id
-    found = {}
-    for name, values in own.items():
-        if len(values) != len(listed):
-            continue
-        column = values[rows]
-        if not known.all():
-            # other bodies, which are left out later
-            empty = {"f": np.nan, "U": ""}.get(values.dtype.kind, -1)
-            column[~known] = empty
-        found[name] = column
-    return found
+    if len(np.unique(listed)) != len(listed) or not np.all(np.isin(id, listed)):
+        return {}
+    rows = order[np.searchsorted(listed[order], id)]
+    return {name: one[rows] for name, one in own.items() if len(one) == len(listed)}
 
 
 def _cell(path: Path, file: HdfFile) -> Cell | None:
@@ -170,71 +177,50 @@ def _contacts(path: Path, file: HdfFile, grains: GrainTable) -> JoinedContacts |
     """Real interactions; those of bodies that are no spheres are contacts with walls."""
     if INTERACTIONS not in file.attributes:
         return None
-    # draft 0.2 has a group for each type
-    groups = [INTERACTIONS, *(f"{INTERACTIONS}/{one}" for one in file.groups(INTERACTIONS))]
-    parts = [own for group in groups if "id1" in (own := file.below(group))]
     if grains.id is None:
         raise ReadError(f"{path}: names grains by id, but the points have no body_id")
-    listed = [_real(path, own) for own in parts]
-    names = set(listed[0]).intersection(*listed) if listed else set()
-    table = {name: np.concatenate([one[name] for one in listed]) for name in names}
-    if not table:
-        ids = np.zeros((0, 2), np.int64)
-        return join_ids(path, grains, ids, None, walls=True)
+    # draft 0.2 has a group for each type
+    groups = [INTERACTIONS, *(f"{INTERACTIONS}/{one}" for one in file.groups(INTERACTIONS))]
+    parts = [_real(path, own) for one in groups if "id1" in (own := file.below(one))]
+    if not parts:
+        return join_ids(path, grains, np.zeros((0, 2), np.int64), None, walls=True)
+    names = set(parts[0]).intersection(*parts)
+    table = {name: np.concatenate([one[name] for one in parts]) for name in names}
     ids = np.column_stack([whole_numbers(path, table[name]) for name in ("id1", "id2")])
-    force = _force(path, file, table)
+    # two bodies that are no spheres are none of ours
+    ours = np.isin(ids, grains.id).any(axis=1)
+    table = {name: values[ours] for name, values in table.items()}
+    force, force_n = _force(path, file, table)
     image = table.get("image")
-    walls = ~np.isin(ids, grains.id)
-    both = walls.all(axis=1)
-    if both.any():
-        # two bodies that are no spheres
-        ids, walls = ids[~both], walls[~both]
-        force = None if force is None else force[~both]
-        image = None if image is None else image[~both]
-    force_n = None
-    if force is None and "normal_force" in table:
-        force_n = _sign(path, file) * table["normal_force"][~both]
     if image is not None:
         image = whole_numbers(path, image.ravel()).reshape(-1, 3)
-    return join_ids(path, grains, ids, force, walls=True, image=image, force_n=force_n)
+    return join_ids(path, grains, ids[ours], force, walls=True, image=image, force_n=force_n)
 
 
-def _real(path: Path, own: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
+def _real(path: Path, own: Arrays) -> Arrays:
     """The rows that are no virtual interactions, of the columns that matter."""
     count = len(own["id1"])
-    shapes = {
-        "id1": (count,),
-        "id2": (count,),
-        "normal": (count, 3),
-        "normal_force": (count,),
-        "shear_force": (count, 3),
-        "virtual": (count,),
-        "force": (count, 3),
-        "image": (count, 3),
-    }
-    found = {}
-    for name, shape in shapes.items():
-        values = own.get(name)
-        if values is None:
-            continue
+    found = {name: own[name] for name in COLUMNS if name in own}
+    for name, values in found.items():
+        shape = (count, 3) if COLUMNS[name] == 3 else (count,)
         if values.shape != shape or values.dtype.kind not in "biuf":
             raise ReadError(f"{path}: {INTERACTIONS}: {name}: expected numbers of shape {shape}")
-        found[name] = values
     if "id2" not in found:
         raise ReadError(f"{path}: {INTERACTIONS}: expected id1 and id2, found id1 alone")
     virtual = found.pop("virtual", np.zeros(count))
     return {name: values[virtual <= 0] for name, values in found.items()}
 
 
-def _force(path: Path, file: HdfFile, table: dict[str, npt.NDArray[Any]]) -> FloatArray | None:
-    """The force on the second body; as YADE's exporter writes it, or whole, as scanfab does."""
-    if "force" in table:
-        return doubles(table["force"])
-    if not {"normal", "normal_force", "shear_force"} <= table.keys():
-        return None
-    normal = _sign(path, file) * table["normal_force"][:, None] * table["normal"]
-    force: FloatArray = (normal + table["shear_force"]).astype(np.float64)
-    return force
+def _force(path: Path, file: HdfFile, table: Arrays) -> tuple[FloatArray | None, FloatArray | None]:
+    """The force on the second body, or else its normal part alone."""
+    if "force" in table:  # as scanfab writes it
+        return doubles(table["force"]), None
+    if "normal_force" not in table:
+        return None, None
+    normal = _sign(path, file) * table["normal_force"]
+    if not {"normal", "shear_force"} <= table.keys():
+        return None, normal
+    return doubles(normal[:, None] * table["normal"] + table["shear_force"]), None
 
 
 def _sign(path: Path, file: HdfFile) -> float:

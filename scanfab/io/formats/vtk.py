@@ -24,8 +24,7 @@ from scanfab.io.formats.vtp_packing import (
     says_all,
 )
 from scanfab.io.formats.yade_cells import cell_beside, cell_file, is_cell_file
-from scanfab.io.parse.vtk_data import Mesh
-from scanfab.io.parse.vtk_mesh import elements, form_of, listed, read_bounds, read_mesh
+from scanfab.io.mesh import Mesh, elements, form_of, listed, read_bounds, read_mesh
 from scanfab.io.reader import (
     Carries,
     FileKind,

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.io.files import first_bytes
-from scanfab.io.parse.vtk_data import Mesh
+from scanfab.io.mesh import Mesh
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import ContactList
 

@@ -14,10 +14,9 @@ from scanfab.io.files import check_memory, first_bytes, plain
 from scanfab.io.formats.columns import grain_table
 from scanfab.io.formats.vtk import VtkReader, vectors
 from scanfab.io.formats.yade_save import is_binary_save, is_save, read_save, snapshot_of_save
+from scanfab.io.mesh import Mesh
 from scanfab.io.parse.number_rows import rows_of_numbers
 from scanfab.io.parse.text_table import FILLED, has_pieces, parse_columns, read_to_end
-from scanfab.io.parse.vtk_data import FlawError, Mesh
-from scanfab.io.parse.vtk_xml import count_rows
 from scanfab.io.reader import (
     Carries,
     FileKind,
@@ -62,8 +61,8 @@ class YadeReader(VtkReader):
                 f"{path}: YADE's binary format can be read by the same build of YADE only: load it "
                 f"there, and save it as XML: O.save('name.xml.bz2')"
             )
-        if _lost_lines(path) is not None:
-            return "contacts"  # which its reading refuses
+        if b'Name="forceN"' in first_bytes(path):
+            return "contacts"  # of VTKRecorder; reading them may be refused (see `vtk_checks`)
         return "grains" if _is_text(path) or is_save(path) else super().kind(path)
 
     def snapshots(self, path: Path) -> list[Snapshot]:
@@ -94,7 +93,6 @@ class YadeReader(VtkReader):
                 f"{snapshot.path}: a saved simulation is no contact list for other grains: "
                 f"compute it by itself"
             )
-        _refuse_lost_lines(snapshot.path)
         return super().read_contacts(snapshot, options, grains)
 
     def carries(self, path: Path) -> Carries:
@@ -165,31 +163,3 @@ def _text_columns(path: Path, lines: list[str], count: int | None) -> tuple[list
     if count is not None and len(names) != count:
         raise ReadError(f"{path}: the first line names {len(names)} columns, the rows have {count}")
     return names, cell
-
-
-def _refuse_lost_lines(path: Path) -> None:
-    """
-    VTKRecorder loses the lines that cross a periodic cell, but writes their values.
-
-    The values then belong to other contacts than those that they stand at.
-    """
-    lost = _lost_lines(path)
-    if lost is not None:
-        lines, values = lost
-        raise ReadError(
-            f"{path}: {values} values for {lines} contacts: YADE's VTKRecorder loses the contacts "
-            f"that cross a periodic cell; export them with export.VTKExporter.exportInteractions, "
-            f'or find them by geometry (`contacts="geometric"`)'
-        )
-
-
-def _lost_lines(path: Path) -> tuple[int, int] | None:
-    """Lines and values of a file of interactions that has more values than lines, else None."""
-    head = first_bytes(path)
-    if b"<VTKFile" not in head or b'Name="forceN"' not in head:
-        return None
-    try:
-        lines, values = count_rows(plain(path).read_bytes(), "Lines", "forceN")
-    except FlawError:
-        return None  # whoever reads it says what is wrong
-    return (lines, values) if values > lines else None

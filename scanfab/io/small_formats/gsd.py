@@ -14,9 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError
-from scanfab.io.files import first_bytes, plain
+from scanfab.io.fence import fenced, needed
+from scanfab.io.files import first_bytes
 from scanfab.io.formats.columns import grain_table, has_radius
-from scanfab.io.parse.fence import fenced, needed
+from scanfab.io.parse.gsd_files import read_gsd
 from scanfab.io.reader import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
 from scanfab.packing.cell import Cell
 
@@ -84,7 +85,7 @@ class GsdReader:
 
 def _read(path: Path, frame: int | None) -> tuple[dict[str, npt.NDArray[Any]], dict[str, Any]]:
     needed(path, "gsd", "gsd")
-    return fenced("gsd", plain(path), path, frame=frame)
+    return fenced(read_gsd, path, 1 << 62, frame)
 
 
 def _bare(name: str) -> str:

@@ -7,7 +7,7 @@ import pytest
 
 import scanfab
 from scanfab import ReadError, ScanfabWarning
-from scanfab.io.parse import fence
+from scanfab.io import fence
 from scanfab.io.registry import reader_named
 from scanfab.testing import check_reader
 from tests.helpers.dumps import ROWS, dump_text, write

@@ -11,9 +11,7 @@ import scanfab
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.io.formats.liggghts import LiggghtsReader
 from scanfab.io.formats.vtk import VtkReader
-from scanfab.io.parse import vtk_data
-from scanfab.io.parse.meshio_files import read_xdmf
-from scanfab.io.parse.vtk_mesh import read_mesh
+from scanfab.io.mesh import read_mesh
 from scanfab.io.reader import GrainTable, ReadOptions, Snapshot
 from tests.helpers.dumps import write, yade_spheres
 from tests.helpers.truth import FLOOR, YADE
@@ -322,22 +320,10 @@ def test_xml_without_content_is_an_error_that_prints_nothing(tmp_path, type, cap
     assert capfd.readouterr() == ("", "")
 
 
-def test_meshio_does_not_end_the_program(tmp_path, capfd):
+def test_an_empty_xdmf_file_does_not_end_the_program(tmp_path, capfd):
     path = write(tmp_path / "a.xdmf", '<?xml version="1.0"?>\n<Xdmf Version="1.0"></Xdmf>\n')
-    with pytest.raises(ReadError, match="meshio"):
+    with pytest.raises(ReadError, match="a.xdmf"):
         scanfab.read(path)
-    assert capfd.readouterr() == ("", "")
-
-
-def test_an_exit_of_meshio_becomes_an_error(tmp_path, monkeypatch, capfd):
-    def stop(*_):
-        print("Error: cannot read")
-        raise SystemExit(1)
-
-    monkeypatch.setattr(meshio.xdmf, "read", stop)
-    path = grid(tmp_path / "a.xdmf", radius=RADIUS)
-    with pytest.raises(ValueError, match="meshio cannot read it"):
-        read_xdmf(str(path))
     assert capfd.readouterr() == ("", "")
 
 
@@ -398,35 +384,3 @@ def test_the_box_beside_a_dump_is_told(tmp_path):
     assert reader.beside(grains) == []
     box.write_text("")
     assert reader.beside(grains) == LiggghtsReader().beside(grains) == [box]
-
-
-@pytest.mark.parametrize(
-    ("text", "type", "values"),
-    [
-        (
-            b"1 2\n\n 3.5\tnan -inf 1e400 1e-320 -0",
-            "f8",
-            [1, 2, 3.5, np.nan, -np.inf, np.inf, 1e-320, 0],
-        ),
-        (b" 9007199254740993\r\n-5 ", "i8", [9007199254740993, -5]),
-        (b"18446744073709551615", "u8", [18446744073709551615]),
-        (b"0.1", "f4", [np.float32(0.1)]),
-        (b"1.5", "i4", None),
-        (b"1_0", "f8", None),
-        (b"300", "u1", None),
-        (b"0x10", "f8", None),
-        (b'"1"', "f8", None),
-        (b"1D3", "f8", None),
-        (b"\x001", "f8", None),
-        (b"1 2", "f8", [1, 2]),
-        (b"1", "f8", None),
-    ],
-)
-@pytest.mark.parametrize("long", [0, 1 << 30])
-def test_long_and_short_texts_hold_the_same_numbers(monkeypatch, text, type, values, long):
-    monkeypatch.setattr(vtk_data, "LONG", long)
-    if values is None:
-        with pytest.raises(vtk_data.FlawError):
-            vtk_data.numbers(text, 2 if text == b"1" else 1, type)
-    else:
-        np.testing.assert_array_equal(vtk_data.numbers(text, len(values), type), values)

@@ -7,8 +7,7 @@ import pytest
 
 import scanfab
 from scanfab import ReadError
-from scanfab.io import registry
-from scanfab.io.parse import fence
+from scanfab.io import fence, registry
 from scanfab.io.registry import reader_named
 from scanfab.testing import check_reader
 from tests.helpers.made.gsd import CENTRES, frame, gsd_file

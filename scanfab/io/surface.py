@@ -1,4 +1,4 @@
-"""Triangulated surfaces from files: .vtp read here, all others by meshio."""
+"""Triangulated surfaces of windows: .vtp by VTK, all others by meshio, both in the worker."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ import numpy as np
 
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.io.files import check_memory
-from scanfab.io.parse.fence import fenced
-from scanfab.io.parse.vtk_mesh import read_faces
+from scanfab.io.fence import fenced
+from scanfab.io.mesh import read_faces
 
 SUFFIXES = (".stl", ".vtp", ".ply", ".obj")
 
@@ -26,10 +25,11 @@ def read_surface(path: Path) -> tuple[FloatArray, IntArray]:
     ReadError
         If the file is damaged, or of another format.
     """
-    if path.suffix.lower() == ".vtp":
+    suffix = path.suffix.lower()
+    if suffix == ".vtp":
         points, faces = read_faces(path)
     else:
-        points, faces = _from_meshio(path)
+        points, faces = fenced(faces_by_meshio, path, suffix[1:])
     if points.shape != (len(points), 3) or not np.all(np.isfinite(points)):
         raise ReadError(f"{path}: expected points of three finite numbers")
     if any(one.size and not 0 <= one.min() <= one.max() < len(points) for one in faces):
@@ -38,11 +38,12 @@ def read_surface(path: Path) -> tuple[FloatArray, IntArray]:
     return points, np.concatenate([np.zeros((0, 3), np.int64), *fans])
 
 
-def _from_meshio(path: Path) -> tuple[FloatArray, list[IntArray]]:
-    check_memory(path, 20.0 * path.stat().st_size)
-    try:
-        found, _ = fenced("surface", path, path, suffix=path.suffix.lower()[1:])
-    except ReadError as error:
-        reason = str(error).removeprefix(f"{path}: ")
-        raise ReadError(f"{path}: cannot be read as a surface: {reason}") from error
-    return found.pop("points"), list(found.values())
+def faces_by_meshio(path: str, suffix: str) -> tuple[FloatArray, list[IntArray]]:
+    """The points of a surface, and its faces, an array for each number of corners."""
+    import meshio
+
+    # in the worker, since meshio prints, and exits if it cannot read a file
+    with np.errstate(over="ignore"):
+        mesh = meshio.read(Path(path), file_format=suffix)
+    faces = [np.asarray(one.data, np.int64) for one in mesh.cells if one.dim == 2 and len(one.data)]
+    return np.asarray(mesh.points, np.float64), faces

@@ -1,0 +1,295 @@
+"""The mesh of a VTK file: all that VTK writes is read, and what is damaged is refused."""
+
+from __future__ import annotations
+
+import base64
+import itertools
+import time
+
+import numpy as np
+import pytest
+import pyvista
+from vtkmodules.vtkIOLegacy import vtkPolyDataWriter
+from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
+
+from scanfab.base.errors import ReadError, ScanfabWarning
+from scanfab.io.files import plain
+from scanfab.io.mesh import read_mesh
+from tests.helpers.dumps import write, yade_spheres
+from tests.helpers.fuzzing import only_scanfabs_warnings
+from tests.helpers.truth import FLOOR, YADE
+
+POINTS = "POINTS 2 double\n0 0 0 2 0 0\n"
+
+
+def legacy(path, body, version="3.0", dataset="POLYDATA"):
+    return write(path, f"# vtk DataFile Version {version}\n\nASCII\nDATASET {dataset}\n{body}")
+
+
+def xml(path, piece, content="", more=""):
+    return write(
+        path,
+        f'<VTKFile type="PolyData" version="0.1" byte_order="LittleEndian"{more}><PolyData>'
+        f"<Piece {piece}>{content}</Piece></PolyData></VTKFile>",
+    )
+
+
+def refuses(path, match="damaged or incomplete|its library crashed"):
+    """ReadError with the name of the file, and no warning of a library."""
+    with only_scanfabs_warnings(), pytest.raises(ReadError, match=rf"{path.name}: .*({match})"):
+        read_mesh(path)
+
+
+@pytest.fixture
+def lines():
+    """Points, vertices and lines with arrays of all kinds, and one with a NaN."""
+    points = np.random.default_rng(1).random((500, 3))
+    ends = np.column_stack([np.full(499, 2), np.arange(499), np.arange(1, 500)])
+    verts = np.column_stack([np.ones(500, int), np.arange(500)])
+    mesh = pyvista.PolyData(points, verts=verts.ravel(), lines=ends.ravel())
+    mesh["radius"], mesh["id"] = np.ones(500), np.arange(500) + 2**40
+    mesh["velocity"] = points.astype(np.float32)
+    mesh["velocity"][3] = np.nan
+    mesh.cell_data["kn"] = np.arange(999.0)
+    return mesh
+
+
+def same(path, mesh, point_type=np.float64):
+    found = read_mesh(path)
+    np.testing.assert_array_equal(found.points, mesh.points.astype(point_type))
+    for name in ("radius", "id", "velocity"):
+        np.testing.assert_array_equal(found.point_arrays[name], mesh[name])
+        assert found.point_arrays[name].dtype == mesh[name].dtype
+    np.testing.assert_array_equal(found.lines, np.arange(499)[:, None] + [0, 1])
+    np.testing.assert_array_equal(found.line_arrays["kn"], np.arange(500.0, 999))
+    assert not found.has_faces
+
+
+@pytest.mark.parametrize("compressor", ["ZLib", "LZ4", "LZMA", "None"])
+@pytest.mark.parametrize(("mode", "is_raw"), [("Binary", 0), ("Appended", 0), ("Appended", 1)])
+def test_all_that_vtk_writes_is_read(tmp_path, lines, compressor, mode, is_raw):
+    grid = lines.cast_to_unstructured_grid()
+    for data, header, order in itertools.product((lines, grid), (32, 64), (0, 1)):
+        writer = vtkXMLPolyDataWriter() if data is lines else vtkXMLUnstructuredGridWriter()
+        writer.SetInputData(data)
+        getattr(writer, f"SetCompressorTypeTo{compressor}")()
+        getattr(writer, f"SetDataModeTo{mode}")()
+        writer.SetEncodeAppendedData(not is_raw)
+        writer.SetHeaderType(header)
+        writer.SetByteOrder(order)
+        path = tmp_path / ("a.vtp" if data is lines else "a.vtu")
+        writer.SetFileName(str(path))
+        writer.Write()
+        same(path, lines)
+
+
+@pytest.mark.parametrize("binary", [False, True])
+@pytest.mark.parametrize("version", [42, 51])
+def test_all_legacy_files_are_read(tmp_path, lines, binary, version):
+    writer = vtkPolyDataWriter()
+    writer.SetInputData(lines)
+    writer.SetFileVersion(version)
+    writer.SetFileType(2 if binary else 1)
+    writer.SetFileName(str(tmp_path / "a.vtk"))
+    writer.Write()
+    if not binary:
+        mesh = read_mesh(tmp_path / "a.vtk")
+        np.testing.assert_allclose(mesh.points, lines.points, rtol=1e-5)
+        np.testing.assert_array_equal(mesh.line_arrays["kn"], np.arange(500.0, 999))
+    else:
+        same(tmp_path / "a.vtk", lines)
+
+
+def test_a_longer_line_joins_its_ends(tmp_path):
+    mesh = pyvista.PolyData(np.eye(3), lines=np.array([3, 0, 2, 1, 2, 1, 2]))
+    mesh.save(tmp_path / "a.vtp")
+    assert read_mesh(tmp_path / "a.vtp").lines.tolist() == [[0, 1], [1, 2]]
+
+
+def test_lines_beside_cells_of_other_kinds(tmp_path):
+    body = POINTS + "CELLS 3 9\n1 0\n2 0 1\n3 1 0 1\nCELL_TYPES 3\n1\n3\n5\n"
+    mesh = read_mesh(legacy(tmp_path / "a.vtk", body, dataset="UNSTRUCTURED_GRID"))
+    assert mesh.lines.tolist() == [[0, 1]]
+    assert mesh.has_faces
+
+
+SOURCES = {
+    "legacy text": YADE / "periodic-spheres-00000000.vtk.gz",
+    "legacy text of lines": YADE / "id-intrs-00000000.vtk.gz",
+    "legacy text of a grid": YADE / "periodic-periCell-00000001.vtk",
+    "legacy bytes": FLOOR / "grains_binary_30000.vtk",
+    "XML text": FLOOR / "grains_30000.vtp",
+    "XML base64": FLOOR / "grains_binary_30000.vtp",
+    "XML text of a grid": FLOOR / "grains_30000.vtu",
+    "XML of packed bytes": YADE / "zlib_spheres.30000.vtu",
+}
+
+
+@pytest.mark.parametrize("form", SOURCES)
+def test_a_file_that_was_cut_off_is_an_error_that_prints_nothing(tmp_path, form, capfd):
+    """Wherever it was cut: VTK fills the rest with zeros, or with what memory holds."""
+    data = plain(SOURCES[form]).read_bytes()
+    path = tmp_path / SOURCES[form].name.removesuffix(".gz")
+    whole = len(data.rstrip())
+    for size in np.random.default_rng(2).integers(200, whole - 60, 12):
+        path.write_bytes(data[:size])
+        with pytest.raises(ReadError, match=path.name):
+            read_mesh(path)
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("array", ["radius", "id", "mask"])
+@pytest.mark.parametrize("behind", [100, 101, 1003])
+def test_an_array_of_a_text_that_was_cut_off(tmp_path, array, behind):
+    values = np.full(400, 0.25)
+    points = np.eye(3)[np.arange(400) % 3]
+    path = yade_spheres(tmp_path / "a.vtk", points, values, id=range(400), mask=values)
+    data = path.read_bytes()
+    path.write_bytes(data[: data.find(f"SCALARS {array}".encode()) + behind])
+    refuses(path)
+
+
+def test_a_last_number_without_a_line_end_is_doubted(tmp_path):
+    path = legacy(tmp_path / "a.vtk", POINTS.rstrip())
+    with pytest.warns(ScanfabWarning, match=r"a\.vtk: the last line has no end"):
+        read_mesh(path)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        POINTS.replace("2", "9" * 5000, 1),
+        POINTS.replace("2", "1" + "0" * 14, 1),
+        POINTS.replace("2", "-2", 1),
+        POINTS + "LINES 1 1\n7\n",
+        POINTS + "LINES 1 3\n-2 0 1\n",
+        POINTS + "LINES 1 3\n2 0 x\n",
+        POINTS + "LINES 1 3\n2 0 2\n",
+        POINTS + "LINES 1 3\n2 0 10000000000\n",
+        POINTS + "POINT_DATA 2\nFIELD FieldData 4294967296\nr 1 2 double\n1 1\n",
+        POINTS + "POINT_DATA 3\nSCALARS radius double\n1 1 1\n",
+        POINTS + "POINT_DATA 2\nSCALARS radius double\nLOOKUP_TABLE default\n1\n",
+        POINTS + "POINT_DATA 2\nSCALARS radius complex\n1 1\n",
+        POINTS + "POINT_DATA 2\nFIELD FieldData 1\nradius 1 1 double\n1\n",
+        POINTS + "POINT_DATA 2\n",
+        POINTS + POINTS,
+        POINTS + "SPLINES 2\n",
+        "",
+        "not at all\n",
+    ],
+)
+def test_legacy_texts_that_are_damaged_are_refused(tmp_path, body):
+    refuses(legacy(tmp_path / "a.vtk", body))
+
+
+CELLS_51 = "CELLS 3 2\nOFFSETS vtktypeint64\n{}\nCONNECTIVITY vtktypeint64\n{}\n"
+
+
+@pytest.mark.parametrize(
+    ("version", "cells", "types"),
+    [
+        ("3.0", CELLS_51.format("0 1 2", "0 1"), "1\n1"),
+        ("5.1", "CELLS 2 4\n1 0 1 1\n", "1\n1"),
+        ("5.1", CELLS_51.format("0 1 2", "0 one"), "1\n1"),
+        ("5.1", CELLS_51.format("0 x 2", "0 1"), "1\n1"),
+        ("5.1", CELLS_51.format("0 1 1", "0 1"), "1\n1"),
+        ("5.1", CELLS_51.format("1 1 2", "0 1"), "1\n1"),
+        ("5.1", CELLS_51.format("0 3 2", "0 1"), "1\n1"),
+        ("3.0", "CELLS 2 4\n1 0 1 1\n", "1 x"),
+        ("3.0", "CELLS 2 6\n3 0 1 1 1 0\n", "3 3"),
+        ("3.0", "CELLS 2 3\n1 0 0\n", "3 3"),
+    ],
+)
+def test_cells_of_legacy_grids_that_are_damaged_are_refused(tmp_path, version, cells, types):
+    body = f"{POINTS}{cells}CELL_TYPES 2\n{types}\n"
+    refuses(legacy(tmp_path / "a.vtk", body, version, "UNSTRUCTURED_GRID"))
+
+
+@pytest.mark.parametrize("dataset", ["HYPEROCTREE", "STRUCTURED_POINTS", "TABLE"])
+def test_data_that_are_no_mesh_are_refused(tmp_path, dataset):
+    refuses(legacy(tmp_path / "a.vtk", "", dataset=dataset), f"a {dataset} holds neither grains")
+    refuses(write(tmp_path / "a.vtk", "hello"), "expected a VTK file, found something else")
+    refuses(write(tmp_path / "a.vtk", "# vtk DataFile Version \n\nASCII\nX\n"), "expected a VTK")
+
+
+@pytest.mark.parametrize("count", [10**8, 10**15, 10**30, -1, "many"])
+@pytest.mark.parametrize("name", ["Points", "Polys", "Verts"])
+def test_counts_of_xml_are_those_of_the_file(tmp_path, name, count):
+    counts = {"Points": 1, "Verts": 0, "Lines": 0, "Strips": 0, "Polys": 0, name: count}
+    piece = " ".join(f'NumberOf{key}="{value}"' for key, value in counts.items())
+    refuses(xml(tmp_path / "a.vtp", piece))
+
+
+def array(content="", **words):
+    """A DataArray of the Points of one point."""
+    words = {"type": "Float64", "NumberOfComponents": "3", "format": "binary", **words}
+    return f"<DataArray {' '.join(f'{k}={v!r}' for k, v in words.items())}>{content}</DataArray>"
+
+
+def sizes(*numbers, type="<u4"):
+    return base64.b64encode(np.array(numbers, type).tobytes()).decode()
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        array("0 0", format="ascii"),
+        array("0 <InformationKey>1 2</InformationKey> 0", format="ascii"),
+        array("0 0 0 0", format="ascii"),
+        array("0 0 zero", format="ascii"),
+        array("0 0 0", format="ascii").replace("</DataArray>", ""),
+        array("&a;", format="ascii"),
+        array(NumberOfComponents="9999999"),
+        array(type="Complex"),
+        array(),
+        array("!!!!!!!!"),
+        array(sizes(24)),
+        array(sizes(4, 0)),
+        array(sizes(2**31, 0, 0)),
+        array(format="appended"),
+        array(format="appended", offset="2.5"),
+        array(format="appended", offset="99"),
+        array(format="anything"),
+    ],
+)
+def test_arrays_of_xml_that_are_damaged_are_refused(tmp_path, points):
+    refuses(xml(tmp_path / "a.vtp", 'NumberOfPoints="1"', f"<Points>{points}</Points>"))
+
+
+@pytest.mark.parametrize(
+    "blocks",
+    [
+        sizes(1, 2**31, 2**31, 16),
+        sizes(1, 2**31, 0, 0),
+        sizes(2**31, 1, 0, 0),
+        sizes(2**32 - 1, 24, 0, 0),
+        sizes(2, 24, 0, 0),
+        sizes(1, 16, 0, 0),
+        sizes(1, 24, 0, 2**32 - 1),
+    ],
+)
+@pytest.mark.parametrize("compressor", ["ZLib", "LZ4", "LZMA", "RAR"])
+def test_packed_arrays_that_are_damaged_are_refused(tmp_path, blocks, compressor):
+    points = f"<Points>{array(blocks)}</Points>"
+    more = f' compressor="vtk{compressor}DataCompressor"'
+    refuses(xml(tmp_path / "a.vtp", 'NumberOfPoints="1"', points, more))
+
+
+@pytest.mark.parametrize("offset", ["1", "-2", "99999999999", "9" * 30, "x"])
+@pytest.mark.parametrize("order", [1, -1])
+def test_offsets_of_xml_cells_that_are_damaged_are_refused(tmp_path, offset, order):
+    one = {"format": "ascii", "type": "Int64", "NumberOfComponents": "1"}
+    parts = [array("0 1 0 1", Name="connectivity", **one)]
+    parts.append(array(f"2 {offset}", Name="offsets", **one))
+    points = array("0 0 0 2 0 0", format="ascii")
+    content = f"<Points>{points}</Points><Lines>{''.join(parts[::order])}</Lines>"
+    refuses(xml(tmp_path / "a.vtp", 'NumberOfPoints="2" NumberOfLines="2"', content))
+
+
+@pytest.mark.parametrize("part", ["<DataArray ", "<DataArray format='ascii'>", "<Piece", "a=' "])
+def test_the_time_grows_as_the_file_does(tmp_path, part):
+    head = '<VTKFile type="PolyData"><PolyData><Piece NumberOfPoints="1"><Points>'
+    path = write(tmp_path / "a.vtp", f"{head}<DataArray {part * 100_000}</DataArray>")
+    began = time.monotonic()
+    refuses(path)
+    assert time.monotonic() - began < 10
