@@ -19,7 +19,7 @@ from scanfab.base.typing import FloatArray
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.columns import grain_table, whole_numbers
 from scanfab.io.formats.join import join_ids
-from scanfab.io.hdf import HdfFile, is_hdf, read_hdf_file
+from scanfab.io.parse.hdf import HdfFile, is_hdf, read_hdf_file
 from scanfab.io.reader import (
     Carries,
     FileKind,

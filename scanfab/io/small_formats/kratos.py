@@ -13,8 +13,8 @@ from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.columns import grain_table
-from scanfab.io.hdf import is_hdf, read_hdf_file
 from scanfab.io.parse.counted_rows import counted_rows, spelt, text_of
+from scanfab.io.parse.hdf import is_hdf, read_hdf_file
 from scanfab.io.reader import (
     Carries,
     FileKind,
