@@ -30,8 +30,8 @@ from scanfab.io.parse.vtk_checks import check_text, check_xml, damaged, is_ascii
 Arrays = dict[str, npt.NDArray[Any]]
 
 # files that hold a mesh; and files that list the pieces of one frame
-MESHES = ("polydata", "unstructuredgrid", "unstructured_grid", "rectilineargrid", "xdmf")
-MESHES += ("rectilinear_grid", "multiblockdataset", "partitioneddatasetcollection")
+MESHES = {"polydata", "unstructuredgrid", "unstructured_grid", "rectilineargrid", "xdmf"}
+MESHES |= {"rectilinear_grid", "multiblockdataset", "partitioneddatasetcollection"}
 PIECES = ("PPolyData", "PUnstructuredGrid")
 VERTEX, POLY_VERTEX, LINE, POLY_LINE = 1, 2, 3, 4
 # bit of vtkGhostType: the point belongs to another piece
@@ -285,10 +285,14 @@ def _reader_for(path: str, head: bytes) -> Any:
     return vtkXMLGenericDataObjectReader()
 
 
-def _arrays(attributes: Any, rows: int | None) -> Arrays:
-    """The arrays of points, cells or the file that have a name; None: any number of rows."""
+def _numpy(array: Any) -> npt.NDArray[Any]:
     from vtkmodules.util.numpy_support import vtk_to_numpy
 
+    return vtk_to_numpy(array)  # type: ignore[no-untyped-call,no-any-return]
+
+
+def _arrays(attributes: Any, rows: int | None) -> Arrays:
+    """The arrays of points, cells or the file that have a name; None: any number of rows."""
     found: Arrays = {}
     for place in range(attributes.GetNumberOfArrays()):
         one = attributes.GetAbstractArray(place)
@@ -296,7 +300,7 @@ def _arrays(attributes: Any, rows: int | None) -> Arrays:
         if one.IsA("vtkStringArray"):
             values = np.array([one.GetValue(k) for k in range(one.GetNumberOfValues())], dtype=str)
         else:
-            values = vtk_to_numpy(one)
+            values = _numpy(one)
         if rows is not None and len(values) != rows:
             raise damaged(f"{name} has {len(values)} of {rows} rows")
         if name:
@@ -306,10 +310,8 @@ def _arrays(attributes: Any, rows: int | None) -> Arrays:
 
 def _cells(cells: Any, points: int) -> tuple[IntArray, IntArray]:
     """Where the points of each cell begin and the last end, and the points of all cells."""
-    from vtkmodules.util.numpy_support import vtk_to_numpy
-
-    offsets = vtk_to_numpy(cells.GetOffsetsArray()).astype(np.int64)
-    named = vtk_to_numpy(cells.GetConnectivityArray()).astype(np.int64)
+    offsets = _numpy(cells.GetOffsetsArray()).astype(np.int64)
+    named = _numpy(cells.GetConnectivityArray()).astype(np.int64)
     if len(offsets) == 0:
         offsets = np.zeros(1, np.int64)
     if offsets[0] != 0 or np.any(np.diff(offsets) < 0) or offsets[-1] != len(named):
@@ -321,8 +323,6 @@ def _cells(cells: Any, points: int) -> tuple[IntArray, IntArray]:
 
 def _mesh_of(data: Any) -> Mesh:
     """The mesh of one of VTK's data sets."""
-    from vtkmodules.util.numpy_support import vtk_to_numpy
-
     none: IntArray = np.zeros((0, 2), np.int64)
     if data.IsA("vtkRectilinearGrid"):
         if not data.GetNumberOfPoints():
@@ -336,7 +336,7 @@ def _mesh_of(data: Any) -> Mesh:
     if count:
         # a float may be a NaN that signals when it is cast
         with np.errstate(invalid="ignore"):
-            points = doubles(vtk_to_numpy(data.GetPoints().GetData()))
+            points = doubles(_numpy(data.GetPoints().GetData()))
     arrays = _arrays(data.GetPointData(), count)
     cell_arrays = _arrays(data.GetCellData(), data.GetNumberOfCells())
     if data.IsA("vtkPolyData"):
@@ -349,7 +349,7 @@ def _mesh_of(data: Any) -> Mesh:
         offsets, named = _cells(data.GetCells(), count)
         array = data.GetCellTypesArray()
         # since VTK 9.6, cells that are all of one type have no such array
-        types = np.array(data.GetCellTypes()) if array is None else vtk_to_numpy(array)
+        types = np.array(data.GetCellTypes()) if array is None else _numpy(array)
         if len(types) != len(offsets) - 1:
             raise damaged(f"{len(types)} types for {len(offsets) - 1} cells")
         sizes = np.diff(offsets)
