@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import scanfab
-from tests.helpers.dumps import write, yade_lines, yade_spheres
+from tests.helpers.dumps import dump_text, local_text, write, yade_lines, yade_spheres
 from tests.helpers.truth import BOX, CELL, SHEAR, YADE, csv_rows
 
 LAMMPS = (
@@ -25,61 +25,49 @@ def on_each_grain(packing):
     return total
 
 
-def test_forces_of_liggghts_add_up_to_those_it_dumps():
+@pytest.mark.parametrize("keywords", [None, "pos id force delta contactPoint"])
+def test_forces_of_liggghts_add_up_to_those_it_dumps(keywords):
     """
-    With the columns fx fy fz, of grains that touch no wall.
+    With the columns fx fy fz; those of the walls carry what other grains do not.
 
     The list is from just before the step whose forces are dumped, so some contacts differ a little.
     """
     files = [BOX / f"{name}_120000.txt.gz" for name in ("dump", "contacts", "walls")]
-    packing = scanfab.read_series(files)[0].read()
-    dumped = np.column_stack([packing.columns[f"f{axis}"] for axis in "xyz"])
-    off = np.abs(on_each_grain(packing) - dumped).max(axis=1)[packing.wall_contacts == 0]
-    assert np.median(np.abs(dumped)) > 10 * np.median(off)
-    assert np.mean(off < 1e-6) > 0.6
-    assert off.max() < 0.003 * np.abs(packing.contacts.force).max()
-
-
-def test_a_heap_of_yade_stands_still():
-    """Contacts with grains (saved) and walls (YADE's own list) carry the weight of each grain."""
-    packing = scanfab.read(YADE / "formats.xml.bz2")
-    walls = csv_rows(YADE / "truth_walls.csv")
-    total = on_each_grain(packing)
-    rows = np.searchsorted(packing.id, walls["sphere"])
-    np.add.at(total, rows, np.column_stack([walls[f"f{axis}"] for axis in "xyz"]))
-    np.testing.assert_allclose(total[:, :2], 0.0, atol=1e-10)
-    density = total[:, 2] / (4 / 3 * np.pi * packing.radius**3 * 9.81)
-    nearest = np.where(density < 2000, 1500.0, 2600.0)
-    np.testing.assert_allclose(density, nearest, rtol=1e-10)
-
-
-def test_walls_of_yade_press_as_it_lists():
-    packing = scanfab.read(YADE / "formats.xml.bz2")
-    truth = csv_rows(YADE / "truth_walls.csv")
-    walls = packing.wall_forces
-    found = np.column_stack([packing.id[walls.row], walls.force])
-    listed = np.column_stack([truth["sphere"], *(truth[f"f{axis}"] for axis in "xyz")])
-    np.testing.assert_allclose(found[np.lexsort(found.T)], listed[np.lexsort(listed.T)], rtol=1e-9)
-    away = np.linalg.norm(walls.point - packing.position[walls.row], axis=1)
-    np.testing.assert_allclose(away, packing.radius[walls.row], rtol=0.02)
-
-
-@pytest.mark.parametrize("keywords", [None, "pos id force delta contactPoint"])
-def test_walls_of_liggghts_carry_what_other_grains_do_not(keywords):
-    """With them the forces on grains at walls are those that LIGGGHTS dumps, too."""
-    files = [BOX / f"{name}_120000.txt.gz" for name in ("dump", "contacts", "walls")]
     packing = scanfab.read_series(files, contact_columns=keywords)[0].read()
+    dumped = np.column_stack([packing.columns[f"f{axis}"] for axis in "xyz"])
+    total, at_wall = on_each_grain(packing), packing.wall_contacts > 0
+    inside = np.abs(total - dumped).max(axis=1)[~at_wall]
+    assert np.median(np.abs(dumped)) > 10 * np.median(inside)
+    assert np.mean(inside < 1e-6) > 0.6
+    assert inside.max() < 0.003 * np.abs(packing.contacts.force).max()
     walls = packing.wall_forces
     assert len(walls.row) == packing.wall_contacts.sum() > 300
-    total = on_each_grain(packing)
     np.add.at(total, walls.row, walls.force)
-    dumped = np.column_stack([packing.columns[f"f{axis}"] for axis in "xyz"])
-    off = np.abs(total - dumped).max(axis=1)[packing.wall_contacts > 0]
+    off = np.abs(total - dumped).max(axis=1)[at_wall]
     size = np.linalg.norm(walls.force, axis=1)
     assert np.median(off) < 0.01 * np.median(size)
     assert np.quantile(off, 0.95) < 0.1 * np.median(size)
     away = np.linalg.norm(walls.point - packing.position[walls.row], axis=1)
     np.testing.assert_allclose(away, packing.radius[walls.row], rtol=0.1)
+
+
+def test_a_heap_of_yade_stands_still_on_walls_that_press_as_it_lists():
+    """Contacts with grains (saved) and walls (YADE's own list) carry the weight of each grain."""
+    packing = scanfab.read(YADE / "formats.xml.bz2")
+    truth = csv_rows(YADE / "truth_walls.csv")
+    pressed = np.column_stack([truth[f"f{axis}"] for axis in "xyz"])
+    total = on_each_grain(packing)
+    np.add.at(total, np.searchsorted(packing.id, truth["sphere"]), pressed)
+    np.testing.assert_allclose(total[:, :2], 0.0, atol=1e-10)
+    density = total[:, 2] / (4 / 3 * np.pi * packing.radius**3 * 9.81)
+    nearest = np.where(density < 2000, 1500.0, 2600.0)
+    np.testing.assert_allclose(density, nearest, rtol=1e-10)
+    walls = packing.wall_forces
+    found = np.column_stack([packing.id[walls.row], walls.force])
+    listed = np.column_stack([truth["sphere"], pressed])
+    np.testing.assert_allclose(found[np.lexsort(found.T)], listed[np.lexsort(listed.T)], rtol=1e-9)
+    away = np.linalg.norm(walls.point - packing.position[walls.row], axis=1)
+    np.testing.assert_allclose(away, packing.radius[walls.row], rtol=0.02)
 
 
 @pytest.mark.filterwarnings("ignore:.*lists contacts with walls only")
@@ -119,21 +107,17 @@ def test_grains_at_rest_in_periodic_cells_are_in_equilibrium(grains, options):
     assert np.mean(packing.contacts.force_n > 0) > 0.95
 
 
-@pytest.mark.parametrize("name", ["ascii_intrs.30000.vtp", "zlib_intrs.30000.vtp"])
-def test_the_recorder_of_yade_has_the_normal_force(name):
-    packing = scanfab.read(YADE / "zlib_spheres.30000.vtu", contacts=YADE / name)
+@pytest.mark.parametrize(
+    ("grains", "contacts", "rtol"),
+    [
+        ("zlib_spheres.30000.vtu", "ascii_intrs.30000.vtp", 1e-6),
+        ("zlib_spheres.30000.vtu", "zlib_intrs.30000.vtp", 1e-6),
+        ("id-spheres-00000000.vtk.gz", "id-intrs-00000000.vtk.gz", 1e-5),
+    ],
+)
+def test_files_of_yade_have_the_normal_force(grains, contacts, rtol):
+    packing = scanfab.read(YADE / grains, contacts=YADE / contacts)
     assert packing.contacts.force is None
-    same_normal_forces(packing, scanfab.read(YADE / "formats.xml.bz2"), 1e-6)
-
-
-def test_a_normal_force_of_yade_alone_is_kept():
-    packing = scanfab.read(
-        YADE / "id-spheres-00000000.vtk.gz", contacts=YADE / "id-intrs-00000000.vtk.gz"
-    )
-    same_normal_forces(packing, scanfab.read(YADE / "formats.xml.bz2"), 1e-5)
-
-
-def same_normal_forces(packing, other, rtol):
     found, expected = (
         {
             tuple(sorted(pair)): force
@@ -141,7 +125,7 @@ def same_normal_forces(packing, other, rtol):
                 one.id[one.contacts.pairs].tolist(), one.contacts.force_n, strict=True
             )
         }
-        for one in (packing, other)
+        for one in (packing, scanfab.read(YADE / "formats.xml.bz2"))
     )
     assert found.keys() == expected.keys()
     scale = np.mean(list(expected.values()))
@@ -149,57 +133,21 @@ def same_normal_forces(packing, other, rtol):
         assert found[pair] == pytest.approx(force, rel=20 * rtol, abs=rtol * scale)
 
 
-def test_parts_of_the_force_of_liggghts_add_up(tmp_path):
-    grains = write(tmp_path / "dump_0.txt", TWO)
-    local = LOCAL.format(columns=names(9), row="1 2 0 -2 0 0 0 3 1")
-    contacts = scanfab.read(
-        grains,
-        contacts=write(tmp_path / "pairs_0.txt", local),
-        contact_columns="id force_normal force_tangential",
-    ).contacts
-    np.testing.assert_array_equal(contacts.force, [[2, -3, -1]])
+@pytest.mark.parametrize(
+    ("columns", "row", "force"),
+    [
+        ("id force_normal force_tangential", (1, 2, 0, -2, 0, 0, 0, 3, 1), [[2, -3, -1]]),
+        ("id force_normal", (1, 2, 0, -2, 0, 0), None),
+    ],
+)
+def test_parts_of_the_force_of_liggghts_add_up(tmp_path, columns, row, force):
+    rows = [(1, 4, 5, 5, 1), (2, 5.9, 5, 5, 1)]
+    text = dump_text(rows, "id x y z radius", box=((0, 10),) * 3)
+    grains = write(tmp_path / "dump_0.txt", text)
+    pairs = write(tmp_path / "pairs_0.txt", local_text([row]))
+    contacts = scanfab.read(grains, contacts=pairs, contact_columns=columns).contacts
+    assert force == (None if contacts.force is None else contacts.force.tolist())
     np.testing.assert_array_equal(contacts.force_n, [2])
-
-
-def test_a_normal_part_of_liggghts_alone_is_kept(tmp_path):
-    grains = write(tmp_path / "dump_0.txt", TWO)
-    local = LOCAL.format(columns=names(6), row="1 2 0 -2 0 0")
-    contacts = scanfab.read(
-        grains,
-        contacts=write(tmp_path / "pairs_0.txt", local),
-        contact_columns="id force_normal",
-    ).contacts
-    assert contacts.force is None
-    np.testing.assert_array_equal(contacts.force_n, [2])
-
-
-TWO = """ITEM: TIMESTEP
-0
-ITEM: NUMBER OF ATOMS
-2
-ITEM: BOX BOUNDS ff ff ff
-0 10
-0 10
-0 10
-ITEM: ATOMS id x y z radius
-1 4 5 5 1
-2 5.9 5 5 1
-"""
-LOCAL = """ITEM: TIMESTEP
-0
-ITEM: NUMBER OF ENTRIES
-1
-ITEM: BOX BOUNDS ff ff ff
-0 10
-0 10
-0 10
-ITEM: ENTRIES {columns}
-{row}
-"""
-
-
-def names(count):
-    return " ".join(f"c_p[{place}]" for place in range(1, count + 1))
 
 
 def test_a_file_with_another_number_of_forces_is_refused(tmp_path):
