@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab import ReadError, ScanfabWarning
+from scanfab import ReadError, ScanfabError, ScanfabWarning
 from scanfab.io.registry import reader_named
 from scanfab.testing import check_reader
 from tests.helpers.dumps import dump_text, write
@@ -39,18 +39,40 @@ def test_every_order_gives_the_same_grains(tmp_path, order, behind, style):
     assert ("iz" in packing.columns) == (len(behind) > 4)
 
 
+LAMMPS = "LAMMPS data file via write_data, version 2 Aug 2023, timestep = 12"
+TILTED = "0 2 zlo zhi\n0.5 0 0.25 xy xz yz"
+THREE = "4 0.5 0 avec\n0 2 0 bvec\n0 0 2 cvec\n-1 0 0 abc origin"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "vectors"),
+    [
+        ("0 2 zlo zhi", TILTED, [[4, 0, 0], [0.5, 2, 0], [0, 0.25, 2]]),
+        ("-1 3 xlo xhi\n0 2 ylo yhi\n0 2 zlo zhi", THREE, [[4, 0.5, 0], [0, 2, 0], [0, 0, 2]]),
+    ],
+)
+def test_boxes_of_lammps(tmp_path, old, new, vectors):
+    text = data_file(title=LAMMPS, style=" # sphere", behind=" 0 0 0").replace(old, new)
+    packing = scanfab.read(write(tmp_path / "a.data", text))
+    assert packing.step == 12
+    np.testing.assert_array_equal(packing.position, CENTRES)
+    np.testing.assert_array_equal(packing.cell.vectors, vectors)
+    np.testing.assert_array_equal(packing.cell.origin, [-1, 0, 0])
+
+
 def test_the_program_is_told_by_the_first_line(tmp_path):
     for title, name in ((TITLE, "liggghts"), ("LAMMPS data file", "lammps"), ("mine", "lammps")):
-        series = scanfab.read_series(write(tmp_path / f"{len(title)}.data", data_file(title=title)))
-        assert series.grains.reader.name == name
+        path = write(tmp_path / f"{len(title)}.data", data_file(title=title))
+        assert scanfab.read_series(path).grains.reader.name == name
+        with pytest.raises(ReadError, match="expected contacts, found grains"):
+            scanfab.read(path, contacts=path)
 
 
 def test_both_orders_may_fit(tmp_path):
     path = write(tmp_path / "a.data", data_file(density=1))
     with pytest.raises(ReadError, match="which may be both: name them by their numbers"):
         scanfab.read(path)
-    columns = {"id": 1, "diameter": 3, "x": 5, "y": 6, "z": 7}
-    packing = scanfab.read(path, columns={what: str(one) for what, one in columns.items()})
+    packing = scanfab.read(path, columns={"id": "1", "diameter": "3", "x": "5", "y": "6", "z": "7"})
     np.testing.assert_array_equal(packing.position, CENTRES)
     np.testing.assert_array_equal(packing.radius, [0.5, 0.5, 0.25])
 
@@ -62,15 +84,24 @@ def test_both_orders_may_fit(tmp_path):
         (" 1.0 2500", " 1.0 -1", "which are neither"),
         ("1 atom types", "1 atom types\n3 ellipsoids", "expected spheres, found '3 ellipsoids'"),
         ("Atoms\n", "Atoms # atomic\n", "found 'Atoms # atomic'"),
+        ("Atoms\n", "Masses\n", "expected a section Atoms, found none"),
         ("3 atoms", "4 atoms", "the header counts 4 atoms, found 3"),
+        ("3 atoms", "999999999999 atoms", "counts 999999999999 atoms, found 3"),
+        ("3 atoms\n1 atom types", "", "expected a line 'N atoms'"),
         ("\nVelocities", "4\n\nVelocities", "counts 3 atoms, found 4"),
-        (TITLE, "LIGGGHTS Description", "YADE writes radii in the column of diameters"),
+        ("xlo xhi", "xlo", "expected the box in the header"),
+        ("-1 3 xlo", "-1 xlo", "expected the box in the header"),
+        ("-1 3 xlo", "9" * 4000 + " xlo", "expected the box in the header"),
+        ("2 1 1.0", "2 1 word", "line 12: expected a number .* found 'word'"),
+        ("2 1 1.0 2500", "2 1 1.0", "line 12: expected 7 columns, found 6"),
+        ("Atoms\n\n1 1 1.0", "Atoms # sphere\n\n1 1 nan", "position and radius must be finite"),
+        (LAMMPS, "LIGGGHTS Description", "YADE writes radii in the column of diameters"),
     ],
 )
 def test_what_is_no_such_file(tmp_path, old, new, message):
-    text = data_file()
+    text = data_file(title=LAMMPS)
     assert old in text
-    with pytest.raises(ReadError, match=message):
+    with pytest.raises(ScanfabError, match=message):
         scanfab.read(write(tmp_path / "a.data", text.replace(old, new)))
 
 

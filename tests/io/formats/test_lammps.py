@@ -10,7 +10,7 @@ import pytest
 import scanfab
 from scanfab.base.errors import ReadError
 from scanfab.io.registry import reader_for
-from tests.helpers.dumps import PAIRS, ROWS, dump_text, local_text, write
+from tests.helpers.dumps import PAIRS, dump_text, local_text, write
 from tests.helpers.truth import FLOOR, SHEAR, id_pairs, lammps_fabric
 
 FORMS = SHEAR / "forms"
@@ -181,71 +181,6 @@ def test_contacts_that_cannot_be_told_are_asked_for(tmp_path, rows, columns, tol
         joined(tmp_path, rows, columns)
 
 
-DATA = """LAMMPS data file via write_data, version 2 Aug 2023, timestep = 12
-
-3 atoms
-2 atom types
-
-0 1 xlo xhi
-0 2 ylo yhi
--1 3 zlo zhi
-0.5 0 0.25 xy xz yz
-
-Atoms # sphere
-
-""" + "".join(f"{i} {t} {2 * r} 2500 {x} {y} {z} 0 0 0\n" for i, t, x, y, z, r in ROWS)
-VELOCITIES = "\nVelocities\n\n1 9 9 9 9 9 9\n2 9 9 9 9 9 9\n3 9 9 9 9 9 9\n"
-
-
-@pytest.mark.parametrize("end", ["", VELOCITIES])
-def test_a_data_file_is_its_atoms(tmp_path, end):
-    packing = scanfab.read(write(tmp_path / "a.data", DATA + end))
-    assert packing.step == 12
-    np.testing.assert_array_equal(packing.position, np.array(ROWS)[:, 2:5])
-    np.testing.assert_array_equal(packing.radius, np.array(ROWS)[:, 5])
-    np.testing.assert_array_equal(packing.id, [1, 2, 3])
-    np.testing.assert_array_equal(packing.columns["type"], [1, 1, 2])
-    np.testing.assert_array_equal(packing.cell.vectors, [[1, 0, 0], [0.5, 2, 0], [0, 0.25, 4]])
-    np.testing.assert_array_equal(packing.cell.origin, [0, 0, -1])
-
-
-def test_a_data_file_with_three_vectors(tmp_path):
-    box = DATA[DATA.index("0 1 xlo") : DATA.index("Atoms")]
-    vectors = "1 0.5 0 avec\n0 2 0 bvec\n0 0 4 cvec\n0 0 -1 abc origin\n\n"
-    packing = scanfab.read(write(tmp_path / "a.data", DATA.replace(box, vectors)))
-    np.testing.assert_array_equal(packing.cell.vectors, [[1, 0.5, 0], [0, 2, 0], [0, 0, 4]])
-    np.testing.assert_array_equal(packing.cell.origin, [0, 0, -1])
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ("Atoms # sphere", "Atoms # full", "expected 'Atoms # sphere'.*found 'Atoms # full'"),
-        ("Atoms # sphere", "Masses", "expected a section Atoms, found none"),
-        ("3 atoms\n", "4 atoms\n", "counts 4 atoms, found 3"),
-        ("3 atoms\n", "999999999999 atoms\n", "counts 999999999999 atoms, found 3"),
-        ("3 atoms\n", "", "expected a line 'N atoms'"),
-        ("xlo xhi", "xlo", "expected the box in the header"),
-        ("0 1 xlo", "0 xlo", "expected the box in the header"),
-        ("2 1 0.2", "2 1 word", "line 14: expected a number .* found 'word'"),
-        ("2 1 0.2 2500", "2 1 0.2", "line 14: expected 10 columns, found 9"),
-        ("2 1 0.2", "2 1 nan", "grain 2: position and radius must be finite"),
-    ],
-)
-def test_what_is_wrong_with_a_data_file(tmp_path, old, new, message):
-    assert old in DATA
-    path = write(tmp_path / "a.data", DATA.replace(old, new))
-    with pytest.raises(scanfab.ScanfabError, match=message):
-        scanfab.read(path)
-
-
-def test_a_data_file_holds_no_contacts_and_no_boundary_flags(tmp_path):
-    path = write(tmp_path / "a.data", DATA)
-    assert scanfab.read(path).cell.periodic == (False, False, False)
-    with pytest.raises(ReadError, match="expected contacts, found grains"):
-        scanfab.read(LAST, contacts=path)
-
-
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
@@ -269,10 +204,3 @@ def test_a_truncated_dump_is_an_error(tmp_path, part):
     text = unpacked(LAST)
     with pytest.raises(scanfab.ScanfabError):
         scanfab.read(write(tmp_path / "a", text[: int(part * len(text))]), format="lammps")
-
-
-def test_a_header_of_many_digits_is_read_at_once(tmp_path):
-    """Its lines once took longer by a factor of two for each digit."""
-    head = "LAMMPS data file via write_data\n\n1 atoms\n"
-    with pytest.raises(ReadError):
-        scanfab.read(write(tmp_path / "a.data", f"{head}0 {'9' * 4000}\n\nAtoms # sphere\n\n"))
