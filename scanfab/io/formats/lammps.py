@@ -29,6 +29,7 @@ from scanfab.io.formats.lammps_netcdf import (
 )
 from scanfab.io.formats.lammps_yaml import index_yaml, is_yaml, read_yaml_grains, yaml_kind
 from scanfab.io.formats.text_dump import Dump, is_dump, read_dump
+from scanfab.io.formats.vtk import VtkReader
 from scanfab.io.reader import (
     Carries,
     FileKind,
@@ -59,14 +60,14 @@ class Form(NamedTuple):
     """Whether a file has this form, by its first bytes."""
     kind: Callable[[Path], FileKind]
     snapshots: Callable[[Path], list[Snapshot]]
-    read: Callable[[Snapshot, ReadOptions], GrainTable]
-    carries: Carries = "cell"
+    read_grains: Callable[[Snapshot, ReadOptions], GrainTable]
+    carries: Callable[[Path], Carries] = lambda _: "cell"
 
 
 TEXT = Form(is_dump, text_dump.dump_kind, text_dump.index_dump, text_dump.read_dump_grains)
 FORMS = (
     TEXT,
-    Form(is_data_file, lambda _: "grains", index_data, read_data_grains, "box"),
+    Form(is_data_file, lambda _: "grains", index_data, read_data_grains, lambda _: "box"),
     Form(is_yaml, lambda path: yaml_kind(first_bytes(path, 1 << 16)), index_yaml, read_yaml_grains),
     Form(is_netcdf, netcdf_kind, index_netcdf, read_netcdf_grains),
     Form(names_of_binary, binary_kind, index_binary, read_binary_grains),
@@ -89,7 +90,30 @@ def form_of(path: Path) -> Form | None:
     return next((form for form in FORMS if form.fits(head)), None)
 
 
-class LammpsReader:
+class DumpReader:
+    """What the readers of LAMMPS' and LIGGGHTS' dumps have in common."""
+
+    other: Form | VtkReader = TEXT
+    """Reads files of all other forms."""
+
+    def kind(self, path: Path) -> FileKind:
+        """By the names of the columns; whatever a text dump counts but ATOMS are contacts."""
+        return (form_of(path) or self.other).kind(path)
+
+    def snapshots(self, path: Path) -> list[Snapshot]:
+        """By ``ITEM: TIMESTEP``; a data file is one."""
+        return (form_of(path) or self.other).snapshots(path)
+
+    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+        """Columns by their names; of a data file by the atom style."""
+        return (form_of(snapshot.path) or self.other).read_grains(snapshot, options)
+
+    def carries(self, path: Path) -> Carries:
+        """A data file has a box without boundary flags, a VTK file at most the box beside it."""
+        return (form_of(path) or self.other).carries(path)
+
+
+class LammpsReader(DumpReader):
     """Reader plugin for what LAMMPS dumps."""
 
     name = "lammps"
@@ -105,23 +129,6 @@ class LammpsReader:
             return not of_liggghts(head)
         # LIGGGHTS' binary dumps have numbered columns
         return is_yaml(head) or is_netcdf(head) or (names_of_binary(head) or ["1"])[0] != "1"
-
-    def kind(self, path: Path) -> FileKind:
-        """By the names of the columns; whatever a text dump counts but ATOMS are contacts."""
-        form = form_of(path)
-        return "other" if form is None else form.kind(path)
-
-    def snapshots(self, path: Path) -> list[Snapshot]:
-        """By ``ITEM: TIMESTEP``; a data file is one."""
-        return (form_of(path) or TEXT).snapshots(path)
-
-    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
-        """Columns by their names; of a data file by the atom style."""
-        return (form_of(snapshot.path) or TEXT).read(snapshot, options)
-
-    def carries(self, path: Path) -> Carries:
-        """A data file has a box without boundary flags."""
-        return (form_of(path) or TEXT).carries
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable

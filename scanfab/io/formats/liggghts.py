@@ -18,6 +18,7 @@ from scanfab.io.formats.binary_dump import names_of_binary
 from scanfab.io.formats.ids import MOST_ROWS, are_ids, are_whole, named_places
 from scanfab.io.formats.join import count_walls, join_ids, rows_of_ids
 from scanfab.io.formats.lammps import (
+    DumpReader,
     form_of,
     id_column,
     is_restart,
@@ -30,8 +31,6 @@ from scanfab.io.formats.text_dump import is_dump
 from scanfab.io.formats.vtk import VtkReader, vectors
 from scanfab.io.mesh import Mesh
 from scanfab.io.reader import (
-    Carries,
-    FileKind,
     GrainTable,
     JoinedContacts,
     ReadOptions,
@@ -40,23 +39,9 @@ from scanfab.io.reader import (
 from scanfab.packing.walls import ListedWallForces
 
 # values of compute pair/gran/local in the order in which they are written, and how many
-PAIR_VALUES = {
-    "pos": 6,
-    "vel": 6,
-    "id": 3,
-    "force": 3,
-    "force_normal": 3,
-    "force_tangential": 3,
-    "torque": 3,
-    "torque_normal": 3,
-    "torque_tangential": 3,
-    "history": 3,
-    "contactArea": 1,
-    "delta": 1,
-    "contactPoint": 3,
-    "ms_id": 2,
-    "heatFlux": 1,
-}
+PAIR_VALUES = {"pos": 6, "vel": 6, "id": 3, "force": 3, "force_normal": 3, "force_tangential": 3}
+PAIR_VALUES |= {"torque": 3, "torque_normal": 3, "torque_tangential": 3, "history": 3}
+PAIR_VALUES |= {"contactArea": 1, "delta": 1, "contactPoint": 3, "ms_id": 2, "heatFlux": 1}
 # damping makes the force of a few contacts attractive; the others push
 PUSHES = 0.9
 
@@ -82,7 +67,7 @@ class LiggghtsVtkReader(VtkReader):
         return None if force is None else -force
 
 
-class LiggghtsReader:
+class LiggghtsReader(DumpReader):
     """Reader plugin for what LIGGGHTS dumps."""
 
     name = "liggghts"
@@ -91,8 +76,7 @@ class LiggghtsReader:
     )
     extensions = (".liggghts", ".dump", ".vtk", ".vtp", ".vtu", ".bin", ".data")
 
-    def __init__(self) -> None:
-        self._vtk = LiggghtsVtkReader()
+    other = LiggghtsVtkReader()
 
     def recognises(self, path: Path) -> bool:
         """An ``ITEM:`` dump, or a data file, restart or legacy VTK file that names LIGGGHTS."""
@@ -100,32 +84,13 @@ class LiggghtsReader:
         if is_data_file(head) or is_restart(head):
             return of_liggghts(head)
         if head.startswith(b"# vtk DataFile"):
-            return b"LIGGGHTS" in head.split(b"\n", 2)[1]
+            return b"LIGGGHTS" in head.partition(b"\n")[2].partition(b"\n")[0]
         # LAMMPS' binary dumps name their columns, these are numbered
         return is_dump(head) or (names_of_binary(head) or [""])[0] == "1"
 
-    def kind(self, path: Path) -> FileKind:
-        """Grains are ATOMS; whatever else a text dump counts are contacts."""
-        return (form_of(path) or self._vtk).kind(path)
-
-    def snapshots(self, path: Path) -> list[Snapshot]:
-        """By ``ITEM: TIMESTEP``; a VTK or data file is one."""
-        return (form_of(path) or self._vtk).snapshots(path)
-
-    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
-        """Columns in any order and any subset that suffices; of repeated names the first counts."""
-        form = form_of(snapshot.path)
-        read = self._vtk.read_grains if form is None else form.read
-        return read(snapshot, options)
-
-    def carries(self, path: Path) -> Carries:
-        """A dump says which directions are periodic, a VTK or data file does not."""
-        form = form_of(path)
-        return self._vtk.carries(path) if form is None else form.carries
-
     def beside(self, path: Path) -> list[Path]:
         """A VTK file has its box beside it."""
-        return self._vtk.beside(path)
+        return self.other.beside(path)
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
@@ -138,7 +103,7 @@ class LiggghtsReader:
         """
         path, told = snapshot.path, options.contact_columns
         if form_of(path) is None:
-            return self._vtk.read_contacts(snapshot, options, grains)
+            return self.other.read_contacts(snapshot, options, grains)
         dump = read_contact_rows(snapshot, grains)
         if dump.rows == 0:
             return join_listed(path, dump, {}, grains)

@@ -43,16 +43,14 @@ def refuse_superquadrics(
     ReadError
         If one is not.
     """
-    names = {name.lower(): name for name in columns}
     expected = dict.fromkeys(HALF_AXES, radius) | dict.fromkeys(EXPONENTS, ROUND)
-    for known, value in expected.items():
-        if known not in names:
-            continue
-        off = np.abs(columns[names[known]] - value) > ROUNDING * np.abs(value)
-        if off.any():
+    for name in [name for name in columns if name.lower() in expected]:
+        value = expected[name.lower()]
+        count = np.count_nonzero(np.abs(columns[name] - value) > ROUNDING * np.abs(value))
+        if count:
             raise ReadError(
-                f"{path}{where}: {np.count_nonzero(off)} of {len(radius)} particles are "
-                f"superquadrics (by the column {names[known]}), whose radius is that of the sphere "
-                f"around them: scanfab measures spheres, and clumps of spheres; fill them with "
-                f"spheres, and say with `bodies` which of these are one particle"
+                f"{path}{where}: {count} of {len(radius)} particles are superquadrics (by the "
+                f"column {name}), whose radius is that of the sphere around them: scanfab measures "
+                f"spheres, and clumps of spheres; fill them with spheres, and say with `bodies` "
+                f"which of these are one particle"
             )

@@ -67,9 +67,10 @@ def is_dump(head: bytes) -> bool:
 def dump_kind(path: Path) -> FileKind:
     """Whatever a dump counts are contacts, unless they are atoms: grains, if they have a radius."""
     sections, names, _ = _header(first_bytes(path, HEADER_BYTES))
-    if "NUMBER OF ATOMS" in sections or not any(key.startswith("NUMBER OF") for key in sections):
-        return "grains" if has_radius(names) else "points"
-    return "contacts"
+    words = [key for key in sections if key.startswith("NUMBER OF ")]
+    if words and words != ["NUMBER OF ATOMS"]:
+        return "contacts"
+    return "grains" if has_radius(names) else "points" if sections else "other"
 
 
 def index_dump(path: Path) -> list[Snapshot]:
