@@ -15,7 +15,7 @@ from scanfab.cli.talk import talk_options, tell_inputs, working
 
 def _complete(ctx: click.Context, parameter: click.Parameter, text: str) -> list[CompletionItem]:
     """The names of the formats."""
-    from scanfab.io.writers.registry import installed_writers
+    from scanfab.io.writer import installed_writers
 
     return [CompletionItem(name) for name in installed_writers() if name.startswith(text)]
 

@@ -12,7 +12,7 @@ def formats() -> None:
     """List every reader and writer, its extensions, and the package it comes from."""
     from scanfab.cli.console import reported_warnings
     from scanfab.io.registry import installed_readers
-    from scanfab.io.writers.registry import installed_writers
+    from scanfab.io.writer import installed_writers
     from scanfab.table.formats.registry import known_formats
     from scanfab.viz.figures.style import PLOT_FORMATS
 

@@ -1,14 +1,13 @@
 """
-What lies beside a file of grains that cannot hold it: contacts, cell, step and time, columns.
+The companion files of a file of grains, which hold what its format has no place for.
 
-``STEM.contacts.csv``, ``STEM.frame.csv`` and ``STEM.columns.csv``, which belong to the file STEM
-with any ending. They are written by :mod:`scanfab.io.convert`, and found by whoever reads the file.
+``STEM.contacts.csv``, ``STEM.frame.csv`` and ``STEM.columns.csv`` belong to the file STEM with any
+ending. :mod:`scanfab.io.convert` writes them, and whoever reads the file finds them there.
 """
 
 from __future__ import annotations
 
-import csv
-import io
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,40 +20,42 @@ from scanfab.io.files import bare_name, check_memory, first_bytes, plain
 from scanfab.io.formats.columns import whole_numbers
 from scanfab.io.formats.join import join_ids
 from scanfab.io.reader import BODIES, WALLS, GrainTable, JoinedContacts, Snapshot
+from scanfab.io.written import contact_arrays, csv_bytes, frame_arrays, more_columns
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 
 IDS = ("id1", "id2")
-IMAGE = ("ix", "iy", "iz")
-FORCE = ("fx2", "fy2", "fz2")
-"""Force on the second grain."""
-FORCE_N = ("fn",)
-"""Normal force, compression positive."""
-CONTACTS = tuple(",".join((*IDS, *IMAGE, *force)) for force in ((), FORCE, FORCE_N))
+# the columns of images, of the force on the second grain and of the normal force (compression
+# positive), by the names of contact_arrays
+PARTS = {"image": ("ix", "iy", "iz"), "force": ("fx2", "fy2", "fz2"), "force_n": ("fn",)}
+CONTACTS = tuple(
+    ",".join((*IDS, *PARTS["image"], *force)) for force in ((), PARTS["force"], PARTS["force_n"])
+)
 VECTORS = tuple(f"{vector}{axis}" for vector in "abco" for axis in "xyz")
-FRAME = ",".join(("step", "time", *VECTORS, "periodic"))
-# how many there are, which earlier versions did not write
-COUNTED = f"{FRAME},grains,contacts"
-# letters by which it is known, also where the rest is missing
-FRAME_WORDS = len("step,time,ax,")
-# the first column of columns, which no other file has
+FRAME = ("step", "time", *VECTORS, "periodic")
+# files of earlier versions do not count
+COUNTED = (*FRAME, "grains", "contacts")
+# letters by which a frame file is known, even if the rest of its first line is missing
+FRAME_WORDS = "step,time,ax,"
+# the first column of a columns file, which no other file has
 OF_ID = "scanfab_id"
-# bytes in memory for each of a file
+# bytes of memory for each byte of a file
 OF_TEXT = 12.0
 
 
 class FrameData(NamedTuple):
-    """Cell, step and time of a frame, and how much there is of it."""
+    """Cell, step and time of a frame, and its numbers of grains and contacts."""
 
     step: int | None
     time: float | None
     cell: Cell | None
     grains: int | None
+    """None: the file does not say."""
     contacts: int | None
-    """None: it does not say; no contacts need lie beside."""
+    """None: there need not be a contacts file."""
 
     def moment_of(self, snapshot: Snapshot) -> Snapshot:
-        """The snapshot at this step and time; without a step the number in its name is none."""
+        """The snapshot at this step and time; if there is no step, its name says none either."""
         return replace(snapshot, step=self.step, time=self.time, stepless=self.step is None)
 
 
@@ -63,79 +64,101 @@ def _named(path: Path, what: str) -> Path:
 
 
 def contacts_file(path: Path) -> Path:
-    """Where the contacts of a file of grains lie."""
+    """The contacts file of a file of grains, which need not exist."""
     return _named(path, "contacts")
 
 
 def frame_file(path: Path) -> Path:
-    """Where the cell, step and time of a file of grains lie."""
+    """The file with the cell, step and time of a file of grains."""
     return _named(path, "frame")
 
 
 def columns_file(path: Path) -> Path:
-    """Where more columns of a file of grains lie."""
+    """The file with more columns of a file of grains."""
     return _named(path, "columns")
 
 
+def companion_kind(path: Path) -> str | None:
+    """``contacts``, ``frame`` or ``columns`` by the first line of a file; None for other files."""
+    line = first_bytes(path).partition(b"\n")[0].decode("utf-8", "replace").rstrip("\r")
+    if line in CONTACTS:
+        return "contacts"
+    if line.startswith(FRAME_WORDS):
+        return "frame"
+    return "columns" if line.startswith(f"{OF_ID},") else None
+
+
 def is_contacts_file(path: Path) -> bool:
-    """Whether a file is one of those that :func:`contacts_csv` makes."""
-    return _first_line(path).startswith(CONTACTS[0])
+    """Whether a file is a contacts file of scanfab's."""
+    return companion_kind(path) == "contacts"
 
 
-def is_frame_file(path: Path) -> bool:
-    """Whether a file is one of those that :func:`frame_csv` makes."""
-    return _first_line(path).startswith(FRAME[:FRAME_WORDS])
-
-
-def is_columns_file(path: Path) -> bool:
-    """Whether a file is one of those that :func:`columns_csv` makes."""
-    return _first_line(path).startswith(f"{OF_ID},")
-
-
-def _first_line(path: Path) -> str:
-    return first_bytes(path).partition(b"\n")[0].decode("utf-8", "replace").rstrip("\r")
+def companions_there(path: Path) -> list[Path]:
+    """The companion files of a file of grains that exist; files of others are not among them."""
+    kinds = {"contacts": contacts_file, "frame": frame_file, "columns": columns_file}
+    files = {kind: file(path) for kind, file in kinds.items()}
+    return [file for kind, file in files.items() if file.is_file() and companion_kind(file) == kind]
 
 
 def contacts_csv(packing: Packing) -> bytes:
     """The contacts of a packing, by ids, in their order."""
-    contacts = packing.contacts
-    assert contacts is not None
-    ids = packing.id[contacts.pairs]
-    force = [] if contacts.force is None else list(contacts.force.T)
-    named = [*IDS, *IMAGE, *(FORCE if force else ())]
-    if not force and contacts.force_n is not None:
-        force, named = [contacts.force_n], [*named, *FORCE_N]
-    return _csv(dict(zip(named, [*ids.T, *contacts.image.T, *force], strict=True)))
+    assert packing.contacts is not None
+    columns = dict(zip(IDS, packing.id[packing.contacts.pairs].T, strict=True))
+    for name, values in contact_arrays(packing).items():
+        columns |= zip(PARTS[name], values.reshape(len(values), len(PARTS[name])).T, strict=True)
+    return csv_bytes(columns)
 
 
-def frame_csv(packing: Packing, *, with_contacts: bool = True) -> bytes:
-    """Cell, step and time of a packing, its number of grains, and of the contacts beside."""
+def frame_csv(packing: Packing) -> bytes:
+    """Cell, step and time of a packing, and its numbers of grains and contacts, in one row."""
+    words: dict[str, Any] = {"grains": len(packing)}
+    if packing.contacts is not None:
+        words["contacts"] = len(packing.contacts)
+    words |= {name: repr(one) for name, one in frame_arrays(packing).items() if name in FRAME}
     cell = packing.cell
-    numbers = [""] * len(VECTORS)
-    along = ""
     if cell is not None:
-        numbers = [repr(float(one)) for one in (*cell.vectors.ravel(), *cell.origin)]
-        along = "".join(x for x, repeats in zip("xyz", cell.periodic, strict=True) if repeats)
-    step = "" if packing.step is None else str(packing.step)
-    time = "" if packing.time is None else repr(packing.time)
-    contacts = packing.contacts if with_contacts else None
-    counts = str(len(packing)), "" if contacts is None else str(len(contacts))
-    return f"{COUNTED}\n{','.join((step, time, *numbers, along, *counts))}\n".encode()
+        numbers = [*cell.vectors.ravel().tolist(), *cell.origin.tolist()]
+        words |= zip(VECTORS, map(repr, numbers), strict=True)
+        words["periodic"] = "".join(np.array(list("xyz"))[list(cell.periodic)])
+    row = ",".join(str(words.get(name, "")) for name in COUNTED)
+    return f"{','.join(COUNTED)}\n{row}\n".encode()
 
 
-def columns_csv(packing: Packing, columns: dict[str, npt.NDArray[Any]]) -> bytes:
+def columns_csv(packing: Packing, names: Iterable[str]) -> bytes:
     """Some columns of the grains, by id, in their order."""
-    return _csv({OF_ID: packing.id, **columns})
+    columns = more_columns(packing)
+    return csv_bytes({OF_ID: packing.id, **{name: columns[name] for name in names}})
 
 
-def _csv(columns: dict[str, npt.NDArray[Any]]) -> bytes:
+def _read(path: Path) -> Any:
+    """A companion file as polars' frame of words; empty cells are null, empty texts are not."""
     import polars
 
-    stream = io.BytesIO()
-    polars.DataFrame({name: np.ascontiguousarray(v) for name, v in columns.items()}).write_csv(
-        stream
-    )
-    return stream.getvalue()
+    check_memory(path, OF_TEXT * plain(path).stat().st_size)
+    data = plain(path).read_bytes()
+    if not data.endswith(b"\n"):
+        raise ReadError(f"{path}: the last line has no end: the file is incomplete")
+    try:
+        # polars leaves doubled quotes in names as they are, but not in rows
+        table = polars.read_csv(data, has_header=False, infer_schema=False)
+        rows = table.slice(1)
+        rows.columns = [str(name) for name in table.row(0)]
+        return rows
+    except polars.exceptions.PolarsError as error:
+        raise ReadError(f"{path}: cannot be read: {str(error).partition(chr(10))[0]}") from None
+
+
+def _values(path: Path, words: Any) -> npt.NDArray[Any]:
+    """A column as whole numbers, numbers or texts, whichever all of its words are."""
+    import polars
+
+    if words.null_count():
+        raise ReadError(f"{path}: column {words.name}: a line is incomplete")
+    for kind in (polars.Int64, polars.Float64):
+        values = words.cast(kind, strict=False)
+        if not values.null_count():
+            return np.array(values.to_numpy())
+    return np.array(words.to_list(), dtype=str)
 
 
 def read_contacts(path: Path, grains: GrainTable) -> JoinedContacts:
@@ -145,43 +168,32 @@ def read_contacts(path: Path, grains: GrainTable) -> JoinedContacts:
     Raises
     ------
     ReadError
-        If a line is not as it should be, or names a grain that does not exist; or if there are
-        fewer or more than the file of the frame beside it says.
+        If a line is damaged or names a grain that does not exist; or if the frame file beside it
+        says another number of contacts.
     """
-    if _first_line(path) not in CONTACTS:
+    if not is_contacts_file(path):
         raise ReadError(f"{path}: expected one of the lines {'; '.join(CONTACTS)}")
-    names = _first_line(path).split(",")
-    whole = [*IDS, *IMAGE]
-    kinds = np.dtype([(name, np.int64 if name in whole else np.float64) for name in names])
-    check_memory(path, OF_TEXT * plain(path).stat().st_size)
-    with open(plain(path), "rb") as stream:
-        _, end, rows = stream.read().partition(b"\n")
-    table = np.zeros(0, kinds)
-    if rows.strip() or not end:
-        if not rows.endswith(b"\n"):
-            raise ReadError(f"{path}: the last line has no end: the file is incomplete")
-        try:
-            table = np.loadtxt(io.BytesIO(rows), kinds, delimiter=",", ndmin=1, comments=None)
-        except (ValueError, OverflowError) as error:
-            raise ReadError(f"{path}: expected numbers as {', '.join(names)}: {error}") from None
-    told = read_frame(_grains_of(path))
+    words = _read(path)
+    table = {name: _values(path, words[name]) for name in words.columns}
+    if any(values.dtype.kind == "U" for values in table.values()):
+        raise ReadError(f"{path}: expected numbers as {', '.join(table)}, found other words")
+    # any file of grains of this name has the same frame file
+    grain_file = path.with_name(f"{bare_name(path).removesuffix('.contacts.csv')}.csv")
+    told = read_frame(grain_file)
     if told is not None:
-        _check_count(path, len(table), "contacts", told.contacts, frame_file(_grains_of(path)))
-    ids = np.column_stack([table[name] for name in IDS])
-    image = np.column_stack([table[name] for name in IMAGE])
-    force = force_n = None
-    if FORCE[0] in names:
-        force = np.column_stack([table[name] for name in FORCE])
-    elif FORCE_N[0] in names:
-        force_n = np.ascontiguousarray(table[FORCE_N[0]])
+        _check_count(path, len(words), "contacts", told.contacts, frame_file(grain_file))
     if grains.id is None:
         grains = grains._replace(id=np.arange(len(grains.radius)))
+    ids, image = (
+        np.column_stack([whole_numbers(path, table[name]) for name in names])
+        for names in (IDS, PARTS["image"])
+    )
+    force = force_n = None
+    if "fx2" in table:
+        force = np.column_stack([table[name] for name in PARTS["force"]]).astype(np.float64)
+    elif "fn" in table:
+        force_n = table["fn"].astype(np.float64)
     return join_ids(path, grains, ids, force, walls=False, image=image, force_n=force_n)
-
-
-def _grains_of(contacts: Path) -> Path:
-    """A file of grains that these contacts lie beside."""
-    return contacts.with_name(f"{bare_name(contacts).removesuffix('.contacts.csv')}.csv")
 
 
 def _check_count(path: Path, found: int, what: str, expected: int | None, frame: Path) -> None:
@@ -189,34 +201,32 @@ def _check_count(path: Path, found: int, what: str, expected: int | None, frame:
     if expected not in (None, found):
         raise ReadError(
             f"{path}: holds {found} {what}, expected {expected} by {frame.name} beside it: it was "
-            f"cut, or belongs to another frame (rows that you took out yourself: empty that number)"
+            f"cut, or belongs to another frame (if you took rows out yourself, empty that number)"
         )
 
 
 def check_contacts_are_there(path: Path, told: FrameData | None) -> None:
     """
-    Whether grains that are read without contacts have none beside them that are lost.
+    Check grains that are read without contacts: none may have been lost.
 
     Parameters
     ----------
     path : Path
         The file of grains.
     told : FrameData, optional
-        What lies beside it.
+        Its frame file.
 
     Raises
     ------
     ReadError
-        If the file of its contacts is empty, or is not there although there were some.
+        If the contacts file is empty, or if it is missing although the frame file counts contacts.
     """
     file = contacts_file(path)
-    is_there = file.is_file()
+    is_empty = file.is_file() and file.stat().st_size == 0
     expected = None if told is None else told.contacts
-    if expected is None and not (is_there and file.stat().st_size == 0):
+    if expected is None and not is_empty:
         return
-    found = "something else" if is_there else "no such file"
-    if is_there and file.stat().st_size == 0:
-        found = "an empty file"
+    found = "an empty file" if is_empty else "something else" if file.is_file() else "no such file"
     raise ReadError(
         f"{file}: expected the {'' if expected is None else f'{expected} '}contacts of "
         f'{path.name}, found {found}: copy it again, or choose `contacts="geometric"`'
@@ -225,95 +235,64 @@ def check_contacts_are_there(path: Path, told: FrameData | None) -> None:
 
 def read_frame(path: Path) -> FrameData | None:
     """
-    What lies beside a file of grains; None if nothing does.
+    The frame file of a file of grains; None if there is none.
 
     Raises
     ------
     ReadError
-        If the file that lies there is damaged.
+        If it is damaged.
     """
     file = frame_file(path)
-    if not file.is_file() or not is_frame_file(file):
+    if not file.is_file() or companion_kind(file) != "frame":
         return None
-    text = first_bytes(file, 1 << 14).decode("utf-8", "replace")
-    rows = list(csv.reader(text.splitlines()))
+    table = _read(file)
+    if tuple(table.columns) not in (FRAME, COUNTED) or len(table) != 1:
+        raise ReadError(f"{file}: expected the line {','.join(COUNTED)} and one row")
+    words = {name: word for name, word in table.row(0, named=True).items() if word is not None}
     try:
-        if ",".join(rows[0]) not in (FRAME, COUNTED):
-            raise ValueError(f"expected the line {COUNTED}")
-        if len(rows) != 2 or len(rows[1]) != len(rows[0]) or not text.endswith("\n"):
-            raise ValueError("expected one row")
-        words = dict(zip(rows[0], rows[1], strict=True))
+        cell, along = None, words.get("periodic", "")
+        if any(name in words for name in VECTORS):
+            numbers = np.array([float(words[name]) for name in VECTORS]).reshape(4, 3)
+            if not set(along) <= set("xyz"):
+                raise ValueError(f"periodic: expected letters out of xyz, found {along!r}")
+            cell = Cell(numbers[:3], ("x" in along, "y" in along, "z" in along), numbers[3])
         step, grains, contacts = (
-            int(words[name]) if words.get(name) else None for name in ("step", "grains", "contacts")
+            int(words[name]) if name in words else None for name in ("step", "grains", "contacts")
         )
-        time = float(words["time"]) if words["time"] else None
-        return FrameData(step, time, _cell(words), grains, contacts)
-    except (ValueError, PackingError) as error:
+        time = float(words["time"]) if "time" in words else None
+    except (KeyError, ValueError, PackingError) as error:
         raise ReadError(f"{file}: cannot be read as cell, step and time: {error}") from None
-
-
-def _cell(words: dict[str, str]) -> Cell | None:
-    if not any(words[name] for name in VECTORS):
-        return None
-    numbers = np.array([float(words[name]) for name in VECTORS]).reshape(4, 3)
-    along = words["periodic"]
-    if not set(along) <= set("xyz"):
-        raise ValueError(f"periodic: expected letters out of xyz, found {along!r}")
-    return Cell(numbers[:3], ("x" in along, "y" in along, "z" in along), numbers[3])
+    return FrameData(step, time, cell, grains, contacts)
 
 
 def with_columns(path: Path, grains: GrainTable, told: FrameData | None) -> GrainTable:
     """
-    Grains with the columns that lie beside their file.
+    Grains with the columns of their columns file.
 
     Raises
     ------
     ReadError
-        If these are of other grains, or damaged; or if there are fewer or more grains than lies
-        beside.
+        If it is damaged or belongs to other grains; or if the frame file says another number of
+        grains.
     """
     if told is not None:
         _check_count(path, len(grains.radius), "grains", told.grains, frame_file(path))
     file = columns_file(path)
-    if not file.is_file() or not is_columns_file(file):
+    if not file.is_file() or companion_kind(file) != "columns":
         return grains
-    check_memory(file, OF_TEXT * file.stat().st_size)
-    data = file.read_bytes()
-    try:
-        rows = list(csv.reader(io.StringIO(data.decode("utf-8"))))
-        names, *body = rows
-        if not data.endswith(b"\n") or any(len(row) != len(names) for row in body):
-            raise ValueError("a line is incomplete")
-        listed = list(zip(*body, strict=True)) if body else [()] * len(names)
-        ids = np.array(list(map(int, listed[0])), dtype=np.int64)
-    except (ValueError, OverflowError, UnicodeDecodeError, csv.Error) as error:
-        raise ReadError(f"{file}: cannot be read as columns of grains: {error}") from None
+    words = _read(file)
+    own = {name: _values(file, words[name]) for name in words.columns}
     id = np.arange(len(grains.radius)) if grains.id is None else grains.id
-    if not np.array_equal(ids, id):
+    if not np.array_equal(own.pop(OF_ID), id):
         raise ReadError(
             f"{file}: holds columns of other grains than {path.name}: they belong to another step, "
             f"or the file was left behind"
         )
-    own = {name: _values(words) for name, words in zip(names[1:], listed[1:], strict=True)}
     bodies, walls = (
         whole_numbers(file, own.pop(name)) if name in own else None for name in (BODIES, WALLS)
     )
-    columns: Any = grains.columns
-    merged = columns.copy() if hasattr(columns, "copy") else dict(columns)
-    merged.update(own)
     return grains._replace(
-        columns=merged,
+        columns={**grains.columns, **own},
         bodies=grains.bodies if bodies is None else bodies,
         wall_contacts=grains.wall_contacts if walls is None else walls,
     )
-
-
-def _values(words: tuple[str, ...]) -> npt.NDArray[Any]:
-    """Whole numbers, numbers or texts, whichever all words are."""
-    for kind, read in ((np.int64, int), (np.float64, float)):
-        try:
-            if not any("_" in word for word in words):
-                return np.array(list(map(read, words)), dtype=kind)
-        except (ValueError, OverflowError):
-            continue
-    return np.array(words, dtype=str)

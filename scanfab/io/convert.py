@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 import os
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, suppress
-from functools import cache
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -18,13 +16,11 @@ from scanfab.base.option import refuse_unknown
 from scanfab.io.beside import (
     columns_csv,
     columns_file,
+    companions_there,
     contacts_csv,
     contacts_file,
     frame_csv,
     frame_file,
-    is_columns_file,
-    is_contacts_file,
-    is_frame_file,
 )
 from scanfab.io.families import names_a_step
 from scanfab.io.files import bare_name
@@ -33,9 +29,7 @@ from scanfab.io.options import parse_frames
 from scanfab.io.registry import installed_readers
 from scanfab.io.series import Series
 from scanfab.io.unpacking import COMPRESSED_SUFFIXES
-from scanfab.io.writer import Writer
-from scanfab.io.writers.registry import installed_writers, writer_for, writer_named
-from scanfab.io.written import more_columns, own_columns, parts_of
+from scanfab.io.writer import Writer, installed_writers, writer_for, writer_named
 from scanfab.packing.packing import Packing
 
 PathLike = str | os.PathLike[str]
@@ -54,17 +48,17 @@ def convert(
     """
     Write frames in another format; nothing of the common table is lost.
 
-    What a format cannot hold lies beside each file, where whoever reads it finds it by itself:
-    contacts in ``STEM.contacts.csv``, cell, step and time in ``STEM.frame.csv``, columns in
-    ``STEM.columns.csv``. What lies nowhere is told by a note.
+    What a format has no place for goes into companion files, which whoever reads the file finds by
+    itself: contacts into ``STEM.contacts.csv``, cell, step and time into ``STEM.frame.csv``,
+    columns into ``STEM.columns.csv``. A note says what is lost nevertheless.
 
     Parameters
     ----------
     source : path, Series, Packing or iterable of Packing
         What to write.
     out : path
-        A file for one frame; a folder, or a name with ``{step}``, for a file each. A frame without
-        a step goes by its number.
+        A file for one frame; a folder, or a name with ``{step}``, for a file each. For a frame
+        without a step its number is taken.
     to : str, optional
         Name of the format; without it the suffix of ``out`` says it. A folder needs it.
     frames : str, int or slice, optional
@@ -82,7 +76,8 @@ def convert(
     Raises
     ------
     SettingsError
-        If there is no such format, several frames are to go into one file, or two have one step.
+        If there is no such format, several frames are to go into one file, two have one step, or a
+        companion file that belongs to another file of the name would be changed.
     ReadError, PackingError
         If a frame cannot be read; files are complete or untouched.
     OSError
@@ -99,67 +94,44 @@ def convert(
     >>> written[0].name, len(packing), packing.step
     ('grains.vtp', 800, 30000)
     """
-    place = _Place(Path(out), to)
+    out = Path(out)
+    is_folder = out.is_dir() or str(out).endswith(os.sep) or (to is not None and not out.suffix)
+    is_folder = is_folder and STEP not in out.name
+    if is_folder and to is None:
+        names = ", ".join(installed_writers())
+        raise SettingsError(f"{out}: a folder has no format: name it with `to`, one of {names}")
+    writer = writer_for(out) if to is None else writer_named(to)
+    check_folder(out / "frame" if out.is_dir() else out)
     refuse_unknown("convert", reading, [*READING, "to", "frames"])
-    chosen = parse_frames(frames)
-    found = _packings(source, chosen, reading)
+    found = _packings(source, parse_frames(frames), reading)
     written: dict[Path, int] = {}
-    held: Packing | None = None
+    if not is_folder and STEP not in out.name:
+        # there must be no second frame, which is known before the file is touched
+        first = list(islice(found, 2))
+        if len(first) > 1:
+            raise SettingsError(
+                f"{out}: there are several frames for one file: name a folder, or a file with "
+                f"{STEP} in its name, or choose one with `frames`"
+            )
+        found = iter(first)
     for number, packing in found:
-        if not place.is_series:
-            # one file: all must be known to be one before it is touched
-            if held is not None:
-                raise SettingsError(
-                    f"{out}: there are several frames for one file: name a folder, or a file with "
-                    f"{STEP} in its name, or choose one with `frames`"
-                )
-            held = packing
-            continue
-        path = place.file(number, packing)
+        path, step = out, str(number if packing.step is None else packing.step)
+        if is_folder:
+            out.mkdir(exist_ok=True)
+            path = out / f"frame_{step}{writer.extensions[0]}"
+        elif STEP in out.name:
+            path = out.with_name(out.name.replace(STEP, step))
         if path in written:
             raise SettingsError(
                 f"{path}: the frames {written[path]} and {number} have the same step: choose with "
                 f"`frames`"
             )
-        save_packing(packing, path, place.writer)
+        save_packing(packing, path, writer)
         written[path] = number
-        after()
-    if held is not None:
-        save_packing(held, place.out, place.writer)
-        written[place.out] = 0
         after()
     if not written:
         raise SettingsError("`frames` chooses none: there is nothing to write")
     return list(written)
-
-
-class _Place:
-    """Where frames go, and in which format."""
-
-    def __init__(self, out: Path, to: str | None) -> None:
-        self.out = out
-        is_folder = out.is_dir() or str(out).endswith(os.sep) or (to is not None and not out.suffix)
-        self.is_folder = is_folder and STEP not in out.name
-        self.is_series = self.is_folder or STEP in out.name
-        if to is not None:
-            self.writer = writer_named(to)
-        elif self.is_folder:
-            names = ", ".join(installed_writers())
-            raise SettingsError(f"{out}: a folder has no format: name it with `to`, one of {names}")
-        else:
-            self.writer = writer_for(out)
-        if self.is_folder:
-            check_folder(out if not out.is_dir() else out / "frame")
-        else:
-            check_folder(out)
-
-    def file(self, number: int, packing: Packing) -> Path:
-        """The file of one frame."""
-        step = number if packing.step is None else packing.step
-        if not self.is_folder:
-            return self.out.with_name(self.out.name.replace(STEP, str(step)))
-        self.out.mkdir(exist_ok=True)
-        return self.out / f"frame_{step}{self.writer.extensions[0]}"
 
 
 def _packings(source: Any, chosen: slice, reading: dict[str, Any]) -> Iterator[tuple[int, Packing]]:
@@ -170,20 +142,26 @@ def _packings(source: Any, chosen: slice, reading: dict[str, Any]) -> Iterator[t
         raise SettingsError(f"`{next(iter(reading))}` is for files that are yet to be read")
     if isinstance(source, Series):
         _tell_left_out(source)
-        part = source[chosen]
-        return ((frame.number, frame.read()) for frame in part)
+        return ((frame.number, frame.read()) for frame in source[chosen])
     packings = [source] if isinstance(source, Packing) else source
     if not isinstance(packings, Iterable):
         raise SettingsError(f"source: expected a path, a Series or packings, found {source!r}")
     bounds = (chosen.start, chosen.stop, chosen.step)
     if any(bound is not None and bound < 0 for bound in bounds):
-        # counted from the end, which has to come first
+        # counted from the end, so that all must be known first
         return iter(list(_numbered(packings))[chosen])
     return islice(_numbered(packings), *bounds)
 
 
+def _numbered(packings: Iterable[Any]) -> Iterator[tuple[int, Packing]]:
+    for number, packing in enumerate(packings):
+        if not isinstance(packing, Packing):
+            raise SettingsError(f"source: expected packings, found {packing!r} among them")
+        yield number, packing
+
+
 def _tell_left_out(series: Series) -> None:
-    """A note for each kind of contact files: contacts have no columns but those of a packing."""
+    """A note for each kind of contact files on the columns that a packing has no place for."""
     for family in series.contacts:
         ask = getattr(family.reader, "left_out", None)
         file = next(iter(family.files.values()))
@@ -197,16 +175,9 @@ def _tell_left_out(series: Series) -> None:
             )
 
 
-def _numbered(packings: Iterable[Any]) -> Iterator[tuple[int, Packing]]:
-    for number, packing in enumerate(packings):
-        if not isinstance(packing, Packing):
-            raise SettingsError(f"source: expected packings, found {packing!r} among them")
-        yield number, packing
-
-
 def save_packing(packing: Packing, path: Path, writer: Writer | None = None) -> None:
     """
-    One packing into one file, with what lies beside it; all files are complete or untouched.
+    One packing into one file, with its companion files; all files are complete or untouched.
 
     Parameters
     ----------
@@ -218,25 +189,33 @@ def save_packing(packing: Packing, path: Path, writer: Writer | None = None) -> 
         By default the one that the suffix names.
     """
     writer = writer_for(path) if writer is None else writer
-    beside: dict[Path, bytes] = {}
+    there = companions_there(path)
+    other = _other_grains(path) if there else None
+    if other is not None:
+        names = " and ".join(file.name for file in there)
+        raise SettingsError(
+            f"{path}: {names} may belong to {other.name}, which has the same name: choose another "
+            f"name or folder"
+        )
     with ExitStack() as files:
-        # the first to be opened is the last to take its place: with the grains all is there
+        # the first file to be opened is the last to take its place: with the grains all is there
         part = files.enter_context(whole_file(path))
         left = writer.write(packing, part)
+        beside: dict[Path, bytes] = {}
         if left.contacts and packing.contacts is not None:
             beside[contacts_file(path)] = contacts_csv(packing)
         is_numbered = left.no_step and packing.step is None and names_a_step(path)
-        if left.frame or is_numbered or contacts_file(path) in beside:
-            beside[frame_file(path)] = frame_csv(packing, with_contacts=left.contacts)
+        if left.frame or is_numbered or beside:
+            beside[frame_file(path)] = frame_csv(packing)
         if left.columns:
-            beside[columns_file(path)] = columns_csv(packing, _columns(packing, left.columns))
-        behind = _left_behind(path, set(beside))
-        is_shared = _is_shared(path, packing, beside, behind)
+            beside[columns_file(path)] = columns_csv(packing, left.columns)
         for file, data in beside.items():
             files.enter_context(whole_file(file)).write_bytes(data)
-    for file in () if is_shared else behind:
-        with suppress(OSError):
-            file.unlink()
+    for file in there:
+        if file not in beside:
+            # an earlier packing of this name has left it
+            with suppress(OSError):
+                file.unlink()
     notes = list(left.notes)
     if packing.wall_forces is not None:
         notes.append("the forces of contacts with walls are left out: no format has them")
@@ -244,71 +223,10 @@ def save_packing(packing: Packing, path: Path, writer: Writer | None = None) -> 
         warnings.warn(f"{path.name}: {note}", ScanfabNote, stacklevel=3)
 
 
-def _columns(packing: Packing, names: Iterable[str]) -> dict[str, Any]:
-    """Columns by the names that writers give them, split into single ones."""
-    own, _ = own_columns(packing)
-    split = more_columns(packing)
-    parts = {name: parts_of(name, values) for name, values in own.items()}
-    return {part: split[part] for name in names for part in parts.get(name, [name])}
-
-
-def _is_shared(
-    path: Path, packing: Packing, beside: dict[Path, bytes], behind: Iterable[Path]
-) -> bool:
-    """
-    Whether another file of this name lies there, to which what lies beside belongs as well.
-
-    Raises
-    ------
-    SettingsError
-        If that is of another packing: it would be lost, or taken for this one's.
-    """
-    stem = Path(bare_name(path)).stem
-    there = [*filter(Path.is_file, beside), *behind]
-    others = (path.with_name(f"{stem}{ending}") for ending in _grain_endings())
-    other = next((one for one in others if there and one != path and one.is_file()), None)
-    if other is None:
-        return False
-    own = {frame_file(path): frame_csv(packing)}
-    if packing.contacts is not None:
-        own[contacts_file(path)] = contacts_csv(packing)
-    if columns_file(path) in there:
-        own[columns_file(path)] = _same_columns(packing, columns_file(path))
-    own |= beside
-    lost = sorted(file.name for file in there if file.read_bytes() != own.get(file))
-    if lost:
-        raise SettingsError(
-            f"{path}: {other.name} of the same name lies there, whose {' and '.join(lost)} would "
-            f"be lost or taken for those of {path.name}: choose another name or folder"
-        )
-    return True
-
-
-def _same_columns(packing: Packing, file: Path) -> bytes:
-    """The packing's columns of the names that a file has; nothing if it lacks one of them."""
-    names = next(csv.reader(file.read_text("utf-8", "replace").splitlines()[:1]), [])[1:]
-    with suppress(KeyError):
-        return columns_csv(packing, _columns(packing, names))
-    return b""
-
-
-@cache
-def _grain_endings() -> list[str]:
-    """Of files that may hold grains, packed or not."""
+def _other_grains(path: Path) -> Path | None:
+    """Another file with the same name and the ending of a format, to which companions belong."""
     formats = [*installed_writers().values(), *installed_readers().values()]
     endings = {ending for one in formats for ending in one.plugin.extensions}
-    return sorted(ending + packed for ending in endings for packed in ("", *COMPRESSED_SUFFIXES))
-
-
-def _left_behind(path: Path, written: set[Path]) -> list[Path]:
-    """What an earlier packing of this name left beside it, and would be taken for this one's."""
-    kinds = {
-        contacts_file(path): is_contacts_file,
-        frame_file(path): is_frame_file,
-        columns_file(path): is_columns_file,
-    }
-    return [
-        file
-        for file, is_ours in kinds.items()
-        if file not in written and file.is_file() and is_ours(file)
-    ]
+    packed = sorted(ending + more for ending in endings for more in ("", *COMPRESSED_SUFFIXES))
+    others = (path.with_name(f"{Path(bare_name(path)).stem}{ending}") for ending in packed)
+    return next((one for one in others if one != path and one.is_file()), None)

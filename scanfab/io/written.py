@@ -1,19 +1,23 @@
-"""What a packing says of its grains, as columns that a file can hold and a reader finds again."""
+"""A packing as arrays, by names that readers know: the same for the writers of all formats."""
 
 from __future__ import annotations
 
+import io
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.errors import PackingError, ReadError
 from scanfab.io.bodies import numbers_in_columns
 from scanfab.io.formats.columns import DIAMETER_NAMES
 from scanfab.io.reader import BODIES, WALLS
 from scanfab.io.sizes import other_size
-from scanfab.packing.bodies import bodies_of
+from scanfab.packing.cell import Cell
+from scanfab.packing.contacts import ContactList
 from scanfab.packing.packing import Packing
 
 Columns = dict[str, npt.NDArray[Any]]
@@ -23,29 +27,71 @@ TAKEN = {"id", "x", "y", "z", "radius", "position"}
 
 
 def standard_columns(packing: Packing) -> Columns:
-    """``id``, and if need be bodies and contacts with walls, by names that readers know."""
+    """``id``, and bodies and contacts with walls if there are any."""
     columns: Columns = {"id": packing.id}
-    bodies = _bodies(packing)
-    if bodies is not None:
-        columns[BODIES] = bodies
+    if packing.bodies is not None:
+        columns[BODIES] = packing.bodies.number
+    elif numbers_in_columns(packing.columns) is not None:
+        # a reader would join the spheres that another column numbers
+        columns[BODIES] = np.full(len(packing), -1)
     if packing.wall_contacts.any():
         columns[WALLS] = packing.wall_contacts
     return columns
 
 
-def _bodies(packing: Packing) -> npt.NDArray[Any] | None:
-    """The number of each sphere's body, unless other columns give the same by themselves."""
-    of_columns = numbers_in_columns(packing.columns)
-    by_itself = (
-        None
-        if of_columns is None
-        else bodies_of(of_columns, packing.position, packing.radius, packing.cell)
-    )
-    if packing.bodies is None:
-        return None if by_itself is None else np.full(len(packing), -1)
-    number = packing.bodies.number
-    same = by_itself is not None and np.array_equal(by_itself.number, number)
-    return None if same else number
+def own_columns(packing: Packing) -> tuple[Columns, list[str]]:
+    """
+    The columns of the source, as numbers and texts, and notes on those that were changed.
+
+    A column whose name a reader would misunderstand gets another name. A column that holds neither
+    numbers nor texts is left out.
+    """
+    found: Columns = {}
+    notes = []
+    for name, column in packing.columns.items():
+        values = np.asarray(column)
+        if values.dtype.kind in "OS":
+            words = [
+                one.decode("utf-8", "replace") if isinstance(one, bytes) else str(one)
+                for one in values.ravel()
+            ]
+            values = np.array(words, dtype=str).reshape(values.shape)
+        if values.dtype.kind not in "biufU":
+            notes.append(f"the column {name} is left out: it holds {values.dtype}")
+            continue
+        if values.dtype.kind == "f" and values.dtype.itemsize not in (4, 8):
+            values = values.astype(np.float64)
+        disagrees = name.lower() in DIAMETER_NAMES and other_size(packing.radius, values)
+        is_taken = re.sub(r"[^a-z0-9]", "", name.lower()) in TAKEN or name in (BODIES, WALLS)
+        free = name
+        if is_taken or disagrees not in (None, False):
+            free = free_name(name, [*found, *packing.columns])
+            notes.append(f"the column {name} is called {free}: {name} is what grains are read from")
+        found[free] = values
+    return found, notes
+
+
+def free_name(name: str, used: Iterable[str]) -> str:
+    """Another name for a column whose own name a reader would misunderstand."""
+    free = f"{name}_of_dump"
+    while free in used:
+        free += "_"
+    return free
+
+
+def flat(columns: Columns) -> tuple[Columns, list[str]]:
+    """Columns of one value for each grain, truth as 0 and 1; and notes on those that were split."""
+    found: Columns = {}
+    notes = []
+    for name, values in columns.items():
+        count = int(np.prod(values.shape[1:]))
+        parts = [name]
+        if values.ndim > 1:
+            parts = [f"{name}_{axis}" for axis in ("xyz" if count == 3 else range(count))]
+            notes.append(f"the column {name} stands as {', '.join(parts)}")
+        table = values.astype(np.int64) if values.dtype.kind == "b" else values
+        found |= zip(parts, table.reshape(len(values), count).T, strict=True)
+    return found, notes
 
 
 def more_columns(packing: Packing) -> Columns:
@@ -67,67 +113,62 @@ def more_columns(packing: Packing) -> Columns:
     return {**standard, **flat(own_columns(packing)[0])[0]}
 
 
-def own_columns(packing: Packing) -> tuple[Columns, list[str]]:
-    """
-    The columns of the source, as numbers and texts, and what is to be said of them.
+def csv_bytes(columns: Columns, separator: str = ",", *, with_names: bool = True) -> bytes:
+    """A table as text, with all digits; texts are in quotes where need be if it has names."""
+    import polars
 
-    A column whose name a reader would misunderstand gets another; what is neither number nor text
-    is left out.
-    """
-    found: Columns = {}
-    notes = []
-    for name, values in packing.columns.items():
-        plain = np.asarray(values)
-        if plain.dtype.kind in "OS":
-            plain = np.array([_text(one) for one in plain.ravel()], dtype=str).reshape(plain.shape)
-        if plain.dtype.kind not in "biufU":
-            notes.append(f"the column {name} is left out: it holds {plain.dtype}")
-            continue
-        disagrees = name.lower() in DIAMETER_NAMES and other_size(packing.radius, plain) is not None
-        free = _free_name(name, [*found, *packing.columns], is_taken=disagrees)
-        if free != name:
-            notes.append(f"the column {name} is called {free}: {name} is what grains are read from")
-        found[free] = plain
-    return found, notes
+    stream = io.BytesIO()
+    polars.DataFrame({name: np.array(values) for name, values in columns.items()}).write_csv(
+        stream,
+        separator=separator,
+        include_header=with_names,
+        quote_style="necessary" if with_names else "never",
+    )
+    return stream.getvalue()
 
 
-def _text(value: Any) -> str:
-    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+def frame_arrays(packing: Packing) -> dict[str, Any]:
+    """``step``, ``time``, and the cell as ``cell``, ``origin`` and ``periodic``, if known."""
+    cell = packing.cell
+    found: dict[str, Any] = {"step": packing.step, "time": packing.time}
+    if cell is not None:
+        found |= {"cell": cell.vectors, "origin": cell.origin, "periodic": np.array(cell.periodic)}
+    return {name: values for name, values in found.items() if values is not None}
 
 
-def _free_name(name: str, used: Iterable[str], *, is_taken: bool) -> str:
-    plain = re.sub(r"[^a-z0-9]", "", name.lower())
-    if not is_taken and plain not in TAKEN and name not in (BODIES, WALLS):
-        return name
-    return free_name(name, used)
+def contact_arrays(packing: Packing) -> Columns:
+    """Image and force of each contact, or the normal force if no more is known."""
+    contacts = packing.contacts
+    if contacts is None:
+        return {}
+    found: Columns = {"image": contacts.image}
+    if contacts.force is not None:
+        found["force"] = contacts.force
+    elif contacts.force_n is not None:
+        found["force_n"] = contacts.force_n
+    return found
 
 
-def free_name(name: str, used: Iterable[str]) -> str:
-    """Another name for a column whose own one a reader would misunderstand."""
-    free = f"{name}_of_dump"
-    while free in used:
-        free += "_"
-    return free
+def cell_of(path: Path, arrays: Mapping[str, Any]) -> Cell | None:
+    """The cell of :func:`frame_arrays`; ReadError if it is none."""
+    if "cell" not in arrays:
+        return None
+    try:
+        vectors, origin = (np.asarray(arrays[name], np.float64) for name in ("cell", "origin"))
+        x, y, z = (bool(one) for one in np.ravel(arrays["periodic"]))
+        return Cell(vectors.reshape(3, 3), (x, y, z), origin.reshape(3))
+    except (KeyError, TypeError, ValueError, PackingError) as error:
+        raise ReadError(f"{path}: cell, origin and periodic are no cell: {error}") from None
 
 
-def parts_of(name: str, values: npt.NDArray[Any]) -> list[str]:
-    """The names of the columns of an array: one, or one for each of its components."""
-    if values.ndim == 1:
-        return [name]
-    count = int(np.prod(values.shape[1:]))
-    return [f"{name}_{axis}" for axis in ("xyz" if count == 3 else range(count))]
-
-
-def flat(columns: Columns) -> tuple[Columns, list[str]]:
-    """Columns of one value a grain, truth as 0 and 1, and what is to be said of them."""
-    found: Columns = {}
-    notes = []
-    for name, values in columns.items():
-        parts = parts_of(name, values)
-        if values.ndim > 1:
-            notes.append(f"the column {name} stands as {', '.join(parts)}")
-        table = values.reshape(len(values), len(parts))
-        for place, part in enumerate(parts):
-            one = table[:, place]
-            found[part] = one.astype(np.int64) if one.dtype.kind == "b" else one
-    return found, notes
+def contacts_of(path: Path, pairs: npt.NDArray[Any], arrays: Mapping[str, Any]) -> ContactList:
+    """The contacts of :func:`contact_arrays`, by rows; ReadError if an array does not fit."""
+    count = len(pairs)
+    known = {"image": (count, 3), "force": (count, 3), "force_n": (count,)}
+    found = {name: arrays[name] for name in known if name in arrays}
+    for name, values in found.items():
+        if values.shape != known[name] or values.dtype.kind not in "iuf":
+            raise ReadError(f"{path}: {name}: expected numbers of shape {known[name]}")
+    force = found.get("force")
+    force_n = found.get("force_n") if force is None else None
+    return ContactList(pairs, found.get("image"), force, force_n=force_n)

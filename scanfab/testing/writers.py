@@ -39,7 +39,7 @@ def check_writer(
     --------
     >>> import tempfile
     >>> from pathlib import Path
-    >>> from scanfab.io.writers.registry import writer_named
+    >>> from scanfab.io.writer import writer_named
     >>> from scanfab.testing import check_writer
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     check_writer(writer_named("vtp"), Path(folder))

@@ -9,7 +9,10 @@ from pathlib import Path
 
 import pytest
 
+import scanfab
 from scanfab.cli.main import run
+from scanfab.io.writer import installed_writers
+from scanfab.testing import made_up_packings
 from tests.helpers.interruptions import PROGRAM, write_series
 
 resource = pytest.importorskip("resource", reason="limits of a process are POSIX")
@@ -80,6 +83,25 @@ def test_a_table_that_cannot_be_converted_keeps_its_rows(compute, capsys, tmp_pa
     assert "error: table.json: File too large" in capsys.readouterr().err
     assert (tmp_path / "table.json").read_text() == "precious"
     assert (tmp_path / "table.json.part").read_bytes() == (tmp_path / "other.jsonl").read_bytes()
+
+
+@pytest.mark.parametrize("name", installed_writers())
+def test_a_conversion_that_does_not_fit_changes_nothing(capsys, tmp_path, name):
+    packing = made_up_packings()["everything"]
+    source, files = tmp_path / "source.npz", tmp_path / name
+    scanfab.convert(packing, source)
+    files.mkdir()
+    out = files / f"a{installed_writers()[name].plugin.extensions[0]}"
+    assert run(["convert", str(source), str(out), "--to", name]) == 0
+    sizes = {file: file.stat().st_size for file in files.iterdir()}
+    before = {file: file.read_bytes() for file in files.iterdir()}
+    capsys.readouterr()
+    # the largest file does not fit, be it that of the grains or a companion
+    with files_up_to(max(sizes.values()) - 1):
+        assert run(["convert", str(source), str(out), "--to", name]) == 1
+    named = max(sizes, key=sizes.get)
+    assert f"scanfab: error: {named}: File too large" in capsys.readouterr().err
+    assert {file: file.read_bytes() for file in files.iterdir()} == before
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="the system has no /dev/full")

@@ -8,7 +8,7 @@ import pytest
 import scanfab
 from scanfab.base.errors import ReadError
 from scanfab.io.sizes import other_size
-from scanfab.io.writers.registry import installed_writers
+from scanfab.io.writer import installed_writers
 from tests.helpers.dumps import write
 
 RADII = np.random.default_rng(5).uniform(0.001, 30, 200)

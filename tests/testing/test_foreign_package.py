@@ -14,7 +14,7 @@ KIT = """
 import sys
 from pathlib import Path
 from scanfab.io.registry import reader_named
-from scanfab.io.writers.registry import writer_named
+from scanfab.io.writer import writer_named
 from scanfab.testing import check_reader, check_writer
 
 folder = Path(sys.argv[1])

@@ -8,7 +8,7 @@ import pytest
 
 import scanfab
 from scanfab.io.registry import reader_named
-from scanfab.io.writers.registry import installed_writers, writer_named
+from scanfab.io.writer import installed_writers, writer_named
 from scanfab.testing import check_reader, check_writer, made_up_packings
 from tests.helpers.sound_files import seeds
 from tests.helpers.truth import FLOOR

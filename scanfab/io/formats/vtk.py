@@ -16,13 +16,6 @@ from scanfab.io.files import bare_name, file_inside, plain
 from scanfab.io.formats.columns import grain_table, has_radius, whole_numbers
 from scanfab.io.formats.join import join_ids, join_positions
 from scanfab.io.formats.proof import proved_force, tell_left_out
-from scanfab.io.formats.vtp_packing import (
-    cell_of,
-    contacts_of,
-    is_packing,
-    moment_of,
-    says_all,
-)
 from scanfab.io.formats.yade_cells import cell_beside, cell_file, is_cell_file
 from scanfab.io.mesh import Mesh, elements, form_of, listed, read_bounds, read_mesh
 from scanfab.io.reader import (
@@ -32,6 +25,13 @@ from scanfab.io.reader import (
     JoinedContacts,
     ReadOptions,
     Snapshot,
+)
+from scanfab.io.writers.vtp import (
+    is_packing,
+    moment_of,
+    packing_cell,
+    packing_contacts,
+    says_all,
 )
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import ContactList
@@ -114,8 +114,8 @@ class VtkReader:
         columns = {**mesh.point_arrays, "position": mesh.points}
         if is_packing(mesh):
             _refuse_parts(snapshot, "a packing that scanfab wrote")
-            own = grain_table(snapshot.path, columns, cell_of(snapshot.path, mesh), options)
-            return own._replace(contacts=contacts_of(snapshot.path, mesh))
+            own = grain_table(snapshot.path, columns, packing_cell(snapshot.path, mesh), options)
+            return own._replace(contacts=packing_contacts(snapshot.path, mesh))
         if len(mesh.points) == 0:
             columns["radius"] = np.zeros(0)
         cell = _box_beside(snapshot.path)

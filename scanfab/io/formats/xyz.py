@@ -24,10 +24,7 @@ from scanfab.io.reader import (
     ReadOptions,
     Snapshot,
 )
-from scanfab.io.writer import Left
-from scanfab.io.written import own_columns, standard_columns
 from scanfab.packing.cell import Cell
-from scanfab.packing.packing import Packing
 
 COUNT = re.compile(rb"\A(?:\xef\xbb\xbf)?[ \t]*([0-9]{1,15})[ \t]*\r?\n")
 # key=value, the value in quotes if it has blanks
@@ -104,29 +101,6 @@ class XyzReader:
     ) -> JoinedContacts:
         """It has none."""
         raise ReadError(f"{snapshot.path}: extended XYZ holds no contacts")
-
-    def write(self, packing: Packing, path: Path) -> Left:
-        """Write one frame; texts with blanks lie beside it."""
-        own, notes = own_columns(packing)
-        held = {name: values for name, values in own.items() if _fits(name, values)}
-        columns = {
-            "pos": packing.position,
-            "radius": packing.radius,
-            **standard_columns(packing),
-            **held,
-        }
-        words = [
-            f"{name}:{_letter(values)}:{int(np.prod(values.shape[1:]))}"
-            for name, values in columns.items()
-        ]
-        with open(path, "wb") as stream:
-            stream.write(f"{len(packing)}\n{_line(packing)}Properties={':'.join(words)}\n".encode())
-            _write_rows(stream, columns)
-        return Left(
-            contacts=True,
-            columns=tuple(name for name in own if name not in held),
-            notes=tuple(notes),
-        )
 
 
 class _Head:
@@ -274,48 +248,3 @@ def _converted(path: Path, name: str, kind: str, words: list[bytes]) -> npt.NDAr
         raise ReadError(
             f"{path}: the column {name}: expected values of the kind {kind}, found something else"
         ) from None
-
-
-def _line(packing: Packing) -> str:
-    """Cell, step and time, as the line names them."""
-    words = []
-    cell = packing.cell
-    if cell is not None:
-        vectors = " ".join(repr(float(one)) for one in cell.vectors.ravel())
-        origin = " ".join(repr(float(one)) for one in cell.origin)
-        along = " ".join("FT"[one] for one in cell.periodic)
-        words.append(f'Lattice="{vectors}" Origin="{origin}" pbc="{along}" ')
-    if packing.step is not None:
-        words.append(f"Timestep={packing.step} ")
-    if packing.time is not None:
-        words.append(f"Time={packing.time!r} ")
-    return "".join(words)
-
-
-def _fits(name: str, values: npt.NDArray[Any]) -> bool:
-    """Whether a name is one word without colons, and so are texts."""
-    if re.search(r"[\s:\"=]", name) or not name or int(np.prod(values.shape[1:])) > 99:
-        return False
-    if name.lower() in POSITIONS or values.dtype == np.uint64:
-        return False
-    texts = values.ravel() if values.dtype.kind == "U" else ()
-    return all(len(text.split()) == 1 and text.split()[0] == text for text in texts)
-
-
-def _letter(values: npt.NDArray[Any]) -> str:
-    return {"b": "L", "i": "I", "u": "I", "f": "R"}.get(values.dtype.kind, "S")
-
-
-def _write_rows(stream: Any, columns: dict[str, npt.NDArray[Any]]) -> None:
-    import polars
-
-    parts = {}
-    for name, values in columns.items():
-        table = values.reshape(len(values), int(np.prod(values.shape[1:])))
-        for place in range(table.shape[1]):
-            one = (
-                np.where(table[:, place], "T", "F") if table.dtype.kind == "b" else table[:, place]
-            )
-            parts[f"{name} {place}"] = np.array(one)
-    frame = polars.DataFrame(parts)
-    frame.write_csv(stream, include_header=False, separator=" ", quote_style="never")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import Any
 
@@ -10,18 +9,18 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.typing import FloatArray
-from scanfab.io.formats.lammps_box import box_vectors
 from scanfab.io.writer import Left
-from scanfab.io.written import flat, more_columns, own_columns, standard_columns
-from scanfab.packing.cell import Cell
+from scanfab.io.written import csv_bytes, flat, more_columns, own_columns, standard_columns
 from scanfab.packing.packing import Packing
 
-Columns = dict[str, npt.NDArray[Any]]
-
-# words that begin or end what a reader looks for
+# whole numbers up to here are the same as decimals
 MOST_EXACT = 2**53
-# of atoms without a type or density, which the data file must name
-TYPE, DENSITY = 1, 1.0
+# ids and types of LAMMPS as it is usually built
+MOST_SMALL = 2**31
+TURNED = (
+    "the box in the file is the one around the cell, which LAMMPS cannot have: its first vector is "
+    "not along x, or its second not in x and y"
+)
 
 
 class LammpsDumpWriter:
@@ -34,26 +33,20 @@ class LammpsDumpWriter:
     def write(self, packing: Packing, path: Path) -> Left:
         """Write one frame; columns that are no numbers lie beside it."""
         own, notes = own_columns(packing)
-        columns, more = flat(own)
-        held = {name: values for name, values in columns.items() if _fits(name, values)}
-        standard = standard_columns(packing)
+        columns, split = flat(own)
+        held = {name: values for name, values in columns.items() if _is_dumped(name, values)}
         place = dict(zip("xyz", packing.position.T, strict=True))
-        rows = {"id": standard.pop("id"), **place, "radius": packing.radius, **standard, **held}
-        bounds = _bounds(packing)
+        standard = standard_columns(packing)
+        rows = {"id": packing.id, **place, "radius": packing.radius, **standard, **held}
         time = "" if packing.time is None else f"ITEM: TIME\n{packing.time!r}\n"
         head = (
             f"{time}ITEM: TIMESTEP\n{packing.step or 0}\nITEM: NUMBER OF ATOMS\n{len(packing)}\n"
-            f"{bounds}ITEM: ATOMS {' '.join(rows)}\n"
+            f"ITEM: BOX BOUNDS {_bounds(packing)}ITEM: ATOMS {' '.join(rows)}\n"
         )
-        with open(path, "wb") as stream:
-            stream.write(head.encode())
-            _write_rows(stream, rows)
-        return Left(
-            contacts=True,
-            frame=packing.step is None or packing.cell is None,
-            columns=tuple(name for name in columns if name not in held),
-            notes=(*notes, *more),
-        )
+        path.write_bytes(head.encode() + csv_bytes(rows, " ", with_names=False))
+        left = tuple(name for name in columns if name not in held)
+        # from bounds the edges of the cell come back with a rounding error
+        return Left(contacts=True, frame=True, columns=left, notes=(*notes, *split))
 
 
 class LammpsDataWriter:
@@ -66,141 +59,91 @@ class LammpsDataWriter:
     def write(self, packing: Packing, path: Path) -> Left:
         """Write one frame; LAMMPS has a place for type and density, all else lies beside it."""
         own, notes = own_columns(packing)
-        columns, more = flat(own)
-        kind, kind_held = _whole_from_one(columns.get("type"), len(packing))
-        density, density_held = _positive(columns.get("density"), len(packing))
-        held = [name for name, ok in (("type", kind_held), ("density", density_held)) if ok]
+        columns, split = flat(own)
+        # both columns must be there: without a sound one they are 1
+        rows = {"type": np.ones(len(packing), np.int64), "density": np.ones(len(packing))}
+        held = [name for name in rows if name in columns and _is_data(name, columns[name])]
+        rows |= {name: columns[name].astype(rows[name].dtype) for name in held}
         rows = {
             "id": packing.id,
-            "type": kind,
+            "type": rows["type"],
             "diameter": 2.0 * packing.radius,
-            "density": density,
+            "density": rows["density"],
             **dict(zip("xyz", packing.position.T, strict=True)),
         }
-        box, box_notes = _box_lines(packing)
+        low, high, tilt, is_turned = _box(packing)
+        box = "".join(
+            f"{a!r} {b!r} {axis}lo {axis}hi\n"
+            for a, b, axis in zip(low.tolist(), high.tolist(), "xyz", strict=True)
+        )
+        if tilt.any():
+            box += f"{' '.join(map(repr, tilt.tolist()))} xy xz yz\n"
         step = f", timestep = {packing.step}" if packing.step is not None else ""
         head = (
             f"LAMMPS data file by scanfab{step}\n\n{len(packing)} atoms\n"
-            f"{int(kind.max(initial=1))} atom types\n\n{box}\nAtoms # sphere\n\n"
+            f"{rows['type'].max(initial=1)} atom types\n\n{box}\nAtoms # sphere\n\n"
         )
-        with open(path, "wb") as stream:
-            stream.write(head.encode())
-            _write_rows(stream, rows)
-        if len(packing) and packing.id.max() >= 2**31:
+        path.write_bytes(head.encode() + csv_bytes(rows, " ", with_names=False))
+        if len(packing) and packing.id.max() >= MOST_SMALL:
             notes.append("LAMMPS takes ids above 2147483647 only if it was built for them")
-        return Left(
-            contacts=True,
-            frame=True,
-            columns=tuple(name for name in more_columns(packing) if name not in held),
-            notes=(*notes, *more, *box_notes),
-        )
+        left = tuple(name for name in more_columns(packing) if name not in held)
+        turned = (TURNED,) if is_turned else ()
+        return Left(contacts=True, frame=True, columns=left, notes=(*notes, *split, *turned))
 
 
-def _fits(name: str, values: npt.NDArray[Any]) -> bool:
+def _is_dumped(name: str, values: npt.NDArray[Any]) -> bool:
     """Whether a dump's reader gives a column back: numbers, under a name of one word."""
-    if len(name.split()) != 1 or values.dtype.kind == "U":
+    if len(name.split()) != 1 or values.dtype.kind == "U" or name.lower() in ("element", "lattice"):
         return False
-    exact = values.dtype.kind == "f" or bool(np.all(np.abs(values.astype(float)) < MOST_EXACT))
-    return exact and name.lower() not in ("element", "lattice")
+    return values.dtype.kind == "f" or bool(np.all(np.abs(values.astype(float)) < MOST_EXACT))
 
 
-def _write_rows(stream: io.BufferedWriter, columns: Columns) -> None:
-    import polars
+def _is_data(name: str, values: npt.NDArray[Any]) -> bool:
+    """Whether LAMMPS takes a column as types (whole numbers from 1) or densities (positive)."""
+    if values.dtype.kind not in "iuf" or not np.all(values > 0):
+        return False
+    return name == "density" or bool(np.all((values < MOST_SMALL) & (values == np.floor(values))))
 
-    frame = polars.DataFrame({name: np.array(values) for name, values in columns.items()})
-    frame.write_csv(stream, include_header=False, separator=" ", quote_style="never")
+
+def _box(packing: Packing) -> tuple[FloatArray, FloatArray, FloatArray, bool]:
+    """
+    Lower and upper corner and tilt (xy, xz, yz) of the box before it was tilted.
+
+    LAMMPS has its first vector along x and its second in x and y. For another cell it is the box
+    around it, and the last value is True. Without a cell it is the box of the grains' surfaces.
+    """
+    cell, none = packing.cell, np.zeros(3)
+    if cell is not None and (
+        np.any(np.triu(cell.vectors, 1)) or np.any(np.diag(cell.vectors) <= 0)
+    ):
+        corners = cell.origin + np.array(list(np.ndindex(2, 2, 2))) @ cell.vectors
+        return corners.min(axis=0), corners.max(axis=0), none, True
+    if cell is not None:
+        high = cell.origin + np.diag(cell.vectors)
+        return cell.origin, high, cell.vectors[[1, 2, 2], [0, 0, 1]], False
+    if len(packing) == 0:
+        return none, np.ones(3), none, False
+    radius = packing.radius[:, None]
+    low, high = (packing.position - radius).min(axis=0), (packing.position + radius).max(axis=0)
+    return low, high, none, False
 
 
 def _bounds(packing: Packing) -> str:
-    """The box of a dump: as its older readers know it if that is exact, else by three vectors."""
+    """The box of a dump: its bounds as older readers know them, or else by three vectors."""
     cell = packing.cell
-    if cell is None:
-        low, high = _extent(packing)
-        rows = _digits(np.column_stack([low, high]))
-        return f"ITEM: BOX BOUNDS ff ff ff\n{rows}"
-    flags = " ".join("pp" if repeats else "ff" for repeats in cell.periodic)
-    bounds = _exact_bounds(cell)
-    if bounds is None:
-        table, kind = np.column_stack([cell.vectors, cell.origin]), "abc origin "
-    else:
-        table, kind = bounds, "xy xz yz " if bounds.shape[1] == 3 else ""
-    rows = _digits(table)
-    return f"ITEM: BOX BOUNDS {kind}{flags}\n{rows}"
-
-
-def _digits(table: FloatArray) -> str:
-    """Rows of numbers with all digits, as LAMMPS writes bounds and nobody else does."""
-    return "".join(" ".join(f"{x:.16e}" for x in row) + "\n" for row in table.tolist())
-
-
-def _exact_bounds(cell: Cell) -> FloatArray | None:
-    """Bounds, with the tilt behind if there is one, from which the very same cell is read again."""
-    vectors, low = cell.vectors, cell.origin
-    if np.any(np.triu(vectors, 1)) or np.any(np.diag(vectors) <= 0):
-        return None
-    xy, xz, yz = tilt = vectors[[1, 2, 2], [0, 0, 1]]
-    high = low + np.diag(vectors)
-    around_low = low + np.array([min(0.0, xy, xz, xy + xz), min(0.0, yz), 0.0])
-    around_high = high + np.array([max(0.0, xy, xz, xy + xz), max(0.0, yz), 0.0])
-    bounds = np.column_stack([around_low, around_high, tilt])
-    again, origin = box_vectors(bounds)
-    if not (np.array_equal(again, vectors) and np.array_equal(origin, low)):
-        return None
-    return bounds if tilt.any() else bounds[:, :2]
-
-
-def _extent(packing: Packing) -> tuple[FloatArray, FloatArray]:
-    """The box of the grains' surfaces; of no grains one from 0 to 1."""
-    if len(packing) == 0:
-        return np.zeros(3), np.ones(3)
-    radius = packing.radius[:, None]
-    low: FloatArray = (packing.position - radius).min(axis=0)
-    high: FloatArray = (packing.position + radius).max(axis=0)
-    return low, high
-
-
-def _box_lines(packing: Packing) -> tuple[str, list[str]]:
-    """The box of a data file: LAMMPS has its first vector along x and its second in x and y."""
-    cell, tilt = packing.cell, np.zeros(3)
-    notes = []
-    low, high = _extent(packing)
-    if cell is not None:
-        vectors = cell.vectors
-        if np.any(np.triu(vectors, 1)) or np.any(np.diag(vectors) <= 0):
-            corners = (
-                cell.origin
-                + np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)]) @ vectors
-            )
-            low, high = corners.min(axis=0), corners.max(axis=0)
-            notes.append(
-                "the box in the file is the one around the cell, which LAMMPS cannot have: its "
-                "first vector is not along x, or its second not in x and y"
-            )
-        else:
-            low, high = cell.origin, cell.origin + np.diag(vectors)
-            tilt = vectors[[1, 2, 2], [0, 0, 1]]
-    lines = "".join(
-        f"{a!r} {b!r} {axis}lo {axis}hi\n"
-        for a, b, axis in zip(low.tolist(), high.tolist(), "xyz", strict=True)
-    )
-    if tilt.any():
-        lines += f"{' '.join(map(repr, tilt.tolist()))} xy xz yz\n"
-    return lines, notes
-
-
-def _whole_from_one(values: npt.NDArray[Any] | None, count: int) -> tuple[npt.NDArray[Any], bool]:
-    """Types as LAMMPS numbers them, and whether they are the column's own."""
-    ok = values is not None and values.dtype.kind in "iuf" and count > 0
-    if ok:
-        assert values is not None
-        ok = bool(np.all((values >= 1) & (values < 2**31) & (values == np.floor(values))))
-    if not ok or values is None:
-        return np.full(count, TYPE), False
-    return values.astype(np.int64), True
-
-
-def _positive(values: npt.NDArray[Any] | None, count: int) -> tuple[FloatArray, bool]:
-    """Densities, and whether they are the column's own."""
-    if values is None or values.dtype.kind not in "iuf" or not np.all(values > 0):
-        return np.full(count, DENSITY), False
-    return values.astype(np.float64), True
+    along = (False,) * 3 if cell is None else cell.periodic
+    flags = " ".join("pp" if repeats else "ff" for repeats in along)
+    low, high, tilt, is_turned = _box(packing)
+    kind, columns = "", [low, high]
+    if cell is not None and is_turned:
+        kind, columns = "abc origin ", [*cell.vectors.T, cell.origin]
+    elif tilt.any():
+        # the bounds are those of the box around the tilted box
+        xy, xz, yz = tilt
+        low = low + np.array([min(0.0, xy, xz, xy + xz), min(0.0, yz), 0.0])
+        high = high + np.array([max(0.0, xy, xz, xy + xz), max(0.0, yz), 0.0])
+        kind, columns = "xy xz yz ", [low, high, tilt]
+    rows = np.column_stack(columns).tolist()
+    # with all digits, as LAMMPS writes bounds
+    lines = "".join(" ".join(f"{x:.16e}" for x in row) + "\n" for row in rows)
+    return f"{kind}{flags}\n{lines}"

@@ -1,7 +1,9 @@
-"""Packings as tables with a row for each sphere: CSV, TSV and Parquet."""
+"""Packings as tables with a row for each sphere: CSV, TSV, Parquet and extended XYZ."""
 
 from __future__ import annotations
 
+import io
+import re
 from pathlib import Path
 from typing import Any
 
@@ -10,86 +12,131 @@ import numpy.typing as npt
 
 from scanfab.io.formats.table_names import is_frame_name
 from scanfab.io.writer import Left
-from scanfab.io.written import flat, free_name, own_columns, standard_columns
+from scanfab.io.written import (
+    Columns,
+    csv_bytes,
+    flat,
+    frame_arrays,
+    free_name,
+    own_columns,
+    standard_columns,
+)
 from scanfab.packing.packing import Packing
 
-Columns = dict[str, npt.NDArray[Any]]
+# letters of extended XYZ by numpy's kinds
+LETTERS = {"b": "L", "i": "I", "u": "I", "f": "R", "U": "S"}
 
 
-class _TableWriter:
-    def write(self, packing: Packing, path: Path) -> Left:
-        """Columns id, x, y, z, radius, and all others; a table holds nothing else."""
-        table, notes = table_of(packing)
-        self._put(table, path)
-        bare = packing.cell is None and packing.step is None and packing.time is None
-        return Left(contacts=True, frame=not bare, notes=tuple(notes))
-
-    def _put(self, table: Any, path: Path) -> None:
-        raise NotImplementedError
-
-
-class CsvWriter(_TableWriter):
+class CsvWriter:
     """Cells separated by commas."""
 
     name = "csv"
     description = "a table of spheres with commas; contacts and cell beside it"
-    extensions = (".csv",)
+    extensions: tuple[str, ...] = (".csv",)
 
-    def _put(self, table: Any, path: Path) -> None:
-        table.write_csv(path)
+    def write(self, packing: Packing, path: Path) -> Left:
+        """Write the columns id, x, y, z, radius and all others; a table holds nothing else."""
+        own, notes = own_columns(packing)
+        own, split = flat(own)
+        place = dict(zip("xyz", packing.position.T, strict=True))
+        columns = {"id": packing.id, **place, "radius": packing.radius, **standard_columns(packing)}
+        for name, values in own.items():
+            tells_frames = is_frame_name(name) and values.dtype.kind in "iuf"
+            if tells_frames and len(np.unique(values)) > 1:
+                free = free_name(name, [*columns, *own])
+                split.append(
+                    f"the column {name} is called {free}: {name} tells frames of a table apart"
+                )
+                columns[free] = values
+            else:
+                columns[name] = values
+        path.write_bytes(self.table(columns))
+        is_bare = not frame_arrays(packing)
+        return Left(contacts=True, frame=not is_bare, notes=(*notes, *split))
+
+    def table(self, columns: Columns) -> bytes:
+        """The bytes of the file."""
+        return csv_bytes(columns)
 
 
-class TsvWriter(_TableWriter):
+class TsvWriter(CsvWriter):
     """Cells separated by tabs."""
 
     name = "tsv"
     description = "a table of spheres with tabs; contacts and cell beside it"
     extensions = (".tsv",)
 
-    def _put(self, table: Any, path: Path) -> None:
-        table.write_csv(path, separator="\t")
+    def table(self, columns: Columns) -> bytes:
+        """The bytes of the file."""
+        return csv_bytes(columns, "\t")
 
 
-class ParquetWriter(_TableWriter):
+class ParquetWriter(CsvWriter):
     """Apache Parquet."""
 
     name = "parquet"
     description = "a table of spheres as Apache Parquet; contacts and cell beside it"
     extensions = (".parquet",)
 
-    def _put(self, table: Any, path: Path) -> None:
-        table.write_parquet(path)
+    def table(self, columns: Columns) -> bytes:
+        """The bytes of the file."""
+        import polars
+
+        stream = io.BytesIO()
+        polars.DataFrame({name: np.array(v) for name, v in columns.items()}).write_parquet(stream)
+        return stream.getvalue()
 
 
-def table_of(packing: Packing) -> tuple[Any, list[str]]:
-    """A data frame of polars with a row for each sphere, and what is to be said of it."""
-    import polars
+class XyzWriter:
+    """Extended XYZ: rows of words, and a line above them that names columns and cell."""
 
-    standard = standard_columns(packing)
-    own, notes = own_columns(packing)
-    columns, more = flat(own)
-    columns, told = _of_one_frame(columns)
-    place = dict(zip("xyz", packing.position.T, strict=True))
-    ordered = {"id": standard.pop("id"), **place, "radius": packing.radius, **standard, **columns}
-    return polars.DataFrame({name: values.copy() for name, values in ordered.items()}), [
-        *notes,
-        *more,
-        *told,
-    ]
+    name = "xyz"
+    description = "extended XYZ with a radius, its cell and step; contacts lie beside it"
+    extensions: tuple[str, ...] = (".xyz", ".extxyz")
+
+    def write(self, packing: Packing, path: Path) -> Left:
+        """Write one frame; texts that are no single words lie beside it."""
+        own, notes = own_columns(packing)
+        held = {name: values for name, values in own.items() if _is_xyz(name, values)}
+        columns = {"pos": packing.position, "radius": packing.radius, **standard_columns(packing)}
+        properties: list[str] = []
+        rows: Columns = {}
+        for name, values in {**columns, **held}.items():
+            width = int(np.prod(values.shape[1:]))
+            properties.append(f"{name}:{LETTERS[values.dtype.kind]}:{width}")
+            words = np.where(values, "T", "F") if values.dtype.kind == "b" else values
+            # no other column has a name with a blank
+            parts = enumerate(words.reshape(len(values), width).T)
+            rows |= {f"{name} {place}": part for place, part in parts}
+        line = f"{_line(packing)}Properties={':'.join(properties)}"
+        table = csv_bytes(rows, " ", with_names=False)
+        path.write_bytes(f"{len(packing)}\n{line}\n".encode() + table)
+        left = flat({name: values for name, values in own.items() if name not in held})[0]
+        return Left(contacts=True, columns=tuple(left), notes=tuple(notes))
 
 
-def _of_one_frame(columns: Columns) -> tuple[Columns, list[str]]:
-    """The columns, none of them called as if its values told frames apart; and what was changed."""
-    found: Columns = {}
-    notes = []
-    for name, values in columns.items():
-        is_number = values.dtype.kind in "iuf"
-        if is_number and is_frame_name(name) and len(np.unique(values)) > 1:
-            free = free_name(name, [*found, *columns])
-            notes.append(
-                f"the column {name} is called {free}: {name} tells frames of a table apart"
-            )
-            found[free] = values
-        else:
-            found[name] = values
-    return found, notes
+def _line(packing: Packing) -> str:
+    """Cell, step and time, as the line above the rows names them."""
+    words = []
+    cell = packing.cell
+    if cell is not None:
+        vectors, origin = (
+            " ".join(map(repr, v.ravel().tolist())) for v in (cell.vectors, cell.origin)
+        )
+        along = " ".join("FT"[one] for one in cell.periodic)
+        words.append(f'Lattice="{vectors}" Origin="{origin}" pbc="{along}" ')
+    if packing.step is not None:
+        words.append(f"Timestep={packing.step} ")
+    if packing.time is not None:
+        words.append(f"Time={packing.time!r} ")
+    return "".join(words)
+
+
+def _is_xyz(name: str, values: npt.NDArray[Any]) -> bool:
+    """Whether extended XYZ has a place for a column: its name and its texts are single words."""
+    if re.search(r"[\s:\"=]", name) or not name or int(np.prod(values.shape[1:])) > 99:
+        return False
+    if name.lower() in ("pos", "position", "positions") or values.dtype == np.uint64:
+        return False
+    texts = values.ravel() if values.dtype.kind == "U" else ()
+    return all(text.split() == [text] for text in texts)

@@ -2,34 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
 from pathlib import Path
-from typing import Any
-from xml.sax.saxutils import quoteattr
+from typing import TYPE_CHECKING, Any
+from xml.sax.saxutils import escape
 
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.io.files import first_bytes
 from scanfab.io.writer import Left
-from scanfab.io.written import own_columns, standard_columns
+from scanfab.io.written import (
+    cell_of,
+    contact_arrays,
+    contacts_of,
+    frame_arrays,
+    own_columns,
+    standard_columns,
+)
+from scanfab.packing.cell import Cell
+from scanfab.packing.contacts import ContactList
 from scanfab.packing.packing import Packing
 
-TYPES = {
-    "i1": "Int8",
-    "u1": "UInt8",
-    "i2": "Int16",
-    "u2": "UInt16",
-    "i4": "Int32",
-    "u4": "UInt32",
-    "i8": "Int64",
-    "u8": "UInt64",
-    "f4": "Float32",
-    "f8": "Float64",
-}
+if TYPE_CHECKING:
+    from scanfab.io.parse.vtk_data import Mesh
+
+# step and time stand in the first line, so that a series is listed without reading its files
+MARK = re.compile(rb"\A<!-- scanfab step=(-?\d{1,18})? time=([-+.\de]{1,30})? -->")
+# the array of the file as a whole that says whether contacts are known, and the others
+KNOWN = "scanfab_contacts"
+FIELDS = {name: f"scanfab_{name}" for name in ("step", "cell", "origin", "periodic")}
+FIELDS["time"] = "TimeValue"
 
 
 class VtpWriter:
-    """One PolyData piece; all numbers in their bytes behind the elements."""
+    """PolyData by VTK's own writer, with all numbers as bytes."""
 
     name = "vtp"
     description = "VTK PolyData: spheres as points, contacts as lines, the cell as field data"
@@ -37,100 +44,90 @@ class VtpWriter:
 
     def write(self, packing: Packing, path: Path) -> Left:
         """Write one frame; it holds everything."""
+        from vtkmodules.vtkCommonCore import vtkPoints
+        from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+        from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+
         own, notes = own_columns(packing)
-        points = {**standard_columns(packing), "radius": packing.radius, **own}
-        contacts = packing.contacts
-        count = 0 if contacts is None else len(contacts)
-        cells: dict[str, npt.NDArray[Any]] = {}
-        pairs = np.zeros((0, 2), np.int64)
-        if contacts is not None:
-            pairs = contacts.pairs
-            ids = packing.id[pairs]
-            cells = {"id1": ids[:, 0], "id2": ids[:, 1], "image": contacts.image}
-            if contacts.force is not None:
-                cells["force"] = contacts.force
-            elif contacts.force_n is not None:
-                cells["force_n"] = contacts.force_n
-        file = _File()
-        body = [
-            f"<FieldData>{''.join(_field(packing))}</FieldData>",
-            f'<Piece NumberOfPoints="{len(packing)}" NumberOfVerts="0" NumberOfLines="{count}" '
-            'NumberOfStrips="0" NumberOfPolys="0">',
-            file.section("PointData", points),
-            file.section("CellData", cells),
-            file.section("Points", {"Points": packing.position}),
-            file.section(
-                "Lines",
-                {"connectivity": pairs.ravel(), "offsets": 2 * np.arange(1, count + 1)},
-            ),
-            "</Piece>",
-        ]
-        file.write(path, body)
+        frame, contacts, cells = frame_arrays(packing), packing.contacts, contact_arrays(packing)
+        fields = {FIELDS[name]: np.ravel(values)[None] for name, values in frame.items()}
+        fields[KNOWN] = np.array([int(contacts is not None)])
+        columns = {**standard_columns(packing), "radius": packing.radius, **own}
+        data, points, lines = vtkPolyData(), vtkPoints(), vtkCellArray()
+        points.SetData(_array("Points", packing.position))
+        data.SetPoints(points)
+        if contacts is not None and len(contacts):
+            lines.SetData(2, _array("", contacts.pairs.ravel()))
+            data.SetLines(lines)
+            cells |= zip(("id1", "id2"), packing.id[contacts.pairs].T, strict=True)
+        for place, arrays in (
+            (data.GetPointData(), columns),
+            (data.GetCellData(), cells),
+            (data.GetFieldData(), fields),
+        ):
+            for name, values in arrays.items():
+                place.AddArray(_array(name, values))
+        writer = vtkXMLPolyDataWriter()
+        writer.SetInputData(data)
+        writer.SetHeaderTypeToUInt64()
+        writer.SetCompressorTypeToNone()
+        writer.EncodeAppendedDataOff()
+        # a full disk is an OSError if VTK writes into memory first
+        writer.WriteToOutputStringOn()
+        writer.Write()
+        text = writer.GetOutputString()
+        step, time = ("" if one is None else repr(one) for one in (packing.step, packing.time))
+        mark = f"<!-- scanfab step={step} time={time} -->\n".encode()
+        path.write_bytes(mark + (text if isinstance(text, bytes) else text.encode()))
         return Left(no_step=False, notes=tuple(notes))
 
 
-def _field(packing: Packing) -> list[str]:
-    """Step, time, cell, and whether contacts are known, as text in the head of the file."""
-    found: list[tuple[str, str, int, list[Any]]] = []
-    if packing.time is not None:
-        found.append(("TimeValue", "Float64", 1, [packing.time]))
-    if packing.step is not None:
-        found.append(("scanfab_step", "Int64", 1, [packing.step]))
-    if packing.cell is not None:
-        cell = packing.cell
-        vectors = [float(one) for one in cell.vectors.ravel()]
-        found.append(("scanfab_cell", "Float64", 9, vectors))
-        found.append(("scanfab_origin", "Float64", 3, [float(one) for one in cell.origin]))
-        found.append(("scanfab_periodic", "Int64", 3, [int(one) for one in cell.periodic]))
-    known = packing.contacts is not None
-    found.append(("scanfab_contacts", "Int64", 1, [int(known)]))
-    return [
-        f'<DataArray type="{kind}" Name="{name}" NumberOfComponents="{width}" '
-        f'NumberOfTuples="{len(values) // width}" format="ascii">'
-        f"{' '.join(map(repr, values))}</DataArray>"
-        for name, kind, width, values in found
-    ]
+def _array(name: str, values: npt.NDArray[Any]) -> Any:
+    """An array of VTK, whose writer puts names between quotes as they are."""
+    from vtkmodules.util.numpy_support import numpy_to_vtk
+    from vtkmodules.vtkCommonCore import vtkStringArray
+
+    if values.dtype.kind == "U":
+        array = vtkStringArray()
+        array.SetNumberOfComponents(int(np.prod(values.shape[1:])))
+        array.SetNumberOfValues(values.size)
+        for place, word in enumerate(values.ravel().tolist()):
+            array.SetValue(place, word)
+    else:
+        numbers = values.astype(np.uint8) if values.dtype.kind == "b" else values
+        table = numbers.reshape(len(values), int(np.prod(values.shape[1:])))
+        array = numpy_to_vtk(np.ascontiguousarray(table), deep=True)  # type: ignore[no-untyped-call]
+    array.SetName(escape(name, {'"': "&quot;"}))
+    return array
 
 
-class _File:
-    """Elements that name places in what is appended, and what is appended."""
+def moment_of(path: Path) -> tuple[int | None, float | None]:
+    """Step and time, where scanfab wrote the file."""
+    match = MARK.match(first_bytes(path))
+    if match is None:
+        return None, None
+    step, time = match.groups()
+    return int(step) if step else None, float(time) if time else None
 
-    def __init__(self) -> None:
-        self.parts: list[bytes] = []
-        self.size = 0
 
-    def section(self, name: str, arrays: Mapping[str, npt.NDArray[Any]]) -> str:
-        """A section of arrays."""
-        return f"<{name}>{''.join(self._array(*one) for one in arrays.items())}</{name}>"
+def says_all(path: Path) -> bool:
+    """Whether scanfab wrote the file, so that there is no cell or step but those in it."""
+    return MARK.match(first_bytes(path)) is not None
 
-    def _array(self, name: str, values: npt.NDArray[Any]) -> str:
-        if values.dtype.kind == "U":
-            data = b"".join(str(one).encode() + b"\0" for one in values.ravel())
-            kind = "String"
-        else:
-            plain = values.astype(np.uint8) if values.dtype.kind == "b" else values
-            if plain.dtype.str[1:] not in TYPES:
-                plain = plain.astype(np.float64)
-            kind = TYPES[plain.dtype.str[1:]]
-            data = np.ascontiguousarray(plain, plain.dtype.newbyteorder("<")).tobytes()
-        width = int(np.prod(values.shape[1:]))
-        place = self.size
-        self.parts += [len(data).to_bytes(8, "little"), data]
-        self.size += 8 + len(data)
-        return (
-            f'<DataArray type="{kind}" Name={quoteattr(name)} NumberOfComponents="{width}" '
-            f'format="appended" offset="{place}"/>'
-        )
 
-    def write(self, path: Path, body: list[str]) -> None:
-        """Put the file on the disk."""
-        head = (
-            '<?xml version="1.0"?>\n<VTKFile type="PolyData" version="1.0" '
-            'byte_order="LittleEndian" header_type="UInt64"><PolyData>\n'
-        )
-        with open(path, "wb") as stream:
-            stream.write((head + "\n".join(body)).encode())
-            stream.write(b'\n</PolyData><AppendedData encoding="raw">_')
-            for part in self.parts:
-                stream.write(part)
-            stream.write(b"\n</AppendedData></VTKFile>\n")
+def is_packing(mesh: Mesh) -> bool:
+    """Whether a file says all that there is to say, contacts and cell as well."""
+    return KNOWN in mesh.field_arrays
+
+
+def packing_cell(path: Path, mesh: Mesh) -> Cell | None:
+    """The cell of a packing."""
+    fields = mesh.field_arrays
+    return cell_of(path, {name: fields[own] for name, own in FIELDS.items() if own in fields})
+
+
+def packing_contacts(path: Path, mesh: Mesh) -> ContactList | None:
+    """The contacts of a packing; None if they were not known."""
+    if not np.any(mesh.field_arrays[KNOWN]):
+        return None
+    return contacts_of(path, mesh.lines, mesh.line_arrays)

@@ -1,0 +1,126 @@
+"""What scanfab alone writes: packings as ``.npz``, and the companion files of other formats."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scanfab.base.errors import ReadError
+from scanfab.io.beside import companion_kind, read_contacts
+from scanfab.io.files import first_bytes
+from scanfab.io.formats.columns import grain_table
+from scanfab.io.parse.sheet_binary import IS_NPZ, npz_shapes, read_npz
+from scanfab.io.reader import (
+    BODIES,
+    WALLS,
+    Carries,
+    FileKind,
+    GrainTable,
+    JoinedContacts,
+    ReadOptions,
+    Snapshot,
+)
+from scanfab.io.writer import Left
+from scanfab.io.written import (
+    cell_of,
+    contact_arrays,
+    contacts_of,
+    frame_arrays,
+    own_columns,
+    standard_columns,
+)
+from scanfab.packing.packing import Packing
+
+# the array that makes it a packing; its value is the version of the layout
+MARK = "scanfab_packing"
+# stands before the names of the columns of the grains
+COLUMN = "columns/"
+
+
+class NpzFormat:
+    """Reader and writer plugin for arrays named as a :class:`scanfab.Packing` names them."""
+
+    name = "npz"
+    description = "packings as arrays of NumPy; .contacts.csv, .frame.csv and .columns.csv"
+    extensions = (".npz",)
+    lists_contacts = True
+
+    def recognises(self, path: Path) -> bool:
+        """By the mark among the arrays, or the first line of a companion file."""
+        if first_bytes(path, 2) == IS_NPZ:
+            try:
+                return MARK in npz_shapes(path)
+            except ReadError:
+                return False
+        return companion_kind(path) is not None
+
+    def kind(self, path: Path) -> FileKind:
+        """Grains, or what belongs to grains in another file."""
+        if first_bytes(path, 2) == IS_NPZ:
+            return "grains"
+        return "contacts" if companion_kind(path) == "contacts" else "cell"
+
+    def snapshots(self, path: Path) -> list[Snapshot]:
+        """One, whose step and time are those of the packing."""
+        if self.kind(path) != "grains":
+            return [Snapshot(path)]
+        moment: list[float | None] = [None, None]
+        for name, values in read_npz(path, ("step", "time")).items():
+            if values.size != 1 or values.dtype.kind not in "iuf" or not np.isfinite(values).all():
+                raise ReadError(f"{path}: {name}: expected one number")
+            moment[name == "time"] = values.item()
+        step = None if moment[0] is None else int(moment[0])
+        return [Snapshot(path, step, moment[1], stepless=step is None)]
+
+    def carries(self, path: Path) -> Carries:
+        """The cell is among the arrays, or there is none."""
+        return "cell"
+
+    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+        """The arrays, with the contacts that they list."""
+        path = snapshot.path
+        arrays = read_npz(path)
+        given = ("position", "radius", "id", BODIES, WALLS)
+        columns: dict[str, Any] = {name: arrays[name] for name in given if name in arrays}
+        columns |= {k.removeprefix(COLUMN): v for k, v in arrays.items() if k.startswith(COLUMN)}
+        if len({values.shape[:1] for values in columns.values()}) != 1:
+            raise ReadError(f"{path}: expected arrays with a row for each grain")
+        grains = grain_table(path, columns, cell_of(path, arrays), options)
+        if "pairs" not in arrays:
+            return grains
+        return grains._replace(contacts=contacts_of(path, arrays["pairs"], arrays))
+
+    def left_out(self, path: Path) -> list[str]:
+        """Of what scanfab writes nothing is left out."""
+        return []
+
+    def read_contacts(
+        self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
+    ) -> JoinedContacts:
+        """Those that lie beside a file of grains."""
+        if first_bytes(snapshot.path, 2) == IS_NPZ:
+            raise ReadError(
+                f"{snapshot.path}: expected contacts, found a packing: read it by itself"
+            )
+        return read_contacts(snapshot.path, grains)
+
+    def write(self, packing: Packing, path: Path) -> Left:
+        """Write one frame; it holds everything."""
+        own, notes = own_columns(packing)
+        arrays: dict[str, Any] = {
+            MARK: 1,
+            "position": packing.position,
+            "radius": packing.radius,
+            **standard_columns(packing),
+            **{f"{COLUMN}{name}": values for name, values in own.items()},
+            **frame_arrays(packing),
+        }
+        if packing.contacts is not None:
+            arrays |= {"pairs": packing.contacts.pairs, **contact_arrays(packing)}
+        stream = io.BytesIO()
+        np.savez_compressed(stream, **arrays)
+        path.write_bytes(stream.getvalue())
+        return Left(no_step=False, notes=tuple(notes))
