@@ -25,10 +25,12 @@ from scanfab.packing.contacts import ContactList
 from scanfab.packing.packing import Packing
 
 if TYPE_CHECKING:
-    from scanfab.io.parse.vtk_data import Mesh
+    from scanfab.io.mesh import Mesh
 
 # step and time stand in the first line, so that a series is listed without reading its files
-MARK = re.compile(rb"\A<!-- scanfab step=(-?\d{1,18})? time=([-+.\de]{1,30})? -->")
+NUMBER = rb"(?P<time>[-+]?\d[\d.]{0,30}(?:[eE][-+]?\d{1,3})?)"
+MARK = re.compile(rb"\A<!-- scanfab step=(?P<step>-?\d{1,18})? time=" + NUMBER + rb"? -->")
+TIME = re.compile(rb'(?P<step>)Name="TimeValue"[^>]*format="ascii"[^>]*>\s*' + NUMBER + rb"\s*<")
 # the array of the file as a whole that says whether contacts are known, and the others
 KNOWN = "scanfab_contacts"
 FIELDS = {name: f"scanfab_{name}" for name in ("step", "cell", "origin", "periodic")}
@@ -102,11 +104,10 @@ def _array(name: str, values: npt.NDArray[Any]) -> Any:
 
 
 def moment_of(path: Path) -> tuple[int | None, float | None]:
-    """Step and time, where scanfab wrote the file."""
-    match = MARK.match(first_bytes(path))
-    if match is None:
-        return None, None
-    step, time = match.groups()
+    """Step and time of a file that scanfab wrote; the time of others, if it stands as text."""
+    head = first_bytes(path, 1 << 14)
+    match = MARK.match(head) or TIME.search(head)
+    step, time = (None, None) if match is None else match.group("step", "time")
     return int(step) if step else None, float(time) if time else None
 
 
