@@ -40,6 +40,10 @@ DUPLICATE = 1
 HARMLESS = re.compile("InformationKey|Could not locate key")
 
 
+# an array of a file without points; in a FIELD its line is NAME COMPONENTS 0 TYPE
+EMPTY_ARRAY = re.compile(r"^(?:SCALARS (\S+)|VECTORS (\S+)|(\S+) (\d+) 0 [a-z])", re.MULTILINE)
+
+
 class Mesh(NamedTuple):
     """The content of a VTK file."""
 
@@ -72,6 +76,11 @@ def form_of(path: Path) -> str | None:
     return "Xdmf" if re.search(rb"<Xdmf\b", head) else None
 
 
+def holds_mesh(form: str | None) -> bool:
+    """Whether a file of this form holds points and cells, or lists pieces that do."""
+    return form is not None and (form.lower() in MESHES or form in PIECES)
+
+
 def read_mesh(path: Path, parts: Sequence[Path] = ()) -> Mesh:
     """
     Read a VTK file, or the pieces that it lists.
@@ -100,13 +109,18 @@ def _read_one(path: Path) -> Mesh:
         if any(form_of(piece) in PIECES for piece in pieces):
             raise ReadError(f"{path}: one of its pieces lists pieces itself")
         return _joined(path, [_read_one(piece) for piece in pieces])
-    if form.lower() not in MESHES:
+    if not holds_mesh(form):
         raise ReadError(f"{path}: a {form} holds neither grains nor contacts")
     _check_other_files(path, form)
     head = first_bytes(path)
     if head.startswith(b"# vtk") and re.search(rb"^POINTS\s+0\s", head, re.MULTILINE):
-        # VTK loses all arrays of such a file
-        return Mesh(np.zeros((0, 3)), {}, np.zeros((0, 2), np.int64), {}, False, {})
+        # VTK loses all arrays of such a file, but their names matter
+        found = EMPTY_ARRAY.findall(first_bytes(path, 1 << 16).decode("utf-8", "replace"))
+        arrays = {
+            scalar or vector or name: np.zeros((0, 3) if vector or count == "3" else 0)
+            for scalar, vector, name, count in found
+        }
+        return Mesh(np.zeros((0, 3)), arrays, np.zeros((0, 2), np.int64), {}, False, {})
     mesh = fenced(mesh_in_worker, path)
     if is_ascii(head) and not _last_byte(path).isspace():
         warnings.warn(
@@ -181,15 +195,6 @@ def _common(arrays: Sequence[Arrays]) -> Arrays:
         for name in names
         if len({one[name].shape[1:] for one in arrays}) == 1
     }
-
-
-def read_bounds(path: Path) -> FloatArray | None:
-    """Lower and upper bound of a grid along x, y and z, shape (3, 2); None if it has no points."""
-    points = _read_one(path).points
-    if len(points) == 0:
-        return None
-    bounds: FloatArray = np.array([points.min(axis=0), points.max(axis=0)]).T
-    return bounds
 
 
 def read_faces(path: Path) -> tuple[FloatArray, list[IntArray]]:

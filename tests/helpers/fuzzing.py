@@ -12,7 +12,7 @@ from random import Random
 
 from scanfab.base.errors import ScanfabError, ScanfabNote, ScanfabWarning
 from scanfab.io.families import Family
-from scanfab.io.mesh import read_bounds
+from scanfab.io.mesh import read_mesh
 from scanfab.io.reader import ReadOptions
 from scanfab.io.registry import reader_for, reader_named
 from scanfab.io.series import Series
@@ -252,7 +252,7 @@ def read_everything(path: Path, format: str, options: ReadOptions) -> None:
                 reader.read_contacts(snapshot, options, grains)
         if format != "yade":
             with suppress(ScanfabError):
-                read_bounds(path)
+                read_mesh(path)
         with suppress(ScanfabError):
             own = Series("", companion, (one("contacts"),), "auto", options)
             next(iter(own)).read()

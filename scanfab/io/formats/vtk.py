@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,7 @@ from scanfab.io.formats.columns import grain_table, has_radius, whole_numbers
 from scanfab.io.formats.join import join_ids, join_positions
 from scanfab.io.formats.proof import proved_force, tell_left_out
 from scanfab.io.formats.yade_cells import cell_beside, cell_file, is_cell_file
-from scanfab.io.mesh import Mesh, elements, form_of, listed, read_bounds, read_mesh
+from scanfab.io.mesh import Mesh, elements, form_of, holds_mesh, listed, read_mesh
 from scanfab.io.reader import (
     Carries,
     FileKind,
@@ -36,18 +36,8 @@ from scanfab.io.writers.vtp import (
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import ContactList
 
-# other kinds of VTK files are grids and indexes of files
-HOLDING_POINTS = (
-    "PolyData",
-    "POLYDATA",
-    "UnstructuredGrid",
-    "UNSTRUCTURED_GRID",
-    "PPolyData",
-    "PUnstructuredGrid",
-    "MultiBlockDataSet",
-    "PartitionedDataSetCollection",
-    "Xdmf",
-)
+# boxes along the axes are no grains; other kinds of VTK files are indexes, or images
+BOXES = ("RectilinearGrid", "RECTILINEAR_GRID")
 # files that list those of one frame: grains, contacts, boxes
 BLOCKS = ("vtkMultiBlockDataSet", "vtkPartitionedDataSetCollection")
 
@@ -57,18 +47,8 @@ class VtkReader:
 
     name = "vtk"
     description = "any VTK point cloud with a radius; contacts as lines; lists of files (.pvd .vtm)"
-    extensions: tuple[str, ...] = (
-        ".vtk",
-        ".vtp",
-        ".vtu",
-        ".pvtp",
-        ".pvtu",
-        ".vtm",
-        ".pvd",
-        ".vtkhdf",
-        ".xdmf",
-        ".xmf",
-    )
+    extensions: tuple[str, ...] = (".vtk", ".vtp", ".vtu", ".pvtp", ".pvtu", ".vtm", ".pvd")
+    extensions += (".vtkhdf", ".xdmf", ".xmf")
     generic = True
     lists_contacts = True
     # whether one end of a contact may be a wall, which is not in the grain file
@@ -85,7 +65,7 @@ class VtkReader:
         form = form_of(path)
         if form == "Collection" or form in BLOCKS:
             return "index"
-        if form not in HOLDING_POINTS:
+        if not holds_mesh(form) or form in BOXES:
             return "other"
         if is_cell_file(path):
             return "cell"
@@ -118,7 +98,7 @@ class VtkReader:
             return own._replace(contacts=packing_contacts(snapshot.path, mesh))
         if len(mesh.points) == 0:
             columns["radius"] = np.zeros(0)
-        cell = _box_beside(snapshot.path)
+        cell = _read_box(snapshot.path)
         if cell is None and options.cell is None:
             cell = cell_beside(snapshot.path, mesh.points)
         grains = grain_table(snapshot.path, columns, cell, options)
@@ -133,20 +113,18 @@ class VtkReader:
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
     ) -> JoinedContacts:
         """Lines; by the arrays id1 and id2 where grains have ids, else by their ends."""
-        mesh = read_mesh(snapshot.path)
-        joined = self._joined(snapshot.path, mesh, grains)
-        assert joined.contacts is not None
-        contacts = self._proved(snapshot.path, grains, joined.contacts, mesh)
-        return joined._replace(contacts=contacts)
-
-    def _joined(self, path: Path, mesh: Mesh, grains: GrainTable) -> JoinedContacts:
+        path, mesh = snapshot.path, read_mesh(snapshot.path)
         force, force_n = self.force_on_second(mesh), self.normal_force(mesh)
         ids = [mesh.line_arrays.get(name) for name in ("id1", "id2")]
         named = [whole_numbers(path, values) for values in ids if values is not None]
         if grains.id is not None and len(named) == 2:
             pairs = np.column_stack(named)
-            return join_ids(path, grains, pairs, force, walls=self.walls, force_n=force_n)
-        return join_positions(path, grains, mesh.points[mesh.lines], force, force_n)
+            joined = join_ids(path, grains, pairs, force, walls=self.walls, force_n=force_n)
+        else:
+            joined = join_positions(path, grains, mesh.points[mesh.lines], force, force_n)
+        assert joined.contacts is not None
+        contacts = self._proved(path, grains, joined.contacts, mesh)
+        return joined._replace(contacts=contacts)
 
     def _proved(
         self, path: Path, grains: GrainTable, contacts: ContactList, mesh: Mesh
@@ -164,33 +142,27 @@ class VtkReader:
         """LIGGGHTS writes a box beside its files; VTK itself has no cell."""
         if says_all(path):
             return "cell"
-        return "nothing" if _box_beside(path) is None else "box"
+        return "nothing" if _read_box(path) is None else "box"
 
     def beside(self, path: Path) -> list[Path]:
         """The box of LIGGGHTS and the cell of YADE."""
         found = (_box_file(path), cell_file(path))
         return [file for file in found if file is not None]
 
-    def _blocks(self, index: Path) -> dict[FileKind, list[Path]]:
-        """The files of one frame that a ``.vtm`` lists, by what they hold."""
-        found: dict[FileKind, list[Path]] = {}
-        for path in listed(index, "DataSet", "file"):
+    def _read_blocks(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+        """The grains of the one file of a ``.vtm`` that has some, with the contacts of another."""
+        _refuse_parts(snapshot, "a list of files itself")
+        found: dict[FileKind, list[Path]] = {"grains": [], "contacts": []}
+        for path in listed(snapshot.path, "DataSet", "file"):
             if form_of(path) not in (*BLOCKS, "Collection"):
                 found.setdefault(self.kind(path), []).append(path)
-        return found
-
-    def _read_blocks(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
-        """The grains of the one file that has some, with the contacts of the one that has some."""
-        _refuse_parts(snapshot, "a list of files itself")
-        index, blocks = snapshot.path, self._blocks(snapshot.path)
-        grains, contacts = blocks.get("grains", []), blocks.get("contacts", [])
-        if len(grains) != 1 or len(contacts) > 1:
+        if len(found["grains"]) != 1 or len(found["contacts"]) > 1:
             raise ReadError(
-                f"{index}: expected one file of grains and at most one of contacts, found "
-                f"{len(grains)} and {len(contacts)}: name one as the source"
+                f"{snapshot.path}: expected one file of grains and at most one of contacts, found "
+                f"{len(found['grains'])} and {len(found['contacts'])}: name one as the source"
             )
-        table = self.read_grains(Snapshot(grains[0]), options)
-        for path in contacts:
+        table = self.read_grains(Snapshot(found["grains"][0]), options)
+        for path in found["contacts"]:
             joined = self.read_contacts(Snapshot(path), options, table)
             table = table._replace(contacts=joined.contacts, wall_contacts=joined.wall_contacts)
         return table
@@ -208,11 +180,17 @@ class VtkReader:
                 continue
             other = frames.setdefault(time, {}).setdefault(part, path)
             if other is not path:
+                moment = "no timestep" if time is None else f"the timestep {time:g}"
                 raise ReadError(
-                    f"{index}: {other.name} and {path.name} have {_moment(time)} and the same part "
-                    f"and group: expected another time, or another part of one frame"
+                    f"{index}: {other.name} and {path.name} have {moment} and the same part and "
+                    f"group: expected another time, or another part of one frame"
                 )
-        _refuse_unlike(index, kinds)
+        unlike = {kind: name for (name, *_), kind in kinds.items() if kind in ("grains", "points")}
+        if len(unlike) > 1:
+            raise ReadError(
+                f"{index}: {unlike['points']} are points without a radius beside the grains in "
+                f"{unlike['grains']}: take them out of the list, or name the files as the source"
+            )
         return [_frame(list(parts.values()), time) for time, parts in frames.items()]
 
     def force_on_second(self, mesh: Mesh) -> FloatArray | None:
@@ -247,25 +225,11 @@ def _entries(index: Path) -> list[tuple[Path, float | None, tuple[str, ...]]]:
         raise ReadError(f"{index}: cannot be read as a list of VTK files: {error}") from None
 
 
-def _moment(time: float | None) -> str:
-    return "no timestep" if time is None else f"the timestep {time:g}"
-
-
 def _frame(files: Sequence[Path], time: float | None) -> Snapshot:
     """Its step is the last number of the names that all parts have in common."""
     numbers = zip(*(re.findall(r"\d+", Path(bare_name(file)).stem) for file in files), strict=False)
     same = [int(one[0]) for one in numbers if len(set(one)) == 1]
     return Snapshot(files[0], same[-1] if same else None, time, parts=tuple(files[1:]))
-
-
-def _refuse_unlike(index: Path, kinds: Mapping[tuple[str, ...], FileKind]) -> None:
-    """Points without a radius are no part of grains that have one."""
-    found = {kind: family[0] for family, kind in kinds.items() if kind in ("grains", "points")}
-    if len(found) > 1:
-        raise ReadError(
-            f"{index}: {found['points']} are points without a radius beside the grains in "
-            f"{found['grains']}: take them out of the list, or name the files as the source"
-        )
 
 
 def _refuse_parts(snapshot: Snapshot, what: str) -> None:
@@ -276,12 +240,6 @@ def _refuse_parts(snapshot: Snapshot, what: str) -> None:
             f"{snapshot.path}: is {what}, and cannot be joined with {names} of the same timestep: "
             f"name one as the source"
         )
-
-
-def _box_beside(path: Path) -> Cell | None:
-    """The box that LIGGGHTS writes beside a VTK dump; it does not say what is periodic."""
-    file = _box_file(path)
-    return None if file is None else _read_box(file)
 
 
 def _box_file(path: Path) -> Path | None:
@@ -296,10 +254,12 @@ def _box_file(path: Path) -> Path | None:
 
 
 def _read_box(path: Path) -> Cell | None:
-    bounds = read_bounds(path)
-    if bounds is None:
+    """The box that LIGGGHTS writes beside a VTK dump; it does not say what is periodic."""
+    file = _box_file(path)
+    corners = np.zeros((0, 3)) if file is None else read_mesh(file).points
+    if len(corners) == 0:
         return None
-    edges = bounds[:, 1] - bounds[:, 0]
-    if not np.all((edges > 0) & (np.abs(bounds).max(axis=1) < MOST)):
+    low, edges = corners.min(axis=0), np.ptp(corners, axis=0)
+    if not np.all((edges > 0) & (np.abs(corners).max(axis=0) < MOST)):
         return None
-    return Cell(edges, (False, False, False), bounds[:, 0])
+    return Cell(edges, (False, False, False), low)

@@ -5,18 +5,14 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-import numpy as np
-
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.lengths import MOST
 from scanfab.base.typing import FloatArray
-from scanfab.io.files import check_memory, first_bytes, plain
+from scanfab.io.files import first_bytes
 from scanfab.io.formats.columns import grain_table
 from scanfab.io.formats.vtk import VtkReader, vectors
 from scanfab.io.formats.yade_save import is_binary_save, is_save, read_save, snapshot_of_save
 from scanfab.io.mesh import Mesh
-from scanfab.io.parse.number_rows import rows_of_numbers
-from scanfab.io.parse.text_table import FILLED, has_pieces, parse_columns, read_to_end
 from scanfab.io.reader import (
     Carries,
     FileKind,
@@ -25,14 +21,16 @@ from scanfab.io.reader import (
     ReadOptions,
     Snapshot,
 )
-from scanfab.io.unpacking import check_lines
+from scanfab.io.text import Layout, read_rows, text_of
 from scanfab.packing.cell import Cell
 
 # legacy VTK by VTKExporter: VTK itself writes no dot behind the version
 EXPORTER_HEAD = b"# vtk DataFile Version 3.0.\n"
 PERIODIC_HEAD = b"##PERIODIC::"
-COMMENTS = re.compile(rb"(?:#[^\n]*\n)*")
 TEXT_HEADS = (b"#format ", PERIODIC_HEAD)
+# an array that VTKRecorder's interactions have
+RECORDED = b'Name="forceN"'
+COMMENT = re.compile(rb"^[ \t]*#[^\n]*", re.MULTILINE)
 
 
 class YadeReader(VtkReader):
@@ -47,12 +45,9 @@ class YadeReader(VtkReader):
     def recognises(self, path: Path) -> bool:
         """YADE's own first lines, or the arrays of VTKRecorder's interactions."""
         head = first_bytes(path)
-        return (
-            head.startswith((EXPORTER_HEAD, *TEXT_HEADS))
-            or (b"<VTKFile" in head and b'Name="forceN"' in head)
-            or is_save(path)
-            or is_binary_save(path)
-        )
+        is_own = head.startswith((EXPORTER_HEAD, *TEXT_HEADS))
+        is_recorded = b"<VTKFile" in head and RECORDED in head
+        return is_own or is_recorded or is_save(path) or is_binary_save(path)
 
     def kind(self, path: Path) -> FileKind:
         """A text export and a saved simulation hold grains."""
@@ -61,8 +56,8 @@ class YadeReader(VtkReader):
                 f"{path}: YADE's binary format can be read by the same build of YADE only: load it "
                 f"there, and save it as XML: O.save('name.xml.bz2')"
             )
-        if b'Name="forceN"' in first_bytes(path):
-            return "contacts"  # of VTKRecorder; reading them may be refused (see `vtk_checks`)
+        if RECORDED in first_bytes(path):
+            return "contacts"  # reading them may be refused: see `vtk_checks`
         return "grains" if _is_text(path) or is_save(path) else super().kind(path)
 
     def snapshots(self, path: Path) -> list[Snapshot]:
@@ -73,14 +68,9 @@ class YadeReader(VtkReader):
         """Text columns by the names of the first line; VTK arrays by their own."""
         if is_save(snapshot.path):
             return read_save(snapshot, options)
-        if not _is_text(snapshot.path):
-            return super().read_grains(snapshot, options)
-        path = snapshot.path
-        lines = first_bytes(path, 1 << 14).decode("utf-8", "replace").splitlines()
-        columns = _columns(path)
-        names, cell = _text_columns(path, lines, len(columns) or None)
-        columns = columns or [np.zeros(0)] * len(names)
-        return grain_table(path, dict(zip(names, columns, strict=True)), cell, options)
+        if _is_text(snapshot.path):
+            return _read_text(snapshot, options)
+        return super().read_grains(snapshot, options)
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
@@ -120,28 +110,24 @@ def _is_text(path: Path) -> bool:
     return first_bytes(path).startswith(TEXT_HEADS)
 
 
-def _columns(path: Path) -> list[FloatArray]:
-    """The numbers of a text by columns; none of an empty frame."""
-    check_memory(path, 6.0 * plain(path).stat().st_size)
-    check_lines(path, plain(path))
-    # a long text need not be copied where it begins with a row
-    with open(plain(path), "rb", buffering=0) as stream:
-        above = COMMENTS.match(stream.read(1 << 12))
-        assert above is not None
-        columns = read_to_end(plain(path), above.end()) if has_pieces(plain(path)) else None
-        if columns is not None:
-            return columns
-        stream.seek(above.end())
-        data = stream.readall()
-    if FILLED.search(data) is None:
-        return []
-    columns = parse_columns(data, 0, len(data))
-    if columns is None:
-        return list(rows_of_numbers(path, data, above=above[0].count(b"\n")).T)
-    return columns
+def _read_text(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+    """Columns by the names in the first line, or in the second one for attributes."""
+    path, text = snapshot.path, text_of(snapshot)
+    lines = first_bytes(path, 1 << 14).decode("utf-8", "replace").splitlines()
+    rows = COMMENT.sub(b"", text)
+    words = rows.lstrip().split(b"\n", 1)[0].split()
+    names, cell = _names_and_cell(path, lines, len(words) or None)
+    if words and len(names) != len(words):
+        raise ReadError(
+            f"{path}: the first line names {len(names)} columns, the rows have {len(words)}"
+        )
+    columns = read_rows(snapshot, rows, Layout(tuple(names)))
+    return grain_table(path, columns, cell, options)
 
 
-def _text_columns(path: Path, lines: list[str], count: int | None) -> tuple[list[str], Cell | None]:
+def _names_and_cell(
+    path: Path, lines: list[str], count: int | None
+) -> tuple[list[str], Cell | None]:
     """Names of the columns and the cell, from the first lines; count is None without rows."""
     head = lines[0]
     if head.startswith("##PERIODIC::"):
@@ -149,17 +135,12 @@ def _text_columns(path: Path, lines: list[str], count: int | None) -> tuple[list
             edges = [float(word) for word in head.removeprefix("##PERIODIC::").split()]
             if not all(abs(edge) < MOST for edge in edges):
                 raise ValueError
-            cell = Cell(edges)
+            return ["x", "y", "z", "r", "clumpId"][:count], Cell(edges)
         except (ValueError, PackingError):
             raise ReadError(f"{path}, line 1: expected three lengths, found {head!r}") from None
-        names = ["x", "y", "z", "r", "clumpId"][:count]
-    else:
-        cell = None
-        names = head.removeprefix("#format").strip().split("_")
-        if names[-1] == "attrs":
-            named = re.fullmatch(r"#\s*(x y z r( .*)?)", lines[1]) if len(lines) > 1 else None
-            names = named[1].split() if named else names[:-1]
-            names += [f"attr{number}" for number in range(1, (count or 0) - len(names) + 1)]
-    if count is not None and len(names) != count:
-        raise ReadError(f"{path}: the first line names {len(names)} columns, the rows have {count}")
-    return names, cell
+    names = head.removeprefix("#format").strip().split("_")
+    if names[-1] == "attrs":
+        named = re.fullmatch(r"#\s*(x y z r( .*)?)", lines[1]) if len(lines) > 1 else None
+        names = named[1].split() if named else names[:-1]
+        names += [f"attr{number}" for number in range(1, (count or 0) - len(names) + 1)]
+    return names, None

@@ -58,18 +58,24 @@ def cell_beside(path: Path, position: FloatArray) -> Cell | None:
         If spheres lie outside: then it is not their cell.
     """
     file = cell_file(path)
-    if file is None:
+    cell = None if file is None else _read_cell(file)
+    if file is None or cell is None:
         _tell_of_doubt(path)
         return None
-    cell = _read_cell(file)
-    if cell is not None:
-        _refuse_outside(path, file, cell, position)
-        pattern = re.sub(r"\d+", "*", file.name)
-        warnings.warn(
-            f"the cell is read from {file.parent / pattern}, beside the grains",
-            ScanfabNote,
-            stacklevel=2,
+    fractions = cell.fractional(position)
+    outside = np.any((fractions < -ROUNDING) | (fractions > 1.0 + ROUNDING), axis=1)
+    if outside.any():
+        raise ReadError(
+            f"{path}: {np.count_nonzero(outside)} grains lie outside the cell of {file}, into "
+            f"which YADE wraps them: it is the cell of another state; name the right one with "
+            f'`cell=(LX, LY, LZ)` or `cell="FILE.csv"`'
         )
+    pattern = re.sub(r"\d+", "*", file.name)
+    warnings.warn(
+        f"the cell is read from {file.parent / pattern}, beside the grains",
+        ScanfabNote,
+        stacklevel=2,
+    )
     return cell
 
 
@@ -83,8 +89,20 @@ def cell_file(path: Path) -> Path | None:
     recorded = RECORDED.fullmatch(name)
     if recorded is None:
         return None
-    beside = _with_any_packing(path.with_name(f"{recorded[1]}pericell.{recorded[2]}.vtu"))
-    return beside or _saved_state(_saves(folder, recorded[1], stamp), int(recorded[2]))
+    cell = path.with_name(f"{recorded[1]}pericell.{recorded[2]}.vtu")
+    for ending in ("", *COMPRESSED_SUFFIXES):
+        if (file := cell.with_name(cell.name + ending)).is_file():
+            return file
+    # or else a saved state of this step, whose name has the number of the step, too
+    step = int(recorded[2])
+    found = [
+        file
+        for file in _saves(folder, recorded[1], stamp)
+        if step in map(int, re.findall(r"\d+", bare_name(file)))
+        and is_save(file)
+        and snapshot_of_save(file).step == step
+    ]
+    return found[0] if len(found) == 1 else None
 
 
 # listed once for all files of a folder, as long as none comes or goes
@@ -150,23 +168,6 @@ def _numbered(folder: Path, start: str) -> dict[int, Path]:
     return {int(match[1]): file for file in files if (match := name.fullmatch(bare_name(file)))}
 
 
-def _with_any_packing(path: Path) -> Path | None:
-    packed = [path, *(path.with_name(path.name + ending) for ending in COMPRESSED_SUFFIXES)]
-    return next((file for file in packed if file.is_file()), None)
-
-
-def _saved_state(files: list[Path], step: int) -> Path | None:
-    """The ``O.save`` of the same step, whose name bears the number of the step too."""
-    found = [
-        file
-        for file in files
-        if step in map(int, re.findall(r"\d+", bare_name(file)))
-        and is_save(file)
-        and snapshot_of_save(file).step == step
-    ]
-    return found[0] if len(found) == 1 else None
-
-
 def _read_cell(file: Path) -> Cell | None:
     """The cell in a file of either kind; None if a saved state does not repeat."""
     if not is_cell_file(file):
@@ -178,14 +179,3 @@ def _read_cell(file: Path) -> Cell | None:
         return Cell(corners[list(ENDS)] - corners[ORIGIN], origin=corners[ORIGIN])
     except PackingError as error:
         raise ReadError(f"{file}: {error}") from None
-
-
-def _refuse_outside(path: Path, file: Path, cell: Cell, position: FloatArray) -> None:
-    fractions = cell.fractional(position)
-    outside = np.any((fractions < -ROUNDING) | (fractions > 1.0 + ROUNDING), axis=1)
-    if outside.any():
-        raise ReadError(
-            f"{path}: {np.count_nonzero(outside)} grains lie outside the cell of {file}, into "
-            f"which YADE wraps them: it is the cell of another state; name the right one with "
-            f'`cell=(LX, LY, LZ)` or `cell="FILE.csv"`'
-        )

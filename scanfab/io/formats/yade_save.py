@@ -14,23 +14,20 @@ import numpy as np
 
 from scanfab.base.errors import PackingError, ReadError, ScanfabWarning
 from scanfab.base.lengths import MOST
-from scanfab.base.typing import IntArray
+from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.files import first_bytes, unpacked
 from scanfab.io.formats.columns import grain_table, whole_numbers
 from scanfab.io.formats.join import join_ids, rows_of_ids
 from scanfab.io.reader import GrainTable, ReadOptions, Snapshot
-from scanfab.io.unpacking import Readable
 from scanfab.packing.cell import Cell
 from scanfab.packing.walls import ListedWallForces
 
 STEP = re.compile(rb"<iter>\s*(\d{1,18})\s*</iter>")
-TIME = re.compile(rb"<time>\s*([-+.\deE]+)\s*</time>")
+TIME = re.compile(rb"<time>\s*(\d[-+.\deE]*)\s*</time>")
 
-# bytes that are parsed at a time; pieces without a new body or contact after which none will come,
-# and inside one; how deep elements stand in one another
-PIECE = 1 << 16
-BARREN, BARREN_PART = 384, 128
-DEPTH = 200
+# bytes that are parsed at a time; elements without a body or contact after which none will come
+# (32 bytes of the file count as one more element); and how deep elements stand in one another
+PIECE, BARREN, DEPTH = 1 << 16, 500_000, 200
 
 # where the scene's own values stand
 SCENE = ["boost_serialization", "scene", "px"]
@@ -68,118 +65,113 @@ def read_save(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         If the file is not as YADE writes it.
     """
     path = snapshot.path
-    scene = _Scene(path)
-    scene.read()
-    columns = {
-        "id": np.array(scene.ids, dtype=np.float64),
-        "mask": np.array(scene.masks, dtype=np.float64),
-        "position": np.array(scene.centres, dtype=np.float64).reshape(-1, 3),
-        "radius": np.array(scene.radii, dtype=np.float64),
-    }
-    if max(scene.clumps, default=-1.0) >= 0:
-        columns["clumpId"] = np.array(scene.clumps, dtype=np.float64)
-    grains = grain_table(path, columns, scene.cell(), options)
-    pairs = whole_numbers(path, np.array(scene.pairs, dtype=np.float64).ravel()).reshape(-1, 2)
-    image = whole_numbers(path, np.array(scene.images, dtype=np.float64).ravel()).reshape(-1, 3)
+    scene = _Scene()
+    try:
+        _walk(path, scene)
+    except (ElementTree.ParseError, LookupError, ValueError, OverflowError) as error:
+        raise ReadError(
+            f"{path}: cannot be read as a simulation that YADE saved (O.save): {error}"
+        ) from None
+    spheres = np.array(scene.spheres, dtype=np.float64).reshape(-1, 7)
+    id, mask, clump, radius = spheres[:, :4].T
+    columns = {"id": id, "mask": mask, "position": spheres[:, 4:], "radius": radius}
+    if np.any(clump >= 0):
+        columns["clumpId"] = clump
+    grains = grain_table(path, columns, _cell(path, scene), options)
+    listed = np.array(scene.contacts, dtype=np.float64).reshape(-1, 11)
+    pairs = whole_numbers(path, listed[:, :2].ravel()).reshape(-1, 2)
     unknown = ~np.isin(pairs, scene.bodies)
     if unknown.any():
         raise ReadError(f"{path}: a contact names the body {pairs[unknown][0]}, which is not there")
     # contacts of walls with walls are not ours
-    ours = np.isin(pairs, scene.ids).any(axis=1)
-    force = None
-    if 0 < len(scene.forces) < len(pairs):
-        lacking = f"{len(pairs) - len(scene.forces)} of {len(pairs)} contacts"
+    ours = np.isin(pairs, id).any(axis=1)
+    pairs, listed = pairs[ours], listed[ours]
+    force: FloatArray | None = listed[:, 5:8]
+    lacking = np.isnan(listed[:, 5])
+    if 0 < np.count_nonzero(lacking) < len(lacking):
         warnings.warn(
-            f"{path}: {lacking} have no normalForce and shearForce: all forces are left out",
+            f"{path}: {np.count_nonzero(lacking)} of {len(lacking)} contacts have no normalForce "
+            f"and shearForce: all forces are left out",
             ScanfabWarning,
             stacklevel=2,
         )
-    if len(scene.forces) == len(pairs):
-        force = np.array(scene.forces, dtype=np.float64).reshape(-1, 3)[ours]
-    if grains.cell is None or not grains.cell.is_periodic:
-        joined = join_ids(path, grains, pairs[ours], force, walls=True)
-    else:
-        joined = join_ids(path, grains, pairs[ours], force, walls=True, image=image[ours])
+    if lacking.any():
+        force = None
+    image = None
+    if grains.cell is not None and grains.cell.is_periodic:
+        image = whole_numbers(path, listed[:, 2:5].ravel()).reshape(-1, 3)
+    joined = join_ids(path, grains, pairs, force, walls=True, image=image)
     return grains._replace(
         contacts=joined.contacts,
         wall_contacts=joined.wall_contacts,
-        wall_forces=_wall_forces(scene, pairs, grains),
+        wall_forces=_wall_forces(pairs, force, listed[:, 8:], grains),
     )
 
 
-def _wall_forces(scene: _Scene, pairs: IntArray, grains: GrainTable) -> ListedWallForces | None:
-    """Of contacts between a sphere and what is none; None if their points or forces are missing."""
+def _wall_forces(
+    pairs: IntArray, force: FloatArray | None, point: FloatArray, grains: GrainTable
+) -> ListedWallForces | None:
+    """Of contacts between a sphere and a wall; None if their points or forces are missing."""
     rows = rows_of_ids(grains, pairs)
     first, second = (rows >= 0).T
     at = first != second
-    if not at.any() or len(scene.forces) != len(pairs) or len(scene.points) != len(pairs):
+    if not at.any() or force is None or np.isnan(point).any():
         return None
     # forces are those on the second body
-    force = np.where(second, 1.0, -1.0)[:, None] * np.array(scene.forces).reshape(-1, 3)
-    point = np.array(scene.points).reshape(-1, 3)
-    return ListedWallForces(rows.max(axis=1)[at], point[at], force[at])
+    own = np.where(second, 1.0, -1.0)[:, None] * force
+    return ListedWallForces(rows.max(axis=1)[at], point[at], own[at])
+
+
+def _cell(path: Path, scene: _Scene) -> Cell | None:
+    """The periodic cell, whose vectors are the columns of hSize."""
+    vectors = np.array(scene.size).reshape(-1, 3).T
+    if not scene.is_periodic or vectors.shape != (3, 3) or not np.all(np.abs(vectors) < MOST):
+        return None
+    try:
+        return Cell(vectors)
+    except PackingError as error:
+        raise ReadError(f"{path}: {error}") from None
 
 
 @dataclass
 class _Scene:
-    """What is read of a simulation, element by element: it never stands in memory as a whole."""
+    """What is read of a simulation."""
 
-    path: Path
     bodies: list[float] = field(default_factory=list)
     """Ids of all bodies, of spheres and of walls."""
-    ids: list[float] = field(default_factory=list)
-    masks: list[float] = field(default_factory=list)
-    clumps: list[float] = field(default_factory=list)
-    """The clump of each sphere; -1 if it stands alone."""
-    centres: list[list[float]] = field(default_factory=list)
-    radii: list[float] = field(default_factory=list)
-    pairs: list[list[float]] = field(default_factory=list)
-    images: list[list[float]] = field(default_factory=list)
-    forces: list[list[float]] = field(default_factory=list)
-    points: list[list[float]] = field(default_factory=list)
-    """Where bodies touch, for those that are walls."""
-    size: list[float] | None = None
+    spheres: list[list[float]] = field(default_factory=list)
+    """Id, mask, clump (-1 if it stands alone), radius and centre of each."""
+    contacts: list[list[float]] = field(default_factory=list)
+    """Two ids, the image, the force and the point of each; NaN for what the file lacks."""
+    size: list[float] = field(default_factory=list)
     is_periodic: bool = False
     shapes: dict[str, str] = field(default_factory=dict)
     """Names of shapes by their class, which is spelled out once only."""
 
-    def read(self) -> None:
-        """Walk through the file."""
-        try:
-            with unpacked(self.path) as stream:
-                self._walk(stream)
-        except (ElementTree.ParseError, LookupError, ValueError, OverflowError) as error:
-            raise ReadError(
-                f"{self.path}: cannot be read as a simulation that YADE saved (O.save): {error}"
-            ) from None
 
-    def _walk(self, stream: Readable) -> None:
-        """Parse piece by piece, as long as bodies or contacts come out of it."""
-        found = barren = 0
-        for inside in self._pieces(stream):
-            known = len(self.bodies) + len(self.pairs)
-            barren = barren + 1 if known == found else 0
-            found = known
-            if barren > (BARREN_PART if inside else BARREN):
-                raise ValueError(f"no body and no contact in {barren * PIECE} bytes")
-
-    def _pieces(self, stream: Readable) -> Iterator[bool]:
-        """For each piece that was parsed, whether it ends inside a body or a contact."""
-        parser: ElementTree.XMLPullParser[Any] = ElementTree.XMLPullParser(("start", "end"))
-        above: list[ElementTree.Element] = []
-        part: int | None = None
+def _walk(path: Path, scene: _Scene) -> None:
+    """Go through the elements; the file never stands in memory as a whole."""
+    parser: ElementTree.XMLPullParser[Any] = ElementTree.XMLPullParser(("start", "end"))
+    above: list[ElementTree.Element] = []
+    # how deep the body or contact stands that is read, and how many elements came without any
+    part: int | None = None
+    barren = 0
+    with unpacked(path) as stream:
         while piece := stream.read(PIECE):
             parser.feed(piece)
+            barren += PIECE // 32
             events: Iterator[Any] = parser.read_events()
             for event, element in events:
                 if event == "start":
-                    if part is None and _is_part(above, element):
+                    is_item = element.tag == "px" and above and above[-1].tag == "item"
+                    if part is None and (is_item or element.tag == "hSize"):
                         part = len(above)
                     above.append(element)
                     continue
                 above.pop()
+                barren += 1
                 if part is None or part == len(above) or element.tag == "px":
-                    self._take(above, element)
+                    barren = 0 if _take(scene, above, element) else barren
                 if part is None or part == len(above):
                     part = None
                     if above:
@@ -187,84 +179,58 @@ class _Scene:
                         del above[-1][:]
             if len(above) > DEPTH:
                 raise ValueError(f"elements stand in one another {len(above)} deep")
-            yield part is not None
-        parser.close()
-
-    def _take(self, above: list[ElementTree.Element], element: ElementTree.Element) -> None:
-        """An element that is complete; ``above``: the elements that it stands in."""
-        tag = element.tag
-        if tag == "px" and element.find("iterMadeReal") is not None:
-            # inside the first body that has it, as YADE writes it
-            self._take_interaction(element)
-            element.clear()
-        elif tag == "px" and _tags(above[-2:]) == ["body", "item"]:
-            self._take_body(element)
-        elif tag == "isPeriodic" and _tags(above) == SCENE:
-            self.is_periodic = (element.text or "").strip() == "1"
-        elif tag == "hSize" and _tags(above) == [*SCENE, "cell", "px"]:
-            self.size = [_number(element, f"m{row}{column}") for row, column in np.ndindex(3, 3)]
-
-    def _take_body(self, body: ElementTree.Element) -> None:
-        if body.find("id") is None:
-            return  # erased
-        self.bodies.append(_number(body, "id"))
-        shape = body.find("shape/px")
-        if shape is None or self._shape(shape) != "Sphere":
-            return
-        place = body.find("state/px/se3/position")
-        if place is None:
-            raise ValueError("a sphere has no position")
-        self.ids.append(_number(body, "id"))
-        self.masks.append(_number(body, "groupMask"))
-        self.clumps.append(float(body.findtext("clumpId", "-1")))
-        self.centres.append(_vector(place))
-        self.radii.append(_number(shape, "radius"))
-
-    def _shape(self, shape: ElementTree.Element) -> str:
-        number = shape.get("class_id") or shape.get("class_id_reference") or ""
-        name = shape.get("class_name")
-        if name is not None:
-            self.shapes[number] = name.rpartition("::")[2]
-        return self.shapes.get(number, "")
-
-    def _take_interaction(self, contact: ElementTree.Element) -> None:
-        # YADE also keeps pairs that are near each other
-        if _number(contact, "iterMadeReal") < 0:
-            return
-        shift = contact.find("cellDist")
-        self.pairs.append([_number(contact, "id1"), _number(contact, "id2")])
-        self.images.append([0.0] * 3 if shift is None else _vector(shift))
-        geometry = contact.find("geom")
-        points = [] if geometry is None else [*geometry.iter("contactPoint")]
-        self.points += [_vector(point) for point in points[:1]]
-        physics = contact.find("phys")
-        parts = (
-            [] if physics is None else [*physics.iter("normalForce"), *physics.iter("shearForce")]
-        )
-        if len(parts) == 2:
-            self.forces.append(np.sum([_vector(part) for part in parts], axis=0).tolist())
-
-    def cell(self) -> Cell | None:
-        """The periodic cell, whose vectors are the columns of hSize."""
-        if not self.is_periodic or self.size is None:
-            return None
-        vectors = np.array(self.size).reshape(3, 3).T
-        if not np.all(np.abs(vectors) < MOST):
-            return None
-        try:
-            return Cell(vectors)
-        except PackingError as error:
-            raise ReadError(f"{self.path}: {error}") from None
+            if barren > BARREN:
+                raise ValueError("no body and no contact in half a million elements")
+    parser.close()
 
 
-def _is_part(above: list[ElementTree.Element], element: ElementTree.Element) -> bool:
-    """Whether an element is looked at as a whole, when it is complete."""
-    tag = element.tag
-    return tag == "hSize" or (tag == "px" and bool(above) and above[-1].tag == "item")
+def _take(scene: _Scene, above: list[ElementTree.Element], element: ElementTree.Element) -> bool:
+    """Read a complete element, which stands in those above; whether it is a body or contact."""
+    tags = [one.tag for one in above]
+    if element.tag == "px" and element.find("iterMadeReal") is not None:
+        # inside the first body that has it, as YADE writes it
+        _take_contact(scene, element)
+        element.clear()
+        return True
+    if element.tag == "px" and tags[-2:] == ["body", "item"]:
+        _take_body(scene, element)
+        return True
+    if element.tag == "isPeriodic" and tags == SCENE:
+        scene.is_periodic = (element.text or "").strip() == "1"
+    elif element.tag == "hSize" and tags == [*SCENE, "cell", "px"]:
+        scene.size = [_number(element, f"m{row}{column}") for row, column in np.ndindex(3, 3)]
+    return False
 
 
-def _tags(elements: list[ElementTree.Element]) -> list[str]:
-    return [element.tag for element in elements]
+def _take_body(scene: _Scene, body: ElementTree.Element) -> None:
+    if body.find("id") is None:
+        return  # erased
+    scene.bodies.append(_number(body, "id"))
+    shape, place = body.find("shape/px"), body.find("state/px/se3/position")
+    if shape is None:
+        return
+    number = shape.get("class_id") or shape.get("class_id_reference") or ""
+    if "class_name" in shape.attrib:
+        scene.shapes[number] = shape.attrib["class_name"].rpartition("::")[2]
+    if scene.shapes.get(number) != "Sphere":
+        return
+    if place is None:
+        raise ValueError("a sphere has no position")
+    own = [_number(body, "id"), _number(body, "groupMask"), float(body.findtext("clumpId", "-1"))]
+    scene.spheres.append([*own, _number(shape, "radius"), *_vector(place)])
+
+
+def _take_contact(scene: _Scene, contact: ElementTree.Element) -> None:
+    # YADE also keeps pairs that are near each other
+    if _number(contact, "iterMadeReal") < 0:
+        return
+    shift = contact.find("cellDist")
+    found = [next(contact.iter(one), None) for one in ("normalForce", "shearForce", "contactPoint")]
+    normal, shear, point = ([np.nan] * 3 if one is None else _vector(one) for one in found)
+    force = [one + other for one, other in zip(normal, shear, strict=True)]
+    ids = [_number(contact, "id1"), _number(contact, "id2")]
+    image = [0.0] * 3 if shift is None else _vector(shift)
+    scene.contacts.append([*ids, *image, *force, *point])
 
 
 def _number(element: ElementTree.Element, name: str) -> float:

@@ -11,10 +11,9 @@ import scanfab
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.io.formats.liggghts import LiggghtsReader
 from scanfab.io.formats.vtk import VtkReader
-from scanfab.io.mesh import read_mesh
 from scanfab.io.reader import GrainTable, ReadOptions, Snapshot
-from tests.helpers.dumps import write, yade_spheres
-from tests.helpers.truth import FLOOR, YADE
+from tests.helpers.dumps import write
+from tests.helpers.truth import FLOOR
 
 POSITION = np.array([[0.0, 0, 0], [1.9, 0, 0], [3.8, 0, 0.25], [5.6, 0.5, 0]])
 RADIUS = np.array([1.0, 1.0, 1.1, 0.9])
@@ -152,26 +151,6 @@ def test_lines_with_ids_name_grains_by_id(tmp_path):
     np.testing.assert_array_equal(packing.contacts.pairs, LINES[:, ::-1])
 
 
-def test_a_longer_line_joins_its_ends(tmp_path):
-    spheres = polydata(tmp_path / "spheres.vtp", radius=RADIUS)
-    middle = 0.5 * (POSITION[0] + POSITION[1])
-    mesh = pyvista.PolyData(np.vstack([POSITION, middle]), lines=np.array([3, 0, 4, 1, 2, 1, 2]))
-    mesh.save(tmp_path / "lines.vtp")
-    packing = scanfab.read(spheres, contacts=tmp_path / "lines.vtp")
-    np.testing.assert_array_equal(packing.contacts.pairs, [[0, 1], [1, 2]])
-
-
-def test_arrays_of_vertices_do_not_shift_those_of_lines(tmp_path):
-    mesh = pyvista.PolyData(
-        POSITION,
-        verts=np.column_stack([np.ones(4, int), np.arange(4)]).ravel(),
-        lines=np.array([2, 0, 1, 2, 1, 2]),
-    )
-    mesh.cell_data["kn"] = np.arange(6.0)
-    mesh.save(tmp_path / "both.vtp")
-    np.testing.assert_array_equal(read_mesh(tmp_path / "both.vtp").line_arrays["kn"], [4, 5])
-
-
 @pytest.mark.parametrize("name", ["a.vtk", "a.vtp", "a.stl"])
 def test_a_mesh_of_triangles_is_a_wall(tmp_path, name):
     pyvista.Plane().triangulate().save(tmp_path / name)
@@ -260,76 +239,6 @@ def test_a_grid_of_points_without_cells_is_a_cloud(tmp_path, capfd):
     packing = scanfab.read(write(tmp_path / "a.vtu", text))
     np.testing.assert_array_equal(packing.radius, [0.5, 0.5])
     assert capfd.readouterr() == ("", "")
-
-
-SOURCES = {
-    "legacy POLYDATA": YADE / "periodic-spheres-00000000.vtk.gz",
-    "legacy grid": YADE / "periodic-periCell-00000001.vtk",
-    "ASCII .vtp": FLOOR / "grains_30000.vtp",
-    "binary .vtp": FLOOR / "grains_binary_30000.vtp",
-    "legacy BINARY": FLOOR / "grains_binary_30000.vtk",
-    "ASCII .vtu": FLOOR / "grains_30000.vtu",
-    "zlib .vtu": YADE / "zlib_spheres.30000.vtu",
-}
-
-
-@pytest.mark.parametrize("form", SOURCES)
-@pytest.mark.parametrize("keep", [0.2, 0.5, 0.8])
-def test_a_file_cut_off_is_an_error_that_prints_nothing(tmp_path, form, keep, capfd):
-    from scanfab.io.files import plain
-
-    source = SOURCES[form]
-    data = plain(source).read_bytes()
-    path = tmp_path / source.name.removesuffix(".gz")
-    path.write_bytes(data[: int(keep * len(data))])
-    with pytest.raises(ReadError, match=path.name):
-        scanfab.read(path)
-    assert capfd.readouterr() == ("", "")
-
-
-@pytest.mark.parametrize("array", ["radius", "id", "mask"])
-@pytest.mark.parametrize("behind", [100, 101, 1000, 1003])
-def test_an_array_cut_off_is_not_filled_with_what_memory_holds(tmp_path, array, behind):
-    count = 400
-    values = np.full(count, 0.25)
-    path = yade_spheres(
-        tmp_path / "a.vtk", np.eye(3)[np.arange(count) % 3], values, id=range(count), mask=values
-    )
-    data = path.read_bytes()
-    path.write_bytes(data[: data.find(f"SCALARS {array}".encode()) + behind])
-    with pytest.raises(ReadError, match=r"a\.vtk"):
-        read_mesh(path)
-
-
-def nonsense(path, dataset="POLYDATA"):
-    return write(path, f"# vtk DataFile Version 3.0\nx\nASCII\nDATASET {dataset}\nnot at all\n")
-
-
-@pytest.mark.parametrize("dataset", ["POLYDATA", "UNSTRUCTURED_GRID", "NONSENSE"])
-def test_nonsense_behind_the_header_is_an_error_that_prints_nothing(tmp_path, dataset, capfd):
-    with pytest.raises(ReadError, match=r"a\.vtk"):
-        scanfab.read(nonsense(tmp_path / "a.vtk", dataset))
-    assert capfd.readouterr() == ("", "")
-
-
-@pytest.mark.parametrize("type", ["UnstructuredGrid", "PolyData", "Hyperoctree"])
-def test_xml_without_content_is_an_error_that_prints_nothing(tmp_path, type, capfd):
-    path = write(tmp_path / "a.vtu", f'<?xml version="1.0"?>\n<VTKFile type="{type}"></VTKFile>\n')
-    with pytest.raises(ReadError, match=r"a\.vtu"):
-        scanfab.read(path)
-    assert capfd.readouterr() == ("", "")
-
-
-def test_an_empty_xdmf_file_does_not_end_the_program(tmp_path, capfd):
-    path = write(tmp_path / "a.xdmf", '<?xml version="1.0"?>\n<Xdmf Version="1.0"></Xdmf>\n')
-    with pytest.raises(ReadError, match="cannot be read"):
-        scanfab.read(path)
-    assert capfd.readouterr() == ("", "")
-
-
-def test_a_file_that_is_no_vtk_is_refused(tmp_path):
-    with pytest.raises(ReadError, match="expected a VTK file, found something else"):
-        read_mesh(write(tmp_path / "a.vtk", "hello"))
 
 
 def push():

@@ -336,7 +336,7 @@ def test_as_many_values_as_contacts_are_right(tmp_path):
 
 
 def test_other_line_ends_do_not_matter(tmp_path):
-    path = write(tmp_path / "a.txt", "#format x_y_z_r\r\n1\t2\t3\t0.5\r\n2\t2\t3\t0.5")
+    path = write(tmp_path / "a.txt", "#format x_y_z_r\r\n1\t2\t3\t0.5\r\n2\t2\t3\t0.5\r\n")
     np.testing.assert_array_equal(scanfab.read(path).position, [[1, 2, 3], [2, 2, 3]])
 
 
@@ -364,8 +364,9 @@ def test_a_text_without_grains_is_an_empty_frame(tmp_path, recwarn):
     ("text", "message"),
     [
         ("#format x_y_z_r\n1 2 3\n", "first line names 4 columns, the rows have 3"),
-        ("#format x_y_z_r\n1 2 3 oops\n", "expected a number, found 'oops'"),
-        ("#format x_y_z_r\n1 2 3 1\n1 2 3\n", "a.txt, line 3: the number of columns changed"),
+        ("#format x_y_z_r\n1 2 3 oops\n", "a.txt, line 2: .*oops"),
+        ("#format x_y_z_r\n1 2 3 1\n1 2 3\n", "a.txt, line 3: expected 4 columns"),
+        ("#format x_y_z_r\n# a comment\n0 0 0 1\n3 x 0 1\n", "a.txt, line 4: .*'x'"),
         ("##PERIODIC:: 1 2\n1 2 3 1\n", "line 1: expected three lengths"),
         ("##PERIODIC:: 1 2 long\n1 2 3 1\n", "line 1: expected three lengths"),
         ("##PERIODIC:: 1 2 0\n1 2 3 1\n", "a.txt"),
@@ -379,10 +380,3 @@ def test_a_text_that_cannot_be_read_says_why(tmp_path, text, message):
 def test_a_text_holds_no_contacts():
     with pytest.raises(ReadError, match="expected contacts, found grains"):
         scanfab.read(YADE / "text.txt", contacts=YADE / "x_y_z_r.txt")
-
-
-def test_a_word_in_a_text_export_names_its_line(tmp_path):
-    path = tmp_path / "spheres.txt"
-    path.write_text("#format x_y_z_r\n# a comment\n0 0 0 1\n\n3 x 0 1\n")
-    with pytest.raises(ReadError, match=r"spheres.txt, line 5: expected a number, found 'x'"):
-        scanfab.read(path)
