@@ -126,8 +126,8 @@ def read_dump(snapshot: Snapshot) -> Dump:
     data = text_of(snapshot)
     where = f"{snapshot.path}, step {snapshot.step}"
     sections, names, count, begin = _table(where, data)
-    width = len(data[begin : begin + MUCH_TEXT].partition(b"\n")[0].split())
-    names = names or [f"{place + 1}" for place in range(width)]
+    first = data[begin : data.find(b"\n", begin)]
+    names = names or [f"{place + 1}" for place in range(len(first.split()))]
     line = data.count(b"\n", 0, begin) + 1
     layout = Layout(tuple(names), line=line, whole=("id",), text=WORDS)
     columns = read_rows(snapshot, data[begin:], layout, count=count)
