@@ -4,25 +4,21 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import IO
 
 from scanfab.base.errors import ReadError
 from scanfab.io.files import plain
 from scanfab.io.formats.columns import grain_table, has_radius
 from scanfab.io.formats.lammps_box import dump_cell
-from scanfab.io.parse.counted_rows import counted_rows, text_of
-from scanfab.io.parse.growing import warn_incomplete
-from scanfab.io.parse.number_rows import exact_column
 from scanfab.io.reader import FileKind, GrainTable, ReadOptions, Snapshot
+from scanfab.io.text import Layout, leave_out_last, read_rows, text_of
+from scanfab.io.unpacking import check_lines
 from scanfab.packing.cell import Cell
 
 START = re.compile(rb"\A(?:\xef\xbb\xbf)?---[ \t]*\r?\ncreator:[ \t]*LAMMPS[ \t]*\r?\n")
 DATA = re.compile(rb"^data:[ \t]*\r?\n", re.MULTILINE)
-BEGIN, END = b"---", b"..."
-MARK = b"\xef\xbb\xbf"
-# bytes that are searched at a time
-PIECE = 1 << 20
-# a header never comes near this size
+BOX = re.compile(rb"^box:[ \t]*\r?\n((?:[ \t]*-[^\n]*\n){1,4})", re.MULTILINE)
+BEGIN, END = (b"---", b"\xef\xbb\xbf---"), b"..."
+# a header is shorter
 HEADER_BYTES = 1 << 16
 
 
@@ -33,50 +29,35 @@ def is_yaml(head: bytes) -> bool:
 
 def yaml_kind(head: bytes) -> FileKind:
     """Grains; without a radius they are points."""
-    return "grains" if has_radius(_listed(head, b"keywords")) else "points"
+    return "grains" if has_radius(_listed(head, "keywords")) else "points"
 
 
 def index_yaml(path: Path) -> list[Snapshot]:
-    """The documents; a last one without its end is left out with a warning if there are others."""
+    """The documents; if the last one has no end, it is left out with a warning."""
+    check_lines(path, plain(path))
+    found: list[Snapshot] = []
+    start, place = -1, 0
     with open(plain(path), "rb") as stream:
-        starts, ends = _borders(stream)
-        if len(ends) == len(starts) - 1 and ends:
-            warn_incomplete(
-                f"{path}: the last snapshot, number {len(starts)}, is incomplete and is left out"
-            )
-            starts.pop()
-        if not starts or len(starts) != len(ends):
-            raise ReadError(
-                f"{path}: expected documents between lines of --- and ..., found {len(starts)} "
-                f"beginnings and {len(ends)} ends: the file is incomplete"
-            )
-        found = []
-        for start, stop in zip(starts, ends, strict=True):
-            stream.seek(start)
-            head = stream.read(min(HEADER_BYTES, max(stop - start, 0)))
-            found.append(_snapshot(path, head, start, stop))
+        for line in stream:
+            if line.rstrip() in BEGIN:
+                if start >= 0:
+                    raise ReadError(f"{path}: expected ... above the document at byte {place:,}")
+                start = place
+            place += len(line)
+            if start >= 0 and line.rstrip() == END:
+                found.append(Snapshot(path, start=start, stop=place))
+                start = -1
+        if start >= 0 or not found:
+            leave_out_last(path, len(found), "expected a line of ... at the end of a document")
+        for number, one in enumerate(found):
+            stream.seek(one.start)
+            head = stream.read(min(HEADER_BYTES, (one.stop or 0) - one.start))
+            step, time = _value(head, "timestep"), _value(head, "time")
+            if not re.fullmatch(r"-?\d{1,18}", step):
+                raise ReadError(f"{path}: expected timestep: and a whole number, found {step!r}")
+            seconds = float(time) if re.fullmatch(r"[-+.\d]+(e[-+]?\d+)?", time) else None
+            found[number] = Snapshot(path, int(step), seconds, one.start, one.stop)
     return sorted(found, key=lambda one: one.step or 0)
-
-
-def _borders(stream: IO[bytes]) -> tuple[list[int], list[int]]:
-    """First bytes of the lines that begin documents, and those behind the lines that end them."""
-    found: dict[bytes, list[int]] = {BEGIN: [], END: []}
-    place = 0
-    # whole lines, so that no border is cut in two
-    while piece := stream.read(PIECE) + stream.readline(HEADER_BYTES):
-        data = b"\n" + piece
-        if place == 0 and piece.startswith(MARK + BEGIN):
-            data = b"\n" * (1 + len(MARK)) + piece.removeprefix(MARK)
-        for word, places in found.items():
-            at = data.find(b"\n" + word)
-            while at >= 0:
-                end = data.find(b"\n", at + 1)
-                end = len(data) if end < 0 else end + 1
-                if data[at + 1 : end].rstrip() == word:
-                    places.append(place + (at if word == BEGIN else end - 1))
-                at = data.find(b"\n" + word, end - 1)
-        place += len(piece)
-    return found[BEGIN], found[END]
 
 
 def read_yaml_grains(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
@@ -89,43 +70,21 @@ def read_yaml_grains(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         If the document is not as LAMMPS writes it.
     """
     path, data = snapshot.path, text_of(snapshot)
-    body = DATA.search(data)
-    end = data.rfind(END)
+    where = f"{path}, step {snapshot.step}"
+    body, end = DATA.search(data), data.rfind(END)
     if body is None or end < body.end():
-        raise ReadError(f"{path}: expected data: and rows to the end, found none")
+        raise ReadError(f"{where}: expected data: and rows to the end, found none")
     head = data[: body.start()]
-    names = _listed(head, b"keywords")
+    names, count = _listed(head, "keywords"), _value(head, "natoms")
     if not names:
-        raise ReadError(f"{path}: expected keywords: [ id, ... ] above the data, found none")
-    rows = _plain(data[body.end() : end])
-    text = data[: body.end()] + rows
-    count = _value(head, b"natoms")
+        raise ReadError(f"{where}: expected keywords: [ id, ... ] above the data, found none")
     if not re.fullmatch(r"\d{1,15}", count):
-        raise ReadError(f"{path}: expected natoms: and a whole number, found {count!r}")
-    values = counted_rows(
-        snapshot,
-        text,
-        body.end(),
-        len(text),
-        count=int(count),
-        widths=(len(names),),
-        names="atoms",
-    )
-    columns = {name: values[:, names.index(name)] for name in names}
-    if "id" in columns:
-        columns["id"] = exact_column(values, rows, names.index("id"))
-    return grain_table(path, columns, _cell(path, head), options, f", step {snapshot.step}")
-
-
-def _snapshot(path: Path, head: bytes, start: int, stop: int) -> Snapshot:
-    step, time = _value(head, b"timestep"), _value(head, b"time")
-    if not re.fullmatch(r"-?\d{1,18}", step):
-        raise ReadError(f"{path}: expected timestep: and a whole number, found {step!r}")
-    try:
-        seconds = float(time)
-    except ValueError:
-        seconds = None
-    return Snapshot(path, int(step), seconds, start, stop)
+        raise ReadError(f"{where}: expected natoms: and a whole number, found {count!r}")
+    line = data.count(b"\n", 0, body.end()) + 1
+    layout = Layout(tuple(names), line=line, whole=["id"], text=["element"])
+    rows = _plain(data[body.end() : end])
+    columns = read_rows(snapshot, rows, layout, count=int(count), what="atoms")
+    return grain_table(path, columns, _cell(where, head), options, f", step {snapshot.step}")
 
 
 def _plain(rows: bytes) -> bytes:
@@ -133,13 +92,13 @@ def _plain(rows: bytes) -> bytes:
     return rows.replace(b"- [", b"").translate(None, b"],")
 
 
-def _value(head: bytes, key: bytes) -> str:
+def _value(head: bytes, key: str) -> str:
     """What stands behind a key at the start of a line."""
-    found = re.search(rb"^" + key + rb":[ \t]*([^\r\n]*)", head, re.MULTILINE)
+    found = re.search(rb"^" + key.encode() + rb":[ \t]*([^\r\n]*)", head, re.MULTILINE)
     return "" if found is None else found[1].decode("utf-8", "replace").strip()
 
 
-def _listed(head: bytes, key: bytes) -> list[str]:
+def _listed(head: bytes, key: str) -> list[str]:
     """The words of a list behind a key; names of columns may have brackets of their own."""
     text = _value(head, key)
     if not (text.startswith("[") and text.endswith("]")):
@@ -147,17 +106,17 @@ def _listed(head: bytes, key: bytes) -> list[str]:
     return text[1:-1].replace(",", " ").split()
 
 
-def _cell(path: Path, head: bytes) -> Cell | None:
+def _cell(where: str, head: bytes) -> Cell | None:
     """Bounds and flags, as text dumps have them."""
-    box = re.search(rb"^box:[ \t]*\r?\n((?:[ \t]*-[^\n]*\n){1,4})", head, re.MULTILINE)
+    box = BOX.search(head)
     if box is None:
         return None
     lines = _plain(box[1]).decode("utf-8", "replace").splitlines()
-    letters = _listed(head, b"boundary")
-    flags = [letters[place] + letters[place + 1] for place in range(0, len(letters) - 1, 2)]
+    letters = _listed(head, "boundary")
+    flags = [low + high for low, high in zip(letters[::2], letters[1::2], strict=False)]
     if len(lines) == 4:
         # the tilt stands in a line of its own
         tilts = lines.pop().split()
         lines = [f"{line} {tilt}" for line, tilt in zip(lines, tilts, strict=False)]
         flags = ["xy", "xz", "yz", *flags]
-    return dump_cell(f"{path}", {" ".join(["BOX BOUNDS", *flags]): lines})
+    return dump_cell(where, {" ".join(["BOX BOUNDS", *flags]): lines})

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from scanfab.base.errors import PackingError, ReadError
-from scanfab.base.typing import FloatArray
+from scanfab.base.errors import ReadError
 from scanfab.io.files import file_inside, first_bytes
 from scanfab.io.formats.columns import grain_table
-from scanfab.io.parse.counted_rows import counted_rows, spelt, text_of
-from scanfab.io.reader import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
+from scanfab.io.formats.shared import GrainsOnly, cell_of, numbers
+from scanfab.io.reader import GrainTable, ReadOptions, Snapshot
+from scanfab.io.text import Columns, Layout, read_rows, spelt, text_of
 from scanfab.packing.cell import Cell
 
 # version of the layout; steps in all, length of a step, step; then the box in words
@@ -24,27 +24,25 @@ HEADER = re.compile(
 )
 BEGINNING = re.compile(rb"(?:\xef\xbb\xbf)?V\s")
 # centre, radius, id, tag, mass; first and last centre, velocity, force, shift through the box
-FIRST_WORDS = "x y z radius id tag mass x0 y0 z0 xo yo zo vx vy vz fx fy fz sx sy sz"
-BASIC = tuple(FIRST_WORDS.split())
-ROTATING = ("q0", "q1", "q2", "q3", "wx", "wy", "wz")
+BASIC = "x y z radius id tag mass x0 y0 z0 xo yo zo vx vy vz fx fy fz sx sy sz"
+ROTATING = "q0 q1 q2 q3 wx wy wz"
 # snapshots and checkpoints, without and with rotation
 LAYOUTS = {
-    len(names): names
+    len(names.split()): tuple(names.split())
     for names in (
         BASIC,
-        (*BASIC, *ROTATING),
-        (*BASIC, "is_dynamic"),
-        (*BASIC, "is_dynamic", "inertia", *ROTATING, "is_rot"),
+        f"{BASIC} {ROTATING}",
+        f"{BASIC} is_dynamic",
+        f"{BASIC} is_dynamic inertia {ROTATING} is_rot",
     )
 }
-# the name of a worker's file
+# the name of a worker's file, and its first line
 PART = re.compile(r"(.*_t=\d+_)[1-9]\d*(\.\w+)")
-WORKER = re.compile(rb"\A(?:\xef\xbb\xbf)?\s*(\d{1,15})[ \t]*\r?\n")
-VERSIONS = (b"2", b"3")
+COUNT = re.compile(rb"\s*(\d{1,15})[ \t]*\r?\n")
 LONGEST = 1 << 20
 
 
-class EsysReader:
+class EsysReader(GrainsOnly):
     """Reader plugin for ESyS-Particle's snapshots."""
 
     name = "esys"
@@ -57,15 +55,11 @@ class EsysReader:
         begins = BEGINNING.match(first_bytes(path)) is not None
         return begins and HEADER.match(first_bytes(path, LONGEST)) is not None
 
-    def kind(self, path: Path) -> FileKind:
-        """Headers list the files of a frame."""
-        return "grains" if self.recognises(path) else "other"
-
     def snapshots(self, path: Path) -> list[Snapshot]:
         """One, at its step."""
         head = _header(path)
-        step, length = int(head[4]), _numbers(path, head[3])[0]
-        return [Snapshot(path, step, step * length)]
+        step = int(head[4])
+        return [Snapshot(path, step, step * numbers(f"{path}: step length", head[3], 1)[0])]
 
     def beside(self, path: Path) -> list[Path]:
         """The files of the workers, called like their header but for the last number."""
@@ -83,26 +77,18 @@ class EsysReader:
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         """The particles of all workers, one behind the other."""
         path, head = snapshot.path, _header(snapshot.path)
-        if head[1] not in VERSIONS:
+        if head[1] not in (b"2", b"3"):
             raise ReadError(f"{path}: expected version 2 or 3, found {head[1].decode()}")
-        # absolute names where the run was: the files lie beside their header
+        # the names are absolute where the run was: the files lie beside their header
         names = [word.decode("utf-8", "replace").replace("\\", "/") for word in head[10].split()]
         files = [file_inside(path, name.rpartition("/")[2]) for name in names]
         if not files or len(set(files)) < len(files):
             raise ReadError(f"{path}: expected the names of its workers' files, found {names}")
         parts = [_particles(file) for file in files]
-        widths = {part.shape[1] for part in parts}
-        if len(widths) > 1:
-            raise ReadError(f"{path}: its files have {sorted(widths)} columns of particles")
-        table = np.concatenate(parts)
-        columns = dict(zip(LAYOUTS[table.shape[1]], table.T, strict=True))
+        if len({len(part) for part in parts}) > 1:
+            raise ReadError(f"{path}: its files have different numbers of columns")
+        columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         return grain_table(path, columns, _cell(path, head), options)
-
-    def read_contacts(
-        self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
-    ) -> JoinedContacts:
-        """It lists bonds, which need not touch."""
-        raise ReadError(f"{snapshot.path}: ESyS-Particle's snapshots hold bonds, but no contacts")
 
 
 def _header(path: Path) -> re.Match[bytes]:
@@ -112,47 +98,32 @@ def _header(path: Path) -> re.Match[bytes]:
     return head
 
 
-def _particles(file: Path) -> FloatArray:
-    """The first block of a worker's file: how many, and their rows; bonds follow."""
-    snapshot = Snapshot(file)
-    data = text_of(snapshot)
-    count = WORKER.match(data)
-    if count is None:
+def _particles(file: Path) -> Columns:
+    """The first block of a worker's file: a count, and as many rows; bonds follow."""
+    data = text_of(Snapshot(file))
+    head = COUNT.match(data)
+    if head is None:
         raise ReadError(f"{file}: expected the number of particles, found {spelt(data[:80])}")
-    end = count.end()
-    for _ in range(min(int(count[1]), len(data))):
-        end = data.find(b"\n", end) + 1
-        if end == 0:
-            raise ReadError(f"{file}: expected {int(count[1])} particles: the file is incomplete")
-    return counted_rows(
-        snapshot,
-        data,
-        count.end(),
-        end,
-        count=int(count[1]),
-        widths=tuple(LAYOUTS),
-        names="particles",
-    )
-
-
-def _numbers(path: Path, words: bytes) -> list[float]:
-    try:
-        return [float(word) for word in words.split()]
-    except ValueError:
-        raise ReadError(f"{path}: expected numbers, found {spelt(words)}") from None
+    count, rest = int(head[1]), data[head.end() :]
+    lines = rest.split(b"\n", count)
+    behind = lines[count] if len(lines) > count else b""
+    if len(behind.lstrip().partition(b"\n")[0].split()) in LAYOUTS:
+        raise ReadError(f"{file}: its first line counts {count} particles, but more rows follow")
+    width = len(lines[0].split()) if count else len(BASIC.split())
+    if width not in LAYOUTS:
+        expected = ", ".join(map(str, LAYOUTS))
+        raise ReadError(f"{file}: expected {expected} columns of particles, found {width}")
+    layout = Layout(LAYOUTS[width], line=data.count(b"\n", 0, head.end()) + 1, whole=["id"])
+    rows = rest[: len(rest) - len(behind)]
+    return read_rows(Snapshot(file), rows, layout, count=count, what="particles")
 
 
 def _cell(path: Path, head: re.Match[bytes]) -> Cell | None:
-    bounds = _numbers(path, head[5])
+    bounds = numbers(f"{path}: BoundingBox", head[5], 6)
     low, high = np.array(bounds[:3]), np.array(bounds[3:])
     along = [one == b"1" for one in head.group(6, 7, 8)]
     edges = high - low
     if head[9] == b"2" and edges[2] <= 0:
-        # a plane repeats in itself only
+        # a plane is not periodic across, whatever the header says
         along[2], edges[2] = False, float(max(edges[0], edges[1]))
-    try:
-        return Cell(edges, (along[0], along[1], along[2]), low)
-    except PackingError as error:
-        if not any(along):
-            return None
-        raise ReadError(f"{path}: BoundingBox: {error}") from None
+    return cell_of(f"{path}: BoundingBox", edges, along, low)

@@ -1,0 +1,200 @@
+"""
+MercuryDPM: grains in ``.data`` and contacts in ``.fstat``, or both in ``.restart``.
+
+Contacts name grains by their row, from 0, and walls by numbers below 0. Each pair is listed from
+both sides, unless one of them is fixed or an image in a periodic cell.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from scanfab.base.errors import ReadError
+from scanfab.base.typing import FloatArray, IntArray
+from scanfab.io.files import bare_name, first_bytes, plain
+from scanfab.io.formats.columns import grain_table, whole_numbers
+from scanfab.io.formats.join import count_walls, join_ids
+from scanfab.io.formats.mercury_restart import is_restart, read_restart, time_of_restart
+from scanfab.io.formats.shared import cell_of, finite_forces, frames_below
+from scanfab.io.reader import (
+    Carries,
+    FileKind,
+    GrainTable,
+    JoinedContacts,
+    ReadOptions,
+    Snapshot,
+)
+from scanfab.io.text import Columns, Layout, leave_out_last, read_rows, skip_rows, spelt, text_of
+from scanfab.packing.cell import Cell
+
+PLANE = "x y vx vy radius angle omega species"
+SPACE = "x y z vx vy vz radius q1 q2 q3 wx wy wz species"
+# by the number of words above a frame
+LAYOUTS = {6: Layout(tuple(PLANE.split()), line=2), 8: Layout(tuple(SPACE.split()), line=2)}
+# time, both rows, contact point, overlaps, normal and tangential force, normal, tangent
+FSTAT = "t i j x y z delta deltat fn ft nx ny nz tx ty tz"
+FSTAT_HEAD = re.compile(
+    rb"\A(?:\xef\xbb\xbf)?#[ \t]+\S+[ \t]+[01][ \t]*\r?\n"
+    rb"#(?:[ \t]+\S+){6}[ \t]*\r?\n#(?:[ \t]+\S+){6,7}[ \t]*\r?\n"
+)
+FSTAT_FRAME = re.compile(rb"(?:\xef\xbb\xbf)?#[ \t]+(\S+)[ \t]+[01][ \t]*\r?\n")
+LONGEST = 1 << 16
+# the interactions that it writes for ParaView name no grains
+OF_PARAVIEW = (b"<VTKFile", b'Name="Overlap"', b'Name="ContactRadius"', b'Name="TangentialOverlap"')
+
+
+class MercuryReader:
+    """Reader plugin for the files of MercuryDPM."""
+
+    name = "mercurydpm"
+    description = "MercuryDPM .data with contacts in .fstat, and .restart"
+    extensions: tuple[str, ...] = (".data", ".fstat", ".restart")
+    lists_contacts = True
+
+    def recognises(self, path: Path) -> bool:
+        """A restart by its first word, contacts by three lines, grains by a line of bounds."""
+        head = first_bytes(path, LONGEST)
+        for_paraview = all(word in head for word in OF_PARAVIEW)
+        if is_restart(head) or FSTAT_HEAD.match(head) is not None or for_paraview:
+            return True
+        first, second = (*head.split(b"\n", 2), b"")[:2]
+        bounds = _bounds(first)
+        if bounds is None:
+            return False
+        if bounds[0] > 0:
+            return len(second.split()) == len(LAYOUTS[len(bounds)].names)
+        # nothing but an empty frame may be anything
+        return _bounds(second) is not None if second.strip() else ".data" in bare_name(path)
+
+    def kind(self, path: Path) -> FileKind:
+        """Contacts are in ``.fstat`` files."""
+        head = first_bytes(path, LONGEST)
+        if all(word in head for word in OF_PARAVIEW):
+            raise ReadError(
+                f"{path}: MercuryDPM's interactions for ParaView do not say which grains touch: "
+                f"contacts are read from .fstat or .restart"
+            )
+        if FSTAT_HEAD.match(head):
+            return "contacts"
+        return "grains" if self.recognises(path) else "other"
+
+    def snapshots(self, path: Path) -> list[Snapshot]:
+        """Frames one behind the other, with their times."""
+        head = first_bytes(path, LONGEST)
+        if is_restart(head):
+            return [Snapshot(path, time=time_of_restart(head))]
+        return frames_below(path, FSTAT_FRAME) if FSTAT_HEAD.match(head) else _grain_frames(path)
+
+    def carries(self, path: Path) -> Carries:
+        """A restart has its periodic boundaries; the bounds in ``.data`` may repeat or not."""
+        return "cell" if is_restart(first_bytes(path)) else "box"
+
+    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+        """Rows of numbers; a restart has names in its rows, and contacts."""
+        path = snapshot.path
+        if is_restart(first_bytes(path)):
+            return read_restart(snapshot, options)
+        line, _, rows = text_of(snapshot).partition(b"\n")
+        bounds = _bounds(line)
+        if bounds is None:
+            raise ReadError(f"{path}: expected the number of grains, time and bounds")
+        layout = LAYOUTS[len(bounds)]
+        columns = read_rows(snapshot, rows, layout, count=int(bounds[0]), what="grains")
+        if "z" not in columns:
+            columns["z"] = np.zeros(len(columns["x"]))
+        return grain_table(path, columns, _box(path, bounds[2:]), options)
+
+    def read_contacts(
+        self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
+    ) -> JoinedContacts:
+        """Each pair once, with its force; rows with walls are counted."""
+        path, data = snapshot.path, text_of(snapshot)
+        head = FSTAT_HEAD.match(data)
+        if head is None:
+            raise ReadError(f"{path}: contacts are read from .fstat files with whole headers")
+        layout = Layout(tuple(FSTAT.split()), line=4, whole="ij")
+        columns = read_rows(snapshot, data[head.end() :], layout, what="contacts")
+        rows = np.column_stack([whole_numbers(path, columns[name]) for name in "ij"])
+        wall, count = rows[:, 1] < 0, len(grains.radius)
+        unknown = rows[(rows[:, 0] < 0) | (wall & (rows[:, 0] >= count)), 0]
+        if len(unknown):
+            raise ReadError(
+                f"{path}: names the grain {unknown[0]}, but there are rows 0 to {count - 1}: do "
+                f"both files belong to the same time?"
+            )
+        pairs, force = _once(rows[~wall], {key: own[~wall] for key, own in columns.items()})
+        # rows of the grain file, whatever ids these have
+        numbered = grains._replace(id=np.arange(count))
+        joined = join_ids(path, numbered, pairs, finite_forces(path, force), walls=False)
+        return joined._replace(wall_contacts=count_walls(rows[wall, 0], count))
+
+
+def _bounds(line: bytes) -> list[float] | None:
+    """Number of grains, time, low and high corner in 2D or 3D; None if it is no such line."""
+    words = line.removeprefix(b"\xef\xbb\xbf").split()
+    if len(words) not in LAYOUTS or not re.fullmatch(rb"[0-9]{1,15}", words[0]):
+        return None
+    try:
+        found = [float(word) for word in words]
+    except ValueError:
+        return None
+    half = len(found) // 2 + 1
+    ordered = all(low <= high for low, high in zip(found[2:half], found[half:], strict=True))
+    return found if ordered and found[1] >= 0 else None
+
+
+def _grain_frames(path: Path) -> list[Snapshot]:
+    """The frames of a ``.data`` file; a last one that is cut is left out with a warning."""
+    found: list[Snapshot] = []
+    with open(plain(path), "rb") as stream:
+        while line := stream.readline(LONGEST):
+            start, bounds = stream.tell() - len(line), _bounds(line)
+            if bounds is None and line.strip() and line.endswith(b"\n"):
+                raise ReadError(
+                    f"{path}: expected the number of grains, time and bounds at byte {start:,}, "
+                    f"found {spelt(line)}"
+                )
+            rows = 0 if bounds is None else skip_rows(stream, int(bounds[0]))
+            if line.strip() and (not line.endswith(b"\n") or (bounds and rows < bounds[0])):
+                reason = f"found {spelt(line)} and {rows} rows at the end"
+                leave_out_last(path, len(found), reason)
+                break
+            if bounds is not None:
+                found.append(Snapshot(path, time=bounds[1], start=start, stop=stream.tell()))
+    if not found:
+        raise ReadError(f"{path}: the file is empty")
+    return found
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def _once(rows: IntArray, columns: Columns) -> tuple[IntArray, FloatArray]:
+    """
+    Pairs and the force on their second grain, each once.
+
+    The normal points from the second to the first grain, on which force and tangential force act.
+    A pair that touches through two images has two normals, and is two contacts.
+    """
+    normal = np.column_stack([columns[name] for name in ("nx", "ny", "nz")])
+    tangent = np.column_stack([columns[name] for name in ("tx", "ty", "tz")])
+    force = -(columns["fn"][:, None] * normal + columns["ft"][:, None] * tangent)
+    turned = rows[:, :1] > rows[:, 1:]
+    # 7 digits tell images apart, and are the same from both sides
+    sides = np.round(np.where(turned, -normal, normal), 7) + 0.0
+    keys = np.column_stack([np.sort(rows, axis=1), sides])
+    _, first = np.unique(keys, axis=0, return_index=True)
+    kept = np.sort(first)
+    return rows[kept], force[kept]
+
+
+@np.errstate(invalid="ignore")
+def _box(path: Path, bounds: list[float]) -> Cell | None:
+    """The domain, of which nothing is known to repeat; None if it has no volume."""
+    half = len(bounds) // 2
+    low, edges = np.zeros(3), np.zeros(3)
+    low[:half], edges[:half] = bounds[:half], np.subtract(bounds[half:], bounds[:half])
+    if half == 2:
+        edges[2] = max(edges)
+    return cell_of(f"{path}: its bounds", edges, (False, False, False), low)
