@@ -88,6 +88,8 @@ def frames_below(path: Path, head: re.Pattern[bytes]) -> list[Snapshot]:
             match = head.match(line)
             if match is not None:
                 starts.append((place, numbers(f"{path}: time of a frame", match[1], 1)[0]))
+            elif not starts and line.strip() and not line.lstrip(b"\xef\xbb\xbf").startswith(b"#"):
+                raise ReadError(f"{path}: expected a line '# TIME ...' above {spelt(line)}")
             place += len(line)
     if not starts:
         raise ReadError(f"{path}: expected frames below lines of '# TIME ...', found none")

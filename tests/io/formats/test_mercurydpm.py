@@ -8,7 +8,6 @@ import pytest
 import scanfab
 from scanfab import ReadError, ScanfabWarning
 from scanfab.io.registry import reader_named
-from scanfab.testing import check_reader
 from tests.helpers.dumps import write
 from tests.helpers.made.mercurydpm import (
     CENTRES,
@@ -108,25 +107,6 @@ def test_an_old_restart(tmp_path):
     assert packing.contacts is None
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ("BaseParticle id 10", "SuperQuadricParticle id 10", "expected spheres, found a SuperQ"),
-        ("Particles 3", "Particles 30", "expected 30 Particles, found"),
-        ("radius 0.1", "radius", "expected 1 numbers in"),
-        ("particleIds 10 30", "particleIds 10 31", "names the grain 31, which is not in"),
-        ("PeriodicBoundary", "LeesEdwardsBoundary", "a LeesEdwardsBoundary repeats in a way"),
-        ("xMin 0", "zmin 0", "expected 1 numbers"),
-        ("shift 1 0 0", "shift 0 0 0", "make no cell"),
-    ],
-)
-def test_what_is_wrong_with_a_restart(tmp_path, old, new, message):
-    text = restart()
-    assert old in text
-    with pytest.raises(ReadError, match=message):
-        scanfab.read(write(tmp_path / "a.restart", text.replace(old, new)))
-
-
 def test_a_period_of_another_kind_can_be_named(tmp_path):
     text = restart().replace("PeriodicBoundary", "LeesEdwardsBoundary")
     packing = scanfab.read(write(tmp_path / "a.restart", text), cell=(1, 2, 3))
@@ -166,16 +146,6 @@ def test_a_last_frame_that_is_cut_is_left_out(run, ending):
     alone = data_frame(1) if ending == "data" else fstat_frame(1, contacts_at(1))
     with pytest.raises(ReadError, match=r"the file is incomplete"):
         reader.snapshots(write(run / f"b.{ending}", alone[:-9]))
-
-
-def test_the_kit(tmp_path):
-    files = [
-        write(tmp_path / "a.data", data_frame(0.1) + data_frame(0.2)),
-        write(tmp_path / "b.data", "1 0.5 0 0 1 2 \n0.1 1 9 9 0.1 0 0 0\n"),
-        write(tmp_path / "c.restart", restart()),
-    ]
-    check_reader(reader_named("mercurydpm"), files[:1], tmp_path / "damaged")
-    check_reader(reader_named("mercurydpm"), files[1:], tmp_path / "damaged", counts=True)
 
 
 @pytest.mark.filterwarnings("error")
