@@ -34,7 +34,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path[0] = str(ROOT)
 
 from scanfab.base.errors import ScanfabError  # noqa: E402
-from scanfab.io.formats import lammps_yaml, text_dump  # noqa: E402
+from scanfab.io.formats import text_dump  # noqa: E402
 from scanfab.io.parse import counted_rows, text_table  # noqa: E402
 from scanfab.io.reader import GrainTable, ReadOptions  # noqa: E402
 from scanfab.io.registry import reader_named  # noqa: E402
@@ -146,7 +146,7 @@ def _set_sizes(least: int, piece: int, searched: int) -> None:
         for name in names.split():
             setattr(module, name, least)
     text_table.PIECE = piece
-    text_dump.PIECE = lammps_yaml.PIECE = searched
+    text_dump.PIECE = searched
 
 
 def _verdict(short: Any, long: Any) -> tuple[bool, str]:
