@@ -13,15 +13,7 @@ from typing import Any
 from scanfab.base.errors import ScanfabNote, SettingsError
 from scanfab.base.files import check_folder, whole_file
 from scanfab.base.option import refuse_unknown
-from scanfab.io.beside import (
-    columns_csv,
-    columns_file,
-    companions_there,
-    contacts_csv,
-    contacts_file,
-    frame_csv,
-    frame_file,
-)
+from scanfab.io import beside
 from scanfab.io.families import names_a_step
 from scanfab.io.files import bare_name
 from scanfab.io.opening import READING, read_series
@@ -189,7 +181,7 @@ def save_packing(packing: Packing, path: Path, writer: Writer | None = None) -> 
         By default the one that the suffix names.
     """
     writer = writer_for(path) if writer is None else writer
-    there = companions_there(path)
+    there = beside.companions_there(path)
     other = _other_grains(path) if there else None
     if other is not None:
         names = " and ".join(file.name for file in there)
@@ -201,18 +193,18 @@ def save_packing(packing: Packing, path: Path, writer: Writer | None = None) -> 
         # the first file to be opened is the last to take its place: with the grains all is there
         part = files.enter_context(whole_file(path))
         left = writer.write(packing, part)
-        beside: dict[Path, bytes] = {}
+        made: dict[Path, bytes] = {}
         if left.contacts and packing.contacts is not None:
-            beside[contacts_file(path)] = contacts_csv(packing)
+            made[beside.contacts_file(path)] = beside.contacts_csv(packing)
         is_numbered = left.no_step and packing.step is None and names_a_step(path)
-        if left.frame or is_numbered or beside:
-            beside[frame_file(path)] = frame_csv(packing)
+        if left.frame or is_numbered or made:
+            made[beside.frame_file(path)] = beside.frame_csv(packing)
         if left.columns:
-            beside[columns_file(path)] = columns_csv(packing, left.columns)
-        for file, data in beside.items():
+            made[beside.columns_file(path)] = beside.columns_csv(packing, left.columns)
+        for file, data in made.items():
             files.enter_context(whole_file(file)).write_bytes(data)
     for file in there:
-        if file not in beside:
+        if file not in made:
             # an earlier packing of this name has left it
             with suppress(OSError):
                 file.unlink()

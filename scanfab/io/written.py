@@ -61,10 +61,13 @@ def own_columns(packing: Packing) -> tuple[Columns, list[str]]:
             continue
         if values.dtype.kind == "f" and values.dtype.itemsize not in (4, 8):
             values = values.astype(np.float64)
-        disagrees = name.lower() in DIAMETER_NAMES and other_size(packing.radius, values)
-        is_taken = re.sub(r"[^a-z0-9]", "", name.lower()) in TAKEN or name in (BODIES, WALLS)
-        free = name
-        if is_taken or disagrees not in (None, False):
+        free, plain = name, re.sub(r"[^a-z0-9]", "", name.lower())
+        is_size = name.lower() in DIAMETER_NAMES
+        if (
+            plain in TAKEN
+            or name in (BODIES, WALLS)
+            or (is_size and other_size(packing.radius, values) is not None)
+        ):
             free = free_name(name, [*found, *packing.columns])
             notes.append(f"the column {name} is called {free}: {name} is what grains are read from")
         found[free] = values

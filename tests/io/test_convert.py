@@ -157,12 +157,13 @@ def test_what_cannot_be_written_leaves_what_was_there(
 
 
 def test_a_name_that_means_something_else_is_told(tmp_path):
-    packing = scanfab.Packing(np.zeros((1, 3)), 1.0, columns={"Radius": [2.0], "x": [3.0]})
+    columns = {"Radius": [2.0], "x": [3.0], "diameter": [5.0]}
+    packing = scanfab.Packing(np.zeros((1, 3)), 1.0, columns=columns)
     with pytest.warns(ScanfabNote, match="the column Radius is called Radius_of_dump"):
         scanfab.convert(packing, tmp_path / "a.npz")
     again = scanfab.read(tmp_path / "a.npz")
     assert again.radius == [1.0]
-    assert (again.columns["Radius_of_dump"], again.columns["x_of_dump"]) == ([2.0], [3.0])
+    assert {f"{name}_of_dump": values for name, values in columns.items()} == dict(again.columns)
 
 
 @pytest.mark.parametrize("name", ["time", "Step", "frame", "TimeStep", "Time [s]", "t", "cycle"])

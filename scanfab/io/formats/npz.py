@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from scanfab.base.errors import ReadError
+from scanfab.io import written
 from scanfab.io.beside import companion_kind, read_contacts
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.columns import grain_table
@@ -24,14 +25,6 @@ from scanfab.io.reader import (
     Snapshot,
 )
 from scanfab.io.writer import Left
-from scanfab.io.written import (
-    cell_of,
-    contact_arrays,
-    contacts_of,
-    frame_arrays,
-    own_columns,
-    standard_columns,
-)
 from scanfab.packing.packing import Packing
 
 # the array that makes it a packing; its value is the version of the layout
@@ -88,10 +81,10 @@ class NpzFormat:
         columns |= {k.removeprefix(COLUMN): v for k, v in arrays.items() if k.startswith(COLUMN)}
         if len({values.shape[:1] for values in columns.values()}) != 1:
             raise ReadError(f"{path}: expected arrays with a row for each grain")
-        grains = grain_table(path, columns, cell_of(path, arrays), options)
+        grains = grain_table(path, columns, written.cell_of(path, arrays), options)
         if "pairs" not in arrays:
             return grains
-        return grains._replace(contacts=contacts_of(path, arrays["pairs"], arrays))
+        return grains._replace(contacts=written.contacts_of(path, arrays["pairs"], arrays))
 
     def left_out(self, path: Path) -> list[str]:
         """Of what scanfab writes nothing is left out."""
@@ -109,17 +102,17 @@ class NpzFormat:
 
     def write(self, packing: Packing, path: Path) -> Left:
         """Write one frame; it holds everything."""
-        own, notes = own_columns(packing)
+        own, notes = written.own_columns(packing)
         arrays: dict[str, Any] = {
             MARK: 1,
             "position": packing.position,
             "radius": packing.radius,
-            **standard_columns(packing),
+            **written.standard_columns(packing),
             **{f"{COLUMN}{name}": values for name, values in own.items()},
-            **frame_arrays(packing),
+            **written.frame_arrays(packing),
         }
         if packing.contacts is not None:
-            arrays |= {"pairs": packing.contacts.pairs, **contact_arrays(packing)}
+            arrays |= {"pairs": packing.contacts.pairs, **written.contact_arrays(packing)}
         stream = io.BytesIO()
         np.savez_compressed(stream, **arrays)
         path.write_bytes(stream.getvalue())

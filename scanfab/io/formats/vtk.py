@@ -29,8 +29,7 @@ from scanfab.io.reader import (
 from scanfab.io.writers.vtp import (
     is_packing,
     moment_of,
-    packing_cell,
-    packing_contacts,
+    packing_of,
     says_all,
 )
 from scanfab.packing.cell import Cell
@@ -94,8 +93,8 @@ class VtkReader:
         columns = {**mesh.point_arrays, "position": mesh.points}
         if is_packing(mesh):
             _refuse_parts(snapshot, "a packing that scanfab wrote")
-            own = grain_table(snapshot.path, columns, packing_cell(snapshot.path, mesh), options)
-            return own._replace(contacts=packing_contacts(snapshot.path, mesh))
+            cell, contacts = packing_of(snapshot.path, mesh)
+            return grain_table(snapshot.path, columns, cell, options)._replace(contacts=contacts)
         if len(mesh.points) == 0:
             columns["radius"] = np.zeros(0)
         cell = _read_box(snapshot.path)

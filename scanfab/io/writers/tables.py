@@ -33,6 +33,7 @@ class CsvWriter:
     name = "csv"
     description = "a table of spheres with commas; contacts and cell beside it"
     extensions: tuple[str, ...] = (".csv",)
+    separator = ","
 
     def write(self, packing: Packing, path: Path) -> Left:
         """Write the columns id, x, y, z, radius and all others; a table holds nothing else."""
@@ -51,12 +52,11 @@ class CsvWriter:
             else:
                 columns[name] = values
         path.write_bytes(self.table(columns))
-        is_bare = not frame_arrays(packing)
-        return Left(contacts=True, frame=not is_bare, notes=(*notes, *split))
+        return Left(contacts=True, frame=bool(frame_arrays(packing)), notes=(*notes, *split))
 
     def table(self, columns: Columns) -> bytes:
         """The bytes of the file."""
-        return csv_bytes(columns)
+        return csv_bytes(columns, self.separator)
 
 
 class TsvWriter(CsvWriter):
@@ -65,10 +65,7 @@ class TsvWriter(CsvWriter):
     name = "tsv"
     description = "a table of spheres with tabs; contacts and cell beside it"
     extensions = (".tsv",)
-
-    def table(self, columns: Columns) -> bytes:
-        """The bytes of the file."""
-        return csv_bytes(columns, "\t")
+    separator = "\t"
 
 
 class ParquetWriter(CsvWriter):
@@ -117,19 +114,15 @@ class XyzWriter:
 
 def _line(packing: Packing) -> str:
     """Cell, step and time, as the line above the rows names them."""
-    words = []
-    cell = packing.cell
+    cell, words = packing.cell, ""
     if cell is not None:
         vectors, origin = (
-            " ".join(map(repr, v.ravel().tolist())) for v in (cell.vectors, cell.origin)
+            " ".join(map(repr, one.ravel().tolist())) for one in (cell.vectors, cell.origin)
         )
         along = " ".join("FT"[one] for one in cell.periodic)
-        words.append(f'Lattice="{vectors}" Origin="{origin}" pbc="{along}" ')
-    if packing.step is not None:
-        words.append(f"Timestep={packing.step} ")
-    if packing.time is not None:
-        words.append(f"Time={packing.time!r} ")
-    return "".join(words)
+        words = f'Lattice="{vectors}" Origin="{origin}" pbc="{along}" '
+    step = "" if packing.step is None else f"Timestep={packing.step} "
+    return words + step + ("" if packing.time is None else f"Time={packing.time!r} ")
 
 
 def _is_xyz(name: str, values: npt.NDArray[Any]) -> bool:

@@ -10,16 +10,9 @@ from xml.sax.saxutils import escape
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.io import written
 from scanfab.io.files import first_bytes
 from scanfab.io.writer import Left
-from scanfab.io.written import (
-    cell_of,
-    contact_arrays,
-    contacts_of,
-    frame_arrays,
-    own_columns,
-    standard_columns,
-)
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import ContactList
 from scanfab.packing.packing import Packing
@@ -27,10 +20,13 @@ from scanfab.packing.packing import Packing
 if TYPE_CHECKING:
     from scanfab.io.mesh import Mesh
 
-# step and time stand in the first line, so that a series is listed without reading its files
-NUMBER = rb"(?P<time>[-+]?\d[\d.]{0,30}(?:[eE][-+]?\d{1,3})?)"
-MARK = re.compile(rb"\A<!-- scanfab step=(?P<step>-?\d{1,18})? time=" + NUMBER + rb"? -->")
-TIME = re.compile(rb'(?P<step>)Name="TimeValue"[^>]*format="ascii"[^>]*>\s*' + NUMBER + rb"\s*<")
+# step and time, as a comment in the first line, so that a series is listed without reading its
+# files; or as other programs and earlier versions write them, as text
+MOMENT = re.compile(
+    rb'(TimeValue|scanfab_step)(?:=|"[^>]*format="ascii"[^>]*>\s*)([-+.\deE]{1,30})(?=[\s<])'
+)
+# the elements of the arrays of the file as a whole are in its first bytes
+HEAD = 1 << 14
 # the array of the file as a whole that says whether contacts are known, and the others
 KNOWN = "scanfab_contacts"
 FIELDS = {name: f"scanfab_{name}" for name in ("step", "cell", "origin", "periodic")}
@@ -50,11 +46,12 @@ class VtpWriter:
         from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
         from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
 
-        own, notes = own_columns(packing)
-        frame, contacts, cells = frame_arrays(packing), packing.contacts, contact_arrays(packing)
+        own, notes = written.own_columns(packing)
+        frame, cells = written.frame_arrays(packing), written.contact_arrays(packing)
+        contacts = packing.contacts
         fields = {FIELDS[name]: np.ravel(values)[None] for name, values in frame.items()}
         fields[KNOWN] = np.array([int(contacts is not None)])
-        columns = {**standard_columns(packing), "radius": packing.radius, **own}
+        columns = {**written.standard_columns(packing), "radius": packing.radius, **own}
         data, points, lines = vtkPolyData(), vtkPoints(), vtkCellArray()
         points.SetData(_array("Points", packing.position))
         data.SetPoints(points)
@@ -78,8 +75,10 @@ class VtpWriter:
         writer.WriteToOutputStringOn()
         writer.Write()
         text = writer.GetOutputString()
-        step, time = ("" if one is None else repr(one) for one in (packing.step, packing.time))
-        mark = f"<!-- scanfab step={step} time={time} -->\n".encode()
+        moment = "".join(
+            f" {FIELDS[one]}={frame[one]!r}" for one in ("step", "time") if one in frame
+        )
+        mark = f"<!--{moment} -->\n".encode()
         path.write_bytes(mark + (text if isinstance(text, bytes) else text.encode()))
         return Left(no_step=False, notes=tuple(notes))
 
@@ -104,16 +103,18 @@ def _array(name: str, values: npt.NDArray[Any]) -> Any:
 
 
 def moment_of(path: Path) -> tuple[int | None, float | None]:
-    """Step and time of a file that scanfab wrote; the time of others, if it stands as text."""
-    head = first_bytes(path, 1 << 14)
-    match = MARK.match(head) or TIME.search(head)
-    step, time = (None, None) if match is None else match.group("step", "time")
-    return int(step) if step else None, float(time) if time else None
+    """Step and time, if they stand in the first bytes of a file."""
+    found = dict(MOMENT.findall(first_bytes(path, HEAD)))
+    try:
+        step = int(found[b"scanfab_step"]) if b"scanfab_step" in found else None
+        return step, float(found[b"TimeValue"]) if b"TimeValue" in found else None
+    except ValueError:
+        return None, None
 
 
 def says_all(path: Path) -> bool:
     """Whether scanfab wrote the file, so that there is no cell or step but those in it."""
-    return MARK.match(first_bytes(path)) is not None
+    return KNOWN.encode() in first_bytes(path, HEAD)
 
 
 def is_packing(mesh: Mesh) -> bool:
@@ -121,14 +122,11 @@ def is_packing(mesh: Mesh) -> bool:
     return KNOWN in mesh.field_arrays
 
 
-def packing_cell(path: Path, mesh: Mesh) -> Cell | None:
-    """The cell of a packing."""
+def packing_of(path: Path, mesh: Mesh) -> tuple[Cell | None, ContactList | None]:
+    """The cell and the contacts of a packing; None if they are not known."""
     fields = mesh.field_arrays
-    return cell_of(path, {name: fields[own] for name, own in FIELDS.items() if own in fields})
-
-
-def packing_contacts(path: Path, mesh: Mesh) -> ContactList | None:
-    """The contacts of a packing; None if they were not known."""
-    if not np.any(mesh.field_arrays[KNOWN]):
-        return None
-    return contacts_of(path, mesh.lines, mesh.line_arrays)
+    cell = {name: fields[own] for name, own in FIELDS.items() if own in fields}
+    contacts = None
+    if np.any(fields[KNOWN]):
+        contacts = written.contacts_of(path, mesh.lines, mesh.line_arrays)
+    return written.cell_of(path, cell), contacts
