@@ -122,7 +122,7 @@ def _read_one(path: Path) -> Mesh:
         }
         return Mesh(np.zeros((0, 3)), arrays, np.zeros((0, 2), np.int64), {}, False, {})
     mesh = fenced(mesh_in_worker, path)
-    if is_ascii(head) and not _last_byte(path).isspace():
+    if is_ascii(head) and not plain(path).read_bytes()[-1:].isspace():
         warnings.warn(
             f"{path}: the last line has no end: its last number may be cut off",
             ScanfabWarning,
@@ -140,12 +140,6 @@ def _check_other_files(path: Path, form: str) -> None:
             file_inside(path, (item.text or "").strip().partition(":")[0])
         if "include" in item.tag.lower():
             raise ReadError(f"{path}: XDMF that includes other files is not read")
-
-
-def _last_byte(path: Path) -> bytes:
-    with open(plain(path), "rb") as stream:
-        stream.seek(-1, 2)
-        return stream.read()
 
 
 def elements(path: Path) -> ElementTree.Element:
@@ -251,6 +245,7 @@ def _read_by_vtk(path: str) -> Any:
 
     with open(path, "rb") as stream:
         head = stream.read(4096)
+    names = check_text(Path(path).read_bytes()) if is_ascii(head) else set()
     reader = _reader_for(path, head)
     window = vtkStringOutputWindow()
     vtkOutputWindow.SetInstance(window)
@@ -259,8 +254,13 @@ def _read_by_vtk(path: str) -> Any:
     data = reader.GetOutputDataObject(0)
     told = [one for one in window.GetOutput().split("\n\n\n") if one and not HARMLESS.search(one)]
     if told or data is None:
-        reason = re.sub(r"^.*(\n.*\(0x[0-9a-f]+\):)?", "", told[0] if told else "no data")
+        reason = re.sub(r"^.*(\n.*\((0x[0-9a-f]+|nullptr)\):)?", "", told[0] if told else "no data")
         raise damaged(" ".join(reason.split()))
+    if names:
+        parts = (data.GetPointData(), data.GetCellData(), data.GetFieldData())
+        names -= {one for part in parts for one in _arrays(part, None)}
+        if names:
+            raise damaged(f"the array {min(names)} cannot be read")
     return data
 
 
@@ -275,8 +275,6 @@ def _reader_for(path: str, head: bytes) -> Any:
 
         return vtkXdmfReader()
     if head.startswith(b"# vtk"):
-        if is_ascii(head):
-            check_text(Path(path).read_bytes())
         from vtkmodules.vtkIOLegacy import vtkGenericDataObjectReader
 
         reader = vtkGenericDataObjectReader()
@@ -302,6 +300,8 @@ def _arrays(attributes: Any, rows: int | None) -> Arrays:
     for place in range(attributes.GetNumberOfArrays()):
         one = attributes.GetAbstractArray(place)
         name = one.GetName()
+        # VTK gives bytes if they are no UTF-8
+        name = name.decode("utf-8", "replace") if isinstance(name, bytes) else name
         if one.IsA("vtkStringArray"):
             values = np.array([one.GetValue(k) for k in range(one.GetNumberOfValues())], dtype=str)
         else:
@@ -345,6 +345,8 @@ def _mesh_of(data: Any) -> Mesh:
     arrays = _arrays(data.GetPointData(), count)
     cell_arrays = _arrays(data.GetCellData(), data.GetNumberOfCells())
     if data.IsA("vtkPolyData"):
+        for others in (data.GetVerts(), data.GetPolys(), data.GetStrips()):
+            _cells(others, count)
         offsets, named = _cells(data.GetLines(), count)
         chosen = np.arange(len(offsets) - 1)
         # the rows of cell arrays are those of vertices, lines and faces, in this order
@@ -352,20 +354,11 @@ def _mesh_of(data: Any) -> Mesh:
         has_faces = data.GetNumberOfPolys() + data.GetNumberOfStrips() > 0
     else:
         offsets, named = _cells(data.GetCells(), count)
-        array = data.GetCellTypesArray()
-        # since VTK 9.6, cells that are all of one type have no such array
-        types = np.array(data.GetCellTypes()) if array is None else _numpy(array)
-        if len(types) != len(offsets) - 1:
-            raise damaged(f"{len(types)} types for {len(offsets) - 1} cells")
-        sizes = np.diff(offsets)
-        is_line = (types == LINE) | ((types == POLY_LINE) & (sizes == 2))
-        has_faces = bool(np.any(~np.isin(types, (VERTEX, POLY_VERTEX)) & ~is_line))
-        if len(types) == count and not has_faces and np.array_equal(named, np.arange(count)):
+        chosen, has_faces = _lines_of_grid(data, offsets)
+        rows = chosen
+        if len(offsets) - 1 == count and not has_faces and np.array_equal(named, np.arange(count)):
             # one cell for each point, whose arrays are those of the points
             arrays.update(cell_arrays)
-        chosen = rows = np.flatnonzero(is_line)
-        if np.any(sizes[rows] != 2):
-            raise damaged("types and points of the cells do not fit")
     first, last = offsets[:-1][chosen], offsets[1:][chosen] - 1
     if np.any(last < first):
         raise damaged("a line has no points")
@@ -373,6 +366,20 @@ def _mesh_of(data: Any) -> Mesh:
     line_arrays = {name: values[rows] for name, values in cell_arrays.items()}
     field_arrays = _arrays(data.GetFieldData(), None)
     return _own(Mesh(points, arrays, lines, line_arrays, has_faces, field_arrays))
+
+
+def _lines_of_grid(data: Any, offsets: IntArray) -> tuple[IntArray, bool]:
+    """Which cells of a grid are lines, and whether others than lines and points are among them."""
+    array, sizes = data.GetCellTypesArray(), np.diff(offsets)
+    # since VTK 9.6, cells that are all of one type have no such array
+    types = np.array(data.GetCellTypes()) if array is None else _numpy(array)
+    if len(types) != len(sizes):
+        raise damaged(f"{len(types)} types for {len(sizes)} cells")
+    is_line = (types == LINE) | ((types == POLY_LINE) & (sizes == 2))
+    if np.any(sizes[is_line] != 2):
+        raise damaged("types and points of the cells do not fit")
+    is_point = (types == VERTEX) | (types == POLY_VERTEX)
+    return np.flatnonzero(is_line), bool(np.any(~is_point & ~is_line))
 
 
 def _own(mesh: Mesh) -> Mesh:

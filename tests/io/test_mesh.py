@@ -293,3 +293,10 @@ def test_the_time_grows_as_the_file_does(tmp_path, part):
     began = time.monotonic()
     refuses(path)
     assert time.monotonic() - began < 10
+
+
+@pytest.mark.parametrize("wrong", [b"0.5 0.5 0.5", b"0.\x005", b"half"])
+def test_arrays_that_vtk_drops_in_silence_are_missed(tmp_path, wrong):
+    path = yade_spheres(tmp_path / "a.vtk", np.eye(3), [0.5, 0.25, 1.0], id=[1, 2, 3])
+    path.write_bytes(path.read_bytes().replace(b"0.5", wrong))
+    refuses(path)

@@ -12,17 +12,19 @@ import base64
 import binascii
 import re
 import xml.etree.ElementTree as ElementTree
+from urllib.parse import unquote
 
 HEAD = re.compile(rb"# vtk DataFile[^\n]*\n[^\n]*\n\s*(ASCII|BINARY)\s", re.IGNORECASE)
 # the header of a section, or of an array in a FIELD: NAME COMPONENTS TUPLES TYPE
 SECTION = re.compile(
     rb"^(?:(POINTS|VERTICES|LINES|POLYGONS|TRIANGLE_STRIPS|CELLS|CELL_TYPES|OFFSETS|CONNECTIVITY"
     rb"|POINT_DATA|CELL_DATA|SCALARS|VECTORS|NORMALS|TENSORS|[XYZ]_COORDINATES)[ \t]+"
-    rb"|\S+[ \t]+(?=\d+[ \t]+\d+[ \t]+[a-z]))([^\n]*)\n",
+    rb"|\S+[ \t]+(?=\d+[ \t]+\d+[ \t]+(?!nan|inf)[a-z]))([^\n]*)\n",
     re.MULTILINE | re.IGNORECASE,
 )
 CELLS = (b"VERTICES", b"LINES", b"POLYGONS", b"TRIANGLE_STRIPS", b"CELLS")
 VALUES = {b"VECTORS": 3, b"NORMALS": 3, b"TENSORS": 9}
+ARRAYS = (b"SCALARS", *VALUES)
 METADATA = re.compile(rb"^METADATA", re.MULTILINE)
 
 
@@ -37,20 +39,30 @@ def damaged(reason: str) -> ValueError:
     return ValueError(f"the file is damaged or incomplete: {reason}")
 
 
-def check_text(data: bytes) -> None:
-    """ValueError if the last section of an ASCII legacy file has too few values."""
-    rows = cells = ids = 0
+def check_text(data: bytes) -> set[str]:
+    """
+    The names of all arrays of an ASCII legacy file: VTK may give up, and drop them all in silence.
+
+    Raises
+    ------
+    ValueError
+        If the last section has too few values.
+    """
+    rows = cells = ids = points = 0
     kind, words = b"", [b""]
     last: re.Match[bytes] | None = None
-    kinds = []
+    names = set()
     for last in SECTION.finditer(data):
         kind, words = (last[1] or b"").upper(), last[2].split() or [b""]
-        kinds.append(kind)
+        points += kind == b"POINTS"
+        if not kind or kind in ARRAYS:
+            name = words[0] if kind else last[0].split()[0]
+            names.add(unquote(name.decode("utf-8", "replace")))
         if kind in (b"POINT_DATA", b"CELL_DATA"):
             rows = _whole(words[0])
         elif kind in CELLS:
             cells, ids = _whole(words[0]), _whole(words[-1])
-    if last is None or kinds.count(b"POINTS") > 1:
+    if last is None or points > 1:
         raise damaged("expected the keywords of sections, and POINTS at most once")
     behind = METADATA.split(data[last.end() :], 1)[0].split()
     if kind == b"SCALARS":
@@ -67,8 +79,9 @@ def check_text(data: bytes) -> None:
         known |= {b"POINT_DATA": min(rows, 1), b"CELL_DATA": min(rows, 1)}
         expected = known.get(kind, ids if kind in CELLS else count)
     if len(behind) < expected:
-        name = last[0].split()[0].decode("utf-8", "replace")
-        raise damaged(f"{name} has {len(behind)} of {expected} values")
+        header = last[0].split()[0].decode("utf-8", "replace")
+        raise damaged(f"{header} has {len(behind)} of {expected} values")
+    return names
 
 
 def _whole(word: bytes | str) -> int:
