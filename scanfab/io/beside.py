@@ -222,7 +222,7 @@ def check_contacts_are_there(path: Path, told: FrameData | None) -> None:
         If the contacts file is empty, or if it is missing although the frame file counts contacts.
     """
     file = contacts_file(path)
-    is_empty = file.is_file() and file.stat().st_size == 0
+    is_empty = file.is_file() and not file.stat().st_size
     expected = None if told is None else told.contacts
     if expected is None and not is_empty:
         return

@@ -97,6 +97,16 @@ def flat(columns: Columns) -> tuple[Columns, list[str]]:
     return found, notes
 
 
+def table_columns(packing: Packing) -> tuple[Columns, Columns, list[str]]:
+    """The columns of a table that readers know, those of the source, and notes on the latter."""
+    own, notes = own_columns(packing)
+    own, split = flat(own)
+    standard = standard_columns(packing)
+    place = dict(zip("xyz", packing.position.T, strict=True))
+    known = {"id": standard.pop("id"), **place, "radius": packing.radius, **standard}
+    return known, own, [*notes, *split]
+
+
 def more_columns(packing: Packing) -> Columns:
     """
     All that there is of the grains but id, position and radius, in columns of one value a grain.
@@ -111,9 +121,8 @@ def more_columns(packing: Packing) -> Columns:
     dict of str to ndarray, shape (N,)
         By names that a reader takes for what they are.
     """
-    standard = standard_columns(packing)
-    del standard["id"]
-    return {**standard, **flat(own_columns(packing)[0])[0]}
+    known, own, _ = table_columns(packing)
+    return {name: values for name, values in known.items() if name not in TAKEN} | own
 
 
 def csv_bytes(columns: Columns, separator: str = ",", *, with_names: bool = True) -> bytes:

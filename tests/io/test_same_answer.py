@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import gzip
-from functools import partial
 
 import meshio
 import numpy as np
+import pyarrow
 import pytest
 import pyvista
+from pyarrow import parquet
 
 import scanfab
 from scanfab.packing.cell import Cell
@@ -73,18 +74,31 @@ class Source:
         return local_text(list(rows), step=step)
 
 
-def liggghts(folder, source):
-    write(folder / "dump_5.txt", source.dump(step=5))
-    return folder / "dump_5.txt", {"contacts": write(folder / "pairs_5.txt", source.local(5))}
+def liggghts(names="id type x y z radius", columns=lambda source: {}, change=lambda text: text):
+    """A dump with other columns, or with another text."""
+
+    def save(folder, source):
+        text = change(source.dump(names, 5, **columns(source)))
+        local = write(folder / "pairs_5.txt", source.local(5))
+        return write(folder / "dump_5.txt", text), {"contacts": local}
+
+    return save
 
 
-def liggghts_shuffled(folder, source):
-    path, options = liggghts(folder, source)
-    *header, body = path.read_text().split("radius \n")
+def coordinates(names, values):
+    return lambda source: dict(zip(names.split(), values(source).T, strict=True))
+
+
+def unwrapped(source):
+    turns = np.random.default_rng(2).integers(-2, 3, source.position.shape)
+    return source.position + (turns * EDGES if source.periodic else 0)
+
+
+def shuffled(text):
+    *header, body = text.split("radius \n")
     lines = body.splitlines(keepends=True)
     np.random.default_rng(1).shuffle(lines)
-    write(path, "radius \n".join([*header, "".join(lines)]))
-    return path, options
+    return "radius \n".join([*header, "".join(lines)])
 
 
 def liggghts_several_snapshots(folder, source):
@@ -94,33 +108,13 @@ def liggghts_several_snapshots(folder, source):
     return path, {"contacts": local, "frame": 1}
 
 
-def liggghts_scaled(folder, source):
-    fractions = dict(zip(("xs", "ys", "zs"), (source.position / EDGES).T, strict=True))
-    path = write(folder / "dump_5.txt", source.dump("id type xs ys zs radius", 5, **fractions))
-    return path, {"contacts": write(folder / "pairs_5.txt", source.local(5))}
-
-
-def liggghts_unwrapped(folder, source):
-    turns = np.random.default_rng(2).integers(-2, 3, source.position.shape)
-    moved = source.position + (turns * EDGES if source.periodic else 0)
-    columns = dict(zip(("xu", "yu", "zu"), moved.T, strict=True))
-    path = write(folder / "dump_5.txt", source.dump("xu yu zu id radius type", 5, **columns))
-    return path, {"contacts": write(folder / "pairs_5.txt", source.local(5))}
-
-
-def liggghts_diameter(folder, source):
-    text = source.dump("diameter z y x type id", 5, diameter=2 * source.radius)
-    path = write(folder / "dump_5.txt", text)
-    return path, {"contacts": write(folder / "pairs_5.txt", source.local(5))}
-
-
 def liggghts_packed(folder, source):
-    path, options = liggghts(folder, source)
-    for file in (path, options["contacts"]):
-        file.with_name(file.name + ".gz").write_bytes(gzip.compress(file.read_bytes()))
-        file.unlink()
-    packed = options["contacts"].with_name("pairs_5.txt.gz")
-    return path.with_name("dump_5.txt.gz"), {"contacts": packed}
+    path, options = liggghts()(folder, source)
+    packed = [file.with_name(f"{file.name}.gz") for file in (path, options["contacts"])]
+    for file in packed:
+        file.write_bytes(gzip.compress(file.with_suffix("").read_bytes()))
+        file.with_suffix("").unlink()
+    return packed[0], {"contacts": packed[1]}
 
 
 def yade_exporter(folder, source):
@@ -134,40 +128,29 @@ def yade_exporter_with_ids(folder, source):
     return path, {"contacts": lines, **source.cell}
 
 
-def yade_text(folder, source, names="x_y_z_r", columns=()):
-    rows = np.column_stack([*columns, source.position, source.radius])
-    lines = ["\t".join(map(repr, row)) + "\n" for row in rows.tolist()]
-    path = write(folder / "grains.txt", f"#format {names}\n" + "".join(lines))
-    return path, {"contacts": "geometric", **source.cell}
+def yade_text(names, lines):
+    """Text of spheres, with contacts by geometry or as lines."""
 
+    def save(folder, source):
+        ids = [source.id] if names.startswith("id") else []
+        rows = np.column_stack([*ids, source.position, source.radius])
+        text = "".join("\t".join(map(repr, row)) + "\n" for row in rows.tolist())
+        path = write(folder / "grains.txt", f"#format {names}\n{text}")
+        contacts = yade_lines(folder / "lines.vtk", source.ends) if lines else "geometric"
+        return path, {"contacts": contacts, **source.cell}
 
-def yade_text_with_ids(folder, source):
-    return yade_text(folder, source, "id_x_y_z_r", [source.id])
-
-
-def yade_text_and_lines(folder, source):
-    path, options = yade_text(folder, source)
-    return path, {**options, "contacts": yade_lines(folder / "lines.vtk", source.ends)}
-
-
-def cloud(source):
-    mesh = pyvista.PolyData(source.position)
-    mesh["radius"] = source.radius
-    return mesh
-
-
-def line_mesh(source):
-    count = len(source.ends)
-    ends = np.arange(2 * count).reshape(-1, 2)
-    return pyvista.PolyData(
-        source.ends.reshape(-1, 3), lines=np.column_stack([np.full(count, 2), ends]).ravel()
-    )
+    return save
 
 
 def vtk_of(ending, binary):
     def save(folder, source):
-        cloud(source).save(folder / f"grains{ending}", binary=binary)
-        line_mesh(source).save(folder / f"lines{ending}", binary=binary)
+        ends = np.arange(2 * len(source.ends)).reshape(-1, 2)
+        cells = np.insert(ends, 0, 2, axis=1).ravel()
+        grains = pyvista.PolyData(source.position)
+        grains["radius"] = source.radius
+        grains.save(folder / f"grains{ending}", binary=binary)
+        lines = pyvista.PolyData(source.ends.reshape(-1, 3), lines=cells)
+        lines.save(folder / f"lines{ending}", binary=binary)
         return folder / f"grains{ending}", {"contacts": folder / f"lines{ending}", **source.cell}
 
     return save
@@ -186,49 +169,31 @@ def grid_of(ending, **options):
     return save
 
 
-def table(folder, source, write_table=None):
+def table(ending, put):
     """Two tables with names, each column under a name that says what it is."""
-    grains = dict(zip(("x", "y", "z"), source.position.T, strict=True))
-    grains = {"radius": source.radius, "id": source.id, **grains}
-    contacts = {"id2": source.id2, "id1": source.id1}
-    write_table(folder / "grains_5", grains)
-    write_table(folder / "pairs_5", contacts)
-    (grains_path,) = folder.glob("grains_5.*")
-    (contacts_path,) = folder.glob("pairs_5.*")
-    return grains_path, {"contacts": contacts_path, **source.cell}
+
+    def save(folder, source):
+        place = dict(zip(("x", "y", "z"), source.position.T, strict=True))
+        grains, contacts = folder / f"grains_5{ending}", folder / f"pairs_5{ending}"
+        put(grains, {"radius": source.radius, "id": source.id, **place})
+        put(contacts, {"id2": source.id2, "id1": source.id1})
+        return grains, {"contacts": contacts, **source.cell}
+
+    return save
 
 
-def text_table(ending, separator, opener=open):
-    def save(path, columns):
+def text(separator, opener=open, comma="."):
+    def put(path, columns):
         rows = zip(*(values.tolist() for values in columns.values()), strict=True)
-        lines = [list(columns), *(map(repr, row) for row in rows)]
-        with opener(f"{path}{ending}", "wt") as stream:
-            stream.writelines(separator.join(line) + "\n" for line in lines)
+        lines = [separator.join(columns), *(separator.join(map(repr, row)) for row in rows)]
+        with opener(path, "wt") as stream:
+            stream.write("\n".join(lines).replace(".", comma) + "\n")
 
-    return partial(table, write_table=save)
-
-
-def comma_table(folder, source):
-    def save(path, columns):
-        rows = zip(*(values.tolist() for values in columns.values()), strict=True)
-        lines = [";".join(map(repr, row)).replace(".", ",") for row in rows]
-        write(path.with_suffix(".csv"), ";".join(columns) + "\n" + "\n".join(lines) + "\n")
-
-    return table(folder, source, save)
+    return put
 
 
-def npz_table(folder, source):
-    return table(folder, source, lambda path, columns: np.savez(f"{path}.npz", **columns))
-
-
-def parquet_table(folder, source):
-    import pyarrow
-    from pyarrow import parquet
-
-    def save(path, columns):
-        parquet.write_table(pyarrow.table(columns), f"{path}.parquet")
-
-    return table(folder, source, save)
+def put_parquet(path, columns):
+    parquet.write_table(pyarrow.table(columns), path)
 
 
 def numbered_table(folder, source):
@@ -245,26 +210,30 @@ def numbered_table(folder, source):
 
 
 FORMATS = {
-    "CSV": text_table(".csv", ","),
-    "CSV, gzip": text_table(".csv.gz", ",", gzip.open),
-    "table with tabs": text_table(".tsv", "\t"),
-    "table with blanks": text_table(".txt", "   "),
-    "table with semicolons and decimal commas": comma_table,
-    "NPZ": npz_table,
-    "Parquet": parquet_table,
+    "CSV": table(".csv", text(",")),
+    "CSV, gzip": table(".csv.gz", text(",", gzip.open)),
+    "table with tabs": table(".tsv", text("\t")),
+    "table with blanks": table(".txt", text("   ")),
+    "table with semicolons and decimal commas": table(".csv", text(";", comma=",")),
+    "NPZ": table(".npz", lambda path, columns: np.savez(path, **columns)),
+    "Parquet": table(".parquet", put_parquet),
     "table without names": numbered_table,
-    "LIGGGHTS": liggghts,
-    "LIGGGHTS, rows in any order": liggghts_shuffled,
+    "LIGGGHTS": liggghts(),
+    "LIGGGHTS, rows in any order": liggghts(change=shuffled),
     "LIGGGHTS, several snapshots": liggghts_several_snapshots,
-    "LIGGGHTS, scaled": liggghts_scaled,
-    "LIGGGHTS, unwrapped": liggghts_unwrapped,
-    "LIGGGHTS, diameter": liggghts_diameter,
+    "LIGGGHTS, scaled": liggghts(
+        "id type xs ys zs radius", coordinates("xs ys zs", lambda source: source.position / EDGES)
+    ),
+    "LIGGGHTS, unwrapped": liggghts("xu yu zu id radius type", coordinates("xu yu zu", unwrapped)),
+    "LIGGGHTS, diameter": liggghts(
+        "diameter z y x type id", lambda source: {"diameter": 2 * source.radius}
+    ),
     "LIGGGHTS, gzip": liggghts_packed,
     "YADE, VTKExporter": yade_exporter,
     "YADE, VTKExporter with ids": yade_exporter_with_ids,
-    "YADE, text": yade_text,
-    "YADE, textExt with ids": yade_text_with_ids,
-    "YADE, text and lines": yade_text_and_lines,
+    "YADE, text": yade_text("x_y_z_r", lines=False),
+    "YADE, textExt with ids": yade_text("id_x_y_z_r", lines=False),
+    "YADE, text and lines": yade_text("x_y_z_r", lines=True),
     "legacy VTK, ASCII": vtk_of(".vtk", binary=False),
     "legacy VTK, binary": vtk_of(".vtk", binary=True),
     ".vtp, ASCII": vtk_of(".vtp", binary=False),

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from scanfab.base.typing import FloatArray
 from scanfab.io.writer import Left
-from scanfab.io.written import csv_bytes, flat, more_columns, own_columns, standard_columns
+from scanfab.io.written import csv_bytes, more_columns, table_columns
 from scanfab.packing.packing import Packing
 
 # whole numbers up to here are the same as decimals
@@ -32,21 +32,18 @@ class LammpsDumpWriter:
 
     def write(self, packing: Packing, path: Path) -> Left:
         """Write one frame; columns that are no numbers lie beside it."""
-        own, notes = own_columns(packing)
-        columns, split = flat(own)
-        held = {name: values for name, values in columns.items() if _is_dumped(name, values)}
-        place = dict(zip("xyz", packing.position.T, strict=True))
-        standard = standard_columns(packing)
-        rows = {"id": packing.id, **place, "radius": packing.radius, **standard, **held}
+        known, own, notes = table_columns(packing)
+        held = {name: values for name, values in own.items() if _is_dumped(name, values)}
+        rows = {**known, **held}
         time = "" if packing.time is None else f"ITEM: TIME\n{packing.time!r}\n"
         head = (
             f"{time}ITEM: TIMESTEP\n{packing.step or 0}\nITEM: NUMBER OF ATOMS\n{len(packing)}\n"
             f"ITEM: BOX BOUNDS {_bounds(packing)}ITEM: ATOMS {' '.join(rows)}\n"
         )
         path.write_bytes(head.encode() + csv_bytes(rows, " ", with_names=False))
-        left = tuple(name for name in columns if name not in held)
+        left = tuple(name for name in own if name not in held)
         # from bounds the edges of the cell come back with a rounding error
-        return Left(contacts=True, frame=True, columns=left, notes=(*notes, *split))
+        return Left(contacts=True, frame=True, columns=left, notes=tuple(notes))
 
 
 class LammpsDataWriter:
@@ -58,17 +55,16 @@ class LammpsDataWriter:
 
     def write(self, packing: Packing, path: Path) -> Left:
         """Write one frame; LAMMPS has a place for type and density, all else lies beside it."""
-        own, notes = own_columns(packing)
-        columns, split = flat(own)
+        _, own, notes = table_columns(packing)
         # both columns must be there: without a sound one they are 1
-        rows = {"type": np.ones(len(packing), np.int64), "density": np.ones(len(packing))}
-        held = [name for name in rows if name in columns and _is_data(name, columns[name])]
-        rows |= {name: columns[name].astype(rows[name].dtype) for name in held}
+        kinds = {"type": np.ones(len(packing), np.int64), "density": np.ones(len(packing))}
+        held = [name for name in kinds if name in own and _is_data(name, own[name])]
+        kinds |= {name: own[name].astype(kinds[name].dtype) for name in held}
         rows = {
             "id": packing.id,
-            "type": rows["type"],
+            "type": kinds["type"],
             "diameter": 2.0 * packing.radius,
-            "density": rows["density"],
+            "density": kinds["density"],
             **dict(zip("xyz", packing.position.T, strict=True)),
         }
         low, high, tilt, is_turned = _box(packing)
@@ -87,8 +83,8 @@ class LammpsDataWriter:
         if len(packing) and packing.id.max() >= MOST_SMALL:
             notes.append("LAMMPS takes ids above 2147483647 only if it was built for them")
         left = tuple(name for name in more_columns(packing) if name not in held)
-        turned = (TURNED,) if is_turned else ()
-        return Left(contacts=True, frame=True, columns=left, notes=(*notes, *split, *turned))
+        notes += [TURNED] if is_turned else []
+        return Left(contacts=True, frame=True, columns=left, notes=tuple(notes))
 
 
 def _is_dumped(name: str, values: npt.NDArray[Any]) -> bool:

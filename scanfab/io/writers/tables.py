@@ -17,9 +17,9 @@ from scanfab.io.written import (
     csv_bytes,
     flat,
     frame_arrays,
-    free_name,
     own_columns,
     standard_columns,
+    table_columns,
 )
 from scanfab.packing.packing import Packing
 
@@ -36,23 +36,16 @@ class CsvWriter:
     separator = ","
 
     def write(self, packing: Packing, path: Path) -> Left:
-        """Write the columns id, x, y, z, radius and all others; a table holds nothing else."""
-        own, notes = own_columns(packing)
-        own, split = flat(own)
-        place = dict(zip("xyz", packing.position.T, strict=True))
-        columns = {"id": packing.id, **place, "radius": packing.radius, **standard_columns(packing)}
-        for name, values in own.items():
-            tells_frames = is_frame_name(name) and values.dtype.kind in "iuf"
-            if tells_frames and len(np.unique(values)) > 1:
-                free = free_name(name, [*columns, *own])
-                split.append(
-                    f"the column {name} is called {free}: {name} tells frames of a table apart"
-                )
-                columns[free] = values
-            else:
-                columns[name] = values
-        path.write_bytes(self.table(columns))
-        return Left(contacts=True, frame=bool(frame_arrays(packing)), notes=(*notes, *split))
+        """Write the columns id, x, y, z, radius and all that do not tell frames apart."""
+        known, own, notes = table_columns(packing)
+        left = [
+            name
+            for name, values in own.items()
+            if is_frame_name(name) and values.dtype.kind in "iuf" and len(np.unique(values)) > 1
+        ]
+        held = {name: values for name, values in own.items() if name not in left}
+        path.write_bytes(self.table({**known, **held}))
+        return Left(True, bool(frame_arrays(packing)), tuple(left), tuple(notes))
 
     def table(self, columns: Columns) -> bytes:
         """The bytes of the file."""
