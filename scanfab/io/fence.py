@@ -138,8 +138,10 @@ def _limit(memory: float, seconds: float) -> None:
     with suppress(ImportError, ValueError, OSError):
         import resource
 
+        # libraries and earlier files may keep memory, which is not of this file
+        held = int(Path("/proc/self/statm").read_text().split()[5]) * resource.getpagesize()
         hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
-        resource.setrlimit(resource.RLIMIT_DATA, (int(memory), hard))
+        resource.setrlimit(resource.RLIMIT_DATA, (held + int(memory), hard))
     if hasattr(signal, "alarm"):
         signal.alarm(math.ceil(seconds))
 

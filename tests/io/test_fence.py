@@ -83,6 +83,19 @@ def test_memory_is_limited(path):
 
 
 @pytest.mark.skipif(not hasattr(signal, "alarm"), reason="needs SIGALRM")
+def keep_memory(path, size):
+    kept.append(np.ones(size // 8))
+    return len(kept)
+
+
+kept = []
+
+
+def test_memory_that_earlier_files_left_does_not_count(path):
+    counts = [fenced(keep_memory, path, int(0.4 * fence.MEMORY)) for _ in range(4)]
+    assert np.diff(counts).tolist() == [1, 1, 1]
+
+
 def test_a_worker_that_hangs_ends_also_when_nobody_is_left_to_end_it(path, monkeypatch):
     monkeypatch.setattr(fence, "SECONDS", -1.0)
     monkeypatch.setattr(fence.threading.Timer, "start", lambda self: None)

@@ -29,9 +29,7 @@ FILES = {
     "yade.txt": "#format x_y_z_r\n0\t0\t0\t1\n2.5\t0\t-1e-3\t1\n",
     "blanks.txt": "#format x_y_z_r\n0 0  0 1\n 2.5 0\t-1e-3 1 \n\n",
     "two_blanks.txt": "#format x_y_z_r\n0  0  0  1\n2.5  0  -1e-3  1\n",
-    "empty.txt": "#format x_y_z_r\n\n0\t0\t0\t1\n\n2.5\t0\t-1e-3\t1\n",
     "empty_windows.txt": "#format x_y_z_r\r\n\r\n0\t0\t0\t1\r\n2.5\t0\t-1e-3\t1\r\n",
-    "comments.txt": "#format x_y_z_r\n0 0 0 1 # the first\n# another\n2.5 0 -1e-3 1\n",
 }
 ROWS = "3,0.5,1e-3,-.25,1\n9007199254740993,2.5,0,0,1\n1,5,0,0,1\n"
 TABLES = {
@@ -108,7 +106,6 @@ def test_workers_of_esys(tmp_path, lengths):
         ("particle_input.dat", "7 8\n", "7  8\r\r\n"),
         ("yade.txt", "2.5\t0", "2.5\r\t0"),
         ("two_blanks.txt", "3  1\n", "3  1\r\r\n"),
-        ("empty.txt", "2.5", "2.5x"),
         ("a.csv", "2.5,0", "2.5,0,0"),
         ("a.csv", "2.5,0", "2.5"),
         ("a.csv", "2.5,0", "2.5,x"),
