@@ -85,6 +85,8 @@ def task_damage(folder: str, runs: int, seed: int, readers: list[str]) -> list[D
 
 def task_read(listed: list[list[Any]]) -> None:
     """Read each file; one line of JSON each: its digest, or how it ended."""
+    # the package of this interpreter, not that of this tree
+    del sys.path[:2]
     import scanfab
 
     def too_long(*_: object) -> None:

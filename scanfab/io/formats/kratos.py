@@ -143,17 +143,15 @@ def _nodes(path: Path) -> Columns:
                 f"shapes lie in other files"
             )
     nodes, radii = _rows(path, data, NODES), _rows(path, data, RADII)
-    lost = radii["id"][~np.isin(radii["id"], nodes["id"])]
+    lost = np.setdiff1d(radii["id"], nodes["id"])
     if len(lost):
         raise ReadError(f"{path}: the node {lost[0]} has a radius, but no place among the nodes")
-    if elements:
-        spheres = _rows(path, data, ELEMENTS)["node"]
-        lost = spheres[~np.isin(spheres, radii["id"])]
-        if len(lost):
-            raise ReadError(
-                f"{path}: the sphere at node {lost[0]:g} and {len(lost) - 1} more have no radius "
-                f"in {RADII.decode()}"
-            )
+    lost = np.setdiff1d(_rows(path, data, ELEMENTS)["node"] if elements else [], radii["id"])
+    if len(lost):
+        raise ReadError(
+            f"{path}: the sphere at node {lost[0]:g} and {len(lost) - 1} more have no radius in "
+            f"{RADII.decode()}"
+        )
     order = np.argsort(nodes["id"], kind="stable")
     row = order[np.searchsorted(nodes["id"][order], radii["id"])]
     places = {axis: nodes[axis][row] for axis in "xyz"}

@@ -22,11 +22,7 @@ Arrays = dict[str, npt.NDArray[Any]]
 # classic, with long offsets, with long data; HDF5 is told apart by its content
 MAGIC = (b"CDF\x01", b"CDF\x02", b"CDF\x05")
 # AMBER's name of each triple, and whether its values are fractions of the box
-POSITIONS = {
-    "coordinates": False,
-    "unwrapped_coordinates": False,
-    "scaled_coordinates": True,
-}
+POSITIONS = {"coordinates": False, "unwrapped_coordinates": False, "scaled_coordinates": True}
 CELL = ("cell_origin", "cell_lengths", "cell_angles")
 # what netCDF reads where nothing was written: atoms that were lost, or left their group
 FILL = {"f4": 9.9692099683868690e36, "f8": 9.9692099683868690e36, "i4": -(2**31) + 1}
@@ -41,9 +37,9 @@ class NetcdfFrame(NamedTuple):
     frames: int
     """How many there are."""
     time: FloatArray
-    """Of all frames, as it is stored: LAMMPS writes the step."""
+    """Of all frames, as it is stored."""
     scale: float | None
-    """By which the time is multiplied: LAMMPS writes the length of a step."""
+    """By which the time is multiplied, if the file says so."""
     program: str
     atoms: Arrays
     """The frame's variables that have a value, or several, for each atom."""
@@ -68,15 +64,16 @@ def index_netcdf(path: Path) -> list[Snapshot]:
     file = _read(path, None)
     if file.frames == 0:
         raise ReadError(f"{path}: expected frames, found none")
-    steps, scale = file.time, file.scale
-    if steps.shape != (file.frames,) or not np.all(np.abs(steps) < 2.0**53):
+    times = file.time
+    if times.shape != (file.frames,) or not np.all(np.abs(times) < 2.0**53):
         raise ReadError(f"{path}: expected a time of each of {file.frames} frames")
-    is_lammps = file.program == "LAMMPS" and bool(np.all(steps == np.rint(steps)))
+    # LAMMPS writes the step as time, and the length of a step as its scale
+    are_steps = file.program == "LAMMPS" and bool(np.all(times == np.rint(times)))
+    scale = 1.0 if file.scale is None and not are_steps else file.scale
     found = []
-    for number, one in enumerate(steps.tolist()):
-        step = int(one) if is_lammps else None
-        time = one if scale is None and not is_lammps else None if scale is None else one * scale
-        found.append(Snapshot(path, step, time, start=number, stop=number + 1))
+    for number, time in enumerate(times.tolist()):
+        step, seconds = int(time) if are_steps else None, None if scale is None else time * scale
+        found.append(Snapshot(path, step, seconds, start=number, stop=number + 1))
     return found
 
 

@@ -30,6 +30,7 @@ POSITION = "position (x, y, z)"
 NORMAL = "normal vector, oriented from particle 1 to particle 2"
 PUSH = "norm of the normal part of the contact force"
 TANGENTIAL = "tangential part of the contact force"
+VECTORS = (POSITION, NORMAL, TANGENTIAL)
 # versions with this title write a push with its sign, whatever the title of the push says
 OF_SIGNED_PUSH = "normal part of the lubrication force"
 
@@ -124,9 +125,8 @@ def _legend(path: Path) -> dict[str, range]:
     found = {}
     for first, last, title in LEGEND.findall(first_bytes(path, HEADER_BYTES)):
         places = range(max(int(first) - 1, 0), int(last or first))
-        vectors = {POSITION, NORMAL, TANGENTIAL}
         title = title.decode("utf-8", "replace").strip()
-        if len(places) == 3 or (len(places) and title not in vectors):
+        if len(places) == 3 or (len(places) and title not in VECTORS):
             found[title] = places
     return found
 

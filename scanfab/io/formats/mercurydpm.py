@@ -16,17 +16,10 @@ from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.files import bare_name, first_bytes, plain
 from scanfab.io.formats.columns import grain_table, whole_numbers
-from scanfab.io.formats.join import count_walls, join_ids
+from scanfab.io.formats.join import join_ids
 from scanfab.io.formats.mercury_restart import is_restart, read_restart, time_of_restart
 from scanfab.io.formats.shared import cell_of, finite_forces, frames_below
-from scanfab.io.reader import (
-    Carries,
-    FileKind,
-    GrainTable,
-    JoinedContacts,
-    ReadOptions,
-    Snapshot,
-)
+from scanfab.io.reader import Carries, FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
 from scanfab.io.text import Columns, Layout, leave_out_last, read_rows, skip_rows, spelt, text_of
 from scanfab.packing.cell import Cell
 
@@ -41,6 +34,7 @@ FSTAT_HEAD = re.compile(
     rb"#(?:[ \t]+\S+){6}[ \t]*\r?\n#(?:[ \t]+\S+){6,7}[ \t]*\r?\n"
 )
 FSTAT_FRAME = re.compile(rb"(?:\xef\xbb\xbf)?#[ \t]+(\S+)[ \t]+[01][ \t]*\r?\n")
+ABOVE = "the number of grains, time and bounds above a frame"
 LONGEST = 1 << 16
 # the interactions that it writes for ParaView name no grains
 OF_PARAVIEW = (b"<VTKFile", b'Name="Overlap"', b'Name="ContactRadius"', b'Name="TangentialOverlap"')
@@ -56,30 +50,17 @@ class MercuryReader:
 
     def recognises(self, path: Path) -> bool:
         """A restart by its first word, contacts by three lines, grains by a line of bounds."""
-        head = first_bytes(path, LONGEST)
-        for_paraview = all(word in head for word in OF_PARAVIEW)
-        if is_restart(head) or FSTAT_HEAD.match(head) is not None or for_paraview:
-            return True
-        first, second = (*head.split(b"\n", 2), b"")[:2]
-        bounds = _bounds(first)
-        if bounds is None:
-            return False
-        if bounds[0] > 0:
-            return len(second.split()) == len(LAYOUTS[len(bounds)].names)
-        # nothing but an empty frame may be anything
-        return _bounds(second) is not None if second.strip() else ".data" in bare_name(path)
+        return _form(path) is not None
 
     def kind(self, path: Path) -> FileKind:
         """Contacts are in ``.fstat`` files."""
-        head = first_bytes(path, LONGEST)
-        if all(word in head for word in OF_PARAVIEW):
+        form = _form(path)
+        if form == "paraview":
             raise ReadError(
                 f"{path}: MercuryDPM's interactions for ParaView do not say which grains touch: "
                 f"contacts are read from .fstat or .restart"
             )
-        if FSTAT_HEAD.match(head):
-            return "contacts"
-        return "grains" if self.recognises(path) else "other"
+        return "other" if form is None else "contacts" if form == "fstat" else "grains"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """Frames one behind the other, with their times."""
@@ -100,7 +81,7 @@ class MercuryReader:
         line, _, rows = text_of(snapshot).partition(b"\n")
         bounds = _bounds(line)
         if bounds is None:
-            raise ReadError(f"{path}: expected the number of grains, time and bounds")
+            raise ReadError(f"{path}: expected {ABOVE}, found {spelt(line)}")
         layout = LAYOUTS[len(bounds)]
         columns = read_rows(snapshot, rows, layout, count=int(bounds[0]), what="grains")
         if "z" not in columns:
@@ -118,18 +99,38 @@ class MercuryReader:
         layout = Layout(tuple(FSTAT.split()), line=4, whole="ij")
         columns = read_rows(snapshot, data[head.end() :], layout, what="contacts")
         rows = np.column_stack([whole_numbers(path, columns[name]) for name in "ij"])
-        wall, count = rows[:, 1] < 0, len(grains.radius)
-        unknown = rows[(rows[:, 0] < 0) | (wall & (rows[:, 0] >= count)), 0]
+        count = len(grains.radius)
+        unknown = rows[(rows >= count) | (rows * [1, 0] < 0)]
         if len(unknown):
             raise ReadError(
                 f"{path}: names the grain {unknown[0]}, but there are rows 0 to {count - 1}: do "
                 f"both files belong to the same time?"
             )
-        pairs, force = _once(rows[~wall], {key: own[~wall] for key, own in columns.items()})
-        # rows of the grain file, whatever ids these have
+        kept, force = _once(rows, columns)
+        finite_forces(path, force[rows[:, 1] >= 0])
+        # rows of the grain file, whatever ids these have; no grain has the number of a wall
         numbered = grains._replace(id=np.arange(count))
-        joined = join_ids(path, numbered, pairs, finite_forces(path, force), walls=False)
-        return joined._replace(wall_contacts=count_walls(rows[wall, 0], count))
+        return join_ids(path, numbered, rows[kept], force[kept], walls=True)
+
+
+def _form(path: Path) -> str | None:
+    """``restart``, ``fstat``, ``data`` or ``paraview``; None if it is no file of MercuryDPM."""
+    head = first_bytes(path, LONGEST)
+    if is_restart(head):
+        return "restart"
+    if FSTAT_HEAD.match(head):
+        return "fstat"
+    if all(word in head for word in OF_PARAVIEW):
+        return "paraview"
+    first, second = (*head.split(b"\n", 2), b"")[:2]
+    bounds, width = _bounds(first), len(second.split())
+    if bounds is None:
+        return None
+    # an empty frame is followed by another one; alone it may be anything
+    is_data = _bounds(second) is not None if width else ".data" in bare_name(path)
+    if bounds[0] > 0:
+        is_data = width == len(LAYOUTS[len(bounds)].names)
+    return "data" if is_data else None
 
 
 def _bounds(line: bytes) -> list[float] | None:
@@ -141,9 +142,8 @@ def _bounds(line: bytes) -> list[float] | None:
         found = [float(word) for word in words]
     except ValueError:
         return None
-    half = len(found) // 2 + 1
-    ordered = all(low <= high for low, high in zip(found[2:half], found[half:], strict=True))
-    return found if ordered and found[1] >= 0 else None
+    low, high = np.reshape(found[2:], (2, -1))
+    return found if np.all(low <= high) and found[1] >= 0 else None
 
 
 def _grain_frames(path: Path) -> list[Snapshot]:
@@ -151,19 +151,16 @@ def _grain_frames(path: Path) -> list[Snapshot]:
     found: list[Snapshot] = []
     with open(plain(path), "rb") as stream:
         while line := stream.readline(LONGEST):
-            start, bounds = stream.tell() - len(line), _bounds(line)
-            if bounds is None and line.strip() and line.endswith(b"\n"):
-                raise ReadError(
-                    f"{path}: expected the number of grains, time and bounds at byte {start:,}, "
-                    f"found {spelt(line)}"
-                )
+            start, bounds, is_whole = stream.tell() - len(line), _bounds(line), line[-1:] == b"\n"
+            if not line.strip():
+                continue
+            if bounds is None and is_whole:
+                raise ReadError(f"{path}: expected {ABOVE}, found {spelt(line)}")
             rows = 0 if bounds is None else skip_rows(stream, int(bounds[0]))
-            if line.strip() and (not line.endswith(b"\n") or (bounds and rows < bounds[0])):
-                reason = f"found {spelt(line)} and {rows} rows at the end"
-                leave_out_last(path, len(found), reason)
+            if bounds is None or not is_whole or rows < bounds[0]:
+                leave_out_last(path, len(found), f"found {rows} rows below {spelt(line)}")
                 break
-            if bounds is not None:
-                found.append(Snapshot(path, time=bounds[1], start=start, stop=stream.tell()))
+            found.append(Snapshot(path, time=bounds[1], start=start, stop=stream.tell()))
     if not found:
         raise ReadError(f"{path}: the file is empty")
     return found
@@ -172,7 +169,7 @@ def _grain_frames(path: Path) -> list[Snapshot]:
 @np.errstate(over="ignore", invalid="ignore")
 def _once(rows: IntArray, columns: Columns) -> tuple[IntArray, FloatArray]:
     """
-    Pairs and the force on their second grain, each once.
+    The rows that are left when each contact is listed once, and the force on each second grain.
 
     The normal points from the second to the first grain, on which force and tangential force act.
     A pair that touches through two images has two normals, and is two contacts.
@@ -183,18 +180,16 @@ def _once(rows: IntArray, columns: Columns) -> tuple[IntArray, FloatArray]:
     turned = rows[:, :1] > rows[:, 1:]
     # 7 digits tell images apart, and are the same from both sides
     sides = np.round(np.where(turned, -normal, normal), 7) + 0.0
-    keys = np.column_stack([np.sort(rows, axis=1), sides])
-    _, first = np.unique(keys, axis=0, return_index=True)
-    kept = np.sort(first)
-    return rows[kept], force[kept]
+    _, first = np.unique(np.column_stack([np.sort(rows, axis=1), sides]), axis=0, return_index=True)
+    # contacts with a wall are listed from one side only, and a wall may touch a grain twice
+    return np.union1d(first, np.flatnonzero(rows[:, 1] < 0)), force
 
 
 @np.errstate(invalid="ignore")
 def _box(path: Path, bounds: list[float]) -> Cell | None:
     """The domain, of which nothing is known to repeat; None if it has no volume."""
-    half = len(bounds) // 2
-    low, edges = np.zeros(3), np.zeros(3)
-    low[:half], edges[:half] = bounds[:half], np.subtract(bounds[half:], bounds[:half])
-    if half == 2:
-        edges[2] = max(edges)
+    low, high = np.reshape(bounds, (2, -1))
+    edges = high - low
+    if len(low) == 2:
+        low, edges = np.append(low, 0.0), np.append(edges, edges.max())
     return cell_of(f"{path}: its bounds", edges, (False, False, False), low)

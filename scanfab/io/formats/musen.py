@@ -28,6 +28,8 @@ SIZES = {
     ID: 1, b"1": 1, TIME: 1, GEOMETRY: 2, b"10": 3, b"11": 3, PLACE: 3, b"15": 3, b"16": 3,
     b"17": 3, b"18": 1, b"19": 3, b"20": 3, b"23": 1, ACTIVE: 2, b"31": 4, b"36": 9, b"37": 1,
 }  # fmt: skip
+# of these so many values are read
+READ = {ID: 1, GEOMETRY: 1, ACTIVE: 2, TIME: 1, PLACE: 3}
 PERIODIC = re.compile(rb"^28 ([01])((?: \S+){9})[ \t]*\r?$", re.MULTILINE)
 
 
@@ -96,9 +98,9 @@ def _export(path: Path, stamp: Stamp) -> _Export:
         raise ReadError(f"{path}: the last line has no end: the file is incomplete")
     # objects stand above all other lines: one among them is an object whose first word is damaged
     stop = max((k + 1 for k, line in enumerate(lines) if line.startswith(b"0 ")), default=0)
-    kinds = set()
-    keys: dict[int, bytes] = {}
     table: list[list[float]] = []
+    keys: dict[int, bytes] = {}
+    kinds = set()
     for number, line in enumerate(lines[:stop], start=1):
         where, match = f"{path}, line {number}", OBJECT.match(line)
         if match is None:
@@ -108,49 +110,40 @@ def _export(path: Path, stamp: Stamp) -> _Export:
             continue
         words = line.split()
         if not keys:
-            keys = _keys(where, words)
-            places, width = _places(where, keys), len(words)
+            width, keys, places = len(words), *_layout(where, words)
         if len(words) != width or any(words[place] != key for place, key in keys.items()):
             raise ReadError(f"{where}: expected the properties of the first sphere, found others")
         table.append(numbers(where, b" ".join(words[place] for place in places), len(places)))
     if not table:
         raise ReadError(f"{path}: expected spheres (0 ID 1 1 5 RADIUS ...), found none")
-    values = np.array(table)
-    has_active = ACTIVE in keys.values()
-    active = values[:, 2:4] if has_active else np.tile((-np.inf, np.inf), (len(values), 1))
-    states = values[:, 4 if has_active else 2 :].reshape(len(values), -1, 4)
+    values, active = np.array(table), np.tile((-np.inf, np.inf), (len(table), 1))
+    if ACTIVE in keys.values():
+        values, active = np.delete(values, (2, 3), axis=1), values[:, 2:4]
+    states = values[:, 2:].reshape(len(values), -1, 4)
     has_bonds = not kinds.isdisjoint(BONDS)
     return _Export(values[:, 0], values[:, 1], active, states, _cell(path, data), has_bonds)
 
 
-def _keys(where: str, words: list[bytes]) -> dict[int, bytes]:
-    """The numbers of the properties in a row, by their places in it."""
+def _layout(where: str, words: list[bytes]) -> tuple[dict[int, bytes], list[int]]:
+    """
+    The numbers of all properties in a row, by their places, and the places of the values we read.
+
+    These are id, radius, times of activity (if exported), and time and place of each state.
+    """
     keys, place = {}, 0
     while place < len(words):
+        keys[place] = words[place]
         if words[place] not in SIZES:
             raise ReadError(
                 f"{where}: expected the number of a property, found {spelt(words[place])}"
             )
-        keys[place] = words[place]
         place += 1 + SIZES[words[place]]
-    if place != len(words):
-        raise ReadError(f"{where}: expected the values of the property {keys.popitem()[1]!r}")
-    return keys
-
-
-def _places(where: str, keys: dict[int, bytes]) -> list[int]:
-    """Where id, radius, times of activity, and time and place of each state stand in a row."""
-    found = {key: place for place, key in keys.items()}
-    times = [place + 1 for place, key in keys.items() if key == TIME]
-    centres = [place + 1 for place, key in keys.items() if key == PLACE]
-    if not times or len(times) != len(centres) or not {ID, GEOMETRY} <= found.keys():
-        raise ReadError(f"{where}: expected 2 TIME 12 X Y Z ... for each time, found no place")
-    places = [found[ID] + 1, found[GEOMETRY] + 1]
-    if ACTIVE in found:
-        places += [found[ACTIVE] + 1, found[ACTIVE] + 2]
-    for time, x in zip(times, centres, strict=True):
-        places += [time, x, x + 1, x + 2]
-    return places
+    found = [key for key in keys.values() if key in READ]
+    times = found.count(TIME)
+    expected = [ID, GEOMETRY, *[ACTIVE] * (ACTIVE in found), *[TIME, PLACE] * times]
+    if place != len(words) or found != expected or not times:
+        raise ReadError(f"{where}: expected 0 ID ... 5 RADIUS ... 2 TIME 12 X Y Z ... in the row")
+    return keys, [place + k for place, key in keys.items() for k in range(1, 1 + READ.get(key, 0))]
 
 
 def _cell(path: Path, data: bytes) -> Cell | None:

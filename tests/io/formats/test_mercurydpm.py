@@ -115,7 +115,7 @@ def test_a_period_of_another_kind_can_be_named(tmp_path):
 
 def test_contacts_of_other_grains(run):
     write(run / "run.data", data_frame(0.3, count=1))
-    with pytest.raises(ReadError, match="names the grain 2, but there are rows 0 to 0"):
+    with pytest.raises(ReadError, match="names the grain 1, but there are rows 0 to 0"):
         scanfab.read(run / "run.data", contacts=run / "run.fstat")
 
 
