@@ -34,6 +34,9 @@ sys.path[:1] = [str(Path.cwd()), str(ROOT)]
 
 from tests.helpers.versions import BASE, installed_base, packed  # noqa: E402
 
+# each version is the one that its environment has installed, not the one of this tree
+del sys.path[:2]
+
 DATA = "sample_data"
 
 WANTED: dict[str, str] = {}
@@ -135,7 +138,9 @@ def unnamed_options(base: Path) -> set[str]:
     found = set()
     for name in ("compute", "map", "calibrate", "inspect", "compare", "merge", "report", "view",
                  "convert"):  # fmt: skip
-        text = subprocess.run([base, "-c", MAIN, name, "--help"], capture_output=True, text=True)
+        text = subprocess.run(
+            [base, "-P", "-c", MAIN, name, "--help"], capture_output=True, text=True
+        )
         found |= set(re.findall(r"^ +(?:-\w, )?(--[a-z-]+)", text.stdout, re.MULTILINE))
     return found - said
 
@@ -213,6 +218,7 @@ def task_convert(folder: str, *sources: str) -> None:
 
 def task_sound(folder: str) -> None:
     """The sound files of the tests, each format in a folder of its own; run in the base's tree."""
+    sys.path.insert(0, str(Path.cwd()))
     from tests.helpers import fuzzing, sound_files
 
     files = []
@@ -283,7 +289,7 @@ def run_commands(python: Path, out: Path) -> dict[str, tuple[int, str]]:
 
     def one(name: str, words: list[str]) -> tuple[int, str]:
         words = [word.format(out=out) for word in words]
-        done = subprocess.run([python, "-c", MAIN, *words], cwd=ROOT, capture_output=True,
+        done = subprocess.run([python, "-P", "-c", MAIN, *words], cwd=ROOT, capture_output=True,
                               text=True, check=False)  # fmt: skip
         print(".", end="", file=sys.stderr, flush=True)
         return done.returncode, done.stdout
