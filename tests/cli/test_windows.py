@@ -161,7 +161,7 @@ def test_broken_surfaces_are_told(compute, tmp_path):
     file.write_bytes(b"ply\nnonsense")
     code, told = compute("--rv-shape", str(file))
     assert code == 1
-    assert "open.ply: cannot be read as a surface" in told
+    assert "open.ply: cannot be read: it is no sound surface in the format ply" in told
 
 
 @pytest.mark.parametrize("name", ["box", "cylinder", "ellipsoid", "follows"])

@@ -44,6 +44,9 @@ def faces_by_meshio(path: str, suffix: str) -> tuple[FloatArray, list[IntArray]]
 
     # in the worker, since meshio prints, and exits if it cannot read a file
     with np.errstate(over="ignore"):
-        mesh = meshio.read(Path(path), file_format=suffix)
+        try:
+            mesh = meshio.read(Path(path), file_format=suffix)
+        except SystemExit:
+            raise ValueError(f"it is no sound surface in the format {suffix}") from None
     faces = [np.asarray(one.data, np.int64) for one in mesh.cells if one.dim == 2 and len(one.data)]
     return np.asarray(mesh.points, np.float64), faces
