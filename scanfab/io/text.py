@@ -9,7 +9,9 @@ are exact.
 from __future__ import annotations
 
 import csv
+import os
 import re
+import sys
 import warnings
 from collections.abc import Collection, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -22,6 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import ReadError, ScanfabWarning
+from scanfab.io.fence import fenced
 from scanfab.io.files import check_memory, plain
 from scanfab.io.reader import Snapshot
 from scanfab.io.unpacking import check_lines
@@ -123,16 +126,39 @@ def read_rows(
     ([1, 2], [0.5, 0.25])
     """
     rows, layout = _trimmed(snapshot.path, rows, layout)
-    frame = _frame(rows, layout) if rows else None
-    found = rows.count(b"\n") if frame is None else frame.height
+    if _is_forked:
+        columns = fenced(columns_of, snapshot.path, rows, layout)
+    else:
+        columns = columns_of("", rows, layout)
+    found = rows.count(b"\n") if columns is None else len(columns[layout.names[0]])
     if count is not None and found != count:
         raise ReadError(
             f"{snapshot.path}{_at(snapshot)}: the header counts {count} {what}, found {found}: the "
             f"file is incomplete or damaged"
         )
-    if rows and frame is None:
+    if columns is None:
         raise _bad_line(snapshot, rows, layout)
-    return _as_arrays(frame, layout)
+    return columns
+
+
+def columns_of(_path: str, rows: bytes, layout: Layout) -> Columns | None:
+    """The columns of sound rows; None if a row is not as it should be. Runs in the worker, too."""
+    frame = _frame(rows, layout) if rows else None
+    return None if rows and frame is None else _as_arrays(frame, layout)
+
+
+# Whether this process was forked behind polars: the threads of polars are gone, and it would wait
+# for them without end. Only the worker, a new process, can use it then.
+_is_forked = False
+
+
+def _note_fork() -> None:
+    global _is_forked
+    _is_forked = "polars" in sys.modules
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_note_fork)
 
 
 def _at(snapshot: Snapshot) -> str:

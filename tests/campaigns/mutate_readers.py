@@ -6,8 +6,8 @@ What damaged files give: an error, a warning, or other values in silence; by two
 Each small sound file of each format is cut at random places, and has bytes or words of it changed.
 Each damaged file is read by the base version, checked out as in same_tables.py, and by the version
 beside this interpreter. Counted is what is read without an error and without a warning, with other
-values than the sound file. Tracebacks, crashes and readings of more than 10 s are listed and kept
-in the folder `mutate_findings`. One line for each format and kind of damage; exit code 1 if this
+values than the sound file. Tracebacks, crashes, readings of more than 10 s, cut files that are read
+in silence and files that only this version so reads are listed and kept in `mutate_findings`. One line for each format and kind of damage; exit code 1 if this
 version reads more in silence than the base, or anything is listed.
 """
 
@@ -77,7 +77,9 @@ def task_damage(folder: str, runs: int, seed: int, readers: list[str]) -> list[D
             made.append(Damaged(str(path), str(path), name, "sound", grains))
             for number in range(runs):
                 kind = list(kinds)[number % len(kinds)]
-                own = sound / f"{kind}{number}_{file}"
+                # a digit would be the step of the file
+                letters = "".join("abcdefghij"[int(digit)] for digit in str(number))
+                own = sound / f"{kind}-{letters}_{file}"
                 own.write_bytes(kinds[kind](content, random))
                 made.append(Damaged(str(own), str(path), name, kind, grains))
     return made
@@ -174,9 +176,11 @@ def report(listed: list[Damaged], before: list[str], after: list[str]) -> bool:
             print(f"{one.format}: {name}: {pair[1]}")
             OUT.mkdir(exist_ok=True)
             shutil.copy(one.path, OUT / f"{one.format}_{name}")
-        elif one.kind == "cut" and pair[1][:1] == "[" and pair[1] != sound[one.sound][1]:
-            size = Path(one.path).stat().st_size
-            print(f"{one.format}: {name}: cut at {size} and read in silence, before: {pair[0][:7]}")
+        elif pair[1][:1] == "[" and pair[1] != sound[one.sound][1]:
+            if one.kind == "cut" or pair[0][:1] != "[":
+                print(f"{one.format}: {name}: read in silence, before: {pair[0][:7]}")
+                OUT.mkdir(exist_ok=True)
+                shutil.copy(one.path, OUT / f"{one.format}_{name}")
     for group in total:
         if total[group]:
             one, two = (count[group] for count in silent)

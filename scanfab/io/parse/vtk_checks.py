@@ -25,6 +25,8 @@ SECTION = re.compile(
 CELLS = (b"VERTICES", b"LINES", b"POLYGONS", b"TRIANGLE_STRIPS", b"CELLS")
 VALUES = {b"VECTORS": 3, b"NORMALS": 3, b"TENSORS": 9}
 ARRAYS = (b"SCALARS", *VALUES)
+# VTK passes over what is no letter of it, and shifts all values behind
+BASE64 = re.compile(r"\s*[A-Za-z0-9+/=]*\s*")
 METADATA = re.compile(rb"^METADATA", re.MULTILINE)
 
 
@@ -158,6 +160,8 @@ def _stored(data: bytes, array: ElementTree.Element, root: ElementTree.Element, 
     try:
         if array.get("format") == "binary" or b"raw" not in data[end : end + 100]:
             digits = head.split(b"=")[0].split()[0] if head.strip(b"= \n") else b""
+            if BASE64.fullmatch("".join(parts)) is None:
+                raise binascii.Error
             head = base64.b64decode(digits + b"=" * (-len(digits) % 4), validate=True)
     except binascii.Error:
         raise damaged("an array is not as base64 writes it") from None
