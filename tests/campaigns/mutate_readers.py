@@ -7,8 +7,9 @@ Each small sound file of each format is cut at random places, and has bytes or w
 Each damaged file is read by the base version, checked out as in same_tables.py, and by the version
 beside this interpreter. Counted is what is read without an error and without a warning, with other
 values than the sound file. Tracebacks, crashes, readings of more than 10 s, cut files that are read
-in silence and files that only this version so reads are listed and kept in `mutate_findings`. One line for each format and kind of damage; exit code 1 if this
-version reads more in silence than the base, or anything is listed.
+in silence, and files that only this version reads in silence, are listed and kept in the folder
+`mutate_findings`. One line for each format and kind of damage; exit code 1 if this version reads
+more in silence than the base, or fails.
 """
 
 from __future__ import annotations
@@ -176,11 +177,12 @@ def report(listed: list[Damaged], before: list[str], after: list[str]) -> bool:
             print(f"{one.format}: {name}: {pair[1]}")
             OUT.mkdir(exist_ok=True)
             shutil.copy(one.path, OUT / f"{one.format}_{name}")
-        elif pair[1][:1] == "[" and pair[1] != sound[one.sound][1]:
-            if one.kind == "cut" or pair[0][:1] != "[":
-                print(f"{one.format}: {name}: read in silence, before: {pair[0][:7]}")
-                OUT.mkdir(exist_ok=True)
-                shutil.copy(one.path, OUT / f"{one.format}_{name}")
+            continue
+        is_silent = pair[1][:1] == "[" and pair[1] != sound[one.sound][1]
+        if is_silent and (one.kind == "cut" or pair[0][:1] != "["):
+            print(f"{one.format}: {name}: read in silence, before: {pair[0][:7]}")
+            OUT.mkdir(exist_ok=True)
+            shutil.copy(one.path, OUT / f"{one.format}_{name}")
     for group in total:
         if total[group]:
             one, two = (count[group] for count in silent)
