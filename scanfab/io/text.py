@@ -13,10 +13,8 @@ import os
 import re
 import sys
 import warnings
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
-from contextvars import ContextVar
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
@@ -26,6 +24,7 @@ import numpy.typing as npt
 from scanfab.base.errors import ReadError, ScanfabWarning
 from scanfab.io.fence import fenced
 from scanfab.io.files import check_memory, plain
+from scanfab.io.parse.growing import grows
 from scanfab.io.reader import Snapshot
 from scanfab.io.unpacking import check_lines
 
@@ -43,8 +42,6 @@ IN_MEMORY = 6.0
 PIECE, SHOWN = 1 << 18, 60
 # the name that polars gets for what stands behind a separator at the end of each row
 BEHIND = "behind"
-
-_grows: ContextVar[bool] = ContextVar("grows", default=False)
 
 
 class Layout(NamedTuple):
@@ -126,16 +123,16 @@ def read_rows(
     ([1, 2], [0.5, 0.25])
     """
     rows, layout = _trimmed(snapshot.path, rows, layout)
-    if _is_forked:
-        columns = fenced(columns_of, snapshot.path, rows, layout)
-    else:
-        columns = columns_of("", rows, layout)
-    found = rows.count(b"\n") if columns is None else len(columns[layout.names[0]])
+    found = rows.count(b"\n")
     if count is not None and found != count:
         raise ReadError(
             f"{snapshot.path}{_at(snapshot)}: the header counts {count} {what}, found {found}: the "
             f"file is incomplete or damaged"
         )
+    if _is_forked:
+        columns = fenced(columns_of, snapshot.path, rows, layout)
+    else:
+        columns = columns_of("", rows, layout)
     if columns is None:
         raise _bad_line(snapshot, rows, layout)
     return columns
@@ -170,7 +167,7 @@ def _trimmed(path: Path, rows: bytes, layout: Layout) -> tuple[bytes, Layout]:
     if not rows[:PIECE].strip() and not rows.strip():
         return b"", layout
     if not rows[-PIECE:].rstrip(b" \t\r").endswith(b"\n"):
-        if _grows.get():
+        if grows():
             raise ReadError(f"{path}: the last line has no end: the file is still being written")
         warnings.warn(
             f"{path}: the last line has no end: if the file was cut, its last number may be cut, "
@@ -393,33 +390,3 @@ def skip_rows(stream: IO[bytes], count: int) -> int:
             stream.seek(int(ends[left - 1]) + 1 - len(piece), 1)
         left -= min(here, left)
     return count - left
-
-
-@contextmanager
-def growing() -> Iterator[None]:
-    """In the block files may still be being written: what lacks at their end is no warning."""
-    token = _grows.set(True)
-    try:
-        yield
-    finally:
-        _grows.reset(token)
-
-
-def grows() -> bool:
-    """Whether files may still be being written."""
-    return _grows.get()
-
-
-def warn_incomplete(text: str) -> None:
-    """Warn that a last snapshot is left out, unless the file may still be being written."""
-    if not _grows.get():
-        warnings.warn(text, ScanfabWarning, stacklevel=3)
-
-
-def leave_out_last(path: Path, complete: int, reason: str) -> None:
-    """Warn that an incomplete last snapshot is left out; ReadError if none is complete."""
-    if complete == 0:
-        raise ReadError(f"{path}: {reason}: the file is incomplete")
-    warn_incomplete(
-        f"{path}: the last snapshot, number {complete + 1}, is incomplete and is left out: {reason}"
-    )

@@ -15,6 +15,7 @@ more in silence than the base, or fails.
 from __future__ import annotations
 
 import argparse
+import faulthandler
 import json
 import shutil
 import signal
@@ -98,6 +99,8 @@ def task_read(listed: list[list[Any]]) -> None:
     signal.signal(signal.SIGALRM, too_long)
     for one in map(Damaged._make, listed):
         signal.alarm(SECONDS)
+        # compiled code sees no signal: the process ends
+        faulthandler.dump_traceback_later(2 * SECONDS, exit=True)
         source, options = one.path, {"format": one.format}
         if one.grains is not None:
             source, options = one.grains, {"contacts": one.path}
@@ -112,6 +115,7 @@ def task_read(listed: list[list[Any]]) -> None:
             except BaseException as error:
                 answer = f"FAILED {type(error).__name__}: {error}"[:200]
         signal.alarm(0)
+        faulthandler.cancel_dump_traceback_later()
         print(json.dumps(answer), flush=True)
 
 

@@ -21,8 +21,8 @@ from scanfab.io.files import check_memory, first_bytes, plain
 from scanfab.io.formats.columns import grain_table, has_radius
 from scanfab.io.formats.lammps_box import box_cell
 from scanfab.io.formats.text_dump import numbered_columns
+from scanfab.io.parse.growing import warn_incomplete
 from scanfab.io.reader import FileKind, GrainTable, ReadOptions, Snapshot
-from scanfab.io.text import warn_incomplete
 
 MAGIC = (b"DUMPCUSTOM", b"DUMPATOM")
 # more stand in damaged files only

@@ -9,8 +9,9 @@ from scanfab.base.errors import ReadError
 from scanfab.io.files import plain
 from scanfab.io.formats.columns import grain_table, has_radius
 from scanfab.io.formats.lammps_box import dump_cell
+from scanfab.io.parse.growing import leave_out_last
 from scanfab.io.reader import FileKind, GrainTable, ReadOptions, Snapshot
-from scanfab.io.text import Layout, leave_out_last, read_rows, text_of
+from scanfab.io.text import Layout, read_rows, text_of
 from scanfab.io.unpacking import check_lines
 from scanfab.packing.cell import Cell
 

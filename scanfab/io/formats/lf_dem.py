@@ -14,8 +14,9 @@ from scanfab.io.files import first_bytes
 from scanfab.io.formats.columns import grain_table, whole_numbers
 from scanfab.io.formats.join import join_ids
 from scanfab.io.formats.shared import cell_of, finite_forces, frames_below, numbers
+from scanfab.io.parse.growing import leave_out_last
 from scanfab.io.reader import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
-from scanfab.io.text import Layout, leave_out_last, read_rows, spelt, text_of
+from scanfab.io.text import Layout, read_rows, spelt, text_of
 from scanfab.packing.cell import Cell
 
 HEAD = re.compile(rb"\A(?:\xef\xbb\xbf)?# LF_DEM version")

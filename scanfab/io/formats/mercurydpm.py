@@ -19,8 +19,9 @@ from scanfab.io.formats.columns import grain_table, whole_numbers
 from scanfab.io.formats.join import join_ids
 from scanfab.io.formats.mercury_restart import is_restart, read_restart, time_of_restart
 from scanfab.io.formats.shared import cell_of, finite_forces, frames_below
+from scanfab.io.parse.growing import leave_out_last
 from scanfab.io.reader import Carries, FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
-from scanfab.io.text import Columns, Layout, leave_out_last, read_rows, skip_rows, spelt, text_of
+from scanfab.io.text import Columns, Layout, read_rows, skip_rows, spelt, text_of
 from scanfab.packing.cell import Cell
 
 PLANE = "x y vx vy radius angle omega species"

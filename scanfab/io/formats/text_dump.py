@@ -20,8 +20,9 @@ from scanfab.base.typing import FloatArray
 from scanfab.io.files import first_bytes, plain
 from scanfab.io.formats.columns import grain_table, has_radius
 from scanfab.io.formats.lammps_box import dump_cell
+from scanfab.io.parse.growing import grows, warn_incomplete
 from scanfab.io.reader import FileKind, GrainTable, ReadOptions, Snapshot
-from scanfab.io.text import Columns, Layout, grows, read_rows, text_of, warn_incomplete
+from scanfab.io.text import Columns, Layout, read_rows, text_of
 from scanfab.io.unpacking import check_lines
 from scanfab.packing.cell import Cell
 

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.io.files import check_memory, first_bytes, plain
 from scanfab.io.formats.columns import grain_table, has_radius
-from scanfab.io.parse.counted_rows import leave_out_last, skip_rows
+from scanfab.io.parse.growing import leave_out_last
 from scanfab.io.parse.text_table import parse_columns
 from scanfab.io.reader import (
     Carries,
@@ -24,6 +24,7 @@ from scanfab.io.reader import (
     ReadOptions,
     Snapshot,
 )
+from scanfab.io.text import skip_rows
 from scanfab.packing.cell import Cell
 
 COUNT = re.compile(rb"\A(?:\xef\xbb\xbf)?[ \t]*([0-9]{1,15})[ \t]*\r?\n")
