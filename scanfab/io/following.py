@@ -18,8 +18,8 @@ from scanfab.io.frame import Frame
 from scanfab.io.grain_files import PathLike
 from scanfab.io.opening import READING, as_text, read_series
 from scanfab.io.options import take_reading
-from scanfab.io.parse.growing import growing
 from scanfab.io.series import Series
+from scanfab.io.text import growing
 from scanfab.io.whole_frames import QUIET, Watch, WholeFrame, Wholeness
 
 # seconds between two looks, or times what a look takes

@@ -127,17 +127,14 @@ def read_rows(
     frame = _frame(rows, layout) if rows and b"\r" not in rows else None
     found = rows.count(b"\n") if frame is None else frame.height
     if count is not None and found != count:
+        step = "" if snapshot.step is None else f", step {snapshot.step}"
         raise ReadError(
-            f"{snapshot.path}{_at(snapshot)}: the header counts {count} {what}, found {found}: the "
+            f"{snapshot.path}{step}: the header counts {count} {what}, found {found}: the "
             f"file is incomplete or damaged"
         )
     if rows and frame is None:
         raise _bad_line(snapshot, rows, layout)
     return _as_arrays(frame, layout)
-
-
-def _at(snapshot: Snapshot) -> str:
-    return "" if snapshot.step is None else f", step {snapshot.step}"
 
 
 def _trimmed(path: Path, rows: bytes, layout: Layout) -> tuple[bytes, Layout]:

@@ -12,8 +12,8 @@ from typing import Any
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.io.families import Family
 from scanfab.io.frame import Frame
-from scanfab.io.parse.growing import growing
 from scanfab.io.series import Series
+from scanfab.io.text import growing
 from scanfab.packing.packing import Packing
 
 # a file that has been as it is for so many seconds is whole, if it can be read to its end

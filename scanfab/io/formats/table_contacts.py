@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.base.typing import FloatArray, IntArray
+from scanfab.io.columns import whole_numbers
 from scanfab.io.contacts import (
     NEARLY_ALL,
     count_walls,
@@ -20,7 +21,6 @@ from scanfab.io.contacts import (
     row_base,
     rows_of_ids,
 )
-from scanfab.io.formats.columns import whole_numbers
 from scanfab.io.reader import GrainTable, JoinedContacts
 
 Columns = Mapping[str, npt.NDArray[Any]]

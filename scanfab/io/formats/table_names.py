@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from scanfab.base.errors import ReadError, ScanfabWarning
-from scanfab.io.formats.columns import (
+from scanfab.io.columns import (
     DIAMETER_NAMES,
     ID_NAMES,
     RADIUS_NAMES,
