@@ -70,7 +70,7 @@ def test_a_table_without_names_is_read_by_a_rule_that_is_told(tmp_path, columns,
         with pytest.warns(
             ScanfabNote, match=f"have no names and are taken for {told}: .*`columns`"
         ):
-            packing = read(path, format="table")
+            packing = read(path)
         np.testing.assert_array_equal(packing.position, loose * POSITION)
         np.testing.assert_array_equal(packing.radius, RADIUS)
     if told.startswith("id"):
@@ -103,6 +103,14 @@ def test_a_table_without_names_that_cannot_be_so_is_asked(tmp_path, columns, rea
     for options in ({}, {"format": "table"}):
         with pytest.raises(ReadError, match=rf"{reason}.*`columns=\"x=1,y=2,z=3,r"):
             read(path, **options)
+
+
+def test_options_of_tables_serve_a_text_of_any_ending(tmp_path):
+    lines = [" ".join(map(repr, row)) for row in zip(*_single([POSITION, 2 * RADIUS]), strict=True)]
+    path = write(tmp_path / "pack.out", "made by hand\n" + "\n".join(lines) + "\n")
+    assert_right(read(path, skip=1, columns="x=1,y=2,z=3,diameter=4"))
+    with pytest.raises(ReadError, match=r"as a table .* columns"):
+        read(write(tmp_path / "notes", "some words\nand more of them\n"))
 
 
 def test_a_diameter_is_one_where_the_user_says_so(tmp_path):
@@ -337,6 +345,17 @@ def test_tables_beside_dumps_are_passed_over(tmp_path):
     assert len(scanfab.read(tmp_path / "table_5.csv", contacts="geometric")) == 1
     packing = scanfab.read(tmp_path / "dump_5.txt", contacts=tmp_path / "pairs_5.csv")
     assert len(packing.contacts) == 1
+
+
+def test_a_table_without_names_beside_others_is_a_frame_only_if_the_format_is_named(tmp_path):
+    grains_file(tmp_path)
+    write(tmp_path / "energy.txt", "0 1 2 0.1\n0 2 3 0.1\n")
+    with pytest.warns(ScanfabNote, match=r"passed over.*energy\.txt"):
+        assert len(scanfab.read_series(tmp_path)[0].read()) == 64
+    with pytest.raises(ReadError, match="several series"):
+        scanfab.read_series(tmp_path, format="table")
+    (tmp_path / "grains.csv").unlink()
+    assert len(scanfab.read_series(tmp_path)[0].read()) == 2
 
 
 @pytest.mark.parametrize("whole_folder", [True, False])
