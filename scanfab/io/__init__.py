@@ -5,9 +5,9 @@ These names are what a reader of another package may import; see docs/adding-a-r
 are defined may change.
 """
 
+from scanfab.io.columns import grain_table
+from scanfab.io.contacts import join_ids, join_positions
 from scanfab.io.files import file_inside, first_bytes, plain
-from scanfab.io.formats.columns import grain_table
-from scanfab.io.formats.join import join_ids, join_positions
 from scanfab.io.reader import (
     Carries,
     FileKind,

@@ -16,9 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError
+from scanfab.io.columns import whole_numbers
+from scanfab.io.contacts import join_ids
 from scanfab.io.files import bare_name, check_memory, first_bytes, plain
-from scanfab.io.formats.columns import whole_numbers
-from scanfab.io.formats.join import join_ids
 from scanfab.io.reader import BODIES, WALLS, GrainTable, JoinedContacts, Snapshot
 from scanfab.io.written import contact_arrays, csv_bytes, frame_arrays, more_columns
 from scanfab.packing.cell import Cell

@@ -156,7 +156,7 @@ def set_tables_aside(
         if family.kind in ("grains", "index") and not _is_table(family)
     ]
     if not sure:
-        return list(families)
+        return _guesses_aside(families, named)
     files = [file for one in [*sure, *own] for file in one.files.values()]
     stems = {bare_name(file).rpartition(".")[0] for file in files}
     return [
@@ -165,6 +165,25 @@ def set_tables_aside(
         or any(file in named or _owner(file) in stems for file in family.files.values())
         else replace(family, kind="other")
         for family in families
+    ]
+
+
+def _guesses_aside(families: Sequence[Family], named: Collection[Path]) -> list[Family]:
+    """The same of tables without names beside tables that have some."""
+    guesses = [
+        one
+        for one in families
+        if one.kind == "grains"
+        and one.reader is not None
+        and _is_table(one)
+        and not one.reader.recognises(next(iter(one.files.values())))
+    ]
+    are_sure = any(one.kind == "grains" and one not in guesses for one in families)
+    return [
+        replace(one, kind="other")
+        if are_sure and one in guesses and not set(named) & set(one.files.values())
+        else one
+        for one in families
     ]
 
 

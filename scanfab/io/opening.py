@@ -184,7 +184,8 @@ def _series(
     families = sort_into_families(
         [file for path in paths for file in files_of(path)], format, options
     )
-    families = set_tables_aside(families, paths)
+    if format is None:
+        families = set_tables_aside(families, paths)
     grains = choose_grains(paths, families, options).check()
     name = as_text(os.fspath(given[0]) if len(paths) == len(given) == 1 else _common_folder(paths))
     sources = tuple(os.fspath(path) for one in given for path in expanded(one))

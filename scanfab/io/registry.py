@@ -14,6 +14,8 @@ from scanfab.io.files import bare_name
 from scanfab.io.reader import Reader, ReadOptions
 
 GROUP = "scanfab.readers"
+# the reader that any text is tried with
+TABLE = "table"
 
 
 @cache
@@ -69,7 +71,7 @@ def _told(reader: Reader, options: ReadOptions | None) -> Reader:
 
 
 def reader_for(path: Path, options: ReadOptions | None = None) -> Reader | None:
-    """The reader that knows a file by its content, else by its extension; None if none does."""
+    """The reader that knows a file by its content or extension; any other text may be a table."""
     readers = [_told(one.plugin, options) for one in installed_readers().values()]
     # a format that any program may write comes after the programs' own
     readers.sort(key=lambda reader: bool(getattr(reader, "generic", False)))
@@ -84,7 +86,9 @@ def reader_for(path: Path, options: ReadOptions | None = None) -> Reader | None:
                 f"{path}: the reader {reader.name!r} failed: {type(error).__name__}: {error}"
             ) from error
     name = bare_name(path).lower()
-    return next((r for r in readers if name.endswith(r.extensions) and _can_open(r, path)), None)
+    likely = [reader for reader in readers if name.endswith(reader.extensions)]
+    tables = [one for one in readers if one.name == TABLE and one not in likely]
+    return next((reader for reader in [*likely, *tables] if _can_open(reader, path)), None)
 
 
 def why_not(path: Path, options: ReadOptions) -> str:
@@ -92,7 +96,7 @@ def why_not(path: Path, options: ReadOptions) -> str:
     reason = ""
     for one in installed_readers().values():
         reader = _told(one.plugin, options)
-        if bare_name(path).lower().endswith(reader.extensions):
+        if reader.name == TABLE or bare_name(path).lower().endswith(reader.extensions):
             try:
                 reader.kind(path)
             except ReadError as error:

@@ -125,8 +125,9 @@ def read_rows(
     rows, layout = _trimmed(snapshot.path, rows, layout)
     found = rows.count(b"\n")
     if count is not None and found != count:
+        step = "" if snapshot.step is None else f", step {snapshot.step}"
         raise ReadError(
-            f"{snapshot.path}{_at(snapshot)}: the header counts {count} {what}, found {found}: the "
+            f"{snapshot.path}{step}: the header counts {count} {what}, found {found}: the "
             f"file is incomplete or damaged"
         )
     if _is_forked:
@@ -140,7 +141,8 @@ def read_rows(
 
 def columns_of(_path: str, rows: bytes, layout: Layout) -> Columns | None:
     """The columns of sound rows; None if a row is not as it should be. Runs in the worker, too."""
-    frame = _frame(rows, layout) if rows else None
+    # polars would pass over a carriage return that ends no line
+    frame = _frame(rows, layout) if rows and b"\r" not in rows else None
     return None if rows and frame is None else _as_arrays(frame, layout)
 
 
@@ -158,23 +160,12 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_note_fork)
 
 
-def _at(snapshot: Snapshot) -> str:
-    return "" if snapshot.step is None else f", step {snapshot.step}"
-
-
 def _trimmed(path: Path, rows: bytes, layout: Layout) -> tuple[bytes, Layout]:
     """The rows without empty lines around them, each with a newline at its end."""
     if not rows[:PIECE].strip() and not rows.strip():
         return b"", layout
     if not rows[-PIECE:].rstrip(b" \t\r").endswith(b"\n"):
-        if grows():
-            raise ReadError(f"{path}: the last line has no end: the file is still being written")
-        warnings.warn(
-            f"{path}: the last line has no end: if the file was cut, its last number may be cut, "
-            f"too, and rows may be missing",
-            ScanfabWarning,
-            stacklevel=3,
-        )
+        warn_of_end(path)
         rows += b"\n"
     if b"\r" in rows:
         rows = rows.replace(b"\r\n", b"\n")
@@ -184,6 +175,18 @@ def _trimmed(path: Path, rows: bytes, layout: Layout) -> tuple[bytes, Layout]:
     while (begin := rows.rfind(b"\n", start, stop - 1) + 1) and not rows[begin:stop].strip():
         stop = begin
     return rows[start:stop], layout
+
+
+def warn_of_end(path: Path) -> None:
+    """Warn that the last line has no end; ReadError if the file may still be being written."""
+    if grows():
+        raise ReadError(f"{path}: the last line has no end: the file is still being written")
+    warnings.warn(
+        f"{path}: the last line has no end: if the file was cut, its last number may be cut, too, "
+        f"and rows may be missing",
+        ScanfabWarning,
+        stacklevel=4,
+    )
 
 
 def _frame(rows: bytes, layout: Layout) -> Any:
@@ -203,8 +206,9 @@ def _single_blanks(rows: bytes) -> bytes:
     def squeezed(start: int) -> bytes:
         text = np.frombuffer(rows, np.uint8, min(PIECE, len(rows) - start), start)
         kept: npt.NDArray[np.bool_] = text != ord(" ")
-        kept[1:] |= text[:-1] > ord(" ")
-        kept[0] |= start > 0 and rows[start - 1] > ord(" ")
+        is_word = kept & (text != ord("\n"))
+        kept[1:] |= is_word[:-1]
+        kept[0] |= start > 0 and rows[start - 1] not in b" \n"
         return text[kept].tobytes()
 
     with ThreadPoolExecutor() as pool:

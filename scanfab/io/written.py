@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.io.bodies import numbers_in_columns
-from scanfab.io.formats.columns import DIAMETER_NAMES
+from scanfab.io.columns import DIAMETER_NAMES
 from scanfab.io.reader import BODIES, WALLS
 from scanfab.io.sizes import other_size
 from scanfab.packing.cell import Cell

@@ -74,11 +74,18 @@ class BoundaryRule:
         Raises
         ------
         SettingsError
-            If there is no such column.
+            If there is no such column, or it has gaps.
         """
         if len(packing) == 0:
             return np.zeros(0, dtype=bool)  # an empty frame may have lost its columns
         values = _column(packing, self.column)
+        gaps = np.isnan(values) if values.dtype.kind == "f" else np.zeros(len(packing), bool)
+        if gaps.any():
+            raise SettingsError(
+                f"boundary: the column {self.column} has no value for {np.count_nonzero(gaps)} of "
+                f"{len(gaps)} particles (the first is in row {np.argmax(gaps) + 1}): expected one "
+                f"for each"
+            )
         if self.operator in ("=", "!="):
             within = [(values >= low) & (values <= high) for low, high in self.ranges]
             chosen: BoolArray = np.any(within, axis=0)
@@ -135,7 +142,7 @@ def enclosing_class(packing: Packing) -> str | None:
         values = packing.columns[name]
         if values.ndim != 1 or values.dtype.kind not in "iuf":
             continue
-        classes = np.unique(values)
+        classes = np.unique(values[values == values])  # a side column may have gaps
         if not 2 <= classes.size <= 20:
             continue
         for value in classes:

@@ -40,7 +40,8 @@ def _period(packing: Packing, axis: int) -> float | None:
         return None
     low, high = float(along.min()), float(along.max())
     layer = 2.0 * float(radius.max())
-    if high - low < 3.0 * layer:
+    # where rounding leaves nothing of the layer there is no face
+    if not 3.0 * layer <= high - low < layer / np.finfo(float).eps:
         return None
     lengths, share = _lengths(packing, axis, along < low + layer, along > high - layer)
     if len(lengths) < FEWEST:

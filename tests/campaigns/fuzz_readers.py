@@ -24,8 +24,6 @@ import traceback
 from pathlib import Path
 from random import Random
 
-import numpy as np
-
 ROOT = Path(__file__).resolve().parents[2]
 # in the place of this folder, whose coverage.py is not the package of that name
 sys.path[0] = str(ROOT)
@@ -90,10 +88,6 @@ def fuzz(reader: str, runs: int, out: Path, folder: Path, only: tuple[str, ...])
     """Fuzz in this process until it has made its runs, or breaks."""
     import atheris
 
-    # what is instrumented cannot be compiled; the first call, which compiles, is no slow input
-    from scanfab.io.parse.kernels import single_blanks
-
-    single_blanks(np.zeros(1, np.uint8), np.zeros(1, np.uint8))
     with atheris.instrument_imports(include=["scanfab", "meshio.vtk", "meshio.vtu", "meshio.xdmf"]):
         from scanfab.io.registry import installed_readers
         from tests.helpers import fuzzing, sound_files

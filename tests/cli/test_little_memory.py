@@ -6,12 +6,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from scanfab.base import memory
 from scanfab.cli import group, main
-from scanfab.io.parse import text_table as regular
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.interruptions import PROGRAM
 
@@ -74,15 +72,6 @@ def test_where_next_to_nothing_is_left_any_failure_is_one_of_memory(monkeypatch,
     monkeypatch.setattr(memory, "address_space", lambda: 1_000_000)
     assert main.run(["compute"]) == 1
     assert "not enough memory (name 'PyLazyFrame'" in capsys.readouterr().err
-
-
-def test_polars_is_not_asked_where_it_would_end_the_process(tmp_path, monkeypatch):
-    path = tmp_path / "table"
-    path.write_text("1 2\n3 4\n")
-    table, column = regular.TextTable(path, 0, 8, 2, 2), np.zeros(2)
-    assert regular.read_regular(table, {0: column})
-    monkeypatch.setattr(regular, "free_memory", lambda: 1 << 30)
-    assert not regular.read_regular(table, {0: column})
 
 
 def test_what_is_free_is_the_least_of_all_limits(monkeypatch, tmp_path):

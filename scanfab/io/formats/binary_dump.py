@@ -17,8 +17,8 @@ import numpy as np
 from scanfab.base.errors import ReadError
 from scanfab.base.lengths import MOST
 from scanfab.base.typing import FloatArray
+from scanfab.io.columns import grain_table, has_radius
 from scanfab.io.files import check_memory, first_bytes, plain
-from scanfab.io.formats.columns import grain_table, has_radius
 from scanfab.io.formats.lammps_box import box_cell
 from scanfab.io.formats.text_dump import numbered_columns
 from scanfab.io.parse.growing import warn_incomplete

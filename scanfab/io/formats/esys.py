@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from scanfab.base.errors import ReadError
+from scanfab.io.columns import grain_table
 from scanfab.io.files import file_inside, first_bytes
-from scanfab.io.formats.columns import grain_table
 from scanfab.io.formats.shared import GrainsOnly, cell_of, numbers
 from scanfab.io.reader import GrainTable, ReadOptions, Snapshot
 from scanfab.io.text import Columns, Layout, read_rows, spelt, text_of

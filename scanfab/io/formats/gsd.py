@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
+from scanfab.io.columns import grain_table, has_radius
 from scanfab.io.fence import fenced, needed
 from scanfab.io.files import first_bytes
-from scanfab.io.formats.columns import grain_table, has_radius
 from scanfab.io.formats.shared import GrainsOnly, cell_of
 from scanfab.io.reader import FileKind, GrainTable, ReadOptions, Snapshot
 from scanfab.packing.cell import Cell

@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.io.formats.columns import refuse_named_twice
-from scanfab.io.formats.join import rows_of_ids
+from scanfab.io.columns import refuse_named_twice
+from scanfab.io.contacts import rows_of_ids
 from scanfab.io.formats.text_dump import Dump
 from scanfab.io.reader import GrainTable
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from scanfab.base.errors import ReadError
+from scanfab.io.columns import grain_table
 from scanfab.io.files import first_bytes
-from scanfab.io.formats.columns import grain_table
 from scanfab.io.formats.shared import GrainsOnly
 from scanfab.io.parse.hdf import is_hdf, read_hdf_file
 from scanfab.io.reader import Carries, FileKind, GrainTable, ReadOptions, Snapshot

@@ -11,6 +11,7 @@ import numpy as np
 
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray, IntArray
+from scanfab.io.contacts import join_ids, rows_of_ids
 from scanfab.io.files import first_bytes
 from scanfab.io.formats import ids, text_dump
 from scanfab.io.formats.binary_dump import (
@@ -19,7 +20,6 @@ from scanfab.io.formats.binary_dump import (
     names_of_binary,
     read_binary_grains,
 )
-from scanfab.io.formats.join import join_ids, rows_of_ids
 from scanfab.io.formats.lammps_data import index_data, is_data_file, of_liggghts, read_data_grains
 from scanfab.io.formats.lammps_netcdf import (
     index_netcdf,

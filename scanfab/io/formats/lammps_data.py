@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
+from scanfab.io.columns import grain_table
 from scanfab.io.files import first_bytes
-from scanfab.io.formats.columns import grain_table
 from scanfab.io.formats.lammps_box import box_cell
 from scanfab.io.reader import GrainTable, ReadOptions, Snapshot
 from scanfab.io.text import Layout, read_rows, text_of

@@ -11,8 +11,8 @@ import numpy.typing as npt
 from scanfab.base.arrays import doubles
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray
+from scanfab.io.columns import grain_table, has_radius
 from scanfab.io.fence import fenced, needed
-from scanfab.io.formats.columns import grain_table, has_radius
 from scanfab.io.formats.shared import cell_of
 from scanfab.io.reader import FileKind, GrainTable, ReadOptions, Snapshot
 from scanfab.packing.cell import Cell

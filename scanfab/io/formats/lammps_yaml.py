@@ -6,8 +6,8 @@ import re
 from pathlib import Path
 
 from scanfab.base.errors import ReadError
+from scanfab.io.columns import grain_table, has_radius
 from scanfab.io.files import plain
-from scanfab.io.formats.columns import grain_table, has_radius
 from scanfab.io.formats.lammps_box import dump_cell
 from scanfab.io.parse.growing import leave_out_last
 from scanfab.io.reader import FileKind, GrainTable, ReadOptions, Snapshot

@@ -10,9 +10,9 @@ import numpy as np
 
 from scanfab.base.errors import ReadError, ScanfabWarning
 from scanfab.base.typing import FloatArray
+from scanfab.io.columns import grain_table, whole_numbers
+from scanfab.io.contacts import join_ids
 from scanfab.io.files import first_bytes
-from scanfab.io.formats.columns import grain_table, whole_numbers
-from scanfab.io.formats.join import join_ids
 from scanfab.io.formats.shared import cell_of, finite_forces, frames_below, numbers
 from scanfab.io.parse.growing import leave_out_last
 from scanfab.io.reader import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot

@@ -13,10 +13,10 @@ import numpy as np
 
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray
+from scanfab.io.contacts import count_walls, join_ids, rows_of_ids
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.binary_dump import names_of_binary
 from scanfab.io.formats.ids import MOST_ROWS, are_ids, are_whole, named_places
-from scanfab.io.formats.join import count_walls, join_ids, rows_of_ids
 from scanfab.io.formats.lammps import (
     DumpReader,
     form_of,

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from scanfab.base.errors import ReadError
-from scanfab.io.formats.columns import grain_table, whole_numbers
-from scanfab.io.formats.join import join_ids
+from scanfab.io.columns import grain_table, whole_numbers
+from scanfab.io.contacts import join_ids
 from scanfab.io.formats.shared import cell_of, finite_forces, numbers
 from scanfab.io.reader import GrainTable, ReadOptions, Snapshot
 from scanfab.io.text import Columns, spelt, text_of

@@ -14,9 +14,9 @@ import numpy as np
 
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray, IntArray
+from scanfab.io.columns import grain_table, whole_numbers
+from scanfab.io.contacts import join_ids
 from scanfab.io.files import bare_name, first_bytes, plain
-from scanfab.io.formats.columns import grain_table, whole_numbers
-from scanfab.io.formats.join import join_ids
 from scanfab.io.formats.mercury_restart import is_restart, read_restart, time_of_restart
 from scanfab.io.formats.shared import cell_of, finite_forces, frames_below
 from scanfab.io.parse.growing import leave_out_last

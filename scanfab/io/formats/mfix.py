@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from scanfab.base.errors import ReadError
+from scanfab.io.columns import grain_table
 from scanfab.io.files import bare_name, first_bytes
-from scanfab.io.formats.columns import grain_table
 from scanfab.io.formats.shared import GrainsOnly, numbers
 from scanfab.io.reader import Carries, GrainTable, ReadOptions, Snapshot
 from scanfab.io.text import Layout, read_rows, text_of

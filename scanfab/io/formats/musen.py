@@ -12,8 +12,8 @@ import numpy as np
 
 from scanfab.base.errors import ReadError, ScanfabNote
 from scanfab.base.typing import FloatArray
+from scanfab.io.columns import grain_table
 from scanfab.io.files import Stamp, first_bytes, stamp_of
-from scanfab.io.formats.columns import grain_table
 from scanfab.io.formats.shared import GrainsOnly, cell_of, numbers
 from scanfab.io.reader import GrainTable, ReadOptions, Snapshot
 from scanfab.io.text import spelt, text_of

@@ -11,9 +11,9 @@ import numpy as np
 from scanfab.base.errors import ReadError
 from scanfab.io import written
 from scanfab.io.beside import companion_kind, read_contacts
+from scanfab.io.binary_tables import IS_NPZ, npz_shapes, read_npz
+from scanfab.io.columns import grain_table
 from scanfab.io.files import first_bytes
-from scanfab.io.formats.columns import grain_table
-from scanfab.io.parse.sheet_binary import IS_NPZ, npz_shapes, read_npz
 from scanfab.io.reader import (
     BODIES,
     WALLS,

@@ -16,9 +16,9 @@ import numpy.typing as npt
 from scanfab.base.arrays import doubles
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.typing import FloatArray
+from scanfab.io.columns import grain_table, whole_numbers
+from scanfab.io.contacts import join_ids
 from scanfab.io.files import first_bytes
-from scanfab.io.formats.columns import grain_table, whole_numbers
-from scanfab.io.formats.join import join_ids
 from scanfab.io.parse.hdf import HdfFile, is_hdf, read_hdf_file
 from scanfab.io.reader import (
     Carries,

@@ -1,8 +1,8 @@
 """
 Tables of any program: text with or without names, Parquet, NPZ and ``.xyzd``.
 
-What a column is, its name says, or the user. Without either a guess is made, and taken only if the
-grains that come of it touch one another; it is told.
+What a column is, its name says, or the user. Without either, four columns are ``x y z r``, and five
+are ``id x y z r`` or ``x y z r`` and the clump; a note says so.
 """
 
 from __future__ import annotations
@@ -10,26 +10,19 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.arrays import doubles
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
-from scanfab.io.files import Stamp, stamp_of
-from scanfab.io.formats.columns import grain_table
-from scanfab.io.formats.proof import TOO_FEW, touch
+from scanfab.base.lengths import MOST
+from scanfab.base.typing import FloatArray
+from scanfab.io.binary_tables import is_xyzd, xyzd_cell
+from scanfab.io.columns import grain_table
 from scanfab.io.formats.table_contacts import join_table
-from scanfab.io.formats.table_files import (
-    Columns,
-    has_ids,
-    names_of,
-    read_table,
-    read_unnamed,
-)
+from scanfab.io.formats.table_files import Columns, first_rows, names_of, read_table
 from scanfab.io.formats.table_names import (
     CONTACTS,
     EDEM,
@@ -37,16 +30,14 @@ from scanfab.io.formats.table_names import (
     PFC,
     TABLE,
     Names,
-    check_one_unit,
+    check_units,
     find_columns,
     is_contacts,
     is_frame_name,
     is_of_contacts,
     plain_name,
-    unique,
-    warn_of_lacking_unit,
 )
-from scanfab.io.formats.xyzd import is_xyzd, prove_xyzd
+from scanfab.io.layout import unique
 from scanfab.io.reader import (
     Carries,
     FileKind,
@@ -57,11 +48,12 @@ from scanfab.io.reader import (
 )
 
 # what must be a number in each row, and what a whole one
-NUMBERS = ("x", "y", "z", "radius", "diameter", "volume", "id", "id1", "id2")
-WHOLE = ("id", "id1", "id2")
-OF_GRAINS = ("x", "y", "z", "radius", "diameter", "id")
-# the columns of the table whose names were guessed last, until it is read; and lines to skip
-_guessed: dict[tuple[Stamp, int], Columns] = {}
+NUMBERS = ("x", "y", "z", "radius", "diameter", "volume", "id", "id1", "id2", "clump")
+WHOLE = ("id", "id1", "id2", "clump")
+OF_GRAINS = ("x", "y", "z", "radius", "diameter", "id", "clump")
+# grains by which a table without names is judged, and the least median distance of a grain from
+# the nearest one, in r1 + r2: below it the radii are diameters, or these are several frames
+LOOKED_AT, LEAST_DISTANCE = 2000, 0.75
 ASK = (
     'name them, for instance `columns="x=1,y=2,z=3,radius=4"` (or diameter=4; numbers of columns '
     "count from 1); discs have a column z, too, with one value"
@@ -79,17 +71,14 @@ class TableReader:
         "tables with a column each of x, y, z, radius: CSV, TSV, blanks, Parquet, NPZ, xyzd"
     )
     extensions: ClassVar[tuple[str, ...]] = (
-        ".csv",
-        ".tsv",
-        ".txt",
-        ".dat",
-        ".parquet",
-        ".npz",
-        ".xyzd",
+        *(".csv", ".tsv", ".txt", ".dat"),
+        *(".parquet", ".npz", ".xyzd"),
     )
     generic = True
     is_table = True
     names: Names = field(default_factory=lambda: {**TABLE, **CONTACTS}, init=False, repr=False)
+    marks: ClassVar[tuple[str, ...]] = ()
+    """How names of columns begin by which a program's own tables are recognised; empty: any."""
 
     def told(self, options: ReadOptions) -> TableReader:
         """Columns may have no names but those that users give them."""
@@ -99,18 +88,22 @@ class TableReader:
         """Names of columns, the usual or the user's, that make grains or contacts."""
         try:
             names, _ = names_of(path, self.options.skip)
-            return names is not None and self._kind_of(path, names) != "points"
+            if names is None or not (
+                not self.marks or any(plain_name(name).startswith(self.marks) for name in names)
+            ):
+                return False
+            return self._kind_of(path, names) != "points"
         except ReadError:
             return False
 
     def kind(self, path: Path) -> FileKind:
-        """By the columns; of a table without names by a guess that holds."""
+        """By the columns; a table without names holds grains."""
         names, width = names_of(path, self.options.skip)
         if names is not None:
             return self._kind_of(path, names)
         if self.options.columns or self.options.contact_columns:
             return self._kind_of(path, [f"{place + 1}" for place in range(width)])
-        _guess(path, self.options.skip)
+        _guessed(path, self.options.skip)
         return "grains"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
@@ -118,29 +111,49 @@ class TableReader:
         return [Snapshot(path)]
 
     def carries(self, path: Path) -> Carries:
-        """A table has no cell."""
-        return "nothing"
+        """A table has no cell, but beside an ``.xyzd`` there is one."""
+        return "cell" if is_xyzd(path) and xyzd_cell(path) is not None else "nothing"
+
+    def beside(self, path: Path) -> list[Path]:
+        """The file with the cell of an ``.xyzd``."""
+        return [path.with_name("packing.nfo")] if is_xyzd(path) else []
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         """Columns by their names or numbers."""
         path, reader = snapshot.path, replace(self, options=options)
         names, width = names_of(path, options.skip)
-        own = names or [f"{place + 1}" for place in range(width)]
         is_guess = names is None and not options.columns
-        found = _guess(path, options.skip) if is_guess else reader._find(path, own, contacts=False)
-        guessed = _guessed.pop((stamp_of(path), options.skip), None) if is_guess else None
-        columns = guessed or read_table(path, options.skip, *_needed(found))
+        if is_guess:
+            found = _guessed(path, options.skip)
+        else:
+            own = names or [f"{place + 1}" for place in range(width)]
+            found = reader._find(path, own, contacts=False)
+        columns = read_table(path, options.skip, *_needed(found))
+        if is_guess:
+            _refuse_wrong_guess(path, found, columns)
         if names is not None:
             _refuse_frames(path, columns)
-            warn_of_lacking_unit(path, found)
-        if is_xyzd(path) and not options.columns:
-            prove_xyzd(path, columns)
+            check_units(path, found)
         if "volume" in found and not found.keys() & {"radius", "diameter"}:
-            columns = _radii_of_volumes(columns, found["volume"])
-            found["radius"] = "radius"
-        _tell_guess(names, found, options)
-        own_names = _grain_columns(found, options.columns)
-        return grain_table(path, columns, None, replace(options, columns=own_names))
+            warnings.warn(
+                f"radii are those of spheres of the volumes in {found['volume']}: of particles "
+                f"that are no single spheres they would be wrong",
+                ScanfabNote,
+                stacklevel=2,
+            )
+            volume = columns[found["volume"]].astype(np.float64)
+            columns, found["radius"] = (
+                {**columns, "radius": np.cbrt(0.75 / np.pi * volume)},
+                "radius",
+            )
+        # of the columns that are known only by their usual names, those of grains
+        own_names = {
+            what: name
+            for what, name in found.items()
+            if what in options.columns or what in OF_GRAINS
+        }
+        cell = xyzd_cell(path) if is_xyzd(path) else None
+        return grain_table(path, columns, cell, replace(options, columns=own_names))
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
@@ -155,11 +168,8 @@ class TableReader:
                 f"{path}: expected two columns of ids, id1 and id2, found {', '.join(own)}: name "
                 f'them with `contact_columns="id1=NAME,id2=NAME"`'
             )
-        check_one_unit(path, "forces", found, [one for one in found if one.startswith("f")])
+        check_units(path, found, contacts=True)
         columns = read_table(path, options.skip, *_needed(found))
-        for name in found.values():
-            if name not in columns:
-                raise ReadError(f"{path}: expected numbers in the column {name}, which is empty")
         return join_table(path, grains, {what: columns[name] for what, name in found.items()})
 
     def left_out(self, path: Path) -> list[str]:
@@ -193,25 +203,23 @@ class TableReader:
             except ReadError as error:
                 wrong.append(error)
                 found.append({})
-        grains, pairs = found[0], found[1]
-        if (
-            self.options.contact_columns
-            and is_contacts(pairs)
-            and has_ids(path, self.options.skip, pairs)
-        ):
-            return "contacts"
+        grains, pairs = found
+        if self.options.contact_columns and is_contacts(pairs):
+            # other tables may have columns of these numbers: ids are whole numbers
+            places = [unique(names).index(pairs[one]) for one in ("id1", "id2")]
+            rows = first_rows(path, self.options.skip)
+            if all(row[place].strip().isdigit() for row in rows for place in places):
+                return "contacts"
         if {"x", "y", "z"} <= grains.keys() and not is_contacts(grains):
             sized = grains.keys() & {"radius", "diameter", "volume"}
             return "grains" if sized else "points"
         if is_contacts(pairs):
             return "contacts"
-        raise (
-            wrong[0]
-            if wrong
-            else ReadError(
-                f"{path}: expected columns of grains (x, y, z, radius or diameter) or contacts "
-                f"(id1, id2), found {', '.join(names)}: {ASK}"
-            )
+        if wrong:
+            raise wrong[0]
+        raise ReadError(
+            f"{path}: expected columns of grains (x, y, z, radius or diameter) or contacts "
+            f"(id1, id2), found {', '.join(names)}: {ASK}"
         )
 
 
@@ -223,10 +231,7 @@ class PfcReader(TableReader):
     description = "tables of PFC's ball and contact attributes: ball.pos.x, contact.end1.id, ..."
     extensions = ()
     names: Names = field(default_factory=lambda: PFC, init=False, repr=False)
-
-    def recognises(self, path: Path) -> bool:
-        """By name only."""
-        return False
+    marks = ("ball.", "contact.end")
 
 
 @dataclass(frozen=True)
@@ -251,11 +256,6 @@ def _needed(found: Mapping[str, str]) -> tuple[list[str], list[str]]:
         [found[one] for one in NUMBERS if one in found],
         [found[one] for one in WHOLE if one in found],
     )
-
-
-def _may_be_ids(values: npt.NDArray[Any]) -> bool:
-    is_whole = values.dtype.kind in "iuf" and np.all(values == np.rint(values))
-    return bool(is_whole) and len(np.unique(values)) == len(values)
 
 
 def _named_contacts(path: Path, text: str | None) -> dict[str, str]:
@@ -295,76 +295,55 @@ def _refuse_frames(path: Path, columns: Columns) -> None:
             )
 
 
-def _grain_columns(found: Mapping[str, str], named: Mapping[str, str]) -> dict[str, str]:
-    """Those columns that are a grain's by their names, and whatever else the user names."""
-    return {what: name for what, name in found.items() if what in named or what in OF_GRAINS}
+def _guessed(path: Path, skip: int) -> dict[str, str]:
+    """
+    The columns of a table without names, by their number.
 
-
-def _radii_of_volumes(columns: Columns, name: str) -> Columns:
-    """The columns and a radius from the volume."""
-    warnings.warn(
-        f"radii are those of spheres of the volumes in {name}: of particles that are no single "
-        f"spheres they would be wrong",
-        ScanfabNote,
-        stacklevel=3,
-    )
-    return {**columns, "radius": np.cbrt(0.75 / np.pi * columns[name].astype(np.float64))}
-
-
-def _guess(path: Path, skip: int) -> dict[str, str]:
-    """Columns without names: ``x y z r`` or ``id x y z r``, if the grains then touch."""
-    names = _proved_names(path, skip, stamp_of(path))
+    Four are x y z r. Five are id x y z r if the first holds distinct whole numbers, else x y z r
+    and the number of the clump.
+    """
+    rows = first_rows(path, skip)
+    width = len(rows[0])
+    first = [row[0].strip() for row in rows]
+    has_ids = all(word.isdigit() for word in first) and len(set(first)) == len(first)
+    if width == 5:
+        names = ["id", "x", "y", "z", "radius"] if has_ids else ["x", "y", "z", "radius", "clump"]
+    elif width == 4 and not (has_ids and len(rows) > 1):
+        names = ["x", "y", "z", "radius"]
+    else:
+        lacks = "the first of four seems to be ids" if width == 4 else "expected four or five"
+        raise ReadError(f"{path}: the {width} columns have no names ({lacks}): {ASK}")
     return {name: f"{place + 1}" for place, name in enumerate(names)}
 
 
-@lru_cache
-def _proved_names(path: Path, skip: int, stamp: Stamp) -> tuple[str, ...]:
-    """Of a table as it stood then, so that it is proved once."""
-    columns = read_unnamed(path, skip)
-    names = _names_by_touch(path, list(columns.values()))
-    _guessed.clear()
-    _guessed[stamp, skip] = columns
-    return names
-
-
-def _names_by_touch(path: Path, places: Sequence[npt.NDArray[Any]]) -> tuple[str, ...]:
-    """What columns must be, for grains to touch one another; ReadError if that cannot be told."""
-    fits, large = [], False
-    for begin in (0, 1):
-        part = places[begin : begin + 4]
-        if len(part) < 4 or any(column.dtype.kind not in "iuf" for column in part):
-            continue
-        if begin and not _may_be_ids(places[0]):
-            continue
-        x, y, z, radius = map(doubles, part)
-        if touch(x, y, z, radius):
-            fits.append(begin)
-        elif not fits:
-            large = large or touch(x, y, z, 0.5 * radius)
-    if len(fits) != 1:
-        lacks = (
-            f"fewer than {TOO_FEW} grains prove nothing"
-            if places and len(places[0]) < TOO_FEW
-            else "the fourth is a diameter, it seems"
-            if large
-            else "as x y z r or id x y z r its grains do not touch"
-        )
-        raise ReadError(
-            f"{path}: the {len(places)} columns have no names, and what they are cannot be "
-            f"told ({lacks}): {ASK}"
-        )
-    return ("x", "y", "z", "radius") if fits[0] == 0 else ("id", "x", "y", "z", "radius")
-
-
-def _tell_guess(
-    names: Sequence[str] | None, found: Mapping[str, str], options: ReadOptions
-) -> None:
-    if names is not None or options.columns:
-        return
-    columns = " ".join(sorted(found, key=lambda what: int(found[what])))
+def _refuse_wrong_guess(path: Path, found: Mapping[str, str], columns: Columns) -> None:
+    """ReadError if the columns of a table without names cannot be what they were taken for."""
+    radius = doubles(columns[found["radius"]])
+    position = np.column_stack([columns[found[axis]] for axis in "xyz"]).astype(np.float64)
+    lacks = ""
+    if not np.all(radius > 0):
+        lacks = "some radii would not be positive"
+    elif "clump" in found and columns[found["clump"]].dtype.kind != "i":
+        lacks = "some numbers of clumps would not be whole"
+    elif _median_distance(position, radius) < LEAST_DISTANCE:
+        lacks = "grains would lie in one another: is the last a diameter, or are these two frames"
+    told = " ".join(found)
+    if lacks:
+        raise ReadError(f"{path}: the columns have no names, and as {told} {lacks}: {ASK}")
     warnings.warn(
-        f"the columns of the table have no names and are taken for {columns}, since the grains "
-        f"then touch one another",
+        f"{path}: the columns have no names and are taken for {told}: if they are something "
+        f"else, say so with `columns`",
         ScanfabNote,
-        stacklevel=2,
+        stacklevel=3,
     )
+
+
+def _median_distance(position: FloatArray, radius: FloatArray) -> float:
+    """The median distance of grains from the nearest one, in the sum of both radii."""
+    from scipy.spatial import KDTree
+
+    if len(radius) < 2 or not np.all(np.abs(position) < MOST):
+        return np.inf
+    chosen = np.random.default_rng(0).permutation(len(radius))[:LOOKED_AT]
+    distance, other = KDTree(position, balanced_tree=False).query(position[chosen], k=2)
+    return float(np.median(distance[:, 1] / (radius[chosen] + radius[other[:, 1]])))

@@ -11,10 +11,16 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
-from scanfab.base.typing import BoolArray, FloatArray, IntArray
-from scanfab.io.formats.columns import whole_numbers
-from scanfab.io.formats.join import count_walls, join_ids, rows_of_ids
-from scanfab.io.formats.proof import NEARLY_ALL, proved_force, row_base
+from scanfab.base.typing import FloatArray, IntArray
+from scanfab.io.columns import whole_numbers
+from scanfab.io.contacts import (
+    NEARLY_ALL,
+    count_walls,
+    join_ids,
+    proved_force,
+    row_base,
+    rows_of_ids,
+)
 from scanfab.io.reader import GrainTable, JoinedContacts
 
 Columns = Mapping[str, npt.NDArray[Any]]
@@ -45,59 +51,64 @@ def join_table(path: Path, grains: GrainTable, found: Columns) -> JoinedContacts
         If a pair names a grain that is not there.
     """
     ids = np.column_stack([whole_numbers(path, found[one]) for one in ("id1", "id2")])
-    walls = _with_walls(found, ids)
-    ids_of_walls, ids = ids[walls], ids[~walls]
-    grains = _with_ids(path, grains, ids)
-    rows = rows_of_ids(grains, ids)
-    known = bool((rows >= 0).all())
-    force = _force(path, grains, rows, found, ~walls) if known else None
-    force_n = _normal_force(path, found, ~walls) if force is None else None
-    image = _image(path, grains, found, ~walls)
-    joined = join_ids(path, grains, ids, force, walls=False, image=image, force_n=force_n)
-    touched = rows_of_ids(grains, ids_of_walls)
-    count = count_walls(touched.max(axis=1)[touched.max(axis=1) >= 0], len(grains.radius))
+    kind = found.get("kind")
+    if kind is not None and kind.dtype.kind == "U":
+        # the second is the wall; its id is of another kind than those of grains
+        ids[~np.isin(np.char.lower(np.char.strip(kind)), OF_GRAINS), 1] = -1
+    walls = np.any(ids < 0, axis=1)
+    found = {name: values[~walls] for name, values in found.items()}
+    pairs = ids[~walls]
+    grains = _with_ids(path, grains, pairs)
+    rows = rows_of_ids(grains, pairs)
+    force = _force(path, grains, rows, found) if (rows >= 0).all() else None
+    force_n = _normal_force(path, found) if force is None else None
+    shift = _vectors(path, grains, found, "ix iy iz")
+    image = None if shift is None else whole_numbers(path, shift.ravel()).reshape(-1, 3)
+    joined = join_ids(path, grains, pairs, force, walls=False, image=image, force_n=force_n)
+    _tell_twice(path, pairs, image)
+    touched = rows_of_ids(grains, ids[walls]).max(axis=1)
+    count = count_walls(touched[touched >= 0], len(grains.radius))
     return joined._replace(wall_contacts=joined.wall_contacts + count)
 
 
-def _with_walls(found: Columns, ids: IntArray) -> BoolArray:
-    """Contacts with something that is no grain: named as such, or by an id below 0."""
-    walls: BoolArray = np.any(ids < 0, axis=1)
-    kind = found.get("kind")
-    if kind is not None and kind.dtype.kind == "U":
-        is_wall = ~np.isin(np.char.lower(np.char.strip(kind)), OF_GRAINS)
-        # the wall is the second; its id is of another kind than those of grains
-        ids[is_wall, 1] = -1
-        walls = walls | is_wall
-    return walls
+def _tell_twice(path: Path, pairs: IntArray, image: IntArray | None) -> None:
+    """A warning for pairs that are listed twice, where no column says that images differ."""
+    turned = (pairs[:, :1] > pairs[:, 1:]) if image is not None else np.zeros((0, 1))
+    sides = [] if image is None else [np.where(turned, -image, image)]
+    keys = np.concatenate([np.sort(pairs, axis=1), *sides], axis=1)
+    unique, counts = np.unique(keys, axis=0, return_counts=True)
+    if len(unique) < len(keys):
+        first = unique[np.argmax(counts > 1), :2]
+        warnings.warn(
+            f"{path}: {np.count_nonzero(counts > 1)} of {len(unique)} pairs are listed more than "
+            f"once, such as {first[0]} and {first[1]}: each row counts as a contact",
+            ScanfabWarning,
+            stacklevel=3,
+        )
 
 
 def _with_ids(path: Path, grains: GrainTable, ids: IntArray) -> GrainTable:
-    """Grains that the contacts can name."""
-    if grains.id is not None or len(ids) == 0:
-        return grains if grains.id is not None else _numbered(grains, 0)
-    base = row_base(grains, ids)
+    """Grains that the contacts can name: by their rows if they have no ids."""
+    if grains.id is not None:
+        return grains
+    base = row_base(grains, ids) if len(ids) else 0
     if base is None:
         raise ReadError(
             f"{path}: names grains by numbers, but the grain file has no ids, and as rows, counted "
             f"from 0 or from 1, they are no neighbours (or both ways): name the ids of grains "
             f'with `columns={{"id": ...}}`'
         )
-    warnings.warn(
-        f"the grains have no ids: contacts name their rows, counted from {base}, since these are "
-        f"neighbours",
-        ScanfabNote,
-        stacklevel=2,
-    )
-    return _numbered(grains, base)
-
-
-def _numbered(grains: GrainTable, base: int) -> GrainTable:
+    if len(ids):
+        warnings.warn(
+            f"the grains have no ids: contacts name their rows, counted from {base}, since these "
+            f"are neighbours",
+            ScanfabNote,
+            stacklevel=3,
+        )
     return grains._replace(id=np.arange(base, base + len(grains.radius)))
 
 
-def _vectors(
-    path: Path, grains: GrainTable, found: Columns, names: str, kept: BoolArray
-) -> FloatArray | None:
+def _vectors(path: Path, grains: GrainTable, found: Columns, names: str) -> FloatArray | None:
     """One vector a contact; what has no column is 0 where all grains lie at one place along it."""
     wanted = names.split()
     lacking = [name for name in wanted if name not in found]
@@ -112,31 +123,24 @@ def _vectors(
             stacklevel=2,
         )
         return None
-    columns = [found.get(name, np.zeros(len(kept))) for name in wanted]
+    columns = [found.get(name, np.zeros(len(found["id1"]))) for name in wanted]
     if any(column.dtype.kind not in "biuf" for column in columns):
         raise ReadError(f"{path}: expected numbers in the columns {names}, found text")
-    return np.column_stack(columns).astype(np.float64)[kept]
+    return np.column_stack(columns).astype(np.float64)
 
 
-def _image(path: Path, grains: GrainTable, found: Columns, kept: BoolArray) -> IntArray | None:
-    image = _vectors(path, grains, found, "ix iy iz", kept)
-    return None if image is None else whole_numbers(path, image.ravel()).reshape(-1, 3)
-
-
-def _force(
-    path: Path, grains: GrainTable, rows: IntArray, found: Columns, kept: BoolArray
-) -> FloatArray | None:
+def _force(path: Path, grains: GrainTable, rows: IntArray, found: Columns) -> FloatArray | None:
     """The force on the second grain; None if there is none, or its sign cannot be told."""
-    second = _vectors(path, grains, found, "fx2 fy2 fz2", kept)
+    second = _vectors(path, grains, found, "fx2 fy2 fz2")
     if second is not None:
         return second
-    first = _vectors(path, grains, found, "fx1 fy1 fz1", kept)
+    first = _vectors(path, grains, found, "fx1 fy1 fz1")
     if first is not None:
         return -first
-    force = _vectors(path, grains, found, "fx fy fz", kept)
+    force = _vectors(path, grains, found, "fx fy fz")
     if force is None:
-        normal = _vectors(path, grains, found, "fnx fny fnz", kept)
-        tangential = _vectors(path, grains, found, "ftx fty ftz", kept)
+        normal = _vectors(path, grains, found, "fnx fny fnz")
+        tangential = _vectors(path, grains, found, "ftx fty ftz")
         if normal is None or tangential is None:
             return None
         force = normal + tangential
@@ -147,12 +151,12 @@ def _force(
     return proved_force(path, grains, rows, force, cure)
 
 
-def _normal_force(path: Path, found: Columns, kept: BoolArray) -> FloatArray | None:
+def _normal_force(path: Path, found: Columns) -> FloatArray | None:
     """The normal force, compression positive: the sign that nearly all have."""
     values = found.get("fn")
     if values is None or values.dtype.kind not in "biuf":
         return None
-    normal = values.astype(np.float64)[kept]
+    normal = values.astype(np.float64)
     signs = normal[normal != 0] > 0
     share = float(np.mean(signs)) if len(signs) else 1.0
     if 1 - NEARLY_ALL < share < NEARLY_ALL:

@@ -5,17 +5,18 @@ from __future__ import annotations
 import re
 import unicodedata
 import warnings
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from scanfab.base.errors import ReadError, ScanfabWarning
-from scanfab.io.formats.columns import (
+from scanfab.io.columns import (
     DIAMETER_NAMES,
     ID_NAMES,
     RADIUS_NAMES,
     refuse_cylindrical,
     refuse_named_twice,
 )
+from scanfab.io.layout import unique
 
 Names = Mapping[str, tuple[str, ...]]
 """The names that a column may have, by what it is; as :func:`plain_name` has them."""
@@ -102,25 +103,9 @@ def plain_name(name: str) -> str:
     return re.sub(r"[^a-z0-9]+", ".", text).strip(".")
 
 
-def unique(names: Sequence[str]) -> list[str]:
-    """Names of columns; one that is empty, or there before, is the number of its column."""
-    first = {name: place for place, name in reversed(list(enumerate(names)))}
-    return [
-        name if name and first[name] == place else f"{place + 1}"
-        for place, name in enumerate(names)
-    ]
-
-
 def is_of_contacts(standard: str) -> bool:
     """Whether a column says something of a contact that a packing has: its grains, image, force."""
     return standard in (*IDS, "kind", "ix", "iy", "iz") or standard.startswith("f")
-
-
-def unit_of(name: str) -> str | None:
-    """The unit in brackets behind the name of a column, spelt in one way."""
-    match = UNIT.search(name)
-    # two letters look alike and mean micro
-    return unicodedata.normalize("NFKC", match[1]).strip() if match else None
 
 
 def is_frame_name(name: str) -> bool:
@@ -181,16 +166,15 @@ def find_columns(
             found[standard] = keys[places[0]]
             if standard == "radius" and not named.keys() & {"radius", "diameter"}:
                 refuse_cylindrical(path, names[places[0]], names)
-    _check_units(path, found)
     return found
 
 
 def _column(path: Path, names: Sequence[str], own: str, standard: str, option: str) -> str:
+    if list(names).count(own) > 1:
+        raise ReadError(
+            f"{path}: there are several columns {own!r}: choose one by its number in `{option}`"
+        )
     if own in names:
-        if list(names).count(own) > 1:
-            raise ReadError(
-                f"{path}: there are several columns {own!r}: choose one by its number in `{option}`"
-            )
         return own
     if re.fullmatch(r"[0-9]{1,6}", own) and 1 <= int(own) <= len(names):
         return unique(names)[int(own) - 1]
@@ -200,46 +184,41 @@ def _column(path: Path, names: Sequence[str], own: str, standard: str, option: s
     )
 
 
-def _check_units(path: Path, found: Mapping[str, str]) -> None:
-    """Lengths of one table have one unit."""
-    check_one_unit(path, "lengths", found, LENGTHS)
-    if "volume" not in found or found.keys() & {"radius", "diameter"}:
+def check_units(path: Path, found: Mapping[str, str], contacts: bool = False) -> None:
+    """
+    Lengths of one table have one unit, as have forces, and volumes have its cube.
+
+    Raises
+    ------
+    ReadError
+        If the names of the columns say two units.
+    """
+    what = "forces" if contacts else "lengths"
+    wanted = [one for one in found if one.startswith("f")] if contacts else LENGTHS
+    units = {found[one]: _unit_of(found[one]) for one in wanted if one in found}
+    named = [name for name, unit in units.items() if unit]
+    if len({units[name] for name in named}) > 1:
+        raise ReadError(f"{path}: {what} of one unit are expected, found {', '.join(named)}")
+    if contacts or not named:
         return
-    unit = next((unit_of(found[one]) for one in "xyz" if one in found), None)
-    cube = unit_of(found["volume"])
-    if unit and cube and cube not in (f"{unit}^3", f"{unit}3", f"{unit}**3", f"cu {unit}"):
+    unit = units[named[0]]
+    cube = _unit_of(found.get("volume", ""))
+    if cube and cube not in (f"{unit}^3", f"{unit}3", f"{unit}**3", f"cu {unit}"):
         raise ReadError(
             f"{path}: volumes in the cube of the unit of lengths, {unit}, are expected, found "
             f"{found['volume']}"
         )
-
-
-def warn_of_lacking_unit(path: Path, found: Mapping[str, str]) -> None:
-    """Tell of lengths without a unit beside others with one: it is taken for the same."""
-    names = [found[one] for one in (*LENGTHS, "volume") if one in found]
-    with_unit = [name for name in names if unit_of(name)]
-    without = [name for name in names if name not in with_unit]
-    if with_unit and without:
+    if len(named) < len(units):
+        lacking = ", ".join(name for name in units if name not in named)
         warnings.warn(
-            f"{path}: {', '.join(with_unit)} name a unit, {', '.join(without)} none: all are taken "
-            f"to be in the same one",
+            f"{path}: {', '.join(named)} name a unit, {lacking} none: all are taken to be in the "
+            f"same one",
             ScanfabWarning,
             stacklevel=3,
         )
 
 
-def check_one_unit(
-    path: Path, what: str, found: Mapping[str, str], standard: Collection[str]
-) -> None:
-    """
-    Whether what is of one kind has one unit, where its names say any.
-
-    Raises
-    ------
-    ReadError
-        If there are two.
-    """
-    names = [found[one] for one in standard if one in found]
-    units = {name: unit for name in names if (unit := unit_of(name))}
-    if len(set(units.values())) > 1:
-        raise ReadError(f"{path}: {what} of one unit are expected, found {', '.join(units)}")
+def _unit_of(name: str) -> str | None:
+    """The unit in brackets behind the name of a column; micro has two letters that look alike."""
+    match = UNIT.search(name)
+    return unicodedata.normalize("NFKC", match[1]).strip() if match else None

@@ -17,8 +17,8 @@ import numpy as np
 
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray
+from scanfab.io.columns import grain_table, has_radius
 from scanfab.io.files import first_bytes, plain
-from scanfab.io.formats.columns import grain_table, has_radius
 from scanfab.io.formats.lammps_box import dump_cell
 from scanfab.io.parse.growing import grows, warn_incomplete
 from scanfab.io.reader import FileKind, GrainTable, ReadOptions, Snapshot

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
 from scanfab.base.arrays import doubles
-from scanfab.base.errors import ReadError
+from scanfab.base.errors import ReadError, ScanfabNote
 from scanfab.base.lengths import MOST
 from scanfab.base.typing import FloatArray
+from scanfab.io.columns import grain_table, has_radius, whole_numbers
+from scanfab.io.contacts import join_ids, join_positions, proved_force
 from scanfab.io.files import bare_name, file_inside, plain
-from scanfab.io.formats.columns import grain_table, has_radius, whole_numbers
-from scanfab.io.formats.join import join_ids, join_positions
-from scanfab.io.formats.proof import proved_force, tell_left_out
 from scanfab.io.formats.yade_cells import cell_beside, cell_file, is_cell_file
 from scanfab.io.mesh import Mesh, elements, form_of, holds_mesh, listed, read_mesh
 from scanfab.io.reader import (
@@ -50,8 +51,8 @@ class VtkReader:
     extensions += (".vtkhdf", ".xdmf", ".xmf")
     generic = True
     lists_contacts = True
-    # whether one end of a contact may be a wall, which is not in the grain file
-    walls = True
+    # whether an id that no grain has is a wall's, see join_ids
+    walls: bool | Literal["unknown"] = "unknown"
     # whether the format says on which grain of a contact its force acts
     says_sign = False
 
@@ -131,7 +132,14 @@ class VtkReader:
         """The contacts with a force whose sign the format says, or the forces themselves."""
         if self.says_sign:
             return contacts
-        tell_left_out(mesh.line_arrays)
+        names = [one for one in mesh.line_arrays if "force" in one.lower() and one != "force"]
+        if names:
+            warnings.warn(
+                f"left out of the contacts: {', '.join(names)}: a force is taken from an array "
+                f"`force` with three components",
+                ScanfabNote,
+                stacklevel=2,
+            )
         if contacts.force is None:
             return contacts
         rows, force = np.asarray(contacts.pairs), np.asarray(contacts.force, np.float64)

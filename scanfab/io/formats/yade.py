@@ -8,8 +8,8 @@ from pathlib import Path
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.lengths import MOST
 from scanfab.base.typing import FloatArray
+from scanfab.io.columns import grain_table
 from scanfab.io.files import first_bytes
-from scanfab.io.formats.columns import grain_table
 from scanfab.io.formats.vtk import VtkReader, vectors
 from scanfab.io.formats.yade_save import is_binary_save, is_save, read_save, snapshot_of_save
 from scanfab.io.mesh import Mesh
@@ -40,6 +40,7 @@ class YadeReader(VtkReader):
     description = "YADE export.VTKExporter, VTKRecorder, export.text, export.textExt, O.save (XML)"
     extensions = (".vtk", ".vtu", ".vtp", ".txt", ".xml", ".yade")
     generic = False
+    walls = True
     says_sign = True
 
     def recognises(self, path: Path) -> bool:

@@ -15,9 +15,9 @@ import numpy as np
 from scanfab.base.errors import PackingError, ReadError, ScanfabWarning
 from scanfab.base.lengths import MOST
 from scanfab.base.typing import FloatArray, IntArray
+from scanfab.io.columns import grain_table, whole_numbers
+from scanfab.io.contacts import join_ids, rows_of_ids
 from scanfab.io.files import first_bytes, unpacked
-from scanfab.io.formats.columns import grain_table, whole_numbers
-from scanfab.io.formats.join import join_ids, rows_of_ids
 from scanfab.io.reader import GrainTable, ReadOptions, Snapshot
 from scanfab.packing.cell import Cell
 from scanfab.packing.walls import ListedWallForces

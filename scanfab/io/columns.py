@@ -17,8 +17,6 @@ from scanfab.base.typing import FloatArray
 from scanfab.io.formats.superquadrics import refuse_superquadrics
 from scanfab.io.reader import BODIES, WALLS, GrainTable, ReadOptions
 from scanfab.io.sizes import refuse_other_size
-from scanfab.packing.bodies import CLUMP_COLUMNS, MOLECULE_COLUMNS
-from scanfab.packing.boundary import CLASS_COLUMNS
 from scanfab.packing.cell import Cell
 from scanfab.packing.packing import LazyColumns, lies_within
 
@@ -36,6 +34,8 @@ POSITION_NAMES = (("x y z", False), ("xu yu zu", False), ("xs ys zs", True), ("x
 
 # no grain is further from a periodic cell, in cells
 MOST_TURNS = 1e9
+# without a cell, no grain is so many times as far away as the others, where there are some
+FAR, FEW = 1e12, 10
 # whole numbers below 2^53 are exact as decimals
 MOST_DECIMAL = 2.0**53 - 1.0
 
@@ -44,47 +44,6 @@ def has_radius(names: Sequence[str]) -> bool:
     """Whether some column is a radius or a diameter."""
     lower = {name.lower() for name in names}
     return bool(lower & {*RADIUS_NAMES, *DIAMETER_NAMES})
-
-
-def room_for_columns(
-    options: ReadOptions, names: Sequence[str], count: int
-) -> tuple[dict[str, npt.NDArray[Any]], dict[str, npt.NDArray[Any]]]:
-    """
-    Empty arrays for those of a dump's columns that :func:`grain_table` or most users ask for.
-
-    Returns them by the dump's names, where they are to be filled in, and by the names that
-    ``grain_table`` knows: coordinates are columns of one array, ``position``.
-    """
-    coordinates = {name for system, _ in POSITION_NAMES for name in system.split()}
-    known = {
-        *coordinates,
-        *RADIUS_NAMES,
-        *DIAMETER_NAMES,
-        *ID_NAMES,
-        *CLASS_COLUMNS,
-        *CLUMP_COLUMNS,
-        *MOLECULE_COLUMNS,
-    }
-    own = options.columns
-    id = own.get("id", _first_of(ID_NAMES, names))
-    columns: dict[str, npt.NDArray[Any]] = {
-        name: np.empty(count, np.int64 if name == id else np.float64)
-        for name in names
-        if name.lower() in known or name in own.values() or name == options.bodies
-    }
-    for system, scaled in POSITION_NAMES:
-        found = [_first_of((name,), names) for name in system.split()]
-        chosen = [name for name in found if name is not None]
-        if len(chosen) < 3:
-            continue
-        named = not set(own.values()) <= set(names) - set(chosen) or own.keys() & set("xyz")
-        if scaled or named or "position" in names:
-            break
-        position = np.empty((count, 3))
-        filled = columns | dict(zip(chosen, position.T, strict=True))
-        others = {name: column for name, column in columns.items() if name not in chosen}
-        return filled, others | {"position": position}
-    return columns, columns
 
 
 def grain_table(
@@ -116,37 +75,25 @@ def grain_table(
     named = _named_by_user(path, rest, options)
     cell = user_cell(path, cell, options)
     position = _position(path, rest, named, cell, where)
-    _refuse_far(path, position, cell, where)
-    position.flags.writeable = False  # so that the packing need not copy it
     radius = _radius(path, rest, named, len(position), options, where)
+    _refuse_far(path, position, radius, cell, where)
+    position.flags.writeable = False  # so that the packing need not copy it
     id = named.get("id", _take(rest, ID_NAMES))
     refuse_superquadrics(path, rest, radius, where)
-    own = {name: rest.pop(name) for name in (BODIES, WALLS) if name in rest}
     bodies, walls = (
-        whole_numbers(path, own[name], where) if name in own else None for name in (BODIES, WALLS)
+        whole_numbers(path, rest.pop(name), where) if name in rest else None
+        for name in (BODIES, WALLS)
     )
-    return GrainTable(
-        position,
-        radius,
-        None if id is None else whole_numbers(path, id, where),
-        rest,
-        cell,
-        wall_contacts=walls,
-        bodies=bodies,
-    )
+    id = None if id is None else whole_numbers(path, id, where)
+    return GrainTable(position, radius, id, rest, cell, wall_contacts=walls, bodies=bodies)
 
 
 def user_cell(path: Path, cell: Cell | None, options: ReadOptions) -> Cell | None:
     """The dump's cell with the user's cell and periodic on top."""
     if options.beside is not None:
         cell = None if options.beside == "none" else options.beside
-    periodic: tuple[bool, bool, bool] | None = None
-    if options.periodic is not None:
-        periodic = (
-            "x" in options.periodic,
-            "y" in options.periodic,
-            "z" in options.periodic,
-        )
+    asked = options.periodic
+    periodic = None if asked is None else ("x" in asked, "y" in asked, "z" in asked)
     if options.cell is not None:
         lx, ly, lz, xy, xz, yz = (*options.cell, 0.0, 0.0, 0.0)[:6]
         vectors = [[lx, 0, 0], [xy, ly, 0], [xz, yz, lz]]
@@ -156,8 +103,8 @@ def user_cell(path: Path, cell: Cell | None, options: ReadOptions) -> Cell | Non
         return cell
     if cell is None:
         raise ReadError(
-            f'{path}: `periodic="{options.periodic}"` was asked for, but the dump names no cell: '
-            f"give it with `cell=(LX, LY, LZ)`"
+            f'{path}: `periodic="{asked}"` was asked for, but the dump names no cell: give it with '
+            f"`cell=(LX, LY, LZ)`"
         )
     return Cell(cell.vectors, periodic, cell.origin)
 
@@ -238,16 +185,29 @@ def _position(
     )
 
 
-def _refuse_far(path: Path, position: FloatArray, cell: Cell | None, where: str) -> None:
-    """An error if rounding would be all that is left of a position once it is in the cell."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        if cell is None or lies_within(cell, position, -MOST_TURNS, MOST_TURNS):
+@np.errstate(over="ignore", invalid="ignore")
+def _refuse_far(
+    path: Path, position: FloatArray, radius: FloatArray, cell: Cell | None, where: str
+) -> None:
+    """ReadError if a grain is so far away that rounding leaves nothing of its place or size."""
+    if cell is not None:
+        if lies_within(cell, position, -MOST_TURNS, MOST_TURNS):
             return
         turns = np.abs(cell.fractional(position[np.isfinite(position).all(axis=1)]))
-    if np.any(turns > MOST_TURNS):
+        if np.any(turns > MOST_TURNS):
+            raise ReadError(
+                f"{path}{where}: a grain is {turns.max():g} cells away from the cell: has the cell "
+                f"the unit of the coordinates?"
+            )
+        return
+    place = np.abs(position).max(axis=1)
+    if len(radius) < FEW or not np.all(np.isfinite(place)):
+        return
+    row = int(np.argmax(place))
+    if place[row] > FAR * max(radius.max(), np.median(place)):
         raise ReadError(
-            f"{path}{where}: a grain is {turns.max():g} cells away from the cell: has the cell the "
-            f"unit of the coordinates?"
+            f"{path}{where}: grain {row + 1} has a coordinate of {place[row]:g}, {FAR:g} times as "
+            f"far as other grains: is the number damaged?"
         )
 
 

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from scanfab.base.errors import ReadError, SettingsError
-from scanfab.io.formats.columns import (
+from scanfab.io.columns import (
     grain_table,
     has_radius,
-    room_for_columns,
     user_cell,
 )
 from scanfab.io.reader import ReadOptions
@@ -64,14 +63,6 @@ def test_a_column_may_be_called_position():
     found = table({**columns(), "position": RADIUS})
     np.testing.assert_array_equal(found.position, POSITION)
     np.testing.assert_array_equal(found.columns["position"], RADIUS)
-
-
-@pytest.mark.parametrize("own", ["position", "place"])
-def test_room_is_made_for_all_columns_whatever_they_are_called(own):
-    names = ["id", "x", "y", "z", "radius", own]
-    filled, ready = room_for_columns(ReadOptions(), names, 2)
-    assert set(filled) == {"id", "x", "y", "z", "radius"}
-    assert own not in ready
 
 
 def test_a_column_of_vectors_is_a_position():

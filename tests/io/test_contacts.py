@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scanfab.base.errors import ReadError
-from scanfab.io.formats.join import join_ids, join_positions, rows_of_ids
+from scanfab.io.contacts import join_ids, join_positions, rows_of_ids
 from scanfab.io.reader import GrainTable
 from scanfab.packing.cell import Cell
 

@@ -1,14 +1,16 @@
-"""Contacts to rows of the grain table: by ids, or by the positions of both centres."""
+"""Contact lists joined to rows of the grain table: by ids, or by the centres of both grains."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.errors import ReadError
+from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.base.lengths import MOST
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.reader import GrainTable, JoinedContacts
@@ -16,6 +18,10 @@ from scanfab.packing.contacts import ContactList
 
 # an end of a contact within this fraction of a radius from a centre belongs to that grain
 SAME_PLACE = 0.01
+# two grains are neighbours if their distance is below (r1 + r2) times this
+NEAR = 1.1
+# a rule that holds for this share of all contacts holds
+NEARLY_ALL = 0.9
 
 
 def rows_of_ids(grains: GrainTable, ids: npt.ArrayLike) -> IntArray:
@@ -35,7 +41,7 @@ def join_ids(
     ids: IntArray,
     force: FloatArray | None,
     *,
-    walls: bool,
+    walls: bool | Literal["unknown"],
     image: IntArray | None = None,
     force_n: FloatArray | None = None,
 ) -> JoinedContacts:
@@ -52,8 +58,8 @@ def join_ids(
         As the file names them.
     force : ndarray, shape (M, 3), optional
         Force on the second grain.
-    walls : bool
-        Whether one of the two ids may be a wall's, which is no grain.
+    walls : bool or "unknown"
+        Whether an id that no grain has is a wall's. ``unknown``: probably; a warning counts them.
     image : ndarray of int, shape (M, 3), optional
         Lattice translation of the second grain, from the positions of the table.
     force_n : ndarray, shape (M,) or (M, 3), optional
@@ -126,7 +132,7 @@ def join_positions(
 
 def _refuse_images(path: Path, grains: GrainTable, rows: IntArray, ends: FloatArray) -> None:
     """
-    Ends at periodic images of grains are no walls.
+    ReadError if ends without a grain are periodic images of grains, and no ends at walls.
 
     An image has two coordinates in common with its grain (in a cell that is not tilted), and lies
     at the distance of a contact; a wall's reference point does so by chance at most.
@@ -137,17 +143,15 @@ def _refuse_images(path: Path, grains: GrainTable, rows: IntArray, ends: FloatAr
     if len(one) == 0 or len(grains.radius) < 2:
         return
     lost = np.argmax(rows[one] < 0, axis=1)
-    partner = rows[one, 1 - lost]
-    point = ends[one, lost]
-    length = np.linalg.norm(point - ends[one, 1 - lost], axis=1)
-    near = SAME_PLACE * float(grains.radius.min())
+    partner, point = rows[one, 1 - lost], ends[one, lost]
+    length = np.linalg.norm(point - ends[one, 1 - lost], axis=1)[:, None]
     image = np.zeros(len(one), dtype=bool)
     for two in ([0, 1], [0, 2], [1, 2]):
-        distance, nearest = KDTree(grains.position[:, two]).query(point[:, two], k=2)
-        for k in range(2):
-            reach = grains.radius[partner] + grains.radius[nearest[:, k]]
-            other = (nearest[:, k] != partner) & (distance[:, k] < near)
-            image |= other & (length > 0.5 * reach) & (length < 1.05 * reach)
+        distance, other = KDTree(grains.position[:, two]).query(point[:, two], k=2)
+        reach = grains.radius[partner][:, None] + grains.radius[other]
+        is_same = distance < SAME_PLACE * float(grains.radius.min())
+        is_contact = (length > 0.5 * reach) & (length < 1.05 * reach)
+        image |= np.any(is_same & is_contact & (other != partner[:, None]), axis=1)
     if image.sum() > 0.5 * len(one):
         raise ReadError(
             f"{path}: {image.sum()} contacts end at periodic images of grains, but the sample has "
@@ -180,7 +184,7 @@ def _grains_at(grains: GrainTable, points: FloatArray) -> IntArray:
 def _join(
     path: Path,
     listed: ContactList,
-    walls: bool,
+    walls: bool | Literal["unknown"],
     describe: Callable[[int, int], str],
     count: int,
 ) -> JoinedContacts:
@@ -197,10 +201,89 @@ def _join(
             f"the same step? A periodic sample also needs its cell (`cell`)"
         )
     both = ~unknown.any(axis=1)
-    with_wall = rows[~both].max(axis=1)
+    if walls == "unknown" and not both.all():
+        first = int(np.argmin(both))
+        warnings.warn(
+            f"{path}: {np.count_nonzero(~both)} of {len(rows)} contacts name a grain that is not "
+            f"in the grain file and are counted as contacts with walls: contact {first + 1} "
+            f"{describe(first, int(np.argmax(unknown[first])))}",
+            ScanfabWarning,
+            stacklevel=4,
+        )
     image, force, force_n = (
         None if values is None else np.asarray(values)[both]
         for values in (listed.image, listed.force, listed.force_n)
     )
     kept = ContactList(rows[both], image, force, force_n=force_n)
-    return JoinedContacts(kept, count_walls(with_wall, count))
+    return JoinedContacts(kept, count_walls(rows[~both].max(axis=1), count))
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def branches(grains: GrainTable, rows: IntArray) -> FloatArray:
+    """From the first to the second grain of each pair, to the nearest image."""
+    branch: FloatArray = grains.position[rows[:, 1]] - grains.position[rows[:, 0]]
+    if grains.cell is not None and grains.cell.is_periodic and np.all(np.isfinite(branch)):
+        branch = branch + grains.cell.nearest_image(branch) @ grains.cell.vectors
+    return branch
+
+
+def row_base(grains: GrainTable, ids: IntArray) -> int | None:
+    """
+    Whether contacts number the rows of grains from 0 or from 1; None if that cannot be told.
+
+    By the pairs, which are neighbours under one of both numberings only.
+    """
+    fits = []
+    for base in (0, 1):
+        rows = ids - base
+        if rows.min(initial=0) >= 0 and rows.max(initial=0) < len(grains.radius):
+            length = np.linalg.norm(branches(grains, rows), axis=1)
+            if np.mean(length < NEAR * grains.radius[rows].sum(axis=1)) > NEARLY_ALL:
+                fits.append(base)
+    return fits[0] if len(fits) == 1 else None
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def proved_force(
+    path: Path, grains: GrainTable, rows: IntArray, force: FloatArray, cure: str = ""
+) -> FloatArray | None:
+    """
+    The force on the second grain: the sign by which nearly all forces push the grains apart.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    grains : GrainTable
+        Of the same step.
+    rows : ndarray, shape (M, 2)
+        Both grains of each contact.
+    force : ndarray, shape (M, 3)
+        On one of both, the same for all contacts.
+    cure : str, optional
+        What the user can do where that cannot be told, for the warning.
+
+    Returns
+    -------
+    ndarray, shape (M, 3), or None
+        None, with a warning, where the forces speak for neither.
+    """
+    along = np.sum(branches(grains, rows) * force, axis=1)
+    along = along[along != 0]
+    share = float(np.mean(along > 0)) if len(along) else 1.0
+    if 1 - NEARLY_ALL < share < NEARLY_ALL:
+        warnings.warn(
+            f"{path}: the forces are left out: {share:.0%} of them push the second grain off the "
+            f"first, so it cannot be told on which of both they act{cure}",
+            ScanfabWarning,
+            stacklevel=2,
+        )
+        return None
+    on_second = share >= NEARLY_ALL
+    warnings.warn(
+        f"the forces act on the {'second' if on_second else 'first'} grain of each "
+        f"contact, since they push the grains apart",
+        ScanfabNote,
+        stacklevel=2,
+    )
+    return force if on_second else -force
