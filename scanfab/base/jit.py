@@ -1,15 +1,33 @@
-"""How kernels are compiled: without the interpreter's lock, and kept on disk."""
+"""
+How kernels are compiled: without the interpreter's lock, and kept on disk for later runs.
+
+Numba's own cache trusts its files: it stops at one that is cut, and runs code with a wrong byte. It
+also looks at the file of a kernel only, and does not see that another file, with a kernel that this
+one calls, has changed. So each compiled form has a file of its own here, with a checksum, in a
+folder that is named by a hash of all kernels.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import os
+import pickle
+import sys
 from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
 from typing import Any, Literal, TypeVar
 
+import llvmlite
 import numba
 import numpy as np
 from llvmlite.binding import get_host_cpu_name
+from numba.core.caching import NullCache
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
 
-from scanfab.base.kernel_cache import cache_of
+from scanfab.base.files import make_private, user_folder, whole_file
 
 # numbers that the compiler's vector instructions take at a time: 256 bits of them, also on
 # processors that have wider ones, but for these
@@ -30,6 +48,11 @@ Flag = Literal[True] | None
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
+# bytes of a checksum
+DIGEST_SIZE = 32
+# called before the next kernel is compiled
+_announcements: list[Callable[[], object]] = []
+
 
 def kernel(function: Function) -> Function:
     """Compile a function that is called from Python."""
@@ -47,8 +70,80 @@ def inner(**options: Any) -> Callable[[Function], Function]:
     return lambda function: _kept(compile_it(function), function)
 
 
+def when_compiling(tell: Callable[[], object]) -> None:
+    """Call a function when a kernel is next compiled rather than found; from any thread."""
+    _announcements[:] = [tell]
+
+
+def kernel_files() -> list[Path]:
+    """The files of all kernels, and this one, which says how they are compiled."""
+    package = Path(__file__).parents[1]
+    return sorted([Path(__file__), *package.glob("*/kernels.py"), *package.glob("*/kernels/*.py")])
+
+
+@cache
+def kernel_folder() -> tuple[Path | None, str]:
+    """The folder of compiled kernels, made if it can be, and why nothing is kept in it."""
+    given = os.environ.get("NUMBA_CACHE_DIR")
+    base = Path(given) if given else user_folder()
+    if base is None:
+        return None, "there is no home folder"
+    sources = hashlib.sha256(f"{sys.version} {llvmlite.__version__}".encode())
+    for file in kernel_files():
+        sources.update(file.read_bytes())
+    folder = base / f"numba-{numba.__version__}-{sources.hexdigest()[:16]}"
+    try:
+        make_private(folder)
+        state = folder.stat()
+    except OSError as error:
+        return None, f"{error.filename}: {error.strerror}"
+    # the files are code that will be run: only the user and the system may write them
+    if os.name == "posix" and (state.st_uid not in (0, os.getuid()) or state.st_mode & 0o022):
+        return None, f"{folder} is not yours, or others can write to it (chmod go-w)"
+    return folder, "" if os.access(folder, os.W_OK) else f"{folder} cannot be written to"
+
+
+class _Cache(NullCache):
+    """The compiled forms of one function, as Numba asks for them and hands them over."""
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self.name = f"{function.__module__}.{function.__qualname__}"
+
+    def _file(self, sig: Any, codegen: Any) -> Path:
+        """Of the form for these types of arguments and this processor."""
+        folder, problem = kernel_folder()
+        if folder is None:
+            raise OSError(problem)
+        form = hashlib.sha256(repr((tuple(sig), codegen.magic_tuple())).encode()).hexdigest()
+        return folder / f"{self.name}-{form[:32]}.nbc"
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        with suppress(OSError):
+            file = self._file(sig, target_context.codegen())
+            stored = file.read_bytes()
+            content = stored[DIGEST_SIZE:]
+            if stored == _signed(file.name, content):
+                target_context.refresh()
+                return CompileResult._rebuild(target_context, *pickle.loads(content))  # type: ignore[no-untyped-call]
+        while _announcements:
+            _announcements.pop()()
+        return None
+
+    def save_overload(self, sig: Any, cres: Any) -> None:
+        with suppress(OSError):  # the disk may be full
+            file = self._file(sig, cres.codegen)
+            content = dumps(cres._reduce())  # type: ignore[no-untyped-call]
+            with whole_file(file) as part:
+                part.write_bytes(_signed(file.name, content))
+
+
+def _signed(name: str, content: bytes) -> bytes:
+    """The content of a file behind a checksum."""
+    return hashlib.sha256(name.encode() + content).digest() + content
+
+
 def _kept(compiled: Any, function: Function) -> Function:
     if compiled is not function:  # else Numba is switched off
-        compiled._cache = cache_of(function)
+        compiled._cache = _Cache(function)
     same: Function = compiled
     return same

@@ -82,7 +82,7 @@ def is_readable() -> bool:
 
 def announce_compiling() -> None:
     """A line on standard error if something has to be compiled first."""
-    from scanfab.base.kernel_cache import kernel_folder, when_compiling
+    from scanfab.base.jit import kernel_folder, when_compiling
 
     _, problem = kernel_folder()
     kept = f"it cannot be kept: {problem}" if problem else "it is kept for later runs"
