@@ -25,10 +25,10 @@ if TYPE_CHECKING:
     from scanfab.fabric.tensor import FabricTensor
     from scanfab.fabric.void import VoidFabric, void_fabric
     from scanfab.io.convert import convert
-    from scanfab.io.following import follow_series
+    from scanfab.io.follow import follow_series
     from scanfab.io.frame import Frame
-    from scanfab.io.opening import read, read_series
     from scanfab.io.series import Series
+    from scanfab.io.sources import read, read_series
     from scanfab.packing.cell import Cell
     from scanfab.packing.contacts import ContactList, Contacts
     from scanfab.packing.packing import Packing
@@ -102,14 +102,14 @@ _HOME = {
     "ellipsoid": "base.shapes",
     "fabric_map": "pipeline.maps.fabric_map",
     "find_contacts": "packing.search",
-    "follow_series": "io.following",
+    "follow_series": "io.follow",
     "load": "table.table",
     "make_report": "viz.report.report",
     "merge_tables": "pipeline.cluster.merging",
     "polyhedron": "base.shapes",
-    "read": "io.opening",
+    "read": "io.sources",
     "read_rows": "table.reading",
-    "read_series": "io.opening",
+    "read_series": "io.sources",
     "samples": "pipeline.samples",
     "scan_frames": "viz.scanned_frames",
     "scan_lines": "scan.scan",

@@ -18,7 +18,7 @@ from scanfab.cli.talk import tell_inputs, working
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from scanfab.io.following import FollowedSeries
+    from scanfab.io.follow import FollowedSeries
     from scanfab.io.series import Series
     from scanfab.pipeline.job import Job
     from scanfab.pipeline.settings import Settings

@@ -12,7 +12,7 @@ from scanfab.cli.options import usage_errors, write_groups
 from scanfab.io.options import take_reading
 
 if TYPE_CHECKING:
-    from scanfab.io.following import FollowedSeries
+    from scanfab.io.follow import FollowedSeries
     from scanfab.io.series import Series
 
 
@@ -54,7 +54,7 @@ def follow_one(
     sources: tuple[str, ...], reading: dict[str, Any], seconds: float | None
 ) -> FollowedSeries:
     """The series of a command line that is still being written."""
-    from scanfab.io.following import follow_series
+    from scanfab.io.follow import follow_series
 
     if len(sources) > 1 or "-" in sources:
         raise click.UsageError("--follow takes one folder, or one file that grows")
@@ -69,7 +69,7 @@ def open_series(sources: tuple[str, ...], reading: dict[str, Any]) -> list[Serie
 
     from scanfab.base.errors import ReadError
     from scanfab.io.files import temporary_copy
-    from scanfab.io.opening import open_sources, read_series
+    from scanfab.io.sources import open_sources, read_series
 
     if "-" not in sources:
         return open_sources(sources, **reading)

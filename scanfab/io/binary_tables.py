@@ -17,8 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError, ScanfabNote, ScanfabWarning
-from scanfab.io.files import bare_name, check_memory, plain
-from scanfab.io.unpacking import check_times
+from scanfab.io.files import bare_name, check_memory, check_times, plain
 from scanfab.packing.cell import Cell
 
 Arrays = dict[str, npt.NDArray[Any]]

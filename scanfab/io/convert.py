@@ -15,12 +15,11 @@ from scanfab.base.files import check_folder, whole_file
 from scanfab.base.option import refuse_unknown
 from scanfab.io import beside
 from scanfab.io.families import names_a_step
-from scanfab.io.files import bare_name
-from scanfab.io.opening import READING, read_series
+from scanfab.io.files import COMPRESSED_SUFFIXES, bare_name
 from scanfab.io.options import parse_frames
 from scanfab.io.registry import installed_readers
 from scanfab.io.series import Series
-from scanfab.io.unpacking import COMPRESSED_SUFFIXES
+from scanfab.io.sources import READING, read_series
 from scanfab.io.writer import Writer, installed_writers, writer_for, writer_named
 from scanfab.packing.packing import Packing
 

@@ -1,56 +1,76 @@
-"""Files as readers want them: plain, whatever they are packed with."""
+"""One file: opened, decompressed, told from others, and what it may take of disk and memory."""
 
 from __future__ import annotations
 
-import math
+import lzma
 import os
 import re
 import shutil
+import sys
 import tempfile
+import zlib
 from collections import OrderedDict
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from importlib import import_module
 from pathlib import Path
 from threading import Lock, get_ident
-from typing import IO, Any
+from types import ModuleType
+from typing import Any, Protocol
 
 from scanfab.base.ending import at_end
 from scanfab.base.errors import ReadError
 from scanfab.base.memory import free_memory
 from scanfab.base.streams import check_file
-from scanfab.io.unpacking import (
-    COMPRESSED_SUFFIXES,
-    MAGIC_BYTES,
-    Readable,
-    bounded,
-    opener_for,
-    unpacking_errors,
-    unpacking_up_to,
-)
 
-# decompressed copies of the files used last, for each thread that reads: a frame needs few
+COMPRESSED_SUFFIXES = (".gz", ".bz2", ".xz", ".zst", ".lz4")
+# part of Python since 3.14
+ZSTD = "compression.zstd" if sys.version_info >= (3, 14) else "backports.zstd"
+DECOMPRESSORS = {
+    b"\x1f\x8b": "gzip",
+    b"BZh": "bz2",
+    b"\xfd7zXZ\x00": "lzma",
+    b"\x28\xb5\x2f\xfd": ZSTD,
+    b"\x50\x2a\x4d\x18": ZSTD,  # a frame to skip, with which pzstd begins
+    b"\x04\x22\x4d\x18": "lz4.frame",
+}
+"""The module that opens a file, by the first bytes of the file."""
+MAGIC_BYTES = max(map(len, DECOMPRESSORS))
+# how many times its compressed size a file may grow to, and bytes that any file may grow to
+MOST_TIMES = 1000.0
+ANYWAY = 64 << 20
+# bytes of a line of text
+LONGEST_LINE = 16 << 20
+# decompressed copies that are kept for each thread that reads: a frame needs few
 KEPT = 4
-# bytes that are copied at a time, and those that are left to other programs
+# bytes that are copied at a time
 PART = 4 << 20
-RESERVE = 1 << 30
-# a copy up to this size is no reason to ask how full the disk is
-SMALL = 64 << 20
-# of the folder that holds the copies of a process
+# bytes that a copy leaves free on the disk, and bytes of a copy that need not leave them
+RESERVE, SMALL = 1 << 30, 64 << 20
+# of the name of the folder that holds the copies of a process
 PREFIX = "scanfab-"
 Stamp = tuple[str, int, int, int]
-"""What tells a file from others, and from itself when it was changed."""
+"""What tells a file from others, and from itself after it was changed."""
+_times: ContextVar[float | None] = ContextVar("times", default=None)
 _copies: OrderedDict[Stamp, Path] = OrderedDict()
-# files that were unpacked once, and whose copies may have been removed since
-_sound: set[Stamp] = set()
 _threads: set[int] = set()
 _lock = Lock()
 _folder: list[str] = []
 
 
+class Readable(Protocol):
+    """What can be read piece by piece."""
+
+    def read(self, size: int, /) -> bytes:
+        """So many bytes, or fewer; none at the end."""
+        ...
+
+
 def _forget_copies() -> None:
-    """A forked process has no copies: those that it knows are its parent's, who needs them."""
+    """Forget the copies in a forked process: they belong to its parent, which still needs them."""
     global _lock
-    _lock = Lock()  # a thread of the parent's may hold the other
+    _lock = Lock()  # a thread of the parent may hold the other
     _copies.clear()
     _threads.clear()
     _folder.clear()
@@ -65,30 +85,24 @@ def bare_name(path: Path) -> str:
     return path.stem if path.suffix in COMPRESSED_SUFFIXES else path.name
 
 
-def first_bytes(path: Path, count: int = 4096) -> bytes:
-    """The first bytes of the decompressed file; ReadError if it cannot be opened."""
-    head = _head(path, max(count, MAGIC_BYTES))
-    opener = opener_for(head)
-    if opener is open:
-        return head[:count]
-    try:
-        with opener(path, "rb") as stream:
-            unpacked: bytes = stream.read(count)
-            return unpacked
-    except unpacking_errors(opener) as error:
-        raise ReadError(f"{path}: cannot be read: {_reason(error)}") from None
-
-
 def stamp_of(path: Path) -> Stamp:
     """Place, number, size and time of change; a relative path may come to mean another file."""
     status = path.stat()
     return os.path.abspath(path), status.st_ino, status.st_size, status.st_mtime_ns
 
 
+def first_bytes(path: Path, count: int = 4096) -> bytes:
+    """The first bytes of the decompressed file; ReadError if it cannot be opened."""
+    head = _head(path, max(count, MAGIC_BYTES))
+    if _decompressor(head) is None:
+        return head[:count]
+    with unpacked(path) as stream:
+        return stream.read(count)
+
+
 def plain(path: Path) -> Path:
     """The file itself, or a decompressed temporary copy that keeps its bare name."""
-    opener = _opener(path)
-    if opener is open:
+    if _decompressor(_head(path, MAGIC_BYTES)) is None:
         return path
     key = stamp_of(path)
     with _lock:
@@ -96,9 +110,8 @@ def plain(path: Path) -> Path:
         if key in _copies:
             _copies.move_to_end(key)
             return _copies[key]
-    with unpacking_up_to(math.inf if key in _sound else None), unpacked(path) as stream:
+    with unpacked(path) as stream:
         copy = temporary_copy(stream, bare_name(path))
-    _sound.add(key)
     with _lock:
         _copies[key] = copy
         surplus = max(len(_copies) - KEPT * len(_threads), 0)
@@ -110,14 +123,87 @@ def plain(path: Path) -> Path:
 
 @contextmanager
 def unpacked(path: Path) -> Iterator[Readable]:
-    """The content of a file, as a stream; ReadError if it cannot be read or decompressed."""
-    opener = _opener(path)
+    """The decompressed content of a file, as a stream that raises nothing but ReadError."""
+    module = _decompressor(_head(path, MAGIC_BYTES))
+    opener = open if module is None else module.open
+    with _read_errors(path, module):
+        file = opener(path, "rb")
+    with file:
+        yield _Unpacked(path, file, module)
+
+
+class _Unpacked:
+    """A stream of decompressed bytes, which ends in a ReadError where there are far too many."""
+
+    def __init__(self, path: Path, stream: Readable, module: ModuleType | None) -> None:
+        self._path, self._stream, self._module = path, stream, module
+        self._packed, self._unpacked = path.stat().st_size, 0
+
+    def read(self, size: int, /) -> bytes:
+        with _read_errors(self._path, self._module):
+            part = self._stream.read(size)
+        self._unpacked += len(part)
+        check_times(self._path, self._packed, self._unpacked)
+        return part
+
+
+@contextmanager
+def unpacking_up_to(times: float | None) -> Iterator[None]:
+    """
+    Inside the block, let files grow to so many times their size, and lines have any length.
+
+    None changes nothing.
+    """
+    token = _times.set(_times.get() if times is None else times)
     try:
-        with opener(path, "rb") as stream:
-            yield stream if opener is open else bounded(path, stream, path.stat().st_size)
-    except unpacking_errors(opener) as error:
-        verb = "read" if opener is open else "decompressed"
-        raise ReadError(f"{path}: cannot be {verb}: {_reason(error)}") from None
+        yield
+    finally:
+        _times.reset(token)
+
+
+def check_times(path: Path, packed: int, unpacked: float) -> None:
+    """ReadError if a file would unpack to far more than one so small can hold."""
+    times = _times.get() or MOST_TIMES
+    if unpacked > max(ANYWAY, times * packed):
+        raise ReadError(
+            f"{path}: its {packed:,} bytes unpack to more than {times:g} times as many, expected "
+            f"no dump that is so empty: if it is one, allow more with `max_unpacked`"
+        )
+
+
+def check_lines(path: Path, plain: Path) -> None:
+    """
+    ReadError if a line of a text is longer than any table has them.
+
+    Parameters
+    ----------
+    path, plain : Path
+        As users know the file, and the same decompressed.
+    """
+    if _times.get() is not None:
+        return
+    with open(plain, "rb") as stream:
+        size, begin = stream.seek(0, 2), 0
+        while begin + LONGEST_LINE < size:
+            stream.seek(begin)
+            ends = stream.read(LONGEST_LINE).rfind(b"\n") + 1
+            if not ends:
+                raise ReadError(
+                    f"{path}: a line is longer than {LONGEST_LINE >> 20} MiB (it begins at byte "
+                    f"{begin:,}), expected rows of a table: if it is one, allow it with "
+                    f"`max_unpacked`"
+                )
+            begin += ends
+
+
+def check_memory(path: Path, needed: float) -> None:
+    """ReadError if there are not so many bytes for what a file holds."""
+    free = free_memory()
+    if needed > free:
+        raise ReadError(
+            f"{path}: needs about {needed / 1e9:.1f} GB of memory to be read, and "
+            f"{free / 1e9:.1f} GB are free"
+        )
 
 
 def file_inside(index: Path, name: str) -> Path:
@@ -143,39 +229,41 @@ def file_inside(index: Path, name: str) -> Path:
     return path
 
 
-def check_memory(path: Path, needed: float) -> None:
-    """ReadError if there are not so many bytes for what a file holds."""
-    free = free_memory()
-    if needed > free:
-        raise ReadError(
-            f"{path}: needs about {needed / 1e9:.1f} GB of memory to be read, and "
-            f"{free / 1e9:.1f} GB are free"
-        )
-
-
 def temporary_copy(stream: Readable, name: str) -> Path:
     """
-    What a stream holds, as a file that goes with the process.
+    What a stream holds, as a file that is deleted at the end of the process.
 
     Raises
     ------
     ReadError
         If it would fill the disk: a few bytes can be decompressed to any number.
     """
-    copy = _new_folder(name) / name
+    folder = ""
     try:
-        with _of_copy(name):
-            file = open(copy, "wb", buffering=0)  # noqa: SIM115
-        with file:
-            size = 0
+        if not _folder:
+            _folder.append(tempfile.mkdtemp(prefix=PREFIX))
+            at_end(_remove_copies)
+        folder = tempfile.mkdtemp(dir=_folder[0])
+        copy, size = Path(folder) / name, 0
+        with open(copy, "wb") as file:
             while part := stream.read(PART):
-                _check_disk(copy, size)
-                _write(copy, file, part)
-                size += len(part)
-    except BaseException:
-        shutil.rmtree(copy.parent, ignore_errors=True)
+                size += file.write(part)
+                disk = shutil.disk_usage(folder)
+                if size > SMALL and disk.free < min(RESERVE, disk.total // 20):
+                    raise ReadError(
+                        f"{name}: its content fills the disk of {_temporary()}, with {size:,} "
+                        f"bytes so far: make room, or name another folder for temporary files by "
+                        f"TMPDIR"
+                    )
+        return copy
+    except BaseException as error:
+        shutil.rmtree(folder, ignore_errors=True)
+        if isinstance(error, OSError):
+            raise ReadError(
+                f"{name}: its content cannot be written to {_temporary()}: {_reason(error)}: name "
+                f"another folder for temporary files by TMPDIR"
+            ) from None
         raise
-    return copy
 
 
 def without_temporary(text: str) -> str:
@@ -191,46 +279,6 @@ def without_temporary(text: str) -> str:
     """
     folder = re.escape(os.path.join(_temporary(), PREFIX))
     return re.sub(rf"{folder}\w+[/\\]tmp\w+[/\\]", "", text)
-
-
-def _new_folder(name: str) -> Path:
-    """An empty folder for the copy of this name."""
-    with _of_copy(name):
-        if not _folder:
-            _folder.append(tempfile.mkdtemp(prefix=PREFIX))
-            at_end(_remove_copies)
-        return Path(tempfile.mkdtemp(dir=_folder[0]))
-
-
-def _check_disk(copy: Path, size: int) -> None:
-    if size < SMALL:
-        return
-    with _of_copy(copy.name):
-        disk = shutil.disk_usage(copy.parent)
-    if disk.free < min(RESERVE, disk.total // 20) + PART:
-        raise ReadError(
-            f"{copy.name}: its content fills the disk of {tempfile.gettempdir()}, with {size:,} "
-            f"bytes so far: make room, or name another folder for temporary files by TMPDIR"
-        )
-
-
-def _write(copy: Path, file: IO[bytes], part: bytes) -> None:
-    with _of_copy(copy.name):
-        left = memoryview(part)
-        while left:
-            left = left[file.write(left) :]
-
-
-@contextmanager
-def _of_copy(name: str) -> Iterator[None]:
-    """Let errors of the system be those of the copy: the file that is read is as it should be."""
-    try:
-        yield
-    except OSError as error:
-        raise ReadError(
-            f"{name}: its content cannot be written to {_temporary()}: {_reason(error)}: name "
-            f"another folder for temporary files by TMPDIR"
-        ) from None
 
 
 def _temporary() -> str:
@@ -251,18 +299,28 @@ def _remove_copies() -> None:
         shutil.rmtree(last, ignore_errors=True)
 
 
-def _opener(path: Path) -> Callable[..., Any]:
-    return opener_for(_head(path, MAGIC_BYTES))
+def _decompressor(head: bytes) -> Any:
+    """The module that opens a file that begins with these bytes; None if it is not compressed."""
+    name = next((one for key, one in DECOMPRESSORS.items() if head.startswith(key)), None)
+    return None if name is None else import_module(name)
 
 
 def _head(path: Path, count: int) -> bytes:
     """The first bytes as they stand there."""
     check_file(path)
+    with _read_errors(path, None), open(path, "rb") as stream:
+        return stream.read(count)
+
+
+@contextmanager
+def _read_errors(path: Path, module: ModuleType | None) -> Iterator[None]:
+    """Turn what can go wrong when a file is opened or decompressed into ReadError."""
+    zstd_error = getattr(module, "ZstdError", OSError)
     try:
-        with open(path, "rb") as stream:
-            return stream.read(count)
-    except OSError as error:
-        raise ReadError(f"{path}: cannot be read: {_reason(error)}") from None
+        yield
+    except (OSError, EOFError, RuntimeError, zlib.error, lzma.LZMAError, zstd_error) as error:
+        verb = "read" if module is None else "decompressed"
+        raise ReadError(f"{path}: cannot be {verb}: {_reason(error)}") from None
 
 
 def _reason(error: Exception) -> str:

@@ -22,6 +22,7 @@ from scanfab.io.beside import (
 )
 from scanfab.io.bodies import body_numbers
 from scanfab.io.families import Family, nearest
+from scanfab.io.files import unpacking_up_to
 from scanfab.io.reader import (
     Carries,
     GrainTable,
@@ -30,7 +31,6 @@ from scanfab.io.reader import (
     ReadOptions,
     Snapshot,
 )
-from scanfab.io.unpacking import unpacking_up_to
 from scanfab.packing.packing import Packing, check_lengths
 from scanfab.packing.walls import ListedWallForces
 

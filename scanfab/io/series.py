@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import chain, islice
@@ -17,17 +17,17 @@ from scanfab.base.typing import FloatArray
 from scanfab.io.beside import columns_file, frame_file, read_frame
 from scanfab.io.dimension import decided_space, refuse_other_space
 from scanfab.io.families import Family
+from scanfab.io.files import unpacking_up_to
 from scanfab.io.frame import Frame
 from scanfab.io.frame_csv import FrameFile
-from scanfab.io.kept_index import snapshots_of
-from scanfab.io.moments import of_moment
 from scanfab.io.reader import ReadOptions, Snapshot
-from scanfab.io.unpacking import unpacking_up_to
 
 # size and time of a file, which change with its content; None if nobody can tell
 _Stamp = tuple[int, int] | None
 # more frames than there can be: the end of frames that nobody has counted
 ENDLESS = 2**62
+# relative difference of two times that are the same: programs write them with six digits or more
+ROUNDING = 2e-6
 
 ContactsFrom = Literal["auto", "beside", "geometric", "path", "grains"]
 """
@@ -254,7 +254,7 @@ class Series:
         problem: ReadError | None = None
         try:
             with unpacking_up_to(self.options.max_unpacked):
-                snapshots = snapshots_of(self.grains.reader, path)
+                snapshots = self.grains.reader.snapshots(path)
             if len(snapshots) == 1 and (told := read_frame(path)) is not None:
                 snapshots = [told.moment_of(snapshots[0])]
         except ReadError as error:
@@ -310,10 +310,10 @@ class Series:
         if path not in self._contact_snapshots:
             assert family.reader is not None
             with unpacking_up_to(self.options.max_unpacked):
-                self._contact_snapshots[path] = snapshots_of(family.reader, path)
+                self._contact_snapshots[path] = family.reader.snapshots(path)
         numbered = None not in family.files and step is not None
         sure = named or not numbered or bool({name_step, step} & set(family.files))
-        return of_moment(self._contact_snapshots[path], grains, sure)
+        return _of_moment(self._contact_snapshots[path], grains, sure)
 
     def beside(self, path: Path) -> list[Path]:
         """
@@ -395,3 +395,20 @@ def _stamp(path: Path) -> _Stamp:
     with suppress(OSError):
         return (found := path.stat()).st_size, found.st_mtime_ns
     return None
+
+
+def _of_moment(snapshots: Sequence[Snapshot], grains: Snapshot, sure: bool) -> Snapshot | None:
+    """
+    The snapshot of contacts at the step of some grains, or at their time where there are no steps.
+
+    A single snapshot needs neither if it is ``sure`` by the names that the files belong together.
+    """
+    timed = [(one.time, one) for one in snapshots if one.step is None and one.time is not None]
+    if grains.step is None and grains.time is not None and timed:
+        wanted = grains.time
+        time, nearest = min(timed, key=lambda pair: abs(pair[0] - wanted))
+        return nearest if abs(time - wanted) <= ROUNDING * abs(wanted) else None
+    if len(snapshots) == 1 and None in (snapshots[0].step, grains.step):
+        return snapshots[0] if sure else None
+    same = [one for one in snapshots if one.step is not None and one.step == grains.step]
+    return same[0] if same else None

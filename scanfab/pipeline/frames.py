@@ -15,7 +15,7 @@ from scanfab.base.errors import (
     SettingsError,
 )
 from scanfab.base.note import SKIPPED, Note, tell
-from scanfab.io.following import FollowedSeries
+from scanfab.io.follow import FollowedSeries
 from scanfab.io.reader import Carries
 from scanfab.io.series import ENDLESS, Series
 from scanfab.packing.boundary import enclosing_class, existing_values

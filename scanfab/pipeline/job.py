@@ -12,7 +12,7 @@ from typing import Any
 
 from scanfab.base.errors import ReadError, ScanfabNote, SettingsError
 from scanfab.base.files import check_folder
-from scanfab.io.following import FollowedSeries
+from scanfab.io.follow import FollowedSeries
 from scanfab.io.series import Series
 from scanfab.pipeline.compute import Observer, compute_rows
 from scanfab.pipeline.frames import NoChosenFrameError, chosen_frames

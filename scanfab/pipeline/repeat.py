@@ -11,9 +11,9 @@ from typing import Any
 from scanfab.base.errors import ReadError, SettingsError
 from scanfab.base.option import flag_of
 from scanfab.base.spelling import shortest
-from scanfab.io.opening import READING, open_sources
 from scanfab.io.options import READING_OPTIONS
 from scanfab.io.series import Series
+from scanfab.io.sources import READING, open_sources
 from scanfab.pipeline.manifest import asked_for
 from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings, is_map
 from scanfab.pipeline.settings import Settings

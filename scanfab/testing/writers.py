@@ -8,7 +8,7 @@ from pathlib import Path
 
 from scanfab.base.errors import ScanfabNote
 from scanfab.io.convert import save_packing
-from scanfab.io.opening import read
+from scanfab.io.sources import read
 from scanfab.io.writer import Writer
 from scanfab.testing.packings import differences, made_up_packings
 

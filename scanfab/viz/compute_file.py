@@ -12,9 +12,9 @@ from scanfab.base.column import DEFAULT_DIGITS
 from scanfab.base.errors import SettingsError
 from scanfab.base.option import options_of, refuse_unknown
 from scanfab.io.grain_files import PathLike, expanded
-from scanfab.io.opening import READING, open_sources
 from scanfab.io.options import take_reading
 from scanfab.io.series import Series
+from scanfab.io.sources import READING, open_sources
 from scanfab.pipeline.frames import of_whole
 from scanfab.pipeline.job import Job
 from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings, is_map

@@ -14,7 +14,7 @@ import pytest
 from PIL import Image
 
 from scanfab.cli.main import run
-from scanfab.io.opening import read_series
+from scanfab.io.sources import read_series
 from scanfab.pipeline.strain import shear_strain
 from scanfab.table.compare import compare_tables
 from scanfab.table.reading import read_rows

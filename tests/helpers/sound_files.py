@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from functools import cache, partial
+from importlib import import_module
 from pathlib import Path
 from tempfile import mkdtemp
 
@@ -15,9 +16,9 @@ import pyvista
 
 from scanfab.io.convert import convert
 from scanfab.io.families import Family
+from scanfab.io.files import COMPRESSED_SUFFIXES, DECOMPRESSORS
 from scanfab.io.reader import GrainTable, ReadOptions
 from scanfab.io.registry import reader_named
-from scanfab.io.unpacking import COMPRESSED_SUFFIXES, OPENERS
 from scanfab.testing import made_up_packings
 from tests.helpers.dumps import (
     PAIRS,
@@ -274,11 +275,11 @@ def _table_files(folder: Path) -> list[Path]:
 
 def _packed(path: Path) -> list[Path]:
     """A file in every way that scanfab unpacks."""
-    openers = zip(COMPRESSED_SUFFIXES, dict.fromkeys(OPENERS.values()), strict=True)
+    modules = zip(COMPRESSED_SUFFIXES, dict.fromkeys(DECOMPRESSORS.values()), strict=True)
     paths = []
-    for suffix, opener in openers:
+    for suffix, module in modules:
         paths.append(path.with_name(path.name + suffix))
-        with opener(paths[-1], "wb") as file:
+        with import_module(module).open(paths[-1], "wb") as file:
             file.write(path.read_bytes())
     return paths
 

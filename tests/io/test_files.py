@@ -94,7 +94,7 @@ def test_a_packed_file_cut_off_is_an_error(packed):
 def test_a_packed_file_of_nonsense_is_an_error(tmp_path):
     path = tmp_path / "dump.gz"
     path.write_bytes(b"\x1f\x8b" + b"nonsense" * 10)
-    with pytest.raises(ReadError, match="cannot be read: "):
+    with pytest.raises(ReadError, match="cannot be decompressed: "):
         files.first_bytes(path)
 
 

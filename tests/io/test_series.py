@@ -16,7 +16,7 @@ from scanfab.base.errors import (
     ScanfabWarning,
     UnknownFormatError,
 )
-from scanfab.io.opening import open_sources
+from scanfab.io.sources import open_sources
 from tests.helpers.dumps import PAIRS, ROWS, dump_text, pairs_text, write
 from tests.helpers.truth import FLOOR, id_pairs
 

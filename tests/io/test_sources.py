@@ -18,7 +18,7 @@ import pyvista
 import scanfab
 from scanfab.base.errors import SettingsError
 from scanfab.cli.main import run
-from scanfab.io.opening import open_sources
+from scanfab.io.sources import open_sources
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.interruptions import PROGRAM, write_series
 

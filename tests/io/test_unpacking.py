@@ -12,8 +12,8 @@ import pytest
 
 import scanfab
 from scanfab.base.errors import ReadError
-from scanfab.io import unpacking
-from scanfab.io.unpacking import ZSTD, check_lines, import_module
+from scanfab.io import files
+from scanfab.io.files import ZSTD, check_lines, import_module
 from tests.helpers.dumps import dump_text, pairs_text
 
 zstd = import_module(ZSTD)
@@ -63,7 +63,7 @@ def test_a_part_of_a_packed_file_is_an_error(tmp_path, suffix, cut):
 
 @pytest.mark.parametrize("suffix", [".bz2", ".xz", ".zst"])
 def test_a_bomb_is_refused_unless_more_is_allowed(tmp_path, monkeypatch, suffix):
-    monkeypatch.setattr(unpacking, "ANYWAY", 1000)
+    monkeypatch.setattr(files, "ANYWAY", 1000)
     rows = "1 1 0.2 0.5 0.5 0.1\n" * 300_000
     text = dump_text(()).replace("ATOMS\n0", "ATOMS\n300000") + rows
     path = tmp_path / f"dump.txt{suffix}"
@@ -72,12 +72,12 @@ def test_a_bomb_is_refused_unless_more_is_allowed(tmp_path, monkeypatch, suffix)
         scanfab.read(path)
     with pytest.raises(scanfab.PackingError, match="the id 1 "):
         scanfab.read(path, max_unpacked=1e6)
-    monkeypatch.setattr(unpacking, "MOST_TIMES", 1e6)
+    monkeypatch.setattr(files, "MOST_TIMES", 1e6)
     assert len(scanfab.read_series(path)) == 1
 
 
 def test_a_line_of_many_megabytes_is_refused_unless_it_is_allowed(tmp_path, monkeypatch):
-    monkeypatch.setattr(unpacking, "LONGEST_LINE", 1 << 17)
+    monkeypatch.setattr(files, "LONGEST_LINE", 1 << 17)
     path = tmp_path / "dump.txt"
     path.write_text(dump_text() + "9" * (1 << 18) + "\n" + dump_text(step=1))
     with pytest.raises(ReadError, match=r"a line is longer than .*`max_unpacked`"):

@@ -7,12 +7,11 @@ from pathlib import Path
 
 from scanfab.base.errors import ReadError
 from scanfab.io.columns import grain_table, has_radius
-from scanfab.io.files import plain
+from scanfab.io.files import check_lines, plain
 from scanfab.io.formats.lammps_box import dump_cell
 from scanfab.io.parse.growing import leave_out_last
 from scanfab.io.reader import FileKind, GrainTable, ReadOptions, Snapshot
 from scanfab.io.text import Layout, read_rows, text_of
-from scanfab.io.unpacking import check_lines
 from scanfab.packing.cell import Cell
 
 START = re.compile(rb"\A(?:\xef\xbb\xbf)?---[ \t]*\r?\ncreator:[ \t]*LAMMPS[ \t]*\r?\n")

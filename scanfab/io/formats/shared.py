@@ -11,11 +11,10 @@ import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.typing import FloatArray
-from scanfab.io.files import plain
+from scanfab.io.files import check_lines, plain
 from scanfab.io.parse.growing import leave_out_last
 from scanfab.io.reader import FileKind, GrainTable, JoinedContacts, Reader, ReadOptions, Snapshot
 from scanfab.io.text import spelt
-from scanfab.io.unpacking import check_lines
 from scanfab.packing.cell import Cell
 
 

@@ -18,12 +18,11 @@ import numpy as np
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray
 from scanfab.io.columns import grain_table, has_radius
-from scanfab.io.files import first_bytes, plain
+from scanfab.io.files import check_lines, first_bytes, plain
 from scanfab.io.formats.lammps_box import dump_cell
 from scanfab.io.parse.growing import grows, warn_incomplete
 from scanfab.io.reader import FileKind, GrainTable, ReadOptions, Snapshot
 from scanfab.io.text import Columns, Layout, read_rows, text_of
-from scanfab.io.unpacking import check_lines
 from scanfab.packing.cell import Cell
 
 # a header is shorter, even with thousands of columns

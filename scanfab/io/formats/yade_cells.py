@@ -18,11 +18,10 @@ import numpy as np
 
 from scanfab.base.errors import PackingError, ReadError, ScanfabNote, ScanfabWarning
 from scanfab.base.typing import FloatArray
-from scanfab.io.files import Stamp, bare_name, stamp_of
+from scanfab.io.files import COMPRESSED_SUFFIXES, Stamp, bare_name, stamp_of
 from scanfab.io.formats.yade_save import is_save, read_save, snapshot_of_save
 from scanfab.io.mesh import read_mesh
 from scanfab.io.reader import ReadOptions
-from scanfab.io.unpacking import COMPRESSED_SUFFIXES
 from scanfab.packing.cell import Cell
 
 EXPORTED = re.compile(r"(.*)-spheres-(\d+)\.vtk")

@@ -17,7 +17,7 @@ import pytest
 
 from scanfab.base.errors import ReadError, SettingsError
 from scanfab.cli.main import run
-from scanfab.io.opening import read_series
+from scanfab.io.sources import read_series
 from scanfab.pipeline.compute import compute_rows
 from scanfab.table.reading import read_rows
 from scanfab.table.table import Table

@@ -7,7 +7,7 @@ import json
 from dataclasses import fields
 from pathlib import Path
 
-from scanfab.io.opening import READING, read_series
+from scanfab.io.sources import READING, read_series
 from scanfab.pipeline.options import MEANINGS
 from scanfab.pipeline.settings import Settings
 from scanfab.viz.report.settings_table import settings_table

@@ -16,6 +16,7 @@ from scanfab.io.families import (
     set_tables_aside,
     sort_into_families,
 )
+from scanfab.io.files import unpacking_up_to
 from scanfab.io.formats.yade_cells import is_cell_file, refuse_as_numbers
 from scanfab.io.frame_csv import FrameFile
 from scanfab.io.grain_files import (
@@ -29,7 +30,6 @@ from scanfab.io.grain_files import (
 from scanfab.io.options import READING_OPTIONS, take_reading
 from scanfab.io.reader import ReadOptions
 from scanfab.io.series import ContactsFrom, Series
-from scanfab.io.unpacking import unpacking_up_to
 from scanfab.packing.packing import Packing
 
 READING = tuple(one.name for one in READING_OPTIONS)

@@ -16,10 +16,10 @@ from scanfab.base.option import refuse_unknown, unusable
 from scanfab.io.families import Family, files_in
 from scanfab.io.frame import Frame
 from scanfab.io.grain_files import PathLike
-from scanfab.io.opening import READING, as_text, read_series
 from scanfab.io.options import take_reading
 from scanfab.io.parse.growing import growing
 from scanfab.io.series import Series
+from scanfab.io.sources import READING, as_text, read_series
 from scanfab.io.whole_frames import QUIET, Watch, WholeFrame, Wholeness
 
 # seconds between two looks, or times what a look takes
