@@ -280,26 +280,11 @@ class Series:
         self, grains: Snapshot, name_step: int | None, family: Family, named: bool
     ) -> Snapshot | None:
         """
-        The contacts of a grain snapshot in a family of contact files.
+        The contacts of a grain snapshot in a family of contact files; None if there are none.
 
         Steps inside the files decide, or times if there are no steps; where a file has none, the
-        number in its name does.
-
-        Parameters
-        ----------
-        grains : Snapshot
-            Of the grains.
-        name_step : int or None
-            The step in the name of their file.
-        family : Family
-            The contact files.
-        named : bool
-            Whether a single contact file was named for a single grain file: it needs no number.
-
-        Returns
-        -------
-        Snapshot or None
-            None if there are none.
+        number in its name does. If a single contact file was ``named`` for a single grain file, it
+        needs no number.
         """
         step = name_step if grains.step is None else grains.step
         path = family.files.get(name_step, family.files.get(step))
