@@ -290,7 +290,7 @@ class Frame:
         series, found = self.series, []
         for family in series.contacts:
             named = series.contacts_from == "path" and len(series.grains.files) == 1
-            contacts = series.contacts_of(self.snapshot, self.name_step, family, named)
+            contacts = series._contacts_of(self.snapshot, self.name_step, family, named)
             if contacts is not None:
                 found.append((family, contacts))
         if not found and series.contacts:

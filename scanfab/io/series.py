@@ -276,7 +276,7 @@ class Series:
         every = sum(met) + (len(self.grains.files) - len(met)) * (met[-1] if met else 1)
         return len(range(self.numbers.start, min(self.numbers.stop, every), self.numbers.step))
 
-    def contacts_of(
+    def _contacts_of(
         self, grains: Snapshot, name_step: int | None, family: Family, named: bool
     ) -> Snapshot | None:
         """

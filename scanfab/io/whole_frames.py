@@ -124,7 +124,7 @@ class Wholeness:
         named = series.contacts_from == "path" and len(series.grains.files) == 1
         try:
             with growing():
-                found = series.contacts_of(frame.snapshot, frame.name_step, family, named)
+                found = series._contacts_of(frame.snapshot, frame.name_step, family, named)
         except ReadError:
             return None
         return None if found is None else found.path
