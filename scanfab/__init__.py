@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from scanfab.base.column import Column
-    from scanfab.base.convex import Convex, sphere
+    from scanfab.base.convex import Convex
     from scanfab.base.errors import (
         NoFrameError,
         PackingError,
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
         SettingsError,
         UnknownFormatError,
     )
-    from scanfab.base.shapes import box, cylinder, ellipsoid, polyhedron
+    from scanfab.base.shapes import box, cylinder, ellipsoid, polyhedron, sphere
     from scanfab.fabric.contact import contact_fabric
     from scanfab.fabric.tensor import FabricTensor
     from scanfab.fabric.void import VoidFabric, void_fabric
@@ -114,7 +114,7 @@ _HOME = {
     "scan_frames": "viz.scanned_frames",
     "scan_lines": "scan.scan",
     "solids_of": "pipeline.solids",
-    "sphere": "base.convex",
+    "sphere": "base.shapes",
     "void_fabric": "fabric.void",
 }
 

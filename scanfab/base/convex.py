@@ -1,4 +1,13 @@
-"""Convex regions about the origin, as data: half-spaces and at most one quadric."""
+"""
+Convex regions about the origin: what lies in them, and how much of them.
+
+A region is the image of a body under a linear map. The map makes every ellipsoid of the ball of
+radius 1, every box of a cube, and carries over what is known of the body in closed form: a window
+that deforms with its sample needs no formula of its own. The bodies are in shapes.py.
+
+A region in a plane is spanned by the map's first two columns; the third is the unit normal. Its
+volume is an area, and its areas are lengths.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +17,55 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.base.bodies import BALL, DISC, Body
-from scanfab.base.option import number
 from scanfab.base.typing import BoolArray, FloatArray
 
 # steps towards the nearest place of a region, and what of a distance is rounding
 STEPS, ROUNDING = 200, 1e-12
-# directions over which a shadow is averaged
-AXES = 200
+# points of curved surfaces, and directions over which a shadow is averaged
+POINTS, POINTS_OF_A_RIM, AXES = 2000, 128, 200
+
+
+def on_sphere() -> FloatArray:
+    """Points of the sphere of radius 1 along a spiral; all have a like share of its surface."""
+    z = 1.0 - (2.0 * np.arange(POINTS) + 1.0) / POINTS
+    turn = np.arange(POINTS) * np.pi * (3.0 - np.sqrt(5.0))
+    across = np.sqrt(1.0 - z**2)
+    return np.column_stack([across * np.cos(turn), across * np.sin(turn), z])
+
+
+def on_circle() -> FloatArray:
+    """Points of the circle of radius 1 about z."""
+    turn = np.arange(POINTS_OF_A_RIM) * 2.0 * np.pi / POINTS_OF_A_RIM
+    return np.column_stack([np.cos(turn), np.sin(turn), np.zeros(POINTS_OF_A_RIM)])
+
+
+class Body:
+    """A convex body with the origin inside, by its constants and three functions of its own."""
+
+    planes: FloatArray
+    """Of its flat faces: rows n, d with the body on the side n·x < d, shape (P, 4)."""
+    form: FloatArray = np.zeros(3)
+    """Of its curved face, x·M x < 1: the diagonal of M, shape (3,); zeros without one."""
+    volume: float
+    """With edges and radii of the body itself."""
+    outline: FloatArray
+    """Points of its surface whose hull it is; of a curved one nearly; shape (K, 3)."""
+    is_symmetric: bool = True
+    """Whether with x also -x lies in it."""
+    is_flat: bool = False
+    """Whether it lies in a plane; what lies above and below it counts as inside."""
+
+    def support(self, along: FloatArray) -> FloatArray:
+        """The place in the body that is furthest along each vector, shape (N, 3)."""
+        raise NotImplementedError
+
+    def reach(self, frame: FloatArray) -> float:
+        """No place of its image, frame @ x, is further away from the origin."""
+        return float(np.linalg.norm(self.outline @ frame.T, axis=1).max())
+
+    def overlap(self, shift: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
+        """As :meth:`scanfab.Convex.overlap`, moved by ``length * shift``, shifts of any length."""
+        raise NotImplementedError
 
 
 class Quadric(NamedTuple):
@@ -110,9 +160,9 @@ class Convex:
     @property
     def mean_shadow(self) -> float:
         """Projected area in the mean of all directions, to some per cent; of a plane a length."""
-        axes = BALL.outline[:: len(BALL.outline) // AXES]
+        axes = on_sphere()[:: POINTS // AXES]
         if self.is_flat:
-            axes = DISC.outline[:, :2] @ np.linalg.qr(self.frame[:, :2])[0].T
+            axes = on_circle()[:, :2] @ np.linalg.qr(self.frame[:, :2])[0].T
         return float(self.overlap(axes, 0.0)[1].mean())
 
     @property
@@ -140,30 +190,6 @@ class Convex:
         inside = np.sqrt(form) < np.sqrt(level)
         for plane in self.planes:
             inside &= points @ plane[:3] < plane[3]
-        return np.asarray(inside)
-
-    def surely_holds(self, points: FloatArray, radius: FloatArray) -> BoolArray:
-        """
-        Which spheres lie inside as a whole; of a quadric that is no sphere not all of them.
-
-        Parameters
-        ----------
-        points : ndarray, shape (N, 3)
-            Their centres, from the origin of the region.
-        radius : ndarray, shape (N,)
-            Their radii.
-
-        Returns
-        -------
-        ndarray of bool, shape (N,)
-        """
-        form = self.quadric.form
-        # √(x·form·x) is a norm: that of a sphere's places is at most that of both parts
-        most = math.sqrt(max(float(np.linalg.eigvalsh(form)[-1]), 0.0))
-        middle = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", points, form, points), 0.0))
-        inside = middle + most * radius < math.sqrt(self.quadric.level)
-        for plane in self.planes:
-            inside &= points @ plane[:3] + radius < plane[3]
         return np.asarray(inside)
 
     def share(self, start: FloatArray, branch: FloatArray) -> FloatArray:
@@ -230,6 +256,17 @@ class Convex:
         unsure = unsure[~self.contains(points[unsure])]
         near[unsure] = self._meets(points[unsure], radius[unsure])
         return np.asarray(near)
+
+    def surely_holds(self, points: FloatArray, radius: FloatArray) -> BoolArray:
+        """Which spheres, likewise, lie inside; of a quadric that is no sphere not all of them."""
+        form = self.quadric.form
+        # √(x·form·x) is a norm: that of a sphere's places is at most that of both parts
+        most = math.sqrt(max(float(np.linalg.eigvalsh(form)[-1]), 0.0))
+        middle = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", points, form, points), 0.0))
+        inside = middle + most * radius < math.sqrt(self.quadric.level)
+        for plane in self.planes:
+            inside &= points @ plane[:3] + radius < plane[3]
+        return np.asarray(inside)
 
     def support(self, along: FloatArray) -> FloatArray:
         """
@@ -359,42 +396,3 @@ def image_of(body: Body, frame: FloatArray, size: str) -> Convex:
     ends = np.einsum("ij,ij->i", body.support(along @ frame) @ frame.T, along)
     reach = body.reach(frame)
     return Convex(planes, quadric, -ends[3:], ends[:3], reach, size, body, frame)
-
-
-def sphere(radius: float) -> Convex:
-    """
-    A sphere about the origin.
-
-    Parameters
-    ----------
-    radius : float
-        Dump's length unit.
-
-    Returns
-    -------
-    Convex
-        The shape of a :class:`scanfab.Window`, or the window of :class:`scanfab.Solids`.
-
-    Raises
-    ------
-    SettingsError
-        If the radius is not a finite number above 0.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from scanfab import sphere
-    >>> sphere(2.0).contains(np.array([[0.0, 0.0, 1.9], [0.0, 2.1, 0.0]]))
-    array([ True, False])
-    """
-    radius = number("a length above 0", lambda value: 0 < value < math.inf)("radius", radius)
-    return Convex(
-        planes=np.zeros((0, 4)),
-        quadric=Quadric(1.0, np.zeros((3, 3)), radius * radius),
-        low=np.full(3, -radius),
-        high=np.full(3, radius),
-        reach=radius,
-        size=f"radius {radius:g}",
-        body=BALL,
-        frame=radius * np.eye(3),
-    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from scanfab.base.shapes import ellipsoid, turned_ellipse
+from scanfab.base.shapes import ellipse, ellipsoid
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
 from scanfab.packing.window import Window
@@ -64,5 +64,5 @@ def inner_ellipsoid(position: FloatArray, largest: float, space: Space = SPACE) 
         return None
     semi_axes = scale * np.sqrt(variance)
     if space.is_plane:
-        return Window(center, turned_ellipse(semi_axes, axes.T @ space.basis[:2], space))
+        return Window(center, ellipse(semi_axes, space, axes.T @ space.basis[:2]))
     return Window(center, ellipsoid(semi_axes, axes.T))

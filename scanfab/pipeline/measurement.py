@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.convex import Convex, sphere
+from scanfab.base.convex import Convex
 from scanfab.base.note import Note
+from scanfab.base.shapes import sphere
 from scanfab.base.typing import FloatArray
 from scanfab.packing.sample import Sample, Variant
 from scanfab.pipeline.plan import NOISE, Plan

@@ -9,10 +9,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.base.convex import Convex, sphere
+from scanfab.base.convex import Convex
 from scanfab.base.errors import SettingsError
 from scanfab.base.note import Note
-from scanfab.base.shapes import box, circle, cylinder, ellipse, ellipsoid, polyhedron, rectangle
+from scanfab.base.shapes import (
+    box,
+    circle,
+    cylinder,
+    ellipse,
+    ellipsoid,
+    polyhedron,
+    rectangle,
+    sphere,
+)
 from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray
 from scanfab.io.parse.surface import read_surface

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scanfab import SettingsError, box, cylinder, direction_rule, ellipsoid, sphere
-from scanfab.base.bodies import BLOCK, Hull
+from scanfab.base.shapes import BLOCK, Hull
 from tests.helpers.lattices import rotation
 from tests.helpers.windows import cut_ball, hull_of, leaning
 

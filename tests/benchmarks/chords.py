@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numba import njit
 
-from scanfab.base.convex import sphere
+from scanfab.base.shapes import sphere
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.edges import EDGES, START

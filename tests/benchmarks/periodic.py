@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 
-from scanfab.base.convex import sphere
+from scanfab.base.shapes import sphere
 from scanfab.scan.directions import direction_rule
 from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.scan import scan_lines

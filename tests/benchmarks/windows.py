@@ -7,8 +7,8 @@ from functools import partial
 
 import numpy as np
 
-from scanfab.base.convex import Convex, sphere
-from scanfab.base.shapes import box, cylinder, ellipsoid, polyhedron
+from scanfab.base.convex import Convex
+from scanfab.base.shapes import box, cylinder, ellipsoid, polyhedron, sphere
 from scanfab.scan.directions import direction_rule
 from scanfab.scan.scan import scan_lines
 from scanfab.scan.solids import Solids

@@ -28,7 +28,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from scanfab.base.convex import sphere
+from scanfab.base.shapes import sphere
 from scanfab.fabric.tensor import axial
 from scanfab.packing.cell import Cell
 from scanfab.packing.inner import inner_ellipsoid

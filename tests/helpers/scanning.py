@@ -4,7 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.base.convex import Convex, sphere
+from scanfab.base.convex import Convex
+from scanfab.base.shapes import sphere
 from scanfab.fabric.void import void_fabric
 from scanfab.scan.directions import direction_rule
 from scanfab.scan.lines import line_triads

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from scanfab import Cell, direction_rule, scan_lines
-from scanfab.base.convex import sphere
+from scanfab.base.shapes import sphere
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.edges import START
 from scanfab.scan.following import Following

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scanfab.base.convex import sphere
+from scanfab.base.shapes import sphere
 from scanfab.scan.lines import line_triads
 from scanfab.scan.segments import Segments, cut_lines, grid_points, sample_segments
 from tests.helpers import naive

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab.base.convex import sphere
+from scanfab.base.shapes import sphere
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import Window
 from scanfab.viz.scene import (

@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from scanfab.base.convex import Convex, sphere
+from scanfab.base.convex import Convex
 from scanfab.base.jit import LANES
+from scanfab.base.shapes import sphere
 from scanfab.scan.kernels import axes, lists, strips, sweep
 from scanfab.scan.kernels.bins import no_bins
 from scanfab.scan.kernels.edges import CLIPPED
