@@ -257,17 +257,6 @@ class Convex:
         near[unsure] = self._meets(points[unsure], radius[unsure])
         return np.asarray(near)
 
-    def surely_holds(self, points: FloatArray, radius: FloatArray) -> BoolArray:
-        """Which spheres, likewise, lie inside; of a quadric that is no sphere not all of them."""
-        form = self.quadric.form
-        # √(x·form·x) is a norm: that of a sphere's places is at most that of both parts
-        most = math.sqrt(max(float(np.linalg.eigvalsh(form)[-1]), 0.0))
-        middle = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", points, form, points), 0.0))
-        inside = middle + most * radius < math.sqrt(self.quadric.level)
-        for plane in self.planes:
-            inside &= points @ plane[:3] + radius < plane[3]
-        return np.asarray(inside)
-
     def support(self, along: FloatArray) -> FloatArray:
         """
         The place that is furthest along each vector.

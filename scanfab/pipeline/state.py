@@ -232,7 +232,7 @@ def cut_volumes(
 ) -> FloatArray:
     """Volumes that spheres share with a region, by points that fill each evenly, shape (N,)."""
     points = _points_in_ball(space)
-    found = shape.surely_holds(places, radius).astype(np.float64)
+    found = surely_inside(shape, places, radius).astype(np.float64)
     cut = np.flatnonzero(found == 0.0)
     for first in range(0, len(cut), CHUNK):
         rows = cut[first : first + CHUNK]
@@ -240,6 +240,18 @@ def cut_volumes(
         inside = shape.contains(spread.reshape(-1, 3)).reshape(-1, len(points))
         found[rows] = inside.mean(axis=1)
     return space.volume(radius, found)
+
+
+def surely_inside(shape: Convex, points: FloatArray, radius: FloatArray) -> BoolArray:
+    """Which spheres lie in a region as a whole; of a quadric that is no sphere not all of them."""
+    form = shape.quadric.form
+    # √(x·form·x) is a norm: that of a sphere's places is at most that of both parts
+    most = math.sqrt(max(float(np.linalg.eigvalsh(form)[-1]), 0.0))
+    middle = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", points, form, points), 0.0))
+    inside = middle + most * radius < math.sqrt(shape.quadric.level)
+    for plane in shape.planes:
+        inside &= points @ plane[:3] + radius < plane[3]
+    return np.asarray(inside)
 
 
 def _rays(count: int, space: Space = SPACE) -> FloatArray:

@@ -13,7 +13,7 @@ from scanfab import Cell, ContactList, Packing, Sample, Window, sphere
 from scanfab.base.shapes import box, cylinder
 from scanfab.packing.sample import VARIANTS
 from scanfab.packing.walls import ListedWallForces
-from scanfab.pipeline.state import cut_volumes, lenses, sample_state
+from scanfab.pipeline.state import cut_volumes, lenses, sample_state, surely_inside
 from tests.fabric.test_forces import directions
 from tests.helpers.lattices import simple_cubic
 from tests.helpers.truth import CELL, SAMPLE_DATA, csv_rows
@@ -192,7 +192,7 @@ def test_lens_of_two_balls(apart, radius, expected):
 def test_what_is_said_to_lie_inside_does(shape):
     rng = np.random.default_rng(3)
     places, radius = rng.uniform(-2, 2, (500, 3)), rng.uniform(0.1, 1.0, 500)
-    surely = shape.surely_holds(places, radius)
+    surely = surely_inside(shape, places, radius)
     assert 5 < surely.sum() < 500
     for place, size in zip(places[surely], radius[surely], strict=True):
         far = directions(200, rng) * size + place
