@@ -11,7 +11,6 @@ volume is an area, and its areas are lengths.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
