@@ -121,7 +121,7 @@ def read_rows(
     >>> found["id"].tolist(), found["r"].tolist()
     ([1, 2], [0.5, 0.25])
     """
-    rows, layout = _trimmed(snapshot.path, rows, layout)
+    rows, layout, has_end = _trimmed(rows, layout)
     found = rows.count(b"\n")
     if count is not None and found != count:
         step = "" if snapshot.step is None else f", step {snapshot.step}"
@@ -129,6 +129,8 @@ def read_rows(
             f"{snapshot.path}{step}: the header counts {count} {what}, found {found}: the "
             f"file is incomplete or damaged"
         )
+    if not has_end:
+        warn_of_end(snapshot.path)
     if _is_forked:
         columns = fenced(columns_of, snapshot.path, rows, layout)
     else:
@@ -159,13 +161,12 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_note_fork)
 
 
-def _trimmed(path: Path, rows: bytes, layout: Layout) -> tuple[bytes, Layout]:
-    """The rows without empty lines around them, each with a newline at its end."""
+def _trimmed(rows: bytes, layout: Layout) -> tuple[bytes, Layout, bool]:
+    """The rows without empty lines around them, and whether the last one had a newline."""
     if not rows[:PIECE].strip() and not rows.strip():
-        return b"", layout
-    if not rows[-PIECE:].rstrip(b" \t\r").endswith(b"\n"):
-        warn_of_end(path)
-        rows += b"\n"
+        return b"", layout, True
+    has_end = rows[-PIECE:].rstrip(b" \t\r").endswith(b"\n")
+    rows = rows if has_end else rows + b"\n"
     if b"\r" in rows:
         rows = rows.replace(b"\r\n", b"\n")
     start, stop = 0, len(rows)
@@ -173,7 +174,7 @@ def _trimmed(path: Path, rows: bytes, layout: Layout) -> tuple[bytes, Layout]:
         start, layout = end, layout._replace(line=layout.line + 1)
     while (begin := rows.rfind(b"\n", start, stop - 1) + 1) and not rows[begin:stop].strip():
         stop = begin
-    return rows[start:stop], layout
+    return rows[start:stop], layout, has_end
 
 
 def warn_of_end(path: Path) -> None:

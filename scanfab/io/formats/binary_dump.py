@@ -17,19 +17,21 @@ import numpy as np
 from scanfab.base.errors import ReadError
 from scanfab.base.lengths import MOST
 from scanfab.base.typing import FloatArray
-from scanfab.io.columns import grain_table, has_radius
+from scanfab.io.columns import has_radius
 from scanfab.io.files import check_memory, first_bytes, plain
-from scanfab.io.formats.lammps_box import box_cell
-from scanfab.io.formats.text_dump import numbered_columns
-from scanfab.io.parse.growing import warn_incomplete
-from scanfab.io.reader import FileKind, GrainTable, ReadOptions, Snapshot
+from scanfab.io.formats.dump import Dump, box_cell, numbers_as_names
+from scanfab.io.formats.shared import HEADER_BYTES
+from scanfab.io.parse.growing import leave_out_last
+from scanfab.io.reader import FileKind, Snapshot
 
 MAGIC = (b"DUMPCUSTOM", b"DUMPATOM")
 # more stand in damaged files only
 MOST_COLUMNS = 1000
 
 
-class _Header(NamedTuple):
+class Header(NamedTuple):
+    """What stands above the blocks of rows, of which each process wrote one."""
+
     step: int
     time: float | None
     rows: int
@@ -39,7 +41,6 @@ class _Header(NamedTuple):
     names: list[str]
     """Of the columns; their numbers from 1 in the old layout."""
     blocks: int
-    """Number of blocks of rows, of which each process wrote one."""
     order: str
     """Of the bytes, as :mod:`struct` names it: < or >."""
 
@@ -54,22 +55,12 @@ def names_of_binary(head: bytes) -> list[str] | None:
 
 def binary_kind(path: Path) -> FileKind:
     """Grains, unless the columns have names and none is a radius."""
-    names = names_of_binary(first_bytes(path, 1 << 16)) or ["1"]
+    names = names_of_binary(first_bytes(path, HEADER_BYTES)) or ["1"]
     return "grains" if names[0] == "1" or has_radius(names) else "points"
 
 
-def index_binary(path: Path) -> list[Snapshot]:
-    """
-    The snapshots of a file, in the order of their steps.
-
-    An incomplete last snapshot (the program is still writing) is left out with a warning if there
-    is a complete one before it.
-
-    Raises
-    ------
-    ReadError
-        If there is no complete snapshot.
-    """
+def binary_snapshots(path: Path) -> list[Snapshot]:
+    """The snapshots of a file, in the order of their steps; an incomplete last one is left out."""
     found: list[Snapshot] = []
     start = 0
     with open(plain(path), "rb") as stream:
@@ -80,25 +71,15 @@ def index_binary(path: Path) -> list[Snapshot]:
                 header = _header(stream)
                 _blocks(stream, header, size)
             except ValueError as error:
-                text = f"{path}: snapshot {len(found) + 1} is damaged or incomplete: {error}"
-                if not found:
-                    raise ReadError(text) from None
-                warn_incomplete(f"{text}; it is left out")
+                leave_out_last(path, len(found), f"expected a whole binary snapshot: {error}")
                 break
             found.append(Snapshot(path, header.step, header.time, start, stream.tell()))
             start = stream.tell()
     return sorted(found, key=lambda one: one.step or 0)
 
 
-def read_binary_grains(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
-    """
-    The grains of a snapshot; users number the columns of the old layout, which has no names.
-
-    Raises
-    ------
-    ReadError
-        If the file is not as it was when it was indexed, or users have to name the columns.
-    """
+def read_binary_dump(snapshot: Snapshot) -> Dump:
+    """One snapshot; ReadError if the file is not as it was when its snapshots were found."""
     path = snapshot.path
     with open(plain(path), "rb") as stream:
         size = stream.seek(0, 2)
@@ -115,13 +96,10 @@ def read_binary_grains(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
             parts.append(np.fromfile(stream, f"{header.order}f8", length))
     values = np.concatenate(parts).astype(np.float64).reshape(-1, len(header.names))
     columns = {name: values[:, header.names.index(name)] for name in header.names}
-    if "1" in columns:
-        options = numbered_columns(path, "binary dump", len(columns), options)
-    cell = box_cell(f"{path}", header.bounds, header.periodic)
-    return grain_table(path, columns, cell, options, f", step {snapshot.step}")
+    return Dump(header.names, columns, box_cell(path, header.bounds, header.periodic))
 
 
-def _header(stream: IO[bytes]) -> _Header:
+def _header(stream: IO[bytes]) -> Header:
     """The header that begins where the stream is; ValueError says why there is none."""
     start, order, time = stream.tell(), "<", None
     first = stream.read(8 + len(MAGIC[0]))
@@ -142,7 +120,7 @@ def _header(stream: IO[bytes]) -> _Header:
     if is_tilted:
         bounds = np.column_stack([bounds, _take(stream, f"{order}3d", -MOST, MOST)])
     (width,) = _take(stream, f"{order}i", 1, MOST_COLUMNS)
-    names = [f"{place + 1}" for place in range(width)]
+    names = numbers_as_names(width)
     if magic:
         _text(stream, order)  # units
         if _take(stream, "b", 0, 1)[0]:
@@ -152,7 +130,7 @@ def _header(stream: IO[bytes]) -> _Header:
         raise ValueError(f"{len(names)} names for {width} columns")
     (blocks,) = _take(stream, f"{order}i", 1)
     x, y, z = (bool(both) for both in (faces == 0).all(axis=1))
-    return _Header(step, time, count, (x, y, z), bounds, names, blocks, order)
+    return Header(step, time, count, (x, y, z), bounds, names, blocks, order)
 
 
 def _take(stream: IO[bytes], kinds: str, low: float = -inf, high: float = inf) -> tuple[Any, ...]:
@@ -161,9 +139,8 @@ def _take(stream: IO[bytes], kinds: str, low: float = -inf, high: float = inf) -
     if len(data) < struct.calcsize(kinds):
         raise ValueError("the file ends too early")
     found = struct.unpack(kinds, data)
-    for one in found:
-        if not low <= one <= high:
-            raise ValueError(f"expected a number from {low} to {high}, found {one}")
+    if not all(low <= one <= high for one in found):
+        raise ValueError(f"expected numbers from {low} to {high}, found {found}")
     return found
 
 
@@ -173,7 +150,7 @@ def _text(stream: IO[bytes], order: str) -> str:
     return stream.read(length).decode("utf-8", "replace")
 
 
-def _blocks(stream: IO[bytes], header: _Header, size: int) -> list[tuple[int, int]]:
+def _blocks(stream: IO[bytes], header: Header, size: int) -> list[tuple[int, int]]:
     """First byte and number of values of each block of rows; the stream is behind them then."""
     found, width = [], len(header.names)
     for _ in range(header.blocks):

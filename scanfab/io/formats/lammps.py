@@ -10,25 +10,19 @@ from typing import NamedTuple
 import numpy as np
 
 from scanfab.base.errors import ReadError
-from scanfab.base.typing import FloatArray, IntArray
-from scanfab.io.contacts import join_ids, rows_of_ids
+from scanfab.base.typing import FloatArray
+from scanfab.io.contacts import join_ids
 from scanfab.io.files import first_bytes
-from scanfab.io.formats import ids, text_dump
-from scanfab.io.formats.binary_dump import (
-    binary_kind,
-    index_binary,
-    names_of_binary,
-    read_binary_grains,
+from scanfab.io.formats import binary_dump, lammps_netcdf, text_dump
+from scanfab.io.formats.dump import Dump, dump_grains
+from scanfab.io.formats.dump_contacts import (
+    Places,
+    id_column,
+    join_places,
+    named_places,
+    refuse_rounded_ids,
 )
-from scanfab.io.formats.lammps_data import index_data, is_data_file, of_liggghts, read_data_grains
-from scanfab.io.formats.lammps_netcdf import (
-    index_netcdf,
-    is_netcdf,
-    netcdf_kind,
-    read_netcdf_grains,
-)
-from scanfab.io.formats.lammps_yaml import index_yaml, is_yaml, read_yaml_grains, yaml_kind
-from scanfab.io.formats.text_dump import Dump, is_dump, read_dump
+from scanfab.io.formats.lammps_data import data_snapshots, is_data_file, of_liggghts, read_data
 from scanfab.io.formats.vtk import VtkReader
 from scanfab.io.reader import (
     Carries,
@@ -49,9 +43,6 @@ LAMMPS_ITEMS = re.compile(
 # LIGGGHTS begins a restart with a flag, the length of its version, and the version
 RESTART = re.compile(rb"LammpS RestartT|\0{4}.{2}\0\0[^\0]{0,100}LIGGGHTS", re.DOTALL)
 
-# LAMMPS lists pairs up to this distance, in r1 + r2, for nearly all rows
-NEIGHBOURS, NEARLY_ALL = 2.0, 0.98
-
 
 class Form(NamedTuple):
     """One of the forms in which LAMMPS and LIGGGHTS write grains."""
@@ -60,17 +51,39 @@ class Form(NamedTuple):
     """Whether a file has this form, by its first bytes."""
     kind: Callable[[Path], FileKind]
     snapshots: Callable[[Path], list[Snapshot]]
-    read_grains: Callable[[Snapshot, ReadOptions], GrainTable]
-    carries: Callable[[Path], Carries] = lambda _: "cell"
+    read: Callable[[Snapshot, ReadOptions], Dump]
+    cell: Carries = "cell"
+
+    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+        """Columns by their names, of a data file by the atom style."""
+        return dump_grains(snapshot, self.read(snapshot, options), options)
+
+    def carries(self, path: Path) -> Carries:
+        """A data file has a box without boundary flags."""
+        return self.cell
 
 
-TEXT = Form(is_dump, text_dump.dump_kind, text_dump.index_dump, text_dump.read_dump_grains)
+TEXT = Form(
+    text_dump.is_text_dump,
+    text_dump.text_kind,
+    text_dump.text_snapshots,
+    lambda snapshot, _: text_dump.read_text_dump(snapshot),
+)
 FORMS = (
     TEXT,
-    Form(is_data_file, lambda _: "grains", index_data, read_data_grains, lambda _: "box"),
-    Form(is_yaml, lambda path: yaml_kind(first_bytes(path, 1 << 16)), index_yaml, read_yaml_grains),
-    Form(is_netcdf, netcdf_kind, index_netcdf, read_netcdf_grains),
-    Form(names_of_binary, binary_kind, index_binary, read_binary_grains),
+    Form(is_data_file, lambda _: "grains", data_snapshots, read_data, "box"),
+    Form(
+        lammps_netcdf.is_netcdf,
+        lammps_netcdf.netcdf_kind,
+        lammps_netcdf.netcdf_snapshots,
+        lambda snapshot, _: lammps_netcdf.read_netcdf(snapshot),
+    ),
+    Form(
+        binary_dump.names_of_binary,
+        binary_dump.binary_kind,
+        binary_dump.binary_snapshots,
+        lambda snapshot, _: binary_dump.read_binary_dump(snapshot),
+    ),
 )
 
 
@@ -79,38 +92,86 @@ def is_restart(head: bytes) -> bool:
     return RESTART.match(head) is not None
 
 
-def form_of(path: Path) -> Form | None:
-    """The form of a file, by its first bytes; None if it has none of these forms."""
-    head = first_bytes(path)
-    if is_restart(head):
-        raise ReadError(
-            f"{path}: a binary restart, which only the program that wrote it can read: let it "
-            f"read_restart, and write the grains with dump custom ... id type x y z radius"
-        )
-    return next((form for form in FORMS if form.fits(head)), None)
-
-
 class DumpReader:
     """What the readers of LAMMPS' and LIGGGHTS' dumps have in common."""
 
     other: Form | VtkReader = TEXT
     """Reads files of all other forms."""
+    lists_walls = False
+    """Whether there are lists of contacts with walls, which are known by their values."""
+
+    def form(self, path: Path) -> Form | VtkReader:
+        """The form of a file, by its first bytes."""
+        head = first_bytes(path)
+        if is_restart(head):
+            raise ReadError(
+                f"{path}: a binary restart, which only the program that wrote it can read: let it "
+                f"read_restart, and write the grains with dump custom ... id type x y z radius"
+            )
+        return next((form for form in FORMS if form.fits(head)), self.other)
 
     def kind(self, path: Path) -> FileKind:
         """By the names of the columns; whatever a text dump counts but ATOMS are contacts."""
-        return (form_of(path) or self.other).kind(path)
+        return self.form(path).kind(path)
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """By ``ITEM: TIMESTEP``; a data file is one."""
-        return (form_of(path) or self.other).snapshots(path)
+        return self.form(path).snapshots(path)
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         """Columns by their names; of a data file by the atom style."""
-        return (form_of(snapshot.path) or self.other).read_grains(snapshot, options)
+        return self.form(snapshot.path).read_grains(snapshot, options)
 
     def carries(self, path: Path) -> Carries:
         """A data file has a box without boundary flags, a VTK file at most the box beside it."""
-        return (form_of(path) or self.other).carries(path)
+        return self.form(path).carries(path)
+
+    def read_contacts(
+        self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
+    ) -> JoinedContacts:
+        """
+        Pairs of a ``dump local``, with their force if it is known which columns are the force.
+
+        Which column is what follows from ``contact_columns``, or from the values if these leave no
+        doubt.
+        """
+        path, form = snapshot.path, self.form(snapshot.path)
+        if isinstance(form, VtkReader):
+            return form.read_contacts(snapshot, options, grains)
+        if form is not TEXT:
+            raise ReadError(
+                f"{path}: contacts are read from text: write them by dump local, to a file without "
+                f".bin"
+            )
+        dump = TEXT.read(snapshot, options)
+        values = np.column_stack([dump.columns[name] for name in dump.names]).astype(np.float64)
+        if not len(values):
+            return join_ids(path, grains, np.zeros((0, 2), np.int64), None, walls=False)
+        if grains.id is None:
+            raise ReadError(f"{path}: names grains by id, but the grain file has no ids")
+        refuse_rounded_ids(path, values, grains)
+        told = options.contact_columns
+        found = self.found(path, values, grains) if told is None or self.lists_walls else None
+        if told is not None and not isinstance(found, JoinedContacts):
+            found = named_places(path, told, dump.names)
+        if found is None:
+            raise ReadError(
+                f"{path}: cannot tell which columns are the two ids of a contact: the ids may "
+                f"belong to another step; or name the columns with "
+                f'`contact_columns="id1=NAME,id2=NAME"`, which are {", ".join(dump.names)}, or the '
+                f'keywords of LIGGGHTS\' compute with `contact_columns="pos id force ..."`; a dump '
+                f'of LAMMPS is read with `format="lammps"`'
+            )
+        if isinstance(found, JoinedContacts):
+            return found
+        return join_places(path, values, found, grains)
+
+    def found(
+        self, path: Path, values: FloatArray, grains: GrainTable
+    ) -> Places | JoinedContacts | None:
+        """Which columns are the ids, if their values leave no doubt; no force is read."""
+        place = id_column(values, grains, is_flagged=False)
+        return None if place is None else Places([place, place + 1], are_contacts=False)
 
 
 class LammpsReader(DumpReader):
@@ -123,103 +184,11 @@ class LammpsReader(DumpReader):
     def recognises(self, path: Path) -> bool:
         """What LAMMPS writes and LIGGGHTS does not: units, time, bounds with all digits."""
         head = first_bytes(path)
-        if is_dump(head):
+        if head.startswith(b"ITEM: "):
             return LAMMPS_ITEMS.search(head) is not None
         if is_data_file(head) or is_restart(head):
             return not of_liggghts(head)
+        if text_dump.is_text_dump(head) or lammps_netcdf.is_netcdf(head):
+            return True
         # LIGGGHTS' binary dumps have numbered columns
-        return is_yaml(head) or is_netcdf(head) or (names_of_binary(head) or ["1"])[0] != "1"
-
-    def read_contacts(
-        self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
-    ) -> JoinedContacts:
-        """
-        Pairs of ``compute property/local`` that touch, with the force of ``compute pair/local``.
-
-        Which column is what follows from ``contact_columns``; without it the ids are found by
-        their values, if there is no doubt, and no force is read.
-        """
-        path, dump = snapshot.path, read_contact_rows(snapshot, grains)
-        places = ids.named_places(path, options.contact_columns, dump)
-        if not places and dump.rows:
-            place = id_column(dump.values, grains)
-            if place is None:
-                raise ReadError(
-                    f"{path}: cannot tell which columns are the two ids of a contact: the ids may "
-                    f"belong to another step; or name them with "
-                    f'`contact_columns="id1=NAME,id2=NAME"`; the columns are '
-                    f"{', '.join(dump.names)}"
-                )
-            places = {"id1": place, "id2": place + 1}
-        return join_listed(path, dump, places, grains)
-
-
-def read_contact_rows(snapshot: Snapshot, grains: GrainTable) -> Dump:
-    """The rows of a dump local; ReadError if they cannot name the grains by their ids."""
-    path = snapshot.path
-    if form_of(path) is not TEXT:
-        raise ReadError(
-            f"{path}: contacts are read from text: write them by dump local, to a file without .bin"
-        )
-    dump = read_dump(snapshot)
-    if dump.rows:
-        if grains.id is None:
-            raise ReadError(f"{path}: names grains by id, but the grain file has no ids")
-        ids.refuse_rounded_ids(path, dump.values, grains)
-    return dump
-
-
-def join_listed(
-    path: Path, dump: Dump, places: dict[str, int], grains: GrainTable
-) -> JoinedContacts:
-    """The pairs that touch, and their forces, by the places of the columns of ids and forces."""
-    if not dump.rows:
-        return join_ids(path, grains, np.zeros((0, 2), np.int64), None, walls=False)
-    pairs = whole_ids(path, dump, [places[key] for key in ids.IDS])
-    force = ids.named_force(dump, places)
-    touch = ids.touching_pairs(grains, rows_of_ids(grains, pairs), force)
-    return join_ids(
-        path, grains, pairs[touch], None if force is None else force[touch], walls=False
-    )
-
-
-def whole_ids(path: Path, dump: Dump, places: list[int]) -> IntArray:
-    """Two columns of ids, shape (M, 2)."""
-    listed = dump.values[:, places]
-    if not (ids.are_whole(listed) and np.all(np.abs(listed) < 2.0**53)):
-        raise ReadError(f"{path}: expected ids in the columns {places[0] + 1} and {places[1] + 1}")
-    return listed.astype(np.int64)
-
-
-@np.errstate(over="ignore", invalid="ignore")
-def id_column(values: FloatArray, grains: GrainTable, *, is_flagged: bool = False) -> int | None:
-    """
-    The first of two neighbouring columns of ids; None unless there is one choice.
-
-    Parameters
-    ----------
-    values : ndarray, shape (M, columns)
-        The rows of contacts.
-    grains : GrainTable
-        With ids.
-    is_flagged : bool, optional
-        Whether a flag 0 or 1 stands behind the ids, as LIGGGHTS writes it. Else the two ids must
-        name grains that lie side by side, and hardly any pair may occur twice: the types of two
-        grains do so all the time, a pair that touches through several images does not.
-    """
-    found = []
-    for place in range(values.shape[1] - 1 - is_flagged):
-        pairs = values[:, place : place + 2]
-        if not all(ids.are_ids(column, grains) for column in pairs.T):
-            continue
-        if is_flagged:
-            flag = values[:, place + 2]
-            fits = np.isin(flag, (0, 1)).all() and np.all(pairs[:, 0] != pairs[:, 1])
-        else:
-            rows = rows_of_ids(grains, pairs)
-            gap = ids.gaps(grains, rows[(rows >= 0).all(axis=1)])
-            fits = np.mean(gap < NEIGHBOURS - 1.0) > NEARLY_ALL
-            fits &= len(np.unique(np.sort(pairs, axis=1), axis=0)) >= 0.5 * len(pairs)
-        if fits:
-            found.append(place)
-    return found[0] if len(found) == 1 else None
+        return (binary_dump.names_of_binary(head) or ["1"])[0] != "1"

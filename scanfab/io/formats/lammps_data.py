@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
-from scanfab.io.columns import grain_table
 from scanfab.io.files import first_bytes
-from scanfab.io.formats.lammps_box import box_cell
-from scanfab.io.reader import GrainTable, ReadOptions, Snapshot
-from scanfab.io.text import Layout, read_rows, text_of
+from scanfab.io.formats.dump import Dump, box_cell, numbers_as_names
+from scanfab.io.reader import ReadOptions, Snapshot
+from scanfab.io.text import Columns, Layout, read_rows, text_of
 from scanfab.packing.cell import Cell
 
-FIRST_LINE = re.compile(rb"\A(?:\xef\xbb\xbf)?LAMMPS data file[^\n]*")
+FIRST_LINE = re.compile(rb"LAMMPS data file[^\n]*")
 # the first line is a comment; these two must stand below it
 ATOMS = re.compile(rb"^[ \t]*\d{1,15}[ \t]+atoms[ \t]*(?:#[^\n]*)?\r?$", re.MULTILINE)
 BOX = re.compile(rb"^[^\n]*[ \t]xlo[ \t]+xhi\b", re.MULTILINE)
@@ -28,14 +25,12 @@ SECTION = re.compile(rb"\n[ \t]*([A-Z][A-Za-z ]*?)[ \t]*(?:#[ \t]*(\S+)[^\n]*)?\
 # orders of the columns; image flags, and of hybrid styles the columns of others, stand behind
 PLAIN = ("id", "type", "diameter", "density", "x", "y", "z")
 HYBRID = ("id", "type", "x", "y", "z", "diameter", "density")
+STYLES = {"": (PLAIN, HYBRID), "sphere": (PLAIN,), "granular": (PLAIN,), "hybrid": (HYBRID,)}
 FLAGS = ("ix", "iy", "iz")
 # what atoms may be that are no spheres: their third column is a flag, not a diameter
 NO_SPHERES = ("ellipsoids", "lines", "triangles", "bodies")
 # YADE writes this first line, and radii in the column of diameters
 OF_YADE = b"LIGGGHTS Description"
-
-Columns = list[npt.NDArray[Any]]
-Header = dict[str, list[str]]
 
 
 def is_data_file(head: bytes) -> bool:
@@ -50,16 +45,17 @@ def of_liggghts(head: bytes) -> bool:
     return b"LIGGGHTS" in head.partition(b"\n")[0][:1000].upper()
 
 
-def index_data(path: Path) -> list[Snapshot]:
+def data_snapshots(path: Path) -> list[Snapshot]:
     """The only snapshot of a file, with the step that the first line of LAMMPS names."""
-    first = FIRST_LINE.match(first_bytes(path))
-    step = None if first is None else STEP.search(first[0])
+    step = STEP.search(first_bytes(path).partition(b"\n")[0])
     return [Snapshot(path, step=None if step is None else int(step[1]))]
 
 
-def read_data_grains(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+def read_data(snapshot: Snapshot, options: ReadOptions) -> Dump:
     """
     The Atoms section; the box has no boundary flags, so nothing is periodic unless the user says.
+
+    The columns have names by the order of the atom style, or numbers if the user numbers them.
 
     Raises
     ------
@@ -80,22 +76,21 @@ def read_data_grains(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
     begin = sections[place].end()
     end = sections[place + 1].start() + 1 if place + 1 < len(sections) else len(data)
     rows = re.sub(rb"[ \t]*#[^\n]*", b"", data[begin:end])
-    width = len(rows.lstrip().partition(b"\n")[0].split()) or len(PLAIN)
-    numbers = tuple(f"{place + 1}" for place in range(width))
+    names = numbers_as_names(len(rows.lstrip().partition(b"\n")[0].split()) or len(PLAIN))
     own = {f"{name}" for name in options.columns.values()}
-    is_numbered = bool(own) and all(name.isdecimal() for name in own)
+    is_numbered = bool(own) and own <= {*names}
     id = f"{options.columns.get('id', 1)}"
-    layout = Layout(numbers, line=data.count(b"\n", 0, begin) + 1, whole=(id,))
+    layout = Layout(tuple(names), line=data.count(b"\n", 0, begin) + 1, whole=(id,))
     columns = read_rows(snapshot, rows, layout, count=int(count), what="atoms")
     if not is_numbered:
         style = (sections[place][2] or b"").decode("utf-8", "replace")
         _refuse_others(path, style, header, data)
-        names = _names(path, style, list(columns.values()), cell)
+        names = _names(path, style, columns, cell)
         columns = dict(zip(names, columns.values(), strict=True))
-    return grain_table(path, columns, cell, options)
+    return Dump(names, columns, cell)
 
 
-def _header(text: str) -> Header:
+def _header(text: str) -> dict[str, list[str]]:
     """The words before each keyword such as ``atoms`` or ``xlo xhi``; the first line is free."""
     found = {}
     for line in text.splitlines()[1:]:
@@ -105,7 +100,7 @@ def _header(text: str) -> Header:
     return found
 
 
-def _cell(path: Path, header: Header) -> Cell | None:
+def _cell(path: Path, header: dict[str, list[str]]) -> Cell | None:
     """The box, from its lower and upper bounds and its tilt, or from three vectors."""
     try:
         if "avec" in header:
@@ -113,8 +108,7 @@ def _cell(path: Path, header: Header) -> Cell | None:
             columns = [*np.transpose(vectors), header["abc origin"]]
         else:
             columns = [*np.transpose([header[f"{axis}lo {axis}hi"] for axis in "xyz"])]
-            if "xy xz yz" in header:
-                columns.append(header["xy xz yz"])
+            columns += [header["xy xz yz"]] if "xy xz yz" in header else []
         bounds = np.array(columns, dtype=np.float64).T
         if bounds.shape not in ((3, 2), (3, 3), (3, 4)):
             raise ValueError
@@ -123,12 +117,12 @@ def _cell(path: Path, header: Header) -> Cell | None:
             f"{path}: expected the box in the header: two numbers before each of xlo xhi, ylo yhi "
             f"and zlo zhi, found {', '.join(filter(None, header)) or 'none'}"
         ) from None
-    return box_cell(f"{path}", bounds, (False, False, False), is_around=False)
+    return box_cell(path, bounds, (False, False, False), is_around=False)
 
 
-def _refuse_others(path: Path, style: str, header: Header, data: bytes) -> None:
+def _refuse_others(path: Path, style: str, header: dict[str, list[str]], data: bytes) -> None:
     """ReadError for atoms that are no spheres, and for radii among diameters."""
-    if style not in ("", "sphere", "granular", "hybrid"):
+    if style not in STYLES:
         raise ReadError(
             f"{path}: expected 'Atoms # sphere' (atom_style sphere), found 'Atoms # {style}': "
             f"write the grains with dump custom ... id type x y z radius"
@@ -151,15 +145,17 @@ def _names(path: Path, style: str, columns: Columns, cell: Cell | None) -> list[
     A file that does not name its style has the order in which diameters and densities are above
     zero, types are whole, and the centres in the box; ReadError if both orders do, or none.
     """
-    orders = {"hybrid": (HYBRID,), "": (PLAIN, HYBRID)}.get(style, (PLAIN,))
-    more = len(columns) - len(PLAIN)
+    values = list(columns.values())
+    more = len(values) - len(PLAIN)
+    has_flags = more >= 3 and all(np.all(one == np.rint(one)) for one in values[-3:])
+    flags, more = (FLAGS, more - 3) if has_flags else ((), more)
     fitting = [
         order
-        for order in orders
-        if (more in (0, len(FLAGS)) if order is PLAIN else more >= 0)
-        and (len(orders) == 1 or _fits(order, columns, cell))
+        for order in STYLES[style]
+        if (more == 0 or (order is HYBRID and more > 0))
+        and (style or _fits(dict(zip(order, values, strict=False)), cell))
     ]
-    if len(columns[0]) == 0:
+    if len(values[0]) == 0:
         fitting = fitting[:1]
     if len(fitting) != 1:
         found = f"'Atoms # {style}'" if style else "'Atoms' without a style"
@@ -169,22 +165,18 @@ def _names(path: Path, style: str, columns: Columns, cell: Cell | None) -> list[
             f"{'may be both' if fitting else 'are neither'}: name them by their numbers, for "
             f'instance `columns="id=1,type=2,diameter=3,x=5,y=6,z=7"`'
         )
-    has_flags = more >= 3 and all(np.all(one == np.rint(one)) for one in columns[-3:])
-    rest = [f"{place + 1}" for place in range(len(PLAIN), len(columns) - 3 * has_flags)]
-    if fitting[0] is HYBRID:
-        rest[:1] = ["mol"] * bool(rest)
-    return [*fitting[0], *rest, *FLAGS[: 3 * has_flags]]
+    return [*fitting[0], *["mol", *list(columns)[len(PLAIN) + 1 :]][:more], *flags]
 
 
 @np.errstate(invalid="ignore")
-def _fits(order: tuple[str, ...], columns: Columns, cell: Cell | None) -> bool:
-    """Whether the first columns can be of this order."""
-    column = dict(zip(order, columns, strict=False))
-    type = column["type"]
-    if not all(np.all(column[name] > 0) for name in ("diameter", "density")):
+def _fits(column: Columns, cell: Cell | None) -> bool:
+    """Whether the columns can be what their names say."""
+    if not (np.all(column["diameter"] > 0) and np.all(column["density"] > 0)):
         return False
-    if not np.all(type == np.rint(type)) or cell is None:
-        return order is PLAIN and bool(np.all(type == np.rint(type)))
+    if not np.all(column["type"] == np.rint(column["type"])):
+        return False
+    if cell is None:
+        return True
     fraction = cell.fractional(np.column_stack([column[axis] for axis in "xyz"]))
     # a grain may reach out of the box, and a periodic one lie there
     return bool(np.all((fraction > -0.5) & (fraction < 1.5)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -11,13 +11,13 @@ import numpy.typing as npt
 from scanfab.base.arrays import doubles
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray
-from scanfab.io.columns import grain_table, has_radius
+from scanfab.io.columns import has_radius
 from scanfab.io.fence import fenced, needed
+from scanfab.io.formats.dump import Dump
 from scanfab.io.formats.shared import cell_of
-from scanfab.io.reader import FileKind, GrainTable, ReadOptions, Snapshot
+from scanfab.io.reader import FileKind, Snapshot
+from scanfab.io.text import Columns
 from scanfab.packing.cell import Cell
-
-Arrays = dict[str, npt.NDArray[Any]]
 
 # classic, with long offsets, with long data; HDF5 is told apart by its content
 MAGIC = (b"CDF\x01", b"CDF\x02", b"CDF\x05")
@@ -29,21 +29,19 @@ FILL = {"f4": 9.9692099683868690e36, "f8": 9.9692099683868690e36, "i4": -(2**31)
 FILL_LONG = -(2**63) + 2
 
 
-class NetcdfFrame(NamedTuple):
-    """What a file holds of one frame, or (the time alone) of all."""
+class Contents(NamedTuple):
+    """What a file holds of one frame, or (names and times alone) of all."""
 
     names: list[str]
-    """Of all variables in the file."""
-    frames: int
-    """How many there are."""
-    time: FloatArray
-    """Of all frames, as it is stored."""
+    """Of all variables."""
+    times: FloatArray
+    """Of all frames, as they are stored."""
     scale: float | None
-    """By which the time is multiplied, if the file says so."""
+    """By which the times are multiplied, if the file says so."""
     program: str
-    atoms: Arrays
-    """The frame's variables that have a value, or several, for each atom."""
-    others: Arrays
+    atoms: Columns
+    """The frame's variables with a value, or several, for each atom."""
+    others: Columns
 
 
 def is_netcdf(head: bytes) -> bool:
@@ -59,25 +57,28 @@ def netcdf_kind(path: Path) -> FileKind:
     return "grains" if has_radius(names) else "points"
 
 
-def index_netcdf(path: Path) -> list[Snapshot]:
+def netcdf_snapshots(path: Path) -> list[Snapshot]:
     """The frames; ``start`` of a snapshot is the number of its frame."""
     file = _read(path, None)
-    if file.frames == 0:
-        raise ReadError(f"{path}: expected frames, found none")
-    times = file.time
-    if times.shape != (file.frames,) or not np.all(np.abs(times) < 2.0**53):
-        raise ReadError(f"{path}: expected a time of each of {file.frames} frames")
+    times, scale = file.times, file.scale
+    if len(times) == 0 or not np.all(np.abs(times) < 2.0**53):
+        raise ReadError(f"{path}: expected frames with their times, found none")
     # LAMMPS writes the step as time, and the length of a step as its scale
     are_steps = file.program == "LAMMPS" and bool(np.all(times == np.rint(times)))
-    scale = 1.0 if file.scale is None and not are_steps else file.scale
-    found = []
-    for number, time in enumerate(times.tolist()):
-        step, seconds = int(time) if are_steps else None, None if scale is None else time * scale
-        found.append(Snapshot(path, step, seconds, start=number, stop=number + 1))
-    return found
+    scale = 1.0 if scale is None and not are_steps else scale
+    return [
+        Snapshot(
+            path,
+            int(time) if are_steps else None,
+            None if scale is None else time * scale,
+            start=number,
+            stop=number + 1,
+        )
+        for number, time in enumerate(times.tolist())
+    ]
 
 
-def read_netcdf_grains(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+def read_netcdf(snapshot: Snapshot) -> Dump:
     """
     The variables of the atoms, by their names.
 
@@ -89,80 +90,71 @@ def read_netcdf_grains(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
     path = snapshot.path
     file = _read(path, snapshot.start)
     there, cell = _written(path, file.atoms), _cell(path, file.others)
-    columns: Arrays = {name: values[there] for name, values in file.atoms.items()}
-    for name, scaled in POSITIONS.items():
-        position = columns.pop(name, None)
-        if position is None or "position" in columns:
-            continue
-        if position.shape[1:] != (3,):
-            raise ReadError(f"{path}: {name}: expected three numbers for each atom")
-        columns["position"] = doubles(position)
-        if scaled:
+    columns = {name: values[there] for name, values in file.atoms.items()}
+    found = [columns.pop(name) for name in POSITIONS if name in columns]
+    if found and found[0].shape[1:] == (3,):
+        columns["position"] = doubles(found[0])
+        if next(is_scaled for name, is_scaled in POSITIONS.items() if name in file.atoms):
             if cell is None:
-                raise ReadError(f"{path}: {name} are fractions of a box, but there is no box")
+                raise ReadError(f"{path}: coordinates are fractions of a box, but there is no box")
             columns["position"] = cell.origin + columns["position"] @ cell.vectors
-    return grain_table(path, columns, cell, options, f", frame {snapshot.start}")
+    return Dump(list(columns), columns, cell)
 
 
-def _read(path: Path, frame: int | None) -> NetcdfFrame:
+def _read(path: Path, frame: int | None) -> Contents:
     needed(path, "netCDF4", "netcdf")
     return fenced(read_in_worker, path, frame)
 
 
-def read_in_worker(path: str, frame: int | None) -> NetcdfFrame:
+def read_in_worker(path: str, frame: int | None) -> Contents:
     """The variables of a frame; ValueError says why it cannot be read."""
     import netCDF4
 
-    atoms: Arrays = {}
-    others: Arrays = {}
+    atoms: Columns = {}
+    others: Columns = {}
     with netCDF4.Dataset(path, "r") as file:
         # what was never written must be seen as it is
         file.set_auto_maskandscale(False)
-        count = len(file.dimensions["frame"]) if "frame" in file.dimensions else 0
-        if frame is not None and not 0 <= frame < count:
-            raise ValueError(f"there is no frame {frame} among {count}")
-        time = file.variables.get("time")
-        steps = np.zeros(0)
-        if time is not None and time.dtype is not str and time.dtype.kind in "iuf":
-            steps = np.asarray(time[:], np.float64)
-        scale = getattr(time, "scale_factor", None)
+        time = file.variables["time"] if "frame" in file.dimensions else np.zeros(0)
+        if frame is not None and not 0 <= frame < len(time):
+            raise ValueError(f"there is no frame {frame} among {len(time)}")
         for name, variable in file.variables.items() if frame is not None else ():
-            own = variable.dimensions
-            if own[:1] == ("frame",) and variable.dtype is not str and variable.dtype.kind in "iuf":
+            dimensions, kind = variable.dimensions, np.dtype(variable.dtype).kind
+            if dimensions[:1] == ("frame",) and kind in "iuf":
                 values = np.asarray(variable[frame])
-                group = atoms if own[1:2] == ("atom",) else others
+                group = atoms if dimensions[1:2] == ("atom",) else others
                 group[name] = values.astype(values.dtype.newbyteorder("="))
-        return NetcdfFrame(
+        scale = getattr(time, "scale_factor", None)
+        return Contents(
             list(file.variables),
-            count,
-            steps,
-            float(scale) if isinstance(scale, float | np.floating) else None,
+            np.asarray(time[:], np.float64),
+            None if scale is None else float(scale),
             str(getattr(file, "program", "")),
             atoms,
             others,
         )
 
 
-def _written(path: Path, atoms: Arrays) -> npt.NDArray[np.bool_]:
+def _written(path: Path, atoms: Columns) -> npt.NDArray[np.bool_]:
     """Which atoms were written: LAMMPS leaves those behind the last one of a frame as they are."""
-    count = max((len(values) for values in atoms.values()), default=0)
-    empty = np.zeros((len(atoms), count), dtype=bool)
-    for place, values in enumerate(atoms.values()):
-        filled = values == FILL.get(values.dtype.str[1:], FILL_LONG)
-        empty[place] = filled.reshape(count, -1).any(axis=1) if filled.size else False
-    lost = empty.all(axis=0)
-    if np.any(empty & ~lost):
-        name = list(atoms)[int(np.argmax((empty & ~lost).any(axis=1)))]
-        raise ReadError(
-            f"{path}: {name} was not written for all atoms: dump all three of x y z, and close the "
-            f"file before it is read"
-        )
+    empty = []
+    for values in atoms.values():
+        is_fill = values == FILL.get(values.dtype.str[1:], FILL_LONG)
+        empty.append(is_fill.any(axis=tuple(range(1, values.ndim))))
+    lost: npt.NDArray[np.bool_] = np.all(empty, axis=0)
+    for name, column in zip(atoms, empty, strict=True):
+        if np.any(column & ~lost):
+            raise ReadError(
+                f"{path}: {name} was not written for all atoms: dump all three of x y z, and close "
+                f"the file before it is read"
+            )
     return np.logical_not(lost)
 
 
-def _cell(path: Path, arrays: Arrays) -> Cell | None:
+@np.errstate(invalid="ignore", over="ignore", divide="ignore")
+def _cell(path: Path, arrays: Columns) -> Cell | None:
     """Three edges and angles; along an edge of length 0 the sample is not periodic."""
-    if not all(arrays.get(name, np.zeros(0)).shape == (3,) for name in CELL):
+    if not all(name in arrays and arrays[name].shape == (3,) for name in CELL):
         return None
     origin, edges, angles = (doubles(arrays[name]) for name in CELL)
     periodic = edges > 0
@@ -170,12 +162,10 @@ def _cell(path: Path, arrays: Arrays) -> Cell | None:
         return None
     # any length will do along an axis that is not periodic
     edges = np.where(periodic, edges, edges.max())
-    with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-        # cos 90° is zero, which rounding would make a tilt
-        alpha, beta, gamma = np.where(angles == 90.0, 0.0, np.cos(np.radians(angles)))
-        sine = np.sqrt(1.0 - gamma**2)
-        xy = (alpha - beta * gamma) / sine
-        # the first vector along x, the second in the plane x-y
-        rows = [[1, 0, 0], [gamma, sine, 0], [beta, xy, np.sqrt(1.0 - beta**2 - xy**2)]]
-        vectors = np.array(rows) * edges[:, None]
-    return cell_of(f"{path}: {', '.join(CELL)}", vectors, periodic, origin)
+    # cos 90° is zero, which rounding would make a tilt
+    alpha, beta, gamma = np.where(angles == 90.0, 0.0, np.cos(np.radians(angles)))
+    sine = np.sqrt(1.0 - gamma**2)
+    xy = (alpha - beta * gamma) / sine
+    # the first vector along x, the second in the plane x-y
+    rows = [[1, 0, 0], [gamma, sine, 0], [beta, xy, np.sqrt(1.0 - beta**2 - xy**2)]]
+    return cell_of(f"{path}: {', '.join(CELL)}", np.array(rows) * edges[:, None], periodic, origin)

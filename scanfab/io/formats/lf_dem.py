@@ -13,8 +13,7 @@ from scanfab.base.typing import FloatArray
 from scanfab.io.columns import grain_table, whole_numbers
 from scanfab.io.contacts import join_ids
 from scanfab.io.files import first_bytes
-from scanfab.io.formats.shared import cell_of, finite_forces, frames_below, numbers
-from scanfab.io.parse.growing import leave_out_last
+from scanfab.io.formats.shared import cell_of, finite_forces, marked_frames, numbers
 from scanfab.io.reader import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
 from scanfab.io.text import Layout, read_rows, spelt, text_of
 from scanfab.packing.cell import Cell
@@ -56,13 +55,20 @@ class LfDemReader:
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """One behind the other; their time is the strain."""
-        frames = frames_below(path, FRAME)
-        if self.kind(path) == "grains":
-            count, rows = _count(path), text_of(frames[-1]).count(b"\n") - 1
+        count = _count(path) if self.kind(path) == "grains" else 0
+
+        def moment(path: Path, head: bytes) -> tuple[None, float]:
+            frame = FRAME.match(head)
+            assert frame is not None
+            return None, numbers(f"{path}: time of a frame", frame[1], 1)[0]
+
+        def lack(data: bytes) -> str | None:
+            rows = data.count(b"\n") - 1
             if rows < count:
-                leave_out_last(path, len(frames) - 1, f"{rows} rows of {count}")
-                frames.pop()
-        return frames
+                return f"it has {rows} rows of {count}"
+            return None if data.endswith(b"\n") else "its last line has no end"
+
+        return marked_frames(path, FRAME, moment, lack)
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         """Columns by their titles; the images above and below are shifted along x."""

@@ -13,35 +13,17 @@ import numpy as np
 
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray
-from scanfab.io.contacts import count_walls, join_ids, rows_of_ids
+from scanfab.io.contacts import branches, count_walls, rows_of_ids
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.binary_dump import names_of_binary
-from scanfab.io.formats.ids import MOST_ROWS, are_ids, are_whole, named_places
-from scanfab.io.formats.lammps import (
-    DumpReader,
-    form_of,
-    id_column,
-    is_restart,
-    join_listed,
-    read_contact_rows,
-    whole_ids,
-)
+from scanfab.io.formats.dump_contacts import MOST_ROWS, Places, are_ids, are_whole, id_column
+from scanfab.io.formats.lammps import DumpReader, is_restart
 from scanfab.io.formats.lammps_data import is_data_file, of_liggghts
-from scanfab.io.formats.text_dump import is_dump
 from scanfab.io.formats.vtk import VtkReader, vectors
 from scanfab.io.mesh import Mesh
-from scanfab.io.reader import (
-    GrainTable,
-    JoinedContacts,
-    ReadOptions,
-    Snapshot,
-)
+from scanfab.io.reader import GrainTable, JoinedContacts
 from scanfab.packing.walls import ListedWallForces
 
-# values of compute pair/gran/local in the order in which they are written, and how many
-PAIR_VALUES = {"pos": 6, "vel": 6, "id": 3, "force": 3, "force_normal": 3, "force_tangential": 3}
-PAIR_VALUES |= {"torque": 3, "torque_normal": 3, "torque_tangential": 3, "history": 3}
-PAIR_VALUES |= {"contactArea": 1, "delta": 1, "contactPoint": 3, "ms_id": 2, "heatFlux": 1}
 # damping makes the force of a few contacts attractive; the others push
 PUSHES = 0.9
 
@@ -77,6 +59,7 @@ class LiggghtsReader(DumpReader):
     extensions = (".liggghts", ".dump", ".vtk", ".vtp", ".vtu", ".bin", ".data")
 
     other = LiggghtsVtkReader()
+    lists_walls = True
 
     def recognises(self, path: Path) -> bool:
         """An ``ITEM:`` dump, or a data file, restart or legacy VTK file that names LIGGGHTS."""
@@ -86,95 +69,35 @@ class LiggghtsReader(DumpReader):
         if head.startswith(b"# vtk DataFile"):
             return b"LIGGGHTS" in head.partition(b"\n")[2].partition(b"\n")[0]
         # LAMMPS' binary dumps name their columns, these are numbered
-        return is_dump(head) or (names_of_binary(head) or [""])[0] == "1"
+        return head.startswith(b"ITEM: ") or (names_of_binary(head) or [""])[0] == "1"
 
     def beside(self, path: Path) -> list[Path]:
         """A VTK file has its box beside it."""
         return self.other.beside(path)
 
-    def read_contacts(
-        self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
-    ) -> JoinedContacts:
+    def found(
+        self, path: Path, values: FloatArray, grains: GrainTable
+    ) -> Places | JoinedContacts | None:
         """
-        Pairs of ``pair/gran/local``, or grains of ``wall/gran/local``.
+        Pairs of ``pair/gran/local``: two columns of ids, then the periodic flag 0 or 1.
 
-        Which column is what follows from ``contact_columns``, which are the keywords of the compute
-        or names of columns; or from the values: two columns of ids, then the periodic flag 0 or 1.
+        The force stands behind the flag, if that pushes the grains apart. Without pairs there may
+        be grains that touch walls.
         """
-        path, told = snapshot.path, options.contact_columns
-        if form_of(path) is None:
-            return self.other.read_contacts(snapshot, options, grains)
-        dump = read_contact_rows(snapshot, grains)
-        if dump.rows == 0:
-            return join_listed(path, dump, {}, grains)
-        values = dump.values
-        pair = id_column(values, grains, is_flagged=True)
-        # also where `contact_columns` are named: those of the pairs
-        walls = _walls(path, values, grains) if pair is None else None
-        if walls is not None:
-            return walls
-        if told is not None and "=" in told:
-            return join_listed(path, dump, named_places(path, told, dump), grains)
-        places = {} if told is None else _keyword_places(path, told, values.shape[1])
-        place = places.get("id", pair)
+        place = id_column(values, grains, is_flagged=True)
         if place is None:
-            raise ReadError(
-                f"{path}: cannot tell which columns are the two ids of a contact: the ids may "
-                f"belong to another step; or name the keywords of the compute with "
-                f'`contact_columns="pos id force ..."`, or the columns with '
-                f'`contact_columns="id1=c_c[1],id2=c_c[2]"`, which are {", ".join(dump.names)}; a '
-                f'dump of LAMMPS is read with `format="lammps"`'
-            )
-        if not places and _pushes(values, place, grains):
-            places = {"force": place + 3}
-        # the file has the forces on the first grain
-        parts = {
-            name: -values[:, places[name] : places[name] + 3]
-            for name in ("force", "force_normal", "force_tangential")
-            if name in places
-        }
-        force, normal = parts.get("force"), parts.get("force_normal")
-        if force is None and normal is not None and "force_tangential" in parts:
-            force = normal + parts["force_tangential"]
-        ids = whole_ids(path, dump, [place, place + 1])
-        return join_ids(path, grains, ids, force, walls=False, force_n=normal)
-
-
-def _keyword_places(path: Path, told: str, width: int) -> dict[str, int]:
-    """The first column of each keyword of the compute, as users name the keywords."""
-    sizes, asked = dict(PAIR_VALUES), set()
-    for word in told.split():
-        name, _, count = word.partition(":")
-        if name == "history" and count.isdecimal():
-            sizes[name] = int(count)
-        asked.add(name)
-    if not asked <= sizes.keys() or "id" not in asked:
-        raise ReadError(
-            f"{path}: `contact_columns`: expected keywords of compute pair/gran/local, id among "
-            f"them ({', '.join(sizes)}), found {told!r}"
+            return _walls(path, values, grains)
+        force = list(range(place + 3, place + 6))
+        is_force = place + 6 <= values.shape[1] and _pushes(
+            values[:, force], values[:, place : place + 2], grains
         )
-    places, place = {}, 0
-    for name, size in sizes.items():
-        if name in asked:
-            places[name] = place
-            place += size
-    if place != width:
-        raise ReadError(
-            f"{path}: `contact_columns={told!r}` makes {place} columns, the file has {width}"
-        )
-    return places
+        return Places([place, place + 1], [force] if is_force else [])
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def _pushes(values: FloatArray, place: int, grains: GrainTable) -> bool:
-    """Whether the three columns behind the periodic flag push the first grain off the second."""
-    force = values[:, place + 3 : place + 6]
-    if force.shape[1] < 3:
-        return False
-    first, second = rows_of_ids(grains, values[:, place : place + 2]).T
-    branch = grains.position[second] - grains.position[first]
-    if grains.cell is not None:
-        branch = branch + grains.cell.nearest_image(branch) @ grains.cell.vectors
+def _pushes(force: FloatArray, ids: FloatArray, grains: GrainTable) -> bool:
+    """Whether three columns push the first grain off the second."""
+    branch = branches(grains, rows_of_ids(grains, ids))
     return bool(np.mean(np.sum(force * branch, axis=1) < 0) > PUSHES)
 
 

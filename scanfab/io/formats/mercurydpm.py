@@ -18,7 +18,7 @@ from scanfab.io.columns import grain_table, whole_numbers
 from scanfab.io.contacts import join_ids
 from scanfab.io.files import bare_name, first_bytes, plain
 from scanfab.io.formats.mercury_restart import is_restart, read_restart, time_of_restart
-from scanfab.io.formats.shared import cell_of, finite_forces, frames_below
+from scanfab.io.formats.shared import cell_of, finite_forces, marked_frames, numbers
 from scanfab.io.parse.growing import leave_out_last
 from scanfab.io.reader import Carries, FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
 from scanfab.io.text import Columns, Layout, read_rows, skip_rows, spelt, text_of
@@ -34,7 +34,7 @@ FSTAT_HEAD = re.compile(
     rb"\A(?:\xef\xbb\xbf)?#[ \t]+\S+[ \t]+[01][ \t]*\r?\n"
     rb"#(?:[ \t]+\S+){6}[ \t]*\r?\n#(?:[ \t]+\S+){6,7}[ \t]*\r?\n"
 )
-FSTAT_FRAME = re.compile(rb"(?:\xef\xbb\xbf)?#[ \t]+(\S+)[ \t]+[01][ \t]*\r?\n")
+FSTAT_FRAME = re.compile(rb"#[ \t]+(\S+)[ \t]+[01][ \t]*\r?\n")
 ABOVE = "the number of grains, time and bounds above a frame"
 LONGEST = 1 << 16
 # the interactions that it writes for ParaView name no grains
@@ -68,7 +68,11 @@ class MercuryReader:
         head = first_bytes(path, LONGEST)
         if is_restart(head):
             return [Snapshot(path, time=time_of_restart(head))]
-        return frames_below(path, FSTAT_FRAME) if FSTAT_HEAD.match(head) else _grain_frames(path)
+        return (
+            marked_frames(path, FSTAT_FRAME, _fstat_moment, _fstat_lack)
+            if FSTAT_HEAD.match(head)
+            else _grain_frames(path)
+        )
 
     def carries(self, path: Path) -> Carries:
         """A restart has its periodic boundaries; the bounds in ``.data`` may repeat or not."""
@@ -132,6 +136,16 @@ def _form(path: Path) -> str | None:
     if bounds[0] > 0:
         is_data = width == len(LAYOUTS[len(bounds)].names)
     return "data" if is_data else None
+
+
+def _fstat_moment(path: Path, head: bytes) -> tuple[None, float]:
+    frame = FSTAT_FRAME.match(head)
+    assert frame is not None
+    return None, numbers(f"{path}: time of a frame", frame[1], 1)[0]
+
+
+def _fstat_lack(data: bytes) -> str | None:
+    return None if data.endswith(b"\n") else "its last line has no end"
 
 
 def _bounds(line: bytes) -> list[float] | None:

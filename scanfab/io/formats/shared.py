@@ -1,9 +1,9 @@
-"""What the readers of small formats share: numbers in headers, cells, frames below one another."""
+"""What readers share: frames below one another, numbers in headers, cells, a base class."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
@@ -11,15 +11,42 @@ import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.typing import FloatArray
+from scanfab.io.columns import grain_table
 from scanfab.io.files import check_lines, plain
 from scanfab.io.parse.growing import leave_out_last
-from scanfab.io.reader import FileKind, GrainTable, JoinedContacts, Reader, ReadOptions, Snapshot
-from scanfab.io.text import spelt
+from scanfab.io.reader import (
+    Carries,
+    FileKind,
+    GrainTable,
+    JoinedContacts,
+    Reader,
+    ReadOptions,
+    Snapshot,
+)
+from scanfab.io.text import Columns, spelt, text_of
 from scanfab.packing.cell import Cell
+
+# the header of a frame is shorter, even with thousands of columns
+HEADER_BYTES = 1 << 16
+# bytes that are searched at a time
+PIECE = 1 << 22
+NO_COMMENT = re.compile(rb"^[ \t]*[^#\s][^\n]*", re.MULTILINE)
 
 
 class GrainsOnly(Reader):
-    """Base class of readers whose files hold one frame of grains, and no contacts."""
+    """
+    Base class of readers whose files hold grains and no contacts.
+
+    A reader says by ``recognises`` which files are of its format, and by ``table`` which
+    columns and which cell a frame has. It overrides ``snapshots`` if a file
+    may hold several frames.
+    """
+
+    has_cell: Carries = "cell"
+
+    def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
+        """All columns of a frame by their names, and its cell."""
+        raise NotImplementedError
 
     def kind(self, path: Path) -> FileKind:
         """Grains, if the file is one of this format."""
@@ -29,11 +56,27 @@ class GrainsOnly(Reader):
         """One."""
         return [Snapshot(path)]
 
+    def carries(self, path: Path) -> Carries:
+        """The same for all files of the format."""
+        return self.has_cell
+
+    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+        """The columns by their names; what lies in the plane has no column z."""
+        columns, cell = self.table(snapshot)
+        return grain_table(snapshot.path, in_space(columns), cell, options)
+
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
     ) -> JoinedContacts:
         """There are none."""
         raise ReadError(f"{snapshot.path}: {self.name} files hold no contacts of grains")
+
+
+def in_space(columns: Columns) -> Columns:
+    """The columns, with z = 0 for grains in the plane."""
+    if "x" in columns and "z" not in columns:
+        columns["z"] = np.zeros(len(columns["x"]))
+    return columns
 
 
 def numbers(where: str, text: bytes, count: int) -> list[float]:
@@ -56,9 +99,9 @@ def finite_forces(path: Path, force: FloatArray) -> FloatArray:
 
 
 def cell_of(
-    where: str, vectors: npt.ArrayLike, periodic: Iterable[bool], origin: npt.ArrayLike
+    where: str | Path, vectors: npt.ArrayLike, periodic: Iterable[bool], origin: npt.ArrayLike
 ) -> Cell | None:
-    """A :class:`Cell`; None if the vectors span no volume, and the packing is not periodic."""
+    """A :class:`Cell`; None if the vectors span no volume and the packing is not periodic."""
     x, y, z = (bool(one) for one in periodic)
     try:
         return Cell(vectors, (x, y, z), origin)
@@ -68,37 +111,62 @@ def cell_of(
         return None
 
 
-def frames_below(path: Path, head: re.Pattern[bytes]) -> list[Snapshot]:
+def marked_frames(
+    path: Path,
+    mark: re.Pattern[bytes],
+    moment: Callable[[Path, bytes], tuple[int | None, float | None] | None],
+    lack: Callable[[bytes], str | None],
+) -> list[Snapshot]:
     """
-    The frames of a text that each begin with a line like ``head``.
+    The frames of a text in the order of their steps.
 
-    The first group of ``head`` is the time of the frame. If the last line of the file has no end,
-    the last frame is left out with a warning.
+    If the last frame is incomplete (the program is still writing), it is left out with a warning,
+    unless it is the only one: then reading it says what is wrong.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    mark : Pattern
+        Matches the beginning of a line with which a frame begins. It is fast if it begins with a
+        letter, not with ``^`` or a choice.
+    moment : callable
+        Says step and time of a frame from its first bytes. None: the frame goes on behind the next
+        mark. Raises ReadError if the bytes do not say it.
+    lack : callable
+        Says what an incomplete frame lacks, from its bytes; None if it is complete.
 
     Raises
     ------
     ReadError
-        If no frame is complete.
+        If there is no frame, or one has no step or time.
     """
     check_lines(path, plain(path))
-    starts: list[tuple[int, float]] = []
-    place, line = 0, b""
+    starts: list[int] = []
+    found: list[Snapshot] = []
+    # not mapped into memory: if a mapped file is cut meanwhile, the process dies
     with open(plain(path), "rb") as stream:
-        for line in stream:
-            match = head.match(line)
-            if match is not None:
-                starts.append((place, numbers(f"{path}: time of a frame", match[1], 1)[0]))
-            elif not starts and line.strip() and not line.lstrip(b"\xef\xbb\xbf").startswith(b"#"):
-                raise ReadError(f"{path}: expected a line '# TIME ...' above {spelt(line)}")
-            place += len(line)
-    if not starts:
-        raise ReadError(f"{path}: expected frames below lines of '# TIME ...', found none")
-    stops = [*(start for start, _ in starts[1:]), place]
-    frames = [
-        Snapshot(path, time=time, start=start, stop=stop)
-        for (start, time), stop in zip(starts, stops, strict=True)
-    ]
-    if not line.endswith(b"\n"):
-        leave_out_last(path, len(frames) - 1, "its last line has no end")
-        frames.pop()
-    return frames
+        place = 0
+        # pieces of whole lines, so that no mark is cut in two
+        while piece := stream.read(PIECE) + stream.readline():
+            found_here = (one.start() for one in mark.finditer(piece))
+            starts += [place + at for at in found_here if piece[at - 1 : at] in (b"", b"\n")]
+            place += len(piece)
+        start = min(starts, default=0)
+        lost = NO_COMMENT.search(text_of(Snapshot(path, stop=start)))
+        if lost:
+            raise ReadError(f"{path}: expected the header of a frame above {spelt(lost[0])}")
+        for stop in [*starts[1:], place] if starts else ():
+            is_last = found and stop == place
+            if is_last and (reason := lack(text_of(Snapshot(path, start=start)))):
+                leave_out_last(path, len(found), reason)
+                break
+            stream.seek(start)
+            at = moment(path, stream.read(min(HEADER_BYTES, stop - start)))
+            if at is not None:
+                found.append(Snapshot(path, *at, start, stop))
+                start = stop
+    if not found:
+        expected = "expected the header of a frame, found none"
+        raise ReadError(f"{path}: {expected if place else 'the file is empty'}")
+    return sorted(found, key=lambda one: one.step or 0)

@@ -24,25 +24,7 @@ ROUNDING = 1e-5
 def refuse_superquadrics(
     path: Path, columns: Mapping[str, npt.NDArray[Any]], radius: FloatArray, where: str = ""
 ) -> None:
-    """
-    Make sure that all particles are spheres.
-
-    Parameters
-    ----------
-    path : Path
-        For messages.
-    columns : mapping of str to ndarray
-        All columns by the dump's names, N rows each.
-    radius : ndarray, shape (N,)
-        Of a superquadric that of the sphere around it, dump's length unit.
-    where : str, optional
-        For messages, such as ``", step 100"``.
-
-    Raises
-    ------
-    ReadError
-        If one is not.
-    """
+    """ReadError if some particles are no spheres: their radius is that of a sphere around them."""
     expected = dict.fromkeys(HALF_AXES, radius) | dict.fromkeys(EXPONENTS, ROUND)
     for name in [name for name in columns if name.lower() in expected]:
         value = expected[name.lower()]

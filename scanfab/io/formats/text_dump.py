@@ -1,120 +1,88 @@
 """
-The ``ITEM:`` text dumps of LIGGGHTS and LAMMPS.
+The text dumps of LIGGGHTS and LAMMPS: sections below ``ITEM:`` lines, and LAMMPS' ``dump yaml``.
 
-A snapshot is a header of sections, each below a line such as ``ITEM: TIMESTEP``, and a table, whose
-columns stand in the last of these lines: ``ITEM: ATOMS id type x y z radius``.
+A snapshot is a header and a table. The names of the table's columns stand in the last ``ITEM:``
+line: ``ITEM: ATOMS id type x y z radius``. A header in YAML is translated into such sections.
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import replace
-from itertools import pairwise
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from scanfab.base.errors import ReadError
-from scanfab.base.typing import FloatArray
-from scanfab.io.columns import grain_table, has_radius
-from scanfab.io.files import check_lines, first_bytes, plain
-from scanfab.io.formats.lammps_box import dump_cell
-from scanfab.io.parse.growing import grows, warn_incomplete
-from scanfab.io.reader import FileKind, GrainTable, ReadOptions, Snapshot
-from scanfab.io.text import Columns, Layout, read_rows, text_of
+from scanfab.io.columns import has_radius
+from scanfab.io.files import first_bytes
+from scanfab.io.formats.dump import Dump, box_cell, numbers_as_names
+from scanfab.io.formats.shared import HEADER_BYTES, marked_frames
+from scanfab.io.parse.growing import grows
+from scanfab.io.reader import FileKind, Snapshot
+from scanfab.io.text import Layout, read_rows, text_of
 from scanfab.packing.cell import Cell
 
-# a header is shorter, even with thousands of columns
-HEADER_BYTES = 1 << 16
-# bytes that are searched at a time
-PIECE = 1 << 22
-# a snapshot may be this large, and larger by so many bytes for each word of its rows: what is
-# larger was decompressed from a file that was made to fill the memory
-MUCH_TEXT, WORD_BYTES = 16 << 20, 100
-# a key, and the lines below it; some files begin with a byte order mark
-SECTION = re.compile(
-    rb"^(?:\xef\xbb\xbf)?ITEM: ([^\r\n]*)\r?\n((?:(?!ITEM: )[^\n]*\n)*)", re.MULTILINE
-)
-# the sections with which a snapshot begins
-FIRST = ([b"UNITS"], [b"TIME"], [b"TIMESTEP"])
+# a snapshot begins with the first of these lines
+MARK, YAML_MARK = re.compile(rb"ITEM: (?:UNITS|TIME|TIMESTEP)\b"), re.compile(rb"---[ \t\r]*\n")
+# the words behind ITEM:, and the lines below them
+SECTION = re.compile(rb"^ITEM: ([^\r\n]*)\r?\n((?:(?!ITEM: )[^\n]*\n)*)", re.MULTILINE)
+YAML = re.compile(rb"---[ \t]*\r?\ncreator:[ \t]*LAMMPS[ \t]*\r?\n")
+YAML_VALUE = re.compile(r"^(\w+):[ \t]*(.*)$", re.MULTILINE)
+YAML_BOX = re.compile(r"^box:[ \t]*\n((?:[ \t]*-[^\n]*\n){1,4})", re.MULTILINE)
+YAML_ROWS, YAML_END = re.compile(rb"^data:[ \t]*\r?\n", re.MULTILINE), b"\n..."
+# the kind of box, and two letters for each axis: its lower and its upper face
+BOX_KEY = re.compile(r"BOX BOUNDS(?: (abc origin|xy xz yz))?((?: (?:pp|[fsm]{2})){3})?")
+# numbers in each line of a box of this kind
+BOX_WIDTHS = {None: 2, "xy xz yz": 3, "abc origin": 4}
 # columns of words
 WORDS = ("element", "lattice")
 
 
-class Dump(NamedTuple):
-    """One snapshot."""
+class Header(NamedTuple):
+    """What stands above the rows of a snapshot, as it stands there: nothing is checked yet."""
 
+    sections: dict[str, list[str]]
+    """The lines below each ``ITEM:`` line, by the words in it."""
     names: list[str]
-    """Of the columns; their numbers from 1 in old files, which do not name them."""
-    columns: Columns
-    """Shape (N,) each; of repeated names the first counts."""
-    cell: Cell | None
-    rows: int
-    """Number of rows."""
+    """Of the columns; none in dumps of old versions."""
+    begin: int
+    """The first byte of the rows; 0 if they are not there."""
+    end: int | None
+    """The byte behind the rows; None: the end of the snapshot."""
 
     @property
-    def values(self) -> FloatArray:
-        """All columns, shape (N, columns)."""
-        return np.column_stack([self.columns[name] for name in self.names]).astype(np.float64)
+    def number(self) -> str:
+        """What ``NUMBER OF ...`` says."""
+        return "".join(self.sections.get(f"NUMBER OF {self.what}", [])[:1]).strip()
+
+    @property
+    def what(self) -> str:
+        """What is counted: ATOMS, or ENTRIES (or a label of the deck) in lists of contacts."""
+        keys = (key for key in self.sections if key.startswith("NUMBER OF "))
+        return next(keys, "NUMBER OF ATOMS").removeprefix("NUMBER OF ")
 
 
-def is_dump(head: bytes) -> bool:
-    """Whether a file starts as such dumps do."""
-    return head.startswith((b"ITEM: ", b"\xef\xbb\xbfITEM: "))
+def is_text_dump(head: bytes) -> bool:
+    """Whether a file starts as these dumps do."""
+    return head.startswith(b"ITEM: ") or YAML.match(head) is not None
 
 
-def dump_kind(path: Path) -> FileKind:
-    """Whatever a dump counts are contacts, unless they are atoms: grains, if they have a radius."""
-    sections, names, _ = _header(first_bytes(path, HEADER_BYTES))
-    words = [key for key in sections if key.startswith("NUMBER OF ")]
-    if words and words != ["NUMBER OF ATOMS"]:
+def text_kind(path: Path) -> FileKind:
+    """Atoms are grains if they have a radius; whatever else is counted are contacts."""
+    header = _header(first_bytes(path, HEADER_BYTES))
+    if header.what != "ATOMS":
         return "contacts"
-    return "grains" if has_radius(names) else "points" if sections else "other"
+    return "grains" if has_radius(header.names) else "points" if header.sections else "other"
 
 
-def index_dump(path: Path) -> list[Snapshot]:
-    """
-    The snapshots of a file, in the order of their steps.
-
-    An incomplete last snapshot (the program is still writing) is left out with a warning if there
-    is a complete one before it.
-
-    Raises
-    ------
-    ReadError
-        If there is no snapshot, or one has no step.
-    """
-    file = plain(path)
-    check_lines(path, file)
-    found: list[Snapshot] = []
-    # not mapped into memory: if a mapped file is cut meanwhile, the process dies
-    with open(file, "rb") as stream:
-        starts = _starts(stream)
-        size = stream.tell()
-        if not starts:
-            reason = "expected a line ITEM: TIMESTEP, found none" if size else "the file is empty"
-            raise ReadError(f"{path}: {reason}")
-        for start, stop in pairwise([*starts, size]):
-            if found and stop == size and not _is_whole(Snapshot(path, start=start, stop=stop)):
-                number = len(starts)
-                warn_incomplete(
-                    f"{path}: the last snapshot, number {number}, is incomplete and is left out"
-                )
-                break
-            stream.seek(start)
-            sections, _, _ = _header(stream.read(min(HEADER_BYTES, stop - start)))
-            try:
-                step = int(sections["TIMESTEP"][0])
-                time = float(sections["TIME"][0]) if "TIME" in sections else None
-            except (LookupError, ValueError):
-                raise ReadError(f"{path}: expected a whole number after ITEM: TIMESTEP") from None
-            found.append(Snapshot(path, step, time, start, stop))
-    # a program that was started again may have gone back
-    return sorted(found, key=lambda one: one.step or 0)
+def text_snapshots(path: Path) -> list[Snapshot]:
+    """The snapshots of a file, in the order of their steps; an incomplete last one is left out."""
+    mark = YAML_MARK if first_bytes(path, 3) == b"---" else MARK
+    return marked_frames(path, mark, _moment, _lack)
 
 
-def read_dump(snapshot: Snapshot) -> Dump:
+def read_text_dump(snapshot: Snapshot) -> Dump:
     """
     One snapshot; words of elements stay words, all other columns are numbers.
 
@@ -123,98 +91,114 @@ def read_dump(snapshot: Snapshot) -> Dump:
     ReadError
         If the header or a line is not as it should be; names the line.
     """
-    data = text_of(snapshot)
-    where = f"{snapshot.path}, step {snapshot.step}"
-    sections, names, count, begin = _table(where, data)
-    first = data[begin : data.find(b"\n", begin)]
-    names = names or [f"{place + 1}" for place in range(len(first.split()))]
-    line = data.count(b"\n", 0, begin) + 1
-    layout = Layout(tuple(names), line=line, whole=("id",), text=WORDS)
-    columns = read_rows(snapshot, data[begin:], layout, count=count)
-    return Dump(names, columns, dump_cell(where, sections), count)
-
-
-def read_dump_grains(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
-    """Columns in any order and any subset that suffices; of repeated names the first counts."""
-    dump = read_dump(snapshot)
-    columns = dump.columns
-    if "1" in columns:
-        options = numbered_columns(snapshot.path, "dump", len(columns), options)
-    # LAMMPS called ids so until 2008
-    if "tag" in columns and "id" not in {*columns, *options.columns}:
-        columns["id"] = columns.pop("tag")
-    return grain_table(snapshot.path, columns, dump.cell, options, f", step {snapshot.step}")
-
-
-def numbered_columns(path: Path, what: str, width: int, options: ReadOptions) -> ReadOptions:
-    """Options with the numbers of columns as their names; ReadError if users name no columns."""
-    if not options.columns:
+    data, where = text_of(snapshot), f"{snapshot.path}, step {snapshot.step}"
+    header = _header(data)
+    if not header.begin:
         raise ReadError(
-            f"{path}: this {what} does not name its {width} columns: name them as the deck "
-            f'lists them, by their numbers from 1: `columns="id=1,type=2,x=3,y=4,z=5,radius=6"`'
+            f"{where}: the header is incomplete: no line ITEM: {header.what} (in YAML: data:, and "
+            f"... below the rows)"
         )
-    return replace(options, columns={what: str(own) for what, own in options.columns.items()})
+    if not re.fullmatch(r"\d{1,18}", header.number):
+        raise ReadError(
+            f"{where}: expected a whole number after ITEM: NUMBER OF {header.what}, found "
+            f"{header.number[:80]!r}"
+        )
+    rows = data[header.begin : header.end]
+    if header.end is not None:
+        # entries such as "- [ 1, 0.5, ]", one a line
+        rows = rows.replace(b"- [", b"").translate(None, b"],")
+    names = header.names or numbers_as_names(len(rows.partition(b"\n")[0].split()))
+    line = data.count(b"\n", 0, header.begin) + 1
+    layout = Layout(tuple(names), line=line, whole=("id",), text=WORDS)
+    columns = read_rows(snapshot, rows, layout, count=int(header.number))
+    return Dump(names, columns, _cell(where, header.sections))
 
 
-def _starts(stream: IO[bytes]) -> list[int]:
-    """First bytes of the snapshots; the stream is at its end then."""
-    starts: list[int] = []
-    place, is_first = 0, False
-    # pieces of whole lines, so that no key is cut in two
-    while piece := stream.read(PIECE) + stream.readline(HEADER_BYTES):
-        at = piece.find(b"ITEM: ")
-        while at >= 0:
-            if at == 0 or piece[at - 1] in b"\n\xbf":
-                was_first, is_first = is_first, piece[at + 6 : at + 20].split()[:1] in FIRST
-                if is_first and not was_first:
-                    starts.append(place + at)
-            at = piece.find(b"ITEM: ", at + 6)
-        place += len(piece)
-    return starts
-
-
-def _header(head: bytes) -> tuple[dict[str, list[str]], list[str], int]:
-    """Lines by the key above them, names of the columns, and the first row; 0 if there is none."""
+def _header(data: bytes) -> Header:
+    if data.startswith(b"---"):
+        return _yaml_header(data)
     sections: dict[str, list[str]] = {}
-    word = None
-    for one in SECTION.finditer(head):
+    for one in SECTION.finditer(data[:HEADER_BYTES]):
         key = one[1].decode("utf-8", "replace").strip()
-        if key.split()[:1] == [word]:
-            return sections, key.split()[1:], one.start(2)
+        if f"NUMBER OF {key.partition(' ')[0]}" in sections:
+            return Header(sections, key.split()[1:], one.start(2), None)
         sections[key] = one[2].decode("utf-8", "replace").splitlines()
-        if key.startswith("NUMBER OF "):
-            word = key.removeprefix("NUMBER OF ")
-    return sections, [], 0
+    return Header(sections, [], 0, None)
 
 
-def _table(where: str, data: bytes) -> tuple[dict[str, list[str]], list[str], int, int]:
-    """The header of a snapshot with the number of its rows; ReadError if they cannot be there."""
-    sections, names, begin = _header(data[:HEADER_BYTES])
-    key = next((key for key in sections if key.startswith("NUMBER OF ")), "NUMBER OF ATOMS")
-    found = "".join(sections.get(key, [])[:1]).strip()
-    if sections and not re.fullmatch(r"\d{1,18}", found):
-        raise ReadError(f"{where}: expected a whole number after ITEM: {key}, found {found[:80]!r}")
-    if not begin:
-        raise ReadError(f"{where}: the header is incomplete: no ITEM: ATOMS line")
-    count, width, size = int(found), max(len(names), 1), len(data) - begin
-    if size > MUCH_TEXT + count * width * WORD_BYTES:
-        raise ReadError(f"{where}: the header counts {count} rows, but {size:,} bytes follow")
+def _yaml_header(data: bytes) -> Header:
+    """The header of a document, as the sections of a text dump."""
+    rows = YAML_ROWS.search(data, 0, HEADER_BYTES)
+    begin, end = (0, 0) if rows is None else (rows.end(), data.rfind(YAML_END) + 1)
+    text = data[: begin or HEADER_BYTES].decode("utf-8", "replace").replace("\r", "")
+    values = {key: value.strip() for key, value in YAML_VALUE.findall(text)}
+
+    def listed(text: str) -> list[str]:
+        """The words of a list such as ``[ p, p, f, f, ]``; names may have brackets, too."""
+        return text.strip(" -").removeprefix("[").removesuffix("]").replace(",", " ").split()
+
+    letters = listed(values.get("boundary", ""))
+    flags = [low + high for low, high in zip(letters[::2], letters[1::2], strict=False)]
+    found = YAML_BOX.search(text)
+    box = [listed(line) for line in found[1].splitlines()] if found else []
+    if len(box) == 4:
+        # the tilt stands in a line of its own
+        box = [[*line, tilt] for line, tilt in zip(box, box[3], strict=False)]
+        flags = ["xy", "xz", "yz", *flags]
+    keys = {"timestep": "TIMESTEP", "time": "TIME", "natoms": "NUMBER OF ATOMS"}
+    sections = {keys[key]: [value] for key, value in values.items() if key in keys}
+    if box:
+        sections[" ".join(["BOX BOUNDS", *flags])] = [" ".join(line) for line in box]
+    names = listed(values.get("keywords", ""))
+    return Header(sections, names, begin if begin <= end else 0, end)
+
+
+def _moment(path: Path, head: bytes) -> tuple[int, float | None] | None:
+    """The step and the time of a snapshot; None if its header goes on below the next mark."""
+    sections = _header(head).sections
+    if sections and sections.keys() <= {"UNITS", "TIME", "TIMESTEP"}:
+        return None
+    step = "".join(sections.get("TIMESTEP", [])[:1]).strip()
+    if not re.fullmatch(r"-?\d{1,18}", step):
+        raise ReadError(
+            f"{path}: expected a whole number after ITEM: TIMESTEP, found {step[:80]!r}"
+        )
+    try:
+        return int(step), float(sections["TIME"][0]) if "TIME" in sections else None
+    except (LookupError, ValueError):
+        raise ReadError(f"{path}, step {step}: expected a number after ITEM: TIME") from None
+
+
+def _lack(data: bytes) -> str | None:
+    """What the last snapshot of a file lacks."""
+    header = _header(data)
+    if not header.begin:
+        return "its header or its end is missing"
     last = data[data.rfind(b"\n") + 1 :].split()
     # the last line may lack its end if it lacks no word
-    lines = data.count(b"\n", begin) + (len(last) == width and not grows())
-    if lines < count:
-        raise ReadError(
-            f"{where}: the header counts {count} rows, but the file ends after {lines} complete "
-            f"lines: the snapshot is incomplete"
-        )
-    return sections, names, count, begin
+    is_line = len(last) == max(len(header.names), 1) and not grows()
+    rows = data.count(b"\n", header.begin, header.end) + is_line
+    # a count that is none is told where the snapshot is read
+    if header.number.isdecimal() and rows < int(header.number[:18]):
+        return f"it has {rows} rows of {header.number}"
+    return None
 
 
-def _is_whole(snapshot: Snapshot) -> bool:
-    """Whether a snapshot has all rows that its header counts."""
-    data = text_of(snapshot)
+def _cell(where: str, sections: dict[str, list[str]]) -> Cell | None:
+    """The box, periodic along the axes with the flag pp; very old dumps have no flags."""
+    key = next((key for key in sections if key.startswith("BOX BOUNDS")), None)
+    if key is None:
+        return None
+    where = f"{where}: ITEM: {key}"
+    match = BOX_KEY.fullmatch(" ".join(key.split()))
+    if match is None:
+        raise ReadError(f"{where}: expected three boundary flags such as pp, ff, fs or mm")
     try:
-        _table("", data)
-    except ReadError:
-        return False
-    return True
+        bounds = np.array([line.split() for line in sections[key][:3]], dtype=np.float64)
+    except ValueError:
+        bounds = np.zeros(0)
+    width = BOX_WIDTHS[match[1]]
+    if bounds.shape != (3, width):
+        raise ReadError(f"{where}: expected three lines of {width} numbers")
+    x, y, z = (flag == "pp" for flag in (match[2] or "ff ff ff").split())
+    return box_cell(where, bounds, (x, y, z))

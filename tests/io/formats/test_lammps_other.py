@@ -6,35 +6,12 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab import ReadError, ScanfabWarning
+from scanfab import ReadError
 from scanfab.io import fence
 from scanfab.io.registry import reader_named
 from scanfab.testing import check_reader
-from tests.helpers.dumps import ROWS, dump_text, write
+from tests.helpers.dumps import ROWS, write
 from tests.helpers.made.lammps import netcdf, yaml_text
-
-
-def test_yaml_is_read_as_the_text_is(tmp_path):
-    packing = scanfab.read(write(tmp_path / "a.yaml", yaml_text()))
-    # the bounds are those around the tilted box
-    box = ((0, 1.5, 0.5), (0, 1, 0), (-1, 1, 0))
-    flags = " xy xz yz pp ff mm"
-    text = scanfab.read(write(tmp_path / "a.dump", dump_text(flags=flags, box=box, step=100)))
-    np.testing.assert_array_equal(packing.position, text.position)
-    np.testing.assert_array_equal(packing.radius, text.radius)
-    np.testing.assert_array_equal(packing.cell.vectors, text.cell.vectors)
-    assert packing.cell.periodic == text.cell.periodic == (True, False, False)
-    assert packing.id.tolist() == [1, 2, 3]
-    assert (packing.step, packing.time) == (100, 0.5)
-    assert packing.columns["c_a[1]"].tolist() == [-3, -3, -3]
-
-
-def test_yaml_of_many_frames(tmp_path):
-    text = yaml_text(200) + yaml_text(100)
-    series = scanfab.read_series(write(tmp_path / "a.yaml", text))
-    assert [frame.step for frame in series] == [100, 200]
-    with pytest.warns(ScanfabWarning, match="last snapshot, number 2, is incomplete"):
-        assert len(scanfab.read_series(write(tmp_path / "b.yaml", text[:-6]))) == 1
 
 
 def test_netcdf(tmp_path):
@@ -73,23 +50,6 @@ def test_netcdf_without_the_package(tmp_path, monkeypatch):
     monkeypatch.setattr(fence, "find_spec", lambda name: None)
     with pytest.raises(ReadError, match=r'pip install "scanfab\[netcdf\]"'):
         scanfab.read(path)
-
-
-def test_a_dump_that_names_no_columns(tmp_path):
-    text = dump_text(names="", flags="").replace("ATOMS  \n", "ATOMS\n")
-    path = write(tmp_path / "old.dump", text)
-    with pytest.raises(ReadError, match="this dump does not name its 6 columns"):
-        scanfab.read(path)
-    numbers = {"id": 1, "x": 3, "y": 4, "z": 5, "radius": 6}
-    packing = scanfab.read(path, columns=numbers)
-    np.testing.assert_array_equal(packing.position, np.array(ROWS)[:, 2:5])
-    assert packing.columns["2"].tolist() == [1, 1, 2]
-    assert packing.cell.periodic == (False, False, False)
-
-
-def test_ids_of_old_versions(tmp_path):
-    text = dump_text(names="tag type x y z radius").replace("\n1 1", "\n7 1")
-    assert scanfab.read(write(tmp_path / "old.dump", text)).id.tolist() == [7, 2, 3]
 
 
 def test_the_kit(tmp_path):

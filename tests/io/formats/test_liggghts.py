@@ -227,10 +227,10 @@ ROUNDED = local_text([(f"{one:g}", f"{two:g}", 0, -1, 0, 0) for one, two in chai
         (local_text([(1, 2, 0, 2, 3, 0), (2, 3, 0, 1, 2, 0)]), ROWS, None, "cannot tell which col"),
         (WIDE, ROWS, "pos force", "id among them"),
         (WIDE, ROWS, "", "id among them"),
-        (WIDE, ROWS, "id forces", "expected keywords of compute pair/gran/local"),
+        (WIDE, ROWS, "id forces", "keywords of compute pair/gran/local"),
         (WIDE, ROWS, "id force torque", "makes 9 columns, the file has 6"),
         (WIDE, ROWS, "id force history:2", "makes 8 columns, the file has 6"),
-        (WIDE, ROWS, "id1=c_con[2],id2=c_con[9]", r"there is no column 'c_con\[9\]'"),
+        (WIDE, ROWS, "id1=c_con[2],id2=c_con[9]", r"found 'id1=c_con\[2\],id2=c_con\[9\]'"),
         (ROUNDED, chain(1234561)[0], None, r"rounded to six digits.*%\.0f"),
         # each rounded id is that of another grain
         (ROUNDED, chain(1234560, 0.01)[0], "id force", r"rounded to six digits.*%\.0f"),

@@ -8,7 +8,6 @@ import scanfab
 from scanfab.io.reader import ReadOptions
 from scanfab.io.registry import reader_named
 from scanfab.testing import check_reader
-from tests.helpers.made.lammps import yaml_text
 from tests.helpers.sound_files import SMALL
 
 # file, what is replaced in it, by what, and words of the message
@@ -72,15 +71,6 @@ WRONG = {
         ("a.txt", " 36 9", " 99 9", "line 1: expected the number of a property, found '99'"),
         ("a.txt", "28 0 0", "28 1 1", "its periodic domain"),
     ],
-    "yaml": [
-        ("a.yaml", "natoms: 3", "natoms: 4", "the header counts 4 atoms, found 3"),
-        ("a.yaml", "natoms: 3", "natoms: x", "natoms: and a whole number"),
-        ("a.yaml", ", -3, ]", ", ]", "line 18: expected 7 columns, found 6"),
-        ("a.yaml", "0.39", "word", "line 19: expected a number in the column x, found 'word'"),
-        ("a.yaml", "boundary: [ p, p,", "boundary: [ p, q,", "three boundary flags"),
-        ("a.yaml", "timestep: 100", "timestep: ", "expected timestep:"),
-        ("a.yaml", "...", "", "the file is incomplete"),
-    ],
 }
 CASES = [(name, *case) for name, cases in WRONG.items() for case in cases]
 # files that no cut may make a smaller sample
@@ -89,11 +79,10 @@ COUNTED = ("a.mdpa", "a.dat", "flat.data", "run.restart", "a.gsd")
 
 @pytest.mark.parametrize(("format", "name", "old", "new", "message"), CASES)
 def test_what_is_wrong(tmp_path, format, name, old, new, message):
-    (tmp_path / "a.yaml").write_text(yaml_text())
-    path = tmp_path / "a.yaml" if format == "yaml" else SMALL[format](tmp_path)[0]
+    path = SMALL[format](tmp_path)[0]
     file = tmp_path / name
     assert old in file.read_text()
-    file.write_text(file.read_text().replace(old, new, 1 if format != "yaml" else -1))
+    file.write_text(file.read_text().replace(old, new, 1))
     with pytest.raises(scanfab.ScanfabError, match=message):
         scanfab.read_series(path if format == "esys" else file, contacts="geometric")[0].read()
 
