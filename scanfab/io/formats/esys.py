@@ -8,21 +8,19 @@ from pathlib import Path
 import numpy as np
 
 from scanfab.base.errors import ReadError
-from scanfab.io.columns import grain_table
 from scanfab.io.files import file_inside, first_bytes
 from scanfab.io.formats.shared import GrainsOnly, cell_of, numbers
-from scanfab.io.reader import GrainTable, ReadOptions, Snapshot
+from scanfab.io.reader import Snapshot
 from scanfab.io.text import Columns, Layout, read_rows, spelt, text_of
 from scanfab.packing.cell import Cell
 
-# version of the layout; steps in all, length of a step, step; then the box in words
+# version of the layout, 2 or 3; steps in all, length of a step, step; the box; names of files
 HEADER = re.compile(
-    rb"\A(?:\xef\xbb\xbf)?V\s+(\d{1,3})\s+(\d{1,18})\s+([-+.\deE]+)\s+(\d{1,18})\s+(?:ESyS|LSM)[^\n]*\n"
+    rb"V\s+[23]\s+\d{1,18}\s+([-+.\deE]+)\s+(\d{1,18})\s+(?:ESyS|LSM)[^\n]*\n"
     rb"\s*BoundingBox\s+((?:[-+.\deEnaif]+\s+){6})PeriodicBoundaries\s+([01])\s+([01])\s+([01])\s+"
     rb"Dimension\s+([23])[dD]\s+(.*)\Z",
     re.DOTALL,
 )
-BEGINNING = re.compile(rb"(?:\xef\xbb\xbf)?V\s")
 # centre, radius, id, tag, mass; first and last centre, velocity, force, shift through the box
 BASIC = "x y z radius id tag mass x0 y0 z0 xo yo zo vx vy vz fx fy fz sx sy sz"
 ROTATING = "q0 q1 q2 q3 wx wy wz"
@@ -36,8 +34,8 @@ LAYOUTS = {
         f"{BASIC} is_dynamic inertia {ROTATING} is_rot",
     )
 }
-# the name of a worker's file, and its first line
-PART = re.compile(r"(.*_t=\d+_)[1-9]\d*(\.\w+)")
+# names of a header and of a worker's file, and the first line of the latter
+NAME, PART = re.compile(r"(.*_)0(\.\w+)"), re.compile(r"(.*_t=\d+_)[1-9]\d*(\.\w+)")
 COUNT = re.compile(rb"\s*(\d{1,15})[ \t]*\r?\n")
 LONGEST = 1 << 20
 
@@ -50,20 +48,18 @@ class EsysReader(GrainsOnly):
     extensions: tuple[str, ...] = (".txt",)
 
     def recognises(self, path: Path) -> bool:
-        """By the first words of a header."""
-        # a header may be long, but few files begin as one does
-        begins = BEGINNING.match(first_bytes(path)) is not None
-        return begins and HEADER.match(first_bytes(path, LONGEST)) is not None
+        """By the first words of a header, which may be long, but few files begin as one does."""
+        return first_bytes(path, 2)[:1] == b"V" and bool(HEADER.match(first_bytes(path, LONGEST)))
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """One, at its step."""
         head = _header(path)
-        step = int(head[4])
-        return [Snapshot(path, step, step * numbers(f"{path}: step length", head[3], 1)[0])]
+        step = int(head[2])
+        return [Snapshot(path, step, step * numbers(f"{path}: step length", head[1], 1)[0])]
 
     def beside(self, path: Path) -> list[Path]:
         """The files of the workers, called like their header but for the last number."""
-        match = re.fullmatch(r"(.*_)0(\.\w+)", path.name)
+        match = NAME.fullmatch(path.name)
         if match is None:
             return []
         pattern = re.compile(re.escape(match[1]) + r"[1-9]\d*" + re.escape(match[2]))
@@ -74,13 +70,11 @@ class EsysReader(GrainsOnly):
         match = PART.fullmatch(path.name)
         return None if match is None else path.with_name(f"{match[1]}0{match[2]}")
 
-    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+    def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
         """The particles of all workers, one behind the other."""
         path, head = snapshot.path, _header(snapshot.path)
-        if head[1] not in (b"2", b"3"):
-            raise ReadError(f"{path}: expected version 2 or 3, found {head[1].decode()}")
         # the names are absolute where the run was: the files lie beside their header
-        names = [word.decode("utf-8", "replace").replace("\\", "/") for word in head[10].split()]
+        names = [word.decode("utf-8", "replace").replace("\\", "/") for word in head[8].split()]
         files = [file_inside(path, name.rpartition("/")[2]) for name in names]
         if not files or len(set(files)) < len(files):
             raise ReadError(f"{path}: expected the names of its workers' files, found {names}")
@@ -88,7 +82,7 @@ class EsysReader(GrainsOnly):
         if len({len(part) for part in parts}) > 1:
             raise ReadError(f"{path}: its files have different numbers of columns")
         columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-        return grain_table(path, columns, _cell(path, head), options)
+        return columns, _cell(path, head)
 
 
 def _header(path: Path) -> re.Match[bytes]:
@@ -119,11 +113,9 @@ def _particles(file: Path) -> Columns:
 
 
 def _cell(path: Path, head: re.Match[bytes]) -> Cell | None:
-    bounds = numbers(f"{path}: BoundingBox", head[5], 6)
-    low, high = np.array(bounds[:3]), np.array(bounds[3:])
-    along = [one == b"1" for one in head.group(6, 7, 8)]
-    edges = high - low
-    if head[9] == b"2" and edges[2] <= 0:
+    low, high = np.reshape(numbers(f"{path}: BoundingBox", head[3], 6), (2, 3))
+    along, edges = [one == b"1" for one in head.group(4, 5, 6)], high - low
+    if head[7] == b"2" and edges[2] <= 0:
         # a plane is not periodic across, whatever the header says
         along[2], edges[2] = False, float(max(edges[0], edges[1]))
     return cell_of(f"{path}: BoundingBox", edges, along, low)

@@ -8,20 +8,17 @@ means, so a file without diameters has no radii.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
-from scanfab.io.columns import grain_table, has_radius
+from scanfab.io.columns import has_radius
 from scanfab.io.fence import fenced, needed
 from scanfab.io.files import first_bytes
-from scanfab.io.formats.shared import GrainsOnly, cell_of
-from scanfab.io.reader import FileKind, GrainTable, ReadOptions, Snapshot
+from scanfab.io.formats.shared import GrainsOnly, cell_of, numbered_frames
+from scanfab.io.reader import FileKind, Snapshot
+from scanfab.io.text import Columns
 from scanfab.packing.cell import Cell
-
-Arrays = dict[str, npt.NDArray[Any]]
 
 # the first eight bytes of a file
 MAGIC = (0x65DF65DF65DF65DF).to_bytes(8, "little")
@@ -45,48 +42,42 @@ class GsdReader(GrainsOnly):
         """Grains, or points if no diameters were ever written."""
         if not self.recognises(path):
             return "other"
-        _, names, _ = _read(path, None)
-        return "grains" if has_radius([_bare(name) for name in names]) else "points"
+        return "grains" if has_radius([_bare(name) for name in _read(path, None)[1]]) else "points"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """The frames with their steps; ``start`` of a snapshot is the number of its frame."""
-        arrays, _, count = _read(path, None)
-        found = []
-        for number in range(count):
-            step = arrays.get(f"{number}", np.zeros(1, np.int64))
-            if step.shape != (1,) or step.dtype.kind not in "iu" or step[0] >= 2**63:
-                raise ReadError(f"{path}: frame {number}: expected one whole number as step")
-            found.append(Snapshot(path, int(step[0]), start=number, stop=number + 1))
-        if not found:
-            raise ReadError(f"{path}: expected frames, found none")
-        return found
+        steps, _, count = _read(path, None)
+        found = [steps.get(f"{number}", np.zeros(1, np.int64)) for number in range(count)]
+        if any(step.shape != (1,) or step.dtype.kind not in "iu" for step in found):
+            raise ReadError(f"{path}: expected one whole number as step of each frame")
+        return numbered_frames(path, ((int(step[0]), None) for step in found))
 
-    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+    def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
         """What the frame, or else the first one, has of each particle."""
-        path, where = snapshot.path, f", frame {snapshot.start}"
+        path = snapshot.path
         arrays, _, _ = _read(path, snapshot.start)
-        count = arrays.pop("particles/N", np.zeros(0))
+        count = arrays.pop("particles/N", np.zeros(0)).tolist()
         position = arrays.pop("particles/position", np.zeros((0, 3), np.float32))
-        if position.shape != (*count.tolist(), 3) and (count.size or position.shape[1:] != (3,)):
+        if position.shape[1:] != (3,) or (count and [len(position)] != count):
             raise ReadError(
-                f"{path}{where}: {count.tolist()} particles, but positions of shape "
+                f"{path}, frame {snapshot.start}: {count} particles, but positions of shape "
                 f"{position.shape}"
             )
-        columns: Arrays = {"position": position.astype(np.float64)}
+        columns: Columns = {"position": position.astype(np.float64)}
         for name, values in arrays.items():
             # the first frame may have had another number of particles; types are texts
             is_column = PARTICLES in name and name != "particles/types"
             if is_column and len(values) == len(position):
                 columns[_bare(name)] = values
-        return grain_table(path, columns, _cell(path, arrays), options, where)
+        return columns, _cell(path, arrays)
 
 
-def _read(path: Path, frame: int | None) -> tuple[Arrays, list[str], int]:
+def _read(path: Path, frame: int | None) -> tuple[Columns, list[str], int]:
     needed(path, "gsd", "gsd")
     return fenced(read_in_worker, path, frame)
 
 
-def read_in_worker(path: str, frame: int | None) -> tuple[Arrays, list[str], int]:
+def read_in_worker(path: str, frame: int | None) -> tuple[Columns, list[str], int]:
     """
     The arrays of a frame, the names of all arrays, and the number of frames.
 
@@ -95,7 +86,7 @@ def read_in_worker(path: str, frame: int | None) -> tuple[Arrays, list[str], int
     """
     import gsd.fl
 
-    arrays: Arrays = {}
+    arrays: Columns = {}
     with gsd.fl.open(path, mode="r") as file:
         if file.schema != "hoomd":
             raise ValueError(f"its schema is {file.schema!r}, expected 'hoomd'")
@@ -103,11 +94,10 @@ def read_in_worker(path: str, frame: int | None) -> tuple[Arrays, list[str], int
         for number in range(file.nframes) if frame is None else [frame]:
             for name in [STEP] if frame is None else names:
                 # what does not change is written in the first frame only
-                for place in (number, 0):
-                    if file.chunk_exists(frame=place, name=name):
-                        values = np.asarray(file.read_chunk(frame=place, name=name))
-                        arrays[f"{number}" if frame is None else name] = values
-                        break
+                own = [one for one in (number, 0) if file.chunk_exists(frame=one, name=name)]
+                if own:
+                    values = np.asarray(file.read_chunk(frame=own[0], name=name))
+                    arrays[f"{number}" if frame is None else name] = values
         sound = {name: values for name, values in arrays.items() if values.dtype.kind in "biuf"}
         return sound, names, int(file.nframes)
 
@@ -116,7 +106,7 @@ def _bare(name: str) -> str:
     return name.removeprefix("log/").removeprefix(PARTICLES)
 
 
-def _cell(path: Path, arrays: Arrays) -> Cell | None:
+def _cell(path: Path, arrays: Columns) -> Cell | None:
     """Edges and tilt factors (of the second and third edge), about the origin."""
     box = arrays.get("configuration/box")
     if box is None:

@@ -14,7 +14,7 @@ from scanfab.base.typing import FloatArray
 from scanfab.io.columns import has_radius
 from scanfab.io.fence import fenced, needed
 from scanfab.io.formats.dump import Dump
-from scanfab.io.formats.shared import cell_of
+from scanfab.io.formats.shared import cell_of, numbered_frames
 from scanfab.io.reader import FileKind, Snapshot
 from scanfab.io.text import Columns
 from scanfab.packing.cell import Cell
@@ -66,16 +66,13 @@ def netcdf_snapshots(path: Path) -> list[Snapshot]:
     # LAMMPS writes the step as time, and the length of a step as its scale
     are_steps = file.program == "LAMMPS" and bool(np.all(times == np.rint(times)))
     scale = 1.0 if scale is None and not are_steps else scale
-    return [
-        Snapshot(
-            path,
-            int(time) if are_steps else None,
-            None if scale is None else time * scale,
-            start=number,
-            stop=number + 1,
-        )
-        for number, time in enumerate(times.tolist())
-    ]
+    return numbered_frames(
+        path,
+        (
+            (int(time) if are_steps else None, None if scale is None else time * scale)
+            for time in times.tolist()
+        ),
+    )
 
 
 def read_netcdf(snapshot: Snapshot) -> Dump:

@@ -1,13 +1,15 @@
 """
 MercuryDPM: grains in ``.data`` and contacts in ``.fstat``, or both in ``.restart``.
 
-Contacts name grains by their row, from 0, and walls by numbers below 0. Each pair is listed from
-both sides, unless one of them is fixed or an image in a periodic cell.
+In ``.fstat`` contacts name grains by their row, from 0, and walls by numbers below 0. Each pair is
+listed from both sides, unless one of them is fixed or an image in a periodic cell. A restart names
+grains by their ids, in rows of words and numbers.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,28 +19,41 @@ from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.columns import grain_table, whole_numbers
 from scanfab.io.contacts import join_ids
 from scanfab.io.files import bare_name, first_bytes, plain
-from scanfab.io.formats.mercury_restart import is_restart, read_restart, time_of_restart
-from scanfab.io.formats.shared import cell_of, finite_forces, marked_frames, numbers
+from scanfab.io.formats import shared
+from scanfab.io.formats.shared import HEADER_BYTES, numbers
 from scanfab.io.parse.growing import leave_out_last
 from scanfab.io.reader import Carries, FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
-from scanfab.io.text import Columns, Layout, read_rows, skip_rows, spelt, text_of
+from scanfab.io.text import Layout, read_rows, skip_rows, spelt, text_of
 from scanfab.packing.cell import Cell
 
 PLANE = "x y vx vy radius angle omega species"
 SPACE = "x y z vx vy vz radius q1 q2 q3 wx wy wz species"
 # by the number of words above a frame
 LAYOUTS = {6: Layout(tuple(PLANE.split()), line=2), 8: Layout(tuple(SPACE.split()), line=2)}
+ABOVE = "the number of grains, time and bounds above a frame"
 # time, both rows, contact point, overlaps, normal and tangential force, normal, tangent
 FSTAT = "t i j x y z delta deltat fn ft nx ny nz tx ty tz"
 FSTAT_HEAD = re.compile(
-    rb"\A(?:\xef\xbb\xbf)?#[ \t]+\S+[ \t]+[01][ \t]*\r?\n"
-    rb"#(?:[ \t]+\S+){6}[ \t]*\r?\n#(?:[ \t]+\S+){6,7}[ \t]*\r?\n"
+    rb"#[ \t]+\S+[ \t]+[01]\s+#(?:[ \t]+\S+){6}\s+#(?:[ \t]+\S+){6,7}[ \t]*\r?\n"
 )
 FSTAT_FRAME = re.compile(rb"#[ \t]+(\S+)[ \t]+[01][ \t]*\r?\n")
-ABOVE = "the number of grains, time and bounds above a frame"
-LONGEST = 1 << 16
-# the interactions that it writes for ParaView name no grains
-OF_PARAVIEW = (b"<VTKFile", b'Name="Overlap"', b'Name="ContactRadius"', b'Name="TangentialOverlap"')
+RESTART = re.compile(rb"(?:restart_version|MercuryDPM)[ \t]+[\d.]+")
+TIME = re.compile(rb"^(?:timeStep|dt) \S+ (?:time|t) (\S+)", re.MULTILINE)
+DOMAIN = re.compile(rb"(?im)^xmin (\S+) xmax (\S+) ymin (\S+) ymax (\S+) zmin (\S+) zmax (\S+)")
+# rows of a restart; versions 2 and 3 have centre, velocity and radius of a sphere without words
+SPHERE = re.compile(
+    rb"(?!\w*(?:SuperQuadric|NonSpherical|Clump|Multi))\w*Particle id (\S+) indSpecies (\S+) "
+    rb"position (\S+) (\S+) (\S+) .*\bradius (\S+)"
+)
+OLD_SPHERE = re.compile(rb"TSP BP (\S+) (\S+) (\S+) \S+ \S+ \S+ (\S+)")
+PAIR = re.compile(rb"\w+ particleIds (\S+) (\S+) .*?\bforce (\S+) (\S+) (\S+)")
+AT_WALL = re.compile(rb"\w+ particleWallIds (\S+) \S+ ")
+PERIOD = re.compile(
+    rb"PeriodicBoundary .*?normal (\S+) (\S+) (\S+) .*?(?:position_left|distanceLeft) (\S+) "
+    rb".*?shift (\S+) (\S+) (\S+)"
+)
+# boundaries that repeat in another way than by a shift
+OTHER_PERIODS = re.compile(rb"\w*(?:LeesEdwards|Periodic|Maser|StressStrain|Circular)\w*")
 
 
 class MercuryReader:
@@ -56,47 +71,47 @@ class MercuryReader:
     def kind(self, path: Path) -> FileKind:
         """Contacts are in ``.fstat`` files."""
         form = _form(path)
-        if form == "paraview":
-            raise ReadError(
-                f"{path}: MercuryDPM's interactions for ParaView do not say which grains touch: "
-                f"contacts are read from .fstat or .restart"
-            )
         return "other" if form is None else "contacts" if form == "fstat" else "grains"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """Frames one behind the other, with their times."""
-        head = first_bytes(path, LONGEST)
-        if is_restart(head):
-            return [Snapshot(path, time=time_of_restart(head))]
-        return (
-            marked_frames(path, FSTAT_FRAME, _fstat_moment, _fstat_lack)
-            if FSTAT_HEAD.match(head)
-            else _grain_frames(path)
-        )
+        head = first_bytes(path, HEADER_BYTES)
+        if RESTART.match(head):
+            found = TIME.search(head)
+            time = None if found is None else numbers(f"{path}: time", found[1], 1)[0]
+            return [Snapshot(path, time=time)]
+        if FSTAT_HEAD.match(head):
+            return shared.marked_frames(
+                path, FSTAT_FRAME, shared.time_in(FSTAT_FRAME), shared.lack_of_end
+            )
+        return _grain_frames(path)
 
     def carries(self, path: Path) -> Carries:
         """A restart has its periodic boundaries; the bounds in ``.data`` may repeat or not."""
-        return "cell" if is_restart(first_bytes(path)) else "box"
+        return "cell" if RESTART.match(first_bytes(path)) else "box"
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
-        """Rows of numbers; a restart has names in its rows, and contacts."""
-        path = snapshot.path
-        if is_restart(first_bytes(path)):
-            return read_restart(snapshot, options)
-        line, _, rows = text_of(snapshot).partition(b"\n")
+        """Rows of numbers; a restart has words in its rows, and contacts."""
+        path, data = snapshot.path, text_of(snapshot)
+        if RESTART.match(data):
+            return _read_restart(path, data, options)
+        line, _, rows = data.partition(b"\n")
         bounds = _bounds(line)
         if bounds is None:
             raise ReadError(f"{path}: expected {ABOVE}, found {spelt(line)}")
         layout = LAYOUTS[len(bounds)]
         columns = read_rows(snapshot, rows, layout, count=int(bounds[0]), what="grains")
-        if "z" not in columns:
-            columns["z"] = np.zeros(len(columns["x"]))
-        return grain_table(path, columns, _box(path, bounds[2:]), options)
+        return grain_table(path, shared.in_space(columns), _box(path, bounds[2:]), options)
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
     ) -> JoinedContacts:
-        """Each pair once, with its force; rows with walls are counted."""
+        """
+        Pairs with their forces; rows with walls are counted.
+
+        The normal points from the second to the first grain, on which normal and tangential force
+        act. That pairs are listed from both sides does no harm.
+        """
         path, data = snapshot.path, text_of(snapshot)
         head = FSTAT_HEAD.match(data)
         if head is None:
@@ -104,29 +119,22 @@ class MercuryReader:
         layout = Layout(tuple(FSTAT.split()), line=4, whole="ij")
         columns = read_rows(snapshot, data[head.end() :], layout, what="contacts")
         rows = np.column_stack([whole_numbers(path, columns[name]) for name in "ij"])
-        count = len(grains.radius)
-        unknown = rows[(rows >= count) | (rows * [1, 0] < 0)]
-        if len(unknown):
-            raise ReadError(
-                f"{path}: names the grain {unknown[0]}, but there are rows 0 to {count - 1}: do "
-                f"both files belong to the same time?"
-            )
-        kept, force = _once(rows, columns)
-        finite_forces(path, force[rows[:, 1] >= 0])
+        normal, tangent = (np.column_stack([columns[f"{v}{x}"] for x in "xyz"]) for v in "nt")
+        with np.errstate(over="ignore", invalid="ignore"):
+            force = -(columns["fn"][:, None] * normal + columns["ft"][:, None] * tangent)
         # rows of the grain file, whatever ids these have; no grain has the number of a wall
-        numbered = grains._replace(id=np.arange(count))
-        return join_ids(path, numbered, rows[kept], force[kept], walls=True)
+        numbered = grains._replace(id=np.arange(len(grains.radius)))
+        at_wall = rows[:, 1] < 0
+        return _joined(path, numbered, rows[~at_wall], force[~at_wall], rows[at_wall, 0])
 
 
 def _form(path: Path) -> str | None:
-    """``restart``, ``fstat``, ``data`` or ``paraview``; None if it is no file of MercuryDPM."""
-    head = first_bytes(path, LONGEST)
-    if is_restart(head):
+    """``restart``, ``fstat`` or ``data``; None if it is no file of MercuryDPM."""
+    head = first_bytes(path, HEADER_BYTES)
+    if RESTART.match(head):
         return "restart"
     if FSTAT_HEAD.match(head):
         return "fstat"
-    if all(word in head for word in OF_PARAVIEW):
-        return "paraview"
     first, second = (*head.split(b"\n", 2), b"")[:2]
     bounds, width = _bounds(first), len(second.split())
     if bounds is None:
@@ -138,19 +146,9 @@ def _form(path: Path) -> str | None:
     return "data" if is_data else None
 
 
-def _fstat_moment(path: Path, head: bytes) -> tuple[None, float]:
-    frame = FSTAT_FRAME.match(head)
-    assert frame is not None
-    return None, numbers(f"{path}: time of a frame", frame[1], 1)[0]
-
-
-def _fstat_lack(data: bytes) -> str | None:
-    return None if data.endswith(b"\n") else "its last line has no end"
-
-
 def _bounds(line: bytes) -> list[float] | None:
     """Number of grains, time, low and high corner in 2D or 3D; None if it is no such line."""
-    words = line.removeprefix(b"\xef\xbb\xbf").split()
+    words = line.split()
     if len(words) not in LAYOUTS or not re.fullmatch(rb"[0-9]{1,15}", words[0]):
         return None
     try:
@@ -165,7 +163,7 @@ def _grain_frames(path: Path) -> list[Snapshot]:
     """The frames of a ``.data`` file; a last one that is cut is left out with a warning."""
     found: list[Snapshot] = []
     with open(plain(path), "rb") as stream:
-        while line := stream.readline(LONGEST):
+        while line := stream.readline(HEADER_BYTES):
             start, bounds, is_whole = stream.tell() - len(line), _bounds(line), line[-1:] == b"\n"
             if not line.strip():
                 continue
@@ -181,23 +179,15 @@ def _grain_frames(path: Path) -> list[Snapshot]:
     return found
 
 
-@np.errstate(over="ignore", invalid="ignore")
-def _once(rows: IntArray, columns: Columns) -> tuple[IntArray, FloatArray]:
-    """
-    The rows that are left when each contact is listed once, and the force on each second grain.
-
-    The normal points from the second to the first grain, on which force and tangential force act.
-    A pair that touches through two images has two normals, and is two contacts.
-    """
-    normal = np.column_stack([columns[name] for name in ("nx", "ny", "nz")])
-    tangent = np.column_stack([columns[name] for name in ("tx", "ty", "tz")])
-    force = -(columns["fn"][:, None] * normal + columns["ft"][:, None] * tangent)
-    turned = rows[:, :1] > rows[:, 1:]
-    # 7 digits tell images apart, and are the same from both sides
-    sides = np.round(np.where(turned, -normal, normal), 7) + 0.0
-    _, first = np.unique(np.column_stack([np.sort(rows, axis=1), sides]), axis=0, return_index=True)
-    # contacts with a wall are listed from one side only, and a wall may touch a grain twice
-    return np.union1d(first, np.flatnonzero(rows[:, 1] < 0)), force
+def _joined(
+    path: Path, grains: GrainTable, pairs: IntArray, force: FloatArray, at_wall: IntArray
+) -> JoinedContacts:
+    """Contacts of two grains, with the force on the second, and how often a grain is at a wall."""
+    joined = join_ids(path, grains, pairs, shared.finite_forces(path, force), walls=False)
+    # the second id of a contact with a wall is one that no grain has
+    none = np.full(len(at_wall), -1 if grains.id is None else grains.id.max(initial=0) + 1)
+    walls = join_ids(path, grains, np.column_stack([at_wall, none]), None, walls=True)
+    return joined._replace(wall_contacts=walls.wall_contacts)
 
 
 @np.errstate(invalid="ignore")
@@ -207,4 +197,95 @@ def _box(path: Path, bounds: list[float]) -> Cell | None:
     edges = high - low
     if len(low) == 2:
         low, edges = np.append(low, 0.0), np.append(edges, edges.max())
-    return cell_of(f"{path}: its bounds", edges, (False, False, False), low)
+    return shared.cell_of(f"{path}: its bounds", edges, (False, False, False), low)
+
+
+def _read_restart(path: Path, data: bytes, options: ReadOptions) -> GrainTable:
+    """The particles, and the interactions, whose force acts on the first grain."""
+    if not data.endswith(b"\n"):
+        raise ReadError(f"{path}: the last line has no end: the file is incomplete")
+    particles, interactions = (_section(path, data, one) for one in (b"Particles", b"Interactions"))
+    is_old = bool(particles) and OLD_SPHERE.match((particles or [b""])[0]) is not None
+    if particles is None or (interactions is None and particles and not is_old):
+        lost = "Particles" if particles is None else "Interactions"
+        raise ReadError(f"{path}: expected a line '{lost} N', found none: the file is incomplete")
+    if is_old:
+        x, y, z, radius = _numbers(path, particles, OLD_SPHERE, "spheres (TSP BP)").T
+        id, species = np.arange(len(x)), np.zeros(len(x))
+    else:
+        id, species, x, y, z, radius = _numbers(path, particles, SPHERE, "spheres").T
+    columns = {"id": id, "species": species, "x": x, "y": y, "z": z, "radius": radius}
+    told = options.cell is not None or options.beside is not None
+    grains = grain_table(path, columns, None if told else _cell(path, data), options)
+    if interactions is None:
+        return grains
+    walls = [row for row in interactions if b" particleWallIds " in row]
+    between = [row for row in interactions if b" particleWallIds " not in row]
+    values = _numbers(path, between, PAIR, "interactions of particleIds with a force")
+    pairs = np.column_stack([whole_numbers(path, values[:, end]) for end in (0, 1)])
+    at_wall = whole_numbers(path, _numbers(path, walls, AT_WALL, "particleWallIds")[:, 0])
+    joined = _joined(path, grains, pairs, -values[:, 2:], at_wall)
+    return grains._replace(contacts=joined.contacts, wall_contacts=joined.wall_contacts)
+
+
+def _section(path: Path, data: bytes, name: bytes) -> list[bytes] | None:
+    """The rows below the line that counts them."""
+    head = re.search(rb"^" + name + rb"[ \t]+(\S+)[ \t]*\r?\n", data, re.MULTILINE)
+    if head is None:
+        return None
+    if not re.fullmatch(rb"\d{1,12}", head[1]):
+        raise ReadError(f"{path}: expected a number of {name.decode()}, found {spelt(head[1])}")
+    count = int(head[1])
+    *rows, behind = data[head.end() :].split(b"\n", count)
+    is_more = rows and behind.split(b" ", 1)[0] == rows[-1].split(b" ", 1)[0]
+    if len(rows) < count or is_more:
+        found = f"more: {spelt(behind)}" if is_more else f"{len(rows)}: the file is incomplete"
+        raise ReadError(f"{path}: expected {count} {name.decode()}, found {found}")
+    return rows
+
+
+def _numbers(
+    path: Path, rows: Sequence[bytes], pattern: re.Pattern[bytes], what: str
+) -> FloatArray:
+    """The numbers that stand in the groups of a pattern, shape (rows, groups)."""
+    found = []
+    for row in rows:
+        match = pattern.match(row)
+        if match is None:
+            raise ReadError(f"{path}: expected {what}, found {spelt(row)}")
+        words = b" ".join(match.groups())
+        found.append(numbers(f"{path}: {what} in {spelt(row)}", words, pattern.groups))
+    return np.reshape(np.array(found, dtype=np.float64), (-1, pattern.groups))
+
+
+def _cell(path: Path, data: bytes) -> Cell | None:
+    """The domain, with the shift of each periodic boundary as the edge along its normal."""
+    where = f"{path}: its domain and periodic boundaries make no cell"
+    domain = DOMAIN.search(data)
+    bounds = numbers(f"{where}: xMin xMax ...", b" ".join(domain.groups()) if domain else b"", 6)
+    low, high = np.array(bounds[::2]), np.array(bounds[1::2])
+    vectors, normals, offsets = np.diag(high - low), np.eye(3), low
+    rows = _section(path, data, b"Boundaries") or []
+    for row in rows:
+        name = row.split(b" ", 1)[0]
+        if name != b"PeriodicBoundary" and OTHER_PERIODS.match(name):
+            raise ReadError(
+                f"{path}: a {spelt(name)} repeats in a way that is not read: name the cell with "
+                f"`cell=(LX, LY, LZ)`"
+            )
+    periodic = np.zeros(3, dtype=bool)
+    periods = [row for row in rows if row.startswith(b"PeriodicBoundary ")]
+    for period in _numbers(path, periods, PERIOD, "normal, distanceLeft and shift"):
+        axis = int(np.argmax(np.abs(period[:3])))
+        if periodic[axis]:
+            raise ReadError(f"{path}: two periodic boundaries along the axis {'xyz'[axis]}")
+        periodic[axis] = True
+        normals[axis], offsets[axis], vectors[axis] = period[:3], period[3], period[4:]
+    # a domain may be flat where nothing repeats: any thickness will do
+    flat = np.flatnonzero(~periodic & (vectors.diagonal() <= 0) & periodic.any())
+    vectors[flat, flat] = np.abs(vectors).max()
+    try:
+        origin = np.linalg.solve(normals, offsets)
+    except np.linalg.LinAlgError as error:
+        raise ReadError(f"{where}: {error}") from None
+    return shared.cell_of(where, vectors, periodic, origin)

@@ -170,3 +170,31 @@ def marked_frames(
         expected = "expected the header of a frame, found none"
         raise ReadError(f"{path}: {expected if place else 'the file is empty'}")
     return sorted(found, key=lambda one: one.step or 0)
+
+
+def numbered_frames(
+    path: Path, moments: Iterable[tuple[int | None, float | None]]
+) -> list[Snapshot]:
+    """Frames with these steps and times; ``start`` of each is its number, not a byte."""
+    found = [
+        Snapshot(path, step, time, start=number, stop=number + 1)
+        for number, (step, time) in enumerate(moments)
+    ]
+    if not found:
+        raise ReadError(f"{path}: expected frames, found none")
+    return found
+
+
+def time_in(header: re.Pattern[bytes]) -> Callable[[Path, bytes], tuple[None, float]]:
+    """The ``moment`` of frames whose time is the first group of their header."""
+
+    def moment(path: Path, head: bytes) -> tuple[None, float]:
+        found = header.match(head)
+        return None, numbers(f"{path}: time of a frame", found[1] if found else b"", 1)[0]
+
+    return moment
+
+
+def lack_of_end(frame: bytes) -> str | None:
+    """The ``lack`` of frames without a count."""
+    return None if frame.endswith(b"\n") else "its last line has no end"
