@@ -7,16 +7,16 @@ import os
 import platform
 import time
 import warnings
+from collections import deque
 from collections.abc import Callable, Container, Iterable, Iterator, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.note import SKIPPED, Note, tell
 from scanfab.base.option import options_of, takes_options, unusable
-from scanfab.base.threads import shared_in_order
 from scanfab.io.frame import Frame
 from scanfab.packing.cell import Cell
 from scanfab.packing.escaped import ESCAPED
@@ -37,6 +37,8 @@ from scanfab.table.table import Table
 LOGGER = logging.getLogger("scanfab")
 
 Observer = Callable[[FrameResult], None]
+Result = TypeVar("Result")
+Job = TypeVar("Job")
 
 
 @takes_options(options_of(Settings))
@@ -302,12 +304,70 @@ class _Pool:
         """The results in the order of the jobs, of which one a worker is under way."""
         pool = self._own or self.executor
         assert pool is not None
-        workers = self.workers
         if isinstance(pool, DaskExecutor):
             return shared_in_order(pool, jobs, pool.room, pool.share)
-        if self._own is None:
-            # how many processors there are elsewhere, only the executor knows
-            return shared_in_order(pool, jobs, lambda: workers, lambda number: 1)
+        # how many processors there are elsewhere, only the executor knows
+        threads = self.workers if self._own else 1
         return shared_in_order(
-            pool, jobs, lambda: workers, lambda number: max(workers // number, 1)
+            pool, jobs, lambda: self.workers, lambda number: max(threads // number, 1)
         )
+
+
+def shared_in_order(
+    pool: Executor,
+    jobs: Iterator[Callable[[int], Result] | None],
+    most: Callable[[], int],
+    share: Callable[[int], int],
+) -> Iterator[Result]:
+    """
+    The results of jobs that share threads, in the order of the jobs.
+
+    Parameters
+    ----------
+    pool : Executor
+        Does the jobs.
+    jobs : iterator
+        Each job is told how many threads it may use. None where the next one is not there yet: a
+        result that is ready then comes meanwhile. If the jobs end in an error, the results of those
+        under way come before it.
+    most : callable
+        How many may be under way.
+    share : callable
+        How many threads each of so many jobs may use.
+    """
+    waiting: deque[Future[Result]] = deque()
+    ready: list[Result] = []
+    over: Exception | None = None
+    try:
+        while waiting or ready or over is None:
+            fresh, over = ([], over) if over else _taken(jobs, most() - len(waiting))
+            threads = share(len(waiting) + len(fresh)) if fresh else 1
+            waiting.extend(pool.submit(job, threads) for job in fresh)
+            # the next jobs are begun before this, as whoever takes a result may be slow
+            yield from ready
+            ready.clear()
+            if waiting and (waiting[0].done() or over or len(waiting) >= most()):
+                try:
+                    ready.append(waiting.popleft().result())
+                except Exception:
+                    # where the jobs have failed, this error has the same cause
+                    if over is not None and not isinstance(over, StopIteration):
+                        raise over from None
+                    raise
+        if not isinstance(over, StopIteration):
+            raise over
+    finally:
+        # the pool may go on for others
+        for future in waiting:
+            future.cancel()
+
+
+def _taken(jobs: Iterator[Job | None], room: int) -> tuple[list[Job], Exception | None]:
+    """Jobs that are there, up to some number, and what ended them: StopIteration, or an error."""
+    fresh: list[Job] = []
+    try:
+        while len(fresh) < room and (job := next(jobs)) is not None:
+            fresh.append(job)
+    except Exception as error:
+        return fresh, error
+    return fresh, None

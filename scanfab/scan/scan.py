@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from scanfab.base.arrays import concatenated
 from scanfab.base.spelling import counted
-from scanfab.base.threads import in_threads
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.scan.directions import DirectionRule
 from scanfab.scan.edges import CLIP
@@ -21,6 +24,19 @@ from scanfab.scan.solids import Solids, check_space, check_spacing
 from scanfab.scan.tallies import tally_triads
 
 JOBS_A_THREAD, MOST_AXES = 4, 16
+# a map() of workers elsewhere
+Spread = Callable[[Callable[[Any], Any], list[Any]], list[Any]]
+_spread: ContextVar[Spread | None] = ContextVar("spread", default=None)
+
+
+@contextmanager
+def spread_over(workers: Spread) -> Iterator[None]:
+    """In the block, these workers do what several threads would do of a scan."""
+    token = _spread.set(workers)
+    try:
+        yield
+    finally:
+        _spread.reset(token)
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,12 +243,20 @@ def in_parts(
     """
     count = offsets.shape[0] * offsets.shape[1]
     triads, shifts = triads.reshape(count, 3, 3), offsets.reshape(count, -1)
-    # so many that no thread waits long for the last one, but not many more
+    # enough jobs to keep all threads busy to the end; more would only add overhead
     axes = min(max(count // (JOBS_A_THREAD * workers), 1), MOST_AXES)
     parts = [slice(first, first + axes) for first in range(0, count, axes)]
 
     lines = [(triads[part], shifts[part]) for part in parts]
-    sums = np.concatenate(in_threads(partial(_scan_part, scan), lines, workers))
+    part_of, spread = partial(_scan_part, scan), _spread.get()
+    if workers == 1 or len(lines) == 1:
+        found = list(map(part_of, lines))
+    elif spread is not None:
+        found = spread(part_of, lines)
+    else:
+        with ThreadPoolExecutor(workers) as pool:
+            found = list(pool.map(part_of, lines))
+    sums = np.concatenate(found)
     return sums.reshape(*offsets.shape[:2], *sums.shape[1:])
 
 

@@ -16,7 +16,6 @@ from weakref import WeakSet
 
 from scanfab.base.errors import ScanfabError, ScanfabWarning, SettingsError
 from scanfab.base.spelling import counted
-from scanfab.base.threads import spread_over
 from scanfab.io.grain_files import PathLike
 from scanfab.pipeline.cluster.connection import (
     ClusterError,
@@ -38,6 +37,7 @@ from scanfab.pipeline.cluster.on_worker import (
     view_there,
 )
 from scanfab.pipeline.cluster.packed import Packed
+from scanfab.scan.scan import spread_over
 
 NEEDS = "a Dask cluster needs the package distributed: pip install 'scanfab[cluster]'"
 # of a frame that raises errors, or takes its worker down
@@ -255,7 +255,7 @@ class DaskExecutor(Executor):
 
     def _spread(self, job: Any, threads: int) -> Any:
         """Compute a frame here, whose scans are done there."""
-        with spread_over(_Parts(self)):
+        with spread_over(_Parts(self).map):
             return job(threads)
 
 

@@ -24,11 +24,11 @@ pytest.importorskip("distributed")
 
 import scanfab
 from scanfab.base.errors import ReadError, ScanfabError
-from scanfab.base.threads import shared_in_order
 from scanfab.cli.main import run
 from scanfab.pipeline.cluster import connection
 from scanfab.pipeline.cluster import dask_executor as module
 from scanfab.pipeline.cluster.connection import ClusterError
+from scanfab.pipeline.compute import shared_in_order
 from tests.helpers.dask_cluster import DaskCluster
 from tests.helpers.dumps import shaken_cubic
 from tests.helpers.growing import SAMPLE

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from scanfab.base.threads import shared_in_order
+from scanfab.pipeline.compute import shared_in_order
 
 
 def in_order(pool, jobs, most):
