@@ -23,8 +23,7 @@ def write(path, data):
 
 
 def assert_right(path, **options):
-    packing = scanfab.read(path, **options)
-    rows = np.array(ROWS)
+    packing, rows = scanfab.read(path, **options), np.array(ROWS)
     np.testing.assert_array_equal(packing.id, rows[:, 0])
     np.testing.assert_array_equal(packing.columns["type"], rows[:, 1])
     np.testing.assert_array_equal(packing.position, rows[:, 2:5])
@@ -35,15 +34,12 @@ def assert_right(path, **options):
 
 @pytest.mark.parametrize("order", ["<", ">"])
 @pytest.mark.parametrize("blocks", [1, 3, 5])
-def test_the_new_layout_names_its_columns(tmp_path, blocks, order):
+def test_the_new_layout_names_its_columns_and_the_old_one_asks_for_them(tmp_path, blocks, order):
     data = binary_dump(names=NAMES, step=7, time=0.25, blocks=blocks, order=order)
-    path = write(tmp_path / "dump.bin", data)
+    path = write(tmp_path / "new.bin", data)
     assert reader_for(path).name == "lammps"
     assert assert_right(path).time == 0.25
-
-
-def test_the_old_layout_is_asked_for_its_columns(tmp_path):
-    path = write(tmp_path / "dump.bin", binary_dump(step=7))
+    path = write(tmp_path / "old.bin", binary_dump(step=7, blocks=blocks))
     assert reader_for(path).name == "liggghts"
     with pytest.raises(ReadError, match=r'does not name its 6 columns.*`columns="id=1,type=2'):
         scanfab.read(path)
@@ -68,12 +64,11 @@ def test_snapshots_are_frames_and_an_incomplete_last_one_is_left_out(tmp_path):
     assert frames == [(10, 3), (20, 0)]
     for cut in (1, 100, 250):
         path = write(tmp_path / f"cut{cut}.bin", data[:-cut])
-        with pytest.warns(ScanfabWarning, match="number 2, is incomplete.*left out"):
+        with pytest.warns(ScanfabWarning, match=r"number 2, is incomplete.*left out"):
             assert [frame.step for frame in scanfab.read_series(path)] == [20]
 
 
-ONE = binary_dump(names=NAMES)
-BLOCK = struct.pack("<i", 18)
+ONE, BLOCK = binary_dump(names=NAMES), struct.pack("<i", 18)
 
 
 @pytest.mark.parametrize(

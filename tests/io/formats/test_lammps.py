@@ -1,4 +1,4 @@
-"""LAMMPS' dumps: its own fabric of a tilted cell, contact columns, data files, bad input."""
+"""LAMMPS' dumps: its own fabric of a tilted cell, its forms, NetCDF."""
 
 from __future__ import annotations
 
@@ -9,8 +9,11 @@ import pytest
 
 import scanfab
 from scanfab.base.errors import ReadError
-from scanfab.io.registry import reader_for
-from tests.helpers.dumps import PAIRS, dump_text, local_text, write
+from scanfab.io import fence
+from scanfab.io.registry import reader_for, reader_named
+from scanfab.testing import check_reader
+from tests.helpers.dumps import ROWS, write
+from tests.helpers.made.lammps import netcdf, yaml_text
 from tests.helpers.truth import FLOOR, SHEAR, id_pairs, lammps_fabric
 
 FORMS = SHEAR / "forms"
@@ -22,10 +25,6 @@ LAST = SHEAR / "shear.200000.lammpstrj.gz"
 LAST_PAIRS = SHEAR / "pairs.200000.local.gz"
 # LAMMPS computed its fabric in the state that is dumped, with 15 digits
 GOLDEN = np.loadtxt(SHEAR / "fabric.txt")
-
-
-def unpacked(path):
-    return gzip.decompress(path.read_bytes()).decode()
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +59,7 @@ def test_contacts_of_the_file_and_by_geometry_give_lammps_own_fabric(frames, num
 
 def test_forces_are_the_sum_of_both_parts():
     packing = scanfab.read(LAST, contacts=LAST_PAIRS, contact_columns=COLUMNS)
-    first = unpacked(LAST_PAIRS).splitlines()[9].split()
+    first = gzip.decompress(LAST_PAIRS.read_bytes()).splitlines()[9].split()
     one, two, *values = map(float, [*first[1:3], *first[5:11]])
     row = np.flatnonzero((packing.id[packing.contacts.pairs] == [one, two]).all(axis=1))
     expected = -(np.array(values[:3]) + values[3:])
@@ -130,76 +129,33 @@ def test_dumps_read_the_same_by_the_reader_of_either_program(path):
     np.testing.assert_array_equal(one.id, two.id)
 
 
-def joined(tmp_path, rows, columns=None):
-    grains = write(tmp_path / "g.dump", dump_text())
-    pairs = write(tmp_path / "c.dump", local_text(rows))
-    return scanfab.read(grains, contacts=pairs, contact_columns=columns, format="lammps")
+def test_netcdf(tmp_path):
+    series = scanfab.read_series(netcdf(tmp_path / "a.nc", written=2))
+    assert [(frame.step, frame.snapshot.time) for frame in series] == [(0, 0.0), (100, 50.0)]
+    first, second = (frame.read() for frame in series)
+    np.testing.assert_array_equal(first.position, first.cell.wrap(np.array(ROWS)[:, 2:5]))
+    np.testing.assert_array_equal(first.radius, 0.1)
+    # one atom was lost: its place holds what was never written
+    assert second.id.tolist() == [1, 2]
+    # edges a, b and their angle; an edge of length 0 does not repeat
+    assert first.cell.periodic == (True, True, False)
+    np.testing.assert_allclose(first.cell.vectors[:2], [[1, 0, 0], [1, 3**0.5, 0]], atol=1e-15)
+    assert first.cell.origin.tolist() == [0, -1, 0]
+    assert scanfab.read(netcdf(tmp_path / "b.nc", lengths=(0, 0, 0)), frame=0).cell is None
+    path = netcdf(tmp_path / "c.nc", name="scaled_coordinates", lengths=(2, 2, 4))
+    scaled = scanfab.read(path, frame=0)
+    expected = scaled.cell.origin + np.array(ROWS)[:, 2:5] @ scaled.cell.vectors
+    np.testing.assert_allclose(scaled.position, scaled.cell.wrap(expected))
 
 
-def test_a_force_column_decides_which_pairs_touch(tmp_path):
-    columns = "id1=c_con[1],id2=c_con[2],fx=c_con[3],fy=c_con[3],fz=c_con[3]"
-    rows = [(1, 2, 0.5), (2, 3, 0.0), (1, 3, 0.0)]
-    assert id_pairs(joined(tmp_path, rows, columns)) == {(1, 2)}
-    assert len(joined(tmp_path, []).contacts) == 0
+def test_netcdf_that_cannot_be_read(tmp_path, monkeypatch):
+    with pytest.raises(ReadError, match="coordinates was not written for all atoms"):
+        scanfab.read(netcdf(tmp_path / "a.nc", axes=2), frame=0)
+    monkeypatch.setattr(fence, "find_spec", lambda name: None)
+    with pytest.raises(ReadError, match=r'pip install "scanfab\[netcdf\]"'):
+        scanfab.read(tmp_path / "a.nc")
 
 
-TWO = "id1=c_con[1],id2=c_con[2]"
-TRIPLES = [(*pair, 1.5) for pair in PAIRS]
-
-
-@pytest.mark.parametrize(
-    ("rows", "columns", "told"),
-    [
-        *(
-            (TRIPLES, columns, "expected id1=NAME,id2=NAME")
-            for columns in (
-                "id1=c_con[1]",
-                f"{TWO},fx=c_con[3]",
-                f"{TWO},tx=c_con[3],ty=c_con[3],tz=c_con[3]",
-                f"{TWO},size=c_con[3]",
-                "id1,id2",
-                "",
-            )
-        ),
-        (TRIPLES, "id1=c_no[1],id2=c_con[2]", r"found 'id1=c_no\[1\].* the columns are c_con\[1\]"),
-        ([(1.5, 2), (2.5, 3)], TWO, "expected ids in the columns 1 and 2"),
-        ([(1, 2), (2, 77)], TWO, "contact 2 names the grain 77, which is not in the grain"),
-        *(
-            (rows, None, "cannot tell which columns are the two ids")
-            for rows in (
-                [(1.5, 2.5), (2.5, 3.5)],  # no ids
-                [(1, 2, 3), (2, 3, 1)],  # two choices
-                [(1, 2)] * 5,  # types
-                [(10, 20), (20, 30)],  # of other grains
-            )
-        ),
-    ],
-)
-def test_contacts_that_cannot_be_told_are_asked_for(tmp_path, rows, columns, told):
-    with pytest.raises(ReadError, match=told):
-        joined(tmp_path, rows, columns)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "told"),
-    [
-        ("\n700\n", "\n701\n", "counts 701 rows, found 700"),
-        ("\n700\n", "\n999999999999\n", "the header counts 999999999999 rows"),
-        ("0.0013", "text", r"line \d+: expected a number .* found 'text'"),
-        ("0.0013", "nan", "position and radius must be finite numbers"),
-        ("0.0013", "-1", "the radius must be larger than zero"),
-    ],
-)
-def test_what_is_wrong_with_a_dump(tmp_path, old, new, told):
-    text = unpacked(LAST)
-    assert old in text
-    path = write(tmp_path / "bad.lammpstrj", text.replace(old, new, 1))
-    with pytest.raises(scanfab.ScanfabError, match=told):
-        scanfab.read(path)
-
-
-@pytest.mark.parametrize("part", [0.001, 0.01, 0.5, 0.99])
-def test_a_truncated_dump_is_an_error(tmp_path, part):
-    text = unpacked(LAST)
-    with pytest.raises(scanfab.ScanfabError):
-        scanfab.read(write(tmp_path / "a", text[: int(part * len(text))]), format="lammps")
+def test_the_kit(tmp_path):
+    files = [write(tmp_path / "a.yaml", yaml_text()), netcdf(tmp_path / "a.nc")]
+    check_reader(reader_named("lammps"), files, tmp_path / "damaged", counts=True)

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import bz2
-import lzma
-
 import numpy as np
 import pytest
 
 import scanfab
 from scanfab import ReadError
-from tests.helpers.dumps import PAIRS, ROWS, dump_text, local_text, pairs_text, write
 from tests.helpers.truth import (
     FLOOR,
     PERIODIC,
@@ -102,45 +98,11 @@ def test_a_file_with_several_snapshots_holds_them_all():
     assert_true_grains(frames[-1], FLOOR)
 
 
-def test_of_a_repeated_column_the_first_counts(tmp_path):
-    rows = [(1, 5, 6, 0.1, 0.2, 0.3, 0.01)]
-    path = write(tmp_path / "dump", dump_text(rows, "id type type x y z radius"))
-    np.testing.assert_array_equal(scanfab.read(path).columns["type"], [5])
-
-
-@pytest.mark.parametrize("module", [bz2, lzma])
-def test_packed_dumps_are_read_like_plain_ones(tmp_path, module):
-    path = tmp_path / "packed"
-    path.write_bytes(module.compress((FLOOR / "tutorial.txt").read_bytes()))
-    assert_true_grains(scanfab.read(path), FLOOR)
-
-
-def test_a_dump_without_a_radius_takes_the_users(tmp_path):
+def test_a_dump_without_a_radius_takes_the_users():
     with pytest.raises(ReadError, match=r"noradius.txt, step 30000: no radius.*`columns.*`radius`"):
         scanfab.read(FLOOR / "noradius.txt")
     packing = scanfab.read(FLOOR / "noradius.txt", radius=0.00125)
     np.testing.assert_array_equal(packing.radius, 0.00125)
-    with pytest.raises(ReadError, match="no coordinates"):
-        scanfab.read(write(tmp_path / "d", dump_text([(1, 2)], "id type")))
-
-
-@pytest.mark.parametrize("scale", [1e-9, 50.0])
-def test_no_length_is_absolute(tmp_path, scale):
-    rows = [(id, type, *(scale * value for value in rest)) for id, type, *rest in ROWS]
-    text = dump_text(rows, box=[(0, scale)] * 3, flags=" pp pp pp")
-    packing = scanfab.read(
-        write(tmp_path / "d", text), contacts=write(tmp_path / "c", pairs_text())
-    )
-    assert id_pairs(packing) == set(PAIRS)
-    assert id_pairs(scanfab.find_contacts(packing)) == set(PAIRS)
-
-
-def test_a_tilted_header_becomes_a_tilted_cell(tmp_path):
-    rows, box = [(1, 1, 0.5, 0.5, 0.5, 0.1)], [(0, 2.25, 0.25), (0, 3, 0), (0, 4, 0)]
-    text = dump_text(rows, "id type xs ys zs radius", box=box, flags=" xy xz yz pp pp pp")
-    packing = scanfab.read(write(tmp_path / "d", text))
-    np.testing.assert_allclose(packing.cell.vectors, [[2, 0, 0], [0.25, 3, 0], [0, 0, 4]])
-    np.testing.assert_allclose(packing.position, [[1.125, 1.5, 2.0]])
 
 
 @pytest.mark.parametrize("name", KEYWORDS)
@@ -189,94 +151,6 @@ def test_wall_contacts_alone_leave_the_contacts_to_geometry(grains, columns):
         )
     assert packing.contacts is None
     assert packing.wall_contacts.sum() == 25
-
-
-def joined(tmp_path, local, rows=ROWS, columns=None, **options):
-    grains = write(tmp_path / "dump_0.txt", dump_text(rows, **options))
-    contacts = write(tmp_path / "pairs_0.txt", local)
-    return scanfab.read(grains, contacts=contacts, contact_columns=columns)
-
-
-def chain(first, step=0.1):
-    """Eight grains in a row with ids from a number on, and the seven pairs that touch."""
-    rows = [(first + k, 1, step * k, 0.5, 0.5, 0.06) for k in range(1, 9)]
-    return rows, [(first + k, first + k + 1) for k in range(1, 8)]
-
-
-def test_pairs_that_are_listed_twice_are_one_contact(tmp_path):
-    packing = joined(tmp_path, local_text([(1, 2, 0), (2, 1, 0), (2, 3, 0), (1, 2, 0)]))
-    assert len(packing.contacts) == 2
-    assert id_pairs(packing) == set(PAIRS)
-
-
-@pytest.mark.parametrize("rows", [ROWS, []])
-def test_no_contacts_at_all_are_an_empty_list(tmp_path, rows):
-    packing = joined(tmp_path, local_text([]), rows)
-    assert (len(packing.contacts), packing.contacts.source) == (0, "file")
-
-
-WIDE = local_text([(1, 2, 0, -1, 0, 0), (2, 3, 0, -1, 0, 0)])
-ROUNDED = local_text([(f"{one:g}", f"{two:g}", 0, -1, 0, 0) for one, two in chain(1234561)[1]])
-
-
-@pytest.mark.parametrize(
-    ("local", "rows", "columns", "told"),
-    [
-        (local_text([(1, 2, 0), (2, 3, 0), (3, 4, 0), (4, 99, 0)]), chain(0)[0], None, "grain 99"),
-        (local_text([(101, 102, 0), (102, 103, 0)]), ROWS, None, "another step"),
-        (local_text([(1, 2, 0, 2, 3, 0), (2, 3, 0, 1, 2, 0)]), ROWS, None, "cannot tell which col"),
-        (WIDE, ROWS, "pos force", "id among them"),
-        (WIDE, ROWS, "", "id among them"),
-        (WIDE, ROWS, "id forces", "keywords of compute pair/gran/local"),
-        (WIDE, ROWS, "id force torque", "makes 9 columns, the file has 6"),
-        (WIDE, ROWS, "id force history:2", "makes 8 columns, the file has 6"),
-        (WIDE, ROWS, "id1=c_con[2],id2=c_con[9]", r"found 'id1=c_con\[2\],id2=c_con\[9\]'"),
-        (ROUNDED, chain(1234561)[0], None, r"rounded to six digits.*%\.0f"),
-        # each rounded id is that of another grain
-        (ROUNDED, chain(1234560, 0.01)[0], "id force", r"rounded to six digits.*%\.0f"),
-    ],
-)
-def test_contacts_that_cannot_be_right_are_refused(tmp_path, local, rows, columns, told):
-    with pytest.raises(ReadError, match=told):
-        joined(tmp_path, local, rows, columns)
-
-
-def test_contacts_by_id_need_ids_in_the_grain_file(tmp_path):
-    with pytest.raises(ReadError, match="the grain file has no ids"):
-        joined(tmp_path, WIDE, [row[1:] for row in ROWS], names="type x y z radius")
-
-
-def test_history_may_have_any_number_of_values(tmp_path):
-    local = local_text([(*pair, 0, -1, 0, 0, 7, 7, 7, 7, 7, 0.5) for pair in PAIRS])
-    packing = joined(tmp_path, local, columns="contactArea id force history:5")
-    assert id_pairs(packing) == set(PAIRS)
-    np.testing.assert_array_equal(packing.contacts.force, [[1, 0, 0], [1, 0, 0]])
-
-
-def test_large_ids_that_lost_nothing_are_read(tmp_path):
-    rows, pairs = chain(1234560)
-    packing = joined(tmp_path, local_text([(*pair, 0) for pair in pairs]), rows)
-    assert id_pairs(packing) == set(pairs)
-    # %g writes a million as 1e+06
-    rows = [(id, *rest) for id, (_, *rest) in zip((999999, 1000000, 7), ROWS, strict=True)]
-    packing = joined(tmp_path, local_text([(999999, "1e+06", 0), ("1e+06", 7, 0)]), rows)
-    assert id_pairs(packing) == {(999999, 1000000), (7, 1000000)}
-
-
-def test_columns_of_any_compute_are_named(tmp_path):
-    # a number, both ids apart, the force on the first grain; no periodic flag
-    local = local_text([(0.5, first, 7, second, -1.5, 0, 2) for first, second in PAIRS])
-    named = "id1=c_con[2],id2=c_con[4],fx=c_con[5],fy=c_con[6],fz=c_con[7]"
-    packing = joined(tmp_path, local, columns=named)
-    assert packing.contacts.pairs.tolist() == [[0, 1], [1, 2]]
-    np.testing.assert_array_equal(packing.contacts.force, [[1.5, 0, -2]] * 2)
-
-
-def test_pairs_apart_are_left_out_of_named_columns(tmp_path):
-    rows = [*ROWS[:2], (3, 2, 0.61, 0.5, 0.5, 0.1)]
-    local = local_text([(*pair, 0.0) for pair in PAIRS])
-    packing = joined(tmp_path, local, rows, "id1=c_con[1],id2=c_con[2]")
-    assert packing.contacts.pairs.tolist() == [[0, 1]]
 
 
 BOXES = [

@@ -1,0 +1,144 @@
+"""Contacts in dump local of LIGGGHTS and LAMMPS: which column is what, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import scanfab
+from scanfab import ReadError
+from tests.helpers.dumps import PAIRS, ROWS, dump_text, local_text, pairs_text, write
+from tests.helpers.truth import id_pairs
+
+
+def joined(tmp_path, local, rows=ROWS, columns=None, format=None, **options):
+    grains = write(tmp_path / "dump_0.txt", dump_text(rows, **options))
+    contacts = write(tmp_path / "pairs_0.txt", local)
+    return scanfab.read(grains, contacts=contacts, contact_columns=columns, format=format)
+
+
+def chain(first, step=0.1):
+    """Eight grains in a row with ids from a number on, and the seven pairs that touch."""
+    rows = [(first + k, 1, step * k, 0.5, 0.5, 0.06) for k in range(1, 9)]
+    return rows, [(first + k, first + k + 1) for k in range(1, 8)]
+
+
+@pytest.mark.parametrize("scale", [1e-9, 50.0])
+def test_no_length_is_absolute(tmp_path, scale):
+    rows = [(id, type, *(scale * value for value in rest)) for id, type, *rest in ROWS]
+    box = {"box": [(0, scale)] * 3, "flags": " pp pp pp"}
+    packing = joined(tmp_path, pairs_text(), rows, **box)
+    assert id_pairs(packing) == set(PAIRS)
+    assert id_pairs(scanfab.find_contacts(packing)) == set(PAIRS)
+
+
+@pytest.mark.parametrize("rows", [ROWS, []])
+@pytest.mark.parametrize("format", ["liggghts", "lammps"])
+def test_no_contacts_at_all_are_an_empty_list(tmp_path, rows, format):
+    packing = joined(tmp_path, local_text([]), rows, format=format)
+    assert (len(packing.contacts), packing.contacts.source) == (0, "file")
+
+
+NAMED = "id1=c_con[2],id2=c_con[4],fx=c_con[5],fy=c_con[6],fz=c_con[7]"
+APART = [*ROWS[:2], (3, 2, 0.61, 0.5, 0.5, 0.1)]
+
+
+@pytest.mark.parametrize(
+    ("local", "rows", "columns", "format", "pairs", "force"),
+    [
+        # pairs that are listed twice are one contact
+        ([(1, 2, 0), (2, 1, 0), (2, 3, 0), (1, 2, 0)], ROWS, None, None, PAIRS, None),
+        # the force stands behind the flag, on the first grain; history has any number of values
+        ([(*pair, 0, -1, 0, 0) for pair in PAIRS], ROWS, None, None, PAIRS, [1, 0, 0]),
+        (
+            [(*pair, 0, -1, 0, 0, *[7] * 5, 0.5) for pair in PAIRS],
+            *(ROWS, "contactArea id force history:5", None, PAIRS, [1, 0, 0]),
+        ),
+        # columns of any compute: a number, both ids apart, the force; no periodic flag
+        ([(0.5, a, 7, b, -1.5, 0, 2) for a, b in PAIRS], ROWS, NAMED, None, PAIRS, [1.5, 0, -2]),
+        # of pairs within a cut-off those are left that overlap, or have a force
+        (PAIRS, APART, "id1=c_con[1],id2=c_con[2]", None, PAIRS[:1], None),
+        (
+            [(1, 2, 0.5), (2, 3, 0.0), (1, 3, 0.0)],
+            *(ROWS, "id1=c_con[1],id2=c_con[2],fx=c_con[3],fy=c_con[3],fz=c_con[3]", "lammps"),
+            *(PAIRS[:1], [-0.5] * 3),
+        ),
+        # %g writes a million as 1e+06, and loses nothing of short ids
+        ([(*pair, 0) for pair in chain(1234560)[1]], chain(1234560)[0], None, None, None, None),
+        ([("1e+06", 3, 0)], [(1000000, *ROWS[0][1:]), (3, *ROWS[1][1:])], None, None, None, None),
+    ],
+)
+def test_columns_are_found_or_named(tmp_path, local, rows, columns, format, pairs, force):
+    packing = joined(tmp_path, local_text(local), rows, columns, format)
+    expected = [tuple(sorted((int(float(one)), int(float(two))))) for one, two, *_ in local]
+    assert id_pairs(packing) == set(expected if pairs is None else pairs)
+    if force is None:
+        assert packing.contacts.force is None
+    else:
+        np.testing.assert_array_equal(packing.contacts.force, [force] * len(pairs))
+
+
+FLAGGED = [(*pair, 0, -1, 0, 0) for pair in PAIRS]
+ROUNDED = [(f"{one:g}", f"{two:g}", 0, -1, 0, 0) for one, two in chain(1234561)[1]]
+TRIPLES = [(*pair, 1.5) for pair in PAIRS]
+TWO = "id1=c_con[1],id2=c_con[2]"
+
+
+@pytest.mark.parametrize(
+    ("local", "rows", "columns", "told"),
+    [
+        ([(1, 2, 0), (2, 3, 0), (3, 4, 0), (4, 99, 0)], chain(0)[0], None, "grain 99"),
+        ([(101, 102, 0), (102, 103, 0)], ROWS, None, "another step"),
+        ([(1, 2, 0, 2, 3, 0), (2, 3, 0, 1, 2, 0)], ROWS, None, "cannot tell which col"),
+        (FLAGGED, ROWS, "pos force", "id among them"),
+        (FLAGGED, ROWS, "", "id among them"),
+        (FLAGGED, ROWS, "id forces", "keywords of compute pair/gran/local"),
+        (FLAGGED, ROWS, "id force torque", "makes 9 columns, the file has 6"),
+        (FLAGGED, ROWS, "id force history:2", "makes 8 columns, the file has 6"),
+        (FLAGGED, ROWS, "id1=c_con[2],id2=c_con[9]", r"c_con\[9\].*; the columns are c_con\[1\]"),
+        (FLAGGED, ROWS, "id1=c_con[1],id2=c_con[1]", "named twice"),
+        (ROUNDED, chain(1234561)[0], None, r"rounded to six digits.*%\.0f"),
+        # each rounded id is that of another grain
+        (ROUNDED, chain(1234560, 0.01)[0], "id force", r"rounded to six digits.*%\.0f"),
+        *(
+            (TRIPLES, ROWS, columns, "expected id1=NAME,id2=NAME")
+            for columns in (
+                "id1=c_con[1]",
+                f"{TWO},fx=c_con[3]",
+                f"{TWO},tx=c_con[3],ty=c_con[3],tz=c_con[3]",
+                f"{TWO},size=c_con[3]",
+                "id1,id2",
+            )
+        ),
+    ],
+)
+def test_contacts_that_cannot_be_right_are_refused(tmp_path, local, rows, columns, told):
+    for format in ("liggghts", "lammps") if columns is not None else ("liggghts",):
+        with pytest.raises(ReadError, match=told):
+            joined(tmp_path, local_text(local), rows, columns, format)
+
+
+@pytest.mark.parametrize(
+    ("rows", "columns", "told"),
+    [
+        ([(1.5, 2), (2.5, 3)], TWO, "expected ids in the columns 1 and 2"),
+        ([(1, 2), (2, 77)], TWO, "contact 2 names the grain 77, which is not in the grain"),
+        *(
+            (rows, None, "cannot tell which columns are the two ids")
+            for rows in (
+                [(1.5, 2.5), (2.5, 3.5)],  # no ids
+                [(1, 2, 3), (2, 3, 1)],  # two choices
+                [(1, 2)] * 5,  # types
+                [(10, 20), (20, 30)],  # of other grains
+            )
+        ),
+    ],
+)
+def test_contacts_of_lammps_that_cannot_be_told_are_asked_for(tmp_path, rows, columns, told):
+    with pytest.raises(ReadError, match=told):
+        joined(tmp_path, local_text(rows), ROWS, columns, "lammps")
+
+
+def test_contacts_by_id_need_ids_in_the_grain_file(tmp_path):
+    with pytest.raises(ReadError, match="the grain file has no ids"):
+        joined(tmp_path, pairs_text(), [row[1:] for row in ROWS], names="type x y z radius")
