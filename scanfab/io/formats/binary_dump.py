@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import struct
 from io import BytesIO
-from math import inf
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
@@ -22,8 +21,9 @@ from scanfab.io.files import check_memory, first_bytes, plain
 from scanfab.io.formats.dump import Dump, box_cell, numbers_as_names
 from scanfab.io.formats.shared import HEADER_BYTES
 from scanfab.io.parse.growing import leave_out_last
-from scanfab.io.reader import FileKind, Snapshot
+from scanfab.io.reader import Carries, FileKind, ReadOptions, Snapshot
 
+carries: Carries = "cell"
 MAGIC = (b"DUMPCUSTOM", b"DUMPATOM")
 # more stand in damaged files only
 MOST_COLUMNS = 1000
@@ -45,58 +45,75 @@ class Header(NamedTuple):
     """Of the bytes, as :mod:`struct` names it: < or >."""
 
 
-def names_of_binary(head: bytes) -> list[str] | None:
+def names_in(head: bytes) -> list[str] | None:
     """The names of the columns, by a file's first bytes; their numbers if it has none; or None."""
     try:
         return _header(BytesIO(head)).names
-    except ValueError:
+    except (ValueError, struct.error):
         return None
 
 
-def binary_kind(path: Path) -> FileKind:
+def fits(head: bytes) -> bool:
+    """Whether a file starts with the header of a snapshot."""
+    return names_in(head) is not None
+
+
+def kind(path: Path) -> FileKind:
     """Grains, unless the columns have names and none is a radius."""
-    names = names_of_binary(first_bytes(path, HEADER_BYTES)) or ["1"]
+    names = names_in(first_bytes(path, HEADER_BYTES)) or ["1"]
     return "grains" if names[0] == "1" or has_radius(names) else "points"
 
 
-def binary_snapshots(path: Path) -> list[Snapshot]:
+def snapshots(path: Path) -> list[Snapshot]:
     """The snapshots of a file, in the order of their steps; an incomplete last one is left out."""
     found: list[Snapshot] = []
-    start = 0
     with open(plain(path), "rb") as stream:
-        size = stream.seek(0, 2)
+        size, start = stream.seek(0, 2), 0
         while start < size or not found:
-            stream.seek(start)
             try:
-                header = _header(stream)
-                _blocks(stream, header, size)
-            except ValueError as error:
+                header, _, stop = _snapshot(stream, start, size)
+            except (ValueError, struct.error) as error:
                 leave_out_last(path, len(found), f"expected a whole binary snapshot: {error}")
                 break
-            found.append(Snapshot(path, header.step, header.time, start, stream.tell()))
-            start = stream.tell()
+            found.append(Snapshot(path, header.step, header.time, start, stop))
+            start = stop
     return sorted(found, key=lambda one: one.step or 0)
 
 
-def read_binary_dump(snapshot: Snapshot) -> Dump:
+def read(snapshot: Snapshot, options: ReadOptions) -> Dump:
     """One snapshot; ReadError if the file is not as it was when its snapshots were found."""
     path = snapshot.path
     with open(plain(path), "rb") as stream:
         size = stream.seek(0, 2)
         check_memory(path, 2.0 * ((snapshot.stop or size) - snapshot.start))
-        stream.seek(snapshot.start)
         try:
-            header = _header(stream)
-            blocks = _blocks(stream, header, size)
-        except ValueError as error:
+            header, blocks, _ = _snapshot(stream, snapshot.start, size)
+        except (ValueError, struct.error) as error:
             raise ReadError(f"{path}: expected a binary dump: {error}") from None
-        parts = []
-        for place, length in blocks:
-            stream.seek(place)
-            parts.append(np.fromfile(stream, f"{header.order}f8", length))
+        parts = [np.fromfile(plain(path), f"{header.order}f8", *block) for block in blocks]
     values = np.concatenate(parts).astype(np.float64).reshape(-1, len(header.names))
     columns = {name: values[:, header.names.index(name)] for name in header.names}
     return Dump(header.names, columns, box_cell(path, header.bounds, header.periodic))
+
+
+def _snapshot(
+    stream: IO[bytes], start: int, size: int
+) -> tuple[Header, list[tuple[int, str, int]], int]:
+    """The header that begins at a byte, the blocks of rows behind it, and where these end."""
+    stream.seek(start)
+    header = _header(stream)
+    blocks, width = [], len(header.names)
+    for _ in range(header.blocks):
+        (length,) = _take(stream, f"{header.order}i")
+        place = stream.tell()
+        if length < 0 or length % width or place + 8 * length > size:
+            raise ValueError(f"a block of {length} numbers, {width} a row")
+        blocks.append((length, "", place))
+        stream.seek(place + 8 * length)
+    rows = sum(length for length, *_ in blocks) // width
+    if rows != header.rows:
+        raise ValueError(f"the header counts {header.rows} rows, found {rows}")
+    return header, blocks, stream.tell()
 
 
 def _header(stream: IO[bytes]) -> Header:
@@ -109,58 +126,38 @@ def _header(stream: IO[bytes]) -> Header:
         # minus the length of the magic word, that word, the number 1, the revision of the layout
         stream.seek(start + 8 + len(magic))
         order = "<" if stream.read(4) == b"\1\0\0\0" else ">"
-        _take(stream, f"{order}i", 1, 2)
-    step, count = _take(stream, f"{order}2q", 0)
-    (is_tilted,) = _take(stream, f"{order}i", 0, 1)
+        stream.seek(4, 1)
+    step, count, tilted = _take(stream, f"{order}2qi")
     # of the lower and the upper face of each axis; 0 is periodic
-    faces = np.reshape(_take(stream, f"{order}6i", 0, 3), (3, 2))
-    bounds = np.reshape(_take(stream, f"{order}6d", -MOST, MOST), (3, 2))
-    if np.any(bounds[:, 0] > bounds[:, 1]):
-        raise ValueError("a lower bound of the box is above the upper one")
-    if is_tilted:
-        bounds = np.column_stack([bounds, _take(stream, f"{order}3d", -MOST, MOST)])
-    (width,) = _take(stream, f"{order}i", 1, MOST_COLUMNS)
+    faces = np.reshape(_take(stream, f"{order}6i"), (3, 2))
+    bounds = np.reshape(_take(stream, f"{order}6d"), (3, 2))
+    if tilted:
+        bounds = np.column_stack([bounds, _take(stream, f"{order}3d")])
+    (width,) = _take(stream, f"{order}i")
+    # a file of the old layout is known by numbers that can be nothing else
+    is_box = np.all(bounds[:, 0] <= bounds[:, 1]) and np.all(np.abs(bounds) <= MOST)
+    is_sound = min(step, count) >= 0 and tilted in (0, 1) and np.all((faces >= 0) & (faces <= 3))
+    if not (is_sound and is_box and 0 < width <= MOST_COLUMNS):
+        raise ValueError("step, box or number of columns cannot be right")
     names = numbers_as_names(width)
     if magic:
         _text(stream, order)  # units
-        if _take(stream, "b", 0, 1)[0]:
+        if _take(stream, "b")[0]:
             (time,) = _take(stream, f"{order}d")
         names = _text(stream, order).split()
-    if len(names) != width:
-        raise ValueError(f"{len(names)} names for {width} columns")
-    (blocks,) = _take(stream, f"{order}i", 1)
+    (blocks,) = _take(stream, f"{order}i")
+    if len(names) != width or blocks < 1:
+        raise ValueError(f"{len(names)} names for {width} columns in {blocks} blocks")
     x, y, z = (bool(both) for both in (faces == 0).all(axis=1))
     return Header(step, time, count, (x, y, z), bounds, names, blocks, order)
 
 
-def _take(stream: IO[bytes], kinds: str, low: float = -inf, high: float = inf) -> tuple[Any, ...]:
-    """The next numbers, of the kinds that :mod:`struct` knows, all of them within two bounds."""
-    data = stream.read(struct.calcsize(kinds))
-    if len(data) < struct.calcsize(kinds):
-        raise ValueError("the file ends too early")
-    found = struct.unpack(kinds, data)
-    if not all(low <= one <= high for one in found):
-        raise ValueError(f"expected numbers from {low} to {high}, found {found}")
-    return found
+def _take(stream: IO[bytes], kinds: str) -> tuple[Any, ...]:
+    """The next numbers, of the kinds that :mod:`struct` knows."""
+    return struct.unpack(kinds, stream.read(struct.calcsize(kinds)))
 
 
 def _text(stream: IO[bytes], order: str) -> str:
     """The next text, which stands behind its length."""
-    (length,) = _take(stream, f"{order}i", 0)
-    return stream.read(length).decode("utf-8", "replace")
-
-
-def _blocks(stream: IO[bytes], header: Header, size: int) -> list[tuple[int, int]]:
-    """First byte and number of values of each block of rows; the stream is behind them then."""
-    found, width = [], len(header.names)
-    for _ in range(header.blocks):
-        (length,) = _take(stream, f"{header.order}i", 0)
-        place = stream.tell()
-        if length % width or place + 8 * length > size:
-            raise ValueError(f"a block of {length} numbers, {width} a row")
-        found.append((place, length))
-        stream.seek(place + 8 * length)
-    rows = sum(length for _, length in found) // width
-    if rows != header.rows:
-        raise ValueError(f"the header counts {header.rows} rows, found {rows}")
-    return found
+    (length,) = _take(stream, f"{order}i")
+    return stream.read(max(length, 0)).decode("utf-8", "replace")

@@ -36,7 +36,7 @@ class Places(NamedTuple):
     """Triples of columns, which add up to the force on the first grain."""
     normal: list[int] | None = None
     """The triple that is the normal part of that force."""
-    are_contacts: bool = True
+    touch: bool = True
     """Whether all pairs in the list touch; LAMMPS lists all within a cut-off."""
 
 
@@ -53,9 +53,9 @@ def join_places(
         force = -sum((values[:, triple] for triple in places.force[1:]), values[:, places.force[0]])
     if places.normal is not None:
         normal = -values[:, places.normal]
-    if not places.are_contacts:
-        touch = _touching(grains, rows_of_ids(grains, ids), force)
-        ids, force = ids[touch], None if force is None else force[touch]
+    if not places.touch:
+        rows = _touching(grains, rows_of_ids(grains, ids), force)
+        ids, force = ids[rows], None if force is None else force[rows]
     return join_ids(path, grains, ids, force, walls=False, force_n=normal)
 
 
@@ -89,7 +89,7 @@ def named_places(path: Path, told: str, names: list[str]) -> Places:
     place = {key: names.index(own) for key, own in named.items()}
     triples = [[place[key] for key in triple if key in place] for triple in (FORCE, TANGENTIAL)]
     ids = [place[key] for key in IDS]
-    return Places(ids, [triple for triple in triples if triple], are_contacts=False)
+    return Places(ids, [triple for triple in triples if triple], touch=False)
 
 
 def _keyword_places(path: Path, told: str, width: int) -> Places:

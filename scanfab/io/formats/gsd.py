@@ -8,8 +8,10 @@ means, so a file without diameters has no radii.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
 from scanfab.io.columns import has_radius
@@ -46,23 +48,17 @@ class GsdReader(GrainsOnly):
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """The frames with their steps; ``start`` of a snapshot is the number of its frame."""
-        steps, _, count = _read(path, None)
-        found = [steps.get(f"{number}", np.zeros(1, np.int64)) for number in range(count)]
-        if any(step.shape != (1,) or step.dtype.kind not in "iu" for step in found):
-            raise ReadError(f"{path}: expected one whole number as step of each frame")
-        return numbered_frames(path, ((int(step[0]), None) for step in found))
+        return numbered_frames(path, ((step, None) for step in _read(path, None)[0]))
 
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
         """What the frame, or else the first one, has of each particle."""
         path = snapshot.path
-        arrays, _, _ = _read(path, snapshot.start)
+        _, _, arrays = _read(path, snapshot.start)
         count = arrays.pop("particles/N", np.zeros(0)).tolist()
         position = arrays.pop("particles/position", np.zeros((0, 3), np.float32))
         if position.shape[1:] != (3,) or (count and [len(position)] != count):
-            raise ReadError(
-                f"{path}, frame {snapshot.start}: {count} particles, but positions of shape "
-                f"{position.shape}"
-            )
+            found = f"{count} particles, but positions of shape {position.shape}"
+            raise ReadError(f"{path}, frame {snapshot.start}: {found}")
         columns: Columns = {"position": position.astype(np.float64)}
         for name, values in arrays.items():
             # the first frame may have had another number of particles; types are texts
@@ -72,34 +68,34 @@ class GsdReader(GrainsOnly):
         return columns, _cell(path, arrays)
 
 
-def _read(path: Path, frame: int | None) -> tuple[Columns, list[str], int]:
+def _read(path: Path, frame: int | None) -> tuple[list[int], list[str], Columns]:
     needed(path, "gsd", "gsd")
     return fenced(read_in_worker, path, frame)
 
 
-def read_in_worker(path: str, frame: int | None) -> tuple[Columns, list[str], int]:
+def read_in_worker(path: str, frame: int | None) -> tuple[list[int], list[str], Columns]:
     """
-    The arrays of a frame, the names of all arrays, and the number of frames.
+    The steps of all frames and the names of all arrays; the arrays of a frame if one is given.
 
-    Without a frame the arrays are the steps of all frames, by the numbers of these. ValueError says
-    why a file cannot be read.
+    ValueError says why a file cannot be read.
     """
     import gsd.fl
 
-    arrays: Columns = {}
     with gsd.fl.open(path, mode="r") as file:
         if file.schema != "hoomd":
             raise ValueError(f"its schema is {file.schema!r}, expected 'hoomd'")
         names = [name for name in file.find_matching_chunk_names("") if name.startswith(GROUPS)]
-        for number in range(file.nframes) if frame is None else [frame]:
-            for name in [STEP] if frame is None else names:
-                # what does not change is written in the first frame only
-                own = [one for one in (number, 0) if file.chunk_exists(frame=one, name=name)]
-                if own:
-                    values = np.asarray(file.read_chunk(frame=own[0], name=name))
-                    arrays[f"{number}" if frame is None else name] = values
-        sound = {name: values for name, values in arrays.items() if values.dtype.kind in "biuf"}
-        return sound, names, int(file.nframes)
+
+        def array(number: int, name: str) -> npt.NDArray[Any]:
+            """What does not change is written in the first frame only; texts if not even there."""
+            own = [one for one in (number, 0) if file.chunk_exists(frame=one, name=name)]
+            return np.asarray(file.read_chunk(frame=own[0], name=name) if own else "")
+
+        if frame is None:
+            steps = (array(number, STEP) for number in range(file.nframes))
+            return [int(step.item() or 0) for step in steps], names, {}
+        found = {name: array(frame, name) for name in names}
+        return [], names, {name: own for name, own in found.items() if own.dtype.kind in "biuf"}
 
 
 def _bare(name: str) -> str:

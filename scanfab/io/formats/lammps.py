@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Protocol
 
 import numpy as np
 
@@ -13,25 +12,10 @@ from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray
 from scanfab.io.contacts import join_ids
 from scanfab.io.files import first_bytes
-from scanfab.io.formats import binary_dump, lammps_netcdf, text_dump
+from scanfab.io.formats import binary_dump, dump_contacts, lammps_data, lammps_netcdf, text_dump
 from scanfab.io.formats.dump import Dump, dump_grains
-from scanfab.io.formats.dump_contacts import (
-    Places,
-    id_column,
-    join_places,
-    named_places,
-    refuse_rounded_ids,
-)
-from scanfab.io.formats.lammps_data import data_snapshots, is_data_file, of_liggghts, read_data
 from scanfab.io.formats.vtk import VtkReader
-from scanfab.io.reader import (
-    Carries,
-    FileKind,
-    GrainTable,
-    JoinedContacts,
-    ReadOptions,
-    Snapshot,
-)
+from scanfab.io.reader import Carries, FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
 
 # LIGGGHTS writes neither of these items, and its bounds with six digits
 LAMMPS_ITEMS = re.compile(
@@ -44,47 +28,29 @@ LAMMPS_ITEMS = re.compile(
 RESTART = re.compile(rb"LammpS RestartT|\0{4}.{2}\0\0[^\0]{0,100}LIGGGHTS", re.DOTALL)
 
 
-class Form(NamedTuple):
-    """One of the forms in which LAMMPS and LIGGGHTS write grains."""
+class Form(Protocol):
+    """A module that reads one of the forms in which LAMMPS and LIGGGHTS write grains."""
 
-    fits: Callable[[bytes], object]
-    """Whether a file has this form, by its first bytes."""
-    kind: Callable[[Path], FileKind]
-    snapshots: Callable[[Path], list[Snapshot]]
-    read: Callable[[Snapshot, ReadOptions], Dump]
-    cell: Carries = "cell"
+    carries: Carries
 
-    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
-        """Columns by their names, of a data file by the atom style."""
-        return dump_grains(snapshot, self.read(snapshot, options), options)
+    def fits(self, head: bytes) -> bool:
+        """Whether a file has this form, by its first bytes."""
+        ...
 
-    def carries(self, path: Path) -> Carries:
-        """A data file has a box without boundary flags."""
-        return self.cell
+    def kind(self, path: Path) -> FileKind:
+        """What a file holds, by the names of its columns."""
+        ...
+
+    def snapshots(self, path: Path) -> list[Snapshot]:
+        """The snapshots of a file."""
+        ...
+
+    def read(self, snapshot: Snapshot, options: ReadOptions) -> Dump:
+        """One snapshot."""
+        ...
 
 
-TEXT = Form(
-    text_dump.is_text_dump,
-    text_dump.text_kind,
-    text_dump.text_snapshots,
-    lambda snapshot, _: text_dump.read_text_dump(snapshot),
-)
-FORMS = (
-    TEXT,
-    Form(is_data_file, lambda _: "grains", data_snapshots, read_data, "box"),
-    Form(
-        lammps_netcdf.is_netcdf,
-        lammps_netcdf.netcdf_kind,
-        lammps_netcdf.netcdf_snapshots,
-        lambda snapshot, _: lammps_netcdf.read_netcdf(snapshot),
-    ),
-    Form(
-        binary_dump.names_of_binary,
-        binary_dump.binary_kind,
-        binary_dump.binary_snapshots,
-        lambda snapshot, _: binary_dump.read_binary_dump(snapshot),
-    ),
-)
+FORMS: tuple[Form, ...] = (text_dump, lammps_data, lammps_netcdf, binary_dump)
 
 
 def is_restart(head: bytes) -> bool:
@@ -92,39 +58,46 @@ def is_restart(head: bytes) -> bool:
     return RESTART.match(head) is not None
 
 
-class DumpReader:
+def form_of(path: Path) -> Form | None:
+    """The form of a file, by its first bytes; None if it is VTK, or something else."""
+    head = first_bytes(path)
+    if is_restart(head):
+        raise ReadError(
+            f"{path}: a binary restart, which only the program that wrote it can read: let it "
+            f"read_restart, and write the grains with dump custom ... id type x y z radius"
+        )
+    return next((form for form in FORMS if form.fits(head)), None)
+
+
+class DumpReader(VtkReader):
     """What the readers of LAMMPS' and LIGGGHTS' dumps have in common."""
 
-    other: Form | VtkReader = TEXT
-    """Reads files of all other forms."""
+    generic = False
+    lists_contacts = False
     lists_walls = False
     """Whether there are lists of contacts with walls, which are known by their values."""
 
-    def form(self, path: Path) -> Form | VtkReader:
-        """The form of a file, by its first bytes."""
-        head = first_bytes(path)
-        if is_restart(head):
-            raise ReadError(
-                f"{path}: a binary restart, which only the program that wrote it can read: let it "
-                f"read_restart, and write the grains with dump custom ... id type x y z radius"
-            )
-        return next((form for form in FORMS if form.fits(head)), self.other)
-
     def kind(self, path: Path) -> FileKind:
         """By the names of the columns; whatever a text dump counts but ATOMS are contacts."""
-        return self.form(path).kind(path)
+        form = form_of(path)
+        return super().kind(path) if form is None else form.kind(path)
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """By ``ITEM: TIMESTEP``; a data file is one."""
-        return self.form(path).snapshots(path)
-
-    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
-        """Columns by their names; of a data file by the atom style."""
-        return self.form(snapshot.path).read_grains(snapshot, options)
+        form = form_of(path)
+        return super().snapshots(path) if form is None else form.snapshots(path)
 
     def carries(self, path: Path) -> Carries:
         """A data file has a box without boundary flags, a VTK file at most the box beside it."""
-        return self.form(path).carries(path)
+        form = form_of(path)
+        return super().carries(path) if form is None else form.carries
+
+    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+        """Columns by their names; of a data file by the atom style."""
+        form = form_of(snapshot.path)
+        if form is None:
+            return super().read_grains(snapshot, options)
+        return dump_grains(snapshot, form.read(snapshot, options), options)
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
@@ -135,25 +108,23 @@ class DumpReader:
         Which column is what follows from ``contact_columns``, or from the values if these leave no
         doubt.
         """
-        path, form = snapshot.path, self.form(snapshot.path)
-        if isinstance(form, VtkReader):
-            return form.read_contacts(snapshot, options, grains)
-        if form is not TEXT:
+        path, form, told = snapshot.path, form_of(snapshot.path), options.contact_columns
+        if form is None:
+            return super().read_contacts(snapshot, options, grains)
+        if form is not text_dump:
             raise ReadError(
-                f"{path}: contacts are read from text: write them by dump local, to a file without "
-                f".bin"
+                f"{path}: contacts are read from text: write them by dump local, no .bin"
             )
-        dump = TEXT.read(snapshot, options)
+        dump = form.read(snapshot, options)
         values = np.column_stack([dump.columns[name] for name in dump.names]).astype(np.float64)
-        if not len(values):
+        if not len(values) or grains.id is None:
             return join_ids(path, grains, np.zeros((0, 2), np.int64), None, walls=False)
-        if grains.id is None:
-            raise ReadError(f"{path}: names grains by id, but the grain file has no ids")
-        refuse_rounded_ids(path, values, grains)
-        told = options.contact_columns
+        dump_contacts.refuse_rounded_ids(path, values, grains)
         found = self.found(path, values, grains) if told is None or self.lists_walls else None
-        if told is not None and not isinstance(found, JoinedContacts):
-            found = named_places(path, told, dump.names)
+        if isinstance(found, JoinedContacts):
+            return found
+        if told is not None:
+            found = dump_contacts.named_places(path, told, dump.names)
         if found is None:
             raise ReadError(
                 f"{path}: cannot tell which columns are the two ids of a contact: the ids may "
@@ -162,16 +133,14 @@ class DumpReader:
                 f'keywords of LIGGGHTS\' compute with `contact_columns="pos id force ..."`; a dump '
                 f'of LAMMPS is read with `format="lammps"`'
             )
-        if isinstance(found, JoinedContacts):
-            return found
-        return join_places(path, values, found, grains)
+        return dump_contacts.join_places(path, values, found, grains)
 
     def found(
         self, path: Path, values: FloatArray, grains: GrainTable
-    ) -> Places | JoinedContacts | None:
+    ) -> dump_contacts.Places | JoinedContacts | None:
         """Which columns are the ids, if their values leave no doubt; no force is read."""
-        place = id_column(values, grains, is_flagged=False)
-        return None if place is None else Places([place, place + 1], are_contacts=False)
+        place = dump_contacts.id_column(values, grains, is_flagged=False)
+        return None if place is None else dump_contacts.Places([place, place + 1], touch=False)
 
 
 class LammpsReader(DumpReader):
@@ -186,9 +155,9 @@ class LammpsReader(DumpReader):
         head = first_bytes(path)
         if head.startswith(b"ITEM: "):
             return LAMMPS_ITEMS.search(head) is not None
-        if is_data_file(head) or is_restart(head):
-            return not of_liggghts(head)
-        if text_dump.is_text_dump(head) or lammps_netcdf.is_netcdf(head):
+        if lammps_data.fits(head) or is_restart(head):
+            return not lammps_data.of_liggghts(head)
+        if text_dump.fits(head) or lammps_netcdf.fits(head):
             return True
         # LIGGGHTS' binary dumps have numbered columns
-        return (binary_dump.names_of_binary(head) or ["1"])[0] != "1"
+        return (binary_dump.names_in(head) or ["1"])[0] != "1"

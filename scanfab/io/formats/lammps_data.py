@@ -1,4 +1,4 @@
-"""Data files of LAMMPS and LIGGGHTS (``write_data``, ``read_data``): the section of atoms."""
+"""Data files of LAMMPS and LIGGGHTS (``write_data``, ``read``): the section of atoms."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ import numpy as np
 from scanfab.base.errors import ReadError
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.dump import Dump, box_cell, numbers_as_names
-from scanfab.io.reader import ReadOptions, Snapshot
+from scanfab.io.reader import Carries, FileKind, ReadOptions, Snapshot
 from scanfab.io.text import Columns, Layout, read_rows, text_of
 from scanfab.packing.cell import Cell
 
+carries: Carries = "box"
 FIRST_LINE = re.compile(rb"LAMMPS data file[^\n]*")
 # the first line is a comment; these two must stand below it
 ATOMS = re.compile(rb"^[ \t]*\d{1,15}[ \t]+atoms[ \t]*(?:#[^\n]*)?\r?$", re.MULTILINE)
@@ -33,11 +34,16 @@ NO_SPHERES = ("ellipsoids", "lines", "triangles", "bodies")
 OF_YADE = b"LIGGGHTS Description"
 
 
-def is_data_file(head: bytes) -> bool:
+def fits(head: bytes) -> bool:
     """Whether a file starts as data files do."""
     return FIRST_LINE.match(head) is not None or (
         ATOMS.search(head) is not None and BOX.search(head) is not None
     )
+
+
+def kind(path: Path) -> FileKind:
+    """Grains, or an error: columns have no names."""
+    return "grains"
 
 
 def of_liggghts(head: bytes) -> bool:
@@ -45,13 +51,13 @@ def of_liggghts(head: bytes) -> bool:
     return b"LIGGGHTS" in head.partition(b"\n")[0][:1000].upper()
 
 
-def data_snapshots(path: Path) -> list[Snapshot]:
+def snapshots(path: Path) -> list[Snapshot]:
     """The only snapshot of a file, with the step that the first line of LAMMPS names."""
     step = STEP.search(first_bytes(path).partition(b"\n")[0])
     return [Snapshot(path, step=None if step is None else int(step[1]))]
 
 
-def read_data(snapshot: Snapshot, options: ReadOptions) -> Dump:
+def read(snapshot: Snapshot, options: ReadOptions) -> Dump:
     """
     The Atoms section; the box has no boundary flags, so nothing is periodic unless the user says.
 
@@ -69,10 +75,9 @@ def read_data(snapshot: Snapshot, options: ReadOptions) -> Dump:
     if place is None:
         raise ReadError(f"{path}: expected a section Atoms, found none")
     header = _header(data[: sections[0].start()].decode("utf-8", "replace"))
-    count = "".join(header.get("atoms", []))
+    count, cell = "".join(header.get("atoms", [])), _cell(path, header)
     if not re.fullmatch(r"\d{1,15}", count):
         raise ReadError(f"{path}: expected a line 'N atoms' in the header, found none")
-    cell = _cell(path, header)
     begin = sections[place].end()
     end = sections[place + 1].start() + 1 if place + 1 < len(sections) else len(data)
     rows = re.sub(rb"[ \t]*#[^\n]*", b"", data[begin:end])
@@ -102,21 +107,23 @@ def _header(text: str) -> dict[str, list[str]]:
 
 def _cell(path: Path, header: dict[str, list[str]]) -> Cell | None:
     """The box, from its lower and upper bounds and its tilt, or from three vectors."""
+    keys = ["xlo xhi", "ylo yhi", "zlo zhi"]
     try:
         if "avec" in header:
-            vectors = [header["avec"], header["bvec"], header["cvec"]]
-            columns = [*np.transpose(vectors), header["abc origin"]]
+            columns = [*zip(*(header[key] for key in ("avec", "bvec", "cvec")), strict=True)]
+            columns.append(tuple(header["abc origin"]))
         else:
-            columns = [*np.transpose([header[f"{axis}lo {axis}hi"] for axis in "xyz"])]
-            columns += [header["xy xz yz"]] if "xy xz yz" in header else []
+            columns = [*zip(*(header[key] for key in keys), strict=True)]
+            columns += [tuple(header["xy xz yz"])] if "xy xz yz" in header else []
         bounds = np.array(columns, dtype=np.float64).T
-        if bounds.shape not in ((3, 2), (3, 3), (3, 4)):
-            raise ValueError
     except (KeyError, ValueError):
+        bounds = np.zeros((0, 0))
+    if bounds.shape not in ((3, 2), (3, 3), (3, 4)):
+        found = ", ".join(filter(None, header)) or "none"
         raise ReadError(
-            f"{path}: expected the box in the header: two numbers before each of xlo xhi, ylo yhi "
-            f"and zlo zhi, found {', '.join(filter(None, header)) or 'none'}"
-        ) from None
+            f"{path}: expected the box in the header: two numbers before each of "
+            f"{', '.join(keys)}, found {found}"
+        )
     return box_cell(path, bounds, (False, False, False), is_around=False)
 
 
@@ -176,7 +183,7 @@ def _fits(column: Columns, cell: Cell | None) -> bool:
     if not np.all(column["type"] == np.rint(column["type"])):
         return False
     if cell is None:
-        return True
+        return False
     fraction = cell.fractional(np.column_stack([column[axis] for axis in "xyz"]))
     # a grain may reach out of the box, and a periodic one lie there
     return bool(np.all((fraction > -0.5) & (fraction < 1.5)))

@@ -15,10 +15,11 @@ from scanfab.io.columns import has_radius
 from scanfab.io.fence import fenced, needed
 from scanfab.io.formats.dump import Dump
 from scanfab.io.formats.shared import cell_of, numbered_frames
-from scanfab.io.reader import FileKind, Snapshot
+from scanfab.io.reader import Carries, FileKind, ReadOptions, Snapshot
 from scanfab.io.text import Columns
 from scanfab.packing.cell import Cell
 
+carries: Carries = "cell"
 # classic, with long offsets, with long data; HDF5 is told apart by its content
 MAGIC = (b"CDF\x01", b"CDF\x02", b"CDF\x05")
 # AMBER's name of each triple, and whether its values are fractions of the box
@@ -44,12 +45,12 @@ class Contents(NamedTuple):
     others: Columns
 
 
-def is_netcdf(head: bytes) -> bool:
+def fits(head: bytes) -> bool:
     """Whether a file is NetCDF, of the kinds that LAMMPS writes."""
     return head.startswith(MAGIC)
 
 
-def netcdf_kind(path: Path) -> FileKind:
+def kind(path: Path) -> FileKind:
     """Grains, or points without a radius."""
     names = _read(path, None).names
     if not any(name in names for name in POSITIONS):
@@ -57,7 +58,7 @@ def netcdf_kind(path: Path) -> FileKind:
     return "grains" if has_radius(names) else "points"
 
 
-def netcdf_snapshots(path: Path) -> list[Snapshot]:
+def snapshots(path: Path) -> list[Snapshot]:
     """The frames; ``start`` of a snapshot is the number of its frame."""
     file = _read(path, None)
     times, scale = file.times, file.scale
@@ -66,16 +67,12 @@ def netcdf_snapshots(path: Path) -> list[Snapshot]:
     # LAMMPS writes the step as time, and the length of a step as its scale
     are_steps = file.program == "LAMMPS" and bool(np.all(times == np.rint(times)))
     scale = 1.0 if scale is None and not are_steps else scale
-    return numbered_frames(
-        path,
-        (
-            (int(time) if are_steps else None, None if scale is None else time * scale)
-            for time in times.tolist()
-        ),
-    )
+    steps = [int(time) if are_steps else None for time in times.tolist()]
+    seconds = [None if scale is None else time * scale for time in times.tolist()]
+    return numbered_frames(path, zip(steps, seconds, strict=True))
 
 
-def read_netcdf(snapshot: Snapshot) -> Dump:
+def read(snapshot: Snapshot, options: ReadOptions) -> Dump:
     """
     The variables of the atoms, by their names.
 
@@ -88,13 +85,15 @@ def read_netcdf(snapshot: Snapshot) -> Dump:
     file = _read(path, snapshot.start)
     there, cell = _written(path, file.atoms), _cell(path, file.others)
     columns = {name: values[there] for name, values in file.atoms.items()}
-    found = [columns.pop(name) for name in POSITIONS if name in columns]
-    if found and found[0].shape[1:] == (3,):
-        columns["position"] = doubles(found[0])
-        if next(is_scaled for name, is_scaled in POSITIONS.items() if name in file.atoms):
-            if cell is None:
-                raise ReadError(f"{path}: coordinates are fractions of a box, but there is no box")
-            columns["position"] = cell.origin + columns["position"] @ cell.vectors
+    found = [name for name in POSITIONS if name in columns]
+    for name in found:
+        position = columns.pop(name)
+        if name == found[0] and position.shape[1:] == (3,):
+            columns["position"] = doubles(position)
+    if found and POSITIONS[found[0]]:
+        if cell is None:
+            raise ReadError(f"{path}: {found[0]} are fractions of a box, but there is no box")
+        columns["position"] = cell.origin + columns["position"] @ cell.vectors
     return Dump(list(columns), columns, cell)
 
 
@@ -141,10 +140,8 @@ def _written(path: Path, atoms: Columns) -> npt.NDArray[np.bool_]:
     lost: npt.NDArray[np.bool_] = np.all(empty, axis=0)
     for name, column in zip(atoms, empty, strict=True):
         if np.any(column & ~lost):
-            raise ReadError(
-                f"{path}: {name} was not written for all atoms: dump all three of x y z, and close "
-                f"the file before it is read"
-            )
+            told = "dump all three of x y z, and close the file before it is read"
+            raise ReadError(f"{path}: {name} was not written for all atoms: {told}")
     return np.logical_not(lost)
 
 

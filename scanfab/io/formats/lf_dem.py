@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections.abc import Collection
 from pathlib import Path
 
 import numpy as np
@@ -64,12 +65,8 @@ class LfDemReader(GrainsOnly):
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
         """Columns by their titles; the images above and below are shifted along x."""
         path = snapshot.path
-        columns, shift = _columns(snapshot, _count(path))
-        if not {"particle index", "radius", POSITION} <= columns.keys():
-            raise ReadError(
-                f"{path}: expected columns of the particle index, the radius and the {POSITION}, "
-                f"found {', '.join(columns)}"
-            )
+        needed = ("particle index", "radius", POSITION)
+        columns, shift = _columns(snapshot, needed, _count(path))
         names = {"particle index": "id", POSITION: "position"}
         named = {names.get(title, title): values for title, values in columns.items()}
         return named, _cell(path, shift)
@@ -84,13 +81,12 @@ class LfDemReader(GrainsOnly):
         alone, without lubrication and repulsion.
         """
         path = snapshot.path
-        columns, _ = _columns(snapshot, None)
-        state = next((own for title, own in columns.items() if "contact state" in title), None)
-        labels = {"particle 1 label", "particle 2 label"}
-        if state is None or not labels <= columns.keys():
-            raise ReadError(f"{path}: expected columns of two labels and of the contact state")
+        titles = [title for title in _legend(path) if "contact state" in title]
+        needed = ("particle 1 label", "particle 2 label", *(titles[:1] or ["contact state"]))
+        columns, _ = _columns(snapshot, needed)
+        state = columns[needed[2]]
         touching = {title: values[state > 0] for title, values in columns.items()}
-        ids = [whole_numbers(path, touching[title]) for title in sorted(labels)]
+        ids = [whole_numbers(path, touching[title]) for title in needed[:2]]
         force = _contact_forces(path, touching)
         return join_ids(path, grains, np.column_stack(ids), force, walls=False)
 
@@ -136,12 +132,17 @@ def _count(path: Path) -> int:
     return int(count[1])
 
 
-def _columns(snapshot: Snapshot, count: int | None) -> tuple[Columns, float]:
+def _columns(
+    snapshot: Snapshot, needed: Collection[str], count: int | None = None
+) -> tuple[Columns, float]:
     """The columns of a frame by their titles, and the shear displacement."""
     path, data, legend = snapshot.path, text_of(snapshot), _legend(snapshot.path)
     frame = FRAME.match(data)
-    if frame is None or not legend:
-        raise ReadError(f"{path}: expected '# strain shear_disp rate', found {spelt(data[:80])}")
+    if frame is None or not legend.keys() >= {*needed}:
+        raise ReadError(
+            f"{path}: expected '# strain shear_disp rate' below columns with the titles "
+            f"{', '.join(needed)}, found {spelt(data[:80])} below {', '.join(legend) or 'none'}"
+        )
     width = max(places.stop for places in legend.values())
     layout = Layout(tuple(f"{place}" for place in range(width)), line=2)
     rows = read_rows(snapshot, data[frame.end() :], layout, count=count, what="particles")

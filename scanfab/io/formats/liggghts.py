@@ -15,38 +15,16 @@ from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray
 from scanfab.io.contacts import branches, count_walls, rows_of_ids
 from scanfab.io.files import first_bytes
-from scanfab.io.formats.binary_dump import names_of_binary
+from scanfab.io.formats import binary_dump, lammps_data
 from scanfab.io.formats.dump_contacts import MOST_ROWS, Places, are_ids, are_whole, id_column
 from scanfab.io.formats.lammps import DumpReader, is_restart
-from scanfab.io.formats.lammps_data import is_data_file, of_liggghts
-from scanfab.io.formats.vtk import VtkReader, vectors
+from scanfab.io.formats.vtk import vectors
 from scanfab.io.mesh import Mesh
 from scanfab.io.reader import GrainTable, JoinedContacts
 from scanfab.packing.walls import ListedWallForces
 
 # damping makes the force of a few contacts attractive; the others push
 PUSHES = 0.9
-
-
-class LiggghtsVtkReader(VtkReader):
-    """The VTK files of LIGGGHTS."""
-
-    # a contact list names grains only
-    walls = False
-    says_sign = True
-
-    def force_on_second(self, mesh: Mesh) -> FloatArray | None:
-        """The file has the force on the first grain, at times its normal and tangential part."""
-        force = vectors(mesh, "force")
-        normal, tangential = vectors(mesh, "force_normal"), vectors(mesh, "force_tangential")
-        if force is None and normal is not None and tangential is not None:
-            force = normal + tangential
-        return None if force is None else -force
-
-    def normal_force(self, mesh: Mesh) -> FloatArray | None:
-        """The normal part acts on the first grain, too."""
-        force = vectors(mesh, "force_normal")
-        return None if force is None else -force
 
 
 class LiggghtsReader(DumpReader):
@@ -58,22 +36,33 @@ class LiggghtsReader(DumpReader):
     )
     extensions = (".liggghts", ".dump", ".vtk", ".vtp", ".vtu", ".bin", ".data")
 
-    other = LiggghtsVtkReader()
     lists_walls = True
+    # in VTK a contact list names grains only, and the force acts on the first grain
+    walls = False
+    says_sign = True
 
     def recognises(self, path: Path) -> bool:
         """An ``ITEM:`` dump, or a data file, restart or legacy VTK file that names LIGGGHTS."""
         head = first_bytes(path)
-        if is_data_file(head) or is_restart(head):
-            return of_liggghts(head)
+        if lammps_data.fits(head) or is_restart(head):
+            return lammps_data.of_liggghts(head)
         if head.startswith(b"# vtk DataFile"):
             return b"LIGGGHTS" in head.partition(b"\n")[2].partition(b"\n")[0]
         # LAMMPS' binary dumps name their columns, these are numbered
-        return head.startswith(b"ITEM: ") or (names_of_binary(head) or [""])[0] == "1"
+        return head.startswith(b"ITEM: ") or (binary_dump.names_in(head) or [""])[0] == "1"
 
-    def beside(self, path: Path) -> list[Path]:
-        """A VTK file has its box beside it."""
-        return self.other.beside(path)
+    def force_on_second(self, mesh: Mesh) -> FloatArray | None:
+        """The force in VTK, at times its normal and tangential part."""
+        force = vectors(mesh, "force")
+        normal, tangential = vectors(mesh, "force_normal"), vectors(mesh, "force_tangential")
+        if force is None and normal is not None and tangential is not None:
+            force = normal + tangential
+        return None if force is None else -force
+
+    def normal_force(self, mesh: Mesh) -> FloatArray | None:
+        """The normal part in VTK."""
+        force = vectors(mesh, "force_normal")
+        return None if force is None else -force
 
     def found(
         self, path: Path, values: FloatArray, grains: GrainTable
@@ -87,7 +76,7 @@ class LiggghtsReader(DumpReader):
         place = id_column(values, grains, is_flagged=True)
         if place is None:
             return _walls(path, values, grains)
-        force = list(range(place + 3, place + 6))
+        force = [place + 3, place + 4, place + 5]
         is_force = place + 6 <= values.shape[1] and _pushes(
             values[:, force], values[:, place : place + 2], grains
         )

@@ -19,10 +19,11 @@ from scanfab.io.files import first_bytes
 from scanfab.io.formats.dump import Dump, box_cell, numbers_as_names
 from scanfab.io.formats.shared import HEADER_BYTES, marked_frames
 from scanfab.io.parse.growing import grows
-from scanfab.io.reader import FileKind, Snapshot
+from scanfab.io.reader import Carries, FileKind, ReadOptions, Snapshot
 from scanfab.io.text import Layout, read_rows, text_of
 from scanfab.packing.cell import Cell
 
+carries: Carries = "cell"
 # a snapshot begins with the first of these lines
 MARK, YAML_MARK = re.compile(rb"ITEM: (?:UNITS|TIME|TIMESTEP)\b"), re.compile(rb"---[ \t\r]*\n")
 # the words behind ITEM:, and the lines below them
@@ -63,12 +64,12 @@ class Header(NamedTuple):
         return next(keys, "NUMBER OF ATOMS").removeprefix("NUMBER OF ")
 
 
-def is_text_dump(head: bytes) -> bool:
+def fits(head: bytes) -> bool:
     """Whether a file starts as these dumps do."""
     return head.startswith(b"ITEM: ") or YAML.match(head) is not None
 
 
-def text_kind(path: Path) -> FileKind:
+def kind(path: Path) -> FileKind:
     """Atoms are grains if they have a radius; whatever else is counted are contacts."""
     header = _header(first_bytes(path, HEADER_BYTES))
     if header.what != "ATOMS":
@@ -76,13 +77,13 @@ def text_kind(path: Path) -> FileKind:
     return "grains" if has_radius(header.names) else "points" if header.sections else "other"
 
 
-def text_snapshots(path: Path) -> list[Snapshot]:
+def snapshots(path: Path) -> list[Snapshot]:
     """The snapshots of a file, in the order of their steps; an incomplete last one is left out."""
     mark = YAML_MARK if first_bytes(path, 3) == b"---" else MARK
     return marked_frames(path, mark, _moment, _lack)
 
 
-def read_text_dump(snapshot: Snapshot) -> Dump:
+def read(snapshot: Snapshot, options: ReadOptions) -> Dump:
     """
     One snapshot; words of elements stay words, all other columns are numbers.
 

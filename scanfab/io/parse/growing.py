@@ -28,16 +28,10 @@ def grows() -> bool:
     return _grows.get()
 
 
-def warn_incomplete(text: str) -> None:
-    """Warn that a last snapshot is left out, unless the file may still be being written."""
-    if not _grows.get():
-        warnings.warn(text, ScanfabWarning, stacklevel=3)
-
-
 def leave_out_last(path: Path, complete: int, reason: str) -> None:
     """Warn that an incomplete last snapshot is left out; ReadError if none is complete."""
     if complete == 0:
         raise ReadError(f"{path}: {reason}: the file is incomplete")
-    warn_incomplete(
-        f"{path}: the last snapshot, number {complete + 1}, is incomplete and is left out: {reason}"
-    )
+    if not grows():
+        text = f"{path}: the last snapshot, number {complete + 1}, is incomplete and is left out"
+        warnings.warn(f"{text}: {reason}", ScanfabWarning, stacklevel=3)
