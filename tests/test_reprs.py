@@ -32,12 +32,12 @@ def series(tmp_path):
 
 def test_of_a_series(series):
     head = f"Series {series.name}: "
-    files = " of dump_*.txt (liggghts), contacts of pairs_*.txt"
-    assert repr(series) == f"{head}3 files (frames not counted){files}"
+    files = " dump_*.txt (liggghts), contacts of pairs_*.txt"
+    assert repr(series) == f"{head}3 files{files}"
     part, last = series[1:], series[-1]
-    assert repr(series) == f"{head}3 frames{files}"
-    assert repr(part) == f"{head}frames 1:{files}"
-    assert repr(series[:2:2]) == f"{head}frames 0:2:2{files}"
+    assert repr(series) == f"{head}3 files{files}"
+    assert repr(part) == f"{head}frames 1: of 3 files{files}"
+    assert repr(series[:2:2]) == f"{head}frames 0:2:2 of 3 files{files}"
     assert repr(last) == f"Frame 2 of {series.name}: dump_20.txt, step 20"
 
 
@@ -45,7 +45,7 @@ def test_of_a_damaged_frame(tmp_path):
     write(tmp_path / "dump_0.txt", dump_text())
     series = scanfab.read_series(tmp_path)
     (tmp_path / "dump_0.txt").unlink()
-    assert repr(series[0]) == f"Frame 0 of {series.name}: dump_0.txt, step 0, damaged"
+    assert repr(series[0]) == f"Frame 0 of {series.name}: dump_0.txt, damaged"
 
 
 def test_of_a_packing():

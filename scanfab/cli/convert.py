@@ -69,7 +69,7 @@ def convert(ctx: click.Context, /, paths: tuple[str, ...], to: str | None, **cho
 
 def _existing(sources: tuple[str, ...]) -> tuple[str, ...]:
     """The sources, with globs in quotes as the shell would have made of them."""
-    from scanfab.io.grain_files import expanded
+    from scanfab.io.families import expanded
 
     return tuple(
         str(one) for source in sources for one in ([source] if source == "-" else expanded(source))

@@ -174,7 +174,7 @@ def options(*chosen: str | Option, **changes: Any) -> Callable[[Command], Comman
 def _expanded(source: str) -> list[Any]:
     """What a glob names; one that names nothing is a path that does not exist."""
     from scanfab.base.errors import ReadError
-    from scanfab.io.grain_files import expanded
+    from scanfab.io.families import expanded
 
     try:
         return [*expanded(source)]

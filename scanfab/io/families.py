@@ -1,219 +1,92 @@
-"""Files sorted into families: names that differ in their numbers only, in natural order."""
+"""From what users name to files, and from their names to families: one for each series."""
 
 from __future__ import annotations
 
+import glob
+import os
 import re
+import warnings
 from collections import defaultdict
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
 from fnmatch import fnmatch
 from functools import lru_cache
+from itertools import chain, zip_longest
 from pathlib import Path
+from typing import NamedTuple
 
-from scanfab.base.errors import ReadError, UnknownFormatError
+from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning, UnknownFormatError
+from scanfab.base.streams import kind_of
 from scanfab.io.files import bare_name
 from scanfab.io.reader import FileKind, Reader, ReadOptions
 from scanfab.io.registry import installed_readers, reader_for, reader_named
 
+PathLike = str | os.PathLike[str]
+
 # options of the command line, beside the dumps
 SETTINGS_FILE = "scanfab.toml"
-# of a table with the contacts of the grains in the file of the same name without it
-CONTACTS_ENDING = ".contacts."
 # endings of what editors and interrupted programs leave
 LEFTOVERS = ("~", ".part", ".tmp", ".bak")
+# of a table with the contacts of the grains in the file of the same name without it
+CONTACTS_ENDING = ".contacts."
 NUMBER = re.compile(r"\d+")
 
 
-@dataclass(frozen=True)
-class Family:
-    """Files of one kind that differ in the step only."""
-
-    pattern: str
-    """A glob for users, such as ``dumps/dump_*.txt``."""
-    files: dict[int | None, Path]
-    """By the step in the name, in natural order; None for a name without a number."""
-    reader: Reader | None
-    """None if no reader knows them."""
-    kind: FileKind
-    problem: str | None = None
-    """Why the reader cannot tell what they hold."""
-    clash: str | None = None
-    """What is wrong with their steps."""
-
-    def check(self) -> Family:
-        """The family itself; ReadError if two files are of the same step."""
-        if self.clash is not None:
-            raise ReadError(self.clash)
-        return self
-
-
-def sort_into_families(
-    files: Sequence[Path], format: str | None, options: ReadOptions | None = None
-) -> list[Family]:
+def expanded(source: PathLike) -> list[PathLike]:
     """
-    Sort files into families, and find the reader and kind of each by its largest file.
+    A source as it is spelt, or the files and folders that a glob names.
 
-    Parameters
-    ----------
-    files : sequence of Path
-        In any order.
-    format : str, optional
-        Name of the reader to use for all.
-    options : ReadOptions, optional
-        What the user tells of them.
-
-    Raises
-    ------
-    UnknownFormatError
-        If there is no reader of that name.
+    The shell leaves globs in quotes to us.
     """
-    return [
-        _family(_by_step(members), members, _glob(members, files), format, options)
-        for members in _groups(_heads(files, format))
-    ]
+    if Path(source).exists() or not glob.has_magic(os.fspath(source)):
+        return [source]
+    found: list[PathLike] = [*sorted(glob.glob(os.fspath(source)))]
+    if not found:
+        raise ReadError(f"{source}: matches nothing: there is no file or folder of such a name")
+    return found
 
 
-def _heads(files: Sequence[Path], format: str | None) -> Sequence[Path]:
-    """The files without those that another one of them lists as its parts."""
-    readers = installed_readers()
-    named = readers.values() if format not in readers else [readers[format]]
-    for ask in [one.plugin.listed_by for one in named if hasattr(one.plugin, "listed_by")]:
-        there = set(files)
-        files = [file for file in files if ask(file) not in there]
+def named_once(sources: Iterable[PathLike]) -> list[PathLike]:
+    """
+    Sources as they are spelt, globs expanded, and each file and folder once.
+
+    Rows that come twice look like two samples, so a warning names what is left out.
+    """
+    first: dict[Path, PathLike] = {}
+    again: list[str] = []
+    for source in (path for one in sources for path in expanded(one)):
+        place = Path(source).resolve()
+        if place in first:
+            before = str(first[place])
+            again.append(before if str(source) == before else f"{source} (as {before})")
+        else:
+            first[place] = source
+    if again:
+        warnings.warn(
+            f"{some(again)}: named twice among the sources, and read once",
+            ScanfabWarning,
+            stacklevel=4,
+        )
+    return list(first.values())
+
+
+def some(names: Sequence[str]) -> str:
+    """The first five names, and how many more there are."""
+    return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+
+
+def files_of(path: Path) -> list[Path]:
+    """A file, or the files of a folder, of which there is at least one."""
+    if not path.exists():
+        raise ReadError(f"{path}: there is no such file, folder or glob")
+    if not path.is_dir():
+        return [path]
+    files = files_in(path)
+    for one in sorted(set(path.iterdir()).difference(files)):
+        if (kind := kind_of(one)) is not None:
+            warnings.warn(f"skipped {one}: it is {kind}, not a file", ScanfabNote, stacklevel=3)
     return files
-
-
-def _groups(files: Sequence[Path]) -> list[list[Path]]:
-    """The files of each family, in the order of their steps, by their names alone."""
-    groups: dict[str, list[Path]] = defaultdict(list)
-    for file in files:
-        groups[NUMBER.sub("*", bare_name(file))].append(file)
-    return [members for _, group in sorted(groups.items()) for members in _split(group)]
-
-
-def _by_step(members: list[Path]) -> list[tuple[int | None, Path]]:
-    place = _place(members)
-    return [(next(iter(_numbers(file)[place:]), None), file) for file in members]
-
-
-def families_beside(
-    grains: Family, format: str | None, options: ReadOptions | None = None
-) -> list[Family]:
-    """
-    Other families in the folders of some grain files, with the files of the same steps only.
-
-    Their files go by the same keys as the grain files. ``STEM.contacts.csv`` is of the file STEM,
-    whatever number in it differs from those of others.
-    """
-    keys: dict[Path, dict[Path, int | None]] = defaultdict(dict)
-    for key, file in grains.files.items():
-        keys[file.parent][file] = key
-    found: dict[str, list[tuple[int | None, Path]]] = defaultdict(list)
-    for folder, own in keys.items():
-        files = files_in(folder)
-        groups = _groups(_heads(files, format))
-        wanted = {
-            step: own[file] for group in groups for step, file in _by_step(group) if file in own
-        }
-        stems = {_own_stem(file): key for file, key in own.items()}
-        for group in groups:
-            same = [(wanted[step], file) for step, file in _by_step(group) if step in wanted]
-            # a name that says whose contacts they are goes before the numbers in it
-            named = [(stems[stem], file) for file in group if (stem := _owner(file)) in stems]
-            if not set(named) <= set(same):
-                same, group = named, [file for _, file in named]
-            if same and not own.keys() & set(group):
-                found[_glob(group, files)] += same
-    return [
-        _family(files, [file for _, file in files], pattern, format, options)
-        for pattern, files in found.items()
-    ]
-
-
-def set_tables_aside(
-    families: Sequence[Family], named: Collection[Path] = (), grains: Family | None = None
-) -> list[Family]:
-    """
-    The families, with ``other`` as the kind of tables that lie beside dumps.
-
-    A table may be anything: results, or what somebody made of the dumps. Beside grains of a
-    program's own format, one counts if users name it, or if it is ``STEM.contacts.csv`` of a file
-    of grains.
-
-    Parameters
-    ----------
-    families : sequence of Family
-        Of one source.
-    named : collection of Path
-        Files that the user names one by one.
-    grains : Family, optional
-        Those that are sure, if the families are others.
-    """
-    own = [] if grains is None else [grains]
-    sure = [
-        family
-        for family in [*families, *own]
-        if family.kind in ("grains", "index") and not _is_table(family)
-    ]
-    if not sure:
-        return _guesses_aside(families, named)
-    files = [file for one in [*sure, *own] for file in one.files.values()]
-    stems = {bare_name(file).rpartition(".")[0] for file in files}
-    return [
-        family
-        if not _is_table(family)
-        or any(file in named or _owner(file) in stems for file in family.files.values())
-        else replace(family, kind="other")
-        for family in families
-    ]
-
-
-def _guesses_aside(families: Sequence[Family], named: Collection[Path]) -> list[Family]:
-    """The same of tables without names beside tables that have some."""
-    guesses = [
-        one
-        for one in families
-        if one.kind == "grains"
-        and one.reader is not None
-        and _is_table(one)
-        and not one.reader.recognises(next(iter(one.files.values())))
-    ]
-    are_sure = any(one.kind == "grains" and one not in guesses for one in families)
-    return [
-        replace(one, kind="other")
-        if are_sure and one in guesses and not set(named) & set(one.files.values())
-        else one
-        for one in families
-    ]
-
-
-def _is_table(family: Family) -> bool:
-    return bool(getattr(family.reader, "is_table", False))
-
-
-def _own_stem(file: Path) -> str:
-    """The stem by which contacts name a file; dumps called dump.100 and dump.200 share no stem."""
-    name = bare_name(file)
-    stem, _, ending = name.rpartition(".")
-    return name if ending.isdigit() else stem or name
-
-
-def _owner(file: Path) -> str | None:
-    """The stem of the file whose contacts these are by their name; None if it does not say so."""
-    stem, ending, _ = bare_name(file).rpartition(CONTACTS_ENDING)
-    return stem if ending else None
-
-
-def contacts_beside(
-    grains: Family, format: str | None, options: ReadOptions | None = None
-) -> tuple[list[Family], list[Family]]:
-    """The contact files in the folder of single grain files: their own, and those in doubt."""
-    if grains.kind == "index":
-        return [], []
-    beside = set_tables_aside(families_beside(grains, format, options), (), grains)
-    rivals = [family for family in beside if family.kind in ("grains", grains.kind)]
-    contacts = [family for family in beside if family.kind == "contacts" and family.clash is None]
-    return own_contacts(grains, rivals, contacts)
 
 
 def files_in(folder: Path) -> list[Path]:
@@ -230,60 +103,110 @@ def files_in(folder: Path) -> list[Path]:
     return sorted(files, key=lambda file: file.name)
 
 
-def own_contacts(
-    grains: Family, rivals: Sequence[Family], contacts: Sequence[Family]
-) -> tuple[list[Family], list[Family]]:
+def files_around(files: Iterable[Path]) -> list[Path]:
+    """All files in the folders of some, as far as these can be listed."""
+    found: list[Path] = []
+    for folder in {file.parent: None for file in files}:
+        with suppress(OSError):
+            found += files_in(folder)
+    return found
+
+
+@dataclass(frozen=True)
+class Family:
+    """Files of one kind that differ in the step only."""
+
+    pattern: str
+    """A glob for users, such as ``dumps/dump_*.txt``."""
+    files: dict[int | None, Path]
+    """By the number in the name, in natural order; None for a name without a number."""
+    reader: Reader | None
+    """None if no reader knows them."""
+    kind: FileKind
+    problem: str | None = None
+    """Why the reader cannot tell what they hold."""
+    clash: str | None = None
+    """What is wrong with their steps."""
+    has_steps: bool = True
+    """Whether the numbers are steps: of a single file in its folder nobody knows."""
+
+    def check(self) -> Family:
+        """The family itself; ReadError if two files are of the same step."""
+        if self.clash is not None:
+            raise ReadError(self.clash)
+        return self
+
+    @property
+    def largest(self) -> Path:
+        """The file that tells reader and kind."""
+        return max(self.files.values(), key=lambda file: file.stat().st_size)
+
+    @property
+    def is_table(self) -> bool:
+        """Whether a reader of tables reads them, which may hold anything."""
+        return bool(getattr(self.reader, "is_table", False))
+
+
+class Named(NamedTuple):
+    """Files that belong together by their names."""
+
+    files: list[tuple[int | None, Path]]
+    """With the number of each that tells it from the others, in natural order."""
+    has_steps: bool
+    """Whether there are several, so that the number is a step."""
+
+
+def sort_names(files: Iterable[Path], around: Iterable[Path] = ()) -> list[Named]:
     """
-    Which families of contact files belong to a family of grains, and of which it is in doubt.
+    Sort files by their names alone.
 
-    Where no other grains lie beside, all do. Else those whose names begin with as many of the same
-    words as the grains' and with more than those of the others have in common with them; and those
-    that are called ``STEM.contacts.csv``, by the grain files' own names.
+    Parameters
+    ----------
+    files : iterable of Path
+        In any order.
+    around : iterable of Path, optional
+        Others in their folders, which show what number is the step.
     """
-    own: list[Family] = []
-    doubtful: list[Family] = []
-    others = [rival for rival in rivals if _stem(rival) != _stem(grains)]
-    stems = set(map(_own_stem, grains.files.values()))
-    for family in contacts:
-        if stems >= set(map(_owner, family.files.values())):
-            own.append(family)
-            continue
-        kin = _kinship(grains, family)
-        closest = max((_kinship(rival, family) for rival in others), default=(-1, False))
-        if kin > closest:
-            own.append(family)
-        elif kin == closest:
-            doubtful.append(family)
-    return own, doubtful
+    own = _heads(files)
+    groups: dict[str, list[Path]] = defaultdict(list)
+    for file in {*own, *_heads(around)}:
+        groups[NUMBER.sub("*", bare_name(file))].append(file)
+    found = [
+        (len(series) > 1, [(step, file) for step, file in series if file in own])
+        for _, group in sorted(groups.items())
+        for series in _series_in(group)
+    ]
+    return [Named(series, has_steps) for has_steps, series in found if series]
 
 
-def nearest(grains: Family, contacts: Sequence[Family]) -> Family | None:
-    """The contact files whose names begin with more of the grains' words than all others do."""
-    ordered = sorted(contacts, key=lambda one: _kinship(grains, one)[0], reverse=True)
-    first, second = ordered[:2]
-    is_nearer = _kinship(grains, first)[0] > _kinship(grains, second)[0]
-    return first if is_nearer else None
+def _heads(files: Iterable[Path]) -> set[Path]:
+    """The files without those that another one of them lists as its parts."""
+    heads = set(files)
+    readers = [one.plugin for one in installed_readers().values()]
+    for reader in [one for one in readers if hasattr(one, "listed_by")]:
+        heads -= {file for file in heads if reader.listed_by(file) in heads}
+    return heads
 
 
-def _stem(family: Family) -> list[str]:
-    """The words of a pattern without its ending."""
-    return re.findall(r"[^\W_]+", bare_name(Path(family.pattern)).removesuffix(_ending(family)))
+def _series_in(group: list[Path]) -> Iterator[list[tuple[int | None, Path]]]:
+    """
+    Tell series apart whose names differ in several numbers (run1_100, run1_200, run2_100).
 
-
-def _ending(family: Family) -> str:
-    return "".join(re.findall(r"\.[A-Za-z]\w*$", bare_name(Path(family.pattern))))
-
-
-def _kinship(one: Family, two: Family) -> tuple[int, bool]:
-    """How many words two names begin with in common, and whether they have the same ending."""
-    words = list(zip(_stem(one), _stem(two), strict=False))
-    common = next((k for k, (a, b) in enumerate(words) if a != b), len(words))
-    return common, _ending(one) == _ending(two)
-
-
-def names_a_step(file: Path) -> bool:
-    """Whether a number in a file's name is taken for its step, if the file has none itself."""
-    return bool(_numbers(file))
+    The last number that differs is the step. All files are one series if the numbers before it
+    never fall while the step rises, and no step occurs twice.
+    """
+    numbers = {file: _numbers(file) for file in group}
+    columns = list(zip(*numbers.values(), strict=True))
+    differing = [place for place, column in enumerate(columns) if len(set(column)) > 1]
+    place = differing[-1] if differing else max(len(columns) - 1, 0)
+    ordered = sorted(group, key=lambda file: (numbers[file][place : place + 1], numbers[file]))
+    steps = [next(iter(numbers[file][place:]), None) for file in ordered]
+    leading = [numbers[file][:place] for file in ordered]
+    repeated = len(set(steps)) < len(steps) and len(set(leading)) > 1
+    series = defaultdict(list)
+    for key, step, file in zip(leading, steps, ordered, strict=True):
+        series[() if not repeated and leading == sorted(leading) else key].append((step, file))
+    yield from series.values()
 
 
 @lru_cache(1 << 16)
@@ -294,60 +217,62 @@ def _numbers(file: Path) -> tuple[int, ...]:
     return tuple(int(number) for number in NUMBER.findall(text))
 
 
-def _split(group: list[Path]) -> list[list[Path]]:
-    """
-    Tell series apart whose names differ in a number too (run1_100, run1_200, run2_100).
-
-    One series: its numbers before the step never fall while the step rises, and no step occurs
-    twice.
-    """
-    place = _place(group)
-    numbers = {file: _numbers(file) for file in group}
-    ordered = sorted(group, key=lambda file: (numbers[file][place:][:1], numbers[file]))
-    steps = [numbers[file][place:][:1] for file in ordered]
-    leading = [numbers[file][:place] for file in ordered]
-    repeated = len(set(steps)) < len(steps) and len(set(leading)) > 1
-    if not repeated and leading == sorted(leading):
-        return [ordered]
-    series: dict[tuple[int, ...], list[Path]] = defaultdict(list)
-    for file, key in zip(ordered, leading, strict=True):
-        series[key].append(file)
-    return list(series.values())
+def names_a_step(file: Path) -> bool:
+    """Whether a number in a file's name may be taken for its step, if the file has none itself."""
+    return bool(_numbers(file))
 
 
-def _place(group: list[Path]) -> int:
-    """Which number of the names is the step: the last one that differs, else the last."""
-    columns = list(zip(*map(_numbers, group), strict=True))
-    differing = [place for place, column in enumerate(columns) if len(set(column)) > 1]
-    return differing[-1] if differing else max(len(columns) - 1, 0)
-
-
-def _family(
-    steps: list[tuple[int | None, Path]],
-    members: list[Path],
-    pattern: str,
+def sort_into_families(
+    files: Iterable[Path],
     format: str | None,
-    options: ReadOptions | None,
+    options: ReadOptions | None = None,
+    around: Iterable[Path] = (),
+) -> list[Family]:
+    """
+    Sort files into families, and find the reader and kind of each by its largest file.
+
+    Parameters
+    ----------
+    files : iterable of Path
+        In any order.
+    format : str, optional
+        Name of the reader to use for all.
+    options : ReadOptions, optional
+        What the user tells of them.
+    around : iterable of Path, optional
+        Other files in their folders.
+
+    Raises
+    ------
+    UnknownFormatError
+        If there is no reader of that name.
+    """
+    files = list(files)
+    return [family_of(one, files, format, options) for one in sort_names(files, around)]
+
+
+def family_of(
+    named: Named, among: Sequence[Path], format: str | None, options: ReadOptions | None
 ) -> Family:
-    sample = max(members, key=lambda file: file.stat().st_size)
+    """The family of some files; its pattern matches no other file ``among`` which they were."""
+    files: dict[int | None, Path] = {}
+    clash: str | None = None
+    for step, file in named.files:
+        if files.setdefault(step, file) is not file:
+            clash = f"two files for one step: {files[step]} and {file}: name one of them"
+    pattern = _glob([file for _, file in named.files], among)
+    family = Family(pattern, files, None, "other", None, clash, named.has_steps)
+    sample, problem, kind = family.largest, None, family.kind
     reader: Reader | None = None
-    kind: FileKind = "other"
-    problem: str | None = None
     try:
         reader = reader_for(sample, options) if format is None else reader_named(format, options)
         kind = "other" if reader is None else reader.kind(sample)
     except UnknownFormatError:
         raise
     except ReadError as error:
-        # in a folder one damaged file is passed over; alone it is the error
+        # in a folder one damaged file is skipped; alone it is the error
         problem = str(error)
-    files: dict[int | None, Path] = {}
-    clash: str | None = None
-    for step, file in steps:
-        if step in files:
-            clash = f"two files for one step: {files[step]} and {file}: name one of them"
-        files.setdefault(step, file)
-    return Family(pattern, files, reader, kind, problem, clash)
+    return Family(pattern, files, reader, kind, problem, clash, named.has_steps)
 
 
 def _glob(members: list[Path], files: Sequence[Path]) -> str:
@@ -356,19 +281,43 @@ def _glob(members: list[Path], files: Sequence[Path]) -> str:
 
     If that would match other files too, the names themselves.
     """
-    texts = [NUMBER.findall(file.name) for file in members]
-
-    def with_stars(star: str) -> str:
-        shown = iter(zip(*texts, strict=False))
-        name = NUMBER.sub(
-            lambda match: star if len(set(next(shown, match[0]))) > 1 else match[0],
-            members[0].name,
-        )
-        return str(members[0].with_name(name))
-
+    numbers = [NUMBER.findall(file.name) for file in members]
+    differs = [len(set(column)) > 1 for column in zip(*numbers, strict=False)]
+    letters = NUMBER.split(members[0].name)
     others = set(files) - set(members)
     for star in ("*", "[0-9]*"):
-        pattern = with_stars(star)
+        shown = zip_longest(numbers[0], differs)
+        words = [star if is_other else number for number, is_other in shown]
+        name = "".join(chain(*zip_longest(letters, words, fillvalue="")))
+        pattern = str(members[0].with_name(name))
         if not any(fnmatch(str(file), pattern) for file in others):
             return pattern
     return " ".join(map(str, members[:3])) + (" ..." if len(members) > 3 else "")
+
+
+def own_stem(file: Path) -> str:
+    """The stem by which contacts name a file; dumps called dump.100 and dump.200 share no stem."""
+    name = bare_name(file)
+    stem, _, ending = name.rpartition(".")
+    return name if ending.isdigit() else stem or name
+
+
+def owner(file: Path) -> str | None:
+    """The stem of the file whose contacts these are by their name; None if it does not say so."""
+    stem, ending, _ = bare_name(file).rpartition(CONTACTS_ENDING)
+    return stem if ending else None
+
+
+def kinship(one: Family, two: Family) -> tuple[int, bool]:
+    """How many words two names begin with in common, and whether they have the same ending."""
+    (own, ending), (others, other_ending) = words_of(one), words_of(two)
+    pairs = enumerate(zip(own, others, strict=False))
+    common = next((k for k, (a, b) in pairs if a != b), min(len(own), len(others)))
+    return common, ending == other_ending
+
+
+def words_of(family: Family) -> tuple[list[str], str]:
+    """The words of a pattern, and its ending."""
+    name = bare_name(Path(family.pattern))
+    ending = "".join(re.findall(r"\.[A-Za-z]\w*$", name))
+    return re.findall(r"[^\W_]+", name.removesuffix(ending)), ending

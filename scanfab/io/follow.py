@@ -13,9 +13,8 @@ from typing import Any
 
 from scanfab.base.errors import ReadError, ScanfabWarning, SettingsError
 from scanfab.base.option import refuse_unknown, unusable
-from scanfab.io.families import Family, files_in
+from scanfab.io.families import Family, PathLike, files_in
 from scanfab.io.frame import Frame
-from scanfab.io.grain_files import PathLike
 from scanfab.io.options import take_reading
 from scanfab.io.parse.growing import growing
 from scanfab.io.series import Series
@@ -110,9 +109,7 @@ class FollowedSeries(Series):
     def as_it_is(self) -> Series:
         """The series of what is there now, which is not waited for."""
         self._follower.look()
-        series = self._with(self.numbers)
-        del vars(series)["_follower"]
-        return series
+        return self._with(self.numbers)
 
     @property
     def lack(self) -> str:
@@ -221,7 +218,7 @@ class _Follower:
     def _go_on_with(self, series: Series) -> None:
         if self._series is not None:
             # by the stamps of the files, and the space of the first frame: they are known already
-            vars(series).update(_met=self._series._met, _spaces=self._series._spaces)
+            series.known = self._series.known
         self._series = series
         self._check_taken(series)
         self.opened(series)
@@ -291,7 +288,7 @@ class _Follower:
             return []
         # contact files are looked into again; threads may still read frames of the series before
         series = replace(self._series)
-        vars(series).update(_met=self._series._met, _spaces=self._series._spaces)
+        series.known = self._series.known
         with growing():
             return list(islice(series, number, None))
 

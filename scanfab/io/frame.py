@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,12 +21,13 @@ from scanfab.io.beside import (
     with_columns,
 )
 from scanfab.io.bodies import body_numbers
-from scanfab.io.families import Family, nearest
+from scanfab.io.families import Family
 from scanfab.io.files import unpacking_up_to
 from scanfab.io.reader import (
     Carries,
     GrainTable,
     JoinedContacts,
+    NotContactsError,
     Reader,
     ReadOptions,
     Snapshot,
@@ -88,11 +89,10 @@ class Frame:
         series, path = self.series, self.snapshot.path
         families = [_of_step(one, self.name_step, self.step) for one in series.contacts]
         grains = replace(series.grains, files=_absolute(series.grains.files))
-        if series.dim == 3 or series._spaces:
+        if series.dim == 3 or series.known.space is not None:
             # else the space of the series is that of a frame before
             grains = _of_step(grains, self.name_step, self.step)
         other = replace(series, grains=grains, contacts=tuple(families))
-        vars(other)["_spaces"] = list(series._spaces)
         parts = tuple(part.absolute() for part in self.snapshot.parts)
         snapshot = replace(self.snapshot, path=path.absolute(), parts=parts)
         return replace(self, series=other, snapshot=snapshot)
@@ -192,15 +192,21 @@ class Frame:
         with _named(self.snapshot.path):
             id = np.arange(len(grains.radius)) if grains.id is None else grains.id
             check_lengths(grains.position, grains.radius, id)
-        joined = [
-            (family, self._joined(family, snapshot, options, grains)) for family, snapshot in files
-        ]
+        joined = []
+        for family, snapshot in files:
+            assert family.reader is not None
+            try:
+                with self._tells_way_out():
+                    joined.append((family, family.reader.read_contacts(snapshot, options, grains)))
+            except NotContactsError as error:
+                if self.series.contacts_from == "path" or options.contact_columns is not None:
+                    raise
+                warnings.warn(f"skipped {error}", ScanfabNote, stacklevel=4)
         lists = [family for family, part in joined if part.contacts is not None]
         with_own = self.series.contacts_from == "auto" and grains.contacts is not None
         paths = " and ".join(str(snapshot.path) for _, snapshot in files)
         if len(lists) + with_own > 1:
-            others = self._left_out(lists, paths)
-            return [part for family, part in joined if family not in others]
+            raise ReadError(f"two contact lists for one frame: {paths}: choose with `contacts`")
         if not lists and self.series.contacts_from == "path":
             warnings.warn(
                 f"{paths}: lists contacts with walls only: contacts between grains are found by "
@@ -210,47 +216,26 @@ class Frame:
             )
         return [part for _, part in joined]
 
-    def _joined(
-        self, family: Family, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
-    ) -> JoinedContacts:
-        assert family.reader is not None
+    @contextmanager
+    def _tells_way_out(self) -> Iterator[None]:
+        """Let the error of a contact file that nobody named tell how to do without it."""
         try:
-            return family.reader.read_contacts(snapshot, options, grains)
+            yield
         except ReadError as error:
-            if self.series.contacts_from != "beside":
+            if self.series.contacts_from != "beside" or isinstance(error, NotContactsError):
                 raise
             raise ReadError(
                 f"{error} (this file lies beside the grains; "
                 '`contacts="geometric"` leaves it alone)'
             ) from None
 
-    def _left_out(self, lists: list[Family], paths: str) -> Sequence[Family]:
-        """An error; but of files that lie beside grains all that are not the nearest by name."""
-        if self.series.contacts_from != "beside":
-            raise ReadError(f"two contact lists for one frame: {paths}: choose with `contacts`")
-        taken = nearest(self.series.grains, lists)
-        if taken is not None:
-            others = [family for family in lists if family is not taken]
-            warnings.warn(
-                f"{taken.pattern}: of several contact lists beside the grains this one is taken, "
-                f"whose name is the nearest: `contacts` names another",
-                ScanfabNote,
-                stacklevel=5,
-            )
-            return others
-        warnings.warn(
-            f"two contact lists lie beside {self.snapshot.path}: {paths}: none is taken; choose "
-            f"with `contacts`",
-            ScanfabWarning,
-            stacklevel=5,
-        )
-        return self.series.contacts
-
     @property
     def step(self) -> int | None:
         """That of the dump, else the one in the file's name, unless the dump says it has none."""
-        from_name = None if self.snapshot.stepless else self.name_step
-        return from_name if self.snapshot.step is None else self.snapshot.step
+        if self.snapshot.step is not None:
+            return self.snapshot.step
+        is_named = self.series.grains.has_steps and not self.snapshot.stepless
+        return self.name_step if is_named else None
 
     @property
     def carries(self) -> Carries:
@@ -276,7 +261,7 @@ class Frame:
             options = replace(options, beside=beside.cell or "none")
         if cells is None:
             return options
-        found = cells.at(self.number, self.step)
+        found = cells.at(self.number, self.name_step if self.step is None else self.step)
         if found is None:
             name = f"step {self.step}" if cells.key == "step" else f"frame {self.number}"
             raise ReadError(
@@ -289,16 +274,16 @@ class Frame:
         """The snapshots of the contact files that belong to this frame."""
         series, found = self.series, []
         for family in series.contacts:
-            named = series.contacts_from == "path" and len(series.grains.files) == 1
-            contacts = series._contacts_of(self.snapshot, self.name_step, family, named)
+            with self._tells_way_out():
+                contacts = series._contacts_of(self, family)
             if contacts is not None:
                 found.append((family, contacts))
         if not found and series.contacts:
             patterns = ", ".join(family.pattern for family in series.contacts)
-            moment = f"step {self.step}"
-            if self.step is None:
-                time = self.snapshot.time
-                moment = f"frame {self.number}" if time is None else f"time {time:g}"
+            step = self.name_step if self.step is None else self.step
+            moment = f"frame {self.number}" if step is None else f"step {step}"
+            if self.step is None and self.snapshot.time is not None:
+                moment = f"time {self.snapshot.time:g}"
             message = f"{self.snapshot.path}: no contact file for {moment} among {patterns}"
             if series.contacts_from == "path":
                 raise ReadError(message)

@@ -9,6 +9,7 @@ from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy.typing as npt
 
+from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.options import (
     parse_cell,
@@ -26,12 +27,18 @@ BODIES = "scanfab_bodies"
 WALLS = "scanfab_wall_contacts"
 """A column of this name is the number of contacts with walls of each grain."""
 
-FileKind = Literal["grains", "index", "points", "contacts", "cell", "other"]
+FileKind = Literal["grains", "index", "start", "points", "contacts", "cell", "other"]
 """
-What a file holds. ``index``: names of other files that hold grains; ``points``: grains without a
+What a file holds. ``index``: names of other files that hold grains; ``start``: grains that a
+simulation starts from, which are no frame beside its dumps; ``points``: grains without a
 radius, unless the user gives one; ``cell``: the periodic cell of grains in another file, whose
 reader finds it; ``other``: neither grains nor contacts (a wall mesh, a box).
 """
+
+
+class NotContactsError(ReadError):
+    """No column of a file can hold ids: if nobody named the file, it is skipped with a note."""
+
 
 Carries = Literal["cell", "box", "nothing"]
 """

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from itertools import chain, islice
 from pathlib import Path
 from typing import Any, Literal, SupportsIndex, overload
@@ -17,13 +17,11 @@ from scanfab.base.typing import FloatArray
 from scanfab.io.beside import columns_file, frame_file, read_frame
 from scanfab.io.dimension import decided_space, refuse_other_space
 from scanfab.io.families import Family
-from scanfab.io.files import unpacking_up_to
+from scanfab.io.files import Stamp, stamp_of, unpacking_up_to
 from scanfab.io.frame import Frame
 from scanfab.io.frame_csv import FrameFile
-from scanfab.io.reader import ReadOptions, Snapshot
+from scanfab.io.reader import Reader, ReadOptions, Snapshot
 
-# size and time of a file, which change with its content; None if nobody can tell
-_Stamp = tuple[int, int] | None
 # more frames than there can be: the end of frames that nobody has counted
 ENDLESS = 2**62
 # relative difference of two times that are the same: programs write them with six digits or more
@@ -36,7 +34,21 @@ ContactsFrom = Literal["auto", "beside", "geometric", "path", "grains"]
 """
 
 
-@dataclass(frozen=True)
+@dataclass
+class Known:
+    """What has been found out of the files of a series."""
+
+    snapshots: dict[Path, tuple[Stamp | None, list[Snapshot]]] = field(default_factory=dict)
+    """Of the files that were looked into, and how these files were then."""
+    space: Space | None = None
+    """That of the first frame that has particles."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        # another process that computes a frame need not know where all others are
+        return {"snapshots": {}, "space": self.space}
+
+
+@dataclass
 class Series:
     """
     Frames in the order of their steps, read one at a time.
@@ -67,6 +79,8 @@ class Series:
         Which frames of the whole series these are; there may be fewer.
     dim : str or int
         2 of discs, 3, or ``auto``: as the first frame that has particles has them.
+    known : Known
+        What has been found out of the files, for the series and its parts.
 
     Examples
     --------
@@ -88,38 +102,17 @@ class Series:
     reading: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
     numbers: range = range(ENDLESS)
     dim: str | int = "auto"
-    # a file that holds the contacts of many frames is indexed once
-    _contact_snapshots: dict[Path, list[Snapshot]] = field(
-        default_factory=dict, init=False, repr=False, compare=False
-    )
-    _met: dict[Path, tuple[_Stamp, list[Snapshot]]] = field(
-        default_factory=dict, init=False, repr=False, compare=False
-    )
-    """The frames of the grain files that were looked into, and how these files were then."""
-    _spaces: list[Space] = field(default_factory=list, init=False, repr=False, compare=False)
-    """One, once it is known."""
-
-    def __getstate__(self) -> dict[str, Any]:
-        # another process that computes a frame need not know where all others are
-        return {**self.__dict__, "_met": {}}
+    known: Known = field(default_factory=Known, repr=False, compare=False)
 
     def __repr__(self) -> str:
-        grains, every = self.grains, all(path in self._met for path in self.grains.files.values())
-        number = (
-            counted(self.frames_expected(), "frame")
-            if every
-            else f"{counted(len(grains.files), 'file')} (frames not counted)"
-        )
-        if not self.is_whole:
-            stop = "" if self.numbers.stop >= ENDLESS else self.numbers.stop
-            step = "" if self.numbers.step == 1 else f":{self.numbers.step}"
-            number = f"frames {self.numbers.start}:{stop}{step}"
-        name = "" if grains.reader is None else f" ({grains.reader.name})"
+        stop = "" if self.numbers.stop >= ENDLESS else self.numbers.stop
+        step = "" if self.numbers.step == 1 else f":{self.numbers.step}"
+        frames = "" if self.is_whole else f"frames {self.numbers.start}:{stop}{step} of "
+        files = f"{counted(len(self.grains.files), 'file')} {Path(self.grains.pattern).name}"
+        reader = "" if self.grains.reader is None else f" ({self.grains.reader.name})"
         contacts = ", ".join(Path(one.pattern).name for one in self.contacts)
-        return (
-            f"Series {self.name}: {number} of {Path(grains.pattern).name}{name}"
-            f"{f', contacts of {contacts}' if contacts else ''}"
-        )
+        more = f", contacts of {contacts}" if contacts else ""
+        return f"Series {self.name}: {frames}{files}{reader}{more}"
 
     def __iter__(self) -> Iterator[Frame]:
         return islice(self._every(), self.numbers.start, self.numbers.stop, self.numbers.step)
@@ -137,7 +130,13 @@ class Series:
     def __getitem__(self, key: slice) -> Series: ...
     def __getitem__(self, key: SupportsIndex | slice) -> Frame | Series:
         if isinstance(key, slice):
-            return self._part(key)
+            numbers = self.numbers_of(key)
+            if numbers.step < 0:
+                raise SettingsError(
+                    "the frames of a series stay in the order of their steps, found a step below "
+                    "0: list(series)[::-1] goes backwards"
+                )
+            return self._with(numbers)
         if not hasattr(key, "__index__"):
             raise TypeError(f"a frame of a series is named by a number or a slice, not by {key!r}")
         place = key.__index__()
@@ -150,20 +149,10 @@ class Series:
             raise NoFrameError(f"{self.name}: has {len(self)} frames, there is no frame {place}")
         return found
 
-    def _part(self, frames: slice) -> Series:
-        numbers = self.numbers_of(frames)
-        if numbers.step < 0:
-            raise SettingsError(
-                "the frames of a series stay in the order of their steps, found a step below 0: "
-                "list(series)[::-1] goes backwards"
-            )
-        return self._with(numbers)
-
     def _with(self, numbers: range) -> Series:
-        """Other frames of the same series; what is known of its files is known to both."""
-        other = object.__new__(Series)
-        vars(other).update({**vars(self), "numbers": numbers})
-        return other
+        """Other frames of the same series."""
+        own = {one.name: getattr(self, one.name) for one in fields(Series)}
+        return Series(**{**own, "numbers": numbers})
 
     def numbers_of(self, frames: slice) -> range:
         """
@@ -207,13 +196,13 @@ class Series:
         """
         if self.dim == 3:
             return SPACE
-        if not self._spaces:
+        if self.known.space is None:
             first = next(filter(len, self._centres_before(number)), position)
             if not len(first):
                 return SPACE
-            self._spaces.append(decided_space(self.name, first, self.dim))
-        refuse_other_space(position, self._spaces[0])
-        return self._spaces[0]
+            self.known.space = decided_space(self.name, first, self.dim)
+        refuse_other_space(position, self.known.space)
+        return self.known.space
 
     def _centres_before(self, number: int) -> Iterator[FloatArray]:
         """Of the frames before one, as far as they can be read."""
@@ -232,35 +221,28 @@ class Series:
         return self.numbers == range(ENDLESS)
 
     def _every(self) -> Iterator[Frame]:
-        """All frames of the whole series."""
+        """All frames of the whole series; one in the place of those of a damaged file."""
+        assert self.grains.reader is not None
         number = 0
         for name_step, path in self.grains.files.items():
-            snapshots, problem = self._look_into(path)
+            problem: ReadError | None = None
+            try:
+                snapshots = self._snapshots_of(self.grains.reader, path)
+                if len(snapshots) == 1 and (told := read_frame(path)) is not None:
+                    snapshots = [told.moment_of(snapshots[0])]
+            except ReadError as error:
+                snapshots, problem = [Snapshot(path)], error
             for snapshot in snapshots:
                 yield Frame(self, snapshot, name_step, number, problem)
                 number += 1
 
-    def _look_into(self, path: Path) -> tuple[list[Snapshot], ReadError | None]:
-        """
-        The frames of a grain file, or one in their place and what is wrong with the file.
-
-        A file is looked through once for as long as it stays as it is.
-        """
-        assert self.grains.reader is not None
-        stamp = _stamp(path)
-        before, snapshots = self._met.get(path, (None, []))
-        if stamp is not None and stamp == before:
-            return snapshots, None
-        problem: ReadError | None = None
-        try:
+    def _snapshots_of(self, reader: Reader, path: Path) -> list[Snapshot]:
+        """The snapshots of a file; it is looked through again if it has changed."""
+        stamp = stamp_of(path) if path.exists() else None
+        if stamp is None or self.known.snapshots.get(path, (None, []))[0] != stamp:
             with unpacking_up_to(self.options.max_unpacked):
-                snapshots = self.grains.reader.snapshots(path)
-            if len(snapshots) == 1 and (told := read_frame(path)) is not None:
-                snapshots = [told.moment_of(snapshots[0])]
-        except ReadError as error:
-            stamp, snapshots, problem = None, [Snapshot(path)], error
-        self._met[path] = stamp, snapshots
-        return snapshots, problem
+                self.known.snapshots[path] = stamp, reader.snapshots(path)
+        return self.known.snapshots[path][1]
 
     def frames_expected(self) -> int:
         """
@@ -272,33 +254,32 @@ class Series:
         -------
         int
         """
-        met = [len(snapshots) for _, snapshots in self._met.values()]
-        every = sum(met) + (len(self.grains.files) - len(met)) * (met[-1] if met else 1)
+        files, known = self.grains.files.values(), self.known.snapshots
+        met = [len(known[path][1]) for path in files if path in known]
+        every = sum(met) + (len(files) - len(met)) * (met[-1] if met else 1)
         return len(range(self.numbers.start, min(self.numbers.stop, every), self.numbers.step))
 
-    def _contacts_of(
-        self, grains: Snapshot, name_step: int | None, family: Family, named: bool
-    ) -> Snapshot | None:
+    def _contacts_of(self, frame: Frame, family: Family) -> Snapshot | None:
         """
-        The contacts of a grain snapshot in a family of contact files; None if there are none.
+        The contacts of a frame in a family of contact files; None if there are none.
 
         Steps inside the files decide, or times if there are no steps; where a file has none, the
-        number in its name does. If a single contact file was ``named`` for a single grain file, it
-        needs no number.
+        number in its name does. A single contact file that is named for a single grain file needs
+        no number.
         """
+        if family.problem is not None or family.reader is None:
+            raise ReadError(f"{family.problem}")
+        grains, name_step = frame.snapshot, frame.name_step
         step = name_step if grains.step is None else grains.step
         path = family.files.get(name_step, family.files.get(step))
         if path is None and len(family.files) == 1:
             path = next(iter(family.files.values()))
         if path is None:
             return None
-        if path not in self._contact_snapshots:
-            assert family.reader is not None
-            with unpacking_up_to(self.options.max_unpacked):
-                self._contact_snapshots[path] = family.reader.snapshots(path)
-        numbered = None not in family.files and step is not None
-        sure = named or not numbered or bool({name_step, step} & set(family.files))
-        return _of_moment(self._contact_snapshots[path], grains, sure)
+        is_numbered = None not in family.files and step is not None
+        is_named = self.contacts_from == "path" and len(self.grains.files) == 1
+        is_sure = is_named or not is_numbered or bool({name_step, step} & set(family.files))
+        return _of_moment(self._snapshots_of(family.reader, path), grains, is_sure)
 
     def beside(self, path: Path) -> list[Path]:
         """
@@ -351,7 +332,7 @@ class Series:
         for step, path in self.grains.files.items():
             steps.append(step)
             yield path, True
-            met += len(self._met[path][1]) if path in self._met else 1
+            met += len(self.known.snapshots[path][1]) if path in self.known.snapshots else 1
             if met > number:
                 break
         last = max((step for step in steps if step is not None), default=None)
@@ -374,12 +355,6 @@ class Series:
             yield from self.beside(path)
         if self.cells is not None:
             yield self.cells.path
-
-
-def _stamp(path: Path) -> _Stamp:
-    with suppress(OSError):
-        return (found := path.stat()).st_size, found.st_mtime_ns
-    return None
 
 
 def _of_moment(snapshots: Sequence[Snapshot], grains: Snapshot, sure: bool) -> Snapshot | None:

@@ -8,25 +8,28 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
+from scanfab.base.errors import ReadError, ScanfabWarning
 from scanfab.base.option import refuse_unknown, takes_options, unusable
-from scanfab.io.families import (
-    Family,
+from scanfab.io.choice import (
+    choose_grains,
     contacts_beside,
-    set_tables_aside,
+    damaged_contacts,
+    named_contacts,
+    note_below,
+    note_skipped,
+    without_tables,
+)
+from scanfab.io.families import (
+    PathLike,
+    expanded,
+    files_around,
+    files_of,
+    named_once,
     sort_into_families,
 )
 from scanfab.io.files import unpacking_up_to
 from scanfab.io.formats.yade_cells import is_cell_file, refuse_as_numbers
 from scanfab.io.frame_csv import FrameFile
-from scanfab.io.grain_files import (
-    PathLike,
-    choose_grains,
-    expanded,
-    files_of,
-    named_once,
-    series_below,
-)
 from scanfab.io.options import READING_OPTIONS, take_reading
 from scanfab.io.reader import ReadOptions
 from scanfab.io.series import ContactsFrom, Series
@@ -94,9 +97,9 @@ def read_series(
     Parameters
     ----------
     source : path or sequence of paths
-        A folder with one series, or its files; globs too. What is named twice counts once, with a
-        warning. Contact files that lie beside single
-        grain files are taken as if the folder had been named, if they are clearly theirs.
+        A folder with one series, or its files; globs too. A file that is named twice is read once,
+        with a warning. Contact files beside single grain files are taken if their names say by a
+        step, or by how they begin, that they are theirs.
     format : str, optional
         Name of the reader; by content if not given.
     contacts : str or path, optional
@@ -125,8 +128,8 @@ def read_series(
         2: discs, whose centres share one coordinate. ``auto``: 2 if those of the first frame that
         has any do so, at least ten, and share no second one; with a note. One for all frames.
     max_unpacked : float, optional
-        Times its size that a packed file may unpack to, 1000 by default. Given, lines of text may
-        also be longer than 16 MiB.
+        How many times its compressed size a file may grow to, 1000 by default. If it is given,
+        lines of text may also be longer than 16 MiB.
 
     Returns
     -------
@@ -171,54 +174,27 @@ def read_series(
         return _series(_given(source), contacts, options, cells, reading, checked["dim"])
 
 
-def _series(
-    given: Sequence[PathLike],
-    contacts: str | PathLike,
-    options: ReadOptions,
-    cells: FrameFile | None,
-    reading: dict[str, Any],
-    dim: str | int,
-) -> Series:
-    """The series of what is named: its files sorted out."""
-    format, paths = reading["format"], [Path(one) for one in named_once(given)]
-    families = sort_into_families(
-        [file for path in paths for file in files_of(path)], format, options
-    )
-    if format is None:
-        families = set_tables_aside(families, paths)
-    grains = choose_grains(paths, families, options).check()
-    name = as_text(os.fspath(given[0]) if len(paths) == len(given) == 1 else _common_folder(paths))
-    sources = tuple(os.fspath(path) for one in given for path in expanded(one))
-    own = [family for family in families if family.kind == "contacts"]
-    _note_passed_over(families, [grains, *own])
-    _note_below(paths, grains)
+def open_sources(sources: Sequence[PathLike], **options: Any) -> list[Series]:
+    """
+    The series of a command line: one for each folder, and one for all single files together.
 
-    def series(files: Sequence[Family], contacts_from: ContactsFrom) -> Series:
-        whole = tuple(family.check() for family in files)
-        return Series(name, grains, whole, contacts_from, options, cells, sources, reading, dim=dim)
-
-    if contacts == "geometric":
-        return series((), "geometric")
-    if contacts not in ("auto", "file"):
-        return series(_named_contacts(contacts, format, options), "path")
-    if not own and not any(path.is_dir() for path in paths):
-        own, beside = _contacts_beside(grains, format, options), True
-    else:
-        beside = False
-    if contacts == "file" and not own:
-        if not getattr(grains.reader, "lists_contacts", False):
-            raise ReadError(
-                f'{name}: `contacts="file"` was asked for, but there is no contact file'
-            )
-        return series((), "grains")
-    if not own and options.contact_columns and not getattr(grains.reader, "lists_contacts", False):
-        warnings.warn(
-            f"{name}: `contact_columns` are named, but there is no file of contacts with such "
-            f"columns: contacts are found by geometry",
-            ScanfabWarning,
-            stacklevel=3,
-        )
-    return series(own, "path" if contacts == "file" else "beside" if beside else "auto")
+    Parameters
+    ----------
+    sources : sequence of paths
+        Folders, files and globs; a source that is named twice is read once, with a warning.
+    **options
+        See :func:`read_series`.
+    """
+    groups: list[list[PathLike]] = []
+    files: list[PathLike] = []
+    for source in named_once(sources):
+        if Path(source).is_dir():
+            groups.append([source])
+        else:
+            if not files:
+                groups.append(files)
+            files.append(source)
+    return [read_series(group, **options) for group in groups]
 
 
 def _given(source: PathLike | Sequence[PathLike]) -> list[PathLike]:
@@ -228,32 +204,6 @@ def _given(source: PathLike | Sequence[PathLike]) -> list[PathLike]:
     if not given or not all(isinstance(path, str | os.PathLike) for path in given):
         raise unusable("source", "the path of a folder or file, or several of files", source)
     return given
-
-
-def open_sources(sources: Sequence[PathLike], **options: Any) -> list[Series]:
-    """
-    The series of a command line: one for each folder, and one for all single files together.
-
-    Parameters
-    ----------
-    sources : sequence of paths
-        Folders, files and globs; what is named twice counts once, with a warning.
-    **options
-        See :func:`read_series`.
-    """
-    groups: list[PathLike | list[PathLike]] = []
-    files: list[PathLike] = []
-    for source in named_once(sources):
-        if Path(source).is_dir():
-            groups.append(source)
-        else:
-            if not files:
-                groups.append(files)
-            files.append(source)
-    return [
-        read_series(group[0] if isinstance(group, list) and len(group) == 1 else group, **options)
-        for group in groups
-    ]
 
 
 def _cell_file(path: PathLike) -> FrameFile:
@@ -266,75 +216,55 @@ def _cell_file(path: PathLike) -> FrameFile:
         raise ReadError(f"{path}: cannot be read: {os.strerror(error.errno or 0)}") from None
 
 
-def _contacts_beside(grains: Family, format: str | None, options: ReadOptions) -> list[Family]:
-    """
-    The contact files in the folder of single grain files, as if the folder had been named.
-
-    Told by a note; also where it is not clear whose contacts they are, and they are left alone.
-    """
-    own, doubtful = contacts_beside(grains, format, options)
-    if len(own) == 1:
-        _note(f"contacts are read from {_patterns(own)}, beside the grains")
-    elif own:
-        _note(f"files of contacts beside the grains, which are read with them: {_patterns(own)}")
-    elif doubtful:
-        _note(
-            f"{_patterns(doubtful)}: contacts beside the grains, but it is not clear whose they "
-            f"are: name them with `contacts`, or they are left alone"
-        )
-    return own
-
-
-def _patterns(families: Sequence[Family]) -> str:
-    return ", ".join(family.pattern for family in families)
-
-
-def _note(text: str) -> None:
-    warnings.warn(text, ScanfabNote, stacklevel=5)
-
-
-def _note_passed_over(families: Sequence[Family], used: Sequence[Family]) -> None:
-    """One note for the files that do not enter, and a warning for each that is damaged."""
-    unused = [
-        one for one in families if one not in used and one.problem is None and one.kind != "cell"
-    ]
-    if unused:
-        names = ", ".join(Path(one.pattern).name + _lack(one) for one in unused[:5])
-        more = f" and {len(unused) - 5} more" if len(unused) > 5 else ""
-        _note(f"passed over, neither grains nor contacts: {names}{more}")
-    for family in families:
-        if family.problem is not None:
-            warnings.warn(f"passed over: {family.problem}", ScanfabWarning, stacklevel=4)
-
-
-def _note_below(paths: Sequence[Path], grains: Family) -> None:
-    """A folder with a single dump beside folders of them: these may have been meant."""
-    if len(paths) != 1 or not paths[0].is_dir() or len(grains.files) > 1:
-        return
-    below = series_below(paths[0])
-    if below:
-        _note(f"{paths[0]}: {Path(grains.pattern).name} alone is read, but {below}")
-
-
-def _lack(family: Family) -> str:
-    if getattr(family.reader, "is_table", False):
-        return " (a table beside dumps)"
-    return " (no radius: `radius`)" if family.kind == "points" else ""
-
-
-def _named_contacts(contacts: PathLike, format: str | None, options: ReadOptions) -> list[Family]:
-    """Contact files from a file, a folder or a glob."""
-    files = [file for one in expanded(contacts) for file in files_of(Path(one))]
-    families = sort_into_families(files, format, options)
-    found = [family for family in families if family.kind == "contacts"]
-    if not found:
-        problem = next((family.problem for family in families if family.problem), None)
-        if problem is not None:
-            raise ReadError(problem)
-        kinds = {"grains": "grains", "points": "points without a radius", "cell": "a cell"}
-        what = sorted({kinds.get(one.kind, "walls, or something else") for one in families})
-        raise ReadError(f"{contacts}: expected contacts, found {' and '.join(what)}")
-    return found
+def _series(
+    given: Sequence[PathLike],
+    contacts: str | PathLike,
+    options: ReadOptions,
+    cells: FrameFile | None,
+    reading: dict[str, Any],
+    dim: str | int,
+) -> Series:
+    """The series of what is named: its files sorted out."""
+    format, paths = reading["format"], [Path(one) for one in named_once(given)]
+    name = as_text(os.fspath(given[0]) if len(paths) == len(given) == 1 else _common_folder(paths))
+    are_files = not any(path.is_dir() for path in paths)
+    files = [file for path in paths for file in files_of(path)]
+    around = files_around(files) if are_files else []
+    families = sort_into_families(files, format, options, around)
+    if format is None:
+        families = without_tables(families, paths)
+    grains = choose_grains(paths, families, options).check()
+    own = [family for family in families if family.kind == "contacts"]
+    note_skipped([one for one in families if one not in (grains, *own)])
+    if paths[0].is_dir() and len(paths) == len(grains.files) == 1:
+        note_below(paths[0], grains)
+    origin: ContactsFrom = "path" if contacts == "file" else "auto"
+    lists_contacts = getattr(grains.reader, "lists_contacts", False)
+    if contacts == "geometric":
+        own, origin = [], "geometric"
+    elif contacts not in ("auto", "file"):
+        own, origin = named_contacts(contacts, format, options), "path"
+    elif not own and are_files:
+        families, own = contacts_beside(grains, format, options, told=True)
+        origin = "beside" if contacts == "auto" else "path"
+    if not own and contacts == "file":
+        if not lists_contacts:
+            raise ReadError(
+                f'{name}: `contacts="file"` was asked for, but there is no contact file'
+            )
+        origin = "grains"
+    elif not own and contacts == "auto":
+        own, origin = damaged_contacts(grains, families), "beside"
+        if options.contact_columns and not own and not lists_contacts:
+            warnings.warn(
+                f"{name}: `contact_columns` are named, but there is no file of contacts with such "
+                f"columns: contacts are found by geometry",
+                ScanfabWarning,
+                stacklevel=3,
+            )
+    whole = tuple(family.check() for family in own)
+    sources = tuple(os.fspath(path) for one in given for path in expanded(one))
+    return Series(name, grains, whole, origin, options, cells, sources, reading, dim=dim)
 
 
 def as_text(name: str) -> str:

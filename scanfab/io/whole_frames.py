@@ -121,10 +121,9 @@ class Wholeness:
 
     def contacts(self, series: Series, frame: Frame, family: Family) -> Path | None:
         """The contact file of a frame in a family, if it is there and can be looked into."""
-        named = series.contacts_from == "path" and len(series.grains.files) == 1
         try:
             with growing():
-                found = series._contacts_of(frame.snapshot, frame.name_step, family, named)
+                found = series._contacts_of(frame, family)
         except ReadError:
             return None
         return None if found is None else found.path

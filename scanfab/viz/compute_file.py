@@ -11,7 +11,7 @@ from typing import Any
 from scanfab.base.column import DEFAULT_DIGITS
 from scanfab.base.errors import SettingsError
 from scanfab.base.option import options_of, refuse_unknown
-from scanfab.io.grain_files import PathLike, expanded
+from scanfab.io.families import PathLike, expanded
 from scanfab.io.options import take_reading
 from scanfab.io.series import Series
 from scanfab.io.sources import READING, open_sources

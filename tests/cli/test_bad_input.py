@@ -304,7 +304,7 @@ def test_the_globs_of_two_series_match_their_own_files_only(tmp_path, refusal):
         ["one_0.txt", "one_1.txt"],
         ["one_more_0.txt", "one_more_1.txt"],
     ]
-    assert lines[3:] == ["and its contacts, --contacts with one of", f"'{tmp_path}/pairs_0.txt'"]
+    assert len(lines) == 3
 
 
 def test_files_that_no_glob_can_tell_apart_are_named(tmp_path, refusal):

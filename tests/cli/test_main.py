@@ -124,7 +124,7 @@ def test_results_go_to_standard_output_and_words_to_standard_error() -> None:
     lines = answer.stdout.splitlines()
     assert lines[0].startswith("source,frame,step,time,strain,variant,grains")
     assert len(lines) == 5
-    assert "passed over" in answer.stderr
+    assert "skipped" in answer.stderr
     assert "\x1b" not in answer.stdout + answer.stderr
 
 

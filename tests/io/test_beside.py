@@ -97,7 +97,7 @@ def test_columns_of_other_grains_are_refused(tmp_path):
         scanfab.read(path)
 
 
-@pytest.mark.filterwarnings("ignore:.*no contact file for frame 0 among")
+@pytest.mark.filterwarnings("ignore:.*no contact file for step 1 among")
 def test_contacts_of_one_frame_of_a_series_that_are_lost_are_an_error_of_that_frame(tmp_path):
     scanfab.convert([EVERYTHING, PACKINGS["normal forces"]], tmp_path / "g-{step}.csv")
     file = tmp_path / "g-1.contacts.csv"

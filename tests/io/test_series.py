@@ -180,9 +180,7 @@ def test_two_files_for_one_step_are_an_error(folder):
 def test_unknown_files_are_passed_over_with_one_note(folder):
     for name in ("log.liggghts", "in.deck", "floor.stl", "README.md", "a.png", "b.pdf", "c.xyz"):
         write(folder / name, "hello\n")
-    with pytest.warns(
-        ScanfabNote, match=r"passed over, neither grains nor contacts: .*and 2 more"
-    ) as e:
+    with pytest.warns(ScanfabNote, match=r"skipped .* and 2 more: they hold neither grains") as e:
         series = scanfab.read_series(folder)
     assert len(e) == 1
     assert len(list(series)) == 3
@@ -204,7 +202,7 @@ def test_points_without_a_radius_are_used_if_there_is_nothing_else(tmp_path):
 
 def test_points_without_a_radius_are_passed_over_beside_grains(folder):
     write(folder / "tracers_9.txt", dump_text(names="id type x y z mass"))
-    with pytest.warns(ScanfabNote, match="passed over.*tracers_9.*no radius: `radius`"):
+    with pytest.warns(ScanfabNote, match="skipped tracers_9.*without a radius .*`radius`"):
         assert len(frames_of(folder)) == 3
 
 
@@ -229,7 +227,9 @@ def test_a_folder_of_unknown_files_is_an_error(tmp_path):
 
 def test_contacts_without_grains_are_an_error(tmp_path):
     write(tmp_path / "pairs_1.txt", pairs_text())
-    with pytest.raises(ReadError, match=r"no grains: expected points.*pairs_1.txt \(contacts\)"):
+    with pytest.raises(
+        ReadError, match=r"no grains: expected points.*found contacts \(pairs_1.txt\)"
+    ):
         scanfab.read_series(tmp_path)
 
 

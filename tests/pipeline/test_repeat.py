@@ -88,7 +88,7 @@ def test_settings_come_back():
 def test_the_source_is_opened_as_it_was(monkeypatch):
     monkeypatch.chdir(ROOT)
     reading = {"contacts": "geometric", "columns": None, "format": "yade"}
-    with pytest.warns(match="passed over"):
+    with pytest.warns(match="skipped"):
         series = reopen(json.loads(json.dumps(asked_for([SAMPLE], reading, Settings()))))
     assert series.name == SAMPLE
     assert series.contacts_from == "geometric"

@@ -15,7 +15,15 @@ from scanfab.io.files import first_bytes
 from scanfab.io.formats import binary_dump, dump_contacts, lammps_data, lammps_netcdf, text_dump
 from scanfab.io.formats.dump import Dump, dump_grains
 from scanfab.io.formats.vtk import VtkReader
-from scanfab.io.reader import Carries, FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
+from scanfab.io.reader import (
+    Carries,
+    FileKind,
+    GrainTable,
+    JoinedContacts,
+    NotContactsError,
+    ReadOptions,
+    Snapshot,
+)
 
 # LIGGGHTS writes neither of these items, and its bounds with six digits
 LAMMPS_ITEMS = re.compile(
@@ -126,7 +134,8 @@ class DumpReader(VtkReader):
         if told is not None:
             found = dump_contacts.named_places(path, told, dump.names)
         if found is None:
-            raise ReadError(
+            may_be_ids = sum(map(dump_contacts.are_whole, values.T)) > 1
+            raise (ReadError if may_be_ids else NotContactsError)(
                 f"{path}: cannot tell which columns are the two ids of a contact: the ids may "
                 f"belong to another step; or name the columns with "
                 f'`contact_columns="id1=NAME,id2=NAME"`, which are {", ".join(dump.names)}, or the '

@@ -42,8 +42,8 @@ def fits(head: bytes) -> bool:
 
 
 def kind(path: Path) -> FileKind:
-    """Grains, or an error: columns have no names."""
-    return "grains"
+    """Grains that a simulation starts from, or an error: columns have no names."""
+    return "start"
 
 
 def of_liggghts(head: bytes) -> bool:

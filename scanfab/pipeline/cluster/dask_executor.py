@@ -16,7 +16,7 @@ from weakref import WeakSet
 
 from scanfab.base.errors import ScanfabError, ScanfabWarning, SettingsError
 from scanfab.base.spelling import counted
-from scanfab.io.grain_files import PathLike
+from scanfab.io.families import PathLike
 from scanfab.pipeline.cluster.connection import (
     ClusterError,
     Pulse,

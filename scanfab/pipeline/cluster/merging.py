@@ -13,7 +13,7 @@ from typing import Any
 from scanfab.base.errors import ReadError, ScanfabWarning, SettingsError
 from scanfab.base.files import check_folder
 from scanfab.base.spelling import counted
-from scanfab.io.grain_files import PathLike
+from scanfab.io.families import PathLike
 from scanfab.io.options import parse_frames
 from scanfab.pipeline.manifest import default_settings, with_frames, write_manifest
 from scanfab.pipeline.repeat import read_manifest, restored_settings

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.base.errors import ScanfabError, ScanfabNote, ScanfabWarning, SettingsError
-from scanfab.io.grain_files import PathLike
+from scanfab.io.families import PathLike
 from scanfab.pipeline.options import as_options
 from scanfab.pipeline.repeat import repeat_command
 from scanfab.table.compare import compare_tables

@@ -76,7 +76,8 @@ def assert_true_forces(packing):
 )
 def test_every_form_gives_the_same_grains(name, options):
     packing = scanfab.read(FLOOR / name, **options)
-    assert packing.step == 30000
+    # VTK files have no step, and single ones none by their names
+    assert packing.step == (None if ".vt" in name else 30000)
     assert packing.cell.periodic == (True, True, False)
     assert_true_grains(packing, FLOOR, 1e-12 if name == "precise.txt" else SIX_DIGITS)
     if name == "shuffled.txt":
@@ -166,7 +167,7 @@ BOXES = [
         ("decomposition_30000.vtk", "no grains: expected points with a radius"),
         ("mesh_30000.stl", "no reader knows the format"),
         ("binary_30000.bin", "does not name its 6 columns: name them"),
-        ("pairs_id_force.txt", r"no grains.*pairs_id_force.txt \(contacts\)"),
+        ("pairs_id_force.txt", r"no grains.*found contacts \(pairs_id_force.txt\)"),
     ],
 )
 def test_files_without_grains_are_told(name, told):

@@ -343,7 +343,10 @@ def test_tables_beside_dumps_are_passed_over(tmp_path):
     write(tmp_path / "dump_5.txt", dump_text(step=5))
     write(tmp_path / "table_5.csv", "id,x,y,z,radius\n1,0,0,0,1\n")
     write(tmp_path / "pairs_5.csv", "id1,id2\n1,2\n")
-    with pytest.warns(ScanfabNote, match=r"passed over.*pairs_5\.csv \(a table beside dumps\)"):
+    with pytest.warns(
+        ScanfabNote,
+        match=r"skipped pairs_5\.csv, table_5\.csv: they hold results, or some",
+    ):
         series = scanfab.read_series(tmp_path)
     assert len(series[0].read()) == 3
     assert series.contacts == ()
@@ -356,7 +359,7 @@ def test_tables_beside_dumps_are_passed_over(tmp_path):
 def test_a_table_without_names_beside_others_is_a_frame_only_if_the_format_is_named(tmp_path):
     grains_file(tmp_path)
     write(tmp_path / "energy.txt", "0 1 2 0.1\n0 2 3 0.1\n")
-    with pytest.warns(ScanfabNote, match=r"passed over.*energy\.txt"):
+    with pytest.warns(ScanfabNote, match=r"skipped energy\.txt"):
         assert len(scanfab.read_series(tmp_path)[0].read()) == 64
     with pytest.raises(ReadError, match="several series"):
         scanfab.read_series(tmp_path, format="table")

@@ -16,7 +16,7 @@ from scanfab.viz.figures.page import drawn_page
 from scanfab.viz.scanned_frames import ScannedFrames
 from tests.helpers.figures import frame_figure, row_of
 
-pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.base.errors.ScanfabNote")
+pytestmark = pytest.mark.filterwarnings("ignore:skipped:scanfab.base.errors.ScanfabNote")
 SETTINGS = Settings(boundary="mask=3", tolerance=5e-4)
 
 

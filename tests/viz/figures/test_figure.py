@@ -25,7 +25,7 @@ from tests.conftest import ROOT, SAMPLE
 from tests.helpers.dumps import write
 from tests.helpers.tables import curve
 
-pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.base.errors.ScanfabNote")
+pytestmark = pytest.mark.filterwarnings("ignore:skipped:scanfab.base.errors.ScanfabNote")
 OWN = (
     "evolution", "normalised", "correlation", "columns", "rose", "projection", "histogram",
     "cutoffs", "calibration", "map",

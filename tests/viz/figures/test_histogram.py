@@ -7,7 +7,7 @@ import pytest
 from scanfab.pipeline.settings import Settings
 from tests.helpers.figures import frame_figure, row_of
 
-pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.base.errors.ScanfabNote")
+pytestmark = pytest.mark.filterwarnings("ignore:skipped:scanfab.base.errors.ScanfabNote")
 SETTINGS = Settings(boundary="mask=3", tolerance=5e-4)
 
 

@@ -14,7 +14,7 @@ from scanfab.viz.figures.rose import Rose, _round_down
 from scanfab.viz.scanned_frames import ScannedFrames
 from tests.helpers.figures import frame_figure
 
-pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.base.errors.ScanfabNote")
+pytestmark = pytest.mark.filterwarnings("ignore:skipped:scanfab.base.errors.ScanfabNote")
 SETTINGS = Settings(boundary="mask=3", tolerance=5e-4)
 
 

@@ -17,7 +17,7 @@ from tests.helpers.dumps import write
 from tests.helpers.tables import curve
 from tests.viz.report.test_report import page_of, words_of
 
-pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.base.errors.ScanfabWarning")
+pytestmark = pytest.mark.filterwarnings("ignore:skipped:scanfab.base.errors.ScanfabWarning")
 
 
 @pytest.fixture

@@ -28,7 +28,7 @@ from tests.conftest import ROOT
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.tables import curve, sheared
 
-pytestmark = pytest.mark.filterwarnings("ignore:passed over:scanfab.base.errors.ScanfabNote")
+pytestmark = pytest.mark.filterwarnings("ignore:skipped:scanfab.base.errors.ScanfabNote")
 
 
 @pytest.fixture
