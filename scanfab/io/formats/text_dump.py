@@ -94,15 +94,11 @@ def read(snapshot: Snapshot, options: ReadOptions) -> Dump:
     """
     data, where = text_of(snapshot), f"{snapshot.path}, step {snapshot.step}"
     header = _header(data)
-    if not header.begin:
+    if not (header.begin and re.fullmatch(r"\d{1,18}", header.number)):
         raise ReadError(
-            f"{where}: the header is incomplete: no line ITEM: {header.what} (in YAML: data:, and "
-            f"... below the rows)"
-        )
-    if not re.fullmatch(r"\d{1,18}", header.number):
-        raise ReadError(
-            f"{where}: expected a whole number after ITEM: NUMBER OF {header.what}, found "
-            f"{header.number[:80]!r}"
+            f"{where}: the header is incomplete: expected a whole number after ITEM: NUMBER OF "
+            f"{header.what}, found {header.number[:80]!r}, and rows below ITEM: {header.what} (in "
+            f"YAML below data:, with ... at their end)"
         )
     rows = data[header.begin : header.end]
     if header.end is not None:
@@ -192,14 +188,14 @@ def _cell(where: str, sections: dict[str, list[str]]) -> Cell | None:
         return None
     where = f"{where}: ITEM: {key}"
     match = BOX_KEY.fullmatch(" ".join(key.split()))
-    if match is None:
-        raise ReadError(f"{where}: expected three boundary flags such as pp, ff, fs or mm")
     try:
         bounds = np.array([line.split() for line in sections[key][:3]], dtype=np.float64)
     except ValueError:
         bounds = np.zeros(0)
-    width = BOX_WIDTHS[match[1]]
-    if bounds.shape != (3, width):
-        raise ReadError(f"{where}: expected three lines of {width} numbers")
+    if match is None or bounds.shape != (3, BOX_WIDTHS[match[1]]):
+        raise ReadError(
+            f"{where}: expected three boundary flags such as pp, ff, fs or mm, and three lines of "
+            f"two numbers (of three with xy xz yz, of four with abc origin)"
+        )
     x, y, z = (flag == "pp" for flag in (match[2] or "ff ff ff").split())
     return box_cell(where, bounds, (x, y, z))

@@ -14,7 +14,7 @@ from scanfab.io.registry import reader_for, reader_named
 from scanfab.testing import check_reader
 from tests.helpers.dumps import ROWS, write
 from tests.helpers.made.lammps import netcdf, yaml_text
-from tests.helpers.truth import FLOOR, SHEAR, id_pairs, lammps_fabric
+from tests.helpers.truth import SHEAR, id_pairs, lammps_fabric
 
 FORMS = SHEAR / "forms"
 COLUMNS = (
@@ -103,30 +103,18 @@ def test_other_forms_hold_the_same_grains(name):
     np.testing.assert_allclose(away, 0, atol=1e-15)
 
 
-def test_a_file_with_many_snapshots_is_a_series():
-    packings = [frame.read() for frame in scanfab.read_series(FORMS / "multi.lammpstrj.gz")]
-    assert [packing.step for packing in packings] == [0, 80000, 160000]
-    single = scanfab.read(SHEAR / "shear.80000.lammpstrj.gz")
-    assert id_pairs(scanfab.find_contacts(single)) == id_pairs(scanfab.find_contacts(packings[1]))
-
-
 @pytest.mark.parametrize("path", [*sorted(SHEAR.glob("*.gz")), *sorted(FORMS.glob("*.gz"))])
-def test_lammps_files_are_known_by_their_content(path):
-    assert reader_for(path).name == "lammps"
-
-
-@pytest.mark.parametrize(
-    "path", [LAST, *(FLOOR / f"{n}.txt" for n in ("tutorial", "label", "multi"))]
-)
 def test_dumps_read_the_same_by_the_reader_of_either_program(path):
-    assert reader_for(path).name == ("lammps" if path == LAST else "liggghts")
-    # the reader of LIGGGHTS cannot read the contacts beside LAMMPS' grains
-    one, two = (
-        scanfab.read(path, format=name, contacts="geometric") for name in ("liggghts", "lammps")
-    )
-    np.testing.assert_array_equal(one.position, two.position)
-    np.testing.assert_array_equal(one.radius, two.radius)
-    np.testing.assert_array_equal(one.id, two.id)
+    assert reader_for(path).name == "lammps"
+    if "lammpstrj" in path.name:
+        # the reader of LIGGGHTS cannot read the contacts beside LAMMPS' grains
+        one, two = (
+            scanfab.read(path, format=name, contacts="geometric", frame=-1)
+            for name in ("liggghts", "lammps")
+        )
+        np.testing.assert_array_equal(one.position, two.position)
+        np.testing.assert_array_equal(one.radius, two.radius)
+        np.testing.assert_array_equal(one.id, two.id)
 
 
 def test_netcdf(tmp_path):
