@@ -14,7 +14,6 @@ from scanfab.base.arrays import doubles
 from scanfab.base.errors import ReadError
 from scanfab.base.lengths import all_within
 from scanfab.base.typing import FloatArray
-from scanfab.io.formats.superquadrics import refuse_superquadrics
 from scanfab.io.reader import BODIES, WALLS, GrainTable, ReadOptions
 from scanfab.io.sizes import refuse_other_size
 from scanfab.packing.cell import Cell
@@ -32,6 +31,10 @@ ANGLES = ("theta", "phi", "azimuth")
 # coordinates in the order of preference, and whether they are fractions of the box
 POSITION_NAMES = (("x y z", False), ("xu yu zu", False), ("xs ys zs", True), ("xsu ysu zsu", True))
 
+# LIGGGHTS' half axes and exponents (and their older names): a superquadric is a sphere if all half
+# axes are its radius and the exponents 2, within the rounding of six digits
+HALF_AXES, EXPONENTS = ("shapex", "shapey", "shapez"), ("blockiness1", "blockiness2")
+OLD_EXPONENTS, SIX_DIGITS = ("roundness1", "roundness2"), 1e-5
 # no grain is further from a periodic cell, in cells
 MOST_TURNS = 1e9
 # without a cell, no grain is so many times as far away as the others, where there are some
@@ -79,7 +82,7 @@ def grain_table(
     _refuse_far(path, position, radius, cell, where)
     position.flags.writeable = False  # so that the packing need not copy it
     id = named.get("id", _take(rest, ID_NAMES))
-    refuse_superquadrics(path, rest, radius, where)
+    _refuse_superquadrics(path, rest, radius, where)
     bodies, walls = (
         whole_numbers(path, rest.pop(name), where) if name in rest else None
         for name in (BODIES, WALLS)
@@ -253,6 +256,21 @@ def _radius(
         f"{'' if like == '...' else ' (if that is one)'}, or give one radius for all grains with "
         f"`radius`"
     )
+
+
+def _refuse_superquadrics(path: Path, rest: Columns, radius: FloatArray, where: str) -> None:
+    """ReadError if some particles are no spheres: their radius is that of a sphere around them."""
+    expected = dict.fromkeys(HALF_AXES, radius) | dict.fromkeys((*EXPONENTS, *OLD_EXPONENTS), 2.0)
+    for name in [name for name in rest if name.lower() in expected]:
+        value = expected[name.lower()]
+        count = np.count_nonzero(np.abs(rest[name] - value) > SIX_DIGITS * np.abs(value))
+        if count:
+            raise ReadError(
+                f"{path}{where}: {count} of {len(radius)} particles are superquadrics (by the "
+                f"column {name}), whose radius is that of the sphere around them: scanfab measures "
+                f"spheres, and clumps of spheres; fill them with spheres, and say with `bodies` "
+                f"which of these are one particle"
+            )
 
 
 def refuse_cylindrical(path: Path, name: str, names: Sequence[str], where: str = "") -> None:

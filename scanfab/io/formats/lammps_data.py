@@ -26,7 +26,7 @@ SECTION = re.compile(rb"\n[ \t]*([A-Z][A-Za-z ]*?)[ \t]*(?:#[ \t]*(\S+)[^\n]*)?\
 # orders of the columns; image flags, and of hybrid styles the columns of others, stand behind
 PLAIN = ("id", "type", "diameter", "density", "x", "y", "z")
 HYBRID = ("id", "type", "x", "y", "z", "diameter", "density")
-STYLES = {"": (PLAIN, HYBRID), "sphere": (PLAIN,), "granular": (PLAIN,), "hybrid": (HYBRID,)}
+STYLES = ("", "sphere", "granular", "hybrid")
 FLAGS = ("ix", "iy", "iz")
 # what atoms may be that are no spheres: their third column is a flag, not a diameter
 NO_SPHERES = ("ellipsoids", "lines", "triangles", "bodies")
@@ -149,40 +149,31 @@ def _names(path: Path, style: str, columns: Columns, cell: Cell | None) -> list[
     """
     The names of the columns, of atom_style sphere or of a hybrid with it.
 
-    A file that does not name its style has the order in which diameters and densities are above
-    zero, types are whole, and the centres in the box; ReadError if both orders do, or none.
+    A file that does not name its style has the order of a hybrid if it has more columns than the
+    seven of atom_style sphere and the three image flags. ReadError if diameters or densities are
+    not above zero then, types are not whole, or centres are outside the box.
     """
     values = list(columns.values())
     more = len(values) - len(PLAIN)
     has_flags = more >= 3 and all(np.all(one == np.rint(one)) for one in values[-3:])
     flags, more = (FLAGS, more - 3) if has_flags else ((), more)
-    fitting = [
-        order
-        for order in STYLES[style]
-        if (more == 0 or (order is HYBRID and more > 0))
-        and (style or _fits(dict(zip(order, values, strict=False)), cell))
-    ]
-    if len(values[0]) == 0:
-        fitting = fitting[:1]
-    if len(fitting) != 1:
-        found = f"'Atoms # {style}'" if style else "'Atoms' without a style"
+    order = HYBRID if style == "hybrid" or (more > 0 and not style) else PLAIN
+    is_wide = more >= 0 if order is HYBRID else more == 0
+    if not is_wide or not (style or _fits(dict(zip(order, values, strict=False)), cell)):
         raise ReadError(
             f"{path}: expected the columns {' '.join(PLAIN)} of atom_style sphere (or, in a hybrid "
-            f"style, {' '.join(HYBRID)}), found {found} with {len(columns)} columns, which "
-            f"{'may be both' if fitting else 'are neither'}: name them by their numbers, for "
-            f'instance `columns="id=1,type=2,diameter=3,x=5,y=6,z=7"`'
+            f"style, {' '.join(HYBRID)} and others), found {len(columns)} columns below 'Atoms' "
+            f"that cannot be these: name them by their numbers, for instance "
+            f'`columns="id=1,type=2,diameter=3,x=5,y=6,z=7"`'
         )
-    return [*fitting[0], *["mol", *list(columns)[len(PLAIN) + 1 :]][:more], *flags]
+    return [*order, *["mol", *list(columns)[len(PLAIN) + 1 :]][:more], *flags]
 
 
 @np.errstate(invalid="ignore")
 def _fits(column: Columns, cell: Cell | None) -> bool:
     """Whether the columns can be what their names say."""
-    if not (np.all(column["diameter"] > 0) and np.all(column["density"] > 0)):
-        return False
-    if not np.all(column["type"] == np.rint(column["type"])):
-        return False
-    if cell is None:
+    is_positive = np.all(column["diameter"] > 0) and np.all(column["density"] > 0)
+    if cell is None or not is_positive or np.any(column["type"] != np.rint(column["type"])):
         return False
     fraction = cell.fractional(np.column_stack([column[axis] for axis in "xyz"]))
     # a grain may reach out of the box, and a periodic one lie there

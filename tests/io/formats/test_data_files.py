@@ -63,10 +63,10 @@ def test_boxes_of_lammps(tmp_path, old, new, vectors):
 
 
 def test_columns_can_be_named_by_their_numbers(tmp_path):
-    path = write(tmp_path / "a.data", data_file(density=1))
-    with pytest.raises(ReadError, match="which may be both: name them by their numbers"):
+    path = write(tmp_path / "a.data", data_file("hybrid"))
+    with pytest.raises(ReadError, match="that cannot be these: name them by their numbers"):
         scanfab.read(path)
-    packing = scanfab.read(path, columns={"id": "1", "diameter": "3", "x": "5", "y": "6", "z": "7"})
+    packing = scanfab.read(path, columns={"id": "1", "diameter": "6", "x": "3", "y": "4", "z": "5"})
     np.testing.assert_array_equal(packing.position, CENTRES)
     np.testing.assert_array_equal(packing.radius, [0.5, 0.5, 0.25])
     path = write(tmp_path / "a.data", data_file(title="LIGGGHTS Description"))
@@ -79,8 +79,8 @@ def test_columns_can_be_named_by_their_numbers(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        (" 1.0 2500", " 0 2500", "which are neither"),
-        (" 1.0 2500", " 1.0 -1", "which are neither"),
+        (" 1.0 2500", " 0 2500", "that cannot be these"),
+        (" 1.0 2500", " 1.0 -1", "that cannot be these"),
         ("1 atom types", "1 atom types\n3 ellipsoids", "expected spheres, found '3 ellipsoids'"),
         ("Atoms\n", "Atoms # atomic\n", "found 'Atoms # atomic'"),
         ("Atoms\n", "Masses\n", "expected a section Atoms, found none"),
