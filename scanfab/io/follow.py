@@ -6,23 +6,27 @@ import os
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from scanfab.base.errors import ReadError, ScanfabWarning, SettingsError
+from scanfab.base.errors import PackingError, ReadError, ScanfabWarning, SettingsError
 from scanfab.base.option import refuse_unknown, unusable
 from scanfab.io.families import Family, PathLike, files_in
+from scanfab.io.files import Stamp, stamp_of
 from scanfab.io.frame import Frame
 from scanfab.io.options import take_reading
 from scanfab.io.parse.growing import growing
 from scanfab.io.series import Series
 from scanfab.io.sources import READING, as_text, read_series
-from scanfab.io.whole_frames import QUIET, Watch, WholeFrame, Wholeness
 
 # seconds between two looks, or times what a look takes
 PAUSE, PAUSES = 0.2, 3.0
+# a file that has been as it is for so many seconds is whole, if it can be read to its end
+QUIET = 1.0
+# one that was written so long ago need not be watched, whatever the clock of its server says
+OLD = 60.0
 
 
 def follow_series(
@@ -71,111 +75,107 @@ def follow_series(
         raise ReadError(f"{source}: expected a folder or a file to follow, found nothing")
     if seconds is not None and not (isinstance(seconds, int | float) and seconds >= 0):
         raise unusable("seconds", "0 or more", seconds)
-    return FollowedSeries(_Follower(os.fspath(source), seconds, take_reading(dict(options))))
+    return FollowedSeries(os.fspath(source), seconds, take_reading(dict(options)))
 
 
 class FollowedSeries(Series):
-    """Frames that are waited for; what is told of its files is told of those of taken frames."""
+    """Frames that are waited for; its files are those of the frames that were taken."""
 
-    _follower: _Follower
-
-    def __init__(self, follower: _Follower) -> None:
-        name = as_text(follower.source)
-        nothing = Family(name, {}, None, "grains")
-        super().__init__(name, nothing, sources=(follower.source,), reading=follower.reading)
-        vars(self)["_follower"] = follower
-        follower.opened = self._take_over
+    def __init__(self, source: str, seconds: float | None, reading: dict[str, Any]) -> None:
+        nothing = Family(source, {}, None, "grains")
+        super().__init__(as_text(source), nothing, sources=(source,), reading=reading)
+        self._path, self._seconds = Path(source), seconds
+        self._is_over = False
+        self._taken: list[Frame] = []
+        self._alone: list[Frame] = []
+        """Taken frames that had no contact file."""
+        self._sizes: dict[Path, int] = {}
+        """Of the files of taken frames."""
+        self._now: Series | None = None
+        """The series of the files that were there at the last look."""
+        self._looked: list[tuple[Path, Stamp | None]] = []
+        self._seen: dict[Path, tuple[Stamp, float]] = {}
+        """How the files of waiting frames are, and since when."""
+        self._told: list[Warning] = []
+        self._problem: Exception | None = None
+        """Why the source cannot be opened, or the next frame not be read."""
+        self._idle: Callable[[], object] = lambda: None
+        self._since = time.monotonic()
 
     def __repr__(self) -> str:
-        return f"FollowedSeries {self.name}: {len(self._follower.taken)} frames so far"
-
-    def _take_over(self, series: Series) -> None:
-        """What is known of the files now."""
-        own = {name: vars(self)[name] for name in ("name", "sources", "reading", "_follower")}
-        vars(self).update({**vars(series), **own})
+        return f"FollowedSeries {self.name}: {len(self._taken)} frames so far"
 
     def _every(self) -> Iterator[Frame]:
         return (frame for frame in self.as_they_come() if frame is not None)
 
     def as_they_come(self) -> Iterator[Frame | None]:
         """The frames; None, after a moment, where the next one is not there yet."""
-        return self._follower.coming()
+        number = 0
+        while True:
+            begun = time.monotonic()
+            frame = self._taken[number] if number < len(self._taken) else self._next()
+            if frame is not None:
+                yield frame
+                number += 1
+            elif self._is_over:
+                return
+            else:
+                self._idle()
+                yield None
+                time.sleep(max(PAUSE, PAUSES * (time.monotonic() - begun)))
 
     def end(self) -> None:
         """Take no more frames."""
-        self._follower.is_over = True
+        self._is_over = True
 
     @property
     def as_it_is(self) -> Series:
         """The series of what is there now, which is not waited for."""
-        self._follower.look()
+        self._look()
         return self._with(self.numbers)
 
     @property
     def lack(self) -> str:
         """Why there is no frame yet."""
-        return str(self._follower.problem or f"{self.name}: no whole frame has come")
+        return str(self._problem or f"{self.name}: no whole frame has come")
 
     def when_idle(self, call: Callable[[], object]) -> None:
         """Call this each time that there is nothing to do but to wait."""
-        self._follower.idle = call
+        self._idle = call
 
     def frames_expected(self) -> int:
         """Those that have come."""
-        return len(self._follower.taken)
+        return len(self._taken)
 
     def files(self) -> Iterator[Path]:
         """Those of the frames that were taken: others may be in the middle of being written."""
-        if not self._follower.taken:
+        if not self._taken:
             return
-        for path, is_grains in self.files_through(len(self._follower.taken) - 1):
+        for path, is_grains in self.files_through(len(self._taken) - 1):
             yield path
             if is_grains:
                 yield from self.beside(path)
         if self.cells is not None:
             yield self.cells.path
 
+    def _next(self) -> Frame | None:
+        """The next frame, if it can be taken now."""
+        if self._is_over:
+            return None if self._taken else self._last()
+        self._look()
+        self._check_sizes()
+        waiting = self._waiting()
+        if waiting and self._may_be_taken(waiting):
+            return self._take(waiting[0])
+        if self._seconds is not None and time.monotonic() - self._since >= self._seconds:
+            # what is left is taken at once: nothing more is waited for
+            self._seconds = 0.0
+            found = self._last()
+            self._is_over = found is None
+            return found
+        return None
 
-class _Follower:
-    """Which frames of a source have been taken, and which is the next."""
-
-    def __init__(self, source: str, seconds: float | None, reading: dict[str, Any]) -> None:
-        self.source = source
-        self.seconds = seconds
-        self.reading = reading
-        self.is_over = False
-        self.taken: list[Frame] = []
-        self.problem: ReadError | None = None
-        """Why the source cannot be opened yet."""
-        self.opened: Callable[[Series], None] = lambda series: None
-        self.idle: Callable[[], object] = lambda: None
-        self._series: Series | None = None
-        self._names: list[Path] = []
-        self._wholeness, self._opening = Wholeness(), Watch()
-        self._sizes: dict[Path, int] = {}
-        """Of the files of taken frames."""
-        self._alone: list[Frame] = []
-        """Taken frames that had no contact file."""
-        self._told: list[Warning] = []
-        self._since = time.monotonic()
-
-    def coming(self) -> Iterator[Frame | None]:
-        """All frames from the first on, those that come too; None while there is none."""
-        number = 0
-        while True:
-            begun = time.monotonic()
-            frame = self._frame(number)
-            if frame is not None:
-                yield frame
-                number += 1
-            elif self.is_over:
-                return
-            else:
-                self.idle()
-                yield None
-                time.sleep(max(PAUSE, PAUSES * (time.monotonic() - begun)))
-
-    def look(self) -> None:
+    def _look(self) -> None:
         """
         Look for files, and open the series again if some have come.
 
@@ -184,75 +184,67 @@ class _Follower:
         ReadError
             If what is there cannot be gone on with.
         """
-        path = Path(self.source)
-        if not path.exists():
+        if not self._path.exists():
             raise ReadError(
-                f"{self.source}: has vanished while it was followed, after "
-                f"{len(self.taken)} frames of it were taken: bring it back and go on with `resume`"
+                f"{self._path}: has vanished while it was followed, after {len(self._taken)} "
+                f"frames of it were taken: bring it back and go on with `resume`"
             )
-        names = files_in(path) if path.is_dir() else [path]
+        names = files_in(self._path) if self._path.is_dir() else [self._path]
         # until a frame is taken, what a file holds may be seen better when there is more of it
-        if names == self._names and (self.taken or not self._opening.has_changed(names)):
+        looked = [(path, None if self._taken else _stamp(path)) for path in names]
+        if looked == self._looked:
             return
         with warnings.catch_warnings(record=True) as caught, growing():
             warnings.simplefilter("always")
-            series = self._open(names)
+            try:
+                series = read_series(self.sources[0], **self.reading)
+            except SettingsError:
+                raise
+            except (ReadError, OSError) as error:
+                self._problem, series = error, None
         # those of the last opening, and of threads that have computed meanwhile
         self._told = [one.message for one in caught if isinstance(one.message, Warning)]
         self._tell()
         if series is not None:
-            self._names, self.problem = names, None
+            self._looked, self._problem = looked, None
             self._go_on_with(series)
-
-    def _open(self, names: Sequence[Path]) -> Series | None:
-        try:
-            return read_series(self.source, **self.reading)
-        except SettingsError:
-            raise
-        except (ReadError, OSError) as error:
-            self.problem = error if isinstance(error, ReadError) else ReadError(str(error))
-            if self.taken and all(map(self._wholeness.watch.is_quiet, names)):
-                raise self.problem from None
-            return None
+        elif self._taken and all(map(self._is_quiet, names)):
+            raise ReadError(str(self._problem))
 
     def _go_on_with(self, series: Series) -> None:
-        if self._series is not None:
-            # by the stamps of the files, and the space of the first frame: they are known already
-            series.known = self._series.known
-        self._series = series
-        self._check_taken(series)
-        self.opened(series)
-
-    def _tell(self) -> None:
-        """What was told when the series was opened, once it is sure that it is one."""
-        if self.taken:
-            told, self._told = self._told, []
-            for one in told:
-                warnings.warn(one, stacklevel=2)
-
-    def _check_taken(self, series: Series) -> None:
-        """ReadError if taken frames would be others in the finished folder."""
+        """Take over what is known of the files now, if taken frames stay what they are."""
+        series.known = self.known
         files = list(series.grains.files.values())
-        taken = list(dict.fromkeys(self._sizes))
-        for path in taken:
-            if path not in files and series.grains.kind != "index":
-                raise ReadError(
-                    f"{path}: has vanished after its frame was taken, so that the numbers of all "
-                    f"later frames would change: bring it back and go on with `resume`"
-                )
+        taken = list(self._sizes)
         if series.grains.kind != "index" and files[: len(taken)] != taken:
+            for path in taken:
+                if path not in files:
+                    raise ReadError(
+                        f"{path}: has vanished after its frame was taken, so that the numbers of "
+                        f"all later frames would change: bring it back and go on with `resume`"
+                    )
             new = next(path for path in files if path not in taken)
             raise ReadError(
                 f"{new}: is new, and belongs before frames that were taken already: compute the "
                 f"finished folder without `follow`"
             )
         for frame in self._alone:
-            for family in series.contacts:
-                if self._wholeness.contacts(series, frame, family) is not None:
-                    raise ReadError(
-                        f"{frame.snapshot.path}: its contact file in {family.pattern} has come "
-                        f"after it was taken without: compute the finished folder without `follow`"
-                    )
+            if any(_contacts(series, frame)):
+                raise ReadError(
+                    f"{frame.snapshot.path}: its contact file has come after it was taken without: "
+                    f"compute the finished folder without `follow`"
+                )
+        self._now = series
+        self.grains, self.contacts, self.cells = series.grains, series.contacts, series.cells
+        self.contacts_from, self.options = series.contacts_from, series.options
+        self.dim = series.dim
+
+    def _tell(self) -> None:
+        """What was told when the series was opened, once it is sure that it is one."""
+        if self._taken:
+            told, self._told = self._told, []
+            for one in told:
+                warnings.warn(one, stacklevel=2)
 
     def _check_sizes(self) -> None:
         """ReadError if a file has grown that was thought whole; one of many snapshots may."""
@@ -263,78 +255,111 @@ class _Follower:
                     f"written within {QUIET:g} s; compute the finished folder without `follow`"
                 )
 
-    def _frame(self, number: int) -> Frame | None:
-        """A frame that was taken, or can be now."""
-        if number < len(self.taken):
-            return self.taken[number]
-        if self.is_over:
-            return self._last(number, ()) if number == 0 else None
-        self.look()
-        self._check_sizes()
-        waiting = self._waiting(number)
-        found = self._next(waiting) if waiting else None
-        if found is not None:
-            return self._take(found)
-        if self.seconds is not None and time.monotonic() - self._since >= self.seconds:
-            # what is left is taken at once: nothing more is waited for
-            self.seconds = 0.0
-            found = self._last(number, waiting)
-            self.is_over = found is None
-        return found
-
-    def _waiting(self, number: int) -> list[Frame]:
+    def _waiting(self) -> list[Frame]:
         """The frames behind those that were taken, as far as they can be told."""
-        if self._series is None:
-            return []
-        # contact files are looked into again; threads may still read frames of the series before
-        series = replace(self._series)
-        series.known = self._series.known
         with growing():
-            return list(islice(series, number, None))
+            return [] if self._now is None else list(islice(self._now, len(self._taken), None))
+
+    def _may_be_taken(self, waiting: Sequence[Frame]) -> bool:
+        """Whether the first of some frames is whole, or broken while a later one is whole."""
+        if len(waiting) > 1 and self._is_old(waiting[0]):
+            return True
+        places = range(1, len(waiting) + 1)
+        return any(
+            self._is_whole(frame, has_later=place < len(waiting))
+            for place, frame in zip(places, waiting, strict=True)
+        )
+
+    def _is_whole(self, frame: Frame, *, has_later: bool) -> bool:
+        """Whether all files of a frame are there and can be read to their ends."""
+        quiet = [self._is_quiet(path) for path in _files(frame)]
+        if not (has_later or all(quiet)) or not all(_contacts(frame.series, frame)):
+            return False
+        if has_later or frame.number:
+            return self._can_be_read(frame)
+        # of the first frame alone nobody knows whether contact files will come, nor whether the
+        # number in its name is its step
+        may_come = frame.series.contacts_from in ("auto", "beside") and not frame.series.contacts
+        has_step = frame.step is not None or frame.name_step is None
+        return has_step and self._can_be_read(frame, with_contacts=may_come)
+
+    def _can_be_read(self, frame: Frame, *, with_contacts: bool = False) -> bool:
+        try:
+            with growing():
+                packing = frame.read()
+        except (ReadError, PackingError) as error:
+            self._problem = error
+            return False
+        return packing.contacts is not None or not with_contacts
+
+    def _is_quiet(self, path: Path) -> bool:
+        """Whether a file is there and has been as it is for a while."""
+        stamp = _stamp(path)
+        if stamp is None:
+            return False
+        if path not in self._seen or self._seen[path][0] != stamp:
+            self._seen[path] = stamp, time.monotonic()
+        return time.monotonic() - self._seen[path][1] >= QUIET or _age([path]) > OLD
+
+    def _is_old(self, frame: Frame) -> bool:
+        """Whether nobody is writing a frame any more."""
+        return all(_contacts(frame.series, frame)) and _age(_files(frame)) > OLD
 
     def _take(self, frame: Frame) -> Frame:
         path = frame.snapshot.path
-        # without its packing, which is needed but once
-        plain = frame
-        if isinstance(frame, WholeFrame):
-            plain = replace(frame, packing=None)
-        self.taken.append(plain)
-        if frame.series.contacts_from in ("auto", "beside"):
-            families = frame.series.contacts
-            if not any(self._wholeness.contacts(frame.series, frame, one) for one in families):
-                self._alone.append(plain)
+        self._taken.append(frame)
+        may_come = frame.series.contacts_from in ("auto", "beside")
+        if may_come and not any(_contacts(frame.series, frame)):
+            self._alone.append(frame)
         if path.exists():
             self._sizes[path] = path.stat().st_size
         self._since = time.monotonic()
         self._tell()
         return frame
 
-    def _next(self, waiting: Sequence[Frame]) -> Frame | None:
-        """The first of some frames, if it is whole, or broken while a later one is whole."""
-        first, *later = waiting
-        if later and self._wholeness.is_old(first):
-            return first
-        whole = self._wholeness.whole(first, bool(later))
-        if whole is not None:
-            return whole
-        for place, other in enumerate(later, start=2):
-            if self._wholeness.whole(other, place < len(waiting)) is not None:
-                return first
-        return None
-
-    def _last(self, number: int, waiting: Sequence[Frame]) -> Frame | None:
+    def _last(self) -> Frame | None:
         """At the end: what is whole but for contacts that have not come."""
-        waiting = waiting or self._waiting(number)
-        for place, frame in enumerate(waiting):
-            found = self._wholeness.read(frame)
-            if found is not None:
-                # broken ones before it are left to whoever reads them
-                return self._take(found if place == 0 else waiting[0])
+        waiting = self._waiting()
+        # broken frames before a whole one are left to whoever reads them
+        if any(map(self._can_be_read, waiting)):
+            return self._take(waiting[0])
         if waiting:
             warnings.warn(
                 f"{waiting[0].snapshot.path}: is left out, as it was not whole when following it "
-                f"ended: {self._wholeness.flaw}",
+                f"ended: {self._problem}",
                 ScanfabWarning,
                 stacklevel=2,
             )
         return None
+
+
+def _contacts(series: Series, frame: Frame) -> list[Path | None]:
+    """The contact file of a frame in each family of contacts, if it is there and can be read."""
+    found: list[Path | None] = []
+    for family in series.contacts:
+        snapshot = None
+        with suppress(ReadError), growing():
+            snapshot = series._contacts_of(frame, family)
+        found.append(None if snapshot is None else snapshot.path)
+    return found
+
+
+def _files(frame: Frame) -> list[Path]:
+    """What a frame is read from, as far as it is there."""
+    series, path = frame.series, frame.snapshot.path
+    beside = [] if series.grains.kind == "index" else series.beside(path)
+    contacts = [one for one in _contacts(series, frame) if one is not None]
+    return [path, *frame.snapshot.parts, *beside, *contacts]
+
+
+def _stamp(path: Path) -> Stamp | None:
+    with suppress(OSError):
+        return stamp_of(path)
+    return None
+
+
+def _age(files: Sequence[Path]) -> float:
+    """Seconds since the last of some files was written; 0 if one is not there."""
+    with suppress(OSError):
+        return time.time() - max(path.stat().st_mtime for path in files)
+    return 0.0
