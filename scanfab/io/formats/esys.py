@@ -79,10 +79,14 @@ class EsysReader(GrainsOnly):
         if not files or len(set(files)) < len(files):
             raise ReadError(f"{path}: expected the names of its workers' files, found {names}")
         parts = [_particles(file) for file in files]
-        if len({len(part) for part in parts}) > 1:
-            raise ReadError(f"{path}: its files have different numbers of columns")
-        columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-        return columns, _cell(path, head)
+        shared = min(parts, key=len)
+        columns = {name: np.concatenate([part[name] for part in parts]) for name in shared}
+        low, high = np.reshape(numbers(f"{path}: BoundingBox", head[3], 6), (2, 3))
+        along, edges = [one == b"1" for one in head.group(4, 5, 6)], high - low
+        if head[7] == b"2" and edges[2] <= 0:
+            # a plane is not periodic across, whatever the header says
+            along[2], edges[2] = False, max(edges[:2])
+        return columns, cell_of(f"{path}: BoundingBox", edges, along, low)
 
 
 def _header(path: Path) -> re.Match[bytes]:
@@ -110,12 +114,3 @@ def _particles(file: Path) -> Columns:
     layout = Layout(LAYOUTS[width], line=data.count(b"\n", 0, head.end()) + 1, whole=["id"])
     rows = rest[: len(rest) - len(behind)]
     return read_rows(Snapshot(file), rows, layout, count=count, what="particles")
-
-
-def _cell(path: Path, head: re.Match[bytes]) -> Cell | None:
-    low, high = np.reshape(numbers(f"{path}: BoundingBox", head[3], 6), (2, 3))
-    along, edges = [one == b"1" for one in head.group(4, 5, 6)], high - low
-    if head[7] == b"2" and edges[2] <= 0:
-        # a plane is not periodic across, whatever the header says
-        along[2], edges[2] = False, float(max(edges[0], edges[1]))
-    return cell_of(f"{path}: BoundingBox", edges, along, low)

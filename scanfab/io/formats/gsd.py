@@ -65,7 +65,20 @@ class GsdReader(GrainsOnly):
             is_column = PARTICLES in name and name != "particles/types"
             if is_column and len(values) == len(position):
                 columns[_bare(name)] = values
-        return columns, _cell(path, arrays)
+        box, where = arrays.get("configuration/box"), f"{path}: configuration/box"
+        if box is None:
+            return columns, None
+        if box.shape != (6,):
+            raise ReadError(f"{where}: expected six numbers, found {box.tolist()}")
+        # edges and tilt factors (of the second and third edge), about the origin
+        lx, ly, lz, xy, xz, yz = box.astype(np.float64).tolist()
+        flat = arrays.get("configuration/dimensions", np.array([3])).tolist() == [2]
+        if flat:
+            # the edge across the plane means nothing, and may be 0
+            lz, xz, yz = max(lx, ly), 0.0, 0.0
+        vectors = np.array([[lx, 0, 0], [xy * ly, ly, 0], [xz * lz, yz * lz, lz]])
+        along = (True, True, not flat)
+        return columns, cell_of(where, vectors, along, -0.5 * vectors.sum(axis=0))
 
 
 def _read(path: Path, frame: int | None) -> tuple[list[int], list[str], Columns]:
@@ -100,20 +113,3 @@ def read_in_worker(path: str, frame: int | None) -> tuple[list[int], list[str], 
 
 def _bare(name: str) -> str:
     return name.removeprefix("log/").removeprefix(PARTICLES)
-
-
-def _cell(path: Path, arrays: Columns) -> Cell | None:
-    """Edges and tilt factors (of the second and third edge), about the origin."""
-    box = arrays.get("configuration/box")
-    if box is None:
-        return None
-    if box.shape != (6,):
-        raise ReadError(f"{path}: configuration/box: expected six numbers, found {box.tolist()}")
-    lx, ly, lz, xy, xz, yz = box.astype(np.float64).tolist()
-    flat = arrays.get("configuration/dimensions", np.array([3])).tolist() == [2]
-    if flat:
-        # the edge across the plane means nothing, and may be 0
-        lz, xz, yz = max(lx, ly), 0.0, 0.0
-    vectors = np.array([[lx, 0, 0], [xy * ly, ly, 0], [xz * lz, yz * lz, lz]])
-    origin = -0.5 * vectors.sum(axis=0)
-    return cell_of(f"{path}: configuration/box", vectors, (True, True, not flat), origin)

@@ -60,7 +60,7 @@ class LfDemReader(GrainsOnly):
             rows = frame.count(b"\n") - 1
             return f"it has {rows} rows of {count}" if rows < count else shared.lack_of_end(frame)
 
-        return shared.marked_frames(path, FRAME, shared.time_in(FRAME), lack)
+        return shared.marked_frames(path, FRAME, lack=lack)
 
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
         """Columns by their titles; the images above and below are shifted along x."""
@@ -69,7 +69,14 @@ class LfDemReader(GrainsOnly):
         columns, shift = _columns(snapshot, needed, _count(path))
         names = {"particle index": "id", POSITION: "position"}
         named = {names.get(title, title): values for title, values in columns.items()}
-        return named, _cell(path, shift)
+        edges = dict(EDGE.findall(first_bytes(path, HEADER_BYTES)))
+        words = b" ".join(edges.get(axis, b"") for axis in (b"x", b"y", b"z"))
+        x, y, z = numbers(f"{path}: lines '# Lx', '# Ly' and '# Lz'", words, 3)
+        # the cell lies about the origin; a plane (Ly = 0) does not repeat across
+        vectors = np.array([[x, 0, 0], [0, y or z, 0], [shift, 0, z]])
+        where = f"{path}: its lines Lx, Ly, Lz and the shear make no cell"
+        origin = -0.5 * vectors.sum(axis=0)
+        return named, shared.cell_of(where, vectors, (True, y != 0.0, True), origin)
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
@@ -151,16 +158,3 @@ def _columns(
         own = [rows[f"{place}"] for place in places]
         columns[title] = own[0] if len(own) == 1 else np.column_stack(own)
     return columns, numbers(f"{path}: shear displacement", frame[2], 1)[0]
-
-
-def _cell(path: Path, shift: float) -> Cell | None:
-    """About the origin; a plane (Ly = 0) does not repeat across."""
-    edges = dict(EDGE.findall(first_bytes(path, HEADER_BYTES)))
-    if edges.keys() != {b"x", b"y", b"z"}:
-        raise ReadError(f"{path}: expected lines '# Lx', '# Ly' and '# Lz' with numbers")
-    words = b" ".join(edges[axis] for axis in (b"x", b"y", b"z"))
-    x, y, z = numbers(f"{path}: Lx, Ly, Lz", words, 3)
-    flat = y == 0.0
-    vectors = np.array([[x, 0, 0], [0, z if flat else y, 0], [shift, 0, z]])
-    where = f"{path}: its lines Lx, Ly, Lz and the shear make no cell"
-    return shared.cell_of(where, vectors, (True, not flat, True), -0.5 * vectors.sum(axis=0))

@@ -81,9 +81,7 @@ class MercuryReader:
             time = None if found is None else numbers(f"{path}: time", found[1], 1)[0]
             return [Snapshot(path, time=time)]
         if FSTAT_HEAD.match(head):
-            return shared.marked_frames(
-                path, FSTAT_FRAME, shared.time_in(FSTAT_FRAME), shared.lack_of_end
-            )
+            return shared.marked_frames(path, FSTAT_FRAME)
         return _grain_frames(path)
 
     def carries(self, path: Path) -> Carries:
@@ -101,7 +99,14 @@ class MercuryReader:
             raise ReadError(f"{path}: expected {ABOVE}, found {spelt(line)}")
         layout = LAYOUTS[len(bounds)]
         columns = read_rows(snapshot, rows, layout, count=int(bounds[0]), what="grains")
-        return grain_table(path, shared.in_space(columns), _box(path, bounds[2:]), options)
+        low, high = np.reshape(bounds[2:], (2, -1))
+        with np.errstate(invalid="ignore"):
+            edges = high - low
+        if len(low) == 2:
+            low, edges = np.append(low, 0.0), np.append(edges, edges.max())
+        # nothing is known to repeat
+        cell = shared.cell_of(path, edges, (False, False, False), low)
+        return grain_table(path, shared.in_space(columns), cell, options)
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
@@ -188,16 +193,6 @@ def _joined(
     none = np.full(len(at_wall), -1 if grains.id is None else grains.id.max(initial=0) + 1)
     walls = join_ids(path, grains, np.column_stack([at_wall, none]), None, walls=True)
     return joined._replace(wall_contacts=walls.wall_contacts)
-
-
-@np.errstate(invalid="ignore")
-def _box(path: Path, bounds: list[float]) -> Cell | None:
-    """The domain, of which nothing is known to repeat; None if it has no volume."""
-    low, high = np.reshape(bounds, (2, -1))
-    edges = high - low
-    if len(low) == 2:
-        low, edges = np.append(low, 0.0), np.append(edges, edges.max())
-    return shared.cell_of(f"{path}: its bounds", edges, (False, False, False), low)
 
 
 def _read_restart(path: Path, data: bytes, options: ReadOptions) -> GrainTable:

@@ -28,7 +28,8 @@ SIZES = {
     b"17": 3, b"18": 1, b"19": 3, b"20": 3, b"23": 1, ACTIVE: 2, b"31": 4, b"36": 9, b"37": 1,
 }  # fmt: skip
 READ = {ID: 1, GEOMETRY: 1, ACTIVE: 2, TIME: 1, PLACE: 3}
-PERIODIC = re.compile(rb"^28 ([01])((?: \S+){9})[ \t]*\r?$", re.MULTILINE)
+# the periodic domain, if it is switched on: along which axes, its low and its high corner
+PERIODIC = re.compile(rb"^28 1((?: \S+){9})[ \t]*\r?$", re.MULTILINE)
 
 
 class Export(NamedTuple):
@@ -114,7 +115,15 @@ def _export(path: Path, stamp: Stamp) -> Export:
         values = np.insert(values, [2, 2], [-np.inf, np.inf], axis=1)
     states = values[:, 4:].reshape(len(values), -1, 4)
     has_bonds = not kinds.isdisjoint(BONDS)
-    return Export(values[:, 0], values[:, 1], values[:, 2:4], states, _cell(path, data), has_bonds)
+    cell, domain = None, PERIODIC.search(data)
+    if domain is not None:
+        where = f"{path}: its periodic domain (28)"
+        along, low, high = np.reshape(numbers(where, domain[1], 9), (3, 3))
+        edges = high - low
+        # a domain that is not periodic along an axis may have no width there
+        edges[(along == 0) & (edges <= 0)] = edges.max()
+        cell = cell_of(where, edges, along, low)
+    return Export(values[:, 0], values[:, 1], values[:, 2:4], states, cell, has_bonds)
 
 
 def _row_like(where: str, line: bytes) -> re.Pattern[bytes]:
@@ -137,16 +146,3 @@ def _row_like(where: str, line: bytes) -> re.Pattern[bytes]:
             f"found {spelt(b' '.join([*found, *words]))}"
         )
     return re.compile(rb"[ ]+".join(parts) + rb"\s*")
-
-
-def _cell(path: Path, data: bytes) -> Cell | None:
-    """The periodic domain, if it is switched on: along which axes, its low and its high corner."""
-    found = PERIODIC.search(data)
-    if found is None or found[1] == b"0":
-        return None
-    where = f"{path}: its periodic domain (28)"
-    along, low, high = np.reshape(numbers(where, found[2], 9), (3, 3))
-    edges = high - low
-    # a domain that is not periodic along an axis may have no width there
-    edges[(along == 0) & (edges <= 0)] = edges.max()
-    return cell_of(where, edges, along, low)

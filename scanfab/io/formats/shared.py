@@ -111,11 +111,16 @@ def cell_of(
         return None
 
 
+def lack_of_end(frame: bytes) -> str | None:
+    """The ``lack`` of frames without a count."""
+    return None if frame.endswith(b"\n") else "its last line has no end"
+
+
 def marked_frames(
     path: Path,
     mark: re.Pattern[bytes],
-    moment: Callable[[Path, bytes], tuple[int | None, float | None] | None],
-    lack: Callable[[bytes], str | None],
+    moment: Callable[[Path, bytes], tuple[int | None, float | None] | None] | None = None,
+    lack: Callable[[bytes], str | None] = lack_of_end,
 ) -> list[Snapshot]:
     """
     The frames of a text in the order of their steps.
@@ -130,11 +135,13 @@ def marked_frames(
     mark : Pattern
         Matches the beginning of a line with which a frame begins. It is fast if it begins with a
         letter, not with ``^`` or a choice.
-    moment : callable
+    moment : callable, optional
         Says step and time of a frame from its first bytes. None: the frame goes on behind the next
-        mark. Raises ReadError if the bytes do not say it.
-    lack : callable
-        Says what an incomplete frame lacks, from its bytes; None if it is complete.
+        mark. Raises ReadError if the bytes do not say it. By default the time is the first group
+        of ``mark``.
+    lack : callable, optional
+        Says what an incomplete frame lacks, from its bytes; None if it is complete. By default the
+        end of its last line.
 
     Raises
     ------
@@ -162,7 +169,8 @@ def marked_frames(
                 leave_out_last(path, len(found), reason)
                 break
             stream.seek(start)
-            at = moment(path, stream.read(min(HEADER_BYTES, stop - start)))
+            head = stream.read(min(HEADER_BYTES, stop - start))
+            at = moment(path, head) if moment else (None, _time(path, mark.match(head)))
             if at is not None:
                 found.append(Snapshot(path, *at, start, stop))
                 start = stop
@@ -185,16 +193,6 @@ def numbered_frames(
     return found
 
 
-def time_in(header: re.Pattern[bytes]) -> Callable[[Path, bytes], tuple[None, float]]:
-    """The ``moment`` of frames whose time is the first group of their header."""
-
-    def moment(path: Path, head: bytes) -> tuple[None, float]:
-        found = header.match(head)
-        return None, numbers(f"{path}: time of a frame", found[1] if found else b"", 1)[0]
-
-    return moment
-
-
-def lack_of_end(frame: bytes) -> str | None:
-    """The ``lack`` of frames without a count."""
-    return None if frame.endswith(b"\n") else "its last line has no end"
+def _time(path: Path, header: re.Match[bytes] | None) -> float:
+    """The time in the first group of the header of a frame."""
+    return numbers(f"{path}: time of a frame", header[1] if header else b"", 1)[0]

@@ -45,7 +45,7 @@ WRONG = {
         ("a.mdpa", "RADIUS", "MASS", "no grains: expected points with a radius"),
     ],
     "lf-dem": [
-        ("par.dat", "# Lz 6", "# Lz", "expected lines '# Lx'"),
+        ("par.dat", "# Lz 6", "# Lz", "lines '# Lx', .*: expected 3 numbers"),
         ("par.dat", "#2: radius", "#2: size", "no reader knows|expected points with a radius"),
         ("par.dat", "0 1 0 0 2.5 9", "0 1 0 0 2.5 9 9", "line 13: expected 8 columns, found 9"),
         ("par.dat", "#6-8:", "#0:", "line 13: expected 5 columns, found 8"),
