@@ -13,6 +13,7 @@ from scanfab.io.families import (
     Family,
     Named,
     PathLike,
+    are_tied,
     expanded,
     family_of,
     files_around,
@@ -206,8 +207,8 @@ def contacts_beside(
     What lies beside single grain files with their numbers, and which of it are their contacts.
 
     Contact files belong to grains if their numbers agree or their names begin with the same word,
-    and if no other grains beside them have a name that is as near; and if no other contact files
-    are nearer. ``STEM.contacts.csv`` belongs to STEM.
+    or if they are the only ones without a number; and if no other grains beside them have a name
+    that is as near, and no other contact files are nearer. ``STEM.contacts.csv`` belongs to STEM.
 
     Parameters
     ----------
@@ -245,7 +246,9 @@ def contacts_beside(
         closest = max((kinship(one, family) for one in rivals), default=(-1, False))
         if owners <= stems:
             near[float("inf"), True].append(family)
-        elif kin > closest and (kin[0] or (owners == {None} and _shares_number(grains, family))):
+        elif kin > closest and (
+            are_tied(grains, family) or (not rivals and owners == {None} and None in grains.files)
+        ):
             near[kin[0], True].append(family)
         elif kin >= closest:
             doubtful.append(family)
@@ -278,10 +281,6 @@ def _families_beside(grains: Family, format: str | None, options: ReadOptions) -
     return found
 
 
-def _shares_number(one: Family, other: Family) -> bool:
-    return bool(set(one.files) & set(other.files) - {None})
-
-
 def damaged_contacts(grains: Family, families: Sequence[Family]) -> list[Family]:
     """
     Files that cannot be read and may be the contacts of grains by their names and number.
@@ -291,9 +290,7 @@ def damaged_contacts(grains: Family, families: Sequence[Family]) -> list[Family]
     return [
         replace(one, kind="contacts", files=dict.fromkeys(grains.files, one.largest), clash=None)
         for one in families
-        if one.problem is not None
-        and len(one.files) == len(grains.files)
-        and (_shares_number(grains, one) or kinship(grains, one)[0])
+        if one.problem is not None and len(one.files) == len(grains.files) and are_tied(grains, one)
     ]
 
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.base.lengths import MOST
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.io.reader import GrainTable, JoinedContacts
+from scanfab.io.reader import GrainTable, JoinedContacts, OtherGrainsError
 from scanfab.packing.contacts import ContactList
 
 # an end of a contact within this fraction of a radius from a centre belongs to that grain
@@ -195,7 +195,7 @@ def _join(
     if wrong.any():
         contact = int(np.argmax(wrong))
         end = int(np.argmax(unknown[contact]))
-        raise ReadError(
+        raise OtherGrainsError(
             f"{path}: contact {contact + 1} {describe(contact, end)}, which is not in the grain "
             f"file ({np.count_nonzero(wrong)} of {len(rows)} contacts): do both files belong to "
             f"the same step? A periodic sample also needs its cell (`cell`)"

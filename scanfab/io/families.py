@@ -316,6 +316,13 @@ def kinship(one: Family, two: Family) -> tuple[int, bool]:
     return common, ending == other_ending
 
 
+def are_tied(grains: Family, contacts: Family) -> bool:
+    """Whether step or name tell that contacts belong to grains: a number or the first word."""
+    shared = set(grains.files) & set(contacts.files) - {None}
+    is_owned = any(map(owner, contacts.files.values()))
+    return kinship(grains, contacts)[0] > 0 or (bool(shared) and not is_owned)
+
+
 def words_of(family: Family) -> tuple[list[str], str]:
     """The words of a pattern, and its ending."""
     name = bare_name(Path(family.pattern))

@@ -21,13 +21,14 @@ from scanfab.io.beside import (
     with_columns,
 )
 from scanfab.io.bodies import body_numbers
-from scanfab.io.families import Family
+from scanfab.io.families import Family, are_tied
 from scanfab.io.files import unpacking_up_to
 from scanfab.io.reader import (
     Carries,
     GrainTable,
     JoinedContacts,
     NotContactsError,
+    OtherGrainsError,
     Reader,
     ReadOptions,
     Snapshot,
@@ -195,13 +196,13 @@ class Frame:
         joined = []
         for family, snapshot in files:
             assert family.reader is not None
-            try:
-                with self._tells_way_out():
+            with self._tells_way_out():
+                try:
                     joined.append((family, family.reader.read_contacts(snapshot, options, grains)))
-            except NotContactsError as error:
-                if self.series.contacts_from == "path" or options.contact_columns is not None:
-                    raise
-                warnings.warn(f"skipped {error}", ScanfabNote, stacklevel=4)
+                except NotContactsError as error:
+                    if self._is_sure(family, error):
+                        raise
+                    warnings.warn(f"skipped {error}", ScanfabNote, stacklevel=4)
         lists = [family for family, part in joined if part.contacts is not None]
         with_own = self.series.contacts_from == "auto" and grains.contacts is not None
         paths = " and ".join(str(snapshot.path) for _, snapshot in files)
@@ -216,13 +217,21 @@ class Frame:
             )
         return [part for _, part in joined]
 
+    def _is_sure(self, family: Family, error: NotContactsError) -> bool:
+        """Whether contact files that do not fit are an error: if they are named, or of the step."""
+        series = self.series
+        if series.contacts_from == "path" or series.options.contact_columns is not None:
+            return True
+        is_tied = series.contacts_from != "beside" or are_tied(series.grains, family)
+        return is_tied and isinstance(error, OtherGrainsError)
+
     @contextmanager
     def _tells_way_out(self) -> Iterator[None]:
         """Let the error of a contact file that nobody named tell how to do without it."""
         try:
             yield
         except ReadError as error:
-            if self.series.contacts_from != "beside" or isinstance(error, NotContactsError):
+            if self.series.contacts_from != "beside":
                 raise
             raise ReadError(
                 f"{error} (this file lies beside the grains; "

@@ -40,6 +40,10 @@ class NotContactsError(ReadError):
     """No column of a file can hold ids: if nobody named the file, it is skipped with a note."""
 
 
+class OtherGrainsError(NotContactsError):
+    """The ids of a file of contacts are not those of the grains."""
+
+
 Carries = Literal["cell", "box", "nothing"]
 """
 What a file of grains says of a cell: all; a ``box``, but not whether it repeats; or ``nothing``.

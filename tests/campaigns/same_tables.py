@@ -44,6 +44,7 @@ WANTED: dict[str, str] = {
     r"pfc/(grains|pairs)\.\w+( [a-z-]+)?: UnknownFormatError": "PFC is known by its columns",
     r"new_empty\.bin lammps-data \[0\]: column type": "without rows a column has no kind",
     r"wide\.csv": "no program writes tables in UTF-16",
+    r"step: -?\d+ -> None": "a single file has no step by its name",
 }
 """Regular expression of what differs, and why it shall."""
 

@@ -1,4 +1,4 @@
-"""Files that are packed with gzip, bzip2 or xz, and files that cannot be opened."""
+"""Files that are compressed, are no dumps, or hold far more than files so small can."""
 
 from __future__ import annotations
 
@@ -8,60 +8,111 @@ import lzma
 from collections import OrderedDict
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
-from pathlib import Path
+from importlib import import_module
 
+import lz4.frame
+import numpy as np
 import pytest
 
+import scanfab
 from scanfab.base.errors import ReadError
 from scanfab.io import files
+from tests.helpers.dumps import dump_text, pairs_text
 
-TEXT = b"ITEM: TIMESTEP\n" * 1000
-PACK = {".gz": gzip.compress, ".bz2": bz2.compress, ".xz": lzma.compress}
-
-
-@pytest.fixture(params=PACK)
-def packed(request, tmp_path):
-    path = tmp_path / f"dump.txt{request.param}"
-    path.write_bytes(PACK[request.param](TEXT))
-    return path
-
-
-def test_the_first_bytes_are_the_unpacked_ones(packed):
-    assert files.first_bytes(packed, 10) == TEXT[:10]
+zstd = import_module(files.ZSTD)
+PROGRAMS = {
+    ".gz": gzip.compress,
+    ".bz2": bz2.compress,
+    ".xz": lzma.compress,
+    ".zst": zstd.compress,
+    ".lz4": lz4.frame.compress,
+}
+TEXT = dump_text().encode()
 
 
-def test_a_packed_file_becomes_plain_under_its_bare_name(packed):
-    copy = files.plain(packed)
-    assert copy.read_bytes() == TEXT
-    assert copy.name == "dump.txt"
+@pytest.fixture(params=PROGRAMS)
+def suffix(request):
+    return request.param
 
 
-def test_a_plain_file_is_itself(tmp_path):
+def test_a_dump_and_its_contacts_are_read_whatever_they_are_packed_with(tmp_path, suffix):
+    (tmp_path / f"dump_5.txt{suffix}").write_bytes(PROGRAMS[suffix](dump_text(step=5).encode()))
+    (tmp_path / f"pairs_5.txt{suffix}").write_bytes(PROGRAMS[suffix](pairs_text(step=5).encode()))
+    packing = scanfab.read_series(tmp_path)[0].read()
+    assert packing.step == 5
+    assert len(packing.contacts) == 2
+
+
+def test_several_parts_one_behind_the_other_are_one_file(tmp_path, suffix):
+    path = tmp_path / f"dump.txt{suffix}"
+    path.write_bytes(PROGRAMS[suffix](TEXT[:40]) + PROGRAMS[suffix](TEXT[40:]))
+    assert len(scanfab.read(path)) == 3
+
+
+@pytest.mark.parametrize(
+    ("name", "data"),
+    [
+        ("dump.txt", gzip.compress(TEXT)),
+        ("dump.txt.gz", TEXT),
+        ("dump.txt.zst", b"\x50\x2a\x4d\x18\x04\x00\x00\x00pzst" + zstd.compress(TEXT)),
+    ],
+)
+def test_packing_is_told_by_the_content(tmp_path, name, data):
+    path = tmp_path / name
+    path.write_bytes(data)
+    assert len(scanfab.read(path)) == 3
+    assert files.first_bytes(path, 9) == b"ITEM: TIM"
+
+
+@pytest.mark.parametrize("cut", [5, 0.5, -3])
+def test_a_part_of_a_packed_file_is_an_error(tmp_path, suffix, cut):
+    noise = np.random.default_rng(0).uniform(size=(3000, 6)).tolist()
+    packed = PROGRAMS[suffix](dump_text(noise).encode())
+    path = tmp_path / f"dump.txt{suffix}"
+    path.write_bytes(packed[: int(cut * len(packed)) if isinstance(cut, float) else cut])
+    with pytest.raises(ReadError, match=r"dump\.txt"):
+        scanfab.read(path, format="liggghts")
+
+
+@pytest.mark.parametrize("suffix", [".bz2", ".xz", ".zst"])
+def test_a_bomb_is_refused_unless_more_is_allowed(tmp_path, monkeypatch, suffix):
+    monkeypatch.setattr(files, "ANYWAY", 1000)
+    rows = "1 1 0.2 0.5 0.5 0.1\n" * 300_000
+    text = dump_text(()).replace("ATOMS\n0", "ATOMS\n300000") + rows
+    path = tmp_path / f"dump.txt{suffix}"
+    path.write_bytes(PROGRAMS[suffix](text.encode()))
+    with pytest.raises(ReadError, match=r"unpack to more than 1000 times as many.*`max_unpacked`"):
+        scanfab.read(path)
+    with pytest.raises(scanfab.PackingError, match="the id 1 "):
+        scanfab.read(path, max_unpacked=1e6)
+
+
+def test_a_line_of_many_megabytes_is_refused_unless_it_is_allowed(tmp_path, monkeypatch):
+    monkeypatch.setattr(files, "LONGEST_LINE", 1 << 17)
     path = tmp_path / "dump.txt"
-    path.write_bytes(TEXT)
-    assert files.plain(path) == path
+    path.write_text(dump_text() + "9" * (1 << 18) + "\n" + dump_text(step=1))
+    with pytest.raises(ReadError, match=r"a line is longer than .*`max_unpacked`"):
+        scanfab.read(path)
+    with pytest.raises(ReadError, match="the header counts 3 rows, found 4"):
+        scanfab.read(path, max_unpacked=1000)
+    # lines of just the length are none too long, wherever they begin
+    for length in (1 << 16, (1 << 17) - 2):
+        path.write_text(("x" * length + "\n") * 9)
+        files.check_lines(path, path)
 
 
-def test_packing_is_told_by_the_content_not_the_name(tmp_path):
-    path = tmp_path / "dump.txt"
-    path.write_bytes(gzip.compress(TEXT))
-    assert files.plain(path).read_bytes() == TEXT
+@pytest.mark.parametrize("wrong", [0, -1, "many"])
+def test_a_bound_that_is_none(wrong):
+    with pytest.raises(scanfab.SettingsError, match="max_unpacked: expected a number above 0"):
+        scanfab.read_series("nowhere", max_unpacked=wrong)
 
 
-def test_a_name_that_promises_packing_need_not_keep_it(tmp_path):
+def test_a_file_is_decompressed_once_until_it_changes(tmp_path):
     path = tmp_path / "dump.txt.gz"
-    path.write_bytes(TEXT)
-    assert files.plain(path) == path
-
-
-def test_a_file_is_unpacked_once(packed):
-    assert files.plain(packed) == files.plain(packed)
-
-
-def test_a_file_that_changes_is_unpacked_again(tmp_path):
-    path = tmp_path / "dump.gz"
     path.write_bytes(gzip.compress(TEXT))
-    files.plain(path)
+    copy = files.plain(path)
+    assert (copy.name, copy.read_bytes()) == ("dump.txt", TEXT)
+    assert files.plain(path) == copy
     path.write_bytes(gzip.compress(b"something else, and longer than it was before"))
     assert files.plain(path).read_bytes().startswith(b"something else")
 
@@ -85,37 +136,16 @@ def test_of_each_thread_only_the_copies_used_last_are_kept(tmp_path, monkeypatch
     assert [copy.exists() for copy in copies] == [False] * 2 + [True] * kept
 
 
-def test_a_packed_file_cut_off_is_an_error(packed):
-    packed.write_bytes(packed.read_bytes()[:-12])
-    with pytest.raises(ReadError, match=f"{packed.name}: cannot be decompressed: "):
-        files.plain(packed)
-
-
-def test_a_packed_file_of_nonsense_is_an_error(tmp_path):
-    path = tmp_path / "dump.gz"
-    path.write_bytes(b"\x1f\x8b" + b"nonsense" * 10)
-    with pytest.raises(ReadError, match="cannot be decompressed: "):
-        files.first_bytes(path)
-
-
-def test_a_missing_file_is_an_error_that_says_so(tmp_path):
-    with pytest.raises(ReadError, match="none: cannot be read: No such file or directory"):
-        files.first_bytes(tmp_path / "none")
-
-
-def test_a_folder_is_an_error_that_says_so(tmp_path):
-    with pytest.raises(ReadError, match="cannot be read: Is a directory"):
-        files.plain(tmp_path)
-
-
 @pytest.mark.parametrize(
-    ("name", "bare"),
+    ("make", "said"),
     [
-        ("dump_10.txt.gz", "dump_10.txt"),
-        ("dump_10.txt", "dump_10.txt"),
-        ("a.xml.bz2", "a.xml"),
-        ("b.xz", "b"),
+        (lambda path: path.write_bytes(b"\x1f\x8b" + b"nonsense" * 10), "decompressed: "),
+        (lambda path: None, "read: No such file or directory"),
+        (lambda path: path.mkdir(), "read: Is a directory"),
     ],
 )
-def test_the_bare_name_has_no_ending_of_packing(name, bare):
-    assert files.bare_name(Path(name)) == bare
+def test_what_cannot_be_opened_is_an_error_that_says_why(tmp_path, make, said):
+    path = tmp_path / "dump.gz"
+    make(path)
+    with pytest.raises(ReadError, match=f"dump.gz: cannot be {said}"):
+        files.first_bytes(path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import os
 import shutil
 import warnings
@@ -12,8 +13,8 @@ import scanfab
 from scanfab.base.errors import ReadError, ScanfabNote
 from scanfab.cli.main import run
 from scanfab.table.result_file import ResultFile
-from tests.helpers.dumps import PAIRS, dump_text, pairs_text, write
-from tests.helpers.truth import FLOOR, SAMPLE_DATA
+from tests.helpers.dumps import PAIRS, dump_text, local_text, pairs_text, write
+from tests.helpers.truth import SAMPLE_DATA
 
 NO_RADIUS = "id type x y z c_rad"
 
@@ -46,18 +47,6 @@ def test_one_file_is_read_with_its_contacts_as_its_folder_is(folder):
     assert len(packing.contacts) == 2
 
 
-def test_several_files_are_read_with_their_contacts(folder):
-    with pytest.warns(ScanfabNote):
-        assert contacts_of(sorted(folder.glob("dump_*"))) == [2, 2]
-
-
-def test_the_command_line_reads_one_file_as_python_does(folder, capsys):
-    assert run(["inspect", str(folder / "dump_9.txt")]) == 0
-    printed = capsys.readouterr()
-    assert "contacts_from file" in printed.out
-    assert "note: contacts are read from" in printed.err
-
-
 @pytest.mark.parametrize("how", ["geometric", "named"])
 def test_contacts_beside_are_left_alone_if_others_are_asked_for(folder, how):
     other = write(folder / "other_9.txt", pairs_text(PAIRS[:1], step=9))
@@ -73,11 +62,6 @@ def test_contacts_of_another_step_are_not_beside(folder):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert contacts_of(folder / "dump_11.txt") == [None]
-
-
-def test_contacts_of_another_folder_are_not_beside(folder, tmp_path):
-    alone = shutil.copy(folder / "dump_9.txt", tmp_path)
-    assert contacts_of(alone) == [None]
 
 
 @pytest.mark.filterwarnings("ignore::scanfab.base.errors.ScanfabNote")
@@ -122,31 +106,6 @@ def test_the_advice_of_several_series_names_the_contacts_that_are_read(tmp_path)
     assert contacts_of(tmp_path / "ex_dump_9.txt") == [2]
 
 
-@pytest.mark.filterwarnings("ignore::scanfab.ScanfabNote")
-def test_the_advice_of_several_series_keeps_the_contacts(folder):
-    series(folder, "p5_dump", "p5_contacts", 9, PAIRS[:1])
-    with pytest.raises(ReadError, match="several series of grains") as told:
-        scanfab.read_series(folder)
-    advice = next(line for line in str(told.value).splitlines() if "p5_dump" in line)
-    assert "contacts: " in advice
-    assert "p5_contacts" in advice
-    assert contacts_of(advice.partition(";")[0].strip()) == [1]
-
-
-def test_a_series_without_radius_is_among_those_to_choose_from(folder):
-    write(folder / "cloud_9.txt", dump_text(step=9))
-    write(folder / "tracers_9.txt", dump_text(step=9, names=NO_RADIUS))
-    with pytest.raises(ReadError, match=r"tracers_9.txt; it has no radius: `radius=L`"):
-        scanfab.read_series(folder)
-
-
-def test_a_column_that_may_be_the_radius_is_suggested(tmp_path):
-    path = write(tmp_path / "dump_9.txt", dump_text(names=NO_RADIUS))
-    with pytest.raises(ReadError, match=r'`columns=."radius": "c_rad".` \(if that is one\)'):
-        scanfab.read(path)
-    assert len(scanfab.read(path, columns={"radius": "c_rad"})) == 3
-
-
 @pytest.mark.parametrize("ending", ["csv", "tsv", "json", "jsonl"])
 def test_a_fabric_table_is_known(tmp_path, ending, capsys):
     grid = [[x, y, z] for x in range(4) for y in range(4) for z in range(4)]
@@ -189,12 +148,6 @@ def test_contacts_beside_that_cannot_be_read_say_how_to_leave_them_alone(folder)
         scanfab.read(folder / "dump_9.txt")
 
 
-def test_a_mesh_of_walls_is_no_list_of_contacts(folder):
-    mesh = FLOOR / "mesh_30000.vtk"
-    with pytest.raises(ReadError, match="expected contacts, found neither grains nor contacts"):
-        scanfab.read_series(folder, contacts=mesh)
-
-
 def test_what_editors_leave_is_no_frame(folder):
     for name in ("dump_9.txt~", "dump_11.txt.part", "dump_12.txt.tmp", "dump_13.txt.bak"):
         write(folder / name, dump_text(step=11))
@@ -223,3 +176,65 @@ def test_a_lone_dump_above_folders_of_dumps_is_told_of(folder):
     shutil.copy(next(folder.glob("dump_*")), folder.parent / "dump_7.txt")
     with pytest.warns(ScanfabNote, match=r"dump_7.txt alone is read, but .*: .*dumps"):
         scanfab.read_series(folder.parent)
+
+
+STEPLESS = "x,y,z,radius\n0,0,0,1\n1.9,0,0,1\n"
+CONTACTS = "id1,id2\n0,1\n"
+
+
+@pytest.mark.parametrize(
+    ("grains", "contacts"),
+    [
+        ("a.csv", "b.csv"),
+        ("a.csv", "b.contacts.csv"),
+        ("a_1.csv", "b_1.contacts.csv"),
+        ("a_1.csv", "b_2.csv"),
+    ],
+)
+def test_contacts_of_another_sample_are_skipped_with_a_note(tmp_path, grains, contacts):
+    path = write(tmp_path / grains, STEPLESS)
+    write(tmp_path / contacts, CONTACTS.replace("0,1", "5,6"))
+    assert contacts_of(path) == [None]
+    write(tmp_path / "a.contacts.csv" if grains == "a.csv" else tmp_path / "a_1.pairs", CONTACTS)
+    with pytest.warns(ScanfabNote, match=r"contacts are read from .*(a.contacts.csv|a_1.pairs)"):
+        assert contacts_of(path) == [1]
+
+
+@pytest.mark.filterwarnings("ignore:skipped rec-intrs")
+@pytest.mark.parametrize("beside", [True, False])
+def test_a_cut_file_that_may_be_the_contacts_is_an_error(tmp_path, beside):
+    for name in ("spheres", "intrs"):
+        file = SAMPLE_DATA / "yade_triaxial" / f"triaxial-{name}-00000000.vtk.gz"
+        text = gzip.decompress(file.read_bytes())
+        (tmp_path / f"rec-{name}-0.vtk").write_bytes(text[: 300 if name == "intrs" else None])
+    source = tmp_path / "rec-spheres-0.vtk" if beside else tmp_path
+    with pytest.raises(ReadError, match=r'rec-intrs-0.vtk.*`contacts="geometric"` leaves it alone'):
+        scanfab.read(source)
+    assert scanfab.read(source, contacts="geometric").contacts is None
+
+
+def test_a_data_file_is_no_frame_beside_dumps(folder):
+    shutil.copy(SAMPLE_DATA / "lammps_shear" / "forms" / "shear.data.gz", folder)
+    with pytest.warns(ScanfabNote, match=r"skipped shear.data.gz: it holds grains that a simul"):
+        assert contacts_of(folder) == [2, 2]
+    assert len(scanfab.read(folder / "shear.data.gz")) == 700
+
+
+def test_a_dump_local_without_ids_is_skipped_with_a_note(folder):
+    write(folder / "other_9.txt", local_text([(0.5, 1.5, -0.25), (2.5, 1, 0.5)], step=9))
+    with pytest.warns(ScanfabNote, match=r"skipped .*other_9.txt: cannot tell which columns"):
+        assert contacts_of(folder) == [2, 2]
+    with pytest.raises(ReadError, match="cannot tell which columns"):
+        contacts_of(folder / "dump_9.txt", contacts=folder / "other_9.txt")
+
+
+def test_seven_files_that_are_skipped_for_one_reason_are_one_note(folder):
+    for k in range(7):
+        write(folder / f"{'abcdefg'[k]}.txt", "hello\n")
+    with pytest.warns(ScanfabNote) as told:
+        scanfab.read_series(folder)
+    (note,) = told
+    assert str(note.message) == (
+        "skipped a.txt, b.txt, c.txt, d.txt, e.txt and 2 more: they hold neither grains nor "
+        "contacts"
+    )

@@ -18,7 +18,6 @@ import pyvista
 import scanfab
 from scanfab.base.errors import SettingsError
 from scanfab.cli.main import run
-from scanfab.io.sources import open_sources
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.interruptions import PROGRAM, write_series
 
@@ -101,33 +100,6 @@ def test_standard_input_needs_a_format(capsys: pytest.CaptureFixture[str]) -> No
     assert "--format" in capsys.readouterr().err
 
 
-def test_files_of_different_steps_are_no_frame(tmp_path: Path) -> None:
-    spheres = tmp_path / "triaxial-spheres-00000003.vtk.gz"
-    lines = tmp_path / "triaxial-intrs-00000004.vtk.gz"
-    for file in (spheres, lines):
-        file.write_bytes((YADE / file.name).read_bytes())
-    with pytest.warns(scanfab.ScanfabWarning, match="no contact file for step 3"):
-        packing = next(iter(scanfab.read_series(tmp_path))).read()
-    assert packing.contacts is None
-
-
-def test_absolute_and_relative_paths_mix(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    for step in (1, 2):
-        grains_with_lines(tmp_path / f"grains_{step}.vtp")
-    series = scanfab.read_series(["grains_1.vtp", tmp_path / "grains_2.vtp"])
-    assert len(list(series)) == 2
-    assert series.name == str(tmp_path)
-
-
-def test_a_source_keeps_the_name_that_it_was_given(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(ROOT)
-    with pytest.warns(scanfab.ScanfabNote):
-        assert scanfab.read_series("./sample_data/yade_triaxial/").name == (
-            "./sample_data/yade_triaxial/"
-        )
-
-
 @pytest.mark.parametrize("again", ["same", "spelt otherwise", "link", "glob"])
 def test_a_folder_that_is_named_twice_is_read_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], again: str
@@ -154,16 +126,6 @@ def test_a_file_that_is_named_twice_is_one_frame(tmp_path: Path) -> None:
     assert [frame.step for frame in series] == [0, 9]
 
 
-def test_many_names_that_come_twice_are_one_warning(tmp_path: Path) -> None:
-    files = [
-        write(tmp_path / f"dump_{step}.txt", dump_text(cubic_rows(), step=step))
-        for step in range(7)
-    ]
-    with pytest.warns(scanfab.ScanfabWarning, match=r"dump_4.txt and 2 more: named") as told:
-        assert len(list(open_sources([*files, tmp_path / "*.txt"])[0])) == 7
-    assert len(told) == 1
-
-
 def test_a_series_may_start_with_frames_of_boundary_alone(tmp_path: Path) -> None:
     head = "ITEM: TIMESTEP\n{0}\nITEM: NUMBER OF ATOMS\n{1}\nITEM: BOX BOUNDS ff ff ff\n" + 3 * (
         "-9 9\n"
@@ -185,15 +147,6 @@ def test_a_series_may_start_with_frames_of_boundary_alone(tmp_path: Path) -> Non
     assert table["grains"].tolist() == [0, 3]
     assert np.isnan(table["alpha_vs"][0])
     assert not np.isnan(table["alpha_vs"][1])
-
-
-@pytest.mark.filterwarnings("ignore:no contact at all by geometry")
-def test_with_a_spacing_alone_every_round_has_sixteen_replicates() -> None:
-    grid = np.stack(np.meshgrid(*3 * [np.arange(8.0)]), axis=-1).reshape(-1, 3)
-    packing = scanfab.Packing(grid, 0.45)
-    table = scanfab.compute(packing, variants="c", spacing=0.7, tolerance=5e-3, cutoff=0.2)
-    assert table["replicates"][0] == 16
-    assert table["alpha_vs_axial_se"][0] <= 5e-3
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX")

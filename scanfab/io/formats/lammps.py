@@ -21,6 +21,7 @@ from scanfab.io.reader import (
     GrainTable,
     JoinedContacts,
     NotContactsError,
+    OtherGrainsError,
     ReadOptions,
     Snapshot,
 )
@@ -135,7 +136,7 @@ class DumpReader(VtkReader):
             found = dump_contacts.named_places(path, told, dump.names)
         if found is None:
             may_be_ids = sum(map(dump_contacts.are_whole, values.T)) > 1
-            raise (ReadError if may_be_ids else NotContactsError)(
+            raise (OtherGrainsError if may_be_ids else NotContactsError)(
                 f"{path}: cannot tell which columns are the two ids of a contact: the ids may "
                 f"belong to another step; or name the columns with "
                 f'`contact_columns="id1=NAME,id2=NAME"`, which are {", ".join(dump.names)}, or the '

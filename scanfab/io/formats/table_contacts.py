@@ -21,7 +21,7 @@ from scanfab.io.contacts import (
     row_base,
     rows_of_ids,
 )
-from scanfab.io.reader import GrainTable, JoinedContacts
+from scanfab.io.reader import GrainTable, JoinedContacts, OtherGrainsError
 
 Columns = Mapping[str, npt.NDArray[Any]]
 
@@ -93,7 +93,7 @@ def _with_ids(path: Path, grains: GrainTable, ids: IntArray) -> GrainTable:
         return grains
     base = row_base(grains, ids) if len(ids) else 0
     if base is None:
-        raise ReadError(
+        raise OtherGrainsError(
             f"{path}: names grains by numbers, but the grain file has no ids, and as rows, counted "
             f"from 0 or from 1, they are no neighbours (or both ways): name the ids of grains "
             f'with `columns={{"id": ...}}`'
