@@ -12,6 +12,9 @@ import numpy.typing as npt
 from scanfab.base.errors import PackingError
 from scanfab.base.typing import IntArray
 
+# lengths from LEAST to MOST: the cubes of these are still numbers
+LEAST, MOST = 1e-100, 1e100
+
 Arrays = TypeVar("Arrays")
 """A dataclass all of whose fields are arrays."""
 
@@ -50,6 +53,11 @@ def cast(
 
 def _spell(shape: tuple[Any, ...]) -> str:
     return "(" + ", ".join("N" if n is None else "..." if n is ... else str(n) for n in shape) + ")"
+
+
+def all_within(values: npt.NDArray[np.float64], least: float, most: float) -> bool:
+    """Whether all are numbers from least to most; without a temporary array."""
+    return values.size == 0 or bool(values.min() >= least and values.max() <= most)
 
 
 def grains_named(id: IntArray, wrong: npt.NDArray[np.bool_]) -> str:

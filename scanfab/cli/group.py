@@ -64,7 +64,7 @@ def _print_version(ctx: click.Context, param: click.Parameter, value: bool) -> N
 def _check_limit(command: str | None) -> None:
     """Some libraries end the process, or wait for ever, where they cannot even be loaded."""
     from scanfab.base.errors import ScanfabError
-    from scanfab.base.memory import address_space
+    from scanfab.base.files import address_space
 
     space, least = address_space(), LEAST_OF_COMMAND.get(str(command), LEAST_SPACE)
     if space is not None and space < least:

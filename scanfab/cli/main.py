@@ -102,7 +102,7 @@ def run(args: list[str]) -> int:
 
 def _lacks_memory(error: Exception) -> bool:
     """Whether there is no memory: libraries that cannot load their parts raise all kinds."""
-    from scanfab.base.memory import address_space
+    from scanfab.base.files import address_space
 
     space = address_space()
     told = any(words in str(error) for words in ("failed to map", "can't start new thread"))

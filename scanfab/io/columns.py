@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.arrays import doubles
+from scanfab.base.arrays import all_within, doubles
 from scanfab.base.errors import ReadError
-from scanfab.base.lengths import all_within
 from scanfab.base.typing import FloatArray
 from scanfab.io.reader import BODIES, WALLS, GrainTable, ReadOptions
 from scanfab.io.sizes import refuse_other_size

@@ -10,8 +10,8 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.arrays import MOST
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
-from scanfab.base.lengths import MOST
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.reader import GrainTable, JoinedContacts, OtherGrainsError
 from scanfab.packing.contacts import ContactList

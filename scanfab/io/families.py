@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning, UnknownFormatError
-from scanfab.base.streams import kind_of
+from scanfab.base.files import kind_of
 from scanfab.io.files import bare_name
 from scanfab.io.reader import FileKind, Reader, ReadOptions
 from scanfab.io.registry import installed_readers, reader_for, reader_named

@@ -24,7 +24,7 @@ from typing import Any, TypeVar
 
 from scanfab.base.ending import at_end
 from scanfab.base.errors import ReadError
-from scanfab.base.memory import free_memory
+from scanfab.base.files import free_memory
 from scanfab.io.files import Stamp, check_memory, plain, stamp_of
 
 Answer = TypeVar("Answer")

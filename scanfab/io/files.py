@@ -21,8 +21,7 @@ from typing import Any, Protocol
 
 from scanfab.base.ending import at_end
 from scanfab.base.errors import ReadError
-from scanfab.base.memory import free_memory
-from scanfab.base.streams import check_file
+from scanfab.base.files import check_file, free_memory
 
 COMPRESSED_SUFFIXES = (".gz", ".bz2", ".xz", ".zst", ".lz4")
 # part of Python since 3.14

@@ -9,8 +9,8 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
+from scanfab.base.arrays import MOST, all_within
 from scanfab.base.errors import PackingError
-from scanfab.base.lengths import MOST, all_within
 from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import spelt_place
 from scanfab.base.typing import FloatArray, IntArray

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.arrays import cast, grains_named
+from scanfab.base.arrays import LEAST, MOST, all_within, cast, grains_named
 from scanfab.base.errors import PackingError
-from scanfab.base.lengths import LEAST, MOST, all_within
 from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import counted, spelt_range
 from scanfab.base.typing import FloatArray, IntArray

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.base.errors import ReadError
-from scanfab.base.streams import check_file_or_pipe
+from scanfab.base.files import check_file
 from scanfab.table.formats.registry import reading_format
 
 
@@ -45,7 +45,7 @@ def read_rows(path: Path | str) -> list[dict[str, Any]]:
 
 def _content(path: str | Path) -> bytes:
     """The bytes of a table, or of what is piped in."""
-    check_file_or_pipe(Path(path))
+    check_file(Path(path), "a table", "as - in place of its name")
     try:
         return sys.stdin.buffer.read() if str(path) == "-" else Path(path).read_bytes()
     except OSError as error:

@@ -27,9 +27,7 @@ from typing import IO, Any
 from scanfab.base.column import Column
 from scanfab.base.ending import undone_at_end
 from scanfab.base.errors import ReadError, ScanfabNote, SettingsError
-from scanfab.base.files import check_folder, named_errors, whole_file
-from scanfab.base.lock import locked
-from scanfab.base.streams import kind_of
+from scanfab.base.files import check_folder, kind_of, locked, named_errors, whole_file
 from scanfab.table.columns import columns_of
 from scanfab.table.formats.registry import RowWriter, format_of
 from scanfab.table.reading import read_rows

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from scanfab.base import memory
+from scanfab.base import files
 from scanfab.cli import group, main
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.interruptions import PROGRAM
@@ -69,22 +69,22 @@ def test_where_next_to_nothing_is_left_any_failure_is_one_of_memory(monkeypatch,
     monkeypatch.setattr(group.cli, "main", fail)
     with pytest.raises(NameError):  # a mistake of ours is not hidden
         main.run(["compute"])
-    monkeypatch.setattr(memory, "address_space", lambda: 1_000_000)
+    monkeypatch.setattr(files, "address_space", lambda: 1_000_000)
     assert main.run(["compute"]) == 1
     assert "not enough memory (name 'PyLazyFrame'" in capsys.readouterr().err
 
 
 def test_what_is_free_is_the_least_of_all_limits(monkeypatch, tmp_path):
-    assert memory.free_memory() > 0
-    monkeypatch.setattr(memory, "address_space", lambda: 1000)
-    assert memory.free_memory() == 1000
+    assert files.free_memory() > 0
+    monkeypatch.setattr(files, "address_space", lambda: 1000)
+    assert files.free_memory() == 1000
     (tmp_path / "memory.max").write_text("900\n")
     (tmp_path / "memory.current").write_text("100\n")
-    monkeypatch.setattr(memory, "GROUP", Path(tmp_path))
-    assert memory.free_memory() == 800
+    monkeypatch.setattr(files, "GROUP", Path(tmp_path))
+    assert files.free_memory() == 800
     # the cache of files that were read is given up where memory is needed
     (tmp_path / "memory.stat").write_text("file 90\ninactive_file 70\nactive_file 20\n")
-    assert memory.free_memory() == 870
+    assert files.free_memory() == 870
     (tmp_path / "memory.max").write_text("max\n")
-    assert memory.free_memory() == 1000
+    assert files.free_memory() == 1000
     assert group.LEAST_SPACE > main.LITTLE

@@ -13,8 +13,8 @@ from typing import IO, Any, NamedTuple
 
 import numpy as np
 
+from scanfab.base.arrays import MOST
 from scanfab.base.errors import ReadError
-from scanfab.base.lengths import MOST
 from scanfab.base.typing import FloatArray
 from scanfab.io.columns import has_radius
 from scanfab.io.files import check_memory, first_bytes, plain

@@ -15,9 +15,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from scanfab.base.arrays import doubles
+from scanfab.base.arrays import MOST, doubles
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
-from scanfab.base.lengths import MOST
 from scanfab.base.typing import FloatArray
 from scanfab.io.binary_tables import is_xyzd, xyzd_cell
 from scanfab.io.columns import grain_table

@@ -10,9 +10,8 @@ from typing import Literal
 
 import numpy as np
 
-from scanfab.base.arrays import doubles
+from scanfab.base.arrays import MOST, doubles
 from scanfab.base.errors import ReadError, ScanfabNote
-from scanfab.base.lengths import MOST
 from scanfab.base.typing import FloatArray
 from scanfab.io.columns import grain_table, has_radius, whole_numbers
 from scanfab.io.contacts import join_ids, join_positions, proved_force

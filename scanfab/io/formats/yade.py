@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from scanfab.base.arrays import MOST
 from scanfab.base.errors import PackingError, ReadError
-from scanfab.base.lengths import MOST
 from scanfab.base.typing import FloatArray
 from scanfab.io.columns import grain_table
 from scanfab.io.files import first_bytes

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from scanfab.base.arrays import MOST
 from scanfab.base.errors import PackingError, ReadError, ScanfabWarning
-from scanfab.base.lengths import MOST
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.columns import grain_table, whole_numbers
 from scanfab.io.contacts import join_ids, rows_of_ids
