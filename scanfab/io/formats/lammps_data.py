@@ -80,7 +80,8 @@ def read(snapshot: Snapshot, options: ReadOptions) -> Dump:
         raise ReadError(f"{path}: expected a line 'N atoms' in the header, found none")
     begin = sections[place].end()
     end = sections[place + 1].start() + 1 if place + 1 < len(sections) else len(data)
-    rows = re.sub(rb"[ \t]*#[^\n]*", b"", data[begin:end])
+    rows = data[begin:end]
+    rows = re.sub(rb"[ \t]*#[^\n]*", b"", rows) if b"#" in rows else rows
     names = numbers_as_names(len(rows.lstrip().partition(b"\n")[0].split()) or len(PLAIN))
     own = {f"{name}" for name in options.columns.values()}
     is_numbered = bool(own) and own <= {*names}
