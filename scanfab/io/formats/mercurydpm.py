@@ -200,10 +200,9 @@ def _read_restart(path: Path, data: bytes, options: ReadOptions) -> GrainTable:
     if not data.endswith(b"\n"):
         raise ReadError(f"{path}: the last line has no end: the file is incomplete")
     particles, interactions = (_section(path, data, one) for one in (b"Particles", b"Interactions"))
-    is_old = bool(particles) and OLD_SPHERE.match((particles or [b""])[0]) is not None
-    if particles is None or (interactions is None and particles and not is_old):
-        lost = "Particles" if particles is None else "Interactions"
-        raise ReadError(f"{path}: expected a line '{lost} N', found none: the file is incomplete")
+    if particles is None:
+        raise ReadError(f"{path}: expected a line 'Particles N', found none")
+    is_old = bool(particles) and OLD_SPHERE.match(particles[0]) is not None
     if is_old:
         x, y, z, radius = _numbers(path, particles, OLD_SPHERE, "spheres (TSP BP)").T
         id, species = np.arange(len(x)), np.zeros(len(x))
@@ -213,7 +212,9 @@ def _read_restart(path: Path, data: bytes, options: ReadOptions) -> GrainTable:
     told = options.cell is not None or options.beside is not None
     grains = grain_table(path, columns, None if told else _cell(path, data), options)
     if interactions is None:
-        return grains
+        if is_old or not particles:
+            return grains
+        raise ReadError(f"{path}: expected a line 'Interactions N': the file is incomplete")
     walls = [row for row in interactions if b" particleWallIds " in row]
     between = [row for row in interactions if b" particleWallIds " not in row]
     values = _numbers(path, between, PAIR, "interactions of particleIds with a force")
