@@ -207,8 +207,8 @@ def contacts_beside(
     What lies beside single grain files with their numbers, and which of it are their contacts.
 
     Contact files belong to grains if their numbers agree or their names begin with the same word,
-    or if they are the only ones without a number; and if no other grains beside them have a name
-    that is as near, and no other contact files are nearer. ``STEM.contacts.csv`` belongs to STEM.
+    or if neither has a number; and if no other grains beside them have a name that is as near, and
+    no other contact files are nearer. ``STEM.contacts.csv`` belongs to STEM.
 
     Parameters
     ----------
@@ -247,7 +247,7 @@ def contacts_beside(
         if owners <= stems:
             near[float("inf"), True].append(family)
         elif kin > closest and (
-            are_tied(grains, family) or (not rivals and owners == {None} and None in grains.files)
+            are_tied(grains, family) or (owners == {None} and None in grains.files)
         ):
             near[kin[0], True].append(family)
         elif kin >= closest:

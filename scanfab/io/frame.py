@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -143,7 +143,10 @@ class Frame:
             raise ReadError(
                 f'{path}: `contacts="file"` was asked for, but there is no contact file'
             )
-        with_walls = with_own or self._are_walls_with_grains(grains)
+        walls = joined
+        if grains.wall_contacts is not None and (with_own or self._walls_are_with_grains()):
+            walls = [*joined, JoinedContacts(None, grains.wall_contacts, grains.wall_forces)]
+        none = np.zeros(len(grains.radius), np.int64)
         with _named(path):
             return Packing(
                 grains.position,
@@ -152,18 +155,16 @@ class Frame:
                 columns=grains.columns,
                 bodies=body_numbers(path, grains, options.bodies),
                 contacts=listed[0] if listed else None,
-                wall_contacts=_wall_contacts(grains, joined, with_walls),
-                wall_forces=_wall_forces(grains, joined, with_walls),
+                wall_contacts=sum((one.wall_contacts for one in walls), none) if walls else None,
+                wall_forces=_wall_forces(walls),
                 cell=grains.cell,
                 step=self.step,
                 time=self.snapshot.time,
                 dim=self.series.space_of(self.number, grains.position),
             )
 
-    def _are_walls_with_grains(self, grains: GrainTable) -> bool:
+    def _walls_are_with_grains(self) -> bool:
         """Whether the contacts are those that a conversion left beside: none is a wall's."""
-        if grains.wall_contacts is None:
-            return False
         return any(is_contacts_file(snapshot.path) for _, snapshot in self._contact_files())
 
     def centres(self) -> FloatArray:
@@ -182,7 +183,9 @@ class Frame:
         """
         if self.problem is not None:
             raise self.problem
-        return self.reader.read_grains(self.snapshot, self._options()).position
+        options = self._options()
+        with unpacking_up_to(options.max_unpacked):
+            return self.reader.read_grains(self.snapshot, options).position
 
     def _joined_contacts(self, grains: GrainTable, options: ReadOptions) -> list[JoinedContacts]:
         """The contact files of the frame, joined to its grains; one of them lists grain pairs."""
@@ -253,7 +256,8 @@ class Frame:
         options = self.series.options
         told = self.series.cells or options.cell or options.periodic is not None
         told = told or frame_file(self.snapshot.path).is_file()
-        return "cell" if told or ask is None else ask(self.snapshot.path)
+        with unpacking_up_to(options.max_unpacked):
+            return "cell" if told or ask is None else ask(self.snapshot.path)
 
     @property
     def named(self) -> dict[str, bool]:
@@ -325,22 +329,9 @@ def _named(path: Path) -> Iterator[None]:
         raise PackingError(f"{path}: {error}") from None
 
 
-def _wall_contacts(grains: GrainTable, joined: list[JoinedContacts], with_own: bool) -> Any:
-    own = grains.wall_contacts if with_own else None
-    if not joined:
-        return own
-    first = np.zeros(len(grains.radius), np.int64) if own is None else own
-    return sum((part.wall_contacts for part in joined), first)
-
-
-def _wall_forces(
-    grains: GrainTable, joined: list[JoinedContacts], with_own: bool
-) -> ListedWallForces | None:
+def _wall_forces(walls: list[JoinedContacts]) -> ListedWallForces | None:
     """Of all files that list contacts with walls; None if one of them does not say the forces."""
-    listing = [part for part in joined if part.wall_contacts.any()]
-    parts = [part.wall_forces for part in listing]
-    if with_own and grains.wall_contacts is not None and grains.wall_contacts.any():
-        parts.append(grains.wall_forces)
+    parts = [one.wall_forces for one in walls if one.wall_contacts.any()]
     known = [part for part in parts if part is not None]
     if not known or len(known) < len(parts):
         return None

@@ -53,13 +53,6 @@ def test_ten_thousand_files_open_within_seconds(tmp_path):
     assert len(packing) == 3
 
 
-def test_a_frame_is_read_when_its_turn_comes(series, packings):
-    rows = compute_rows(series, Settings(workers=1, **SCAN))
-    assert next(rows).frame == 0
-    assert len(packings) <= 2
-    assert [row.frame for row in rows] == list(range(1, FRAMES))
-
-
 @pytest.mark.parametrize("workers", [1, 2, 3])
 def test_memory_holds_one_frame_a_worker(series, packings, workers):
     # one more for each row that is taken while the next frame is read

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from importlib.metadata import EntryPoint
 from types import SimpleNamespace
 
 import numpy as np
@@ -89,15 +88,6 @@ def test_a_plugin_that_cannot_be_made_is_one_warning_with_its_name():
     assert list(found) == ["numbers"]
 
 
-def test_a_plugin_that_cannot_be_imported_is_one_warning_with_its_name():
-    missing = EntryPoint("absent", "a_module_that_is_not_there:Reader", registry.GROUP)
-    with pytest.warns(
-        ScanfabWarning, match="'absent' of unknown package .*ModuleNotFoundError"
-    ) as seen:
-        assert load_readers([missing]) == {}
-    assert len(seen) == 1
-
-
 def test_two_packages_with_one_name_are_an_error_that_names_both():
     points = [
         Point("numbers", lambda: NumbersReader, "one"),
@@ -105,20 +95,6 @@ def test_two_packages_with_one_name_are_an_error_that_names_both():
     ]
     with pytest.raises(ScanfabError, match="'numbers': one and two; remove one of them"):
         load_readers(points)
-
-
-def test_a_broken_plugin_does_not_clash():
-    points = [
-        Point("numbers", lambda: NumbersReader, "one"),
-        Point("numbers", lambda: FailingReader, "two"),
-    ]
-    with pytest.warns(ScanfabWarning, match="of two cannot be loaded"):
-        assert load_readers(points)["numbers"].package == "one"
-
-
-def test_a_plugin_without_a_package_is_loaded():
-    found = load_readers([Point("numbers", lambda: NumbersReader, None)])
-    assert found["numbers"].package == "unknown package"
 
 
 @pytest.mark.usefixtures("with_plugin")
@@ -137,13 +113,6 @@ def test_a_foreign_plugin_can_be_named(tmp_path):
     assert reader_named("numbers").name == "numbers"
     path = write(tmp_path / "a.txt", "numbers of grains\n0 0 0 1\n")
     assert len(scanfab.read(path, format="numbers")) == 1
-
-
-@pytest.mark.usefixtures("with_plugin")
-def test_an_error_of_a_foreign_plugin_is_passed_on(tmp_path):
-    path = write(tmp_path / "a.txt", "numbers of grains\n0 0 zero 1\n")
-    with pytest.raises(ReadError, match=r"a\.txt: could not convert"):
-        scanfab.read(path)
 
 
 def test_a_name_that_does_not_exist_is_an_error_that_lists_those_that_do():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pickle
 
-import numpy as np
 import pytest
 
 import scanfab
@@ -28,18 +27,6 @@ def series(request, tmp_path):
 
 def numbers(frames):
     return [frame.number for frame in frames]
-
-
-def test_a_series_has_a_length(series):
-    assert len(series) == COUNT
-    assert numbers(series) == list(range(COUNT))
-
-
-@pytest.mark.parametrize("index", [0, 3, COUNT - 1, -1, -COUNT, np.int64(2), True])
-def test_a_frame_by_its_number(series, index):
-    frame = series[index]
-    assert frame.number == list(range(COUNT))[index]
-    assert frame.read().step == 10 * frame.number
 
 
 @pytest.mark.parametrize("index", [COUNT, 99, -COUNT - 1])
@@ -92,14 +79,6 @@ def test_a_part_knows_its_whole(series):
     assert part.whole == series
     assert part != series
     assert part.name == series.name
-
-
-def test_how_many_frames_are_expected_of_a_part(series):
-    list(series)
-    assert series.frames_expected() == COUNT
-    assert series[2:5].frames_expected() == 3
-    assert series[5:].frames_expected() == 2
-    assert series[1::2].frames_expected() == 3
 
 
 @pytest.fixture
