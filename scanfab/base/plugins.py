@@ -18,10 +18,6 @@ class Offer(NamedTuple):
     """The name of the package."""
 
 
-def _as_it_is(plugin: Any) -> Any:
-    return plugin
-
-
 def having(expected: str, **members: Any) -> Callable[[Any], Any]:
     """
     Of plugins that are objects: raises TypeError for one without these members, or a class.
@@ -47,7 +43,7 @@ def having(expected: str, **members: Any) -> Callable[[Any], Any]:
     return make
 
 
-def load_plugins(group: str, what: str, make: Callable[[Any], Any] = _as_it_is) -> dict[str, Any]:
+def load_plugins(group: str, what: str, make: Callable[[Any], Any]) -> dict[str, Any]:
     """
     The objects that packages offer, by name and in alphabetical order.
 
@@ -59,7 +55,7 @@ def load_plugins(group: str, what: str, make: Callable[[Any], Any] = _as_it_is) 
         The entry point, for instance ``scanfab.fabrics``.
     what : str
         What one of them is called in a message.
-    make : callable, optional
+    make : callable
         Turns into a plugin what is loaded, or raises where it is none.
 
     Raises
@@ -72,7 +68,7 @@ def load_plugins(group: str, what: str, make: Callable[[Any], Any] = _as_it_is) 
 
 
 def load_offers(
-    points: Iterable[EntryPoint], what: str, make: Callable[[Any], Any] = _as_it_is
+    points: Iterable[EntryPoint], what: str, make: Callable[[Any], Any]
 ) -> dict[str, Offer]:
     """As :func:`load_plugins`, with the package of each."""
     found: dict[str, Offer] = {}

@@ -81,6 +81,8 @@ def spelt_apart(value: float, limit: float) -> tuple[str, str]:
     >>> from scanfab.base.spelling import spelt_apart
     >>> spelt_apart(0.00100041, 0.001)
     ('0.0010004', '0.001')
+    >>> spelt_apart(0.25, 0.25), spelt_apart(float("inf"), 1e-4)
+    (('0.25', '0.25'), ('inf', '0.0001'))
     """
     for digits in range(2, 18):
         spelt = f"{value:.{digits}g}", f"{limit:.{digits}g}"

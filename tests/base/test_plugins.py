@@ -32,19 +32,19 @@ def offered(monkeypatch):
 
 def test_they_come_by_name(offered):
     offered += [point("b", lambda: 2), point("a", lambda: 1)]
-    assert list(load_plugins("some.group", "thing").items()) == [("a", 1), ("b", 2)]
+    assert list(load_plugins("some.group", "thing", str).items()) == [("a", "1"), ("b", "2")]
 
 
 def test_a_broken_one_is_a_warning_that_names_it_and_its_package(offered):
     offered += [point("bad", broken), point("good", lambda: 1)]
     with pytest.warns(ScanfabWarning, match="the thing 'bad' of one .*RuntimeError: needs a lic"):
-        assert load_plugins("some.group", "thing") == {"good": 1}
+        assert load_plugins("some.group", "thing", str) == {"good": "1"}
 
 
 def test_one_name_twice_is_an_error_that_names_both_packages(offered):
     offered += [point("a", lambda: 1), point("a", lambda: 2, "two")]
     with pytest.raises(ScanfabError, match="two packages offer a thing called 'a': one and two"):
-        load_plugins("some.group", "thing")
+        load_plugins("some.group", "thing", str)
 
 
 @pytest.mark.parametrize(
