@@ -24,8 +24,8 @@ from scanfab.base.errors import ReadError, ScanfabWarning
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.fence import fenced
 from scanfab.io.files import check_memory, file_inside, first_bytes, plain
-from scanfab.io.parse.hdf import is_hdf, read_hdf_file
-from scanfab.io.parse.vtk_checks import check_text, check_xml, damaged, is_ascii
+from scanfab.io.hdf import is_hdf, read_hdf_file
+from scanfab.io.vtk_checks import check_text, check_xml, damaged, is_ascii
 
 Arrays = dict[str, npt.NDArray[Any]]
 

@@ -24,7 +24,7 @@ from scanfab.base.shapes import (
 )
 from scanfab.base.space import Space
 from scanfab.base.typing import FloatArray
-from scanfab.io.parse.surface import read_surface
+from scanfab.io.surface import read_surface
 from scanfab.packing.plane import spelt_plane
 from scanfab.packing.sample import Sample
 from scanfab.packing.window import RV_MEANING, SurfaceBox, Window

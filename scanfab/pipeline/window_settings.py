@@ -81,7 +81,7 @@ def parse_shape(name: str, value: Any) -> str:
     """The shape of a window: a word, or a file with its surface that exists."""
     if str(value) in SHAPES:
         return str(value)
-    from scanfab.io.parse.surface import SUFFIXES
+    from scanfab.io.surface import SUFFIXES
 
     path = Path(value)
     if path.suffix.lower() not in SUFFIXES or not path.is_file():

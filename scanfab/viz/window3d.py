@@ -16,7 +16,6 @@ from scanfab.base.convex import Convex
 from scanfab.base.errors import ScanfabError
 from scanfab.base.files import whole_file
 from scanfab.base.typing import BoolArray, FloatArray
-from scanfab.base.vtk_log import quiet_vtk
 from scanfab.viz.figures.style import COLOURS
 from scanfab.viz.overlay import SIZE, Framing, add_scale, add_words
 from scanfab.viz.scene import SHADES, Grains, Scene, towards_viewer
@@ -70,8 +69,15 @@ def show_scene(
     """
     if screenshot is not None:
         check_drawing()
-    with quiet_vtk():
+    from vtkmodules.vtkCommonCore import vtkLogger
+
+    # VTK would write to standard error; errors tell what is wrong
+    before = vtkLogger.GetCurrentVerbosityCutoff()
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
+    try:
         _show(scene, np.asarray(axis, dtype=np.float64), title, screenshot)
+    finally:
+        vtkLogger.SetStderrVerbosity(before)
 
 
 def _show(scene: Scene, up: FloatArray, title: str, screenshot: Path | None) -> None:

@@ -82,7 +82,6 @@ def test_memory_is_limited(path):
         fenced(fill, path, 1 << 30)
 
 
-@pytest.mark.skipif(not hasattr(signal, "alarm"), reason="needs SIGALRM")
 def keep_memory(path, size):
     kept.append(np.ones(size // 8))
     return len(kept)
@@ -96,6 +95,7 @@ def test_memory_that_earlier_files_left_does_not_count(path):
     assert np.diff(counts).tolist() == [1, 1, 1]
 
 
+@pytest.mark.skipif(not hasattr(signal, "alarm"), reason="needs SIGALRM")
 def test_a_worker_that_hangs_ends_also_when_nobody_is_left_to_end_it(path, monkeypatch):
     monkeypatch.setattr(fence, "SECONDS", -1.0)
     monkeypatch.setattr(fence.threading.Timer, "start", lambda self: None)

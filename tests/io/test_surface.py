@@ -6,7 +6,7 @@ import pytest
 import pyvista
 
 from scanfab import ReadError, polyhedron
-from scanfab.io.parse.surface import SUFFIXES, read_surface
+from scanfab.io.surface import SUFFIXES, read_surface
 from tests.helpers.windows import OF_A_BOX, corners_of_a_box
 
 HALF = np.array([0.5, 1.0, 1.75])

@@ -10,7 +10,7 @@ import numpy as np
 from scanfab.base.errors import ReadError
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.shared import GrainsOnly, numbered_frames
-from scanfab.io.parse.hdf import is_hdf, read_hdf_file
+from scanfab.io.hdf import is_hdf, read_hdf_file
 from scanfab.io.reader import Carries, FileKind, Snapshot
 from scanfab.io.text import Columns, Layout, read_rows, spelt, text_of
 from scanfab.packing.cell import Cell

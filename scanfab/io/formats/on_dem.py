@@ -19,7 +19,7 @@ from scanfab.base.typing import FloatArray
 from scanfab.io.columns import grain_table, whole_numbers
 from scanfab.io.contacts import join_ids
 from scanfab.io.files import first_bytes
-from scanfab.io.parse.hdf import HdfFile, is_hdf, read_hdf_file
+from scanfab.io.hdf import HdfFile, is_hdf, read_hdf_file
 from scanfab.io.reader import (
     Carries,
     FileKind,
