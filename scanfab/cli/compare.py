@@ -55,7 +55,7 @@ def compare(
     from scanfab.cli.comparison_tables import print_comparison
     from scanfab.cli.console import is_readable, print_csv, reported_warnings
     from scanfab.table.compare import compare_tables
-    from scanfab.table.formats.registry import format_of
+    from scanfab.table.formats import format_of
     from scanfab.table.reading import read_rows
     from scanfab.table.result_file import ResultFile
     from scanfab.table.selection import choose_rows

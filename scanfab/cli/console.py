@@ -99,12 +99,10 @@ def print_csv(
 ) -> None:
     """Rows of a kind, or of some columns, as CSV on standard output, each as it comes."""
     from scanfab.table.columns import columns_of
-    from scanfab.table.writing import row_writer
+    from scanfab.table.formats import OWN_FORMATS
+    from scanfab.table.writing import write_to
 
-    writer = row_writer(".csv", sys.stdout, columns_of(kind), excerpt=excerpt)
-    for row in rows:
-        writer.write(row)
-    writer.close()
+    write_to(sys.stdout, OWN_FORMATS[0], rows, columns_of(kind), excerpt)
 
 
 def print_table(rows: Iterable[Row], excerpt: Excerpt) -> None:

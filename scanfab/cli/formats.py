@@ -13,7 +13,7 @@ def formats() -> None:
     from scanfab.cli.console import reported_warnings
     from scanfab.io.registry import installed_readers
     from scanfab.io.writer import installed_writers
-    from scanfab.table.formats.registry import known_formats
+    from scanfab.table.formats import known_formats
     from scanfab.viz.figures.style import PLOT_FORMATS
 
     with reported_warnings():

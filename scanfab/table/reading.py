@@ -10,7 +10,7 @@ from typing import Any
 
 from scanfab.base.errors import ReadError
 from scanfab.base.files import check_file
-from scanfab.table.formats.registry import reading_format
+from scanfab.table.formats import reading_format
 
 
 def read_rows(path: Path | str) -> list[dict[str, Any]]:

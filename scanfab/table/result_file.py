@@ -1,15 +1,12 @@
 """
 A result file that is complete or untouched, and that an interrupted computation can go on with.
 
-Rows go to FILE.part, which becomes FILE at the end. FILE.part is of the
-format of FILE where that has a line for each row (CSV, TSV, JSON lines);
-for other formats, and where not all columns or digits are wanted, it is JSON lines, and converted
-at the end. What was asked for stands beside it in FILE.manifest.json.part, and what the files of
-the frames held, so that nobody goes on with other settings or other files: JSON lines, as entries
-come with the frames. No finished row is ever lost: a part that a new run does not go on with is
-kept under another name, and one that another run writes to is left alone.
-The manifest of FILE is written before FILE, as FILE.manifest.json.new, so that no run that is
-killed in its last moment leaves a table of which nobody knows what made it.
+Rows go to FILE.part as JSON lines with all columns and digits. At the end they are written as FILE.
+The settings of the run, and what the input files of each frame held, go to FILE.manifest.json.part,
+so that nobody goes on with other settings or other files. No finished row is ever lost: a part that
+a new run does not go on with is kept under another name, and a part that another run writes to is
+left alone. The manifest of FILE is written before FILE, as FILE.manifest.json.new, so that a run
+that is killed in its last moment leaves no table without a manifest.
 """
 
 from __future__ import annotations
@@ -29,9 +26,21 @@ from scanfab.base.ending import undone_at_end
 from scanfab.base.errors import ReadError, ScanfabNote, SettingsError
 from scanfab.base.files import check_folder, kind_of, locked, named_errors, whole_file
 from scanfab.table.columns import columns_of
-from scanfab.table.formats.registry import RowWriter, format_of
+from scanfab.table.formats import format_of, json_line
 from scanfab.table.reading import read_rows
-from scanfab.table.writing import ALL, Excerpt, row_writer, write_rows
+from scanfab.table.writing import ALL, Excerpt, write_rows
+
+
+class PartWriter:
+    """Writes rows to FILE.part, each as soon as it comes."""
+
+    def __init__(self, stream: IO[str]) -> None:
+        self.stream = stream
+
+    def write(self, row: Mapping[str, Any]) -> None:
+        """Write one row."""
+        self.stream.write(json_line(ALL.of(row)) + "\n")
+        self.stream.flush()
 
 
 class ResultFile:
@@ -54,12 +63,11 @@ class ResultFile:
     """
 
     def __init__(self, path: Path, kind: type | Sequence[Column], excerpt: Excerpt = ALL) -> None:
-        table_format = format_of(path)
+        format_of(path)
         check_folder(path)
         self.path = path
         self.kind = kind
         self.excerpt = excerpt
-        self.suffix = path.suffix.lower()
         self.part = path.with_name(path.name + ".part")
         self.manifest, self._coming = _manifests(path)
         self._record = path.with_name(self.manifest.name + ".part")
@@ -70,8 +78,6 @@ class ResultFile:
                     f"{one}: is {found}, expected a file or nothing, as rows are kept there until "
                     f"{path.name} is complete: remove it, or name another `output=FILE`"
                 )
-        as_it_is = table_format.appends and excerpt.is_all
-        self._part_suffix = self.suffix if as_it_is else ".jsonl"
 
     @property
     def has_part(self) -> bool:
@@ -89,7 +95,7 @@ class ResultFile:
         if self._lock is not None:
             yield
             return
-        self._settle_manifest()
+        self._settle()
         with locked(self.part) as self._lock, undone_at_end(self._remove_empty_part):
             try:
                 yield
@@ -128,9 +134,8 @@ class ResultFile:
                 f"{self.part}: was made with other settings ({', '.join(differing)}): repeat "
                 f"them, or leave out `resume` to start afresh; then it is kept under another name"
             )
-        header, complete = self._lines_of_part()
-        frames = max(len(complete) - header, 0) // rows_per_frame
-        kept = complete[: header + frames * rows_per_frame] if frames else []
+        complete = self._lines_of_part()
+        kept = complete[: len(complete) // rows_per_frame * rows_per_frame]
         with open(self.part, "r+b") as stream:
             stream.truncate(sum(map(len, kept)))
         return self._rows()
@@ -145,7 +150,7 @@ class ResultFile:
         asked: dict[str, Any],
         resume: bool = False,
         save_manifest: Callable[[Path], object] = lambda path: None,
-    ) -> Iterator[RowWriter]:
+    ) -> Iterator[PartWriter]:
         """Write rows to FILE.part, behind those that are there if resumed; then make FILE of it."""
         with self.alone():
             going_on = resume and self.has_part
@@ -155,22 +160,14 @@ class ResultFile:
                 self._put_part_aside()
             self._coming.unlink(missing_ok=True)
             self._begin_record(asked, inputs)
-            with self._open_part() as stream:
-                columns = columns_of(self.kind)
-                excerpt = self.excerpt if self._part_suffix == self.suffix else ALL
-                writer = row_writer(self._part_suffix, stream, columns, not going_on, excerpt)
-                yield writer
-                # of a table without rows the names of its columns
-                writer.close()
+            with named_errors(self.part), open(self.part, "a", encoding="utf-8") as stream:
+                yield PartWriter(stream)
             save_manifest(self._coming)
-            # what stands there is of the table that was FILE before
+            # the manifest that stands there is of the table that was FILE before
             self.manifest.unlink(missing_ok=True)
-            if self._part_suffix == self.suffix:
-                self._let_go()
-                os.replace(self.part, self.path)
-            else:
-                self._convert()
-            self._settle_manifest()
+            write_rows(self.path, self._rows(), columns_of(self.kind), self.excerpt)
+            self._remove_part()
+            self._settle()
             self._record.unlink(missing_ok=True)
 
     def save(self, rows: Iterable[Mapping[str, Any]]) -> None:
@@ -187,17 +184,15 @@ class ResultFile:
         with named_errors(self._record), open(self._record, "a", encoding="utf-8") as stream:
             stream.write(lines)
 
-    def _lines_of_part(self) -> tuple[int, list[bytes]]:
-        """How many lines come before the first row, and all whole lines."""
+    def _lines_of_part(self) -> list[bytes]:
+        """The rows that were written to their end."""
         lines = self.part.read_bytes().splitlines(keepends=True)
-        header = 0 if lines[:1] and lines[0].startswith(b"{") else 1
-        return header, [line for line in lines if line.endswith(b"\n")]
+        return [line for line in lines if line.endswith(b"\n")]
 
     def _put_part_aside(self) -> None:
         """Keep what FILE.part holds under another name, so that a resumed run can find it."""
-        header, lines = self._lines_of_part()
-        if len(lines) > header:
-            self._copy_aside(len(lines) - header)
+        if rows := len(self._lines_of_part()):
+            self._copy_aside(rows)
         # not moved: it is this very file that other runs find locked
         os.truncate(self.part, 0)
 
@@ -219,28 +214,25 @@ class ResultFile:
             stacklevel=5,
         )
 
-    @contextmanager
-    def _open_part(self) -> Iterator[IO[str]]:
-        with named_errors(self.part), open(self.part, "a", newline="", encoding="utf-8") as stream:
-            yield stream
-
-    def _settle_manifest(self) -> None:
-        """Give the manifest of FILE its name."""
-        # another process may do it at the same time
-        with suppress(FileNotFoundError):
-            if manifest_of(self.path) != self.manifest:
+    def _settle(self) -> None:
+        """Finish what a run that was killed behind its last row has left to do."""
+        if is_finished(self.path) and self._coming.exists() and not self.manifest.exists():
+            # another process may do it at the same time
+            with suppress(FileNotFoundError):
+                self.part.unlink(missing_ok=True)
+                self._record.unlink(missing_ok=True)
                 os.replace(self._coming, self.manifest)
 
-    def _let_go(self) -> None:
-        """Windows moves and removes no file that is open."""
-        if sys.platform == "win32" and self._lock is not None:
-            self._lock.close()
+    def _remove_part(self) -> None:
+        if self._holds_part():
+            if sys.platform == "win32" and self._lock is not None:
+                self._lock.close()  # Windows removes no file that is open
+            self.part.unlink()
 
     def _remove_empty_part(self) -> None:
         """Without a row there is nothing to go on with."""
         if self._holds_part() and not self.part.stat().st_size:
-            self._let_go()
-            self.part.unlink()
+            self._remove_part()
             self._record.unlink(missing_ok=True)
 
     def _holds_part(self) -> bool:
@@ -277,19 +269,21 @@ class ResultFile:
     def _rows(self) -> list[dict[str, Any]]:
         return read_rows(self.part) if self.part.stat().st_size else []
 
-    def _convert(self) -> None:
-        """Write FILE from the JSON lines of FILE.part."""
-        write_rows(self.path, self._rows(), columns_of(self.kind), self.excerpt)
-        self._let_go()
-        self.part.unlink()
+
+def is_finished(table: Path) -> bool:
+    """Whether FILE is the table of the last run: FILE.part is gone, or its rows are in FILE."""
+    part = table.with_name(table.name + ".part")
+    if not table.exists() or not part.exists():
+        return table.exists()
+    settled, coming = _manifests(table)
+    is_newer = table.stat().st_mtime_ns >= part.stat().st_mtime_ns
+    return is_newer and coming.exists() and not settled.exists()
 
 
 def manifest_of(table: Path) -> Path:
     """Where the manifest of a table is, if it has one: it may still wait for its name."""
     settled, coming = _manifests(table)
-    # as long as there is FILE.part, FILE is the table from before
-    is_of_table = table.exists() and not table.with_name(table.name + ".part").exists()
-    return coming if is_of_table and coming.exists() and not settled.exists() else settled
+    return coming if is_finished(table) and coming.exists() and not settled.exists() else settled
 
 
 def _manifests(table: Path) -> tuple[Path, Path]:

@@ -289,17 +289,10 @@ class Table(Sequence[Row]):
         >>> Table([dict(frame=0, alpha_vs=0.01), dict(frame=1)]).to_polars()["alpha_vs"].to_list()
         [0.01, None]
         """
-        import polars
+        from scanfab.table.formats import data_frame
+        from scanfab.table.writing import ALL
 
-        from scanfab.table.writing import plain
-
-        # the kind of a list's entries is found by polars
-        kinds = {int: polars.Int64, float: polars.Float64, str: polars.String}
-        columns = []
-        for name, kind in ((one.name, one.kind) for one in self.columns):
-            values = [plain(row[name]) for row in self]
-            columns.append(polars.Series(name, values, kinds.get(kind), strict=False))
-        return polars.DataFrame(columns)
+        return data_frame([ALL.of(row) for row in self], self.columns)
 
     def __repr__(self) -> str:
         return as_text(self.rows, self.names)

@@ -15,7 +15,7 @@ from scanfab.base.errors import SettingsError
 from scanfab.base.files import check_folder, whole_file
 from scanfab.base.option import unusable, whole
 from scanfab.table.columns import columns_of
-from scanfab.table.formats.registry import RowWriter, TableFormat, format_of
+from scanfab.table.formats import TableFormat, format_of
 
 
 @dataclass(frozen=True)
@@ -134,54 +134,17 @@ def plain(value: Any) -> Any:
 ALL = Excerpt()
 
 
-class ExcerptWriter:
-    """Hands on what is asked for of each row."""
-
-    def __init__(self, writer: RowWriter, excerpt: Excerpt) -> None:
-        self.writer = writer
-        self.excerpt = excerpt
-
-    def write(self, row: Mapping[str, Any]) -> None:
-        """Write one row."""
-        self.writer.write(self.excerpt.of(row))
-
-    def close(self) -> None:
-        """Write what comes after the last row."""
-        self.writer.close()
-
-
-def row_writer(
-    suffix: str,
+def write_to(
     stream: IO[Any],
+    table_format: TableFormat,
+    rows: Iterable[Mapping[str, Any]],
     columns: Sequence[Column],
-    header: bool = True,
     excerpt: Excerpt = ALL,
-) -> RowWriter:
-    """
-    The writer of a format.
-
-    Parameters
-    ----------
-    suffix : str
-        The format's.
-    stream : file object
-        For text or bytes, as the format has it.
-    columns : sequence of Column
-        Of the rows.
-    header : bool, optional
-        Whether the stream starts with the names of the columns, where the format has them.
-    excerpt : Excerpt, optional
-        Which columns, and how many digits.
-
-    Raises
-    ------
-    SettingsError
-        If there is no such format, or its package is missing.
-    """
-    table_format = format_of(Path(f"table{suffix}"))
+) -> None:
+    """Write rows to a stream, which is of text or of bytes, as the format has it."""
     if not getattr(table_format, "holds_lists", False):
         excerpt = excerpt.without_lists(columns)
-    return ExcerptWriter(table_format.writer(stream, excerpt.columns(columns), header), excerpt)
+    table_format.write(stream, map(excerpt.of, rows), excerpt.columns(columns))
 
 
 def write_rows(
@@ -190,15 +153,7 @@ def write_rows(
     """Write a table to a file, which is complete or untouched."""
     table_format = format_of(path)
     check_folder(path)
-    with whole_file(path) as part, open_table(table_format, part) as stream:
-        writer = row_writer(table_format.suffix, stream, columns, excerpt=excerpt)
-        for row in rows:
-            writer.write(row)
-        writer.close()
-
-
-def open_table(table_format: TableFormat, path: Path) -> IO[Any]:
-    """Open a file to write a table to."""
-    if not table_format.is_text:
-        return open(path, "wb")
-    return open(path, "w", newline="", encoding="utf-8")
+    mode = "w" if table_format.is_text else "wb"
+    text: Any = {"newline": "", "encoding": "utf-8"} if table_format.is_text else {}
+    with whole_file(path) as part, open(part, mode, **text) as stream:
+        write_to(stream, table_format, rows, columns, excerpt)

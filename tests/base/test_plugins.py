@@ -10,8 +10,8 @@ from scanfab.base import plugins
 from scanfab.base.errors import ScanfabError, ScanfabWarning
 from scanfab.base.plugins import load_plugins
 from scanfab.packing import rattlers
+from scanfab.table import formats
 from scanfab.table.columns import installed_fabrics
-from scanfab.table.formats import registry as formats
 from tests.helpers.plugins import offer
 
 
@@ -51,7 +51,7 @@ def test_one_name_twice_is_an_error_that_names_both_packages(offered):
     ("group", "installed", "rest"),
     [
         ("scanfab.rattlers", rattlers.installed_rules, ["count", "force", "recursive"]),
-        ("scanfab.table_formats", formats._foreign_formats, []),
+        ("scanfab.table_formats", formats.foreign_formats, []),
         ("scanfab.fabrics", installed_fabrics, []),
     ],
 )

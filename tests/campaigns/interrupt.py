@@ -17,7 +17,7 @@ import tempfile
 from pathlib import Path
 from random import Random
 
-from scanfab.table.formats.registry import OWN_FORMATS
+from scanfab.table.formats import OWN_FORMATS
 from tests.helpers.interruptions import Interrupter, write_series
 
 SUFFIXES = [one.suffix for one in OWN_FORMATS]

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from scanfab.cli.main import run
-from scanfab.table.formats.registry import OWN_FORMATS
+from scanfab.table.formats import OWN_FORMATS
 from scanfab.table.reading import read_rows
 from tests.helpers.dumps import write
 from tests.helpers.tables import curve

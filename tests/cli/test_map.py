@@ -11,7 +11,6 @@ import pyvista
 import scanfab
 from scanfab.cli.main import run
 from scanfab.pipeline.repeat import repeat_command
-from scanfab.table.formats.text import TextWriter
 from tests.helpers.interruptions import interrupted_at_row, write_series
 
 FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--workers", "1")
@@ -75,7 +74,7 @@ def test_a_run_that_was_stopped_goes_on(series, table, tmp_path, monkeypatch):
     """In the middle of a frame, which has two rows."""
     output = tmp_path / "map.csv"
     command = ["map", str(series), *FAST, *GRID, "-o", str(output)]
-    with interrupted_at_row(monkeypatch, 4, TextWriter) as rows:
+    with interrupted_at_row(monkeypatch, 4) as rows:
         assert run(command) == 130
     assert len(rows) == 4
     assert run([*command, "--resume"]) == 0

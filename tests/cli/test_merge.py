@@ -10,7 +10,7 @@ import pytest
 
 import scanfab
 from scanfab.cli.main import run
-from scanfab.table.formats.registry import OWN_FORMATS
+from scanfab.table.formats import OWN_FORMATS
 from tests.helpers.interruptions import write_series
 
 FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--workers", "1")

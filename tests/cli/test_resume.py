@@ -14,8 +14,8 @@ from random import Random
 import pytest
 
 from scanfab.cli.main import run
-from scanfab.table.formats.json_rows import ArrayWriter, LinesWriter
-from scanfab.table.formats.text import TextWriter
+from scanfab.table.formats import JsonArray
+from scanfab.table.result_file import PartWriter
 from tests.helpers.interruptions import Interrupter, interrupted_at_row, write_series
 
 # about a second of scanning
@@ -68,8 +68,7 @@ def stopped(compute, monkeypatch, tmp_path):
 
     def stop(name: str = "table.csv") -> Path:
         output = tmp_path / name
-        writer = TextWriter if name.endswith(("csv", "tsv")) else LinesWriter
-        with interrupted_at_row(monkeypatch, 6, writer) as rows:
+        with interrupted_at_row(monkeypatch, 6) as rows:
             assert compute(output) == 130
         _wait_for_frames_under_way()
         assert not output.exists()
@@ -265,7 +264,7 @@ def test_an_error_says_how_to_go_on_too(short_series, tmp_path, capsys):
 def test_a_second_run_into_the_same_file_is_refused(compute, tmp_path, capsys, monkeypatch):
     """However it begins; and the first goes on undisturbed."""
     output, whole, codes = tmp_path / "table.csv", tmp_path / "whole.csv", []
-    write_row = TextWriter.write
+    write_row = PartWriter.write
 
     def second_run_meanwhile(self, row):
         write_row(self, row)
@@ -274,7 +273,7 @@ def test_a_second_run_into_the_same_file_is_refused(compute, tmp_path, capsys, m
             codes[:] = [compute(output, *more) for more in (["--resume"], ["--rv", "0.4"], [])]
 
     assert compute(whole) == 0
-    monkeypatch.setattr(TextWriter, "write", second_run_meanwhile)
+    monkeypatch.setattr(PartWriter, "write", second_run_meanwhile)
     assert compute(output) == 0
     assert codes == [1, 1, 1]
     told = capsys.readouterr().err
@@ -415,7 +414,7 @@ def test_a_failure_behind_the_last_frame_says_so(compute, tmp_path, capsys, monk
     def full(*_):
         raise OSError(28, os.strerror(28))
 
-    monkeypatch.setattr(ArrayWriter, "close", full)
+    monkeypatch.setattr(JsonArray, "write", full)
     assert compute(tmp_path / "table.json") == 1
     said = "stopped after the last frame, before the table was complete; the same command with"
     assert said in capsys.readouterr().err

@@ -10,7 +10,6 @@ import pytest
 import scanfab
 from scanfab.cli.main import run
 from scanfab.pipeline.repeat import repeat_command
-from scanfab.table.formats.text import TextWriter
 from scanfab.viz.scanned_frames import scan_frames
 from tests.helpers.interruptions import interrupted_at_row, write_series
 
@@ -53,7 +52,7 @@ def test_a_run_that_was_stopped_goes_on(series, table, tmp_path, monkeypatch):
     """In the middle of a frame, which has three rows."""
     output = tmp_path / "table.csv"
     command = ["compute", str(series), *FAST, *RVS, "--workers", "1", "-o", str(output)]
-    with interrupted_at_row(monkeypatch, 8, TextWriter) as rows:
+    with interrupted_at_row(monkeypatch, 8) as rows:
         assert run(command) == 130
     assert len(rows) == 8
     assert run([*command, "--resume"]) == 0

@@ -9,7 +9,7 @@ import scanfab
 from scanfab import Column, ScanfabError, ScanfabWarning
 from scanfab.table import columns
 from scanfab.table.columns import COLUMNS, complete_row
-from scanfab.table.formats.registry import OWN_FORMATS
+from scanfab.table.formats import OWN_FORMATS
 from scanfab.table.reading import read_rows
 from scanfab.table.result_file import ResultFile
 from tests.helpers.lattices import simple_cubic

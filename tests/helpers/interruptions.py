@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 
-from scanfab.table.formats.text import TextWriter
+from scanfab.table.writing import Excerpt
 from tests.helpers.dumps import cubic_rows, dump_text, write
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGKILL)
@@ -25,21 +25,19 @@ FRAMES = 30
 
 
 @contextmanager
-def interrupted_at_row(
-    monkeypatch: pytest.MonkeyPatch, number: int, writer: type = TextWriter
-) -> Iterator[list[Any]]:
-    """Rows of a writer are listed, and the number-th is interrupted before it is written."""
+def interrupted_at_row(monkeypatch: pytest.MonkeyPatch, number: int) -> Iterator[list[Any]]:
+    """Rows are listed, and the run is interrupted before it writes the number-th."""
     rows: list[Any] = []
-    write = writer.write
+    written = Excerpt.of
 
-    def interrupted(self: Any, row: Any) -> None:
+    def interrupted(self: Excerpt, row: Any) -> dict[str, Any]:
         rows.append(row)
         if len(rows) == number:
             raise KeyboardInterrupt
-        write(self, row)
+        return written(self, row)
 
     with monkeypatch.context() as patch:
-        patch.setattr(writer, "write", interrupted)
+        patch.setattr(Excerpt, "of", interrupted)
         yield rows
 
 

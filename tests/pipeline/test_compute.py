@@ -16,7 +16,7 @@ from scanfab.pipeline.compute import compute_rows
 from scanfab.pipeline.frames import Frames
 from scanfab.pipeline.settings import Settings
 from scanfab.table.columns import COLUMNS
-from scanfab.table.formats.text import TextWriter
+from scanfab.table.formats import OWN_FORMATS
 from scanfab.viz.frame_view import look_at
 from scanfab.viz.scanned_frames import scan_frames
 from tests.helpers.dumps import dump_text, pairs_text, write, yade_spheres
@@ -117,9 +117,7 @@ def test_rows_come_as_soon_as_their_frame_is_done(shrinking):
 
 def test_every_number_of_a_row_reads_back_the_same(whole_table):
     stream = io.StringIO(newline="")
-    writer = TextWriter(stream)
-    for row in whole_table:
-        writer.write(row)
+    OWN_FORMATS[0].write(stream, whole_table, whole_table.columns)
     text = stream.getvalue()
     assert "np." not in text
     assert "nan" not in text

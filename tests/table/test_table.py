@@ -12,10 +12,10 @@ import pytest
 
 import scanfab
 from scanfab.base.errors import ReadError, ScanfabError, SettingsError
+from scanfab.table import formats
 from scanfab.table.columns import COLUMNS
 from scanfab.table.compare import compare_tables
-from scanfab.table.formats import registry
-from scanfab.table.formats.registry import OWN_FORMATS
+from scanfab.table.formats import OWN_FORMATS
 from scanfab.table.reading import read_rows
 from scanfab.table.result_file import ResultFile
 from scanfab.table.row import Row
@@ -252,16 +252,14 @@ class Sections:
     suffix = ".ini"
     description = "a section for each row"
     is_text = True
-    appends = False
-
-    def check(self):
-        pass
 
     def recognises(self, data):
         return data.startswith(b"[row]")
 
-    def writer(self, stream, columns, header):
-        return SectionWriter(stream)
+    def write(self, stream, rows, columns):
+        for row in rows:
+            lines = (f"{name}={value!r}\n" for name, value in row.items())
+            stream.write("[row]\n" + "".join(lines))
 
     def read(self, data, name):
         sections = data.decode().split("[row]\n")[1:]
@@ -277,21 +275,9 @@ class Sections:
             raise ReadError(f"{name}: expected NAME=VALUE") from None
 
 
-class SectionWriter:
-    def __init__(self, stream):
-        self.stream = stream
-
-    def write(self, row):
-        lines = (f"{name}={value!r}\n" for name, value in row.items())
-        self.stream.write("[row]\n" + "".join(lines))
-
-    def close(self):
-        pass
-
-
 @pytest.fixture
 def sections(monkeypatch):
-    monkeypatch.setattr(registry, "_foreign_formats", lambda: (Sections(),))
+    monkeypatch.setattr(formats, "foreign_formats", lambda: (Sections(),))
 
 
 @pytest.mark.usefixtures("sections")
@@ -311,7 +297,7 @@ def test_a_foreign_format_is_written_resumed_and_read_like_the_own_ones(results,
 
 @pytest.mark.usefixtures("sections")
 def test_a_foreign_format_is_listed_and_takes_no_files_from_the_others(results, tmp_path):
-    assert list(registry.known_formats())[-1] == ".ini"
+    assert list(formats.known_formats())[-1] == ".ini"
     with pytest.raises(SettingsError, match=r"can be written as .*\.parquet, .ini, not as .xls"):
         results.save(tmp_path / "t.xls")
     results.save(tmp_path / "t.csv")

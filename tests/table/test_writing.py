@@ -14,14 +14,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from scanfab.base.errors import SettingsError
-from scanfab.table.columns import COLUMNS
-from scanfab.table.formats.registry import OWN_FORMATS, format_of
-from scanfab.table.formats.text import TextWriter
+from scanfab.table.columns import COLUMNS, table_columns
+from scanfab.table.formats import OWN_FORMATS, format_of
 from scanfab.table.reading import read_rows
 from scanfab.table.result_file import ResultFile
 from scanfab.table.row import Row
 from scanfab.table.table import Table
-from scanfab.table.writing import Excerpt
+from scanfab.table.writing import ALL, Excerpt
 from tests.table.test_table import a_row
 
 SUFFIXES = [one.suffix for one in OWN_FORMATS]
@@ -41,9 +40,7 @@ def interrupt(result, asked, rows):
 
 def written(*rows):
     stream = io.StringIO(newline="")
-    writer = TextWriter(stream)
-    for row in rows:
-        writer.write(row)
+    OWN_FORMATS[0].write(stream, map(ALL.of, rows), table_columns() if rows else [])
     return stream.getvalue()
 
 
@@ -84,20 +81,19 @@ def test_names_read_back_the_same(name):
     assert row["source"] == name
 
 
-def test_the_header_comes_once_with_the_first_row():
-    assert written() == ""
-    lines = written(a_row(), a_row()).splitlines()
-    assert lines[0] == ",".join(COLUMNS)
-    assert len(lines) == 3
-
-
-def test_each_row_is_written_at_once(tmp_path):
+def test_the_header_and_each_row_are_written_as_the_rows_come(tmp_path):
     path = tmp_path / "t.csv"
+
+    def rows():
+        for count in (0, 2, 3):
+            lines = path.read_text().splitlines()
+            assert len(lines) == count
+            assert lines[:1] in ([], [",".join(COLUMNS)])
+            yield a_row()
+
     with open(path, "w", newline="") as stream:
-        writer = TextWriter(stream)
-        for count in (2, 3):
-            writer.write(a_row())
-            assert len(path.read_text().splitlines()) == count
+        OWN_FORMATS[0].write(stream, rows(), table_columns())
+    assert len(path.read_text().splitlines()) == 4
 
 
 def test_lines_end_alike_everywhere(tmp_path):
@@ -124,7 +120,7 @@ def test_an_error_leaves_the_old_result_and_keeps_the_part(tmp_path):
 
     interrupt(result, {}, [a_row()])
     assert result.path.read_text() == "old"
-    assert len(result.part.read_text().splitlines()) == 2
+    assert read_rows(result.part) == [dict(a_row())]
 
 
 @pytest.mark.parametrize("name", ["t.docx", "t", "t.csv.gz", ".csv"])

@@ -19,9 +19,9 @@ from scanfab.pipeline.manifest import default_settings, with_frames, write_manif
 from scanfab.pipeline.repeat import read_manifest, restored_settings
 from scanfab.pipeline.resume import written_row
 from scanfab.pipeline.settings import Settings
-from scanfab.table.formats.registry import format_of
+from scanfab.table.formats import format_of
 from scanfab.table.reading import read_finished_rows
-from scanfab.table.result_file import ResultFile, differing_settings
+from scanfab.table.result_file import ResultFile, differing_settings, is_finished
 from scanfab.table.row import Row
 from scanfab.table.table import Table
 from scanfab.table.writing import Excerpt
@@ -190,7 +190,7 @@ def check_output(output: Path, paths: Sequence[Path]) -> None:
 
 def _read(path: Path) -> _Part:
     part = path.with_name(path.name + ".part")
-    if part.exists():
+    if part.exists() and not is_finished(path):
         raise ReadError(
             f"{path}: is not finished: {part.name} is there, which holds the rows of a run under "
             f"way, or of one that was interrupted: the same command with `resume` goes on with it"

@@ -1,1 +1,0 @@
-"""The file formats of tables: an object each, which reads, writes and says what it is."""
