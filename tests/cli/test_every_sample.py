@@ -117,7 +117,7 @@ def test_what_is_of_space_is_refused_of_discs(compute, words, message):
     ("change", "columns", "words", "code", "message"),
     [
         (lambda rows: None, 6, ("--with", "forces"), 0, ""),
-        (lambda rows: rows.pop(), 6, ("--with", "forces"), 1, "counts 144 rows, but the file ends"),
+        (lambda rows: rows.pop(), 6, ("--with", "forces"), 1, "counts 144 rows, found 143"),
         (lambda rows: None, 3, ("--with", "forces"), 1, "--with forces needs the forces of cont"),
         (lambda rows: None, 3, ("--with", "state"), 0, "the contacts have no forces: stress"),
         (lambda rows: None, 3, ("--rattlers", "force"), 1, "the rule --rattlers force needs the"),
