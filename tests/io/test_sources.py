@@ -173,7 +173,7 @@ def test_a_signal_ends_the_process_with_its_code(sent: int, code: int, tmp_path:
     assert process.returncode == code
     assert "Traceback" not in errors
     assert not output.exists()
-    assert part.read_text().startswith("source,frame")
+    assert part.read_text().startswith('{"source"')
     left = {file.name for file in folder.iterdir()}
     assert left == {"table.csv.part", "table.csv.manifest.json.part"}
 
