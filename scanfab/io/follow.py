@@ -16,8 +16,8 @@ from scanfab.base.option import refuse_unknown, unusable
 from scanfab.io.families import Family, PathLike, files_in
 from scanfab.io.files import Stamp, stamp_of
 from scanfab.io.frame import Frame
+from scanfab.io.growing import growing
 from scanfab.io.options import take_reading
-from scanfab.io.parse.growing import growing
 from scanfab.io.series import Series
 from scanfab.io.sources import READING, as_text, read_series
 

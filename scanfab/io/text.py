@@ -24,7 +24,7 @@ import numpy.typing as npt
 from scanfab.base.errors import ReadError, ScanfabWarning
 from scanfab.io.fence import fenced
 from scanfab.io.files import check_lines, check_memory, plain
-from scanfab.io.parse.growing import grows
+from scanfab.io.growing import grows
 from scanfab.io.reader import Snapshot
 
 Columns = dict[str, npt.NDArray[Any]]

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import scanfab
 from scanfab.base.errors import ReadError, ScanfabWarning
 from scanfab.io import text
-from scanfab.io.parse.growing import growing, leave_out_last
+from scanfab.io.growing import growing, leave_out_last
 from scanfab.io.reader import Snapshot
 from scanfab.io.text import Layout, read_rows, skip_rows
 from tests.helpers.dumps import write

@@ -20,7 +20,7 @@ from scanfab.io.columns import has_radius
 from scanfab.io.files import check_memory, first_bytes, plain
 from scanfab.io.formats.dump import Dump, box_cell, numbers_as_names
 from scanfab.io.formats.shared import HEADER_BYTES
-from scanfab.io.parse.growing import leave_out_last
+from scanfab.io.growing import leave_out_last
 from scanfab.io.reader import Carries, FileKind, ReadOptions, Snapshot
 
 carries: Carries = "cell"

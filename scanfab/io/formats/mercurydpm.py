@@ -21,7 +21,7 @@ from scanfab.io.contacts import join_ids
 from scanfab.io.files import bare_name, first_bytes, plain
 from scanfab.io.formats import shared
 from scanfab.io.formats.shared import HEADER_BYTES, numbers
-from scanfab.io.parse.growing import leave_out_last
+from scanfab.io.growing import leave_out_last
 from scanfab.io.reader import Carries, FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
 from scanfab.io.text import Layout, read_rows, skip_rows, spelt, text_of
 from scanfab.packing.cell import Cell

@@ -13,7 +13,7 @@ from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.typing import FloatArray
 from scanfab.io.columns import grain_table
 from scanfab.io.files import check_lines, plain
-from scanfab.io.parse.growing import leave_out_last
+from scanfab.io.growing import leave_out_last
 from scanfab.io.reader import (
     Carries,
     FileKind,

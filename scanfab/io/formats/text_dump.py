@@ -18,7 +18,7 @@ from scanfab.io.columns import has_radius
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.dump import Dump, box_cell, numbers_as_names
 from scanfab.io.formats.shared import HEADER_BYTES, marked_frames
-from scanfab.io.parse.growing import grows
+from scanfab.io.growing import grows
 from scanfab.io.reader import Carries, FileKind, ReadOptions, Snapshot
 from scanfab.io.text import Layout, read_rows, text_of
 from scanfab.packing.cell import Cell

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.io.columns import grain_table, has_radius
 from scanfab.io.files import bare_name, first_bytes, plain
-from scanfab.io.parse.growing import leave_out_last
+from scanfab.io.growing import leave_out_last
 from scanfab.io.reader import (
     Carries,
     FileKind,

@@ -1,1 +1,0 @@
-"""The syntax of files, and nothing of what it means."""
