@@ -26,8 +26,7 @@ from scanfab.base.ending import undone_at_end
 from scanfab.base.errors import ReadError, ScanfabNote, SettingsError
 from scanfab.base.files import check_folder, kind_of, locked, named_errors, whole_file
 from scanfab.table.columns import columns_of
-from scanfab.table.formats import format_of, json_line
-from scanfab.table.reading import read_rows
+from scanfab.table.formats import JsonLines, format_of, json_line
 from scanfab.table.writing import ALL, Excerpt, write_rows
 
 
@@ -267,7 +266,7 @@ class ResultFile:
         return settings, inputs
 
     def _rows(self) -> list[dict[str, Any]]:
-        return read_rows(self.part) if self.part.stat().st_size else []
+        return JsonLines().read(self.part.read_bytes(), str(self.part))
 
 
 def is_finished(table: Path) -> bool:

@@ -6,6 +6,7 @@ import contextlib
 import csv
 import io
 import math
+import os
 import re
 
 import numpy as np
@@ -13,11 +14,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scanfab.base.errors import SettingsError
+from scanfab.base.errors import ReadError, SettingsError
 from scanfab.table.columns import COLUMNS, table_columns
 from scanfab.table.formats import OWN_FORMATS, format_of
 from scanfab.table.reading import read_rows
-from scanfab.table.result_file import ResultFile
+from scanfab.table.result_file import ResultFile, is_finished, manifest_of
 from scanfab.table.row import Row
 from scanfab.table.table import Table
 from scanfab.table.writing import ALL, Excerpt
@@ -168,6 +169,30 @@ def test_other_settings_are_refused(tmp_path):
     interrupt(result, {"seed": 0, "rv": 0.7}, [a_row()])
     with pytest.raises(SettingsError, match=r"made with other settings \(seed\)"):
         result.finished_rows({"seed": 1, "rv": 0.7}, 1)
+
+
+def test_a_part_that_is_not_json_lines_is_refused(tmp_path):
+    result = result_in(tmp_path)
+    result.part.write_text("source,frame\na,0\n")
+    with pytest.raises(ReadError, match=r"t\.csv\.part: cannot be read as JSON"):
+        result.finished_rows({}, 1)
+
+
+def test_a_run_that_was_killed_before_it_removed_its_part_is_finished(tmp_path):
+    result = result_in(tmp_path)
+    with result.writer({}, save_manifest=lambda path: path.write_text("{}")) as writer:
+        writer.write(a_row())
+    whole = result.path.read_bytes()
+    # what such a run leaves: FILE, its rows in FILE.part, the manifest under its first name
+    result.part.write_text("{}\n")
+    os.utime(result.part, (0, 0))
+    result.manifest.rename(tmp_path / "t.csv.manifest.json.new")
+    assert is_finished(result.path)
+    assert manifest_of(result.path).exists()
+    with result.alone():
+        assert not result.has_part
+    assert {path.name for path in tmp_path.iterdir()} == {"t.csv", "t.csv.manifest.json"}
+    assert result.path.read_bytes() == whole
 
 
 def test_without_a_part_there_is_nothing_to_go_on_with(tmp_path):
