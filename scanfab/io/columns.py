@@ -16,7 +16,7 @@ from scanfab.base.typing import FloatArray
 from scanfab.io.reader import BODIES, WALLS, GrainTable, ReadOptions
 from scanfab.io.sizes import refuse_other_size
 from scanfab.packing.cell import Cell
-from scanfab.packing.packing import LazyColumns, lies_within
+from scanfab.packing.packing import lies_within
 
 Columns = Mapping[str, npt.NDArray[Any]]
 
@@ -73,7 +73,7 @@ def grain_table(
     ReadError
         If coordinates or radii cannot be found.
     """
-    rest = columns.copy() if isinstance(columns, LazyColumns) else dict(columns)
+    rest = dict(columns)
     named = _named_by_user(path, rest, options)
     cell = user_cell(path, cell, options)
     position = _position(path, rest, named, cell, where)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
+from collections.abc import Mapping
 from itertools import product
 from typing import Any
 
@@ -23,57 +23,6 @@ from scanfab.packing.walls import ListedWallForces, WallForces, resolve_wall_for
 
 # rows whose temporary array stays in a cache: a new one for all would take longer to come by
 PART = 1 << 15
-
-
-class LazyColumns(MutableMapping[str, npt.NDArray[Any]]):
-    """
-    Columns of a large dump by name, each read when it is first asked for.
-
-    Parameters
-    ----------
-    names : sequence of str
-        All of them, in the order of the dump.
-    ready : mapping of str to ndarray
-        Those that have been read.
-    load : callable
-        Reads a column by its name.
-    """
-
-    def __init__(
-        self,
-        names: Sequence[str],
-        ready: Mapping[str, npt.NDArray[Any]],
-        load: Callable[[str], npt.NDArray[Any]],
-    ) -> None:
-        self._found: dict[str, npt.NDArray[Any] | None] = dict.fromkeys(names)
-        self._load = load
-        for name, values in ready.items():
-            self[name] = values
-
-    def __getitem__(self, name: str) -> npt.NDArray[Any]:
-        values = self._found[name]
-        if values is None:
-            values = self._load(name)
-            self[name] = values
-        return values
-
-    def __setitem__(self, name: str, values: npt.NDArray[Any]) -> None:
-        values.flags.writeable = False
-        self._found[name] = values
-
-    def __delitem__(self, name: str) -> None:
-        del self._found[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._found)
-
-    def __len__(self) -> int:
-        return len(self._found)
-
-    def copy(self) -> LazyColumns:
-        """Another mapping to the same arrays."""
-        ready = {name: values for name, values in self._found.items() if values is not None}
-        return LazyColumns(list(self), ready, self._load)
 
 
 def lies_within(cell: Cell, position: FloatArray, low: float, high: float) -> bool:
@@ -177,9 +126,7 @@ class Packing:
         if cell is not None and not lies_within(cell, centres, 0.0, 1.0):
             self.position, turns = cell.place(centres)
         self.position.flags.writeable = False
-        self.columns: Mapping[str, npt.NDArray[Any]] = (
-            columns if isinstance(columns, LazyColumns) else _cast_columns(columns or {}, count)
-        )
+        self.columns: Mapping[str, npt.NDArray[Any]] = _cast_columns(columns or {}, count)
         self.bodies: Bodies | None = None
         if bodies is not None:
             numbers = cast("bodies", bodies, np.int64, (count,))
