@@ -4,36 +4,30 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import IO, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from scanfab.base.errors import PackingError, ReadError
-from scanfab.io.columns import grain_table, has_radius
+from scanfab.base.errors import ReadError
+from scanfab.io.columns import has_radius
 from scanfab.io.files import bare_name, first_bytes, plain
+from scanfab.io.formats.shared import GrainsOnly, cell_of, numbers
 from scanfab.io.growing import leave_out_last
-from scanfab.io.reader import (
-    Carries,
-    FileKind,
-    GrainTable,
-    JoinedContacts,
-    ReadOptions,
-    Snapshot,
-)
-from scanfab.io.text import Layout, read_rows, skip_rows, spelt, text_of
+from scanfab.io.reader import Carries, FileKind, Snapshot
+from scanfab.io.text import Columns, Layout, read_rows, skip_rows, spelt, text_of
 from scanfab.packing.cell import Cell
 
 COUNT = re.compile(rb"\A(?:\xef\xbb\xbf)?[ \t]*([0-9]{1,15})[ \t]*\r?\n")
 # key=value, the value in quotes if it has blanks
 PAIR = re.compile(r"([A-Za-z_][\w.-]*)\s*=\s*(?:\"([^\"]*)\"|([^\s\"]+))")
+PROPERTIES = re.compile(r"[^:]+:[SIRL]:[1-9][0-9]?(:[^:]+:[SIRL]:[1-9][0-9]?)*")
 # the longest line that names columns
 HEAD = 1 << 16
 TRUTHS = {"T": True, "F": False, "TRUE": True, "FALSE": False, "1": True, "0": False}
 POSITIONS = ("pos", "position", "positions")
 
 
-class XyzReader:
+class XyzReader(GrainsOnly):
     """Reader plugin for extended XYZ."""
 
     name = "xyz"
@@ -52,8 +46,11 @@ class XyzReader:
 
     def kind(self, path: Path) -> FileKind:
         """Grains, with or without a radius."""
-        head = _first_head(path)
-        return "grains" if has_radius([name for name, _, _ in head.properties]) else "points"
+        return "grains" if has_radius([one[0] for one in _first_head(path).columns]) else "points"
+
+    def carries(self, path: Path) -> Carries:
+        """The line above the rows has a cell, or none."""
+        return "nothing" if _cell(_first_head(path)) is None else "cell"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """One behind the other."""
@@ -63,40 +60,57 @@ class XyzReader:
             start = stream.seek(0)
             while (head := _next_head(path, stream)) is not None:
                 rows = skip_rows(stream, head.rows)
-                # the last line of the file may have no end
-                if rows < head.rows - 1 or (rows < head.rows and not _has_word(stream, size)):
+                if rows == head.rows - 1:  # the last line of the file may have no end
+                    stream.seek(max(size - HEAD, 0))
+                    rows += bool(stream.read().rpartition(b"\n")[2].strip())
+                if rows < head.rows:
                     reason = f"expected {head.rows} rows, the file ends after {rows}"
                     leave_out_last(path, len(found), reason)
                     break
-                found.append(head.snapshot(start, stream.tell()))
-                start = stream.tell()
+                stop = stream.tell()
+                steps = [head.words.get(key, "") for key in ("step", "timestep")]
+                step = next(
+                    (int(one) for one in steps if re.fullmatch(r"[-+]?[0-9]{1,18}", one)), None
+                )
+                time = head.numbers("time", 1)
+                found.append(Snapshot(path, step, time[0] if time else None, start, stop))
+                start = stop
         if not found:
             raise ReadError(f"{path}: the file is empty")
         return found
 
-    def carries(self, path: Path) -> Carries:
-        """The line above the rows has a cell, or none."""
-        return "nothing" if _first_head(path).cell() is None else "cell"
-
-    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+    def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
         """Columns by their names; ``pos`` are the centres."""
         path, data = snapshot.path, text_of(snapshot)
         above = len(data) - len(data.lstrip())
         start = data.find(b"\n", data.find(b"\n", above) + 1) + 1
         head = _head(path, data[above:start])
-        columns = _columns(snapshot, head, data[start:], data.count(b"\n", 0, start) + 1)
-        named = next((name for name in columns if name.lower() in POSITIONS), None)
-        if named is not None:
-            columns["position"] = columns.pop(named)
-            if columns["position"].shape[1:] != (3,):
-                raise ReadError(f"{path}: {named}: expected three coordinates in each row")
-        return grain_table(path, columns, head.cell(), options)
-
-    def read_contacts(
-        self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
-    ) -> JoinedContacts:
-        """It has none."""
-        raise ReadError(f"{snapshot.path}: extended XYZ holds no contacts")
+        parts = {name: [f"{name} {k}" for k in range(width)] for name, _, width in head.columns}
+        kinds = {part: kind for name, kind, _ in head.columns for part in parts[name]}
+        layout = Layout(
+            tuple(kinds),
+            line=data.count(b"\n", 0, start) + 1,
+            whole=[part for part, kind in kinds.items() if kind == "I"],
+            text=[part for part, kind in kinds.items() if kind in "SL"],
+        )
+        rows = read_rows(snapshot, data[start:], layout, count=head.rows)
+        found: Columns = {}
+        for name, kind, width in head.columns:
+            own = [rows[part] for part in parts[name]]
+            values = own[0] if width == 1 else np.column_stack(own)
+            where = f"{path}: the column {name}"
+            if kind == "L":
+                values = np.char.upper(values.astype(str))
+                if not np.isin(values, list(TRUTHS)).all():
+                    raise ReadError(f"{where}: expected T or F in each row")
+                values = np.isin(values, [word for word, truth in TRUTHS.items() if truth])
+            if kind == "I" and values.dtype.kind != "i":
+                raise ReadError(f"{where}: expected whole numbers")
+            is_position = name.lower() in POSITIONS and "position" not in found
+            if is_position and values.shape[1:] != (3,):
+                raise ReadError(f"{where}: expected three coordinates in each row")
+            found["position" if is_position else name] = values
+        return found, _cell(head)
 
 
 class _Head(NamedTuple):
@@ -105,47 +119,27 @@ class _Head(NamedTuple):
     path: Path
     rows: int
     words: dict[str, str]
-    properties: list[tuple[str, str, int]]
-    """Name, kind and width of each column."""
+    columns: list[tuple[str, str, int]]
+    """Name, kind and width of each."""
 
     def numbers(self, key: str, count: int) -> list[float] | None:
         """The numbers behind a key; None without it."""
         if key not in self.words:
             return None
-        try:
-            numbers = [float(word) for word in self.words[key].split()]
-        except ValueError:
-            numbers = []
-        if len(numbers) != count:
-            raise ReadError(
-                f"{self.path}: {key}: expected {count} numbers, found {self.words[key][:100]!r}"
-            )
-        return numbers
+        return numbers(f"{self.path}: {key}", self.words[key].encode(), count)
 
-    def cell(self) -> Cell | None:
-        """Of ``Lattice``, ``Origin`` and ``pbc``."""
-        vectors = self.numbers("lattice", 9)
-        if vectors is None:
-            return None
-        truths = self.words.get("pbc", "T T T").upper().split()
-        if len(truths) != 3 or not set(truths) <= set(TRUTHS):
-            raise ReadError(f"{self.path}: pbc: expected three of T and F, found {truths}")
-        along = (TRUTHS[truths[0]], TRUTHS[truths[1]], TRUTHS[truths[2]])
-        try:
-            origin = self.numbers("origin", 3) or [0.0, 0.0, 0.0]
-            return Cell(np.array(vectors).reshape(3, 3), along, origin)
-        except PackingError as error:
-            if not any(along):
-                return None
-            raise ReadError(f"{self.path}: Lattice: {error}") from None
 
-    def snapshot(self, start: int, stop: int) -> Snapshot:
-        """The frame, with its step and time if the line names them."""
-        steps = [self.words.get(key, "") for key in ("timestep", "step")]
-        found = [int(word) for word in steps if re.fullmatch(r"[-+]?[0-9]{1,18}", word)]
-        time = self.numbers("time", 1)
-        step = found[-1] if found else None
-        return Snapshot(self.path, step, None if time is None else time[0], start, stop)
+def _cell(head: _Head) -> Cell | None:
+    """Of ``Lattice``, ``Origin`` and ``pbc``."""
+    vectors = head.numbers("lattice", 9)
+    if vectors is None:
+        return None
+    periodic = [TRUTHS.get(one) for one in head.words.get("pbc", "T T T").upper().split()]
+    if len(periodic) != 3 or None in periodic:
+        raise ReadError(f"{head.path}: pbc: expected three of T and F, found {head.words['pbc']}")
+    origin = head.numbers("origin", 3) or [0.0, 0.0, 0.0]
+    vectors_by_row = np.reshape(vectors, (3, 3))
+    return cell_of(f"{head.path}: Lattice", vectors_by_row, map(bool, periodic), origin)
 
 
 def _first_head(path: Path) -> _Head:
@@ -180,48 +174,10 @@ def _head(path: Path, lines: bytes) -> _Head:
             f'`format="table", skip=2, columns="x=2,y=3,z=4,radius=5"`'
         )
     parts = words["properties"].split(":")
-    names, kinds, widths = parts[::3], parts[1::3], parts[2::3]
-    sound = len(names) == len(kinds) == len(widths) and set(kinds) <= set("SIRL")
-    if not sound or not all(re.fullmatch("[1-9][0-9]?", width) for width in widths):
+    if not PROPERTIES.fullmatch(words["properties"]) or len(set(parts[::3])) < len(parts) // 3:
         raise ReadError(
-            f"{path}: expected Properties=NAME:KIND:WIDTH:... with the kinds S, I, R and L, found "
-            f"{words['properties'][:100]!r}"
+            f"{path}: expected Properties=NAME:KIND:WIDTH:... with the kinds S, I, R and L, and "
+            f"each name once, found {words['properties'][:100]!r}"
         )
-    if len(set(names)) < len(names):
-        raise ReadError(f"{path}: a column is named twice in {words['properties'][:100]!r}")
-    properties = list(zip(names, kinds, map(int, widths), strict=True))
-    return _Head(path, int(count[1]), words, properties)
-
-
-def _has_word(stream: IO[bytes], size: int) -> bool:
-    """Whether the last line of a file holds anything."""
-    stream.seek(max(size - HEAD, 0))
-    return bool(stream.read().rpartition(b"\n")[2].strip())
-
-
-def _columns(
-    snapshot: Snapshot, head: _Head, rows: bytes, line: int
-) -> dict[str, npt.NDArray[Any]]:
-    """The columns, each of one or several values in a row."""
-    parts = {name: [f"{name} {k}" for k in range(width)] for name, _, width in head.properties}
-    kinds = {part: kind for name, kind, _ in head.properties for part in parts[name]}
-    layout = Layout(
-        tuple(kinds),
-        line=line,
-        whole=[part for part, kind in kinds.items() if kind == "I"],
-        text=[part for part, kind in kinds.items() if kind in "SL"],
-    )
-    columns = read_rows(snapshot, rows, layout, count=head.rows)
-    found: dict[str, npt.NDArray[Any]] = {}
-    for name, kind, width in head.properties:
-        own = [columns[part] for part in parts[name]]
-        values = own[0] if width == 1 else np.column_stack(own)
-        if kind == "L":
-            words = np.char.upper(values.astype(str))
-            if not np.isin(words, list(TRUTHS)).all():
-                raise ReadError(f"{head.path}: the column {name}: expected T or F in each row")
-            values = np.isin(words, [word for word, truth in TRUTHS.items() if truth])
-        if kind == "I" and values.dtype.kind != "i":
-            raise ReadError(f"{head.path}: the column {name}: expected whole numbers")
-        found[name] = values
-    return found
+    columns = list(zip(parts[::3], parts[1::3], map(int, parts[2::3]), strict=True))
+    return _Head(path, int(count[1]), words, columns)
