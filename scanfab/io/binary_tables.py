@@ -11,13 +11,13 @@ import zlib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError, ScanfabNote, ScanfabWarning
-from scanfab.io.files import bare_name, check_memory, check_times, plain
+from scanfab.io.files import bare_name, check_memory, check_times, first_bytes, plain
 from scanfab.packing.cell import Cell
 
 Arrays = dict[str, npt.NDArray[Any]]
@@ -26,10 +26,12 @@ IS_PARQUET = b"PAR1"
 IS_NPZ = b"PK"
 # headers and members of an archive, of which sound ones have fewer
 MOST_HEADER, MOST_MEMBERS = 10_000, 1000
-# what packing.nfo says of a packing
-NFO = r"(?i)^\s*{}\s*:?\s*" + r"([-+0-9.e]+)[ \t]*" + r"(?:([-+0-9.e]+)[ \t]+([-+0-9.e]+))?"
-
-
+# how packing.nfo names the numbers of a packing
+NFO = re.compile(
+    r"(?im)^\s*(dimensions|final porosity|theoretical porosity)\s*:?((?:[ \t]+[-+0-9.e]+)+)"
+)
+# arrays of an NPZ file that are centres
+POSITIONS = ("position", "positions", "pos", "points", "centers", "centres")
 # what libraries raise for damaged files
 DAMAGED: tuple[type[Exception], ...] = (
     *(zipfile.BadZipFile, OSError, ValueError, MemoryError),
@@ -38,28 +40,47 @@ DAMAGED: tuple[type[Exception], ...] = (
 
 
 @contextmanager
-def _told(path: Path, kind: str, *more: type[Exception]) -> Iterator[None]:
-    """Let errors of a library be those of the file."""
+def _told(path: Path, kind: str) -> Iterator[None]:
+    """Turn the errors of a library into those of the file."""
     try:
         yield
-    except (*DAMAGED, *more) as error:
+    except Exception as error:
+        if not isinstance(error, DAMAGED) and not type(error).__module__.startswith("pyarrow"):
+            raise
         reason = str(error).partition("\n")[0][:200] or type(error).__name__
         raise ReadError(f"{path}: cannot be read as {kind}: {reason}") from None
 
 
-def parquet_names(path: Path) -> list[str]:
-    """The names of the columns of a Parquet file."""
-    import pyarrow
+def binary_names(path: Path) -> list[str] | None:
+    """The names of the columns of a binary table; None if the file is no such table."""
+    head = first_bytes(path, 8)
+    if is_xyzd(path):  # doubles may begin as any other file does
+        return ["x", "y", "z", "diameter"]
+    if head.startswith(IS_PARQUET):
+        with _told(path, "Parquet"):
+            return list(_parquet(path).schema_arrow.names)
+    if head.startswith(IS_NPZ):
+        return [part for name, shape in npz_shapes(path).items() for part in _parts(name, shape)]
+    return None
 
-    with _told(path, "Parquet", pyarrow.ArrowException):
-        return list(_parquet(path).schema_arrow.names)
+
+def read_binary(path: Path) -> Arrays:
+    """The columns of a binary table, without those that are neither numbers nor text."""
+    if is_xyzd(path):
+        return _read_xyzd(path)
+    if first_bytes(path, 8).startswith(IS_PARQUET):
+        return _read_parquet(path)
+    columns = {}
+    for name, values in read_npz(path).items():
+        for place, part in enumerate(_parts(name, values.shape)):
+            columns[part] = values if values.ndim == 1 else values[:, place]
+    # arrays of another length than the grains are no columns of them
+    rows = len(columns["x"]) if "x" in columns else max(map(len, columns.values()), default=0)
+    return {name: values for name, values in columns.items() if len(values) == rows}
 
 
-def read_parquet(path: Path) -> Arrays:
-    """The columns of a Parquet file, without those that are neither numbers nor text."""
-    import pyarrow
-
-    with _told(path, "Parquet", pyarrow.ArrowException):
+def _read_parquet(path: Path) -> Arrays:
+    with _told(path, "Parquet"):
         file = _parquet(path)
         names = list(file.schema_arrow.names)
         room = 8.0 * file.metadata.num_rows * len(names)
@@ -81,6 +102,17 @@ def _parquet(path: Path) -> Any:
     return parquet.ParquetFile(plain(path), thrift_string_size_limit=1 << 20)
 
 
+def _parts(name: str, shape: tuple[int, ...]) -> list[str]:
+    """The names of the columns of an array of an NPZ file; none if it cannot be columns."""
+    if len(shape) == 2 and shape[1] <= 9:
+        if name.lower() in POSITIONS:
+            return list("xyz"[: shape[1]])
+        if name.lower() in ("pairs", "contacts", "ids") and shape[1] == 2:
+            return ["id1", "id2"]
+        return [f"{name}_{axis}" for axis in ("xyz" if shape[1] == 3 else range(shape[1]))]
+    return [name] if len(shape) == 1 else []
+
+
 def npz_shapes(path: Path) -> dict[str, tuple[int, ...]]:
     """The shapes of the arrays of numbers and text in an NPZ file, by name."""
     with _told(path, "NPZ"), zipfile.ZipFile(plain(path)) as archive:
@@ -89,25 +121,20 @@ def npz_shapes(path: Path) -> dict[str, tuple[int, ...]]:
 
 def read_npz(path: Path, wanted: Iterable[str] | None = None) -> Arrays:
     """The arrays of numbers and text in an NPZ file, those wanted; pickled objects are refused."""
-    names = None if wanted is None else set(wanted)
     with _told(path, "NPZ"), zipfile.ZipFile(plain(path)) as archive:
-        members = {
-            name: info
-            for name, (_, info) in _members(path, archive).items()
-            if names is None or name in names
-        }
+        members = {name: info for name, (_, info) in _members(path, archive).items()}
+        if wanted is not None:
+            members = {name: members[name] for name in members.keys() & set(wanted)}
         room = float(sum(info.file_size for info in members.values()))
         check_times(path, plain(path).stat().st_size, room)
         check_memory(path, 2.0 * room)
-        return {name: _array(archive.open(info)) for name, info in members.items()}
-
-
-def _array(stream: IO[bytes]) -> npt.NDArray[Any]:
-    with stream:
-        array: npt.NDArray[Any] = np.lib.format.read_array(
-            stream, allow_pickle=False, max_header_size=MOST_HEADER
-        )
-    return array
+        arrays: Arrays = {}
+        for name, info in members.items():
+            with archive.open(info) as stream:
+                arrays[name] = np.lib.format.read_array(
+                    stream, allow_pickle=False, max_header_size=MOST_HEADER
+                )
+        return arrays
 
 
 def _members(
@@ -153,7 +180,7 @@ def is_xyzd(path: Path) -> bool:
     return bare_name(path).lower().endswith(".xyzd")
 
 
-def read_xyzd(path: Path) -> Arrays:
+def _read_xyzd(path: Path) -> Arrays:
     """
     The columns x, y, z and diameter of a binary packing of PackingGeneration.
 
@@ -170,8 +197,8 @@ def read_xyzd(path: Path) -> Arrays:
         )
     check_memory(path, 3.0 * size)
     x, y, z, diameter = np.fromfile(file, "<f8").reshape(-1, 4).astype(np.float64).T
-    info, text = _nfo(path)
-    if text is None:
+    info = _nfo(path)
+    if info is None:
         warnings.warn(
             f"{path}: there is no packing.nfo beside the file, which says by how much "
             f"PackingGeneration means diameters to be scaled: they are taken as they stand",
@@ -179,14 +206,15 @@ def read_xyzd(path: Path) -> Arrays:
             stacklevel=2,
         )
         return {"x": x, "y": y, "z": z, "diameter": diameter}
-    final, theoretical = _numbers(text, "final porosity"), _numbers(text, "theoretical porosity")
-    factor = np.nan
-    if final and theoretical and final[0] < 1 and theoretical[0] < 1:
-        factor = ((1.0 - final[0]) / (1.0 - theoretical[0])) ** (1.0 / 3.0)
+    # without a porosity, or with one that is no fraction, the factor is not finite
+    final, theoretical = (
+        1.0 - info.get(f"{one} porosity", [1.0])[0] for one in ("final", "theoretical")
+    )
+    factor = (final / theoretical) ** (1 / 3) if final > 0 and theoretical > 0 else np.nan
     if not 0.5 < factor < 2.0:
         raise ReadError(
-            f"{info}: expected a theoretical and a final porosity between 0 and 1, by which the "
-            f"diameters of {path.name} are scaled"
+            f"{path.with_name('packing.nfo')}: expected a theoretical and a final porosity between "
+            f"0 and 1, by which the diameters of {path.name} are scaled"
         )
     if factor != 1.0:
         warnings.warn(
@@ -199,27 +227,22 @@ def read_xyzd(path: Path) -> Arrays:
 
 def xyzd_cell(path: Path) -> Cell | None:
     """The cell by the dimensions in ``packing.nfo``, which repeats along all axes."""
-    info, text = _nfo(path)
-    edges = None if text is None else _numbers(text, "dimensions")
-    if edges is None or len(edges) != 3:
-        return None
+    edges = (_nfo(path) or {}).get("dimensions", [])
     try:
-        return Cell(edges)
+        return Cell(edges) if len(edges) == 3 else None
     except PackingError as error:
-        raise ReadError(f"{info}: Dimensions: {error}") from None
+        raise ReadError(f"{path.with_name('packing.nfo')}: Dimensions: {error}") from None
 
 
-def _nfo(path: Path) -> tuple[Path, str | None]:
-    """The file ``packing.nfo`` beside a packing, and its text if it is there."""
+def _nfo(path: Path) -> dict[str, list[float]] | None:
+    """The numbers in ``packing.nfo`` beside a packing by their names; None without the file."""
     info = path.with_name("packing.nfo")
-    text = info.read_bytes()[:10_000].decode("utf-8", "replace") if info.is_file() else None
-    return info, text
-
-
-def _numbers(text: str, key: str) -> list[float] | None:
-    """The numbers behind a word of ``packing.nfo``."""
-    match = re.search(NFO.format(key), text, re.MULTILINE)
-    try:
-        return None if match is None else [float(word) for word in match.groups() if word]
-    except ValueError:
+    if not info.is_file():
         return None
+    found: dict[str, list[float]] = {}
+    for key, words in NFO.findall(info.read_bytes()[:10_000].decode("utf-8", "replace")):
+        try:
+            found.setdefault(key.lower(), [float(word) for word in words.split()])
+        except ValueError:  # as if the line was not there
+            continue
+    return found

@@ -8,13 +8,27 @@ from pathlib import Path
 from typing import NamedTuple
 
 from scanfab.base.errors import ReadError
-from scanfab.io.files import first_bytes
-from scanfab.io.text import Layout, is_number, spelt, words_of
+from scanfab.io.files import first_bytes, plain
+from scanfab.io.reader import Snapshot
+from scanfab.io.text import (
+    Columns,
+    Layout,
+    is_number,
+    read_rows,
+    spelt,
+    text_of,
+    warn_of_end,
+    words_of,
+)
 
 # bytes of a file that are looked at, the rows among them, and the most columns a table has
 HEAD, SAMPLE, MOST_COLUMNS = 1 << 18, 20, 4096
 COMMENTS = ("#", "%", "//", "!")
 CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f]")
+# a word with a comma, and one whose comma may stand before thousands: no decimal number has two
+# commas, or begins with 0
+WITH_COMMA = re.compile(rb"[-+0-9.eE]*,[-+0-9.,eE]*")
+THOUSANDS = re.compile(rb"[-+]?[1-9][0-9]{0,2}(,[0-9]{3})+")
 # a blank stands for any run of blanks and tabs
 SEPARATORS = ("\t", ";", ",", " ")
 
@@ -38,6 +52,11 @@ class TextTable(NamedTuple):
     """Byte of the first row in the file."""
     rows: list[list[str]]
     """The words of the first rows."""
+
+    @property
+    def own(self) -> Sequence[str]:
+        """The names of columns, or their numbers."""
+        return self.names or self.layout.names
 
 
 def text_table(path: Path, skip: int) -> TextTable:
@@ -76,24 +95,68 @@ def text_table(path: Path, skip: int) -> TextTable:
     width = len(rows[0]) if rows else len(names or ())
     check_width(path, width)
     for line, row in zip(lines, rows, strict=True):
-        if len(row) != width:
+        # rows below names that are cut are found when the table is read
+        if names is None and len(row) != width:
             raise ReadError(
                 f"{path}, line {line.number}: expected {width} columns as in line "
                 f"{lines[0].number}, found {len(row)}"
             )
     if width > 1 and len(names or ()) != width and rows and not any(row[-1] for row in rows):
         width -= 1  # there is a separator at the end of each row
-    if names is not None and rows and len(names) != width:
+    line = lines[0] if rows else end
+    layout = Layout(tuple(unique(names or [""] * width)), separator, line.number, comma=comma)
+    return TextTable(layout, names, line.start, [row[:width] for row in rows])
+
+
+def read_text(
+    path: Path, table: TextTable, numbers: Sequence[str], whole: Sequence[str]
+) -> Columns:
+    """
+    All columns of a table of text.
+
+    Parameters
+    ----------
+    path : Path
+        Of the file.
+    table : TextTable
+        How it is written.
+    numbers : sequence of str
+        Columns that must hold a number in each row; others may have gaps or hold words.
+    whole : sequence of str
+        Columns among them that hold whole numbers.
+
+    Raises
+    ------
+    ReadError
+        If a row does not fit the columns, or a comma may stand before thousands.
+    """
+    check_names(path, table)
+    snapshot = Snapshot(path, start=table.start)
+    rows = text_of(snapshot)
+    if not rows and not plain(path).read_bytes().endswith(b"\n"):
+        warn_of_end(path)
+    doubtful = [one[0] for one in WITH_COMMA.finditer(rows)] if table.layout.comma else []
+    if doubtful and all(map(THOUSANDS.fullmatch, doubtful)):
         raise ReadError(
-            f"{path}, line {lines[0].number}: the columns have {len(names)} names "
+            f"{path}: {doubtful[0].decode()!r} may be a decimal number or have a sign of "
+            f"thousands, as may all numbers with a comma: write them with a point, without signs "
+            f"of thousands"
+        )
+    optional = [name for name in table.layout.names if name not in numbers]
+    layout = table.layout._replace(line=1, whole=whole, optional=optional)
+    return read_rows(snapshot, rows, layout)
+
+
+def check_names(path: Path, table: TextTable) -> None:
+    """ReadError if the first row has more or fewer columns than there are names."""
+    width, names = len(table.rows[0]) if table.rows else 0, table.names or ()
+    if names and table.rows and len(names) != width:
+        raise ReadError(
+            f"{path}, line {table.layout.line}: the columns have {len(names)} names "
             f"({', '.join(names[:8])}), but {width} columns follow: it cannot be told which name "
             f"is whose; skip the names with `skip`, and name columns by their numbers with "
             f"`columns`"
         )
-    keys = unique(names or [""] * width)
-    line = lines[0] if rows else end
-    layout = Layout(tuple(keys), separator, comma=comma)
-    return TextTable(layout, names, line.start, rows)
 
 
 def check_width(path: Path, width: int) -> None:

@@ -231,7 +231,7 @@ def test_an_incomplete_last_snapshot_is_left_out_unless_it_is_the_only_one():
     [
         ("", "expected a table, found no row"),
         ("# only\n\n", "expected a table, found no row"),
-        ("x,y,z,radius\n1,2,3,4\n1,2,3\n", "line 3: expected 4 columns as in line 2, found 3"),
+        ("x,y,z,radius\n1,2,3,4\n1,2,3\n", "line 3: expected 4 columns, found 3"),
         ("x,y,z\n1,2,3,4\n", "the columns have 3 names .* but 4 columns follow"),
         ("x,y,z,radius,q\n1,2,3,4\n", "the columns have 5 names .* but 4 columns follow"),
         ("x,y,z,radius\n-,m,m,m\n1,2,3,4\n", "line 2: expected a number in the column x"),

@@ -8,7 +8,7 @@ are ``id x y z r`` or ``x y z r`` and the clump; a note says so.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import ClassVar
@@ -18,12 +18,10 @@ import numpy as np
 from scanfab.base.arrays import MOST, doubles
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
 from scanfab.base.typing import FloatArray
-from scanfab.io.binary_tables import is_xyzd, xyzd_cell
+from scanfab.io.binary_tables import binary_names, is_xyzd, read_binary, xyzd_cell
 from scanfab.io.columns import grain_table
 from scanfab.io.formats.table_contacts import join_table
-from scanfab.io.formats.table_files import Columns, first_rows, names_of, read_table
 from scanfab.io.formats.table_names import (
-    CONTACTS,
     EDEM,
     PERHAPS_FRAMES,
     PFC,
@@ -36,7 +34,7 @@ from scanfab.io.formats.table_names import (
     is_of_contacts,
     plain_name,
 )
-from scanfab.io.layout import unique
+from scanfab.io.layout import TextTable, check_names, check_width, read_text, text_table, unique
 from scanfab.io.reader import (
     Carries,
     FileKind,
@@ -45,6 +43,7 @@ from scanfab.io.reader import (
     ReadOptions,
     Snapshot,
 )
+from scanfab.io.text import Columns, Layout
 
 # what must be a number in each row, and what a whole one
 NUMBERS = ("x", "y", "z", "radius", "diameter", "volume", "id", "id1", "id2", "clump")
@@ -75,9 +74,9 @@ class TableReader:
     )
     generic = True
     is_table = True
-    names: Names = field(default_factory=lambda: {**TABLE, **CONTACTS}, init=False, repr=False)
-    marks: ClassVar[tuple[str, ...]] = ()
-    """How names of columns begin by which a program's own tables are recognised; empty: any."""
+    names: ClassVar[Names] = TABLE
+    marks: ClassVar[tuple[str, ...]] = ("",)
+    """How names of columns begin by which a program's own tables are recognised."""
 
     def told(self, options: ReadOptions) -> TableReader:
         """Columns may have no names but those that users give them."""
@@ -86,23 +85,21 @@ class TableReader:
     def recognises(self, path: Path) -> bool:
         """Names of columns, the usual or the user's, that make grains or contacts."""
         try:
-            names, _ = names_of(path, self.options.skip)
-            if names is None or not (
-                not self.marks or any(plain_name(name).startswith(self.marks) for name in names)
+            head = table_head(path, self.options.skip)
+            if head.names is None or not any(
+                plain_name(name).startswith(self.marks) for name in head.names
             ):
                 return False
-            return self._kind_of(path, names) != "points"
+            return self._kind_of(path, head) != "points"
         except ReadError:
             return False
 
     def kind(self, path: Path) -> FileKind:
         """By the columns; a table without names holds grains."""
-        names, width = names_of(path, self.options.skip)
-        if names is not None:
-            return self._kind_of(path, names)
-        if self.options.columns or self.options.contact_columns:
-            return self._kind_of(path, [f"{place + 1}" for place in range(width)])
-        _guessed(path, self.options.skip)
+        head = table_head(path, self.options.skip)
+        if head.names or self.options.columns or self.options.contact_columns:
+            return self._kind_of(path, head)
+        _guessed(path, head)
         return "grains"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
@@ -119,18 +116,16 @@ class TableReader:
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         """Columns by their names or numbers."""
-        path, reader = snapshot.path, replace(self, options=options)
-        names, width = names_of(path, options.skip)
-        is_guess = names is None and not options.columns
+        path, head = snapshot.path, table_head(snapshot.path, options.skip)
+        is_guess = head.names is None and not options.columns
         if is_guess:
-            found = _guessed(path, options.skip)
+            found = _guessed(path, head)
         else:
-            own = names or [f"{place + 1}" for place in range(width)]
-            found = reader._find(path, own, contacts=False)
-        columns = read_table(path, options.skip, *_needed(found))
+            found = replace(self, options=options)._find(path, head, contacts=False)
+        columns = _read(path, head, found)
         if is_guess:
             _refuse_wrong_guess(path, found, columns)
-        if names is not None:
+        if head.names is not None:
             _refuse_frames(path, columns)
             check_units(path, found)
         if "volume" in found and not found.keys() & {"radius", "diameter"}:
@@ -141,10 +136,8 @@ class TableReader:
                 stacklevel=2,
             )
             volume = columns[found["volume"]].astype(np.float64)
-            columns, found["radius"] = (
-                {**columns, "radius": np.cbrt(0.75 / np.pi * volume)},
-                "radius",
-            )
+            columns["radius"] = np.cbrt(0.75 / np.pi * volume)
+            found["radius"] = "radius"
         # of the columns that are known only by their usual names, those of grains
         own_names = {
             what: name
@@ -158,67 +151,65 @@ class TableReader:
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
     ) -> JoinedContacts:
         """Pairs by the columns ``id1`` and ``id2``, or those that the user names."""
-        path, reader = snapshot.path, replace(self, options=options)
-        names, width = names_of(path, options.skip)
-        own = names or [f"{place + 1}" for place in range(width)]
-        found = reader._find(path, own, contacts=True)
+        path, head = snapshot.path, table_head(snapshot.path, options.skip)
+        found = replace(self, options=options)._find(path, head, contacts=True)
         if not {"id1", "id2"} <= found.keys():
             raise ReadError(
-                f"{path}: expected two columns of ids, id1 and id2, found {', '.join(own)}: name "
-                f'them with `contact_columns="id1=NAME,id2=NAME"`'
+                f"{path}: expected two columns of ids, id1 and id2, found {', '.join(head.own)}: "
+                f'name them with `contact_columns="id1=NAME,id2=NAME"`'
             )
         check_units(path, found, contacts=True)
-        columns = read_table(path, options.skip, *_needed(found))
+        columns = _read(path, head, found)
         return join_table(path, grains, {what: columns[name] for what, name in found.items()})
 
     def left_out(self, path: Path) -> list[str]:
         """The columns of a table of contacts that no packing has a place for."""
-        names, _ = names_of(path, self.options.skip)
-        if names is None:
+        head = table_head(path, self.options.skip)
+        if head.names is None:
             return []
-        found = self._find(path, names, contacts=True)
+        found = self._find(path, head, contacts=True)
         used = {own for what, own in found.items() if is_of_contacts(what)}
-        return [name for name in unique(names) if name not in used]
+        return [name for name in unique(head.names) if name not in used]
 
-    def _find(self, path: Path, names: Sequence[str], *, contacts: bool) -> dict[str, str]:
+    def _find(self, path: Path, head: TextTable, *, contacts: bool) -> dict[str, str]:
         """The columns of grains, or those of contacts, by what they are."""
         if contacts:
             pairs = _named_contacts(path, self.options.contact_columns)
-            return find_columns(path, names, self.names, pairs, "contact_columns")
+            return find_columns(path, head.own, self.names, pairs, "contact_columns")
         named = self.options.columns
-        found = find_columns(path, names, self.names, named, "columns")
+        found = find_columns(path, head.own, self.names, named, "columns")
         for size, other in (("diameter", "radius"), ("radius", "diameter")):
             if size in named and other not in named:
                 found.pop(other, None)
         return found
 
-    def _kind_of(self, path: Path, names: Sequence[str]) -> FileKind:
+    def _kind_of(self, path: Path, head: TextTable) -> FileKind:
         """What these columns are; ReadError if they are nothing that scanfab reads."""
         wrong: list[ReadError] = []
         found: list[dict[str, str]] = []
         for contacts in (False, True):
             try:
-                found.append(self._find(path, names, contacts=contacts))
+                found.append(self._find(path, head, contacts=contacts))
             except ReadError as error:
                 wrong.append(error)
                 found.append({})
         grains, pairs = found
         if self.options.contact_columns and is_contacts(pairs):
             # other tables may have columns of these numbers: ids are whole numbers
-            places = [unique(names).index(pairs[one]) for one in ("id1", "id2")]
-            rows = first_rows(path, self.options.skip)
-            if all(row[place].strip().isdigit() for row in rows for place in places):
+            places = [unique(head.own).index(pairs[one]) for one in ("id1", "id2")]
+            if all("".join(row[k].strip() for k in places).isdigit() for row in head.rows):
                 return "contacts"
         if {"x", "y", "z"} <= grains.keys() and not is_contacts(grains):
             sized = grains.keys() & {"radius", "diameter", "volume"}
             return "grains" if sized else "points"
         if is_contacts(pairs):
             return "contacts"
+        check_names(path, head)
         if wrong:
             raise wrong[0]
         raise ReadError(
             f"{path}: expected columns of grains (x, y, z, radius or diameter) or contacts "
-            f"(id1, id2), found {', '.join(names)}: {ASK}"
+            f"(id1, id2), found {', '.join(head.own)}: {ASK}"
         )
 
 
@@ -229,7 +220,7 @@ class PfcReader(TableReader):
     name = "pfc"
     description = "tables of PFC's ball and contact attributes: ball.pos.x, contact.end1.id, ..."
     extensions = ()
-    names: Names = field(default_factory=lambda: PFC, init=False, repr=False)
+    names = PFC
     marks = ("ball.", "contact.end")
 
 
@@ -242,19 +233,33 @@ class EdemReader(TableReader):
         'tables of EDEM\'s export, by the titles of its queries: "Particle Position X", ...'
     )
     extensions = ()
-    names: Names = field(default_factory=lambda: EDEM, init=False, repr=False)
+    names = EDEM
 
     def recognises(self, path: Path) -> bool:
         """By name only."""
         return False
 
 
-def _needed(found: Mapping[str, str]) -> tuple[list[str], list[str]]:
-    """Which columns must be numbers, and which whole ones."""
-    return (
-        [found[one] for one in NUMBERS if one in found],
-        [found[one] for one in WHOLE if one in found],
-    )
+def table_head(path: Path, skip: int) -> TextTable:
+    """The names of the columns, and of a text how it is written."""
+    names = binary_names(path)
+    if names is None:
+        return text_table(path, skip)
+    check_width(path, len(names))
+    return TextTable(Layout(tuple(names)), names, 0, [])
+
+
+def _read(path: Path, head: TextTable, found: Mapping[str, str]) -> Columns:
+    """All columns by their names; those that were found hold numbers if they must."""
+    numbers = [found[one] for one in NUMBERS if one in found]
+    if binary_names(path) is None:
+        columns = read_text(path, head, numbers, [found[one] for one in WHOLE if one in found])
+    else:
+        columns = read_binary(path)
+    for name in numbers:
+        if name not in columns or columns[name].dtype.kind not in "biuf":
+            raise ReadError(f"{path}: expected numbers in the column {name}, found none")
+    return columns
 
 
 def _named_contacts(path: Path, text: str | None) -> dict[str, str]:
@@ -294,20 +299,18 @@ def _refuse_frames(path: Path, columns: Columns) -> None:
             )
 
 
-def _guessed(path: Path, skip: int) -> dict[str, str]:
+def _guessed(path: Path, head: TextTable) -> dict[str, str]:
     """
     The columns of a table without names, by their number.
 
     Four are x y z r. Five are id x y z r if the first holds distinct whole numbers, else x y z r
     and the number of the clump.
     """
-    rows = first_rows(path, skip)
-    width = len(rows[0])
-    first = [row[0].strip() for row in rows]
+    width, first = len(head.own), [row[0].strip() for row in head.rows]
     has_ids = all(word.isdigit() for word in first) and len(set(first)) == len(first)
     if width == 5:
         names = ["id", "x", "y", "z", "radius"] if has_ids else ["x", "y", "z", "radius", "clump"]
-    elif width == 4 and not (has_ids and len(rows) > 1):
+    elif width == 4 and not (has_ids and len(first) > 1):
         names = ["x", "y", "z", "radius"]
     else:
         lacks = "the first of four seems to be ids" if width == 4 else "expected four or five"

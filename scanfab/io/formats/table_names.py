@@ -29,29 +29,15 @@ PERHAPS_FRAMES = ("t", "iteration", "iter", "cycle", "cycles", "snapshot", "incr
 LENGTHS = ("x", "y", "z", "radius", "diameter")
 # what a contact table must have, and what it may
 IDS = ("id1", "id2")
+# the force on either grain, the image of the second, the force on the first or second, the normal
+# and the tangential part
 FORCES = {
-    "fx": ("fx", "force.x", "f.x"),
-    "fy": ("fy", "force.y", "f.y"),
-    "fz": ("fz", "force.z", "f.z"),
-    "fx2": ("fx2",),
-    "fy2": ("fy2",),
-    "fz2": ("fz2",),
-    "fx1": ("fx1",),
-    "fy1": ("fy1",),
-    "fz1": ("fz1",),
+    **{f"f{axis}": (f"f{axis}", f"force.{axis}", f"f.{axis}") for axis in "xyz"},
+    **{f"i{axis}": (f"i{axis}", f"image.{axis}") for axis in "xyz"},
+    **{name: (name,) for axis in "xyz" for name in (f"f{axis}1", f"f{axis}2")},
+    **{name: (name,) for axis in "xyz" for name in (f"fn{axis}", f"ft{axis}")},
     "fn": ("fn", "force.n", "normal.force"),
-    "ix": ("ix", "image.x"),
-    "iy": ("iy", "image.y"),
-    "iz": ("iz", "image.z"),
     "kind": ("contact.type", "kind"),
-}
-# normal and tangential part
-PARTS = {f"{part}{axis}": (f"{part}{axis}",) for part in ("fn", "ft") for axis in "xyz"}
-CONTACTS: Names = {
-    "id1": ("id1", "id.1", "grain1", "particle1", "particle.1", "body1", "geoa", "i"),
-    "id2": ("id2", "id.2", "grain2", "particle2", "particle.2", "body2", "geob", "j"),
-    **FORCES,
-    **PARTS,
 }
 TABLE: Names = {
     **{
@@ -61,6 +47,9 @@ TABLE: Names = {
     "radius": (*RADIUS_NAMES, "f.radius"),
     "diameter": DIAMETER_NAMES,
     "id": (*ID_NAMES, "particle.id", "body.id"),
+    "id1": ("id1", "id.1", "grain1", "particle1", "particle.1", "body1", "geoa", "i"),
+    "id2": ("id2", "id.2", "grain2", "particle2", "particle.2", "body2", "geob", "j"),
+    **FORCES,
 }
 PFC: Names = {
     **{
@@ -82,10 +71,7 @@ PFC: Names = {
 }
 EDEM: Names = {
     **{axis: (f"particle.position.{axis}", f"position.{axis}") for axis in "xyz"},
-    "radius": ("particle.radius", "radius"),
-    "diameter": ("particle.diameter", "diameter"),
-    "volume": ("particle.volume", "volume"),
-    "id": ("particle.id", "id"),
+    **{what: (f"particle.{what}", what) for what in ("radius", "diameter", "volume", "id")},
     "id1": ("contact.idfirst", "contact.id.first", "contact.first.id"),
     "id2": ("contact.idsecond", "contact.id.second", "contact.second.id"),
     **{f"fn{axis}": (f"contact.normal.force.{axis}",) for axis in "xyz"},

@@ -679,6 +679,16 @@ def test_pairs_that_stand_twice_are_counted_and_told(tmp_path):
         scanfab.read(grains_file(tmp_path), contacts=contacts)
 
 
+@pytest.mark.filterwarnings("ignore:.*the last line has no end")
+@pytest.mark.parametrize("text", ["id1,id2,fn\n1,2,5\n2", "id1,id2,fn\n1,2"])
+@pytest.mark.parametrize("whole_folder", [True, False])
+def test_a_cut_list_of_contacts_beside_the_grains_is_an_error(tmp_path, text, whole_folder):
+    path = write(tmp_path / "g_1.csv", "id,x,y,z,radius\n1,0,0,0,.5\n2,1,0,0,.5\n3,2,0,0,.5\n")
+    write(tmp_path / "g_1.contacts.csv", text)
+    with pytest.raises(ReadError, match=r"g_1\.contacts\.csv, line \d: .*columns"):
+        scanfab.read(tmp_path if whole_folder else path)
+
+
 def test_a_damaged_coordinate_is_told(tmp_path):
     path = rows(tmp_path / "g.csv", POSITION, RADIUS, names=[*"xyz", "r"], separator=",")
     lines = path.read_text().splitlines(True)
