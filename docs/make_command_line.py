@@ -10,9 +10,8 @@ from scanfab.base.column import Column, columns_of_fields
 from scanfab.cli.group import COMMANDS, cli
 from scanfab.pipeline.calibration_ladders import StepRow
 from scanfab.pipeline.inspection import FrameReport
-from scanfab.table.columns import MORE_COLUMNS, OWN_COLUMNS
-from scanfab.table.comparison_rows import DifferenceRow, FrameRow, SummaryRow
-from scanfab.table.map_columns import map_columns
+from scanfab.table.columns import MORE_COLUMNS, OWN_COLUMNS, map_columns
+from scanfab.table.compare import DIFFERENCES, FRAMES, SUMMARY
 
 PAGE = Path(__file__).parent / "command-line.md"
 
@@ -50,9 +49,9 @@ TABLES = {
     "scanfab compute": OWN_COLUMNS,
     "scanfab compute, where the options ask for more than the default": MORE_COLUMNS,
     "scanfab map": map_columns(("edge",), shells=True),
-    "scanfab compare": columns_of_fields(FrameRow),
-    "scanfab compare --summary": columns_of_fields(SummaryRow),
-    "scanfab compare --differences": columns_of_fields(DifferenceRow),
+    "scanfab compare": FRAMES,
+    "scanfab compare --summary": SUMMARY,
+    "scanfab compare --differences": DIFFERENCES,
     "scanfab calibrate": columns_of_fields(StepRow),
     "scanfab inspect --json": columns_of_fields(FrameReport),
 }

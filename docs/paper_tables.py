@@ -14,7 +14,7 @@ from scipy.stats import t as student
 
 import scanfab
 from scanfab.table.compare import SAME_STRAIN
-from scanfab.table.reading import total_error
+from scanfab.table.row import total_error
 
 TABLES = Path(__file__).parents[1] / "sample_data" / "paper"
 RUNS = {

@@ -30,7 +30,7 @@ from paper_tables import (
     usual_variant,
 )
 
-from scanfab.table.reading import total_error
+from scanfab.table.row import total_error
 
 
 def span(values: Iterable[float], form: str = "{:.0f}") -> str:

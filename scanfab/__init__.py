@@ -37,9 +37,9 @@ if TYPE_CHECKING:
     from scanfab.packing.window import Window
     from scanfab.pipeline.calibration import Calibration, calibrate
     from scanfab.pipeline.cluster.dask_executor import dask_executor
-    from scanfab.pipeline.cluster.merging import merge_tables
     from scanfab.pipeline.compute import compute
     from scanfab.pipeline.maps.fabric_map import fabric_map
+    from scanfab.pipeline.merge import merge_tables
     from scanfab.pipeline.samples import samples
     from scanfab.pipeline.settings import Settings
     from scanfab.pipeline.solids import solids_of
@@ -47,9 +47,8 @@ if TYPE_CHECKING:
     from scanfab.scan.scan import ScanSums, scan_lines
     from scanfab.scan.solids import Solids
     from scanfab.table.columns import COLUMNS
-    from scanfab.table.compare import compare_tables
-    from scanfab.table.comparison_rows import Comparison
-    from scanfab.table.reading import read_rows
+    from scanfab.table.compare import Comparison, compare_tables
+    from scanfab.table.formats import read_rows
     from scanfab.table.row import Row
     from scanfab.table.table import Table, load
     from scanfab.viz.compute_file import compute_file
@@ -62,7 +61,7 @@ _HOME = {
     "Calibration": "pipeline.calibration",
     "Cell": "packing.cell",
     "Column": "base.column",
-    "Comparison": "table.comparison_rows",
+    "Comparison": "table.compare",
     "ContactList": "packing.contacts",
     "Contacts": "packing.contacts",
     "Convex": "base.convex",
@@ -105,10 +104,10 @@ _HOME = {
     "follow_series": "io.follow",
     "load": "table.table",
     "make_report": "viz.report.report",
-    "merge_tables": "pipeline.cluster.merging",
+    "merge_tables": "pipeline.merge",
     "polyhedron": "base.shapes",
     "read": "io.sources",
-    "read_rows": "table.reading",
+    "read_rows": "table.formats",
     "read_series": "io.sources",
     "samples": "pipeline.samples",
     "scan_frames": "viz.scanned_frames",

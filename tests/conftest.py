@@ -11,7 +11,7 @@ from typing import NamedTuple
 import pytest
 
 from scanfab.cli.main import run
-from scanfab.table.reading import read_rows
+from scanfab.table.formats import read_rows
 
 ROOT = Path(__file__).parents[1]
 SAMPLE = "sample_data/yade_triaxial"

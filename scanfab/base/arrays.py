@@ -38,12 +38,12 @@ def cast(
         numbers = array.astype(array.dtype if dtype is None else dtype, copy=not shared)
     except (TypeError, ValueError) as error:
         raise PackingError(f"{name}: expected numbers of shape {_spell(shape)}: {error}") from None
-    wanted = shape[:-1] if shape[-1] is ... else shape
-    fits = (
-        len(numbers.shape) >= len(wanted) if shape[-1] is ... else len(numbers.shape) == len(wanted)
-    )
-    lengths = zip(numbers.shape, wanted, strict=False)
-    if not fits or any(want is not None and have != want for have, want in lengths):
+    wanted, found = shape, numbers.shape
+    if shape[-1] is ...:
+        wanted, found = shape[:-1], found[: len(shape) - 1]
+    if len(found) != len(wanted) or any(
+        want not in (None, have) for have, want in zip(found, wanted, strict=True)
+    ):
         raise PackingError(f"{name}: expected shape {_spell(shape)}, found {numbers.shape}")
     if dtype is np.int64 and array.dtype.kind == "f" and not np.array_equal(array, numbers):
         raise PackingError(f"{name}: expected whole numbers")

@@ -10,10 +10,9 @@ from typing import get_args, get_origin, get_type_hints
 
 from scanfab.base.errors import ScanfabError
 
-ALL_DIGITS = 17
-"""With so many significant digits every number that is written reads back the same."""
-DEFAULT_DIGITS = ALL_DIGITS
-"""Of written tables, unless others are asked for; manifests list only what differs from it."""
+# With so many significant digits every number that is written reads back the same. No more can be
+# asked for; manifests list only what differs from it.
+DEFAULT_DIGITS = 17
 # the unit of all lengths: that of the dump, as nothing is converted
 LENGTH = "length"
 
@@ -53,10 +52,15 @@ class Column:
 
 
 class NoColumnError(ScanfabError, KeyError, AttributeError):
-    """A column that does not exist, asked for by key or as an attribute; names the nearest."""
+    """
+    A column that does not exist, asked for by key or as an attribute; names the nearest.
 
-    # a KeyError would put its message between quotes
-    __str__ = Exception.__str__
+    It takes the name that was asked for, and those that there are.
+    """
+
+    def __str__(self) -> str:
+        # only where it is shown: most are raised in ``row.get(name)``, which asks often
+        return no_column(*self.args)
 
 
 def no_column(name: object, known: Iterable[str]) -> str:
@@ -85,9 +89,9 @@ def columns_of_fields(kind: type) -> tuple[Column, ...]:
     Examples
     --------
     >>> from scanfab.base.column import columns_of_fields
-    >>> from scanfab.table.comparison_rows import SummaryRow
-    >>> columns_of_fields(SummaryRow)[2].meaning
-    'number of frames that enter the fits'
+    >>> from scanfab.pipeline.calibration_ladders import StepRow
+    >>> columns_of_fields(StepRow)[0].meaning
+    'the series as given'
     """
     found = []
     for name, hint in get_type_hints(kind, include_extras=True).items():

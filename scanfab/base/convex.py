@@ -250,10 +250,28 @@ class Convex:
             near &= points @ plane[:3] < plane[3] + radius
         if self.is_sphere:
             return np.asarray(near)
-        # past an edge, or a quadric that is no sphere, these are too many
-        unsure = np.flatnonzero(near)
-        unsure = unsure[~self.contains(points[unsure])]
-        near[unsure] = self._meets(points[unsure], radius[unsure])
+        # Past an edge, or a quadric that is no sphere, these are too many. For a centre p outside,
+        # walk from a place x inside as near to p as the way to the place furthest along p - x
+        # allows. The distance of p is at most |p - x|, and at least that of the plane through the
+        # furthest place; a sphere between the two after all steps may reach inside.
+        left = np.flatnonzero(near)
+        left = left[~self.contains(points[left])]
+        at = np.zeros((len(left), 3))
+        for _ in range(STEPS):
+            toward = points[left] - at
+            distance, furthest = np.linalg.norm(toward, axis=1), self.support(toward)
+            # a place on the surface may be reached, and then is no distance away
+            over = np.where(distance > 0.0, distance, 1.0)
+            missed = np.einsum("ij,ij->i", points[left] - furthest, toward) / over >= radius[left]
+            near[left[missed]] = False
+            unsure = ~missed & (distance >= radius[left])
+            left, toward, at = left[unsure], toward[unsure], at[unsure]
+            if not len(left):
+                break
+            way = furthest[unsure] - at
+            square = np.einsum("ij,ij->i", way, way)
+            share = np.einsum("ij,ij->i", toward, way) / np.where(square > 0.0, square, 1.0)
+            at = at + np.clip(share, 0.0, 1.0)[:, None] * way
         return np.asarray(near)
 
     def support(self, along: FloatArray) -> FloatArray:
@@ -269,36 +287,7 @@ class Convex:
         -------
         ndarray, shape (N, 3)
         """
-        furthest: FloatArray = self.body.support(along @ self.frame) @ self.frame.T
-        return furthest
-
-    def _meets(self, points: FloatArray, radius: FloatArray) -> BoolArray:
-        """
-        Which spheres about places outside reach inside, by walking towards the nearest place.
-
-        From a place x inside go as near to p as the way to the place furthest along p - x allows.
-        The distance of p is at most |p - x|, and at least that of the plane through the furthest
-        place; a sphere between the two after all steps may reach inside.
-        """
-        meets = np.ones(len(points), bool)
-        open_, at = np.arange(len(points)), np.zeros_like(points)
-        for _ in range(STEPS):
-            toward = points[open_] - at
-            distance, furthest = np.linalg.norm(toward, axis=1), self.support(toward)
-            # a place on the surface may be reached, and then is no distance away
-            over = np.where(distance > 0.0, distance, 1.0)
-            gap = np.einsum("ij,ij->i", points[open_] - furthest, toward) / over
-            missed = gap >= radius[open_]
-            meets[open_[missed]] = False
-            unsure = ~missed & (distance >= radius[open_])
-            open_, toward, at = open_[unsure], toward[unsure], at[unsure]
-            if not len(open_):
-                break
-            way = furthest[unsure] - at
-            square = np.einsum("ij,ij->i", way, way)
-            share = np.einsum("ij,ij->i", toward, way) / np.where(square > 0.0, square, 1.0)
-            at = at + np.clip(share, 0.0, 1.0)[:, None] * way
-        return meets
+        return np.asarray(self.body.support(along @ self.frame) @ self.frame.T)
 
     def overlap(self, axes: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
         """

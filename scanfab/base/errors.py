@@ -1,6 +1,17 @@
-"""The errors and warnings of scanfab: one kind for each thing that a user can mend."""
+"""
+What users are told: errors and warnings, one kind for each thing that they can mend, and notes.
+
+A note is data about a frame; whoever faces the user makes sentences of it.
+"""
 
 from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable
+from typing import NamedTuple
+
+SKIPPED = "skipped"
+"""The code of the note on a frame that was left out because it could not be read."""
 
 
 class ScanfabError(Exception):
@@ -41,3 +52,56 @@ class ScanfabNote(UserWarning):
 
 class SkippedFrameWarning(ScanfabWarning):
     """A frame was left out because it could not be read."""
+
+
+class Note(NamedTuple):
+    """One thing that a user should know."""
+
+    code: str
+    """What it is about, for programs: the same for all notes of one kind."""
+    text: str
+    """The sentence, which speaks of arguments as the library calls them."""
+    variants: tuple[str, ...] = ()
+    """The variants that it is about; none if it is about the whole frame."""
+
+    def told(self, where: str) -> str:
+        """
+        The sentence with what it is about.
+
+        Examples
+        --------
+        >>> from scanfab.base.errors import Note
+        >>> Note("empty", "no grain is left", ("b", "d")).told("frame 3")
+        'frame 3, variants b, d: no grain is left'
+        """
+        if not where:
+            return self.text
+        several = "s" if len(self.variants) > 1 else ""
+        named = f", variant{several} {', '.join(self.variants)}" if self.variants else ""
+        return f"{where}{named}: {self.text}"
+
+
+def warn(text: str) -> None:
+    """Tell the user something that he should know, although the result stands."""
+    warnings.warn(text, ScanfabWarning, stacklevel=5)
+
+
+def note(text: str) -> None:
+    """Tell the user something worth knowing that puts nothing in doubt."""
+    warnings.warn(text, ScanfabNote, stacklevel=5)
+
+
+def joined(notes: Iterable[Note]) -> tuple[Note, ...]:
+    """The notes with each sentence once, of all variants that it is about."""
+    variants: dict[tuple[str, str], dict[str, None]] = {}
+    for code, text, about in notes:
+        variants.setdefault((code, text), {}).update(dict.fromkeys(about))
+    return tuple(Note(*key, tuple(about)) for key, about in variants.items())
+
+
+def tell(notes: Iterable[Note], where: str = "") -> None:
+    """Warn of each note; a frame that was left out is a warning of its own kind."""
+    for one in notes:
+        skipped = one.code == SKIPPED
+        text = one.told(f"{where} skipped" if skipped else where)
+        warnings.warn(text, SkippedFrameWarning if skipped else ScanfabWarning, stacklevel=3)

@@ -1,4 +1,8 @@
-"""Files: written whole or not at all, locked, or none at all; the user's cache; free memory."""
+"""
+Files: what a path is, writing whole or not at all, locks.
+
+The memory that a process can still get is here, too: it says whether a file can be read.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +26,8 @@ KINDS |= {stat.S_IFCHR: "a device", stat.S_IFBLK: "a device"}
 INHERITED = ("/dev/fd/", "/dev/stdin", "/proc/self/fd/")
 # Windows lets nobody read a locked byte, so the lock is on one that no table is long enough to have
 FAR = 1 << 40
-# limits of the container
-GROUP = Path("/sys/fs/cgroup")
+# the limit of the container
+CONTAINER = Path("/sys/fs/cgroup/memory.max")
 
 
 def kind_of(path: Path) -> str | None:
@@ -123,43 +127,16 @@ def locked(path: Path) -> Iterator[IO[bytes]]:
         yield stream
 
 
-def user_folder() -> Path | None:
-    """scanfab's folder in the user's cache; None if there is no home."""
-    try:
-        home = Path.home()
-    except RuntimeError:
-        return None
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
-    elif sys.platform == "darwin":
-        base = home / "Library" / "Caches"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache")
-    return base / "scanfab"
-
-
-def make_private(folder: Path) -> None:
-    """Make a folder, and those above it, for the user alone."""
-    if not folder.is_dir():
-        make_private(folder.parent)
-        folder.mkdir(mode=0o700, exist_ok=True)
-
-
 def free_memory() -> int:
-    """Bytes that this process can still get: of the machine, its container and its own limit."""
-    found = [sys.maxsize]
+    """Bytes that this process can get at most: of the machine, its container, its own limit."""
+    found = [sys.maxsize if (own := address_space()) is None else own]
     with suppress(OSError):
         text = Path("/proc/meminfo").read_text("ascii")
         found += [int(kB) << 10 for kB in re.findall(r"MemAvailable:\s*(\d+) kB", text)]
     # not every process is in a container, and one without a limit has the word "max"
     with suppress(OSError, ValueError):
-        most, used = (int((GROUP / f"memory.{one}").read_text()) for one in ("max", "current"))
-        found.append(most - used)
-        # copies of files that the system keeps until someone needs the room
-        cache = re.search(r"(?m)^inactive_file (\d+)$", (GROUP / "memory.stat").read_text())
-        found[-1] += int(cache[1]) if cache else 0
-    own = address_space()
-    return max(min(*found, sys.maxsize if own is None else own), 0)
+        found.append(int(CONTAINER.read_text("ascii")))
+    return max(min(found), 0)
 
 
 def address_space() -> int | None:

@@ -1,10 +1,11 @@
 """
 How kernels are compiled: without the interpreter's lock, and kept on disk for later runs.
 
-Numba's own cache trusts its files: it stops at one that is cut, and runs code with a wrong byte. It
-also looks at the file of a kernel only, and does not see that another file, with a kernel that this
-one calls, has changed. So each compiled form has a file of its own here, with a checksum, in a
-folder that is named by a hash of all kernels.
+Numba's own cache trusts its files: it stops at a file that is cut, and runs code with a wrong byte.
+Its files are numbered by an index, so that two processes that save at once can give a form the code
+of another. It also looks at the file of a kernel only, and does not see that a kernel in another
+file, which this kernel calls, has changed. So each compiled form has a file of its own here, with a
+checksum, in a folder that is named by a hash of all kernels.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import pickle
 import sys
 from collections.abc import Callable
 from contextlib import suppress
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -26,8 +27,9 @@ from llvmlite.binding import get_host_cpu_name
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
+from numba.misc import appdirs
 
-from scanfab.base.files import make_private, user_folder, whole_file
+from scanfab.base.files import whole_file
 
 # numbers that the compiler's vector instructions take at a time: 256 bits of them, also on
 # processors that have wider ones, but for these
@@ -54,9 +56,13 @@ DIGEST_SIZE = 32
 _announcements: list[Callable[[], object]] = []
 
 
-def kernel(function: Function) -> Function:
+def kernel(function: Function, **options: Any) -> Function:
     """Compile a function that is called from Python."""
-    return _kept(njit(nogil=True)(function), function)
+    compiled = njit(nogil=True, **options)(function)
+    if compiled is not function:  # else Numba is switched off
+        compiled._cache = _Cache(function)
+    same: Function = compiled
+    return same
 
 
 def inner(**options: Any) -> Callable[[Function], Function]:
@@ -66,8 +72,7 @@ def inner(**options: Any) -> Callable[[Function], Function]:
     Without what Python needs to call it, which would take a sixth of the time to compile it all:
     called from Python it ends the process, so tests call it in a kernel of their own.
     """
-    compile_it = njit(nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)
-    return lambda function: _kept(compile_it(function), function)
+    return partial(kernel, no_cpython_wrapper=True, no_cfunc_wrapper=True, **options)
 
 
 def when_compiling(tell: Callable[[], object]) -> None:
@@ -85,15 +90,16 @@ def kernel_files() -> list[Path]:
 def kernel_folder() -> tuple[Path | None, str]:
     """The folder of compiled kernels, made if it can be, and why nothing is kept in it."""
     given = os.environ.get("NUMBA_CACHE_DIR")
-    base = Path(given) if given else user_folder()
-    if base is None:
+    base = given or appdirs.user_cache_dir("scanfab", appauthor=False)  # type: ignore[no-untyped-call]
+    if base.startswith("~"):
         return None, "there is no home folder"
     sources = hashlib.sha256(f"{sys.version} {llvmlite.__version__}".encode())
     for file in kernel_files():
         sources.update(file.read_bytes())
-    folder = base / f"numba-{numba.__version__}-{sources.hexdigest()[:16]}"
+    folder = Path(base, f"numba-{numba.__version__}-{sources.hexdigest()[:16]}")
     try:
-        make_private(folder)
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(mode=0o700, exist_ok=True)
         state = folder.stat()
     except OSError as error:
         return None, f"{error.filename}: {error.strerror}"
@@ -122,7 +128,7 @@ class _Cache(NullCache):
             file = self._file(sig, target_context.codegen())
             stored = file.read_bytes()
             content = stored[DIGEST_SIZE:]
-            if stored == _signed(file.name, content):
+            if stored[:DIGEST_SIZE] == _digest(file, content):
                 target_context.refresh()
                 return CompileResult._rebuild(target_context, *pickle.loads(content))  # type: ignore[no-untyped-call]
         while _announcements:
@@ -131,19 +137,11 @@ class _Cache(NullCache):
 
     def save_overload(self, sig: Any, cres: Any) -> None:
         with suppress(OSError):  # the disk may be full
-            file = self._file(sig, cres.codegen)
-            content = dumps(cres._reduce())  # type: ignore[no-untyped-call]
+            file, content = self._file(sig, cres.codegen), dumps(cres._reduce())  # type: ignore[no-untyped-call]
             with whole_file(file) as part:
-                part.write_bytes(_signed(file.name, content))
+                part.write_bytes(_digest(file, content) + content)
 
 
-def _signed(name: str, content: bytes) -> bytes:
-    """The content of a file behind a checksum."""
-    return hashlib.sha256(name.encode() + content).digest() + content
-
-
-def _kept(compiled: Any, function: Function) -> Function:
-    if compiled is not function:  # else Numba is switched off
-        compiled._cache = _Cache(function)
-    same: Function = compiled
-    return same
+def _digest(file: Path, content: bytes) -> bytes:
+    """The checksum of a form, which is no other's."""
+    return hashlib.sha256(file.name.encode() + content).digest()

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Iterable
-from importlib.metadata import EntryPoint, entry_points
+from collections.abc import Callable
+from importlib.metadata import entry_points
 from typing import Any, NamedTuple
 
-from scanfab.base.errors import ScanfabError, ScanfabWarning
+from scanfab.base.errors import ScanfabError, warn
 
 
 class Offer(NamedTuple):
@@ -27,23 +26,21 @@ def having(expected: str, **members: Any) -> Callable[[Any], Any]:
     >>> from scanfab.base.plugins import having
     >>> having("something with a length", __len__=Callable)(3)
     Traceback (most recent call last):
-    TypeError: expected something with a length, found 3 without __len__
+    TypeError: expected something with a length, found 3, whose __len__ is None
     """
 
     def make(plugin: Any) -> Any:
         if isinstance(plugin, type):
             raise TypeError(f"expected {expected}, found the class {plugin.__name__} itself")
         for name, kind in members.items():
-            if not hasattr(plugin, name):
-                raise TypeError(f"expected {expected}, found {plugin!r} without {name}")
-            if not isinstance(value := getattr(plugin, name), kind):
-                raise TypeError(f"expected {expected}, found {plugin!r}, whose {name} is {value!r}")
+            if not isinstance(found := getattr(plugin, name, None), kind):
+                raise TypeError(f"expected {expected}, found {plugin!r}, whose {name} is {found!r}")
         return plugin
 
     return make
 
 
-def load_plugins(group: str, what: str, make: Callable[[Any], Any]) -> dict[str, Any]:
+def load_plugins(group: str, what: str, make: Callable[[Any], Any]) -> dict[str, Offer]:
     """
     The objects that packages offer, by name and in alphabetical order.
 
@@ -63,25 +60,15 @@ def load_plugins(group: str, what: str, make: Callable[[Any], Any]) -> dict[str,
     ScanfabError
         If two packages use one name.
     """
-    offers = load_offers(entry_points(group=group), what, make)
-    return {name: offer.plugin for name, offer in offers.items()}
-
-
-def load_offers(
-    points: Iterable[EntryPoint], what: str, make: Callable[[Any], Any]
-) -> dict[str, Offer]:
-    """As :func:`load_plugins`, with the package of each."""
     found: dict[str, Offer] = {}
-    for point in sorted(points, key=lambda point: (point.name, point.value)):
+    for point in sorted(entry_points(group=group), key=lambda point: (point.name, point.value)):
         package = point.dist.name if point.dist is not None else "unknown package"
         try:
             plugin = make(point.load())
         except (Exception, SystemExit) as error:  # a foreign package may fail in any way
-            warnings.warn(
+            warn(
                 f"the {what} {point.name!r} of {package} cannot be loaded: "
-                f"{type(error).__name__}: {error}",
-                ScanfabWarning,
-                stacklevel=2,
+                f"{type(error).__name__}: {error}"
             )
             continue
         if point.name in found:

@@ -93,8 +93,7 @@ class Hull(Body):
 
     def support(self, along: FloatArray) -> FloatArray:
         """A corner."""
-        furthest: FloatArray = self.outline[np.argmax(along @ self.outline.T, axis=1)]
-        return furthest
+        return np.asarray(self.outline[np.argmax(along @ self.outline.T, axis=1)])
 
     def overlap(self, shift: FloatArray, length: float) -> tuple[FloatArray, FloatArray]:
         """
@@ -169,16 +168,9 @@ def sphere(radius: float) -> Convex:
     array([ True, False])
     """
     radius = number("a length above 0", lambda value: 0 < value < math.inf)("radius", radius)
-    return Convex(
-        planes=np.zeros((0, 4)),
-        quadric=Quadric(1.0, np.zeros((3, 3)), radius * radius),
-        low=np.full(3, -radius),
-        high=np.full(3, radius),
-        reach=radius,
-        size=f"radius {radius:g}",
-        body=BALL,
-        frame=radius * np.eye(3),
-    )
+    quadric, corner = Quadric(1.0, np.zeros((3, 3)), radius * radius), np.full(3, radius)
+    frame, size = radius * np.eye(3), f"radius {radius:g}"
+    return Convex(np.zeros((0, 4)), quadric, -corner, corner, radius, size, BALL, frame)
 
 
 def box(edges: Sequence[float] | FloatArray, turn: npt.ArrayLike | None = None) -> Convex:
@@ -337,12 +329,11 @@ def polyhedron(points: FloatArray, triangles: IntArray) -> tuple[Convex, FloatAr
     middle = points.mean(axis=0) if len(points) else np.zeros(3)
     points = points - middle
     try:
-        hull = ConvexHull(points)
+        hull, extent = ConvexHull(points), float(np.ptp(points, axis=0).max())
     except (QhullError, ValueError):
-        raise SettingsError("the surface encloses no volume: it is flat, or has no faces") from None
-    extent = float(np.ptp(points, axis=0).max())
-    if hull.volume < TOLERANCE * extent**3:
-        raise SettingsError("the surface encloses no volume: it is flat")
+        hull = None
+    if hull is None or hull.volume < TOLERANCE * extent**3:
+        raise SettingsError("the surface encloses no volume: it is flat, or has no faces")
     # tetrahedra of the triangles with a place inside fill the hull, unless some are missing or
     # lie within it
     filled = float(np.abs(np.linalg.det(points[triangles.reshape(-1, 3)])).sum()) / 6.0

@@ -44,19 +44,6 @@ def spelt_place(values: Iterable[float]) -> str:
     return f"({', '.join(f'{value + 0.0:.4g}' for value in values)})"
 
 
-def spelt_range(low: float, high: float) -> str:
-    """
-    From where to where, to four digits; one number where both are the same.
-
-    Examples
-    --------
-    >>> from scanfab.base.spelling import spelt_range
-    >>> spelt_range(0.5, 1.5), spelt_range(1.0, 1.0)
-    ('0.5 to 1.5', '1')
-    """
-    return f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
-
-
 def spelt_time(seconds: float) -> str:
     """
     A time to wait, to about a tenth.

@@ -87,22 +87,23 @@ def calibrate(
 
     On a terminal a readable table; else the steps as CSV, and what they show on standard error.
     """
+    from scanfab.base.column import columns_of_fields
     from scanfab.cli.console import announce_compiling, is_readable, print_csv, reported_warnings
     from scanfab.pipeline.calibration import calibrate as calibrate_series
     from scanfab.pipeline.calibration_ladders import StepRow
     from scanfab.pipeline.settings import Settings
-    from scanfab.table.result_file import ResultFile
-    from scanfab.table.writing import Excerpt
+    from scanfab.table.writing import Excerpt, ResultFile
     from scanfab.viz.figures.page import make_figures, save_figures
 
     check_plot(plot, None)
+    columns = columns_of_fields(StepRow)
     with reported_warnings():
         chosen, settings_file = fill_from_file(ctx, (source,), chosen)
         with settings_file.named_errors():
             reading = reading_arguments(chosen)
-            excerpt = Excerpt.make(StepRow, chosen.pop("fields"), int(chosen.pop("digits")))
+            excerpt = Excerpt.make(columns, chosen.pop("fields"), int(chosen.pop("digits")))
             settings = Settings(**chosen)
-            result = None if output is None else ResultFile(output, StepRow, excerpt)
+            result = None if output is None else ResultFile(output, columns, excerpt)
         announce_compiling()
         series = open_series((source,), reading)
         if len(series) > 1:
@@ -122,7 +123,7 @@ def calibrate(
         if result is None and tells_all:
             _print(found.rows)
         elif result is None:
-            print_csv(found.rows, excerpt, StepRow)
+            print_csv(found.rows, excerpt, columns)
         # behind rows on standard output, what they show goes beside them
         for sentence in (*found.findings, command):
             click.echo(sentence, err=not tells_all)

@@ -55,11 +55,9 @@ def compare(
     from scanfab.cli.comparison_tables import print_comparison
     from scanfab.cli.console import is_readable, print_csv, reported_warnings
     from scanfab.table.compare import compare_tables
-    from scanfab.table.formats import format_of
-    from scanfab.table.reading import read_rows
-    from scanfab.table.result_file import ResultFile
+    from scanfab.table.formats import format_of, read_rows
     from scanfab.table.selection import choose_rows
-    from scanfab.table.writing import Excerpt
+    from scanfab.table.writing import ALL, Excerpt, ResultFile
     from scanfab.viz.figures.page import make_figures, save_figures
 
     check_plot(plot, figure, "table")
@@ -84,7 +82,7 @@ def compare(
             excerpt = Excerpt.make(chosen.columns, fields, digits)
         if output is not None:
             ResultFile(output, chosen.columns, excerpt).save(chosen)
-        elif is_readable() and not differences and excerpt.is_all:
+        elif is_readable() and not differences and excerpt == ALL:
             print_comparison(comparison)
         else:
             print_csv(chosen, excerpt, chosen.columns)

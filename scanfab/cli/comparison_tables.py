@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from scanfab.cli.tables import GAP, Column, print_columns, spelt, width_of
 
 if TYPE_CHECKING:
-    from scanfab.table.comparison_rows import Comparison
+    from scanfab.table.compare import Comparison
     from scanfab.table.row import Row
 
 
@@ -50,7 +50,7 @@ def _sources(rows: Sequence[Row], names: dict[str, str]) -> Titled:
 
 
 def _slopes(rows: Sequence[Row]) -> Titled:
-    from scanfab.table.reading import variant_of
+    from scanfab.table.row import variant_of
 
     return [
         ("variant", [variant_of(row) for row in rows]),
@@ -65,7 +65,7 @@ def _slopes(rows: Sequence[Row]) -> Titled:
 
 def _curves(comparison: Comparison, longest: int) -> Titled:
     """Both anisotropies over the frames, as bars."""
-    from scanfab.table.reading import variant_of
+    from scanfab.table.row import variant_of
 
     groups: dict[tuple[str, str], list[Row]] = {}
     for frame in comparison.frames:
@@ -78,8 +78,8 @@ def _curves(comparison: Comparison, longest: int) -> Titled:
 
 
 def _frames(rows: Sequence[Row]) -> Titled:
-    from scanfab.table.abscissa import strain_column
-    from scanfab.table.reading import variant_of
+    from scanfab.table.curves import strain_column
+    from scanfab.table.row import variant_of
 
     sheared = strain_column(rows) == "shear_strain"
     return [

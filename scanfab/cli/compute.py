@@ -79,7 +79,7 @@ def compute(
         job = finished_job(
             ctx, sources, chosen, Settings, told,
             output=output, resume=resume, manifest=manifest, vtk=vtk, check=check,
-            drawn=None if plot is None else _columns_drawn(figure),
+            drawn=() if plot is None else _columns_drawn(figure),
             draw=draw,
         )  # fmt: skip
         if plot is not None:
@@ -115,8 +115,9 @@ def _draw(plot: Path, figure: str | None, job: Job) -> None:
     if not job.found_void_fabric:
         click.echo(f"scanfab: {plot} is not drawn: no row has a void fabric", err=True)
     elif _needs_frames(figure):
-        frames = ScannedFrames(job.series[0], job.settings, job.kept)
+        frames = ScannedFrames(job.series[0], job.settings, job.every_row)
         save_figures(plot, make_figures(frames, "frames", figure))
     else:
-        comparison = compare_tables(job.kept)
-        save_figures(plot, make_figures(job.kept, "table", figure, comparison=comparison))
+        rows = job.every_row
+        comparison = compare_tables(rows)
+        save_figures(plot, make_figures(rows, "table", figure, comparison=comparison))

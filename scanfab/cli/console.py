@@ -95,19 +95,18 @@ def announce_compiling() -> None:
 
 
 def print_csv(
-    rows: Iterable[Mapping[str, Any]], excerpt: Excerpt, kind: type | Sequence[column.Column] = Row
+    rows: Iterable[Mapping[str, Any]], excerpt: Excerpt, columns: Sequence[column.Column]
 ) -> None:
-    """Rows of a kind, or of some columns, as CSV on standard output, each as it comes."""
-    from scanfab.table.columns import columns_of
+    """Rows as CSV on standard output, each as it comes."""
     from scanfab.table.formats import OWN_FORMATS
     from scanfab.table.writing import write_to
 
-    write_to(sys.stdout, OWN_FORMATS[0], rows, columns_of(kind), excerpt)
+    write_to(sys.stdout, OWN_FORMATS[0], rows, columns, excerpt)
 
 
 def print_table(rows: Iterable[Row], excerpt: Excerpt) -> None:
     """A readable table on standard output: the columns that were asked for, or those that fit."""
-    from scanfab.table.reading import total_error
+    from scanfab.table.row import total_error
 
     values = [dict(row) for row in rows]
     for row in values:

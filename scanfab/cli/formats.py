@@ -11,7 +11,7 @@ import click
 def formats() -> None:
     """List every reader and writer, its extensions, and the package it comes from."""
     from scanfab.cli.console import reported_warnings
-    from scanfab.io.registry import installed_readers
+    from scanfab.io.reader import installed_readers
     from scanfab.io.writer import installed_writers
     from scanfab.table.formats import known_formats
     from scanfab.viz.figures.style import PLOT_FORMATS
@@ -44,7 +44,7 @@ def formats() -> None:
 
 def _described(plugin: Any) -> str:
     """What it is, and how to get the package that it needs."""
-    from scanfab.io.registry import lacking
+    from scanfab.io.reader import lacking
 
     advice = lacking(plugin)
     return f"{plugin.description}{'' if advice is None else f' (not installed: {advice})'}"

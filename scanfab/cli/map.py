@@ -63,7 +63,7 @@ def map(
         job = finished_job(
             ctx, sources, chosen, MapSettings, told,
             output=output, resume=resume, manifest=manifest, vtk=vtk,
-            drawn=None if plot is None else _columns_drawn(),
+            drawn=() if plot is None else _columns_drawn(),
             draw=draw,
         )  # fmt: skip
         draw(job)
@@ -83,4 +83,4 @@ def _draw(plot: Path, job: Job) -> None:
     if not job.found_void_fabric:
         click.echo(f"scanfab: {plot} is not drawn: no row has a void fabric", err=True)
     else:
-        save_figures(plot, make_figures(Table(job.kept, job.settings.columns), "map"))
+        save_figures(plot, make_figures(Table(job.every_row, job.settings.columns), "map"))

@@ -30,7 +30,7 @@ def merge(parts: tuple[Path, ...], output: Path | None, frames: str | None) -> i
     """
     from scanfab.cli.console import is_readable, print_csv, print_table, reported_warnings
     from scanfab.io.options import parse_frames
-    from scanfab.pipeline.cluster.merging import check_output, merged
+    from scanfab.pipeline.merge import check_output, merged
 
     with reported_warnings():
         with usage_errors():

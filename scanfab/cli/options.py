@@ -111,17 +111,16 @@ def _complete_fields(
     ctx: click.Context, parameter: click.Parameter, text: str
 ) -> list[CompletionItem]:
     """The columns of what a command writes, behind those that are named already."""
+    from scanfab.base.column import columns_of_fields
     from scanfab.pipeline.calibration_ladders import StepRow
-    from scanfab.table.columns import MORE_COLUMNS, columns_of
-    from scanfab.table.comparison_rows import FrameRow, SummaryRow
-    from scanfab.table.map_columns import map_columns
-    from scanfab.table.row import Row
+    from scanfab.table.columns import MORE_COLUMNS, map_columns, table_columns
+    from scanfab.table.compare import FRAMES, SUMMARY
 
-    of_compare = SummaryRow if ctx.params.get("summary") else FrameRow
-    kind: type = {"calibrate": StepRow, "compare": of_compare}.get(str(ctx.command.name), Row)
-    columns = (*columns_of(kind), *(MORE_COLUMNS if kind is Row else ()))
-    if ctx.command.name == "map":
-        columns = map_columns(("edge",), shells=True)
+    columns = {
+        "calibrate": columns_of_fields(StepRow),
+        "compare": SUMMARY if ctx.params.get("summary") else FRAMES,
+        "map": map_columns(("edge",), shells=True),
+    }.get(str(ctx.command.name), (*table_columns(), *MORE_COLUMNS))
     before, comma, last = text.rpartition(",")
     names = [one.name for one in columns if one.name not in before.split(",")]
     return [CompletionItem(before + comma + name) for name in names if name.startswith(last)]

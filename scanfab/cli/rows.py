@@ -23,8 +23,7 @@ if TYPE_CHECKING:
     from scanfab.pipeline.job import Job
     from scanfab.pipeline.settings import Settings
     from scanfab.pipeline.told import Told
-    from scanfab.table.result_file import ResultFile
-    from scanfab.table.writing import Excerpt
+    from scanfab.table.writing import Excerpt, ResultFile
 
 
 def finished_job(
@@ -39,7 +38,7 @@ def finished_job(
     manifest: Path | None,
     vtk: Path | None,
     check: Callable[[list[Series], dict[str, Any]], None] = lambda series, chosen: None,
-    drawn: Sequence[str] | None = None,
+    drawn: Sequence[str] = (),
     draw: Callable[[Job], object] = lambda job: None,
 ) -> Job:
     """
@@ -79,20 +78,17 @@ def finished_job(
                 reading=reading,
                 resume=resume,
                 manifest_path=manifest,
+                more=settings_file.asked(),
                 observers=() if vtk is None else vtk_folders(vtk, len(series), settings, resume),
                 told=told,
-                keep=drawn is not None,
                 executor=executor,
             )
         if followed is not None:
             stack.enter_context(ending_in_order(followed.end))
             followed.when_idle(_Redraw(job, draw))
         with usage_errors():
-            stack.enter_context(job.begun())
-            if drawn is not None and job.table is not None:
-                job.table.check_columns(drawn)
+            stack.enter_context(job.begun(drawn))
         _write_or_say(job, excerpt)
-    job.save_manifests(settings_file.asked())
     return job
 
 
@@ -100,8 +96,7 @@ def _asked(
     chosen: dict[str, Any], kind: type[Settings], output: Path | None
 ) -> tuple[Settings, Excerpt, ResultFile | None]:
     """What the options that are not those of reading ask for, and the file that it goes to."""
-    from scanfab.table.result_file import ResultFile
-    from scanfab.table.writing import Excerpt
+    from scanfab.table.writing import Excerpt, ResultFile
 
     fields, digits = chosen.pop("fields"), int(chosen.pop("digits"))
     settings = kind(**chosen)
@@ -183,9 +178,9 @@ def _write_or_say(job: Job, excerpt: Excerpt) -> None:
 
 def _standing(job: Job, printed: bool) -> str:
     """How far a job is, and how to go on."""
-    if not job.done and job.table is not None:
+    if job.result is not None and job.done == job.taken_over > 0 and job.result.path.exists():
         return (
-            f"before the first new frame was finished: {job.table.path} is as it was; the same "
+            f"before the first new frame was finished: {job.result.path} is as it was; the same "
             f"command goes on"
         )
     if not job.done:
@@ -208,8 +203,10 @@ def _write(job: Job, excerpt: Excerpt) -> None:
         if job.result is not None:
             job.write(advance)
             return
-        if not is_readable():
+        if is_table := is_readable():
+            rows = list(job.rows(advance))
+        else:
             print_csv(job.rows(advance), excerpt, job.settings.columns)
-            return
-        rows = list(job.rows(advance))
-    print_table(rows, excerpt)
+    if is_table:
+        print_table(rows, excerpt)
+    job.save_manifests()

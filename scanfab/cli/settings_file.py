@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -61,7 +60,7 @@ def fill_from_file(
 
     A note says which; a file that cannot be right is a usage error in every command.
     """
-    from scanfab.base.errors import ScanfabNote
+    from scanfab.base.errors import note
 
     path = _path_beside(sources)
     if path is None:
@@ -78,7 +77,7 @@ def fill_from_file(
             filled[name] = _from_toml(ctx, path, parameter, value)
             used.append(key)
     if used:
-        warnings.warn(f"options from {path}: {', '.join(used)}", ScanfabNote, stacklevel=2)
+        note(f"options from {path}: {', '.join(used)}")
     return filled, SettingsFile(path, given, tuple(used))
 
 

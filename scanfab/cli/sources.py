@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -68,7 +69,7 @@ def open_series(sources: tuple[str, ...], reading: dict[str, Any]) -> list[Serie
     from dataclasses import replace
 
     from scanfab.base.errors import ReadError
-    from scanfab.io.files import temporary_copy
+    from scanfab.io.files import PART, temporary_copy
     from scanfab.io.sources import open_sources, read_series
 
     if "-" not in sources:
@@ -77,7 +78,7 @@ def open_series(sources: tuple[str, ...], reading: dict[str, Any]) -> list[Serie
         raise click.UsageError("standard input needs --format NAME")
     if len(sources) > 1:
         raise click.UsageError("standard input is a series of its own: name no other source")
-    copy = temporary_copy(sys.stdin.buffer, "standard input")
+    copy = temporary_copy(iter(partial(sys.stdin.buffer.read, PART), b""), "standard input")
     if copy.stat().st_size == 0:
         raise ReadError("standard input: expected a dump, found nothing")
     return [replace(read_series(copy, **reading), name="-")]
@@ -92,7 +93,7 @@ def _leading_numbers(words: list[str], counts: tuple[int, ...]) -> int:
 
 
 def _check_format(name: str) -> None:
-    from scanfab.io.registry import reader_named
+    from scanfab.io.reader import reader_named
 
     with usage_errors("--format: "):
         reader_named(name)

@@ -151,24 +151,21 @@ def working(
     """
     Show progress while something works; what is yielded is called after each frame.
 
-    With ``new=False`` the frame was taken over from an earlier run, so that it took no time.
-
     On a terminal that is a bar with the time that is left, in a log a line a minute; nothing with
     --quiet. With --verbose each step is a line. What ``prints`` as it goes shows by itself how far
     it is on a terminal.
     """
     work, chosen = _Work(total, done), level()
     if chosen is Level.QUIET:
-        yield lambda new=True: None
+        yield lambda: None
         return
     with _listening(_say if chosen is Level.VERBOSE else None) as heard:
         on_terminal = chosen is Level.USUAL and sys.stderr.isatty()
         on_terminal = on_terminal and not (prints and sys.stdout.isatty())
         with _bar(work, heard) if on_terminal else _lines(work, heard) as show:
 
-            def advance(new: bool = True) -> None:
+            def advance() -> None:
                 work.done += 1
-                work.before += not new
                 show()
 
             yield advance

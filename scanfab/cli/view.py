@@ -90,8 +90,7 @@ def _show(
 ) -> None:
     from dataclasses import replace
 
-    from scanfab.table.abscissa import spelt_strain
-    from scanfab.table.curves import middle_out
+    from scanfab.table.curves import middle_out, spelt_strain
     from scanfab.viz.frame_view import look_at
     from scanfab.viz.scene import section_lines
     from scanfab.viz.window3d import check_screen, show_scene

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from scanfab.base.column import Column
 from scanfab.base.space import SPACE, Space
-from scanfab.fabric.tensor import FabricTensor, tensor_columns, tensor_values
+from scanfab.fabric.tensor import FabricTensor, error_of_mean, tensor_columns, tensor_values
 
 if TYPE_CHECKING:
     from scanfab.fabric.measured import Measured
@@ -62,9 +62,7 @@ def axial_error(normals: npt.ArrayLike, axis: npt.ArrayLike, space: Space = SPAC
     by √N_c; None for fewer than two contacts.
     """
     cosine = np.asarray(normals, dtype=np.float64) @ np.asarray(axis, dtype=np.float64)
-    if len(cosine) < 2:
-        return None
-    return float(np.std(space.axial(cosine**2), ddof=1) / np.sqrt(len(cosine)))
+    return error_of_mean(space.axial(cosine**2))
 
 
 class Contact:

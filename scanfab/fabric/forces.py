@@ -208,10 +208,13 @@ def _mean_by_direction(
     along = (vectors @ a) * (n @ a) - np.einsum("ci,ci->c", vectors, n) / dimension
     less = dimension / (dimension - 1.0)
     ratio = float(weights @ along) / count / scale
-    influence = _influence(n, weights, along - ratio * size, space)
-    error = (
-        less * factor / scale * np.std(influence, ddof=1) / np.sqrt(count) if count > 1 else None
-    )
+    # By how much each contact moves the mean, times their number. A contact counts in the mean, and
+    # moves C, and so the weights of all: without this second part the error would be several times
+    # too large.
+    values = along - ratio * size
+    through = space.second_order * ((weights**2 * values)[:, None] * n).T @ n / count
+    moved = weights * values - np.einsum("ci,ij,cj->c", n, through, n)
+    error = less * factor / scale * np.std(moved, ddof=1) / np.sqrt(count) if count > 1 else None
     return DirectionalMean(matrix, less * factor * ratio, None if error is None else float(error))
 
 
@@ -223,35 +226,6 @@ def _weights(normals: FloatArray, space: Space) -> FloatArray | None:
     deviator = space.second_order * (fabric.matrix - space.identity / space.dimension)
     density = 1.0 + np.einsum("ci,ij,cj->c", normals, deviator, normals)
     return None if density.min() <= 0.0 else 1.0 / density
-
-
-def _influence(
-    normals: FloatArray, weights: FloatArray, values: FloatArray, space: Space
-) -> FloatArray:
-    """
-    By how much each contact moves the mean of weights times values, times their number.
-
-    A contact counts in the mean, and moves C, and so the weights of all: without this second part
-    the error would be several times too large.
-    """
-    count = len(normals)
-    through = space.second_order * ((weights**2 * values)[:, None] * normals).T @ normals / count
-    moved: FloatArray = weights * values
-    moved -= np.einsum("ci,ij,cj->c", normals, through, normals)
-    return moved
-
-
-def _tensor_columns(name: str, what: str) -> tuple[Column, ...]:
-    return tuple(Column(f"{name}_{one}", float, "", f"{one} of {what}") for one in COMPONENTS)
-
-
-def _axial_columns(name: str, what: str) -> tuple[Column, ...]:
-    return (
-        Column(f"alpha_{name}_axial", float, "", f"{what}, signed, along the loading axis"),
-        Column(
-            f"alpha_{name}_axial_se", float, "", "its standard error if contacts were independent"
-        ),
-    )
 
 
 TENSORS = {
@@ -274,8 +248,19 @@ class Forces:
     """The columns of branches, forces, and strong and weak contacts."""
 
     columns = (
-        *(column for name, what in TENSORS.items() for column in _tensor_columns(name, what)),
-        *(column for name, what in AXIAL.items() for column in _axial_columns(name, what)),
+        *(
+            Column(f"{name}_{one}", float, "", f"{one} of {what}")
+            for name, what in TENSORS.items()
+            for one in COMPONENTS
+        ),
+        *(
+            Column(f"alpha_{name}_axial{suffix}", float, "", meaning)
+            for name, what in AXIAL.items()
+            for suffix, meaning in (
+                ("", f"{what}, signed, along the loading axis"),
+                ("_se", "its standard error if contacts were independent"),
+            )
+        ),
     )
 
     def values(self, measured: Measured) -> dict[str, Any]:
@@ -324,25 +309,19 @@ def _contact_values(
     }
 
 
-def _is_frictionless(normals: FloatArray, forces: ContactForces) -> bool:
-    """Whether all forces are along the normals, but for the digits of the dump."""
-    assert forces.force is not None
-    tangential = forces.force - forces.force_n[:, None] * normals
-    return bool(np.abs(tangential).max() <= NO_FRICTION * np.abs(forces.force_n).mean())
-
-
 def doubts_of_forces(measured: Measured) -> dict[str, str]:
     """Why some of these columns are empty, or 0, by the code of a note."""
     forces = measured.forces
     if forces is None or not len(measured.normals):
         return {}
     texts = {}
+    normal = forces.force_n
     if _weights(measured.normals, measured.space) is None:
         texts["few_contacts"] = (
             "the contacts are so few, or so anisotropic, that 1 + n·C·n is not above 0 in "
             "some direction: bn, fn and ft are empty"
         )
-    elif forces.force_n.sum() <= 0.0:
+    elif normal.sum() <= 0.0:
         texts["tension"] = (
             "the contacts pull in the mean, so fn and ft are empty: is the force in the dump "
             "that on the other grain?"
@@ -351,7 +330,11 @@ def doubts_of_forces(measured: Measured) -> dict[str, str]:
         texts["no_tangential"] = (
             "the dump has the normal part of the contact forces only: ft is empty"
         )
-    elif _is_frictionless(measured.normals, forces):
+    elif (
+        np.abs(forces.force - normal[:, None] * measured.normals).max()
+        <= NO_FRICTION * np.abs(normal).mean()
+    ):
+        # all forces are along the normals, but for the digits of the dump
         texts["no_tangential"] = (
             "no contact has a tangential force, so ft is 0: are the contacts without friction, "
             "or is the force of `contact_columns` its normal part only (LAMMPS: name tx, ty, "

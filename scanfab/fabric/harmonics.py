@@ -19,6 +19,7 @@ from scanfab.base.column import Column
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.distribution import harmonics_of
+from scanfab.fabric.tensor import error_of_mean
 
 if TYPE_CHECKING:
     from scanfab.fabric.measured import Measured
@@ -171,7 +172,7 @@ def _of_voids(void: VoidFabric, axis: FloatArray, space: Space) -> dict[str, Any
         means = np.sum(weights * harmonic(order, void.axes @ axis, space), axis=1)
         values = harmonics_of(order, space) * means
         found[f"vs_a{order}"] = float(values.mean())
-        found[f"vs_a{order}_se"] = _error(values)
+        found[f"vs_a{order}_se"] = error_of_mean(values)
     tensor = tensor4(void.axes.reshape(-1, 3), weights.ravel())
     return {**found, "vs_tensor4": tensor.ravel().tolist()}
 
@@ -182,10 +183,5 @@ def _of_contacts(normals: FloatArray, axis: FloatArray, space: Space) -> dict[st
     for order in ORDERS:
         values = harmonics_of(order, space) * harmonic(order, normals @ axis, space)
         found[f"c_a{order}"] = float(values.mean())
-        found[f"c_a{order}_se"] = _error(values)
+        found[f"c_a{order}_se"] = error_of_mean(values)
     return {**found, "c_tensor4": tensor4(normals, np.ones(len(normals))).ravel().tolist()}
-
-
-def _error(values: FloatArray) -> float | None:
-    """Standard error of the mean; None for one value."""
-    return float(np.std(values, ddof=1) / np.sqrt(len(values))) if len(values) > 1 else None

@@ -1,5 +1,5 @@
 """
-Invariants of the fabric tensors: F = 15/2 (G - I/3), a = √(3/2 F:F), principal values, b.
+Invariants of the fabric tensors: F = 15/2 (G - I/3), a = √(3/2 F:F), principal values and axes, b.
 
 Of discs F = 4 (G - I/2), a = √(1/2 F:F), and there is no b.
 
@@ -18,7 +18,7 @@ import numpy as np
 from scanfab.base.column import Column
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
-from scanfab.fabric.tensor import FabricTensor
+from scanfab.fabric.tensor import FabricTensor, error_of_mean
 
 if TYPE_CHECKING:
     from scanfab.fabric.measured import Measured
@@ -153,16 +153,20 @@ class Invariants:
         if measured.void is not None:
             tensors = measured.void.replicates
             found |= _values("vs", measured.void.tensor, measured.segment_count)
-            found["f_vs_bias"] = _scan_bias(tensors, measured.space)
-            found |= _errors("vs", measured.void.tensor, lambda form: _scatter(tensors, form))
+            if len(tensors) > 1:
+                # all are of trace 1, so the components of the deviator share what there is of
+                # variance in the mean of the replicates
+                freedom = COMPONENTS_OF_DEVIATOR[measured.space.dimension]
+                variance = float(np.sum(np.var(tensors, axis=0, ddof=1))) / freedom / len(tensors)
+                found["f_vs_bias"] = bias_of(measured.space) * math.sqrt(variance)
+            found |= _errors("vs", measured.void.tensor, tensors)
         if measured.contact is not None:
             count = len(measured.normals)
             found |= _values("c", measured.contact, count)
             variance = CONTACT_VARIANCE[measured.space.dimension]
             found["f_c_bias"] = bias_of(measured.space) * math.sqrt(variance / count)
             n = measured.normals
-            pairs = np.einsum("ci,cj->cij", n, n)
-            found |= _errors("c", measured.contact, lambda form: _scatter(pairs, form))
+            found |= _errors("c", measured.contact, np.einsum("ci,cj->cij", n, n))
         return found
 
 
@@ -179,36 +183,52 @@ def _values(name: str, tensor: FabricTensor, count: int) -> dict[str, float | No
     }
 
 
-def _scan_bias(tensors: FloatArray, space: Space) -> float | None:
-    """What the scatter of replicates, shape (R, 3, 3), gives a of their mean; None for one."""
-    count = len(tensors)
-    if count < 2:
-        return None
-    # all are of trace 1, so the components of the deviator share what there is of variance
-    freedom = COMPONENTS_OF_DEVIATOR[space.dimension]
-    variance = float(np.sum(np.var(tensors, axis=0, ddof=1))) / freedom / count
-    return bias_of(space) * math.sqrt(variance)
+def _errors(name: str, tensor: FabricTensor, each: FloatArray) -> dict[str, float | None]:
+    """
+    Of a and of the principal values: to first order each is linear in G.
 
-
-def _scatter(tensors: FloatArray, form: FloatArray) -> float | None:
-    """Standard error of the mean of T:form over some tensors, shape (M, 3, 3)."""
-    count = len(tensors)
-    if count < 2:
-        return None
-    along = np.einsum("cij,ij->c", tensors, form)
-    return float(np.std(along, ddof=1) / math.sqrt(count))
-
-
-def _errors(name: str, tensor: FabricTensor, scatter: Any) -> dict[str, float | None]:
-    """Of a and of the principal values: to first order each is linear in G."""
+    G is the mean of each tensor, shape (M, 3, 3).
+    """
     space = tensor.space
     deviator = fabric_deviator(tensor.matrix, space)
     size = float(np.linalg.norm(deviator))
-    found: dict[str, float | None] = {}
+    forms = {f"g{name}_{k}": np.outer(one, one) for k, one in enumerate(tensor.principal_axes, 1)}
     if size > 0.0:
-        found[f"f_{name}_se"] = scatter(
-            math.sqrt(space.intensity) * space.second_order * deviator / size
-        )
-    for k, axis in enumerate(tensor.principal_axes, start=1):
-        found[f"g{name}_{k}_se"] = scatter(np.outer(axis, axis))
-    return found
+        forms[f"f_{name}"] = math.sqrt(space.intensity) * space.second_order * deviator / size
+    return {
+        f"{of}_se": error_of_mean(np.einsum("cij,ij->c", each, form)) for of, form in forms.items()
+    }
+
+
+class Orientation:
+    """The columns of the major axes of both fabrics, and of the angle: are they coaxial?"""
+
+    columns = (
+        *(
+            Column(
+                f"{prefix}_axis_{one}",
+                float,
+                "",
+                f"{one} of the direction of the {what}'s largest principal value, a unit vector",
+            )
+            for prefix, what in (("gvs", "void fabric"), ("gc", "contact fabric"))
+            for one in "xyz"
+        ),
+        Column(
+            "coaxiality_deg",
+            float,
+            "degrees",
+            "angle between the major axes of void and contact fabric, 0 to 90",
+        ),
+    )
+
+    def values(self, measured: Measured) -> dict[str, Any]:
+        """Of what there is: an angle needs both fabrics."""
+        void = measured.void.tensor if measured.void else None
+        contact = measured.contact
+        found: dict[str, Any] = {}
+        for prefix, tensor in (("gvs", void), ("gc", contact)):
+            axis = [None] * 3 if tensor is None else tensor.major_axis.tolist()
+            found |= {f"{prefix}_axis_{one}": x for one, x in zip("xyz", axis, strict=True)}
+        found["coaxiality_deg"] = void.angle_to(contact) if void and contact else None
+        return found

@@ -10,19 +10,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping
-from importlib.metadata import entry_points
 from typing import Any, Protocol
 
 from scanfab.base.column import Column
 from scanfab.base.errors import ScanfabError
-from scanfab.base.plugins import having, load_offers
+from scanfab.base.plugins import having, load_plugins
 from scanfab.fabric.contact import Contact
 from scanfab.fabric.forces import Forces
 from scanfab.fabric.harmonics import Harmonics
-from scanfab.fabric.invariants import Invariants
+from scanfab.fabric.invariants import Invariants, Orientation
 from scanfab.fabric.jackknife import Halves, Scatter
 from scanfab.fabric.measured import Measured
-from scanfab.fabric.orientation import Orientation
 from scanfab.fabric.state import State
 from scanfab.fabric.void import Void
 
@@ -69,7 +67,7 @@ def load_fabrics(taken: Iterable[str]) -> dict[str, Fabric]:
         If two packages use one name for a fabric, or for a column.
     """
     names = set(taken)
-    offers = load_offers(entry_points(group=GROUP), "fabric", lambda one: _fabric(one, names))
+    offers = load_plugins(GROUP, "fabric", lambda one: _fabric(one, names))
     owners: dict[str, str] = {}
     for name, offer in offers.items():
         who = f"{name!r} of {offer.package}"

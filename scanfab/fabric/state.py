@@ -22,7 +22,7 @@ from scanfab.base.column import Column
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.invariants import fabric_deviator
-from scanfab.fabric.tensor import COMPONENTS, FabricTensor
+from scanfab.fabric.tensor import COMPONENTS, FabricTensor, error_of_mean
 
 if TYPE_CHECKING:
     from scanfab.fabric.measured import Measured
@@ -197,10 +197,8 @@ def _against_stress(measured: Measured, state: SampleState) -> dict[str, float |
 def _values(
     name: str, fabric: FabricTensor, direction: FloatArray, stress: FabricTensor, each: FloatArray
 ) -> dict[str, float | None]:
-    count = len(each)
-    error = float(np.std(each, ddof=1) / math.sqrt(count)) if count > 1 else None
     return {
         f"acst_{name}": float(np.sum(fabric_deviator(fabric.matrix, fabric.space) * direction)),
         f"angle_{name}_stress": fabric.angle_to(stress),
-        f"acst_{name}_se": error,
+        f"acst_{name}_se": error_of_mean(each),
     }

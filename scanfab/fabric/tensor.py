@@ -16,6 +16,11 @@ from scanfab.base.typing import FloatArray
 COMPONENTS = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
 
 
+def error_of_mean(values: FloatArray) -> float | None:
+    """Standard error of the mean of independent values, shape (M,); None for fewer than two."""
+    return float(np.std(values, ddof=1) / np.sqrt(len(values))) if len(values) > 1 else None
+
+
 def axial(tensor: npt.NDArray[np.float64], axis: npt.ArrayLike, space: Space = SPACE) -> FloatArray:
     """
     Signed anisotropy along an axis: a·G·a - (1 - a·G·a)/2, in a plane a·G·a - b·G·b.

@@ -18,7 +18,13 @@ from scanfab.base.column import LENGTH, Column
 from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.fabric.tensor import FabricTensor, axial, tensor_columns, tensor_values
+from scanfab.fabric.tensor import (
+    FabricTensor,
+    axial,
+    error_of_mean,
+    tensor_columns,
+    tensor_values,
+)
 
 if TYPE_CHECKING:
     from scanfab.fabric.measured import Measured
@@ -93,11 +99,7 @@ class VoidFabric:
         float or None
             None for one replicate.
         """
-        count = len(self.replicates)
-        if count < 2:
-            return None
-        along = axial(self.replicates, axis, self.tensor.space)
-        return float(np.std(along, ddof=1) / np.sqrt(count))
+        return error_of_mean(axial(self.replicates, axis, self.tensor.space))
 
     def expected_error(self, axis: npt.ArrayLike, degree: int | None = None) -> float | None:
         """

@@ -17,9 +17,8 @@ from scanfab.io.reader import (
     ReadOptions,
     Snapshot,
 )
-from scanfab.io.writer import Left, Writer
-from scanfab.io.written import more_columns
-from scanfab.packing.walls import ListedWallForces
+from scanfab.io.writer import Left, Writer, more_columns
+from scanfab.packing.contacts import ListedWallForces
 
 __all__ = [
     "Carries",

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, MutableMapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.arrays import all_within, doubles
+from scanfab.base.arrays import doubles
 from scanfab.base.errors import ReadError
-from scanfab.base.typing import FloatArray
+from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.reader import BODIES, WALLS, GrainTable, ReadOptions
-from scanfab.io.sizes import refuse_other_size
+from scanfab.packing.bodies import CLUMP_COLUMNS, MOLECULE_COLUMNS
 from scanfab.packing.cell import Cell
-from scanfab.packing.packing import lies_within
 
 Columns = Mapping[str, npt.NDArray[Any]]
 
@@ -38,8 +37,11 @@ OLD_EXPONENTS, SIX_DIGITS = ("roundness1", "roundness2"), 1e-5
 MOST_TURNS = 1e9
 # without a cell, no grain is so many times as far away as the others, where there are some
 FAR, FEW = 1e12, 10
-# whole numbers below 2^53 are exact as decimals
-MOST_DECIMAL = 2.0**53 - 1.0
+# a diameter that differs from twice the radius by more than this share of it is another size:
+# numbers of few digits are rounded
+ROUNDED = 0.05
+# whole numbers below this are exact as decimals
+EXACT = 2.0**53
 
 
 def has_radius(names: Sequence[str]) -> bool:
@@ -73,20 +75,18 @@ def grain_table(
     ReadError
         If coordinates or radii cannot be found.
     """
-    rest = dict(columns)
-    named = _named_by_user(path, rest, options)
+    here = f"{path}{where}"
+    rest = _named_by_user(path, columns, options)
     cell = user_cell(path, cell, options)
-    position = _position(path, rest, named, cell, where)
-    radius = _radius(path, rest, named, len(position), options, where)
-    _refuse_far(path, position, radius, cell, where)
+    position = _position(here, rest, options, cell)
+    radius = _radius(here, rest, options, len(position))
+    _refuse_far(here, position, radius, cell)
+    _refuse_superquadrics(here, rest, radius)
     position.flags.writeable = False  # so that the packing need not copy it
-    id = named.get("id", _take(rest, ID_NAMES))
-    _refuse_superquadrics(path, rest, radius, where)
-    bodies, walls = (
-        whole_numbers(path, rest.pop(name), where) if name in rest else None
-        for name in (BODIES, WALLS)
+    id, bodies, walls = (
+        None if name is None else whole_numbers(path, rest.pop(name), where)
+        for name in (first_of(names, rest) for names in (ID_NAMES, [BODIES], [WALLS]))
     )
-    id = None if id is None else whole_numbers(path, id, where)
     return GrainTable(position, radius, id, rest, cell, wall_contacts=walls, bodies=bodies)
 
 
@@ -129,22 +129,17 @@ def refuse_named_twice(path: Path, named: Mapping[str, str], option: str) -> Non
     ReadError
         If two of them are the same column.
     """
-    places: dict[str, str] = {}
+    serves: dict[str, str] = {}
     for standard, own in named.items():
-        if own in places:
-            raise ReadError(
-                f"{path}: the column {own!r} is named twice in `{option}`, as {places[own]} and as "
-                f"{standard}: expected one column for each"
-            )
-        places[own] = standard
+        if serves.setdefault(own, standard) != standard:
+            both = f"as {serves[own]} and as {standard}"
+            raise ReadError(f"{path}: the column {own!r} is named twice in `{option}`, {both}")
 
 
-def _named_by_user(
-    path: Path, rest: MutableMapping[str, Any], options: ReadOptions
-) -> dict[str, Any]:
-    """Columns that the user named, taken out of the rest."""
-    named = {}
+def _named_by_user(path: Path, columns: Columns, options: ReadOptions) -> dict[str, Any]:
+    """All columns, those that the user named by their standard names."""
     refuse_named_twice(path, options.columns, "columns")
+    rest, named = dict(columns), {}
     for standard, own in options.columns.items():
         if own not in rest:
             raise ReadError(
@@ -152,112 +147,114 @@ def _named_by_user(
                 f"the columns are {', '.join(rest)}"
             )
         named[standard] = rest.pop(own)
-    for standard in [name for name in named if name not in ("x", "y", "z", "id", "radius")]:
-        rest[standard] = named.pop(standard)
-    return named
+    # a column that the file calls by a standard name is something else
+    return {name + "_of_dump" * (name in named): one for name, one in rest.items()} | named
 
 
 def _position(
-    path: Path, rest: MutableMapping[str, Any], named: dict[str, Any], cell: Cell | None, where: str
+    where: str, rest: dict[str, Any], options: ReadOptions, cell: Cell | None
 ) -> FloatArray:
+    """Take the coordinates out of the columns."""
     # a column of a dump may have that name, too
     if "position" in rest and np.ndim(rest["position"]) == 2:
-        return _lengths(path, rest.pop("position"), "a coordinate", where)
+        return _lengths(where, rest.pop("position"), "a coordinate")
     for names, scaled in POSITION_NAMES:
-        found = [
-            named[axis] if axis in named else _take(rest, (name,), keep=True)
-            for name, axis in zip(names.split(), "xyz", strict=True)
-        ]
-        if any(column is None for column in found):
+        known = zip(names.split(), "xyz", strict=True)
+        wanted = [first_of([a if a in options.columns else name], rest) for name, a in known]
+        if not all(wanted):
             continue
-        for name in names.split():
-            _take(rest, (name,))
-        position = _lengths(path, np.column_stack(found), "a coordinate", where)
+        found = np.column_stack([rest.pop(name) for name in wanted if name])
+        position = _lengths(where, found, "a coordinate")
         if not scaled:
             return position
         if cell is None:
-            raise ReadError(f"{path}{where}: {names} are fractions of a box, but there is no box")
+            raise ReadError(f"{where}: {names} are fractions of a box, but there is no box")
         # what is not finite is the packing's to refuse
         with np.errstate(over="ignore", invalid="ignore"):
             return np.asarray(cell.origin + position @ cell.vectors)
     raise ReadError(
-        f"{path}{where}: no coordinates: expected the columns x y z (or xu yu zu, xs ys zs), "
-        f"found {', '.join(rest) or 'none'}; name them with "
-        f'`columns={{"x": ..., "y": ..., "z": ...}}`'
+        f"{where}: no coordinates: expected the columns x y z (or xu yu zu, xs ys zs), found "
+        f'{", ".join(rest) or "none"}; name them with `columns={{"x": ..., "y": ..., "z": ...}}`'
     )
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def _refuse_far(
-    path: Path, position: FloatArray, radius: FloatArray, cell: Cell | None, where: str
-) -> None:
+def _refuse_far(where: str, position: FloatArray, radius: FloatArray, cell: Cell | None) -> None:
     """ReadError if a grain is so far away that rounding leaves nothing of its place or size."""
+    sound = position[np.isfinite(position).all(axis=1)]
     if cell is not None:
-        if lies_within(cell, position, -MOST_TURNS, MOST_TURNS):
-            return
-        turns = np.abs(cell.fractional(position[np.isfinite(position).all(axis=1)]))
-        if np.any(turns > MOST_TURNS):
+        turns = np.abs(cell.fractional(sound)[:, list(cell.periodic)]).max(initial=0.0)
+        if turns > MOST_TURNS:
             raise ReadError(
-                f"{path}{where}: a grain is {turns.max():g} cells away from the cell: has the cell "
-                f"the unit of the coordinates?"
+                f"{where}: a grain lies {turns:g} cells away: is the cell's unit right?"
             )
-        return
-    place = np.abs(position).max(axis=1)
-    if len(radius) < FEW or not np.all(np.isfinite(place)):
-        return
-    row = int(np.argmax(place))
-    if place[row] > FAR * max(radius.max(), np.median(place)):
-        raise ReadError(
-            f"{path}{where}: grain {row + 1} has a coordinate of {place[row]:g}, {FAR:g} times as "
-            f"far as other grains: is the number damaged?"
-        )
+    elif len(radius) >= FEW and len(sound) == len(position):
+        place = np.abs(position).max(axis=1)
+        row = int(np.argmax(place))
+        if place[row] > FAR * max(radius.max(), np.median(place)):
+            found = f"grain {row + 1} has a coordinate of {place[row]:g}, far from all others"
+            raise ReadError(f"{where}: {found}: is the number damaged?")
 
 
-def _radius(
-    path: Path,
-    rest: MutableMapping[str, Any],
-    named: dict[str, Any],
-    count: int,
-    options: ReadOptions,
-    where: str,
-) -> FloatArray:
-    if options.radius is not None:
-        if "radius" in named or has_radius(list(rest)):
-            raise ReadError(
-                f"{path}{where}: `radius` is for dumps without radii, but this one has them: "
-                f"leave it out"
-            )
-        return np.full(count, options.radius)
+def _radius(where: str, rest: dict[str, Any], options: ReadOptions, count: int) -> FloatArray:
+    """Take the radii out of the columns, or half the diameters; or the user's for all."""
     own = options.columns
-    if "radius" in named:
-        radius = _lengths(path, named["radius"], "a radius", where)
-        if "diameter" in own:
-            pair = own["radius"], own["diameter"]
-            refuse_other_size(path, radius, rest["diameter"], pair, where)
-        return radius
-    if "diameter" in own:
-        return 0.5 * _lengths(path, rest.pop("diameter"), "a diameter", where)
-    name = _first_of(RADIUS_NAMES, list(rest))
+    # of a size that the user names, the other need not be believed
+    sizes = own.keys() & {"radius", "diameter"} or {"radius", "diameter"}
+    name = first_of(RADIUS_NAMES, rest) if "radius" in sizes else None
+    other = first_of(DIAMETER_NAMES, rest) if "diameter" in sizes else None
+    if options.radius is not None:
+        if has_radius(list(rest)):
+            raise ReadError(f"{where}: `radius` is for dumps without radii, but this one has them")
+        return np.full(count, options.radius)
     if name is not None:
-        refuse_cylindrical(path, name, list(rest), where)
-        radius = _lengths(path, rest.pop(name), "a radius", where)
-        other = _first_of(DIAMETER_NAMES, list(rest))
-        if other is not None:
-            refuse_other_size(path, radius, rest[other], (name, other), where)
+        if "radius" not in own:
+            refuse_cylindrical(where, name, list(rest))
+        radius = _lengths(where, rest.pop(name), "a radius")
+        row = None if other is None else other_size(radius, rest[other])
+        if other is not None and row is not None:
+            sizes_of_row = f"{radius[row]:g} and {rest[other][row]:g}"
+            name, other = own.get("radius", name), own.get("diameter", other)
+            raise ReadError(
+                f"{where}: the columns {name!r} and {other!r} contradict each other: grain "
+                f"{row + 1} has {sizes_of_row}, no diameter of twice the radius: say which is "
+                f'right: `columns={{"radius": "{name}"}}` or `columns={{"diameter": "{other}"}}`'
+            )
         return radius
-    diameter = _take(rest, DIAMETER_NAMES)
-    if diameter is not None:
-        return 0.5 * _lengths(path, diameter, "a diameter", where)
+    if other is not None:
+        return 0.5 * _lengths(where, rest.pop(other), "a diameter")
     like = next((name for name in rest if LIKE_A_RADIUS.search(name)), "...")
     raise ReadError(
-        f"{path}{where}: no radius: expected a column radius (or diameter), found "
+        f"{where}: no radius: expected a column radius (or diameter), found "
         f'{", ".join(rest) or "none"}; name it with `columns={{"radius": "{like}"}}`'
-        f"{'' if like == '...' else ' (if that is one)'}, or give one radius for all grains with "
-        f"`radius`"
+        f"{' (if that is one)' * (like != '...')}, or give one radius for all grains with `radius`"
     )
 
 
-def _refuse_superquadrics(path: Path, rest: Columns, radius: FloatArray, where: str) -> None:
+def other_size(radius: FloatArray, diameter: npt.NDArray[Any]) -> int | None:
+    """
+    The first grain whose diameter is not twice its radius, as nearly as numbers are printed.
+
+    Parameters
+    ----------
+    radius : ndarray, shape (N,)
+        Dump's length unit.
+    diameter : ndarray
+        A column that may be one of diameters.
+
+    Returns
+    -------
+    int or None
+        Its row; None if all agree, or the column is none of lengths.
+    """
+    if diameter.shape != radius.shape or diameter.dtype.kind not in "iuf":
+        return None
+    with np.errstate(over="ignore", invalid="ignore"):
+        differ = np.abs(2.0 * radius - diameter) > ROUNDED * 2.0 * radius
+    return int(np.argmax(differ)) if differ.any() else None
+
+
+def _refuse_superquadrics(where: str, rest: Columns, radius: FloatArray) -> None:
     """ReadError if some particles are no spheres: their radius is that of a sphere around them."""
     expected = dict.fromkeys(HALF_AXES, radius) | dict.fromkeys((*EXPONENTS, *OLD_EXPONENTS), 2.0)
     for name in [name for name in rest if name.lower() in expected]:
@@ -265,61 +262,90 @@ def _refuse_superquadrics(path: Path, rest: Columns, radius: FloatArray, where: 
         count = np.count_nonzero(np.abs(rest[name] - value) > SIX_DIGITS * np.abs(value))
         if count:
             raise ReadError(
-                f"{path}{where}: {count} of {len(radius)} particles are superquadrics (by the "
-                f"column {name}), whose radius is that of the sphere around them: scanfab measures "
-                f"spheres, and clumps of spheres; fill them with spheres, and say with `bodies` "
-                f"which of these are one particle"
+                f"{where}: {count} of {len(radius)} particles are superquadrics (by the column "
+                f"{name}): fill them with spheres, and say with `bodies` which of these are one "
+                f"particle"
             )
 
 
-def refuse_cylindrical(path: Path, name: str, names: Sequence[str], where: str = "") -> None:
+def refuse_cylindrical(where: object, name: str, names: Sequence[str]) -> None:
     """ReadError for an r that stands beside an angle: it may be the distance from an axis."""
-    angle = _first_of(ANGLES, names)
+    angle = first_of(ANGLES, names)
     if name.lower() == "r" and angle is not None:
         raise ReadError(
-            f"{path}{where}: the column {name} may be a radius of grains or, beside {angle}, the "
-            f'distance from an axis: say which column is the radius, by `columns={{"radius": ...}}`'
+            f"{where}: the column {name} may be a radius of grains or, beside {angle}, the "
+            f'distance from an axis: name the radius with `columns={{"radius": ...}}`'
         )
 
 
-def _take(rest: MutableMapping[str, Any], names: Sequence[str], keep: bool = False) -> Any:
-    """The first column that has one of the names; taken out of the rest unless kept."""
-    found = _first_of(names, list(rest))
-    if found is None:
-        return None
-    return rest[found] if keep else rest.pop(found)
-
-
-def _first_of(known: Sequence[str], names: Sequence[str]) -> str | None:
-    """The first name that is one of those known, in the order of these."""
-    lower = {name.lower(): name for name in reversed(names)}
+def first_of(known: Sequence[str], names: Iterable[str]) -> str | None:
+    """The first name that is one of those known, in the order of these; without regard to case."""
+    lower = {name.lower(): name for name in reversed([*names])} | {name: name for name in names}
     return next((lower[name] for name in known if name in lower), None)
 
 
 def whole_numbers(path: Path, values: npt.ArrayLike, where: str = "") -> npt.NDArray[np.int64]:
     """Ids as whole numbers; ReadError if they are not."""
     numbers = np.asarray(values)
-    if numbers.ndim != 1 or not _are_whole(numbers):
-        raise ReadError(
-            f"{path}{where}: ids must be whole numbers, below 2^53 where they are read as decimals"
-        )
+    is_whole = numbers.ndim == 1 and numbers.dtype.kind in "biuf"
+    if is_whole and numbers.dtype.kind == "f":
+        # larger decimals may have been rounded; comparisons with NaN are false
+        is_whole = bool(np.all((np.abs(numbers) < EXACT) & (numbers == np.rint(numbers))))
+    if is_whole and numbers.dtype.kind == "u":
+        is_whole = bool(np.all(numbers <= np.iinfo(np.int64).max))
+    if not is_whole:
+        told = "ids must be whole numbers, below 2^53 where they are read as decimals"
+        raise ReadError(f"{path}{where}: {told}")
     whole = numbers.astype(np.int64, copy=False)
     whole.flags.writeable = False  # so that the packing need not copy it
     return whole
 
 
-def _are_whole(numbers: npt.NDArray[Any]) -> bool:
-    if numbers.dtype == np.int64 or numbers.size == 0:
-        return True
-    # larger decimals may have been rounded; comparisons with NaN are false
-    if numbers.dtype.kind == "f" and not all_within(numbers, -MOST_DECIMAL, MOST_DECIMAL):
-        return False
-    return numbers.dtype.kind in "biuf" and bool(np.all(numbers == numbers.astype(np.int64)))
-
-
-def _lengths(path: Path, values: npt.ArrayLike, what: str, where: str) -> FloatArray:
+def _lengths(where: str, values: npt.ArrayLike, what: str) -> FloatArray:
     """Numbers that may be lengths; which of them cannot be is the packing's to say."""
     array = np.asarray(values)
     if array.dtype.kind not in "biuf":
-        raise ReadError(f"{path}{where}: expected numbers for {what}, found {array.dtype}")
+        raise ReadError(f"{where}: expected numbers for {what}, found {array.dtype}")
     return doubles(array)
+
+
+def body_numbers(path: Path, grains: GrainTable, named: str | None) -> IntArray | None:
+    """
+    The number of the body that each sphere is of, shape (N,); negative: a grain of its own.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    grains : GrainTable
+        Of one frame.
+    named : str, optional
+        The column that says it; ``id``: each sphere is a grain. Without it a column that numbers
+        clumps whatever the format; one of molecules is never taken unasked, as these may be bonded
+        spheres that move against one another.
+
+    Returns
+    -------
+    ndarray of int, shape (N,), or None
+        None if each sphere is a grain.
+
+    Raises
+    ------
+    ReadError
+        If there is no such column, or it does not hold whole numbers.
+    """
+    columns, name = grains.columns, named
+    if named is None:
+        if grains.bodies is not None:
+            return grains.bodies
+        name = first_of(CLUMP_COLUMNS, columns)
+    # an empty frame may have lost its columns, and grains without ids are grains all the same
+    if name is None or not len(grains.radius) or (name == "id" and name not in columns):
+        return None
+    if name not in columns:
+        raise ReadError(
+            f"{path}: there is no column {name!r} to say which spheres are one body (`bodies`); "
+            f"the columns are {', '.join(['id', *columns])}"
+        )
+    numbers = whole_numbers(path, columns[name], f": `bodies`: the column {name}")
+    return np.where(numbers > 0, numbers, -1) if name.lower() in MOLECULE_COLUMNS else numbers

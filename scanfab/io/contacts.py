@@ -1,18 +1,22 @@
-"""Contact lists joined to rows of the grain table: by ids, or by the centres of both grains."""
+"""
+Contact lists joined to rows of the grain table: by ids, or by the centres of both grains.
+
+Where a file does not say on which grain its forces act, their sign is proved by the grains.
+"""
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.arrays import MOST
-from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
+from scanfab.base.errors import ReadError, note, warn
 from scanfab.base.typing import FloatArray, IntArray
+from scanfab.io.columns import whole_numbers
 from scanfab.io.reader import GrainTable, JoinedContacts, OtherGrainsError
 from scanfab.packing.contacts import ContactList
 
@@ -22,6 +26,10 @@ SAME_PLACE = 0.01
 NEAR = 1.1
 # a rule that holds for this share of all contacts holds
 NEARLY_ALL = 0.9
+# what programs call a contact of two grains; whatever else is one with a wall
+OF_GRAINS = ("ss", "ball-ball", "ball-pebble", "pebble-ball", "pebble-pebble", "rball-rball")
+
+Columns = Mapping[str, npt.NDArray[Any]]
 
 
 def rows_of_ids(grains: GrainTable, ids: npt.ArrayLike) -> IntArray:
@@ -41,7 +49,7 @@ def join_ids(
     ids: IntArray,
     force: FloatArray | None,
     *,
-    walls: bool | Literal["unknown"],
+    walls: bool | Literal["unknown", "negative"],
     image: IntArray | None = None,
     force_n: FloatArray | None = None,
 ) -> JoinedContacts:
@@ -58,8 +66,9 @@ def join_ids(
         As the file names them.
     force : ndarray, shape (M, 3), optional
         Force on the second grain.
-    walls : bool or "unknown"
+    walls : bool, "unknown" or "negative"
         Whether an id that no grain has is a wall's. ``unknown``: probably; a warning counts them.
+        ``negative``: if it is below 0.
     image : ndarray of int, shape (M, 3), optional
         Lattice translation of the second grain, from the positions of the table.
     force_n : ndarray, shape (M,) or (M, 3), optional
@@ -72,14 +81,8 @@ def join_ids(
     """
     if grains.id is None:
         raise ReadError(f"{path}: names grains by id, but the grain file has no ids")
-    rows = rows_of_ids(grains, ids)
-    return _join(
-        path,
-        ContactList(rows, image, force, force_n=force_n),
-        walls,
-        lambda contact, end: f"names the grain {ids[contact, end]}",
-        len(grains.radius),
-    )
+    listed = ContactList(rows_of_ids(grains, ids), image, force, force_n=force_n)
+    return _join(path, grains, listed, ids, "names the grain", walls)
 
 
 def join_positions(
@@ -111,23 +114,33 @@ def join_positions(
         If both ends of a contact are where no grain is.
     """
     points = ends.reshape(-1, 3)
-    for what, numbers in (("a contact ends", points), ("a grain is", grains.position)):
-        if not np.all(np.abs(numbers) < MOST):
-            raise ReadError(f"{path}: {what} at coordinates that are no finite numbers")
-    if not np.all((grains.radius > 0) & (grains.radius < MOST)):
-        raise ReadError(f"{path}: the radii of the grains must be finite and larger than zero")
-    rows = np.full(len(points), -1, dtype=np.int64)
-    if len(grains.position) and len(points):
-        rows = _grains_at(grains, points)
-        if grains.cell is None or not grains.cell.is_periodic:
-            _refuse_images(path, grains, rows.reshape(-1, 2), ends)
-    return _join(
-        path,
-        ContactList(rows.reshape(-1, 2), force=force, force_n=force_n),
-        True,
-        lambda contact, end: f"ends at {ends[contact, end].tolist()}, where no grain is",
-        len(grains.radius),
-    )
+    numbers = np.concatenate([points.ravel(), grains.position.ravel(), grains.radius])
+    if not np.all(np.abs(numbers) < MOST) or not np.all(grains.radius > 0):
+        raise ReadError(f"{path}: expected finite ends and centres, and finite radii above 0")
+    rows = _grains_at(grains, points).reshape(-1, 2)
+    if grains.cell is None or not grains.cell.is_periodic:
+        _refuse_images(path, grains, rows, ends)
+    listed = ContactList(rows, force=force, force_n=force_n)
+    return _join(path, grains, listed, ends, "ends at a grain at", True)
+
+
+def _grains_at(grains: GrainTable, points: FloatArray) -> IntArray:
+    """Rows of the grains whose centres are at the points; -1 where there is none."""
+    from scipy.spatial import KDTree
+
+    position, radius, row = grains.position, grains.radius, np.arange(len(grains.position))
+    if len(row) == 0 or len(points) == 0:
+        return np.full(len(points), -1, dtype=np.int64)
+    if grains.cell is not None and grains.cell.is_periodic:
+        points, position = grains.cell.wrap(points), grains.cell.wrap(position)
+        # rounding may put a point and its centre on opposite faces: images just outside help
+        margin = min(SAME_PLACE * float(radius.max()), float(grains.cell.heights.min()))
+        images, of, _ = grains.cell.images(position, margin)
+        position = np.concatenate([position, images])
+        row = np.concatenate([row, of])
+    distance, nearest = KDTree(position).query(points)
+    same = distance < SAME_PLACE * radius[row[nearest]]
+    return np.where(same, row[nearest], -1)
 
 
 def _refuse_images(path: Path, grains: GrainTable, rows: IntArray, ends: FloatArray) -> None:
@@ -145,17 +158,17 @@ def _refuse_images(path: Path, grains: GrainTable, rows: IntArray, ends: FloatAr
     lost = np.argmax(rows[one] < 0, axis=1)
     partner, point = rows[one, 1 - lost], ends[one, lost]
     length = np.linalg.norm(point - ends[one, 1 - lost], axis=1)[:, None]
-    image = np.zeros(len(one), dtype=bool)
+    is_image = np.zeros(len(one), dtype=bool)
     for two in ([0, 1], [0, 2], [1, 2]):
         distance, other = KDTree(grains.position[:, two]).query(point[:, two], k=2)
         reach = grains.radius[partner][:, None] + grains.radius[other]
         is_same = distance < SAME_PLACE * float(grains.radius.min())
         is_contact = (length > 0.5 * reach) & (length < 1.05 * reach)
-        image |= np.any(is_same & is_contact & (other != partner[:, None]), axis=1)
-    if image.sum() > 0.5 * len(one):
+        is_image |= np.any(is_same & is_contact & (other != partner[:, None]), axis=1)
+    if is_image.sum() > 0.5 * len(one):
         raise ReadError(
-            f"{path}: {image.sum()} contacts end at periodic images of grains, but the sample has "
-            f"no cell: name it with `cell=(LX, LY, LZ)` (and `periodic`)"
+            f"{path}: {is_image.sum()} contacts end at periodic images of grains, but the sample "
+            f"has no cell: name it with `cell=(LX, LY, LZ)` (and `periodic`)"
         )
 
 
@@ -164,58 +177,42 @@ def count_walls(rows: IntArray, count: int) -> IntArray:
     return np.bincount(rows, minlength=count).astype(np.int64)
 
 
-def _grains_at(grains: GrainTable, points: FloatArray) -> IntArray:
-    """Rows of the grains whose centres are at the points; -1 where there is none."""
-    from scipy.spatial import KDTree
-
-    position, radius, row = grains.position, grains.radius, np.arange(len(grains.position))
-    if grains.cell is not None and grains.cell.is_periodic:
-        points, position = grains.cell.wrap(points), grains.cell.wrap(position)
-        # rounding may put a point and its centre on opposite faces: images just outside help
-        margin = min(SAME_PLACE * float(radius.max()), float(grains.cell.heights.min()))
-        images, of, _ = grains.cell.images(position, margin)
-        position = np.concatenate([position, images])
-        row = np.concatenate([row, of])
-    distance, nearest = KDTree(position).query(points)
-    same = distance < SAME_PLACE * radius[row[nearest]]
-    return np.where(same, row[nearest], -1)
-
-
 def _join(
     path: Path,
+    grains: GrainTable,
     listed: ContactList,
-    walls: bool | Literal["unknown"],
-    describe: Callable[[int, int], str],
-    count: int,
+    named: npt.NDArray[Any],
+    verb: str,
+    walls: bool | Literal["unknown", "negative"],
 ) -> JoinedContacts:
-    """Tell contacts of two grains from contacts with a wall (one row is -1) and from errors."""
+    """
+    Tell contacts of two grains from contacts with a wall (one row is -1) and from errors.
+
+    Messages say with ``verb`` how the file names both ends (in ``named``).
+    """
     rows = np.asarray(listed.pairs)
-    unknown = rows < 0
-    wrong = unknown.all(axis=1) if walls else unknown.any(axis=1)
-    if wrong.any():
-        contact = int(np.argmax(wrong))
-        end = int(np.argmax(unknown[contact]))
-        raise OtherGrainsError(
-            f"{path}: contact {contact + 1} {describe(contact, end)}, which is not in the grain "
-            f"file ({np.count_nonzero(wrong)} of {len(rows)} contacts): do both files belong to "
-            f"the same step? A periodic sample also needs its cell (`cell`)"
-        )
-    both = ~unknown.any(axis=1)
-    if walls == "unknown" and not both.all():
-        first = int(np.argmin(both))
-        warnings.warn(
-            f"{path}: {np.count_nonzero(~both)} of {len(rows)} contacts name a grain that is not "
-            f"in the grain file and are counted as contacts with walls: contact {first + 1} "
-            f"{describe(first, int(np.argmax(unknown[first])))}",
-            ScanfabWarning,
-            stacklevel=4,
-        )
+    lost = rows < 0
+    both = ~lost.any(axis=1)
+    wrong = lost.all(axis=1) if walls else ~both
+    if walls == "negative":
+        wrong |= np.any(lost & (named >= 0), axis=1)
+    doubtful = ~both & (walls == "unknown") if not wrong.any() else wrong
+    if doubtful.any():
+        contact = int(np.argmax(doubtful))
+        end = named[contact, np.argmax(lost[contact])].tolist()
+        told = f"{path}: contact {contact + 1} {verb} {end}, which is not in the grain file "
+        told += f"({np.count_nonzero(doubtful)} of {len(rows)} contacts)"
+        if wrong.any():
+            raise OtherGrainsError(
+                f"{told}: are both of the same step? A periodic sample also needs its cell (`cell`)"
+            )
+        warn(f"{told}: these are counted as contacts with walls")
     image, force, force_n = (
         None if values is None else np.asarray(values)[both]
         for values in (listed.image, listed.force, listed.force_n)
     )
     kept = ContactList(rows[both], image, force, force_n=force_n)
-    return JoinedContacts(kept, count_walls(rows[~both].max(axis=1), count))
+    return JoinedContacts(kept, count_walls(rows[~both].max(axis=1), len(grains.radius)))
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -227,20 +224,14 @@ def branches(grains: GrainTable, rows: IntArray) -> FloatArray:
     return branch
 
 
-def row_base(grains: GrainTable, ids: IntArray) -> int | None:
-    """
-    Whether contacts number the rows of grains from 0 or from 1; None if that cannot be told.
-
-    By the pairs, which are neighbours under one of both numberings only.
-    """
-    fits = []
-    for base in (0, 1):
-        rows = ids - base
-        if rows.min(initial=0) >= 0 and rows.max(initial=0) < len(grains.radius):
-            length = np.linalg.norm(branches(grains, rows), axis=1)
-            if np.mean(length < NEAR * grains.radius[rows].sum(axis=1)) > NEARLY_ALL:
-                fits.append(base)
-    return fits[0] if len(fits) == 1 else None
+def _sign(values: FloatArray, what: str, doubt: str) -> float | None:
+    """The sign that nearly all values have (1 without any); None, with a warning, without one."""
+    values = values[values != 0]
+    share = float(np.mean(values > 0)) if len(values) else 1.0
+    if 1 - NEARLY_ALL < share < NEARLY_ALL:
+        warn(f"{what}: {share:.0%} {doubt}")
+        return None
+    return 1.0 if share >= NEARLY_ALL else -1.0
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -250,40 +241,141 @@ def proved_force(
     """
     The force on the second grain: the sign by which nearly all forces push the grains apart.
 
+    ``force`` acts on one of both grains, whose rows are in ``rows``, on the same in all contacts.
+    Where the forces speak for neither, the answer is None, with a warning that ends in ``cure``:
+    what the user can do.
+    """
+    doubt = f"of them push the second grain, so it cannot be told on which of both they act{cure}"
+    along = np.sum(branches(grains, rows) * force, axis=1)
+    sign = _sign(along, f"{path}: the forces are left out", doubt)
+    if sign is None:
+        return None
+    which = "second" if sign > 0 else "first"
+    note(f"the forces act on the {which} grain of each contact, since they push the grains apart")
+    return sign * force
+
+
+def join_table(path: Path, grains: GrainTable, found: Columns) -> JoinedContacts:
+    """
+    Join the contacts of a table to grains.
+
     Parameters
     ----------
     path : Path
         For messages.
     grains : GrainTable
-        Of the same step.
-    rows : ndarray, shape (M, 2)
-        Both grains of each contact.
-    force : ndarray, shape (M, 3)
-        On one of both, the same for all contacts.
-    cure : str, optional
-        What the user can do where that cannot be told, for the warning.
+        Of the same step; without ids their rows are numbered from 0 or 1, whichever makes pairs
+        of neighbours.
+    found : mapping
+        Columns by what they are: ``id1 id2``, and if there are any ``kind``, ``ix iy iz`` (image
+        of the second), ``fx2 fy2 fz2`` or ``fx1 fy1 fz1`` (force on the second or first), ``fx fy
+        fz`` (on either), ``fnx`` to ``ftz`` (normal and tangential part), ``fn``.
 
-    Returns
-    -------
-    ndarray, shape (M, 3), or None
-        None, with a warning, where the forces speak for neither.
+    Raises
+    ------
+    ReadError
+        If a pair names a grain that is not there.
     """
-    along = np.sum(branches(grains, rows) * force, axis=1)
-    along = along[along != 0]
-    share = float(np.mean(along > 0)) if len(along) else 1.0
-    if 1 - NEARLY_ALL < share < NEARLY_ALL:
-        warnings.warn(
-            f"{path}: the forces are left out: {share:.0%} of them push the second grain off the "
-            f"first, so it cannot be told on which of both they act{cure}",
-            ScanfabWarning,
-            stacklevel=2,
+    ids = np.column_stack([whole_numbers(path, found[one]) for one in ("id1", "id2")])
+    kind = found.get("kind")
+    if kind is not None and kind.dtype.kind == "U":
+        # the second is the wall; its id is of another kind than those of grains
+        ids[~np.isin(np.char.lower(np.char.strip(kind)), OF_GRAINS), 1] = -1
+    walls = np.any(ids < 0, axis=1)
+    found = {name: values[~walls] for name, values in found.items()}
+    pairs = ids[~walls]
+    grains = _with_ids(path, grains, pairs)
+    rows = rows_of_ids(grains, pairs)
+    force = _force(path, grains, rows, found) if (rows >= 0).all() else None
+    force_n = _normal_force(path, found) if force is None else None
+    shift = _vectors(path, grains, found, "ix iy iz")
+    image = None if shift is None else whole_numbers(path, shift.ravel()).reshape(-1, 3)
+    joined = join_ids(path, grains, pairs, force, walls=False, image=image, force_n=force_n)
+    _tell_twice(path, pairs, image)
+    touched = rows_of_ids(grains, ids[walls]).max(axis=1)
+    count = count_walls(touched[touched >= 0], len(grains.radius))
+    return joined._replace(wall_contacts=joined.wall_contacts + count)
+
+
+def _tell_twice(path: Path, pairs: IntArray, image: IntArray | None) -> None:
+    """Warn of pairs that are listed twice, where no column says that their images differ."""
+    keys = np.sort(pairs, axis=1)
+    if image is not None:
+        keys = np.hstack([keys, np.where(pairs[:, :1] > pairs[:, 1:], -image, image)])
+    unique, counts = np.unique(keys, axis=0, return_counts=True)
+    twice = unique[counts > 1]
+    if len(twice):
+        told = f"{path}: {len(twice)} of {len(unique)} pairs are listed more than once, such as "
+        warn(f"{told}{twice[0, 0]} and {twice[0, 1]}: each row counts as a contact")
+
+
+def _with_ids(path: Path, grains: GrainTable, ids: IntArray) -> GrainTable:
+    """
+    Grains that the contacts can name: by their rows if they have no ids.
+
+    Rows are counted from 0 or from 1: the pairs are neighbours under one of both numberings only.
+    """
+    if grains.id is not None:
+        return grains
+    fits, count = [], len(grains.radius)
+    for base in (0, 1):
+        rows = ids - base
+        if len(rows) and rows.min() >= 0 and rows.max() < count:
+            length = np.linalg.norm(branches(grains, rows), axis=1)
+            near = length < NEAR * grains.radius[rows].sum(axis=1)
+            fits += [base] * bool(np.mean(near) > NEARLY_ALL)
+    if len(ids) and len(fits) != 1:
+        raise OtherGrainsError(
+            f"{path}: names grains by numbers, but the grain file has no ids, and as rows these "
+            f'are no neighbours: name the ids of grains with `columns={{"id": ...}}`'
         )
+    base = fits[0] if fits else 0
+    if fits:
+        told = f"the grains have no ids: contacts name their rows, counted from {base}"
+        note(f"{told}, since these are neighbours")
+    return grains._replace(id=np.arange(base, base + count))
+
+
+def _vectors(path: Path, grains: GrainTable, found: Columns, names: str) -> FloatArray | None:
+    """One vector a contact; what has no column is 0 where all grains lie at one place along it."""
+    wanted = names.split()
+    there = [name for name in wanted if name in found]
+    if not there:
         return None
-    on_second = share >= NEARLY_ALL
-    warnings.warn(
-        f"the forces act on the {'second' if on_second else 'first'} grain of each "
-        f"contact, since they push the grains apart",
-        ScanfabNote,
-        stacklevel=2,
-    )
-    return force if on_second else -force
+    flat = (grains.position == grains.position[:1]).all(axis=0)
+    lacking = [name for name in wanted if name not in found]
+    if not all(flat[wanted.index(name)] for name in lacking):
+        told = f"{path}: {', '.join(there)} are left out"
+        warn(f"{told}, since there is no {' and no '.join(lacking)}")
+        return None
+    columns = [found.get(name, np.zeros(len(found["id1"]))) for name in wanted]
+    if any(column.dtype.kind not in "biuf" for column in columns):
+        raise ReadError(f"{path}: expected numbers in the columns {names}, found text")
+    return np.column_stack(columns).astype(np.float64)
+
+
+def _force(path: Path, grains: GrainTable, rows: IntArray, found: Columns) -> FloatArray | None:
+    """The force on the second grain; None if there is none, or its sign cannot be told."""
+    for names, sign in (("fx2 fy2 fz2", 1.0), ("fx1 fy1 fz1", -1.0)):
+        named = _vectors(path, grains, found, names)
+        if named is not None:
+            return sign * named
+    force = _vectors(path, grains, found, "fx fy fz")
+    if force is None:
+        normal = _vectors(path, grains, found, "fnx fny fnz")
+        tangential = _vectors(path, grains, found, "ftx fty ftz")
+        if normal is None or tangential is None:
+            return None
+        force = normal + tangential
+    cure = ": name them as fx1, fy1, fz1 (on the first) or fx2, fy2, fz2 with `contact_columns`"
+    return proved_force(path, grains, rows, force, cure)
+
+
+def _normal_force(path: Path, found: Columns) -> FloatArray | None:
+    """The normal force, compression positive: the sign that nearly all have."""
+    values = found.get("fn")
+    if values is None or values.dtype.kind not in "biuf":
+        return None
+    doubt = "are above 0, so it cannot be told whether that means compression"
+    sign = _sign(values.astype(np.float64), f"{path}: the normal forces are left out", doubt)
+    return None if sign is None else sign * values.astype(np.float64)

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, suppress
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from scanfab.base.errors import ScanfabNote, SettingsError
+from scanfab.base.errors import SettingsError, note
 from scanfab.base.files import check_folder, whole_file
 from scanfab.base.option import refuse_unknown
-from scanfab.io import beside
-from scanfab.io.families import names_a_step
+from scanfab.io.companions import HEADS, companion_there, companions_of
 from scanfab.io.files import COMPRESSED_SUFFIXES, bare_name
 from scanfab.io.options import parse_frames
-from scanfab.io.registry import installed_readers
+from scanfab.io.reader import installed_readers
 from scanfab.io.series import Series
 from scanfab.io.sources import READING, read_series
 from scanfab.io.writer import Writer, installed_writers, writer_for, writer_named
@@ -86,37 +84,31 @@ def convert(
     ('grains.vtp', 800, 30000)
     """
     out = Path(out)
-    is_folder = out.is_dir() or str(out).endswith(os.sep) or (to is not None and not out.suffix)
-    is_folder = is_folder and STEP not in out.name
+    is_folder = STEP not in out.name and (out.is_dir() or (to is not None and not out.suffix))
     if is_folder and to is None:
-        names = ", ".join(installed_writers())
-        raise SettingsError(f"{out}: a folder has no format: name it with `to`, one of {names}")
+        raise SettingsError(f"{out}: a folder has no format: name one as `to`")
     writer = writer_for(out) if to is None else writer_named(to)
-    check_folder(out / "frame" if out.is_dir() else out)
+    pattern = out / f"frame_{STEP}{writer.extensions[0]}" if is_folder else out
+    check_folder(pattern if out.is_dir() else out)
     refuse_unknown("convert", reading, [*READING, "to", "frames"])
     found = _packings(source, parse_frames(frames), reading)
-    written: dict[Path, int] = {}
-    if not is_folder and STEP not in out.name:
+    if STEP not in pattern.name:
         # there must be no second frame, which is known before the file is touched
         first = list(islice(found, 2))
         if len(first) > 1:
-            raise SettingsError(
-                f"{out}: there are several frames for one file: name a folder, or a file with "
-                f"{STEP} in its name, or choose one with `frames`"
-            )
+            where = f"a folder, or a file with {STEP} in its name, or one frame by `frames`"
+            raise SettingsError(f"{out}: there are several frames for one file: name {where}")
         found = iter(first)
+    written: dict[Path, int] = {}
     for number, packing in found:
-        path, step = out, str(number if packing.step is None else packing.step)
-        if is_folder:
-            out.mkdir(exist_ok=True)
-            path = out / f"frame_{step}{writer.extensions[0]}"
-        elif STEP in out.name:
-            path = out.with_name(out.name.replace(STEP, step))
+        if not isinstance(packing, Packing):
+            raise SettingsError(f"source: expected packings, found {packing!r} among them")
+        step = number if packing.step is None else packing.step
+        path = pattern.with_name(pattern.name.replace(STEP, str(step)))
         if path in written:
-            raise SettingsError(
-                f"{path}: the frames {written[path]} and {number} have the same step: choose with "
-                f"`frames`"
-            )
+            both = f"{written[path]} and {number}"
+            raise SettingsError(f"{path}: the frames {both} have the same step: choose by `frames`")
+        path.parent.mkdir(exist_ok=True)
         save_packing(packing, path, writer)
         written[path] = number
         after()
@@ -138,17 +130,10 @@ def _packings(source: Any, chosen: slice, reading: dict[str, Any]) -> Iterator[t
     if not isinstance(packings, Iterable):
         raise SettingsError(f"source: expected a path, a Series or packings, found {source!r}")
     bounds = (chosen.start, chosen.stop, chosen.step)
-    if any(bound is not None and bound < 0 for bound in bounds):
+    if any((bound or 0) < 0 for bound in bounds):
         # counted from the end, so that all must be known first
-        return iter(list(_numbered(packings))[chosen])
-    return islice(_numbered(packings), *bounds)
-
-
-def _numbered(packings: Iterable[Any]) -> Iterator[tuple[int, Packing]]:
-    for number, packing in enumerate(packings):
-        if not isinstance(packing, Packing):
-            raise SettingsError(f"source: expected packings, found {packing!r} among them")
-        yield number, packing
+        return iter(list(enumerate(packings))[chosen])
+    return islice(enumerate(packings), *bounds)
 
 
 def _tell_left_out(series: Series) -> None:
@@ -158,12 +143,8 @@ def _tell_left_out(series: Series) -> None:
         file = next(iter(family.files.values()))
         names = ["whatever else stands there"] if ask is None else ask(file)
         if names:
-            warnings.warn(
-                f"{family.pattern}: contacts are kept as pairs, images and forces; left out: "
-                f"{', '.join(names)}",
-                ScanfabNote,
-                stacklevel=3,
-            )
+            kept = "contacts are kept as pairs, images and forces"
+            note(f"{family.pattern}: {kept}; left out: {', '.join(names)}")
 
 
 def save_packing(packing: Packing, path: Path, writer: Writer | None = None) -> None:
@@ -179,45 +160,33 @@ def save_packing(packing: Packing, path: Path, writer: Writer | None = None) -> 
     writer : Writer, optional
         By default the one that the suffix names.
     """
-    writer = writer_for(path) if writer is None else writer
-    there = beside.companions_there(path)
+    writer = writer or writer_for(path)
+    there = [file for kind in HEADS if (file := companion_there(path, kind))]
     other = _other_grains(path) if there else None
     if other is not None:
         names = " and ".join(file.name for file in there)
-        raise SettingsError(
-            f"{path}: {names} may belong to {other.name}, which has the same name: choose another "
-            f"name or folder"
-        )
+        raise SettingsError(f"{path}: {names} may belong to {other.name}: choose another name")
     with ExitStack() as files:
         # the first file to be opened is the last to take its place: with the grains all is there
-        part = files.enter_context(whole_file(path))
-        left = writer.write(packing, part)
-        made: dict[Path, bytes] = {}
-        if left.contacts and packing.contacts is not None:
-            made[beside.contacts_file(path)] = beside.contacts_csv(packing)
-        is_numbered = left.no_step and packing.step is None and names_a_step(path)
-        if left.frame or is_numbered or made:
-            made[beside.frame_file(path)] = beside.frame_csv(packing)
-        if left.columns:
-            made[beside.columns_file(path)] = beside.columns_csv(packing, left.columns)
+        left = writer.write(packing, files.enter_context(whole_file(path)))
+        made = companions_of(packing, path, left)
         for file, data in made.items():
             files.enter_context(whole_file(file)).write_bytes(data)
-    for file in there:
-        if file not in made:
-            # an earlier packing of this name has left it
-            with suppress(OSError):
-                file.unlink()
-    notes = list(left.notes)
+    for file in set(there) - made.keys():
+        # an earlier packing of this name has left it
+        with suppress(OSError):
+            file.unlink()
+    for text in left.notes:
+        note(f"{path.name}: {text}")
     if packing.wall_forces is not None:
-        notes.append("the forces of contacts with walls are left out: no format has them")
-    for note in notes:
-        warnings.warn(f"{path.name}: {note}", ScanfabNote, stacklevel=3)
+        note(f"{path.name}: the forces of contacts with walls are left out: no format has them")
 
 
 def _other_grains(path: Path) -> Path | None:
     """Another file with the same name and the ending of a format, to which companions belong."""
-    formats = [*installed_writers().values(), *installed_readers().values()]
-    endings = {ending for one in formats for ending in one.plugin.extensions}
-    packed = sorted(ending + more for ending in endings for more in ("", *COMPRESSED_SUFFIXES))
-    others = (path.with_name(f"{Path(bare_name(path)).stem}{ending}") for ending in packed)
-    return next((one for one in others if one != path and one.is_file()), None)
+    offers = [*installed_writers().values(), *installed_readers().values()]
+    endings = sorted({ending for offer in offers for ending in offer.plugin.extensions})
+    stem = Path(bare_name(path)).stem
+    names = [f"{stem}{ending}{more}" for ending in endings for more in ("", *COMPRESSED_SUFFIXES)]
+    others = [path.with_name(name) for name in names if name != path.name]
+    return next((file for file in others if file.is_file()), None)

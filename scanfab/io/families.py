@@ -1,44 +1,47 @@
-"""From what users name to files, and from their names to families: one for each series."""
+"""
+From what users name to files, and from their names to families: one for each series.
+
+A family is a number of files of one kind whose names differ in the step only. Contact files are
+paired with grain files by their steps and names.
+"""
 
 from __future__ import annotations
 
 import glob
 import os
 import re
-import warnings
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatch
-from functools import lru_cache
-from itertools import chain, zip_longest
+from itertools import chain, takewhile
 from pathlib import Path
-from typing import NamedTuple
 
-from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning, UnknownFormatError
+from scanfab.base.errors import ReadError, UnknownFormatError, note, warn
 from scanfab.base.files import kind_of
 from scanfab.io.files import bare_name
-from scanfab.io.reader import FileKind, Reader, ReadOptions
-from scanfab.io.registry import installed_readers, reader_for, reader_named
+from scanfab.io.reader import (
+    FileKind,
+    Reader,
+    ReadOptions,
+    installed_readers,
+    reader_for,
+    reader_named,
+)
 
 PathLike = str | os.PathLike[str]
+Numbered = list[tuple[int | None, Path]]
+"""Files with the numbers that tell them apart."""
 
-# options of the command line, beside the dumps
 SETTINGS_FILE = "scanfab.toml"
 # endings of what editors and interrupted programs leave
 LEFTOVERS = ("~", ".part", ".tmp", ".bak")
-# of a table with the contacts of the grains in the file of the same name without it
-CONTACTS_ENDING = ".contacts."
 NUMBER = re.compile(r"\d+")
 
 
 def expanded(source: PathLike) -> list[PathLike]:
-    """
-    A source as it is spelt, or the files and folders that a glob names.
-
-    The shell leaves globs in quotes to us.
-    """
+    """A source as it is spelt, or what a glob names: shells leave globs in quotes to us."""
     if Path(source).exists() or not glob.has_magic(os.fspath(source)):
         return [source]
     found: list[PathLike] = [*sorted(glob.glob(os.fspath(source)))]
@@ -48,26 +51,18 @@ def expanded(source: PathLike) -> list[PathLike]:
 
 
 def named_once(sources: Iterable[PathLike]) -> list[PathLike]:
-    """
-    Sources as they are spelt, globs expanded, and each file and folder once.
-
-    Rows that come twice look like two samples, so a warning names what is left out.
-    """
+    """Sources as they are spelt, each file and folder once; a warning names what comes twice."""
     first: dict[Path, PathLike] = {}
-    again: list[str] = []
-    for source in (path for one in sources for path in expanded(one)):
+    again = []
+    for source in chain.from_iterable(map(expanded, sources)):
         place = Path(source).resolve()
         if place in first:
-            before = str(first[place])
-            again.append(before if str(source) == before else f"{source} (as {before})")
+            is_same = str(source) == str(first[place])
+            again.append(f"{source}" if is_same else f"{source} (as {first[place]})")
         else:
             first[place] = source
     if again:
-        warnings.warn(
-            f"{some(again)}: named twice among the sources, and read once",
-            ScanfabWarning,
-            stacklevel=4,
-        )
+        warn(f"{some(again)}: named twice among the sources, and read once")
     return list(first.values())
 
 
@@ -77,30 +72,22 @@ def some(names: Sequence[str]) -> str:
 
 
 def files_of(path: Path) -> list[Path]:
-    """A file, or the files of a folder, of which there is at least one."""
+    """A file, or the files of a folder; a note names the pipes and devices in it."""
     if not path.exists():
         raise ReadError(f"{path}: there is no such file, folder or glob")
     if not path.is_dir():
         return [path]
-    files = files_in(path)
-    for one in sorted(set(path.iterdir()).difference(files)):
+    for one in sorted(path.iterdir()):
         if (kind := kind_of(one)) is not None:
-            warnings.warn(f"skipped {one}: it is {kind}, not a file", ScanfabNote, stacklevel=3)
-    return files
+            note(f"skipped {one}: it is {kind}, not a file")
+    return files_in(path)
 
 
 def files_in(folder: Path) -> list[Path]:
     """The files of a folder that may be dumps: not hidden ones, nor what is left behind."""
-    files = [
-        file
-        for file in folder.iterdir()
-        if not file.name.startswith(".")
-        and file.name != SETTINGS_FILE
-        and not file.name.endswith(LEFTOVERS)
-        and file.is_file()
-    ]
-    # to compare names is quicker than to compare paths
-    return sorted(files, key=lambda file: file.name)
+    names = [name for name in sorted(os.listdir(folder)) if name != SETTINGS_FILE]
+    files = [folder / name for name in names if name[0] != "." and not name.endswith(LEFTOVERS)]
+    return [file for file in files if file.is_file()]
 
 
 def files_around(files: Iterable[Path]) -> list[Path]:
@@ -130,12 +117,6 @@ class Family:
     has_steps: bool = True
     """Whether the numbers are steps: of a single file in its folder nobody knows."""
 
-    def check(self) -> Family:
-        """The family itself; ReadError if two files are of the same step."""
-        if self.clash is not None:
-            raise ReadError(self.clash)
-        return self
-
     @property
     def largest(self) -> Path:
         """The file that tells reader and kind."""
@@ -146,80 +127,15 @@ class Family:
         """Whether a reader of tables reads them, which may hold anything."""
         return bool(getattr(self.reader, "is_table", False))
 
+    @property
+    def stems(self) -> set[str]:
+        """The names of the files as ``STEM.contacts.csv`` has them."""
+        return set(map(_own_stem, self.files.values()))
 
-class Named(NamedTuple):
-    """Files that belong together by their names."""
-
-    files: list[tuple[int | None, Path]]
-    """With the number of each that tells it from the others, in natural order."""
-    has_steps: bool
-    """Whether there are several, so that the number is a step."""
-
-
-def sort_names(files: Iterable[Path], around: Iterable[Path] = ()) -> list[Named]:
-    """
-    Sort files by their names alone.
-
-    Parameters
-    ----------
-    files : iterable of Path
-        In any order.
-    around : iterable of Path, optional
-        Others in their folders, which show what number is the step.
-    """
-    own = _heads(files)
-    groups: dict[str, list[Path]] = defaultdict(list)
-    for file in {*own, *_heads(around)}:
-        groups[NUMBER.sub("*", bare_name(file))].append(file)
-    found = [
-        (len(series) > 1, [(step, file) for step, file in series if file in own])
-        for _, group in sorted(groups.items())
-        for series in _series_in(group)
-    ]
-    return [Named(series, has_steps) for has_steps, series in found if series]
-
-
-def _heads(files: Iterable[Path]) -> set[Path]:
-    """The files without those that another one of them lists as its parts."""
-    heads = set(files)
-    readers = [one.plugin for one in installed_readers().values()]
-    for reader in [one for one in readers if hasattr(one, "listed_by")]:
-        heads -= {file for file in heads if reader.listed_by(file) in heads}
-    return heads
-
-
-def _series_in(group: list[Path]) -> Iterator[list[tuple[int | None, Path]]]:
-    """
-    Tell series apart whose names differ in several numbers (run1_100, run1_200, run2_100).
-
-    The last number that differs is the step. All files are one series if the numbers before it
-    never fall while the step rises, and no step occurs twice.
-    """
-    numbers = {file: _numbers(file) for file in group}
-    columns = list(zip(*numbers.values(), strict=True))
-    differing = [place for place, column in enumerate(columns) if len(set(column)) > 1]
-    place = differing[-1] if differing else max(len(columns) - 1, 0)
-    ordered = sorted(group, key=lambda file: (numbers[file][place : place + 1], numbers[file]))
-    steps = [next(iter(numbers[file][place:]), None) for file in ordered]
-    leading = [numbers[file][:place] for file in ordered]
-    repeated = len(set(steps)) < len(steps) and len(set(leading)) > 1
-    series = defaultdict(list)
-    for key, step, file in zip(leading, steps, ordered, strict=True):
-        series[() if not repeated and leading == sorted(leading) else key].append((step, file))
-    yield from series.values()
-
-
-@lru_cache(1 << 16)
-def _numbers(file: Path) -> tuple[int, ...]:
-    # the ending of a name (.mp4) is not a number of the frame, unless it is nothing else (dump.100)
-    name = Path(bare_name(file))
-    text = name.name if name.suffix[1:].isdigit() else name.stem
-    return tuple(int(number) for number in NUMBER.findall(text))
-
-
-def names_a_step(file: Path) -> bool:
-    """Whether a number in a file's name may be taken for its step, if the file has none itself."""
-    return bool(_numbers(file))
+    @property
+    def owners(self) -> set[str | None]:
+        """Of each ``STEM.contacts.csv`` the stem of the grains; None of files with other names."""
+        return set(map(_owner, self.files.values()))
 
 
 def sort_into_families(
@@ -229,42 +145,86 @@ def sort_into_families(
     around: Iterable[Path] = (),
 ) -> list[Family]:
     """
-    Sort files into families, and find the reader and kind of each by its largest file.
+    Sort files into families; the largest file of each tells its reader and kind.
 
-    Parameters
-    ----------
-    files : iterable of Path
-        In any order.
-    format : str, optional
-        Name of the reader to use for all.
-    options : ReadOptions, optional
-        What the user tells of them.
-    around : iterable of Path, optional
-        Other files in their folders.
-
-    Raises
-    ------
-    UnknownFormatError
-        If there is no reader of that name.
+    A ``format`` is the reader of all. Files ``around`` them in their folders show which number in
+    a name is the step.
     """
-    files = list(files)
-    return [family_of(one, files, format, options) for one in sort_names(files, around)]
+    files = set(files)
+    own = _heads(files)
+    return [
+        _family_of(members, files, format, options, len(series) > 1)
+        for series in _series_in({*own, *_heads(around)})
+        if (members := [pair for pair in series if pair[1] in own])
+    ]
 
 
-def family_of(
-    named: Named, among: Sequence[Path], format: str | None, options: ReadOptions | None
+def _heads(files: Iterable[Path]) -> set[Path]:
+    """The files without those that another one of them lists as its parts."""
+    heads = set(files)
+    for offer in installed_readers().values():
+        if hasattr(offer.plugin, "listed_by"):
+            heads -= {file for file in heads if offer.plugin.listed_by(file) in heads}
+    return heads
+
+
+def _series_in(files: Iterable[Path]) -> Iterator[Numbered]:
+    """Sort files by their names, in natural order: a series of all that differ in the step only."""
+    groups: dict[str, list[Path]] = defaultdict(list)
+    for file in sorted(files, key=str):
+        groups[NUMBER.sub("*", bare_name(file))].append(file)
+    for _, group in sorted(groups.items()):
+        yield from _split(group)
+
+
+def _split(group: list[Path]) -> Iterable[Numbered]:
+    """
+    Tell series apart whose names differ in several numbers (run1_100, run1_200, run2_100).
+
+    The last number that differs is the step. All files are one series if the numbers before it
+    never fall while the step rises, and no step occurs twice.
+    """
+    numbers = {file: numbers_in(file) for file in group}
+    columns = list(zip(*numbers.values(), strict=True))
+    differing = [place for place, column in enumerate(columns) if len(set(column)) > 1]
+    place = differing[-1] if differing else max(len(columns) - 1, 0)
+    group = sorted(group, key=lambda file: (numbers[file][place : place + 1], numbers[file]))
+    steps = [next(iter(numbers[file][place:]), None) for file in group]
+    leading = [numbers[file][:place] for file in group]
+    repeated = len(set(steps)) < len(steps) and len(set(leading)) > 1
+    is_one = not repeated and leading == sorted(leading)
+    series: dict[tuple[int, ...], Numbered] = defaultdict(list)
+    for key, step, file in zip(leading, steps, group, strict=True):
+        series[() if is_one else key].append((step, file))
+    return series.values()
+
+
+def numbers_in(file: Path) -> tuple[int, ...]:
+    """The numbers in a name, of which one may be the step."""
+    # the ending of a name (.mp4) is not a number of the frame, unless it is nothing else (dump.100)
+    name = Path(bare_name(file))
+    text = name.name if name.suffix[1:].isdigit() else name.stem
+    return tuple(map(int, NUMBER.findall(text)))
+
+
+def _family_of(
+    members: Numbered,
+    among: Collection[Path],
+    format: str | None,
+    options: ReadOptions | None,
+    has_steps: bool,
 ) -> Family:
     """The family of some files; its pattern matches no other file ``among`` which they were."""
     files: dict[int | None, Path] = {}
-    clash: str | None = None
-    for step, file in named.files:
+    clash = problem = reader = None
+    for step, file in members:
         if files.setdefault(step, file) is not file:
             clash = f"two files for one step: {files[step]} and {file}: name one of them"
-    pattern = _glob([file for _, file in named.files], among)
-    family = Family(pattern, files, None, "other", None, clash, named.has_steps)
-    sample, problem, kind = family.largest, None, family.kind
-    reader: Reader | None = None
+    pattern = _glob([file for _, file in members], among)
+    family = Family(pattern, files, None, "other", None, clash, has_steps)
+    kind: FileKind = "other"
     try:
+        sample = family.largest
         reader = reader_for(sample, options) if format is None else reader_named(format, options)
         kind = "other" if reader is None else reader.kind(sample)
     except UnknownFormatError:
@@ -272,59 +232,139 @@ def family_of(
     except ReadError as error:
         # in a folder one damaged file is skipped; alone it is the error
         problem = str(error)
-    return Family(pattern, files, reader, kind, problem, clash, named.has_steps)
+    return replace(family, reader=reader, kind=kind, problem=problem)
 
 
-def _glob(members: list[Path], files: Sequence[Path]) -> str:
-    """
-    The names, with a star for each number in which they differ.
-
-    If that would match other files too, the names themselves.
-    """
+def _glob(members: list[Path], among: Iterable[Path]) -> str:
+    """The names with stars for the numbers that differ; some names if stars match other files."""
     numbers = [NUMBER.findall(file.name) for file in members]
     differs = [len(set(column)) > 1 for column in zip(*numbers, strict=False)]
-    letters = NUMBER.split(members[0].name)
-    others = set(files) - set(members)
+    pieces = re.split(r"(\d+)", members[0].name)
+    others = set(among) - set(members)
     for star in ("*", "[0-9]*"):
-        shown = zip_longest(numbers[0], differs)
-        words = [star if is_other else number for number, is_other in shown]
-        name = "".join(chain(*zip_longest(letters, words, fillvalue="")))
-        pattern = str(members[0].with_name(name))
+        for place, is_other in enumerate(differs):
+            if is_other:
+                pieces[2 * place + 1] = star
+        pattern = str(members[0].with_name("".join(pieces)))
         if not any(fnmatch(str(file), pattern) for file in others):
             return pattern
     return " ".join(map(str, members[:3])) + (" ..." if len(members) > 3 else "")
 
 
-def own_stem(file: Path) -> str:
+def _own_stem(file: Path) -> str:
     """The stem by which contacts name a file; dumps called dump.100 and dump.200 share no stem."""
     name = bare_name(file)
     stem, _, ending = name.rpartition(".")
     return name if ending.isdigit() else stem or name
 
 
-def owner(file: Path) -> str | None:
+def _owner(file: Path) -> str | None:
     """The stem of the file whose contacts these are by their name; None if it does not say so."""
-    stem, ending, _ = bare_name(file).rpartition(CONTACTS_ENDING)
+    stem, ending, _ = bare_name(file).rpartition(".contacts.")
     return stem if ending else None
 
 
-def kinship(one: Family, two: Family) -> tuple[int, bool]:
+def _words(family: Family) -> tuple[list[str], str]:
+    """The words of the pattern, and its ending."""
+    name = bare_name(Path(family.pattern))
+    ending = "".join(re.findall(r"\.[A-Za-z]\w*$", name))
+    return re.findall(r"[^\W_]+", name.removesuffix(ending)), ending
+
+
+def _kinship(one: Family, two: Family) -> tuple[int, bool]:
     """How many words two names begin with in common, and whether they have the same ending."""
-    (own, ending), (others, other_ending) = words_of(one), words_of(two)
-    pairs = enumerate(zip(own, others, strict=False))
-    common = next((k for k, (a, b) in pairs if a != b), min(len(own), len(others)))
-    return common, ending == other_ending
+    (own, ending), (others, other_ending) = _words(one), _words(two)
+    common = takewhile(lambda pair: pair[0] == pair[1], zip(own, others, strict=False))
+    return len(list(common)), ending == other_ending
 
 
 def are_tied(grains: Family, contacts: Family) -> bool:
     """Whether step or name tell that contacts belong to grains: a number or the first word."""
     shared = set(grains.files) & set(contacts.files) - {None}
-    is_owned = any(map(owner, contacts.files.values()))
-    return kinship(grains, contacts)[0] > 0 or (bool(shared) and not is_owned)
+    return _kinship(grains, contacts)[0] > 0 or (bool(shared) and not any(contacts.owners))
 
 
-def words_of(family: Family) -> tuple[list[str], str]:
-    """The words of a pattern, and its ending."""
-    name = bare_name(Path(family.pattern))
-    ending = "".join(re.findall(r"\.[A-Za-z]\w*$", name))
-    return re.findall(r"[^\W_]+", name.removesuffix(ending)), ending
+def without_tables(
+    families: Sequence[Family], named: Collection[Path] = (), grains: Family | None = None
+) -> list[Family]:
+    """
+    The families, with ``other`` as the kind of tables that lie beside dumps.
+
+    A table may be anything, such as results. Beside grains of a program's own format it counts if
+    it is one of the files that users have ``named``, or ``STEM.contacts.csv`` of grains, such as
+    those beside which the families lie. One without names counts only if none has names.
+    """
+    chosen = [] if grains is None else [grains]
+    frames = [one for one in [*families, *chosen] if one.kind in ("grains", "index")]
+    dumps = [one for one in frames if not one.is_table]
+    tables = [one for one in frames if one.is_table]
+    with_names = [one for one in tables if one.reader and one.reader.recognises(one.largest)]
+    stems = set[str | None]().union(*(one.stems for one in [*dumps, *chosen]))
+
+    def counts(one: Family) -> bool:
+        if not one.is_table or set(one.files.values()) & set(named):
+            return True
+        if dumps:
+            return bool(one.owners & stems)
+        return one.kind != "grains" or one in with_names or not with_names
+
+    return [one if counts(one) else replace(one, kind="other") for one in families]
+
+
+def contacts_beside(
+    grains: Family, format: str | None, options: ReadOptions
+) -> tuple[list[Family], list[Family]]:
+    """
+    What lies beside single grain files with their numbers, and which of it are their contacts.
+
+    Contact files belong to grains if their numbers agree or their names begin with the same word,
+    or if neither has a number; and if no other grains beside them have a name that is as near, and
+    no other contact files are nearer. ``STEM.contacts.csv`` belongs to STEM.
+
+    Returns all families of these numbers, and the contacts. A note tells of these, or which
+    contacts may be meant.
+    """
+    if grains.kind == "index":
+        return [], []
+    families = without_tables(_families_beside(grains, format, options), (), grains)
+    frames = [one for one in families if one.kind in ("grains", grains.kind)]
+    rivals = [one for one in frames if _words(one)[0] != _words(grains)[0]]
+    near: dict[float, list[Family]] = defaultdict(list)
+    doubtful = []
+    for family in families:
+        if family.kind != "contacts" or family.clash is not None:
+            continue
+        kin = _kinship(grains, family)
+        closest = max((_kinship(one, family) for one in rivals), default=(-1, False))
+        is_alone = None in grains.files and family.owners == {None}
+        if family.owners <= grains.stems:
+            near[float("inf")].append(family)
+        elif kin > closest and (is_alone or are_tied(grains, family)):
+            near[kin[0]].append(family)
+        elif kin >= closest:
+            doubtful.append(Path(family.pattern).name)
+    own = near[max(near)] if near else []
+    if own:
+        note(f"contacts are read from {', '.join(one.pattern for one in own)}, beside the grains")
+    elif doubtful:
+        note(
+            f"skipped {some(doubtful)}: contacts beside the grains, but neither step nor name "
+            f"tells that they belong to {grains.pattern}: if they do, name them with `contacts`"
+        )
+    return families, own
+
+
+def _families_beside(grains: Family, format: str | None, options: ReadOptions) -> list[Family]:
+    """Other files in the folders of grain files: of the same numbers, or named as theirs."""
+    own = {(file.parent, step) for step, file in grains.files.items()}
+    stems = {_own_stem(file): step for step, file in grains.files.items()}
+    around = files_around(grains.files.values())
+    found = []
+    for series in _series_in(_heads(around)):
+        if not set(grains.files.values()).isdisjoint(file for _, file in series):
+            continue
+        same = [(stems[stem], file) for _, file in series if (stem := _owner(file) or "") in stems]
+        same = same or [(step, file) for step, file in series if (file.parent, step) in own]
+        if same:
+            found.append(_family_of(same, around, format, options, len(series) > 1))
+    return found

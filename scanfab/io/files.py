@@ -1,4 +1,4 @@
-"""One file: opened, decompressed, told from others, and what it may take of disk and memory."""
+"""One file: opened, decompressed, what it may take of memory, and whether it still grows."""
 
 from __future__ import annotations
 
@@ -9,18 +9,17 @@ import shutil
 import sys
 import tempfile
 import zlib
-from collections import OrderedDict
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager, suppress
 from contextvars import ContextVar
+from functools import cache, lru_cache, partial
 from importlib import import_module
 from pathlib import Path
-from threading import Lock, get_ident
-from types import ModuleType
-from typing import Any, Protocol
+from typing import Any, TypeVar
+from weakref import finalize
 
 from scanfab.base.ending import at_end
-from scanfab.base.errors import ReadError
+from scanfab.base.errors import ReadError, warn
 from scanfab.base.files import check_file, free_memory
 
 COMPRESSED_SUFFIXES = (".gz", ".bz2", ".xz", ".zst", ".lz4")
@@ -41,42 +40,21 @@ MOST_TIMES = 1000.0
 ANYWAY = 64 << 20
 # bytes of a line of text
 LONGEST_LINE = 16 << 20
-# decompressed copies that are kept for each thread that reads: a frame needs few
-KEPT = 4
+# decompressed copies that are kept although nobody is reading them
+KEPT = 16
 # bytes that are copied at a time
 PART = 4 << 20
-# bytes that a copy leaves free on the disk, and bytes of a copy that need not leave them
-RESERVE, SMALL = 1 << 30, 64 << 20
 # of the name of the folder that holds the copies of a process
 PREFIX = "scanfab-"
 Stamp = tuple[str, int, int, int]
 """What tells a file from others, and from itself after it was changed."""
+_grows: ContextVar[bool] = ContextVar("grows", default=False)
 _times: ContextVar[float | None] = ContextVar("times", default=None)
-_copies: OrderedDict[Stamp, Path] = OrderedDict()
-_threads: set[int] = set()
-_lock = Lock()
-_folder: list[str] = []
+Value = TypeVar("Value")
 
 
-class Readable(Protocol):
-    """What can be read piece by piece."""
-
-    def read(self, size: int, /) -> bytes:
-        """So many bytes, or fewer; none at the end."""
-        ...
-
-
-def _forget_copies() -> None:
-    """Forget the copies in a forked process: they belong to its parent, which still needs them."""
-    global _lock
-    _lock = Lock()  # a thread of the parent may hold the other
-    _copies.clear()
-    _threads.clear()
-    _folder.clear()
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_forget_copies)
+class _Copy(type(Path())):  # type: ignore[misc]
+    """The path of a temporary copy, which is deleted when nobody holds its path any more."""
 
 
 def bare_name(path: Path) -> str:
@@ -93,71 +71,67 @@ def stamp_of(path: Path) -> Stamp:
 def first_bytes(path: Path, count: int = 4096) -> bytes:
     """The first bytes of the decompressed file; ReadError if it cannot be opened."""
     head = _head(path, max(count, MAGIC_BYTES))
-    if _decompressor(head) is None:
-        return head[:count]
-    with unpacked(path) as stream:
-        return stream.read(count)
+    return head[:count] if _decompressor(head) is None else next(pieces(path, count), b"")
 
 
 def plain(path: Path) -> Path:
-    """The file itself, or a decompressed temporary copy that keeps its bare name."""
+    """
+    The file itself, or a decompressed temporary copy that keeps its bare name.
+
+    The copy is there as long as somebody holds this path, and the last few copies stay longer, so
+    that a file is decompressed once for all questions to its reader.
+    """
     if _decompressor(_head(path, MAGIC_BYTES)) is None:
         return path
-    key = stamp_of(path)
-    with _lock:
-        _threads.add(get_ident())
-        if key in _copies:
-            _copies.move_to_end(key)
-            return _copies[key]
-    with unpacked(path) as stream:
-        copy = temporary_copy(stream, bare_name(path))
-    with _lock:
-        _copies[key] = copy
-        surplus = max(len(_copies) - KEPT * len(_threads), 0)
-        oldest = [_copies.popitem(last=False)[1] for _ in range(surplus)]
-    for one in oldest:
-        shutil.rmtree(one.parent, ignore_errors=True)
+    return _copy_of(path, stamp_of(path), os.getpid())
+
+
+@lru_cache(KEPT)
+def _copy_of(path: Path, stamp: Stamp, process: int) -> Path:
+    """A copy of a file as it is now; a forked process makes its own."""
+    copy: Path = _Copy(temporary_copy(pieces(path), bare_name(path)))
+    finalize(copy, _remove, os.path.dirname(copy), process)
     return copy
 
 
-@contextmanager
-def unpacked(path: Path) -> Iterator[Readable]:
-    """The decompressed content of a file, as a stream that raises nothing but ReadError."""
+def _remove(folder: str, process: int) -> None:
+    """Delete the folder of a copy, unless this is a forked process: the parent still needs it."""
+    if os.getpid() == process:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def pieces(path: Path, size: int = PART) -> Iterator[bytes]:
+    """The decompressed content of a file, so many bytes at a time; raises nothing but ReadError."""
     module = _decompressor(_head(path, MAGIC_BYTES))
-    opener = open if module is None else module.open
-    with _read_errors(path, module):
-        file = opener(path, "rb")
-    with file:
-        yield _Unpacked(path, file, module)
-
-
-class _Unpacked:
-    """A stream of decompressed bytes, which ends in a ReadError where there are far too many."""
-
-    def __init__(self, path: Path, stream: Readable, module: ModuleType | None) -> None:
-        self._path, self._stream, self._module = path, stream, module
-        self._packed, self._unpacked = path.stat().st_size, 0
-
-    def read(self, size: int, /) -> bytes:
-        with _read_errors(self._path, self._module):
-            part = self._stream.read(size)
-        self._unpacked += len(part)
-        check_times(self._path, self._packed, self._unpacked)
-        return part
+    zstd_error, unpacked = getattr(module, "ZstdError", OSError), 0
+    try:
+        with open(path, "rb") as packed, packed if module is None else module.open(packed) as file:
+            while piece := file.read(size):
+                unpacked += len(piece)
+                # by what was read so far, a bomb is known long before its end
+                check_times(path, packed.tell(), unpacked)
+                yield piece
+    except (OSError, EOFError, RuntimeError, zlib.error, lzma.LZMAError, zstd_error) as error:
+        verb = "read" if module is None else "decompressed"
+        raise ReadError(f"{path}: cannot be {verb}: {_reason(error)}") from None
 
 
 @contextmanager
-def unpacking_up_to(times: float | None) -> Iterator[None]:
+def _set(variable: ContextVar[Value], value: Value) -> Iterator[None]:
+    token = variable.set(value)
+    try:
+        yield
+    finally:
+        variable.reset(token)
+
+
+def unpacking_up_to(times: float | None) -> AbstractContextManager[None]:
     """
     Inside the block, let files grow to so many times their size, and lines have any length.
 
     None changes nothing.
     """
-    token = _times.set(_times.get() if times is None else times)
-    try:
-        yield
-    finally:
-        _times.reset(token)
+    return _set(_times, _times.get() if times is None else times)
 
 
 def check_times(path: Path, packed: int, unpacked: float) -> None:
@@ -165,8 +139,8 @@ def check_times(path: Path, packed: int, unpacked: float) -> None:
     times = _times.get() or MOST_TIMES
     if unpacked > max(ANYWAY, times * packed):
         raise ReadError(
-            f"{path}: its {packed:,} bytes unpack to more than {times:g} times as many, expected "
-            f"no dump that is so empty: if it is one, allow more with `max_unpacked`"
+            f"{path}: {packed:,} bytes of it unpack to more than {times:g} times as many: if it "
+            f"is a dump, allow more with `max_unpacked`"
         )
 
 
@@ -189,8 +163,7 @@ def check_lines(path: Path, plain: Path) -> None:
             if not ends:
                 raise ReadError(
                     f"{path}: a line is longer than {LONGEST_LINE >> 20} MiB (it begins at byte "
-                    f"{begin:,}), expected rows of a table: if it is one, allow it with "
-                    f"`max_unpacked`"
+                    f"{begin:,}): if it is one of a table, allow it with `max_unpacked`"
                 )
             begin += ends
 
@@ -228,41 +201,46 @@ def file_inside(index: Path, name: str) -> Path:
     return path
 
 
-def temporary_copy(stream: Readable, name: str) -> Path:
+def temporary_copy(content: Iterable[bytes], name: str) -> Path:
     """
-    What a stream holds, as a file that is deleted at the end of the process.
+    Some content as a file that is deleted at the end of the process.
 
     Raises
     ------
     ReadError
-        If it would fill the disk: a few bytes can be decompressed to any number.
+        If it cannot be written, for instance to a full disk.
     """
     folder = ""
     try:
-        if not _folder:
-            _folder.append(tempfile.mkdtemp(prefix=PREFIX))
-            at_end(_remove_copies)
-        folder = tempfile.mkdtemp(dir=_folder[0])
-        copy, size = Path(folder) / name, 0
+        folder = tempfile.mkdtemp(dir=_folder(os.getpid()))
+        copy = Path(folder) / name
         with open(copy, "wb") as file:
-            while part := stream.read(PART):
-                size += file.write(part)
-                disk = shutil.disk_usage(folder)
-                if size > SMALL and disk.free < min(RESERVE, disk.total // 20):
-                    raise ReadError(
-                        f"{name}: its content fills the disk of {_temporary()}, with {size:,} "
-                        f"bytes so far: make room, or name another folder for temporary files by "
-                        f"TMPDIR"
-                    )
+            file.writelines(content)
         return copy
     except BaseException as error:
         shutil.rmtree(folder, ignore_errors=True)
-        if isinstance(error, OSError):
-            raise ReadError(
-                f"{name}: its content cannot be written to {_temporary()}: {_reason(error)}: name "
-                f"another folder for temporary files by TMPDIR"
-            ) from None
-        raise
+        if not isinstance(error, OSError):
+            raise
+        raise ReadError(
+            f"{name}: its content cannot be written to {_temporary()}: {_reason(error)}: make "
+            f"room, or name another folder for temporary files by TMPDIR"
+        ) from None
+
+
+@cache
+def _folder(process: int) -> str:
+    """The folder for the copies of a process, which goes at its end."""
+    folder = tempfile.mkdtemp(prefix=PREFIX)
+    at_end(partial(_remove_at_end, folder))
+    return folder
+
+
+def _remove_at_end(folder: str) -> None:
+    # under another name no thread that is still reading can put a copy into it
+    last = f"{folder}-removed"
+    with suppress(OSError):
+        os.rename(folder, last)
+    shutil.rmtree(last, ignore_errors=True)
 
 
 def without_temporary(text: str) -> str:
@@ -271,9 +249,8 @@ def without_temporary(text: str) -> str:
 
     Examples
     --------
-    >>> from io import BytesIO
     >>> from scanfab.io.files import temporary_copy, without_temporary
-    >>> without_temporary(f"{temporary_copy(BytesIO(), 'standard input')}: no grains")
+    >>> without_temporary(f"{temporary_copy([], 'standard input')}: no grains")
     'standard input: no grains'
     """
     folder = re.escape(os.path.join(_temporary(), PREFIX))
@@ -288,16 +265,6 @@ def _temporary() -> str:
         return "a temporary file"
 
 
-def _remove_copies() -> None:
-    """Delete all temporary copies, at the end of the process."""
-    for folder in _folder:
-        # under another name no thread that is still reading can put a copy into it
-        last = f"{folder}-removed"
-        with suppress(OSError):
-            os.rename(folder, last)
-        shutil.rmtree(last, ignore_errors=True)
-
-
 def _decompressor(head: bytes) -> Any:
     """The module that opens a file that begins with these bytes; None if it is not compressed."""
     name = next((one for key, one in DECOMPRESSORS.items() if head.startswith(key)), None)
@@ -307,22 +274,33 @@ def _decompressor(head: bytes) -> Any:
 def _head(path: Path, count: int) -> bytes:
     """The first bytes as they stand there."""
     check_file(path)
-    with _read_errors(path, None), open(path, "rb") as stream:
-        return stream.read(count)
-
-
-@contextmanager
-def _read_errors(path: Path, module: ModuleType | None) -> Iterator[None]:
-    """Turn what can go wrong when a file is opened or decompressed into ReadError."""
-    zstd_error = getattr(module, "ZstdError", OSError)
     try:
-        yield
-    except (OSError, EOFError, RuntimeError, zlib.error, lzma.LZMAError, zstd_error) as error:
-        verb = "read" if module is None else "decompressed"
-        raise ReadError(f"{path}: cannot be {verb}: {_reason(error)}") from None
+        with open(path, "rb") as stream:
+            return stream.read(count)
+    except OSError as error:
+        raise ReadError(f"{path}: cannot be read: {_reason(error)}") from None
 
 
 def _reason(error: Exception) -> str:
     if isinstance(error, OSError) and error.errno is not None:
         return os.strerror(error.errno)
     return str(error) or "the file ends too early"
+
+
+def growing() -> AbstractContextManager[None]:
+    """In the block files may still be being written: what lacks at their end is no warning."""
+    return _set(_grows, True)
+
+
+def grows() -> bool:
+    """Whether files may still be being written."""
+    return _grows.get()
+
+
+def leave_out_last(path: Path, complete: int, reason: str) -> None:
+    """Warn that an incomplete last snapshot is left out; ReadError if none is complete."""
+    if complete == 0:
+        raise ReadError(f"{path}: {reason}: the file is incomplete")
+    if not grows():
+        text = f"{path}: the last snapshot, number {complete + 1}, is incomplete and is left out"
+        warn(f"{text}: {reason}")

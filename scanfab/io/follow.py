@@ -5,27 +5,26 @@ from __future__ import annotations
 import os
 import time
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from scanfab.base.errors import PackingError, ReadError, ScanfabWarning, SettingsError
+from scanfab.base.errors import PackingError, ReadError, warn
 from scanfab.base.option import refuse_unknown, unusable
 from scanfab.io.families import Family, PathLike, files_in
-from scanfab.io.files import Stamp, stamp_of
+from scanfab.io.files import Stamp, growing, stamp_of
 from scanfab.io.frame import Frame
-from scanfab.io.growing import growing
 from scanfab.io.options import take_reading
 from scanfab.io.series import Series
 from scanfab.io.sources import READING, as_text, read_series
 
-# seconds between two looks, or times what a look takes
+# seconds between two looks at the files, or so many times what the last look took
 PAUSE, PAUSES = 0.2, 3.0
-# a file that has been as it is for so many seconds is whole, if it can be read to its end
+# a file that did not change for so many seconds is whole, if it can be read to its end
 QUIET = 1.0
-# one that was written so long ago need not be watched, whatever the clock of its server says
+# a file that was written so many seconds ago is not watched, whatever the clock of its server says
 OLD = 60.0
 
 
@@ -79,28 +78,29 @@ def follow_series(
 
 
 class FollowedSeries(Series):
-    """Frames that are waited for; its files are those of the frames that were taken."""
+    """A series whose frames are waited for; its files are those of the frames taken so far."""
 
     def __init__(self, source: str, seconds: float | None, reading: dict[str, Any]) -> None:
         nothing = Family(source, {}, None, "grains")
         super().__init__(as_text(source), nothing, sources=(source,), reading=reading)
-        self._path, self._seconds = Path(source), seconds
+        self._seconds = seconds
         self._is_over = False
+        self._idle: Callable[[], object] = lambda: None
         self._taken: list[Frame] = []
+        self._sizes: dict[Path, int] = {}
+        """Sizes of the grain files of the taken frames."""
         self._alone: list[Frame] = []
         """Taken frames that had no contact file."""
-        self._sizes: dict[Path, int] = {}
-        """Of the files of taken frames."""
-        self._now: Series | None = None
-        """The series of the files that were there at the last look."""
-        self._looked: list[tuple[Path, Stamp | None]] = []
-        self._seen: dict[Path, tuple[Stamp, float]] = {}
-        """How the files of waiting frames are, and since when."""
-        self._told: list[Warning] = []
-        self._problem: Exception | None = None
-        """Why the source cannot be opened, or the next frame not be read."""
-        self._idle: Callable[[], object] = lambda: None
         self._since = time.monotonic()
+        """When the last frame was taken."""
+        self._seen: dict[Path, tuple[Stamp, float]] = {}
+        """How each file is, and since when."""
+        self._looked: list[Any] = []
+        """The files as they were when the series was opened."""
+        self._told: list[Warning | str] = []
+        """What was told when the files were opened, for when the first frame is taken."""
+        self._problem: Exception | None = None
+        """Why the source cannot be opened, or the next frame cannot be read."""
 
     def __repr__(self) -> str:
         return f"FollowedSeries {self.name}: {len(self._taken)} frames so far"
@@ -113,9 +113,10 @@ class FollowedSeries(Series):
         number = 0
         while True:
             begun = time.monotonic()
-            frame = self._taken[number] if number < len(self._taken) else self._next()
-            if frame is not None:
-                yield frame
+            if number == len(self._taken):
+                self._take_next()
+            if number < len(self._taken):
+                yield self._taken[number]
                 number += 1
             elif self._is_over:
                 return
@@ -132,7 +133,7 @@ class FollowedSeries(Series):
     def as_it_is(self) -> Series:
         """The series of what is there now, which is not waited for."""
         self._look()
-        return self._with(self.numbers)
+        return self.whole
 
     @property
     def lack(self) -> str:
@@ -151,186 +152,138 @@ class FollowedSeries(Series):
         """Those of the frames that were taken: others may be in the middle of being written."""
         if not self._taken:
             return
-        for path, is_grains in self.files_through(len(self._taken) - 1):
-            yield path
-            if is_grains:
-                yield from self.beside(path)
+        yield from self.files_through(len(self._taken) - 1)
         if self.cells is not None:
             yield self.cells.path
 
-    def _next(self) -> Frame | None:
-        """The next frame, if it can be taken now."""
-        if self._is_over:
-            return None if self._taken else self._last()
+    def _take_next(self) -> None:
+        """Take the next frame if it is whole, or broken while a later frame is whole."""
+        if self._is_over and self._taken:
+            return
         self._look()
-        self._check_sizes()
-        waiting = self._waiting()
-        if waiting and self._may_be_taken(waiting):
-            return self._take(waiting[0])
-        if self._seconds is not None and time.monotonic() - self._since >= self._seconds:
-            # what is left is taken at once: nothing more is waited for
+        waiting: list[Frame] = []
+        if self.grains.reader is not None:
+            with growing():
+                waiting = list(islice(self.whole, len(self._taken), None))
+        waited = time.monotonic() - self._since
+        if any(self._is_whole(frame, has_later=frame is not waiting[-1]) for frame in waiting):
+            self._take(waiting[0])
+        elif self._is_over or (self._seconds is not None and waited >= self._seconds):
+            # from now on nothing is waited for, not even contact files
             self._seconds = 0.0
-            found = self._last()
-            self._is_over = found is None
-            return found
-        return None
+            if any(map(self._can_be_read, waiting)):
+                self._take(waiting[0])
+                return
+            self._is_over = True
+            if waiting:
+                warn(
+                    f"{waiting[0].snapshot.path}: is left out, as it was not whole when following "
+                    f"ended: {self._problem}"
+                )
+
+    def _take(self, frame: Frame) -> None:
+        path = frame.snapshot.path
+        self._taken.append(frame)
+        if not any(_contacts(frame.series, frame)):
+            self._alone.append(frame)
+        if path.exists():
+            self._sizes[path] = path.stat().st_size
+        self._since = time.monotonic()
+        self._tell()
+
+    def _tell(self) -> None:
+        """Pass on what was told when the files were opened, once there is a frame."""
+        while self._taken and self._told:
+            warnings.warn(self._told.pop(0), stacklevel=2)
 
     def _look(self) -> None:
-        """
-        Look for files, and open the series again if some have come.
-
-        Raises
-        ------
-        ReadError
-            If what is there cannot be gone on with.
-        """
-        if not self._path.exists():
+        """Open the series again if files have changed; ReadError if it cannot be gone on with."""
+        source = Path(self.sources[0])
+        if not source.exists():
             raise ReadError(
-                f"{self._path}: has vanished while it was followed, after {len(self._taken)} "
-                f"frames of it were taken: bring it back and go on with `resume`"
+                f"{source}: has vanished while it was followed, after {len(self._taken)} frames of "
+                f"it were taken: bring it back and go on with `resume`"
             )
-        names = files_in(self._path) if self._path.is_dir() else [self._path]
-        # until a frame is taken, what a file holds may be seen better when there is more of it
-        looked = [(path, None if self._taken else _stamp(path)) for path in names]
+        names = files_in(source) if source.is_dir() else [source]
+        quiet = [self._quiet(path) for path in names]
+        looked = [(path, self._seen.get(path)) for path in names]
         if looked == self._looked:
             return
         with warnings.catch_warnings(record=True) as caught, growing():
             warnings.simplefilter("always")
             try:
-                series = read_series(self.sources[0], **self.reading)
-            except SettingsError:
-                raise
+                series = read_series(source, **self.reading)
             except (ReadError, OSError) as error:
                 self._problem, series = error, None
-        # those of the last opening, and of threads that have computed meanwhile
-        self._told = [one.message for one in caught if isinstance(one.message, Warning)]
+        # threads that compute frames are heard, too
+        self._told = [one.message for one in caught]
         self._tell()
         if series is not None:
+            self._check_taken(series)
+            self.grains, self.contacts, self.cells = series.grains, series.contacts, series.cells
+            self.contacts_from, self.options = series.contacts_from, series.options
+            self.dim = series.dim
             self._looked, self._problem = looked, None
-            self._go_on_with(series)
-        elif self._taken and all(map(self._is_quiet, names)):
+        elif self._taken and min(quiet, default=QUIET) >= QUIET:
             raise ReadError(str(self._problem))
 
-    def _go_on_with(self, series: Series) -> None:
-        """Take over what is known of the files now, if taken frames stay what they are."""
-        series.known = self.known
-        files = list(series.grains.files.values())
-        taken = list(self._sizes)
-        if series.grains.kind != "index" and files[: len(taken)] != taken:
-            for path in taken:
-                if path not in files:
-                    raise ReadError(
-                        f"{path}: has vanished after its frame was taken, so that the numbers of "
-                        f"all later frames would change: bring it back and go on with `resume`"
-                    )
-            new = next(path for path in files if path not in taken)
-            raise ReadError(
-                f"{new}: is new, and belongs before frames that were taken already: compute the "
-                f"finished folder without `follow`"
-            )
+    def _check_taken(self, series: Series) -> None:
+        """ReadError if the frames that were taken are not the first of the series any more."""
+        series.known, taken = self.known, self._sizes
+        # an index lists files of any names
+        is_index = series.grains.kind == "index"
+        files = list(taken if is_index else series.grains.files.values())
+        wrong = [(path, "has vanished after its frame was taken") for path in taken]
+        wrong = [one for one in wrong if one[0] not in files]
+        for path in files[: len(taken)]:
+            if path not in taken:
+                wrong.append((path, "is new, and belongs before frames that were taken"))
+            # one file of many snapshots may grow
+            elif len(taken) > 1 and path.exists() and path.stat().st_size != taken[path]:
+                wrong.append((path, "has changed after its frame was taken"))
         for frame in self._alone:
             if any(_contacts(series, frame)):
-                raise ReadError(
-                    f"{frame.snapshot.path}: its contact file has come after it was taken without: "
-                    f"compute the finished folder without `follow`"
-                )
-        self._now = series
-        self.grains, self.contacts, self.cells = series.grains, series.contacts, series.cells
-        self.contacts_from, self.options = series.contacts_from, series.options
-        self.dim = series.dim
-
-    def _tell(self) -> None:
-        """What was told when the series was opened, once it is sure that it is one."""
-        if self._taken:
-            told, self._told = self._told, []
-            for one in told:
-                warnings.warn(one, stacklevel=2)
-
-    def _check_sizes(self) -> None:
-        """ReadError if a file has grown that was thought whole; one of many snapshots may."""
-        for path, size in self._sizes.items() if len(self._sizes) > 1 else ():
-            if path.exists() and path.stat().st_size != size:
-                raise ReadError(
-                    f"{path}: has changed after its frame was taken: expected a file that is "
-                    f"written within {QUIET:g} s; compute the finished folder without `follow`"
-                )
-
-    def _waiting(self) -> list[Frame]:
-        """The frames behind those that were taken, as far as they can be told."""
-        with growing():
-            return [] if self._now is None else list(islice(self._now, len(self._taken), None))
-
-    def _may_be_taken(self, waiting: Sequence[Frame]) -> bool:
-        """Whether the first of some frames is whole, or broken while a later one is whole."""
-        if len(waiting) > 1 and self._is_old(waiting[0]):
-            return True
-        places = range(1, len(waiting) + 1)
-        return any(
-            self._is_whole(frame, has_later=place < len(waiting))
-            for place, frame in zip(places, waiting, strict=True)
-        )
+                wrong.append((frame.snapshot.path, "was taken before its contact file came"))
+        if wrong:
+            path, what = wrong[0]
+            raise ReadError(f"{path}: {what}: compute the finished folder without `follow`")
 
     def _is_whole(self, frame: Frame, *, has_later: bool) -> bool:
-        """Whether all files of a frame are there and can be read to their ends."""
-        quiet = [self._is_quiet(path) for path in _files(frame)]
-        if not (has_later or all(quiet)) or not all(_contacts(frame.series, frame)):
+        """Whether all files of a frame are there, are not written any more, and can be read."""
+        series, path = frame.series, frame.snapshot.path
+        contacts = _contacts(series, frame)
+        beside = [] if series.grains.kind == "index" else series.beside(path)
+        files = [path, *frame.snapshot.parts, *beside, *filter(None, contacts)]
+        quiet = min(map(self._quiet, files))
+        if not all(contacts) or not (has_later or quiet >= QUIET):
             return False
         if has_later or frame.number:
-            return self._can_be_read(frame)
+            return (has_later and quiet > OLD) or self._can_be_read(frame)
         # of the first frame alone nobody knows whether contact files will come, nor whether the
         # number in its name is its step
-        may_come = frame.series.contacts_from in ("auto", "beside") and not frame.series.contacts
+        may_come = series.contacts_from in ("auto", "beside") and not series.contacts
         has_step = frame.step is not None or frame.name_step is None
-        return has_step and self._can_be_read(frame, with_contacts=may_come)
+        return has_step and self._can_be_read(frame, needs_contacts=may_come)
 
-    def _can_be_read(self, frame: Frame, *, with_contacts: bool = False) -> bool:
+    def _can_be_read(self, frame: Frame, *, needs_contacts: bool = False) -> bool:
         try:
             with growing():
                 packing = frame.read()
         except (ReadError, PackingError) as error:
             self._problem = error
             return False
-        return packing.contacts is not None or not with_contacts
+        return packing.contacts is not None or not needs_contacts
 
-    def _is_quiet(self, path: Path) -> bool:
-        """Whether a file is there and has been as it is for a while."""
-        stamp = _stamp(path)
-        if stamp is None:
-            return False
+    def _quiet(self, path: Path) -> float:
+        """For how many seconds a file has not changed; 0 if it is not there."""
+        try:
+            stamp = stamp_of(path)
+        except OSError:
+            return 0.0
+        now, age = time.monotonic(), time.time() - stamp[-1] / 1e9
         if path not in self._seen or self._seen[path][0] != stamp:
-            self._seen[path] = stamp, time.monotonic()
-        return time.monotonic() - self._seen[path][1] >= QUIET or _age([path]) > OLD
-
-    def _is_old(self, frame: Frame) -> bool:
-        """Whether nobody is writing a frame any more."""
-        return all(_contacts(frame.series, frame)) and _age(_files(frame)) > OLD
-
-    def _take(self, frame: Frame) -> Frame:
-        path = frame.snapshot.path
-        self._taken.append(frame)
-        may_come = frame.series.contacts_from in ("auto", "beside")
-        if may_come and not any(_contacts(frame.series, frame)):
-            self._alone.append(frame)
-        if path.exists():
-            self._sizes[path] = path.stat().st_size
-        self._since = time.monotonic()
-        self._tell()
-        return frame
-
-    def _last(self) -> Frame | None:
-        """At the end: what is whole but for contacts that have not come."""
-        waiting = self._waiting()
-        # broken frames before a whole one are left to whoever reads them
-        if any(map(self._can_be_read, waiting)):
-            return self._take(waiting[0])
-        if waiting:
-            warnings.warn(
-                f"{waiting[0].snapshot.path}: is left out, as it was not whole when following it "
-                f"ended: {self._problem}",
-                ScanfabWarning,
-                stacklevel=2,
-            )
-        return None
+            self._seen[path] = stamp, now
+        return age if age > OLD else now - self._seen[path][1]
 
 
 def _contacts(series: Series, frame: Frame) -> list[Path | None]:
@@ -339,27 +292,6 @@ def _contacts(series: Series, frame: Frame) -> list[Path | None]:
     for family in series.contacts:
         snapshot = None
         with suppress(ReadError), growing():
-            snapshot = series._contacts_of(frame, family)
+            snapshot = series.contacts_of(frame, family)
         found.append(None if snapshot is None else snapshot.path)
     return found
-
-
-def _files(frame: Frame) -> list[Path]:
-    """What a frame is read from, as far as it is there."""
-    series, path = frame.series, frame.snapshot.path
-    beside = [] if series.grains.kind == "index" else series.beside(path)
-    contacts = [one for one in _contacts(series, frame) if one is not None]
-    return [path, *frame.snapshot.parts, *beside, *contacts]
-
-
-def _stamp(path: Path) -> Stamp | None:
-    with suppress(OSError):
-        return stamp_of(path)
-    return None
-
-
-def _age(files: Sequence[Path]) -> float:
-    """Seconds since the last of some files was written; 0 if one is not there."""
-    with suppress(OSError):
-        return time.time() - max(path.stat().st_mtime for path in files)
-    return 0.0

@@ -2,25 +2,21 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scanfab.base.errors import PackingError, ReadError, ScanfabNote, ScanfabWarning
-from scanfab.base.typing import FloatArray
-from scanfab.io.beside import (
+from scanfab.base.errors import PackingError, ReadError, note, warn
+from scanfab.io.columns import body_numbers
+from scanfab.io.companions import (
     check_contacts_are_there,
-    frame_file,
-    is_contacts_file,
+    companion_file,
+    companion_kind,
     read_frame,
     with_columns,
 )
-from scanfab.io.bodies import body_numbers
 from scanfab.io.families import Family, are_tied
 from scanfab.io.files import unpacking_up_to
 from scanfab.io.reader import (
@@ -33,8 +29,8 @@ from scanfab.io.reader import (
     ReadOptions,
     Snapshot,
 )
+from scanfab.packing.contacts import ListedWallForces
 from scanfab.packing.packing import Packing, check_lengths
-from scanfab.packing.walls import ListedWallForces
 
 if TYPE_CHECKING:
     from scanfab.io.series import Series
@@ -87,16 +83,17 @@ class Frame:
         Frame
             With absolute paths.
         """
-        series, path = self.series, self.snapshot.path
-        families = [_of_step(one, self.name_step, self.step) for one in series.contacts]
-        grains = replace(series.grains, files=_absolute(series.grains.files))
-        if series.dim == 3 or series.known.space is not None:
-            # else the space of the series is that of a frame before
-            grains = _of_step(grains, self.name_step, self.step)
-        other = replace(series, grains=grains, contacts=tuple(families))
-        parts = tuple(part.absolute() for part in self.snapshot.parts)
-        snapshot = replace(self.snapshot, path=path.absolute(), parts=parts)
-        return replace(self, series=other, snapshot=snapshot)
+        series, snapshot = self.series, self.snapshot
+        # a series whose space is not known yet looks for it in the frames before
+        is_known = series.dim == 3 or series.known.space is not None
+        steps = (self.name_step, self.step) if is_known else tuple(series.grains.files)
+        grains, *contacts = (_of_steps(one, steps) for one in (series.grains, *series.contacts))
+        parts = tuple(part.absolute() for part in snapshot.parts)
+        return replace(
+            self,
+            series=replace(series, grains=grains, contacts=tuple(contacts)),
+            snapshot=replace(snapshot, path=snapshot.path.absolute(), parts=parts),
+        )
 
     @property
     def reader(self) -> Reader:
@@ -120,61 +117,19 @@ class Frame:
         PackingError
             If its content is no packing.
         """
-        if self.problem is not None:
-            raise self.problem
-        options = self._options()
-        with unpacking_up_to(options.max_unpacked):
-            return self._packing(options)
+        try:
+            with unpacking_up_to(self.series.options.max_unpacked):
+                return self._packing()
+        except PackingError as error:
+            raise PackingError(f"{self.snapshot.path}: {error}") from None
 
-    def _packing(self, options: ReadOptions) -> Packing:
-        path = self.snapshot.path
-        told = read_frame(path)
-        grains = with_columns(path, self.reader.read_grains(self.snapshot, options), told)
-        with_own = self.series.contacts_from in ("auto", "beside", "grains")
-        own = grains.contacts if with_own else None
-        beside = self.series.contacts_from == "beside"
-        joined = [] if beside and own is not None else self._joined_contacts(grains, options)
-        listed = [part.contacts for part in joined if part.contacts is not None]
-        if own is not None:
-            listed.append(own)
-        if not listed and self.series.contacts_from in ("auto", "beside", "grains"):
-            check_contacts_are_there(path, told)
-        if self.series.contacts_from == "grains" and not listed:
-            raise ReadError(
-                f'{path}: `contacts="file"` was asked for, but there is no contact file'
-            )
-        walls = joined
-        if grains.wall_contacts is not None and (with_own or self._walls_are_with_grains()):
-            walls = [*joined, JoinedContacts(None, grains.wall_contacts, grains.wall_forces)]
-        none = np.zeros(len(grains.radius), np.int64)
-        with _named(path):
-            return Packing(
-                grains.position,
-                grains.radius,
-                id=grains.id,
-                columns=grains.columns,
-                bodies=body_numbers(path, grains, options.bodies),
-                contacts=listed[0] if listed else None,
-                wall_contacts=sum((one.wall_contacts for one in walls), none) if walls else None,
-                wall_forces=_wall_forces(walls),
-                cell=grains.cell,
-                step=self.step,
-                time=self.snapshot.time,
-                dim=self.series.space_of(self.number, grains.position),
-            )
-
-    def _walls_are_with_grains(self) -> bool:
-        """Whether the contacts are those that a conversion left beside: none is a wall's."""
-        return any(is_contacts_file(snapshot.path) for _, snapshot in self._contact_files())
-
-    def centres(self) -> FloatArray:
+    def read_grains(self) -> GrainTable:
         """
-        The centres of its particles alone.
+        What the file of grains itself says of them.
 
         Returns
         -------
-        ndarray, shape (N, 3)
-            Dump's length unit.
+        GrainTable
 
         Raises
         ------
@@ -183,63 +138,93 @@ class Frame:
         """
         if self.problem is not None:
             raise self.problem
-        options = self._options()
-        with unpacking_up_to(options.max_unpacked):
-            return self.reader.read_grains(self.snapshot, options).position
+        with unpacking_up_to(self.series.options.max_unpacked):
+            return self.reader.read_grains(self.snapshot, self._options())
 
-    def _joined_contacts(self, grains: GrainTable, options: ReadOptions) -> list[JoinedContacts]:
-        """The contact files of the frame, joined to its grains; one of them lists grain pairs."""
-        files = self._contact_files()
-        if not files:
-            return []
-        # contacts are joined by lengths and ids: what is wrong with those comes first
-        with _named(self.snapshot.path):
+    def _packing(self) -> Packing:
+        series, path = self.series, self.snapshot.path
+        grains, told = self.read_grains(), read_frame(path)
+        grains = with_columns(path, grains, told)
+        takes_own = series.contacts_from in ("auto", "beside", "grains")
+        lists = [grains.contacts] if takes_own and grains.contacts is not None else []
+        files: list[Path] = []
+        parts: list[JoinedContacts] = []
+        if not lists or series.contacts_from != "beside":
+            files, parts = self._contacts(grains)
+            lists += [part.contacts for part in parts if part.contacts is not None]
+        named = " and ".join(map(str, files))
+        if len(lists) > 1:
+            raise ReadError(f"two contact lists for one frame: {named}: choose with `contacts`")
+        if not lists and takes_own:
+            check_contacts_are_there(path, told)
+        if not lists and series.contacts_from == "grains":
+            raise ReadError(
+                f'{path}: `contacts="file"` was asked for, but there is no contact file'
+            )
+        if not lists and series.contacts_from == "path":
+            warn(
+                f"{named}: lists contacts with walls only: contacts between grains are found by "
+                f"geometry, unless `contacts` names their file"
+            )
+        # the contacts file that a conversion has left beside the grains lists no walls
+        if grains.wall_contacts is not None and (
+            takes_own or any(companion_kind(file) == "contacts" for file in files)
+        ):
+            parts.append(JoinedContacts(None, grains.wall_contacts, grains.wall_forces))
+        none = np.zeros(len(grains.radius), np.int64)
+        return Packing(
+            grains.position,
+            grains.radius,
+            id=grains.id,
+            columns=grains.columns,
+            bodies=body_numbers(path, grains, series.options.bodies),
+            contacts=lists[0] if lists else None,
+            wall_contacts=sum((one.wall_contacts for one in parts), none) if parts else None,
+            wall_forces=_wall_forces(parts),
+            cell=grains.cell,
+            step=self.step,
+            time=self.snapshot.time,
+            dim=series.space_of(self.number, grains.position),
+        )
+
+    def _contacts(self, grains: GrainTable) -> tuple[list[Path], list[JoinedContacts]]:
+        """The contact files of the frame, and their contacts joined to its grains."""
+        series, options = self.series, self._options()
+        files: list[Path] = []
+        parts: list[JoinedContacts] = []
+        if series.contacts:
+            # contacts are joined by lengths and ids: what is wrong with those comes first
             id = np.arange(len(grains.radius)) if grains.id is None else grains.id
             check_lengths(grains.position, grains.radius, id)
-        joined = []
-        for family, snapshot in files:
-            assert family.reader is not None
-            with self._tells_way_out():
-                try:
-                    joined.append((family, family.reader.read_contacts(snapshot, options, grains)))
-                except NotContactsError as error:
-                    if self._is_sure(family, error):
-                        raise
-                    warnings.warn(f"skipped {error}", ScanfabNote, stacklevel=4)
-        lists = [family for family, part in joined if part.contacts is not None]
-        with_own = self.series.contacts_from == "auto" and grains.contacts is not None
-        paths = " and ".join(str(snapshot.path) for _, snapshot in files)
-        if len(lists) + with_own > 1:
-            raise ReadError(f"two contact lists for one frame: {paths}: choose with `contacts`")
-        if not lists and self.series.contacts_from == "path":
-            warnings.warn(
-                f"{paths}: lists contacts with walls only: contacts between grains are found by "
-                f"geometry, unless `contacts` names their file",
-                ScanfabWarning,
-                stacklevel=4,
-            )
-        return [part for _, part in joined]
-
-    def _is_sure(self, family: Family, error: NotContactsError) -> bool:
-        """Whether contact files that do not fit are an error: if they are named, or of the step."""
-        series = self.series
-        if series.contacts_from == "path" or series.options.contact_columns is not None:
-            return True
-        is_tied = series.contacts_from != "beside" or are_tied(series.grains, family)
-        return is_tied and isinstance(error, OtherGrainsError)
-
-    @contextmanager
-    def _tells_way_out(self) -> Iterator[None]:
-        """Let the error of a contact file that nobody named tell how to do without it."""
-        try:
-            yield
-        except ReadError as error:
-            if self.series.contacts_from != "beside":
-                raise
-            raise ReadError(
-                f"{error} (this file lies beside the grains; "
-                '`contacts="geometric"` leaves it alone)'
-            ) from None
+        for family in series.contacts:
+            try:
+                snapshot = series.contacts_of(self, family)
+                if snapshot is not None:
+                    files.append(snapshot.path)
+                    assert family.reader is not None
+                    parts.append(family.reader.read_contacts(snapshot, options, grains))
+            except ReadError as error:
+                if series.contacts_from == "path":
+                    raise
+                is_theirs = series.contacts_from != "beside" or are_tied(series.grains, family)
+                is_sure = isinstance(error, OtherGrainsError) and is_theirs
+                if not isinstance(error, NotContactsError) or options.contact_columns or is_sure:
+                    raise ReadError(
+                        f"{error} (this file lies beside the grains; "
+                        f'`contacts="geometric"` leaves it alone)'
+                    ) from None
+                note(f"skipped {error}")
+        if series.contacts and not files:
+            step, time = self.name_step if self.step is None else self.step, self.snapshot.time
+            moment = f"frame {self.number}" if step is None else f"step {step}"
+            if self.step is None and time is not None:
+                moment = f"time {time:g}"
+            patterns = ", ".join(family.pattern for family in series.contacts)
+            message = f"{self.snapshot.path}: no contact file for {moment} among {patterns}"
+            if series.contacts_from == "path":
+                raise ReadError(message)
+            warn(f"{message}: contacts are found by geometry")
+        return files, parts
 
     @property
     def step(self) -> int | None:
@@ -255,7 +240,7 @@ class Frame:
         ask = getattr(self.reader, "carries", None)
         options = self.series.options
         told = self.series.cells or options.cell or options.periodic is not None
-        told = told or frame_file(self.snapshot.path).is_file()
+        told = told or companion_file(self.snapshot.path, "frame").is_file()
         with unpacking_up_to(options.max_unpacked):
             return "cell" if told or ask is None else ask(self.snapshot.path)
 
@@ -283,50 +268,13 @@ class Frame:
             )
         return replace(options, cell=found)
 
-    def _contact_files(self) -> list[tuple[Family, Snapshot]]:
-        """The snapshots of the contact files that belong to this frame."""
-        series, found = self.series, []
-        for family in series.contacts:
-            with self._tells_way_out():
-                contacts = series._contacts_of(self, family)
-            if contacts is not None:
-                found.append((family, contacts))
-        if not found and series.contacts:
-            patterns = ", ".join(family.pattern for family in series.contacts)
-            step = self.name_step if self.step is None else self.step
-            moment = f"frame {self.number}" if step is None else f"step {step}"
-            if self.step is None and self.snapshot.time is not None:
-                moment = f"time {self.snapshot.time:g}"
-            message = f"{self.snapshot.path}: no contact file for {moment} among {patterns}"
-            if series.contacts_from == "path":
-                raise ReadError(message)
-            warnings.warn(
-                f"{message}: contacts are found by geometry", ScanfabWarning, stacklevel=3
-            )
-        return found
 
-
-def _absolute(files: dict[int | None, Path]) -> dict[int | None, Path]:
-    return {step: path.absolute() for step, path in files.items()}
-
-
-def _of_step(family: Family, *steps: int | None) -> Family:
-    """The files of some steps; another one too, as a single file may be that of any step."""
-    wanted = (None, *steps)
-    files = {step: path for step, path in family.files.items() if step in wanted}
-    other = next((step for step in family.files if step not in wanted), None)
-    if other is not None and len(files) < 2:
-        files[other] = family.files[other]
-    return replace(family, files=_absolute(files))
-
-
-@contextmanager
-def _named(path: Path) -> Iterator[None]:
-    """Let errors of a packing begin with its file."""
-    try:
-        yield
-    except PackingError as error:
-        raise PackingError(f"{path}: {error}") from None
+def _of_steps(family: Family, steps: tuple[int | None, ...]) -> Family:
+    """The files of some steps, and one more: a file that is the only one may be of any step."""
+    wanted = {None, *steps}
+    wanted.add(next((step for step in family.files if step not in wanted), None))
+    files = {step: path.absolute() for step, path in family.files.items() if step in wanted}
+    return replace(family, files=files)
 
 
 def _wall_forces(walls: list[JoinedContacts]) -> ListedWallForces | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,7 +14,6 @@ from scanfab.io.fence import fenced
 MAGIC = b"\x89HDF\r\n\x1a\n"
 # filters that are part of HDF5 and h5py; for any other one, HDF5 would load code from the disk
 FILTERS = {1, 2, 3, 4, 5, 6, 32000}  # deflate, shuffle, fletcher32, szip, nbit, scaleoffset, lzf
-MOST_OBJECTS = 100_000
 
 
 class HdfFile(NamedTuple):
@@ -55,25 +55,20 @@ def read_hdf_file(path: Path, with_data: bool = True) -> HdfFile:
         If the file is damaged, if data stand in other files, or if foreign code would have to
         unpack them.
     """
-    return HdfFile(*fenced(read_in_worker, path, with_data))
+    return fenced(read_in_worker, path, with_data)
 
 
-def read_in_worker(
-    path: str, with_data: bool
-) -> tuple[dict[str, npt.NDArray[Any]], dict[str, dict[str, Any]]]:
+def read_in_worker(path: str, with_data: bool) -> HdfFile:
     """Arrays and attributes; ValueError says what cannot be read."""
     import h5py
 
-    arrays: dict[str, npt.NDArray[Any]] = {}
-    attributes: dict[str, dict[str, Any]] = {}
+    arrays, attributes = HdfFile({}, {})
     with h5py.File(path, "r") as file:
         waiting = [("", file)]
         while waiting:
             name, group = waiting.pop(0)
             attributes[name] = _attributes(group)
             for key in group:
-                if len(attributes) > MOST_OBJECTS or name.count("/") > 32:
-                    raise ValueError("too many objects for a frame")
                 here = f"{name}/{key}".lstrip("/")
                 link = group.get(key, getlink=True)
                 if isinstance(link, h5py.ExternalLink):
@@ -84,7 +79,7 @@ def read_in_worker(
                 elif isinstance(one, h5py.Dataset) and one.shape is not None:
                     _take(here, one, with_data, arrays)
                     attributes[here] = _attributes(one)
-    return arrays, attributes
+    return HdfFile(arrays, attributes)
 
 
 def _take(name: str, one: Any, with_data: bool, arrays: dict[str, npt.NDArray[Any]]) -> None:
@@ -106,17 +101,13 @@ def _take(name: str, one: Any, with_data: bool, arrays: dict[str, npt.NDArray[An
 
 
 def _attributes(one: Any) -> dict[str, Any]:
-    """The attributes that are numbers or texts."""
+    """The attributes that are numbers or texts; h5py does not know all other types."""
     found: dict[str, Any] = {}
     for name in one.attrs:
-        try:
+        with suppress(OSError, TypeError, ValueError):
             value = one.attrs[name]
-        except (OSError, TypeError, ValueError):
-            continue
-        if isinstance(value, bytes):
-            found[name] = value.decode("utf-8", "replace")
-        elif isinstance(value, str):
-            found[name] = value
-        elif isinstance(value, np.ndarray | np.generic) and value.dtype.kind in "biuf":
-            found[name] = value.tolist()
+            if isinstance(value, bytes | str):
+                found[name] = value if isinstance(value, str) else value.decode("utf-8", "replace")
+            elif isinstance(value, np.ndarray | np.generic) and value.dtype.kind in "biuf":
+                found[name] = value.tolist()
     return found

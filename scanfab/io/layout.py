@@ -1,4 +1,4 @@
-"""How a table of text is written, by its first rows: separator, decimal sign, names of columns."""
+"""A table of text of any program: how it is written, by its first rows, and its columns."""
 
 from __future__ import annotations
 
@@ -7,61 +7,44 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
 from scanfab.base.errors import ReadError
 from scanfab.io.files import first_bytes, plain
 from scanfab.io.reader import Snapshot
-from scanfab.io.text import (
-    Columns,
-    Layout,
-    is_number,
-    read_rows,
-    spelt,
-    text_of,
-    warn_of_end,
-    words_of,
-)
+from scanfab.io.text import Columns, Layout, is_number, read_rows, text_of, warn_of_end, words_of
 
-# bytes of a file that are looked at, the rows among them, and the most columns a table has
-HEAD, SAMPLE, MOST_COLUMNS = 1 << 18, 20, 4096
+# bytes of a file that are looked at, and the rows among them
+HEAD, SAMPLE = 1 << 18, 20
 COMMENTS = ("#", "%", "//", "!")
 CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f]")
 # a word with a comma, and one whose comma may stand before thousands: no decimal number has two
 # commas, or begins with 0
 WITH_COMMA = re.compile(rb"[-+0-9.eE]*,[-+0-9.,eE]*")
 THOUSANDS = re.compile(rb"[-+]?[1-9][0-9]{0,2}(,[0-9]{3})+")
-# a blank stands for any run of blanks and tabs
-SEPARATORS = ("\t", ";", ",", " ")
-
-
-class Line(NamedTuple):
-    """A line of a file: its number from 1, its first byte and its text."""
-
-    number: int
-    start: int
-    text: str
+# separators (a blank stands for any run of blanks and tabs) without and with a decimal comma
+WAYS = [("\t", False), ("\t", True), (";", False), (";", True), (",", False), (" ", False)]
+WAYS += [(" ", True)]
 
 
 class TextTable(NamedTuple):
-    """A table of text, as its first rows show it."""
+    """A table, as its first rows show it."""
 
     layout: Layout
-    """With the numbers of columns as names where the table has none (or one twice)."""
-    names: list[str] | None
-    """As they stand there; None if the table has none."""
-    start: int
+    """With the number of a column as its name where it has none, or that of another column."""
+    own: Sequence[str]
+    """The names of the columns as they stand there, or their numbers."""
+    is_named: bool
+    """Whether the table has names."""
+    start: int = 0
     """Byte of the first row in the file."""
-    rows: list[list[str]]
+    rows: Sequence[Sequence[str]] = ()
     """The words of the first rows."""
-
-    @property
-    def own(self) -> Sequence[str]:
-        """The names of columns, or their numbers."""
-        return self.names or self.layout.names
 
 
 def text_table(path: Path, skip: int) -> TextTable:
     """
-    How a table is written.
+    How a table of text is written.
 
     Parameters
     ----------
@@ -75,37 +58,45 @@ def text_table(path: Path, skip: int) -> TextTable:
     ReadError
         If it is no table: no text, or its first rows differ in width.
     """
-    *lines, end = _lines(path, skip)
-    above = ""
-    while lines and (not lines[0].text.strip() or lines[0].text.lstrip().startswith(COMMENTS)):
-        above = lines.pop(0).text
-    lines = [line for line in lines if line.text.strip()][: SAMPLE + 1]
-    if not lines:
-        raise ReadError(f"{path}: expected a table, found no row")
-    separator, comma = _separator([line.text for line in lines])
-    rows = [words_of(line.text, separator) for line in lines]
+    head = _first_lines(path)
+    try:
+        lines = head.decode("utf-8-sig").split("\n")
+    except UnicodeDecodeError:
+        lines = head.decode("latin-1").split("\n")
+    # comments and empty lines stand above the table, and no empty line counts within the sample
+    numbers = [k for k in range(skip, len(lines)) if lines[k].strip()]
+    while numbers and lines[numbers[0]].lstrip().startswith(COMMENTS):
+        del numbers[0]
+    numbers = numbers[: SAMPLE + 1]
+    if not numbers:
+        skipped = f" (`skip={skip}`)" if skip else ""
+        raise ReadError(f"{path}: expected a table, found no row{skipped}")
+    texts = [lines[k].rstrip("\r") for k in numbers]
+    separator, comma = max(WAYS, key=lambda way: _score(texts[1:] or texts, *way))
+    rows = [words_of(text, separator) for text in texts]
+    width, first = len(rows[0]), numbers[0]
     names: list[str] | None = None
     # a name beside a number is no header: "P 0.3 1.2 4.1" is a row
     if not any(is_number(word, comma) for word in rows[0]):
-        text = lines[0].text.strip().rstrip(separator)
-        names = [word.strip() for word in words_of(text, separator)]
-        lines, rows = lines[1:], rows[1:]
-    elif above:
-        names = _names_in_comment(above, separator, len(rows[0]))
-    width = len(rows[0]) if rows else len(names or ())
-    check_width(path, width)
-    for line, row in zip(lines, rows, strict=True):
-        # rows below names that are cut are found when the table is read
-        if names is None and len(row) != width:
-            raise ReadError(
-                f"{path}, line {line.number}: expected {width} columns as in line "
-                f"{lines[0].number}, found {len(row)}"
-            )
+        names = [word.strip() for word in words_of(texts[0].strip().rstrip(separator), separator)]
+        first, rows = numbers[1] if len(numbers) > 1 else first + 1, rows[1:]
+        width = len(rows[0]) if rows else len(names)
+    elif first > skip:
+        names = _names_in_comment(lines[first - 1], separator, width)
+    # a row below names that was cut is found when the table is read
+    for number, row in zip(numbers if names is None else (), rows, strict=False):
+        if len(row) != width:
+            wrong = f"expected {width} columns as above, found {len(row)}"
+            raise ReadError(f"{path}, line {number + 1}: {wrong}")
     if width > 1 and len(names or ()) != width and rows and not any(row[-1] for row in rows):
         width -= 1  # there is a separator at the end of each row
-    line = lines[0] if rows else end
-    layout = Layout(tuple(unique(names or [""] * width)), separator, line.number, comma=comma)
-    return TextTable(layout, names, line.start, [row[:width] for row in rows])
+    own = names or [f"{place + 1}" for place in range(width)]
+    # a name that is empty, or stands before, is the number of its column
+    places = {name: place for place, name in reversed([(-1, ""), *enumerate(own)])}
+    keys = [one if places[one] == k else f"{k + 1}" for k, one in enumerate(own)]
+    layout = Layout(tuple(keys), separator, first + 1, comma=comma)
+    start = sum(len(line) + 1 for line in head.split(b"\n")[:first])
+    return TextTable(layout, own, names is not None, start, [row[:width] for row in rows])
 
 
 def read_text(
@@ -130,101 +121,104 @@ def read_text(
     ReadError
         If a row does not fit the columns, or a comma may stand before thousands.
     """
-    check_names(path, table)
-    snapshot = Snapshot(path, start=table.start)
-    rows = text_of(snapshot)
-    if not rows and not plain(path).read_bytes().endswith(b"\n"):
+    names = table.layout.names
+    if table.rows and len(names) != len(table.rows[0]):
+        raise ReadError(
+            f"{path}, line {table.layout.line}: the columns have {len(names)} names, but "
+            f"{len(table.rows[0])} columns follow: skip the names with `skip`, and name columns by "
+            f"their numbers with `columns`"
+        )
+    rows = text_of(Snapshot(path, start=table.start))
+    if table.start > plain(path).stat().st_size:  # the line of names has no end
         warn_of_end(path)
-    doubtful = [one[0] for one in WITH_COMMA.finditer(rows)] if table.layout.comma else []
-    if doubtful and all(map(THOUSANDS.fullmatch, doubtful)):
+    first = WITH_COMMA.search(rows) if table.layout.comma else None
+    if first and all(THOUSANDS.fullmatch(one[0]) for one in WITH_COMMA.finditer(rows)):
         raise ReadError(
-            f"{path}: {doubtful[0].decode()!r} may be a decimal number or have a sign of "
-            f"thousands, as may all numbers with a comma: write them with a point, without signs "
-            f"of thousands"
+            f"{path}: the comma in {first[0].decode()!r} may be a decimal sign or a sign of "
+            f"thousands, as in all numbers: write them with a point"
         )
-    optional = [name for name in table.layout.names if name not in numbers]
-    layout = table.layout._replace(line=1, whole=whole, optional=optional)
-    return read_rows(snapshot, rows, layout)
+    optional = [name for name in names if name not in numbers]
+    return read_rows(Snapshot(path), rows, table.layout._replace(whole=whole, optional=optional))
 
 
-def check_names(path: Path, table: TextTable) -> None:
-    """ReadError if the first row has more or fewer columns than there are names."""
-    width, names = len(table.rows[0]) if table.rows else 0, table.names or ()
-    if names and table.rows and len(names) != width:
-        raise ReadError(
-            f"{path}, line {table.layout.line}: the columns have {len(names)} names "
-            f"({', '.join(names[:8])}), but {width} columns follow: it cannot be told which name "
-            f"is whose; skip the names with `skip`, and name columns by their numbers with "
-            f"`columns`"
-        )
-
-
-def check_width(path: Path, width: int) -> None:
-    """ReadError for more columns than any table of grains has: each would take its time."""
-    if width > MOST_COLUMNS:
-        raise ReadError(f"{path}: expected at most {MOST_COLUMNS} columns, found {width}")
-
-
-def _lines(path: Path, skip: int) -> list[Line]:
-    """The lines that are looked at, without those to be skipped, and where the next one begins."""
+def _first_lines(path: Path) -> bytes:
+    """The lines that are looked at, each whole; ReadError if they are no text."""
     head = first_bytes(path, HEAD)
     if found := CONTROL.search(head):
         line = head.count(b"\n", 0, found.start()) + 1
-        raise ReadError(
-            f"{path}, line {line}: expected text, found the byte {found[0][0]}: this is no "
-            f"table of text (or it is UTF-16: save it as UTF-8)"
-        )
-    texts = head.removeprefix(b"\xef\xbb\xbf").split(b"\n")
-    if len(head) == HEAD:
-        texts.pop()  # which is cut
-    if not texts or (len(texts) == 1 and b"\r" in texts[0].rstrip()):
-        raise ReadError(f"{path}: expected rows of a table, found {spelt(head)} without a line end")
-    if skip >= len(texts):
-        raise ReadError(f"{path}: `skip={skip}` leaves no line: it has {len(texts)}")
-    lines, start = [], len(head) - len(head.removeprefix(b"\xef\xbb\xbf"))
-    for number, text in enumerate(texts, start=1):
-        lines.append(Line(number, start, _decoded(text).rstrip("\r")))
-        start += len(text) + 1
-    return [*lines[skip:], Line(len(texts) + 1, start, "")]
+        raise ReadError(f"{path}, line {line}: expected text, found the byte {found[0][0]}")
+    if b"\n" not in head and (len(head) == HEAD or b"\r" in head.rstrip()):
+        raise ReadError(f"{path}: expected rows of a table, found text without a line end")
+    return head if len(head) < HEAD else head[: head.rfind(b"\n") + 1]
 
 
-def _decoded(line: bytes) -> str:
-    try:
-        return line.decode("utf-8")
-    except UnicodeDecodeError:
-        return line.decode("latin-1")
-
-
-def _separator(lines: Sequence[str]) -> tuple[str, bool]:
-    """What stands between columns, and whether a comma is the decimal sign: by most numbers."""
-    best, choice = 0.0, (" ", False)
-    # names of columns say nothing, unless there is nothing else
-    lines = lines[1:] or lines
-    for separator in SEPARATORS:
-        rows = [words_of(line, separator) for line in lines]
-        words = [word for row in rows for word in row]
-        same = sum(len(row) == len(rows[0]) > 1 for row in rows) / len(rows)
-        for comma in (False,) if separator == "," else (False, True):
-            numbers = sum(not word or is_number(word, comma) for word in words)
-            score = same * (1e-3 + numbers / max(len(words), 1))
-            if score > best + 1e-9:
-                best, choice = score, (separator, comma)
-    return choice
+def _score(lines: Sequence[str], separator: str, comma: bool) -> float:
+    """How well lines fit a separator: by the words of a row, as many in each, and the numbers."""
+    rows = [words_of(line, separator) for line in lines]
+    words = [word for row in rows for word in row]
+    alike = sum(len(row) == len(rows[0]) > 1 for row in rows) / len(rows)
+    numbers = sum(not word or is_number(word, comma) for word in words) / max(len(words), 1)
+    # what no separator parts is one column, of a table of blanks
+    return alike * (1e-3 + numbers) if alike or separator == " " else -1.0
 
 
 def _names_in_comment(comment: str, separator: str, width: int) -> list[str] | None:
     """The names in the line above the rows, as ``numpy.savetxt`` writes them, if it holds names."""
-    text = comment.strip().lstrip("#%!/").strip()
-    for one in dict.fromkeys((separator, " ", ",", ";")):
+    text = comment.strip().lstrip("#%!/")
+    for one in (separator, " ", ",", ";"):
         words = [word.strip() for word in words_of(text, one)]
         if len(words) == width and all(words) and not any(map(is_number, words)):
             return words
     return None
 
 
-def unique(names: Sequence[str]) -> list[str]:
-    """Names of columns; one that is empty, or there before, is the number of its column."""
-    return [
-        name if name and name not in names[:place] else f"{place + 1}"
-        for place, name in enumerate(names)
-    ]
+class FrameFile:
+    """
+    Numbers of each frame from a table: strains, or cells of a series that does not carry them.
+
+    Parameters
+    ----------
+    path : Path
+        A table of text with a column ``step`` or ``frame``.
+    names : sequence of str
+        Columns that must be there.
+    optional : sequence of str, optional
+        Columns that are 0 if none of them is there, and otherwise must all be.
+    positive : int, optional
+        How many of the first columns must be above 0.
+
+    Raises
+    ------
+    ReadError
+        If a column is missing, a value is no number, or a frame occurs twice with other numbers.
+    """
+
+    def __init__(
+        self, path: Path, names: Sequence[str], optional: Sequence[str] = (), *, positive: int = 0
+    ) -> None:
+        self.path, table = path, text_table(path, 0)
+        known = table.layout.names
+        self.key = "step" if "step" in known else "frame"
+        """Whether rows go by step or by frame."""
+        wanted = [*names, *(optional if set(optional) & set(known) else ())]
+        if not {self.key, *wanted} <= set(known):
+            expected = f"expected the columns step or frame, and {', '.join(wanted)}"
+            raise ReadError(f"{path}: {expected}, found {', '.join(known)}")
+        columns = read_text(path, table, [self.key, *wanted], [self.key])
+        rows = np.zeros((len(columns[self.key]), len(names) + len(optional)))
+        rows[:, : len(wanted)] = np.column_stack([columns[name] for name in wanted])
+        self._rows: dict[int, tuple[float, ...]] = {}
+        pairs = zip(columns[self.key].tolist(), map(tuple, rows.tolist()), strict=True)
+        for line, (number, row) in enumerate(pairs, table.layout.line):
+            is_sound = np.isfinite([number, *row]).all() and number == round(number)
+            if not is_sound or min(row[:positive], default=1.0) <= 0.0:
+                above = f" (above 0: {', '.join(names[:positive])})" if positive else ""
+                expected = f"expected a whole {self.key} and finite numbers{above}"
+                raise ReadError(f"{path}, line {line}: {expected}, found {number}, {row}")
+            if self._rows.setdefault(int(number), row) != row:
+                raise ReadError(f"{path}, line {line}: {self.key} {number} occurs twice")
+
+    def at(self, frame: int, step: int | None) -> tuple[float, ...] | None:
+        """The numbers of a frame; None if the file does not name it."""
+        number = step if self.key == "step" else frame
+        return None if number is None else self._rows.get(number)

@@ -2,15 +2,15 @@
 One mesh from any file of VTK: points, lines between them, and the arrays of both.
 
 VTK's own readers do the work, in the worker process of `fence`, because a damaged header may crash
-them. They raise no errors. What is wrong with a file stands in VTK's output window, which is a
-string here, and any text in it is an error. `vtk_checks` looks for faults that do not even stand
-there.
+them. They raise no errors: they write into VTK's output window, which is a string here, and any
+text in it is an error. Two faults are not told even there. Of a legacy file that was cut off, VTK
+fills the arrays with zeros: so an array is appended to the file, and must be found behind all
+others. What VTK does not notice in XML, `vtk_checks` looks for.
 """
 
 from __future__ import annotations
 
 import re
-import warnings
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 from pathlib import Path
@@ -20,12 +20,12 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.arrays import doubles
-from scanfab.base.errors import ReadError, ScanfabWarning
+from scanfab.base.errors import ReadError, warn
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.fence import fenced
 from scanfab.io.files import check_memory, file_inside, first_bytes, plain
 from scanfab.io.hdf import is_hdf, read_hdf_file
-from scanfab.io.vtk_checks import check_text, check_xml, damaged, is_ascii
+from scanfab.io.vtk_checks import check_xml, damaged
 
 Arrays = dict[str, npt.NDArray[Any]]
 
@@ -33,15 +33,17 @@ Arrays = dict[str, npt.NDArray[Any]]
 MESHES = {"polydata", "unstructuredgrid", "unstructured_grid", "rectilineargrid", "xdmf"}
 MESHES |= {"rectilinear_grid", "multiblockdataset", "partitioneddatasetcollection"}
 PIECES = ("PPolyData", "PUnstructuredGrid")
-VERTEX, POLY_VERTEX, LINE, POLY_LINE = 1, 2, 3, 4
+# VTK's numbers for kinds of cells
+VERTEX, POLY_VERTEX, LINE, POLY_LINE, POLYGON = 1, 2, 3, 4, 7
 # bit of vtkGhostType: the point belongs to another piece
 DUPLICATE = 1
-# what VTK says of keys that describe arrays: its own files have such with a NaN, which it refuses
+# VTK itself writes a NaN into keys that describe arrays, and cannot read it
 HARMLESS = re.compile("InformationKey|Could not locate key")
-
-
-# an array of a file without points; in a FIELD its line is NAME COMPONENTS 0 TYPE
-EMPTY_ARRAY = re.compile(r"^(?:SCALARS (\S+)|VECTORS (\S+)|(\S+) (\d+) 0 [a-z])", re.MULTILINE)
+TEXT = re.compile(rb"# vtk DataFile[^\n]*\n[^\n]*\n\s*ASCII\s", re.IGNORECASE)
+NO_POINTS = re.compile(rb"# vtk.*^POINTS\s+0\s", re.MULTILINE | re.DOTALL)
+# what is appended to a legacy file: an array without values
+END = "scanfab_end"
+APPENDED = f"FIELD scanfab 1\n{END} 1 0 int\n".encode()
 
 
 class Mesh(NamedTuple):
@@ -61,18 +63,20 @@ class Mesh(NamedTuple):
     """Of the file as a whole, with any number of rows."""
 
 
+NO_LINES: IntArray = np.zeros((0, 2), np.int64)
+
+
 def form_of(path: Path) -> str | None:
     """``PolyData``, ``UNSTRUCTURED_GRID``, ``Xdmf``, ...: what the header says; None if no VTK."""
     head = first_bytes(path)
     if is_hdf(head):
         form = read_hdf_file(path, with_data=False).attributes.get("VTKHDF", {}).get("Type")
         return form if isinstance(form, str) else None
-    if head.startswith(b"# vtk DataFile"):
-        match = re.search(rb"^\s*DATASET\s+(\w+)", head, re.MULTILINE)
+    is_legacy = head.startswith(b"# vtk DataFile")
+    pattern = rb"^\s*DATASET\s+(\w+)" if is_legacy else rb"<VTKFile[^>]*\btype=[\"'](\w+)"
+    match = re.search(pattern, head, re.MULTILINE)
+    if match or is_legacy:
         return match[1].decode() if match else None
-    match = re.search(rb"<VTKFile[^>]*\btype=[\"'](\w+)", head)
-    if match:
-        return match[1].decode()
     return "Xdmf" if re.search(rb"<Xdmf\b", head) else None
 
 
@@ -97,49 +101,38 @@ def read_mesh(path: Path, parts: Sequence[Path] = ()) -> Mesh:
     ReadError
         If a file is damaged, incomplete, or no mesh.
     """
-    return _joined(path, [_read_one(path), *map(_read_one, parts)])
+    return _joined(path, [_read_one(one) for one in (path, *parts)])
 
 
 def _read_one(path: Path) -> Mesh:
-    form = form_of(path)
-    if form is None:
-        raise ReadError(f"{path}: expected a VTK file, found something else")
+    form, head = form_of(path), first_bytes(path)
+    if form is None or not holds_mesh(form):
+        raise ReadError(
+            f"{path}: expected a VTK file with points, found {form or 'something else'}"
+        )
     if form in PIECES:
         pieces = listed(path, "Piece", "Source")
         if any(form_of(piece) in PIECES for piece in pieces):
             raise ReadError(f"{path}: one of its pieces lists pieces itself")
         return _joined(path, [_read_one(piece) for piece in pieces])
-    if not holds_mesh(form):
-        raise ReadError(f"{path}: a {form} holds neither grains nor contacts")
-    _check_other_files(path, form)
-    head = first_bytes(path)
-    if head.startswith(b"# vtk") and re.search(rb"^POINTS\s+0\s", head, re.MULTILINE):
-        # VTK loses all arrays of such a file, but their names matter
-        found = EMPTY_ARRAY.findall(first_bytes(path, 1 << 16).decode("utf-8", "replace"))
-        arrays = {
-            scalar or vector or name: np.zeros((0, 3) if vector or count == "3" else 0)
-            for scalar, vector, name, count in found
-        }
-        return Mesh(np.zeros((0, 3)), arrays, np.zeros((0, 2), np.int64), {}, False, {})
+    if NO_POINTS.match(head):
+        # VTK takes it for an error
+        return Mesh(np.zeros((0, 3)), {}, NO_LINES, {}, False, {})
+    if form == "Xdmf":
+        _check_xdmf(path)
     mesh = fenced(mesh_in_worker, path)
-    if is_ascii(head) and not plain(path).read_bytes()[-1:].isspace():
-        warnings.warn(
-            f"{path}: the last line has no end: its last number may be cut off",
-            ScanfabWarning,
-            stacklevel=2,
-        )
+    if TEXT.match(head) and not plain(path).read_bytes()[-1:].isspace():
+        warn(f"{path}: the last line has no end: its last number may be cut off")
     return mesh
 
 
-def _check_other_files(path: Path, form: str) -> None:
+def _check_xdmf(path: Path) -> None:
     """ReadError if an XDMF file names a file outside of its folder."""
-    if form != "Xdmf":
-        return
     for item in elements(path).iter():
-        if item.get("Format", "").upper() in ("HDF", "BINARY"):
-            file_inside(path, (item.text or "").strip().partition(":")[0])
         if "include" in item.tag.lower():
             raise ReadError(f"{path}: XDMF that includes other files is not read")
+        if item.get("Format", "").upper() in ("HDF", "BINARY"):
+            file_inside(path, (item.text or "").strip().partition(":")[0])
 
 
 def elements(path: Path) -> ElementTree.Element:
@@ -164,45 +157,31 @@ def listed(path: Path, tag: str, key: str) -> list[Path]:
     return [file_inside(path, name) for name in names]
 
 
-def _joined(path: Path, parts: Sequence[Mesh]) -> Mesh:
-    """Parts one behind the other, with the arrays that all parts which are not empty have."""
-    filled = [one for one in parts if len(one.points)] or list(parts[:1])
-    if not filled:
-        raise ReadError(f"{path}: expected a piece, found none")
-    if len(filled) == 1:
-        return filled[0]
-    starts = np.cumsum([0, *(len(one.points) for one in filled)])
-    return Mesh(
-        np.concatenate([one.points for one in filled]),
-        _common([one.point_arrays for one in filled]),
-        np.concatenate([one.lines + start for one, start in zip(filled, starts, strict=False)]),
-        _common([one.line_arrays for one in filled]),
-        any(one.has_faces for one in filled),
-        filled[0].field_arrays,
-    )
-
-
-def _common(arrays: Sequence[Arrays]) -> Arrays:
-    names = [name for name in arrays[0] if all(name in one for one in arrays)]
+def joined_arrays(parts: Sequence[Arrays]) -> Arrays:
+    """The arrays that all parts have, with as many components, one behind the other."""
+    found = {
+        name: [one[name] for one in parts] for name in parts[0] if all(name in one for one in parts)
+    }
     return {
-        name: np.concatenate([one[name] for one in arrays])
-        for name in names
-        if len({one[name].shape[1:] for one in arrays}) == 1
+        name: np.concatenate(own)
+        for name, own in found.items()
+        if len({one.shape[1:] for one in own}) == 1
     }
 
 
-def read_faces(path: Path) -> tuple[FloatArray, list[IntArray]]:
-    """
-    The points of a surface, (N, 3), and its faces, an array for each number of corners.
-
-    Raises
-    ------
-    ReadError
-        If it cannot be read, or is no PolyData.
-    """
-    if form_of(path) != "PolyData":
-        raise ReadError(f"{path}: expected a surface (PolyData), found something else")
-    return fenced(faces_in_worker, path)
+def _joined(path: Path, parts: Sequence[Mesh]) -> Mesh:
+    """Parts one behind the other; empty ones have lost their arrays, and count for nothing."""
+    filled = [one for one in parts if len(one.points)] or list(parts[:1])
+    if not filled:
+        raise ReadError(f"{path}: expected a piece, found none")
+    starts = np.cumsum([0, *(len(one.points) for one in filled)])
+    return filled[0]._replace(
+        points=np.concatenate([one.points for one in filled]),
+        point_arrays=joined_arrays([one.point_arrays for one in filled]),
+        lines=np.concatenate([one.lines + at for one, at in zip(filled, starts, strict=False)]),
+        line_arrays=joined_arrays([one.line_arrays for one in filled]),
+        has_faces=any(one.has_faces for one in filled),
+    )
 
 
 # from here on, in the worker process: errors are ValueErrors, and the fence names the file
@@ -211,32 +190,25 @@ def read_faces(path: Path) -> tuple[FloatArray, list[IntArray]]:
 def mesh_in_worker(path: str) -> Mesh:
     """The mesh of one file; of several blocks all that have points."""
     data = _read_by_vtk(path)
-    blocks = [data]
-    if data.IsA("vtkCompositeDataSet"):
-        iterator, blocks = data.NewIterator(), []
-        while not iterator.IsDoneWithTraversal():
-            blocks.append(iterator.GetCurrentDataObject())
-            iterator.GoToNextItem()
-    return _joined(Path(path), [_mesh_of(one) for one in blocks])
+    if not data.IsA("vtkCompositeDataSet"):
+        return _mesh_of(data)
+    blocks, iterator = [], data.NewIterator()
+    while not iterator.IsDoneWithTraversal():
+        blocks.append(_mesh_of(iterator.GetCurrentDataObject()))
+        iterator.GoToNextItem()
+    return _joined(Path(path), blocks)
 
 
 def faces_in_worker(path: str) -> tuple[FloatArray, list[IntArray]]:
-    """The points and faces of PolyData; strips are cut into triangles."""
-    data = _read_by_vtk(path)
-    points = _mesh_of(data).points
-    if data.GetNumberOfStrips():
-        from vtkmodules.vtkFiltersCore import vtkTriangleFilter
+    """The points of PolyData, and the triangles into which VTK cuts its polygons and strips."""
+    from vtkmodules.vtkFiltersCore import vtkTriangleFilter
 
-        triangles = vtkTriangleFilter()
-        triangles.SetInputData(data)
-        triangles.Update()
-        data = triangles.GetOutput()
-    offsets, named = _cells(data.GetPolys(), len(points))
-    corners = np.diff(offsets)
-    return points, [
-        named[offsets[:-1][corners == count][:, None] + np.arange(count)]
-        for count in np.unique(corners[corners > 2])
-    ]
+    data, triangles = _read_by_vtk(path), vtkTriangleFilter()
+    points = _mesh_of(data).points
+    triangles.SetInputData(data)
+    triangles.Update()
+    _, named = _cells(triangles.GetOutput().GetPolys(), len(points))
+    return points, [named.reshape(-1, 3)]
 
 
 def _read_by_vtk(path: str) -> Any:
@@ -245,27 +217,43 @@ def _read_by_vtk(path: str) -> Any:
 
     with open(path, "rb") as stream:
         head = stream.read(4096)
-    names = check_text(Path(path).read_bytes()) if is_ascii(head) else set()
-    reader = _reader_for(path, head)
+    is_legacy = head.startswith(b"# vtk")
+    reader = _legacy_reader(path, head) if is_legacy else _other_reader(path, head)
+    reader.SetFileName(path)
     window = vtkStringOutputWindow()
     vtkOutputWindow.SetInstance(window)
-    reader.SetFileName(path)
     reader.Update()
     data = reader.GetOutputDataObject(0)
     told = [one for one in window.GetOutput().split("\n\n\n") if one and not HARMLESS.search(one)]
     if told or data is None:
         reason = re.sub(r"^.*(\n.*\((0x[0-9a-f]+|nullptr)\):)?", "", told[0] if told else "no data")
         raise damaged(" ".join(reason.split()))
-    if names:
-        parts = (data.GetPointData(), data.GetCellData(), data.GetFieldData())
-        names -= {one for part in parts for one in _arrays(part, None)}
-        if names:
-            raise damaged(f"the array {min(names)} cannot be read")
+    if is_legacy:
+        places = (data.GetFieldData(), data.GetPointData(), data.GetCellData())
+        last = next((one for one in places if one.HasArray(END)), None)
+        # behind the number of rows stands at least the header of an array
+        if last is None or (last is not places[0] and last.GetNumberOfArrays() == 1):
+            raise damaged("it has fewer or more values than its headers say")
+        last.RemoveArray(END)
     return data
 
 
-def _reader_for(path: str, head: bytes) -> Any:
-    """VTK's reader of a file that was looked at as far as VTK does not."""
+def _legacy_reader(path: str, head: bytes) -> Any:
+    """VTK's reader of a legacy file, to whose bytes an array is appended."""
+    from vtkmodules.vtkIOLegacy import vtkGenericDataObjectReader
+
+    reader: Any = vtkGenericDataObjectReader()
+    for kind in ("Scalars", "Vectors", "Normals", "Tensors", "ColorScalars", "TCoords", "Fields"):
+        getattr(reader, f"ReadAll{kind}On")()
+    # bytes that were cut off would swallow empty lines
+    data = Path(path).read_bytes() + b"\n\n" * bool(TEXT.match(head)) + APPENDED
+    reader.ReadFromInputStringOn()
+    reader.SetBinaryInputString(data, len(data))
+    return reader
+
+
+def _other_reader(path: str, head: bytes) -> Any:
+    """VTK's reader of HDF5, XDMF or XML, which is looked at as far as VTK does not."""
     if is_hdf(head):
         from vtkmodules.vtkIOHDF import vtkHDFReader
 
@@ -274,17 +262,9 @@ def _reader_for(path: str, head: bytes) -> Any:
         from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
 
         return vtkXdmfReader()
-    if head.startswith(b"# vtk"):
-        from vtkmodules.vtkIOLegacy import vtkGenericDataObjectReader
-
-        reader = vtkGenericDataObjectReader()
-        for kind in ("Scalars", "Vectors", "Normals", "Tensors", "ColorScalars", "TCoords"):
-            getattr(reader, f"ReadAll{kind}On")()
-        reader.ReadAllFieldsOn()
-        return reader
-    check_xml(Path(path).read_bytes())
     from vtkmodules.vtkIOXML import vtkXMLGenericDataObjectReader
 
+    check_xml(Path(path).read_bytes())
     return vtkXMLGenericDataObjectReader()
 
 
@@ -328,69 +308,53 @@ def _cells(cells: Any, points: int) -> tuple[IntArray, IntArray]:
 
 def _mesh_of(data: Any) -> Mesh:
     """The mesh of one of VTK's data sets."""
-    none: IntArray = np.zeros((0, 2), np.int64)
     if data.IsA("vtkRectilinearGrid"):
         if not data.GetNumberOfPoints():
             raise damaged("expected coordinates along three axes")
-        corners = np.array(data.GetBounds()).reshape(3, 2).T
-        return Mesh(corners, {}, none, {}, False, {})
+        return Mesh(np.array(data.GetBounds()).reshape(3, 2).T, {}, NO_LINES, {}, False, {})
     if not data.IsA("vtkPointSet"):
         raise ValueError(f"a {data.GetClassName()} holds neither grains nor contacts")
     count = data.GetNumberOfPoints()
-    points = np.zeros((0, 3))
-    if count:
-        # a float may be a NaN that signals when it is cast
-        with np.errstate(invalid="ignore"):
-            points = doubles(_numpy(data.GetPoints().GetData()))
+    points = doubles(_numpy(data.GetPoints().GetData())) if count else np.zeros((0, 3))
     arrays = _arrays(data.GetPointData(), count)
     cell_arrays = _arrays(data.GetCellData(), data.GetNumberOfCells())
-    if data.IsA("vtkPolyData"):
-        for others in (data.GetVerts(), data.GetPolys(), data.GetStrips()):
-            _cells(others, count)
-        offsets, named = _cells(data.GetLines(), count)
-        chosen = np.arange(len(offsets) - 1)
-        # the rows of cell arrays are those of vertices, lines and faces, in this order
-        rows = data.GetNumberOfVerts() + chosen
-        has_faces = data.GetNumberOfPolys() + data.GetNumberOfStrips() > 0
-    else:
-        offsets, named = _cells(data.GetCells(), count)
-        chosen, has_faces = _lines_of_grid(data, offsets)
-        rows = chosen
-        if len(offsets) - 1 == count and not has_faces and np.array_equal(named, np.arange(count)):
-            # one cell for each point, whose arrays are those of the points
-            arrays.update(cell_arrays)
-    first, last = offsets[:-1][chosen], offsets[1:][chosen] - 1
+    offsets, named, types = _all_cells(data, count)
+    rows = np.flatnonzero(np.isin(types, (LINE, POLY_LINE)))
+    has_faces = not np.all(np.isin(types, (VERTEX, POLY_VERTEX, LINE, POLY_LINE)))
+    is_grid = not data.IsA("vtkPolyData")
+    if is_grid and len(types) == count and not has_faces and np.array_equal(named, range(count)):
+        # one cell for each point, whose arrays are those of the points
+        arrays.update(cell_arrays)
+    first, last = offsets[rows], offsets[rows + 1] - 1
     if np.any(last < first):
         raise damaged("a line has no points")
     lines = np.column_stack([named[first], named[last]])
     line_arrays = {name: values[rows] for name, values in cell_arrays.items()}
-    field_arrays = _arrays(data.GetFieldData(), None)
-    return _own(Mesh(points, arrays, lines, line_arrays, has_faces, field_arrays))
+    own = (arrays.get("vtkGhostType", np.zeros(count, np.uint8)) & DUPLICATE) == 0
+    if not own.all():
+        if len(lines):
+            raise ValueError("points of other pieces (vtkGhostType) and lines between points")
+        points, arrays = points[own], {name: values[own] for name, values in arrays.items()}
+    return Mesh(points, arrays, lines, line_arrays, has_faces, _arrays(data.GetFieldData(), None))
 
 
-def _lines_of_grid(data: Any, offsets: IntArray) -> tuple[IntArray, bool]:
-    """Which cells of a grid are lines, and whether others than lines and points are among them."""
-    array, sizes = data.GetCellTypesArray(), np.diff(offsets)
-    # since VTK 9.6, cells that are all of one type have no such array
-    types = np.array(data.GetCellTypes()) if array is None else _numpy(array)
-    if len(types) != len(sizes):
-        raise damaged(f"{len(types)} types for {len(sizes)} cells")
-    is_line = (types == LINE) | ((types == POLY_LINE) & (sizes == 2))
-    if np.any(sizes[is_line] != 2):
-        raise damaged("types and points of the cells do not fit")
-    is_point = (types == VERTEX) | (types == POLY_VERTEX)
-    return np.flatnonzero(is_line), bool(np.any(~is_point & ~is_line))
-
-
-def _own(mesh: Mesh) -> Mesh:
-    """The mesh without the points that belong to other pieces (vtkGhostType)."""
-    ghosts = mesh.point_arrays.get("vtkGhostType")
-    if ghosts is None or ghosts.dtype.kind not in "iu" or ghosts.ndim != 1:
-        return mesh
-    own = (ghosts.astype(np.int64) & DUPLICATE) == 0
-    if own.all():
-        return mesh
-    if len(mesh.lines):
-        raise ValueError("points of other pieces (vtkGhostType) and lines between points")
-    arrays = {name: values[own] for name, values in mesh.point_arrays.items()}
-    return mesh._replace(points=mesh.points[own], point_arrays=arrays)
+def _all_cells(data: Any, points: int) -> tuple[IntArray, IntArray, npt.NDArray[Any]]:
+    """Offsets, points and types of all cells, in the order of the rows of their arrays."""
+    if not data.IsA("vtkPolyData"):
+        offsets, named = _cells(data.GetCells(), points)
+        array = data.GetCellTypesArray()
+        # since VTK 9.6, cells that are all of one type have no such array
+        types = np.array(data.GetCellTypes()) if array is None else _numpy(array)
+        if len(types) != len(offsets) - 1 or np.any(np.diff(offsets)[types == LINE] != 2):
+            raise damaged("types and points of the cells do not fit")
+        return offsets, named, types
+    kinds = (data.GetVerts(), data.GetLines(), data.GetPolys(), data.GetStrips())
+    parts = [_cells(one, points) for one in kinds]
+    counts = [len(offsets) - 1 for offsets, _ in parts]
+    starts = np.cumsum([0, *(len(named) for _, named in parts)])
+    ends = [offsets[1:] + start for (offsets, _), start in zip(parts, starts, strict=False)]
+    return (
+        np.concatenate([[0], *ends]),
+        np.concatenate([named for _, named in parts]),
+        np.repeat([VERTEX, POLY_LINE, POLYGON, POLYGON], counts),
+    )

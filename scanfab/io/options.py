@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from scanfab.base.option import Option, number, optional, unusable, whole
+from scanfab.base.option import Option, number, one_of, optional, unusable, whole
 
 
 def _reader_names() -> Iterable[str]:
-    from scanfab.io.registry import installed_readers
+    from scanfab.io.reader import installed_readers
 
     return installed_readers()
 
@@ -70,17 +72,16 @@ def parse_frames(text: str | int | slice | None, name: str = "frames") -> slice:
         return slice(None)
     if isinstance(text, slice):
         return text
-    try:
-        numbers = [int(part) if part.strip() else None for part in str(text).split(":")]
-    except ValueError:
-        numbers = []
-    if not 1 <= len(numbers) <= 3 or numbers == [None] or numbers[2:] == [0]:
-        raise unusable(name, "a slice such as 0:10:2, :5 or -1:", text)
-    if len(numbers) > 1:
-        return slice(*numbers)
-    first = numbers[0]
-    assert first is not None
-    return slice(first, first + 1 if first != -1 else None)
+    words = str(text).split(":")
+    with suppress(ValueError):
+        if len(words) == 1:
+            first = int(words[0])
+            # nothing is behind the last frame, which is -1
+            return slice(first, first + 1 or None)
+        numbers = [int(word) if word.strip() else None for word in words]
+        if len(numbers) <= 3 and numbers[2:] != [0]:
+            return slice(*numbers)
+    raise unusable(name, "a slice such as 0:10:2, :5 or -1:", text)
 
 
 def parse_periodic(name: str, value: Any) -> str | None:
@@ -94,96 +95,87 @@ def parse_periodic(name: str, value: Any) -> str | None:
 
 def parse_dim(name: str, value: Any) -> str | int:
     """``auto``, or a number of dimensions."""
-    if value is None or str(value) not in ("auto", "2", "3"):
-        raise unusable(name, "auto, 2 or 3", value)
-    return "auto" if value == "auto" else int(value)
+    word = one_of("auto", "2", "3")(name, str(value))
+    return word if word == "auto" else int(word)
 
 
 parse_radius = optional(number("a length above 0", lambda value: 0 < value < math.inf))
 parse_skip = whole("how many lines to skip, 0 or more", lambda value: 0 <= value < 2**31)
 parse_max_unpacked = optional(number("a number above 0", lambda value: value > 0))
 
+_reading = partial(Option, group="reading")
 READING_OPTIONS = (
-    Option(
+    _reading(
         name="format",
         parse=parse_text,
-        group="reading",
         help="Reader to use (default: by content).",
         meaning="reader of the dumps; not given: found by their content",
         metavar="NAME",
         choices=_reader_names,
     ),
-    Option(
+    _reading(
         name="columns",
         parse=parse_columns,
-        group="reading",
         help='Names of columns that are not the usual ones: "radius=c_rad,x=px"; of tables without '
         'names their numbers from 1: "x=1,y=2,z=3,diameter=4".',
         meaning="names of columns that are not the usual ones",
         takes="dict",
         metavar="NAMES",
     ),
-    Option(
+    _reading(
         name="contact_columns",
         parse=parse_text,
-        group="reading",
         help='Columns of a dump local: LIGGGHTS keywords "pos id force", or LAMMPS names '
         '"id1=NAME,id2=NAME", which serve tables too.',
         meaning="what the columns of the contact files are",
         metavar="KEYWORDS",
     ),
-    Option(
+    _reading(
         name="skip",
         default=0,
         parse=parse_skip,
-        group="reading",
         help="Lines before the table, of tables of text.",
         meaning="lines that are skipped before a table",
         takes="int",
         kind=int,
         metavar="N",
     ),
-    Option(
+    _reading(
         name="radius",
         parse=parse_radius,
-        group="reading",
         help="Radius for dumps without one.",
         meaning="radius of grains whose dump has none, dump's unit",
         takes="float",
         kind=float,
         metavar="L",
     ),
-    Option(
+    _reading(
         name="cell",
         parse=parse_cell,
-        group="reading",
         help="The cell, for formats that do not carry it (periodic in xyz unless `periodic`); "
         "FILE.csv has one for each step or frame: step lx ly lz, and xy xz yz if tilted.",
         meaning="the periodic cell, where the dump carries none, dump's unit",
         takes="tuple of float or path",
         metavar="LX LY LZ [XY XZ YZ]|FILE.csv",
     ),
-    Option(
+    _reading(
         name="periodic",
         parse=parse_periodic,
-        group="reading",
         help="Periodic directions (default: the dump's).",
         meaning="directions in which the sample repeats; not given: the dump's",
         metavar="xyz",
     ),
-    Option(
+    _reading(
         name="bodies",
         parse=parse_text,
-        group="reading",
         help="Column that says which clump a sphere belongs to (default: id_multisphere, clumpId, "
         "clump_id or clump, if there is one; id: each sphere is a grain).",
         meaning="column that says which clump a sphere belongs to; not given: the format's own",
         metavar="COLUMN",
     ),
-    Option(
+    _reading(
         name="max_unpacked",
         parse=parse_max_unpacked,
-        group="reading",
         help="Times its size that a packed file may unpack to; given, lines may also be of any "
         "length (default: 1000, and 16 MiB).",
         meaning="times its size that a packed file may unpack to; not given: 1000",
@@ -191,11 +183,10 @@ READING_OPTIONS = (
         kind=float,
         metavar="TIMES",
     ),
-    Option(
+    _reading(
         name="contacts",
         default="auto",
         parse=parse_contacts,
-        group="reading",
         help="Contacts: a file, folder or glob matched by step; from the dump's own contact files; "
         "or by geometry (default: file if there is one, else geometric).",
         meaning="where the contacts come from: contact files, or the geometry of the grains",
@@ -204,11 +195,10 @@ READING_OPTIONS = (
         choices=lambda: ("file", "geometric"),
         files=True,
     ),
-    Option(
+    _reading(
         name="dim",
         default="auto",
         parse=parse_dim,
-        group="reading",
         help="2: discs in a coordinate plane; auto: 2 if all centres of the first frame with any, "
         "ten at least, share exactly one coordinate, for the whole series.",
         meaning="3: spheres; 2: discs in a coordinate plane; auto: as the first frame has them",

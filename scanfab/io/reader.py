@@ -1,27 +1,27 @@
-"""What a reader plugin offers, what it is asked, and what it answers."""
+"""What a reader is asked and what it answers, which readers are installed, and which one fits."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy.typing as npt
 
-from scanfab.base.errors import ReadError
+from scanfab.base.errors import ReadError, UnknownFormatError
+from scanfab.base.plugins import Offer, having, load_plugins
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.io.options import (
-    parse_cell,
-    parse_max_unpacked,
-    parse_periodic,
-    parse_radius,
-    parse_skip,
-)
+from scanfab.io.files import bare_name
 from scanfab.packing.cell import Cell
-from scanfab.packing.contacts import ContactList
-from scanfab.packing.walls import ListedWallForces
+from scanfab.packing.contacts import ContactList, ListedWallForces
 
+GROUP = "scanfab.readers"
+"""The entry point by which packages offer readers."""
+TABLE = "table"
+"""The reader that any text is tried with."""
 BODIES = "scanfab_bodies"
 """A column of this name is the number of each sphere's body, whatever other columns say."""
 WALLS = "scanfab_wall_contacts"
@@ -72,14 +72,6 @@ class ReadOptions:
     """Times its size that a packed file may unpack to; None: the usual bound."""
     beside: Cell | Literal["none"] | None = None
     """The dump's own cell, where a file beside the dump says which it is, or that it has none."""
-
-    def __post_init__(self) -> None:
-        """Raise SettingsError if a value cannot be used."""
-        parse_cell("cell", self.cell)
-        parse_periodic("periodic", self.periodic)
-        parse_radius("radius", self.radius)
-        parse_skip("skip", self.skip)
-        parse_max_unpacked("max_unpacked", self.max_unpacked)
 
 
 @dataclass(frozen=True)
@@ -180,3 +172,99 @@ class Reader(Protocol):
     ) -> JoinedContacts:
         """The contacts of a frame."""
         ...
+
+
+@cache
+def installed_readers() -> dict[str, Offer]:
+    """
+    All readers by name, with the package of each.
+
+    A plugin that cannot be loaded is one warning with its name.
+
+    Raises
+    ------
+    ScanfabError
+        If two packages offer a reader of the same name.
+    """
+    make = having(
+        "a class of objects with the members of scanfab.io.reader.Reader",
+        **dict.fromkeys(("name", "description"), str),
+        extensions=tuple,
+        **dict.fromkeys(("recognises", "kind", "snapshots", "read_grains"), Callable),
+    )
+    return load_plugins(GROUP, "reader", lambda reader: make(reader()))
+
+
+def lacking(plugin: object) -> str | None:
+    """What to install for a plugin whose package is not there; None if nothing lacks."""
+    module, words = getattr(plugin, "requires", (None, ""))
+    return None if module is None or find_spec(module) is not None else f"pip install {words}"
+
+
+def plugin_named(offers: Mapping[str, Offer], what: str, name: str) -> Any:
+    """The ``reader`` or ``writer`` that a user names; UnknownFormatError lists those that exist."""
+    if name not in offers:
+        raise UnknownFormatError(
+            f"there is no {what} called {name!r}; the {what}s are {', '.join(offers)}"
+        )
+    advice = lacking(offers[name].plugin)
+    if advice is not None:
+        raise UnknownFormatError(f"{name} needs another package: {advice}")
+    return offers[name].plugin
+
+
+def reader_named(name: str, options: ReadOptions | None = None) -> Reader:
+    """The reader that a user names; UnknownFormatError lists those that exist."""
+    return _told(plugin_named(installed_readers(), "reader", name), options)
+
+
+def _told(reader: Reader, options: ReadOptions | None) -> Reader:
+    """The reader, with what users say of its files if it needs that to know what they hold."""
+    tell = getattr(reader, "told", None)
+    told: Reader = reader if tell is None or options is None else tell(options)
+    return told
+
+
+def reader_for(path: Path, options: ReadOptions | None = None) -> Reader | None:
+    """The reader that knows a file by its content or extension; any other text may be a table."""
+    readers = [_told(one.plugin, options) for one in installed_readers().values()]
+    # a format that any program may write comes after the programs' own
+    readers.sort(key=lambda reader: bool(getattr(reader, "generic", False)))
+    for reader in readers:
+        try:
+            if reader.recognises(path):
+                if (advice := lacking(reader)) is not None:
+                    raise ReadError(f"{path}: {reader.name} needs another package: {advice}")
+                return reader
+        except ReadError:
+            raise
+        # a plugin may raise anything
+        except Exception as error:
+            raise ReadError(
+                f"{path}: the reader {reader.name!r} failed: {type(error).__name__}: {error}"
+            ) from error
+    name = bare_name(path).lower()
+    likely = [reader for reader in readers if name.endswith(reader.extensions)]
+    tables = [one for one in readers if one.name == TABLE and one not in likely]
+    return next((reader for reader in [*likely, *tables] if _can_open(reader, path)), None)
+
+
+def why_not(path: Path, options: ReadOptions) -> str:
+    """What the last reader of files with such an ending says of one that it cannot read."""
+    reason = ""
+    for one in installed_readers().values():
+        reader = _told(one.plugin, options)
+        if reader.name == TABLE or bare_name(path).lower().endswith(reader.extensions):
+            try:
+                reader.kind(path)
+            except ReadError as error:
+                reason = str(error).removeprefix(f"{path}").lstrip(":, ")
+    return reason
+
+
+def _can_open(reader: Reader, path: Path) -> bool:
+    """An extension alone proves little: many programs write .txt."""
+    try:
+        return reader.kind(path) != "other"
+    except ReadError:
+        return False

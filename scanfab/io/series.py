@@ -3,24 +3,24 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, fields
 from itertools import chain, islice
 from pathlib import Path
 from typing import Any, Literal, SupportsIndex, overload
 
-from scanfab.base.errors import NoFrameError, ReadError, SettingsError
+from scanfab.base.errors import NoFrameError, PackingError, ReadError, SettingsError, note
 from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray
-from scanfab.io.beside import columns_file, frame_file, read_frame
-from scanfab.io.dimension import decided_space, refuse_other_space
+from scanfab.io.companions import companion_file, read_frame
 from scanfab.io.families import Family
 from scanfab.io.files import Stamp, stamp_of, unpacking_up_to
 from scanfab.io.frame import Frame
-from scanfab.io.frame_csv import FrameFile
+from scanfab.io.layout import FrameFile
 from scanfab.io.reader import Reader, ReadOptions, Snapshot
+from scanfab.packing.plane import flat_space, space_of, spelt_plane
 
 # more frames than there can be: the end of frames that nobody has counted
 ENDLESS = 2**62
@@ -140,14 +140,10 @@ class Series:
         if not hasattr(key, "__index__"):
             raise TypeError(f"a frame of a series is named by a number or a slice, not by {key!r}")
         place = key.__index__()
-        if place >= 0:
-            found = next(islice(self, place, None), None)
-        else:
-            last = deque(self, maxlen=-place)
-            found = last[0] if len(last) == -place else None
-        if found is None:
+        found = list(islice(self, place, place + 1) if place >= 0 else deque(self, -place))
+        if not found or len(found) < -place:
             raise NoFrameError(f"{self.name}: has {len(self)} frames, there is no frame {place}")
-        return found
+        return found[0]
 
     def _with(self, numbers: range) -> Series:
         """Other frames of the same series."""
@@ -175,7 +171,7 @@ class Series:
 
     def space_of(self, number: int, position: FloatArray) -> Space:
         """
-        In which space the particles of all frames lie, when those of one are known.
+        The space in which the particles of all frames lie; one frame is known.
 
         Parameters
         ----------
@@ -187,7 +183,8 @@ class Series:
         Returns
         -------
         Space
-            That of the first frame that has particles.
+            That of the first frame that has particles. If it is a plane that nobody has asked for,
+            a note says so.
 
         Raises
         ------
@@ -200,15 +197,25 @@ class Series:
             first = next(filter(len, self._centres_before(number)), position)
             if not len(first):
                 return SPACE
-            self.known.space = decided_space(self.name, first, self.dim)
-        refuse_other_space(position, self.known.space)
-        return self.known.space
+            found = flat_space(first) if self.dim == 2 else space_of(first)
+            if found.is_plane and self.dim == "auto":
+                note(
+                    f"{self.name}: all centres lie in {found} ({spelt_plane(first, found)}): they "
+                    f"are read as discs, in 2D; `dim=3` reads them as spheres"
+                )
+            self.known.space = found
+        own, decided = space_of(position), self.known.space
+        if own.is_plane and not decided.is_plane:
+            raise PackingError(
+                f"{other_space(own, decided)}; `dim=2` reads all as discs, `dim=3` all as spheres"
+            )
+        return decided
 
     def _centres_before(self, number: int) -> Iterator[FloatArray]:
         """Of the frames before one, as far as they can be read."""
         for frame in islice(self._every(), number):
             with suppress(ReadError):
-                yield frame.centres()
+                yield frame.read_grains().position
 
     @property
     def whole(self) -> Series:
@@ -259,27 +266,38 @@ class Series:
         every = sum(met) + (len(files) - len(met)) * (met[-1] if met else 1)
         return len(range(self.numbers.start, min(self.numbers.stop, every), self.numbers.step))
 
-    def _contacts_of(self, frame: Frame, family: Family) -> Snapshot | None:
+    def contacts_of(self, frame: Frame, family: Family) -> Snapshot | None:
         """
         The contacts of a frame in a family of contact files; None if there are none.
 
         Steps inside the files decide, or times if there are no steps; where a file has none, the
         number in its name does. A single contact file that is named for a single grain file needs
         no number.
+
+        Parameters
+        ----------
+        frame : Frame
+            One of this series.
+        family : Family
+            One of ``contacts``.
+
+        Returns
+        -------
+        Snapshot or None
         """
         if family.problem is not None or family.reader is None:
             raise ReadError(f"{family.problem}")
-        grains, name_step = frame.snapshot, frame.name_step
-        step = name_step if grains.step is None else grains.step
+        name_step, step = frame.name_step, frame.snapshot.step
+        step = name_step if step is None else step
         path = family.files.get(name_step, family.files.get(step))
         if path is None and len(family.files) == 1:
-            path = next(iter(family.files.values()))
+            (path,) = family.files.values()
         if path is None:
             return None
         is_numbered = None not in family.files and step is not None
         is_named = self.contacts_from == "path" and len(self.grains.files) == 1
         is_sure = is_named or not is_numbered or bool({name_step, step} & set(family.files))
-        return _of_moment(self._snapshots_of(family.reader, path), grains, is_sure)
+        return _of_moment(self._snapshots_of(family.reader, path), frame.snapshot, is_sure)
 
     def beside(self, path: Path) -> list[Path]:
         """
@@ -294,25 +312,22 @@ class Series:
         -------
         list of Path
         """
-        told = [file for file in (frame_file(path), columns_file(path)) if file.is_file()]
-        listed = [*(self._listed(path) if self.grains.kind == "index" else ()), *told]
+        dumps: list[Path] = []
+        if self.grains.kind == "index" and self.grains.reader is not None:
+            # a dump that is not there has been told of
+            with suppress(ReadError):
+                listed = [(one.path, *one.parts) for one in self.grains.reader.snapshots(path)]
+                dumps = [file for file in dict.fromkeys(chain(*listed)) if file.is_file()]
+        companions = [companion_file(path, kind) for kind in ("frame", "columns")]
+        found = [*dumps, *(file for file in companions if file.is_file())]
         ask = getattr(self.grains.reader, "beside", None)
-        if ask is None or self.cells is not None or self.options.cell is not None:
-            return listed
-        dumps = [one for one in listed if one not in told] or [path]
-        return [*listed, *(file for one in dumps for file in ask(one))]
+        if ask is not None and self.cells is None and self.options.cell is None:
+            found += [file for dump in dumps or [path] for file in ask(dump)]
+        return found
 
-    def _listed(self, index: Path) -> list[Path]:
-        """The dumps of an index that are there; a frame that is not has been told of."""
-        assert self.grains.reader is not None
-        with suppress(ReadError):
-            files = [(one.path, *one.parts) for one in self.grains.reader.snapshots(index)]
-            return [path for path in dict.fromkeys(chain(*files)) if path.is_file()]
-        return []
-
-    def files_through(self, number: int) -> Iterator[tuple[Path, bool]]:
+    def files_through(self, number: int, known: Container[Path] = ()) -> Iterator[Path]:
         """
-        The files of the frames up to one.
+        The files of the frames up to one, and what is read with them.
 
         All of these frames have been looked for: one file may hold many.
 
@@ -320,26 +335,26 @@ class Series:
         ----------
         number : int
             The last frame, in the whole series.
+        known : container of Path, optional
+            Files that are left out, with what is read with them.
 
         Yields
         ------
-        path : Path
-            Each file.
-        is_grains : bool
-            Whether it holds grains.
+        Path
         """
-        steps, met = [], 0
+        last, met = -1, 0
         for step, path in self.grains.files.items():
-            steps.append(step)
-            yield path, True
+            last = max(last, ENDLESS if step is None else step)
+            if path not in known:
+                yield path
+                yield from self.beside(path)
             met += len(self.known.snapshots[path][1]) if path in self.known.snapshots else 1
             if met > number:
                 break
-        last = max((step for step in steps if step is not None), default=None)
         for family in self.contacts:
             for step, path in family.files.items():
-                if step is None or last is None or step <= last:
-                    yield path, False
+                if (step is None or step <= last) and path not in known:
+                    yield path
 
     def files(self) -> Iterator[Path]:
         """
@@ -372,3 +387,11 @@ def _of_moment(snapshots: Sequence[Snapshot], grains: Snapshot, sure: bool) -> S
         return snapshots[0] if sure else None
     same = [one for one in snapshots if one.step is not None and one.step == grains.step]
     return same[0] if same else None
+
+
+def other_space(found: Space, decided: Space) -> str:
+    """What is said of a frame that lies in another space than its series."""
+    return (
+        f"all its centres lie in {found}, but the first frame that has grains lies in {decided}: "
+        f"the frames of a series are all discs in one plane, or all spheres"
+    )

@@ -3,40 +3,56 @@
 from __future__ import annotations
 
 import os
-import warnings
+from collections import defaultdict
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from scanfab.base.errors import ReadError, ScanfabWarning
+from scanfab.base.errors import ReadError, UnknownFormatError, note, warn
 from scanfab.base.option import refuse_unknown, takes_options, unusable
-from scanfab.io.choice import (
-    choose_grains,
-    contacts_beside,
-    damaged_contacts,
-    named_contacts,
-    note_below,
-    note_skipped,
-    without_tables,
-)
 from scanfab.io.families import (
+    Family,
     PathLike,
+    are_tied,
+    contacts_beside,
     expanded,
     files_around,
+    files_in,
     files_of,
     named_once,
+    some,
     sort_into_families,
+    without_tables,
 )
-from scanfab.io.files import unpacking_up_to
-from scanfab.io.formats.yade_cells import is_cell_file, refuse_as_numbers
-from scanfab.io.frame_csv import FrameFile
+from scanfab.io.files import first_bytes, unpacking_up_to
+from scanfab.io.formats.yade_save import is_cell_file
+from scanfab.io.layout import FrameFile
 from scanfab.io.options import READING_OPTIONS, take_reading
-from scanfab.io.reader import ReadOptions
+from scanfab.io.reader import FileKind, ReadOptions, why_not
 from scanfab.io.series import ContactsFrom, Series
 from scanfab.packing.packing import Packing
 
 READING = tuple(one.name for one in READING_OPTIONS)
 """The options of :func:`read_series`, by which commands and manifests know them too."""
+# of these, the files decide; the others say how a file is read
+CHOICES = ("format", "contacts")
+# sub-folders that are looked into for the advice in an error
+MOST_FOLDERS = 50
+# how a fabric table begins, in whatever format
+TABLE_WORDS = (b"source", b"frame", b"variant", b"alpha_vs")
+GRAINS: tuple[FileKind, ...] = ("grains", "index", "start", "points")
+"""Kinds of files that may be frames; a kind counts only where there is none of the kinds before."""
+HOLDS: dict[FileKind, str] = {
+    "grains": "grains",
+    "index": "grains",
+    "start": "grains that a simulation starts from",
+    "points": "points without a radius (give it by `radius`)",
+    "contacts": "contacts",
+    "cell": "a cell",
+    "other": "neither grains nor contacts",
+}
 
 
 def read(path: PathLike, *, frame: int = 0, **options: Any) -> Packing:
@@ -141,10 +157,8 @@ def read_series(
         If no reader knows the files.
     ReadError
         If there is no series, or more than one.
-    SettingsError
-        If an option has a value that cannot be used.
-    TypeError
-        If there is no such option; names the nearest that there is.
+    SettingsError, TypeError
+        If an option has a value that cannot be used, or if there is no such option.
 
     Examples
     --------
@@ -157,68 +171,43 @@ def read_series(
     arguments = locals()
     reading = {name: arguments[name] for name in READING}
     checked = take_reading(dict(reading))
-    named_cell = checked["cell"]
-    one_cell = named_cell if isinstance(named_cell, tuple) else None
-    cells = None if named_cell is None or one_cell is not None else _cell_file(named_cell)
-    options = ReadOptions(
-        checked["columns"] or {},
-        contact_columns,
-        checked["radius"],
-        one_cell,
-        periodic,
-        bodies,
-        checked["skip"],
-        checked["max_unpacked"],
-    )
+    cell, dim = checked["cell"], checked.pop("dim")
+    cells = None if cell is None or isinstance(cell, tuple) else _cell_file(Path(cell))
+    checked |= {"columns": checked["columns"] or {}, "cell": cell if cells is None else None}
+    options = ReadOptions(**{name: checked[name] for name in checked if name not in CHOICES})
     with unpacking_up_to(options.max_unpacked):
-        return _series(_given(source), contacts, options, cells, reading, checked["dim"])
+        return _series(_given(source), options, cells, reading, dim)
 
 
 def open_sources(sources: Sequence[PathLike], **options: Any) -> list[Series]:
-    """
-    The series of a command line: one for each folder, and one for all single files together.
-
-    Parameters
-    ----------
-    sources : sequence of paths
-        Folders, files and globs; a source that is named twice is read once, with a warning.
-    **options
-        See :func:`read_series`.
-    """
-    groups: list[list[PathLike]] = []
-    files: list[PathLike] = []
+    """The series of a command line: one for each folder, and one for all single files together."""
+    groups: dict[PathLike, list[PathLike]] = defaultdict(list)
     for source in named_once(sources):
-        if Path(source).is_dir():
-            groups.append([source])
-        else:
-            if not files:
-                groups.append(files)
-            files.append(source)
-    return [read_series(group, **options) for group in groups]
+        groups[source if Path(source).is_dir() else ""].append(source)
+    return [read_series(group, **options) for group in groups.values()]
 
 
-def _given(source: PathLike | Sequence[PathLike]) -> list[PathLike]:
+def _given(source: Any) -> list[PathLike]:
     """What is named, one by one."""
     one = isinstance(source, str | os.PathLike) or not isinstance(source, Iterable)
-    given: list[Any] = [source] if one else list(source)  # type: ignore[arg-type]
+    given = [source] if one else list(source)
     if not given or not all(isinstance(path, str | os.PathLike) for path in given):
         raise unusable("source", "the path of a folder or file, or several of files", source)
     return given
 
 
-def _cell_file(path: PathLike) -> FrameFile:
+def _cell_file(path: Path) -> FrameFile:
     """The cells of a CSV file."""
-    if is_cell_file(Path(path)):
-        raise refuse_as_numbers(Path(path))
-    try:
-        return FrameFile(Path(path), ["lx", "ly", "lz"], ["xy", "xz", "yz"], positive=3)
-    except OSError as error:
-        raise ReadError(f"{path}: cannot be read: {os.strerror(error.errno or 0)}") from None
+    if is_cell_file(path):
+        raise ReadError(
+            f"{path}: is the cell of one frame, which is read if it lies beside its spheres: "
+            f"expected a CSV file with the cells of all frames (step, lx, ly, lz)"
+        )
+    return FrameFile(path, ["lx", "ly", "lz"], ["xy", "xz", "yz"], positive=3)
 
 
 def _series(
     given: Sequence[PathLike],
-    contacts: str | PathLike,
     options: ReadOptions,
     cells: FrameFile | None,
     reading: dict[str, Any],
@@ -229,42 +218,150 @@ def _series(
     name = as_text(os.fspath(given[0]) if len(paths) == len(given) == 1 else _common_folder(paths))
     are_files = not any(path.is_dir() for path in paths)
     files = [file for path in paths for file in files_of(path)]
-    around = files_around(files) if are_files else []
-    families = sort_into_families(files, format, options, around)
+    families = sort_into_families(files, format, options, files_around(files) if are_files else ())
     if format is None:
         families = without_tables(families, paths)
-    grains = choose_grains(paths, families, options).check()
-    own = [family for family in families if family.kind == "contacts"]
-    note_skipped([one for one in families if one not in (grains, *own)])
-    if paths[0].is_dir() and len(paths) == len(grains.files) == 1:
-        note_below(paths[0], grains)
-    origin: ContactsFrom = "path" if contacts == "file" else "auto"
-    lists_contacts = getattr(grains.reader, "lists_contacts", False)
-    if contacts == "geometric":
-        own, origin = [], "geometric"
-    elif contacts not in ("auto", "file"):
-        own, origin = named_contacts(contacts, format, options), "path"
-    elif not own and are_files:
-        families, own = contacts_beside(grains, format, options, told=True)
-        origin = "beside" if contacts == "auto" else "path"
-    if not own and contacts == "file":
-        if not lists_contacts:
-            raise ReadError(
-                f'{name}: `contacts="file"` was asked for, but there is no contact file'
-            )
-        origin = "grains"
-    elif not own and contacts == "auto":
-        own, origin = damaged_contacts(grains, families), "beside"
-        if options.contact_columns and not own and not lists_contacts:
-            warnings.warn(
-                f"{name}: `contact_columns` are named, but there is no file of contacts with such "
-                f"columns: contacts are found by geometry",
-                ScanfabWarning,
-                stacklevel=3,
-            )
-    whole = tuple(family.check() for family in own)
+    grains = _choose_grains(paths, families, options)
+    _tell_skipped([one for one in families if one is not grains and one.kind != "contacts"])
+    is_lone = paths[0].is_dir() and len(paths) == len(grains.files) == 1
+    if is_lone and (below := _series_below(paths[0])):
+        note(f"{paths[0]}: {Path(grains.pattern).name} alone is read, but {below}")
+    contacts, origin = _choose_contacts(grains, families, are_files, reading, options)
+    for family in (grains, *contacts):
+        if family.clash is not None:
+            raise ReadError(family.clash)
     sources = tuple(os.fspath(path) for one in given for path in expanded(one))
-    return Series(name, grains, whole, origin, options, cells, sources, reading, dim=dim)
+    return Series(name, grains, tuple(contacts), origin, options, cells, sources, reading, dim=dim)
+
+
+def _choose_grains(
+    paths: Sequence[Path], families: Sequence[Family], options: ReadOptions
+) -> Family:
+    """The one family of grain files among all; ReadError if there are none, or several."""
+    where = ", ".join(map(str, paths[:3])) + (", ..." if len(paths) > 3 else "")
+    for kind in GRAINS if options.radius is None else ("points", *GRAINS):
+        grains = [family for family in families if family.kind == kind]
+        if len(grains) == 1:
+            return grains[0]
+        if grains:
+            ends = dict.fromkeys(GRAINS, "") | {"points": "; it has no radius: `radius=L`"}
+            every = [one for kind in GRAINS for one in families if one.kind == kind]
+            listed = "".join(f"\n  {one.pattern}{ends[one.kind]}" for one in every)
+            raise ReadError(f"{where}: several series of grains: choose one of{listed}")
+    raise _no_grains(where, paths, families, options)
+
+
+def _no_grains(
+    where: str, paths: Sequence[Path], families: Sequence[Family], options: ReadOptions
+) -> ReadError:
+    """The error for a source without grains."""
+    problem = next((family.problem for family in families if family.problem), None)
+    if problem is not None:
+        return ReadError(problem)
+    known = [one for one in families if one.reader is not None]
+    if known:
+        held = ", ".join(f"{HOLDS[one.kind]} ({Path(one.pattern).name})" for one in known[:5])
+        return ReadError(f"{where}: no grains: expected points with a radius, found {held}")
+    folders = [path for path in paths if path.is_dir()]
+    below = ", ".join(filter(None, map(_series_below, folders)))
+    if below:
+        return ReadError(f"{where}: the folder holds no dumps, but {below}")
+    if not families:
+        return ReadError(f"{where}: the folder holds no files")
+    for table in set(paths).difference(folders):
+        with suppress(OSError, ReadError):
+            is_binary = table.suffix == ".parquet"
+            data = table.read_bytes() if is_binary else first_bytes(table, 1 << 14)
+            if all(word in data for word in TABLE_WORDS):
+                advice = "scanfab compare or scanfab report take it"
+                return ReadError(f"{table}: this is a fabric table, not a dump: {advice}")
+    reason = why_not(paths[0], options) if len(paths) == 1 and not folders else ""
+    return UnknownFormatError(
+        f"{where}: no reader knows the format; scanfab formats lists those that exist"
+        + (f"; as a table it cannot be read: {reason}" if reason else "")
+    )
+
+
+def _series_below(folder: Path) -> str:
+    """Which sub-folders hold grains, as the end of a sentence; empty if none does."""
+    below = sorted(one for one in folder.iterdir() if one.is_dir() and one.name[0] != ".")
+    found = []
+    for one in below[:MOST_FOLDERS]:
+        with suppress(OSError, ReadError):
+            if any(family.kind in GRAINS for family in sort_into_families(files_in(one), None)):
+                found.append(str(one))
+    return f"there are series in its folders: name them as sources: {some(found)}" if found else ""
+
+
+def _tell_skipped(families: Sequence[Family]) -> None:
+    """One note on the files that do not enter, and a warning on those that are damaged."""
+    skipped: dict[str, list[str]] = defaultdict(list)
+    damaged: dict[str, list[str]] = defaultdict(list)
+    for one in families:
+        name = Path(one.pattern).name
+        if one.problem is not None:
+            damaged[one.problem.removeprefix(f"{one.largest}").lstrip(":, ")].append(name)
+        elif one.kind != "cell":
+            held = "results, or something else in a table" if one.is_table else HOLDS[one.kind]
+            skipped[held].append(name)
+    told = []
+    for held, names in skipped.items():
+        told.append(f"{some(names)}: {'it holds' if len(names) == 1 else 'they hold'} {held}")
+    if told:
+        note(f"skipped {'; '.join(told)}")
+    for problem, names in damaged.items():
+        warn(f"skipped {some(names)}: {problem}")
+
+
+def _choose_contacts(
+    grains: Family,
+    families: Sequence[Family],
+    are_files: bool,
+    reading: dict[str, Any],
+    options: ReadOptions,
+) -> tuple[list[Family], ContactsFrom]:
+    """The families of contact files, and where the contacts of the series come from."""
+    contacts, format = reading["contacts"], reading["format"]
+    if contacts == "geometric":
+        return [], "geometric"
+    if contacts not in ("auto", "file"):
+        return _named_contacts(contacts, format, options), "path"
+    own = [family for family in families if family.kind == "contacts"]
+    origin: ContactsFrom = "auto"
+    if not own and are_files:
+        families, own = contacts_beside(grains, format, options)
+        origin = "beside"
+    in_grains = getattr(grains.reader, "lists_contacts", False)
+    if contacts == "file" and not (own or in_grains):
+        raise ReadError(
+            f'{grains.pattern}: `contacts="file"` was asked for, but there is no contact file'
+        )
+    if contacts == "file":
+        return own, "path" if own else "grains"
+    if own:
+        return own, origin
+    # a file that cannot be read, and may be the contacts by its name and number, is an error
+    damaged = [
+        replace(one, kind="contacts", files=dict.fromkeys(grains.files, one.largest), clash=None)
+        for one in families
+        if one.problem is not None and len(one.files) == len(grains.files) and are_tied(grains, one)
+    ]
+    if options.contact_columns and not (damaged or in_grains):
+        missing = "there is no file of contacts with such columns"
+        warn(f"`contact_columns` are named, but {missing}: contacts are found by geometry")
+    return damaged, "beside"
+
+
+def _named_contacts(contacts: PathLike, format: str | None, options: ReadOptions) -> list[Family]:
+    """Contact files from a file, a folder or a glob."""
+    files = [file for one in expanded(contacts) for file in files_of(Path(one))]
+    families = sort_into_families(files, format, options)
+    found = [family for family in families if family.kind == "contacts"]
+    if not found:
+        problem = next((family.problem for family in families if family.problem), None)
+        held = " and ".join(sorted({HOLDS[one.kind] for one in families})) or "no files"
+        raise ReadError(problem or f"{contacts}: expected contacts, found {held}")
+    return found
 
 
 def as_text(name: str) -> str:
@@ -273,7 +370,6 @@ def as_text(name: str) -> str:
 
 
 def _common_folder(paths: list[Path]) -> str:
-    folders = [str(path.parent) for path in paths]
-    if len({path.is_absolute() for path in paths}) > 1:
-        folders = [os.path.abspath(folder) for folder in folders]
+    are_alike = len({path.is_absolute() for path in paths}) == 1
+    folders = [str(path.parent if are_alike else path.parent.absolute()) for path in paths]
     return os.path.commonpath(folders) or "."

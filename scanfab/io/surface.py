@@ -9,7 +9,7 @@ import numpy as np
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.fence import fenced
-from scanfab.io.mesh import read_faces
+from scanfab.io.mesh import faces_in_worker, form_of
 
 SUFFIXES = (".stl", ".vtp", ".ply", ".obj")
 
@@ -27,7 +27,9 @@ def read_surface(path: Path) -> tuple[FloatArray, IntArray]:
     """
     suffix = path.suffix.lower()
     if suffix == ".vtp":
-        points, faces = read_faces(path)
+        if form_of(path) != "PolyData":
+            raise ReadError(f"{path}: expected a surface (PolyData), found something else")
+        points, faces = fenced(faces_in_worker, path)
     else:
         points, faces = fenced(faces_by_meshio, path, suffix[1:])
     if points.shape != (len(points), 3) or not np.all(np.isfinite(points)):

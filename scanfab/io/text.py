@@ -12,19 +12,16 @@ import csv
 import os
 import re
 import sys
-import warnings
 from collections.abc import Collection
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.errors import ReadError, ScanfabWarning
+from scanfab.base.errors import ReadError, warn
 from scanfab.io.fence import fenced
-from scanfab.io.files import check_lines, check_memory, plain
-from scanfab.io.growing import grows
+from scanfab.io.files import check_lines, check_memory, grows, plain
 from scanfab.io.reader import Snapshot
 
 Columns = dict[str, npt.NDArray[Any]]
@@ -39,8 +36,13 @@ LIKE_COMPRESSED = (b"\x1f\x8b", b"x\x01", b"x^", b"x\x9c", b"x\xda", b"(\xb5")
 IN_MEMORY = 6.0
 # bytes that are handled at a time, and characters of a word or line that a message shows
 PIECE, SHOWN = 1 << 18, 60
-# the name that polars gets for what stands behind a separator at the end of each row
-BEHIND = "behind"
+# in a process that was forked behind polars, the threads of polars are gone, and it would wait for
+# them without end: only the worker, a new process, can use it there
+_forked_behind_polars: list[bool] = []
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(
+        after_in_child=lambda: _forked_behind_polars.append("polars" in sys.modules)
+    )
 
 
 class Layout(NamedTuple):
@@ -121,7 +123,8 @@ def read_rows(
     >>> found["id"].tolist(), found["r"].tolist()
     ([1, 2], [0.5, 0.25])
     """
-    rows, layout, has_end = _trimmed(rows, layout)
+    rows, line, has_end = _trimmed(rows, layout.line)
+    layout = layout._replace(line=line)
     found = rows.count(b"\n")
     if count is not None and found != count:
         step = "" if snapshot.step is None else f", step {snapshot.step}"
@@ -131,7 +134,10 @@ def read_rows(
         )
     if not has_end:
         warn_of_end(snapshot.path)
-    if _is_forked:
+    if not rows:
+        kinds = {name: np.int64 if name in layout.whole else np.float64 for name in layout.names}
+        return {name: np.zeros(0, kind) for name, kind in kinds.items()}
+    if any(_forked_behind_polars):
         columns = fenced(columns_of, snapshot.path, rows, layout)
     else:
         columns = columns_of("", rows, layout)
@@ -140,133 +146,98 @@ def read_rows(
     return columns
 
 
-def columns_of(_path: str, rows: bytes, layout: Layout) -> Columns | None:
-    """The columns of sound rows; None if a row is not as it should be. Runs in the worker, too."""
-    # polars would pass over a carriage return that ends no line
-    frame = _frame(rows, layout) if rows and b"\r" not in rows else None
-    return None if rows and frame is None else _as_arrays(frame, layout)
-
-
-# Whether this process was forked behind polars: the threads of polars are gone, and it would wait
-# for them without end. Only the worker, a new process, can use it then.
-_is_forked = False
-
-
-def _note_fork() -> None:
-    global _is_forked
-    _is_forked = "polars" in sys.modules
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_note_fork)
-
-
-def _trimmed(rows: bytes, layout: Layout) -> tuple[bytes, Layout, bool]:
-    """The rows without empty lines around them, and whether the last one had a newline."""
-    if not rows[:PIECE].strip() and not rows.strip():
-        return b"", layout, True
-    has_end = rows[-PIECE:].rstrip(b" \t\r").endswith(b"\n")
-    rows = rows if has_end else rows + b"\n"
-    if b"\r" in rows:
-        rows = rows.replace(b"\r\n", b"\n")
-    start, stop = 0, len(rows)
-    while (end := rows.find(b"\n", start) + 1) and not rows[start:end].strip():
-        start, layout = end, layout._replace(line=layout.line + 1)
-    while (begin := rows.rfind(b"\n", start, stop - 1) + 1) and not rows[begin:stop].strip():
-        stop = begin
-    return rows[start:stop], layout, has_end
+def _trimmed(rows: bytes, line: int) -> tuple[bytes, int, bool]:
+    """The rows without empty lines around them, the first one's line, and whether the last ends."""
+    rows = rows.replace(b"\r\n", b"\n")
+    first, last = len(rows) - len(rows.lstrip()), len(rows.rstrip())
+    if not last:
+        return b"", line, True
+    start, stop = rows.rfind(b"\n", 0, first) + 1, rows.find(b"\n", last) + 1
+    line += rows.count(b"\n", 0, start)
+    return (rows[start:stop], line, True) if stop else (rows[start:] + b"\n", line, False)
 
 
 def warn_of_end(path: Path) -> None:
     """Warn that the last line has no end; ReadError if the file may still be being written."""
     if grows():
         raise ReadError(f"{path}: the last line has no end: the file is still being written")
-    warnings.warn(
-        f"{path}: the last line has no end: if the file was cut, its last number may be cut, too, "
-        f"and rows may be missing",
-        ScanfabWarning,
-        stacklevel=4,
-    )
+    warn(f"{path}: the last line has no end: if the file was cut, rows or digits may be missing")
 
 
-def _frame(rows: bytes, layout: Layout) -> Any:
-    """The rows as a data frame of polars, whose columns are called by their places; or None."""
-    frame = _parsed(rows, layout, loose=False)
-    if layout.separator != " " or frame is not None:
-        return _parsed(rows, layout, loose=True) if frame is None else frame
-    rows = _single_blanks(rows)
-    frame = _parsed(rows, layout, loose=False)
-    return _parsed(rows.replace(b" \n", b"\n"), layout, loose=True) if frame is None else frame
+def columns_of(_path: str, rows: bytes, layout: Layout) -> Columns | None:
+    """The columns of sound rows; None if a row is not as it should be. Runs in the worker, too."""
+    # polars would skip a carriage return that ends no line, and decompress what looks compressed
+    if b"\r" in rows or rows.startswith(LIKE_COMPRESSED):
+        return None
+    rows = _regular(rows, layout)
+    # with a decimal comma a point may stand for thousands, which only words tell
+    found = None if layout.comma else _parsed(rows, layout, by_words=False)
+    if found is None:
+        rows = _stripped(rows) if layout.separator == " " else rows
+        found = _parsed(rows, layout, by_words=True)
+    return found
 
 
-def _single_blanks(rows: bytes) -> bytes:
-    """The rows with one blank behind each word, but none behind the last of a row if none was."""
-    rows = rows.replace(b"\t", b" ") if b"\t" in rows else rows
-
-    def squeezed(start: int) -> bytes:
-        text = np.frombuffer(rows, np.uint8, min(PIECE, len(rows) - start), start)
+def _regular(rows: bytes, layout: Layout) -> bytes:
+    """The rows with one separator between words, and none around a row if the first has any."""
+    first = rows[: rows.find(b"\n")]
+    if layout.separator != " ":
+        words = words_of(first.decode("utf-8", "replace"), layout.separator)
+        is_behind = len(words) == len(layout.names) + 1 and not words[-1]
+        return rows.replace(layout.separator.encode() + b"\n", b"\n") if is_behind else rows
+    if b"  " in rows or b"\t" in rows:
+        text = np.frombuffer(rows.replace(b"\t", b" "), np.uint8)
         kept: npt.NDArray[np.bool_] = text != ord(" ")
-        is_word = kept & (text != ord("\n"))
-        kept[1:] |= is_word[:-1]
-        kept[0] |= start > 0 and rows[start - 1] not in b" \n"
-        return text[kept].tobytes()
-
-    with ThreadPoolExecutor() as pool:
-        return b"".join(pool.map(squeezed, range(0, len(rows), PIECE)))
+        kept[1:] |= kept[:-1].copy()
+        return _stripped(text[kept].tobytes())
+    # the first row speaks for all: a search for blanks around each of them would take too long
+    return rows if first == first.strip() else _stripped(rows)
 
 
-def _parsed(rows: bytes, layout: Layout, loose: bool) -> Any:
+def _stripped(rows: bytes) -> bytes:
+    """The rows without the single blank that may stand before or behind each."""
+    return rows.replace(b" \n", b"\n").replace(b"\n ", b"\n").lstrip(b" ")
+
+
+def _parsed(rows: bytes, layout: Layout, by_words: bool) -> Columns | None:
     """
-    The rows as polars reads them; None unless every row has all its words.
+    The columns as polars reads them; None unless every row has all its words.
 
-    If ``loose``, polars makes words of all columns, and numbers of the words afterwards.
+    If ``by_words``, polars reads words, of which numbers are made afterwards: by more spellings.
     """
     import polars
 
-    first = rows[: rows.find(b"\n")].decode("utf-8", "replace")
-    has_quotes = layout.separator != " " and b'"' in rows
-    words = first.split(" ") if layout.separator == " " else words_of(first, layout.separator)
-    # a separator at the end of each row looks like one more column
-    is_behind = len(words) == len(layout.names) + 1 and not words[-1]
-    schema: dict[str, Any] = {
-        f"{place}": polars.String
-        if loose or name in layout.text
-        else polars.Int64
-        if name in layout.whole
-        else polars.Float64
-        for place, name in enumerate(layout.names)
-    }
-    # with a decimal comma a point may stand for thousands, which the loose way tells
-    if rows.startswith(LIKE_COMPRESSED) or (layout.comma and not loose and b"." in rows):
-        return None
+    known: dict[str, Any] = dict.fromkeys(layout.whole, polars.Int64)
+    known |= dict.fromkeys(layout.names if by_words else layout.text, polars.String)
+    places = enumerate(layout.names)
     try:
         frame = polars.read_csv(
             rows,
             has_header=False,
             separator=layout.separator,
-            quote_char='"' if has_quotes else None,
-            schema={**schema, BEHIND: polars.String} if is_behind else schema,
-            decimal_comma=layout.comma and not loose,
+            quote_char='"' if layout.separator != " " and b'"' in rows else None,
+            schema={f"{place}": known.get(name, polars.Float64) for place, name in places},
             encoding="utf8-lossy",
         )
     except (polars.exceptions.PolarsError, OSError):
         return None
-    if is_behind and frame[BEHIND].null_count() != frame.height:
-        return None
-    if loose:
-        frame = frame.with_columns(
-            _numbers(frame[f"{place}"], layout.comma, name in layout.whole)
-            for place, name in enumerate(layout.names)
-            if name not in layout.text
-        )
-    gaps = frame.null_count().row(0)
-    gapless = layout.separator == " " or (any(gaps) and _is_ragged(rows, layout, frame))
-    for place, name in enumerate(layout.names):
-        is_needed = name not in layout.text and name not in layout.optional
-        is_words = frame.dtypes[place] == polars.String
-        if (gaps[place] and (is_needed or gapless)) or (is_needed and is_words):
+    if any(frame.null_count().row(0)):
+        # a word that lacks looks like one that is empty
+        bare = re.sub(rb'"[^"\n]*"', b"", rows) if b'"' in rows else rows
+        signs = bare.count(layout.separator.encode())
+        if layout.separator == " " or signs != frame.height * (frame.width - 1):
             return None
-    return frame
+    found: Columns = {}
+    for column, name in zip(frame, layout.names, strict=True):
+        if by_words and name not in layout.text:
+            column = _numbers(column, layout.comma, name in layout.whole)
+        numeric = column.dtype.is_numeric()
+        if name not in (*layout.text, *layout.optional) and (column.has_nulls() or not numeric):
+            return None
+        if name not in found:
+            texts = None if numeric else column.fill_null("").str.strip_chars().to_list()
+            found[name] = column.to_numpy() if texts is None else np.array(texts, dtype=np.str_)
+    return found
 
 
 def _numbers(words: Any, comma: bool, is_whole: bool) -> Any:
@@ -274,11 +245,9 @@ def _numbers(words: Any, comma: bool, is_whole: bool) -> Any:
     import polars
 
     words = words.str.strip_chars().replace("", None)
-    texts = words
-    if comma:
-        if words.str.contains(r"^[-+0-9.,eEdD]*\.[-+0-9.,eEdD]*$").any():
-            return words
-        texts = words.str.replace(",", ".", literal=True)
+    if comma and words.str.contains(".", literal=True).any():
+        return words
+    texts = words.str.replace(",", ".", literal=True) if comma else words
     texts = texts.str.replace(r"^([-+]?[0-9.]+)[dD]([-+]?[0-9]+)$", "${1}e${2}")
     for kind in (polars.Int64, polars.Float64) if is_whole else (polars.Float64,):
         numbers = texts.cast(kind, strict=False)
@@ -287,56 +256,28 @@ def _numbers(words: Any, comma: bool, is_whole: bool) -> Any:
     return words
 
 
-def _is_ragged(rows: bytes, layout: Layout, frame: Any) -> bool:
-    """Whether some row lacks a word, where gaps may as well be empty words."""
-    if b'"' not in rows:
-        return bool(rows.count(layout.separator.encode()) != frame.height * (frame.width - 1))
-    lines = rows.decode("utf-8", "replace").split("\n")[:-1]
-    return any(len(words_of(line, layout.separator)) != frame.width for line in lines)
-
-
-def _as_arrays(frame: Any, layout: Layout) -> Columns:
-    """The columns of a data frame by name; empty ones without it."""
-    found: Columns = {}
-    for place, name in enumerate(layout.names):
-        if name in found:
-            continue
-        column = None if frame is None else frame[f"{place}"]
-        if column is None:
-            found[name] = np.zeros(0, np.int64 if name in layout.whole else np.float64)
-        elif column.dtype.is_numeric():
-            found[name] = column.to_numpy()
-        else:
-            words = column.fill_null("").str.strip_chars()
-            found[name] = np.array(words.to_list(), dtype=np.str_)
-    return found
-
-
 def _bad_line(snapshot: Snapshot, rows: bytes, layout: Layout) -> ReadError:
     """The error for the first row that is not as it should be: each word is looked at."""
-    width, above = len(layout.names), lines_above(snapshot)
+    width, above = len(layout.names), 0
+    if snapshot.start:
+        with open(plain(snapshot.path), "rb") as stream:
+            parts = iter(lambda: stream.read(min(PIECE, snapshot.start - stream.tell())), b"")
+            above = sum(part.count(b"\n") for part in parts)
     for number, row in enumerate(rows.split(b"\n")[:-1], start=above + layout.line):
-        where = f"{snapshot.path}, line {number}"
-        if not row.strip():
-            return ReadError(f"{where}: expected rows to the end of the table, found an empty line")
-        if b"\r" in row:
-            return ReadError(f"{where}: found a carriage return that ends no line")
+        where = f"{snapshot.path}, line {number}: "
         words = words_of(row.decode("utf-8", "replace"), layout.separator)
         if len(words) == width + 1 and not words[-1]:
             words.pop()
         if len(words) != width or row.count(b'"') % 2:
             shown = spelt(row[:SHOWN])
-            return ReadError(f"{where}: expected {width} columns, found {len(words)}: {shown}")
+            return ReadError(f"{where}expected {width} columns, found {len(words)}: {shown}")
         for name, word in zip(layout.names, words, strict=True):
-            if name in layout.text or name in layout.optional:
-                continue
-            is_sound = not (layout.comma and "." in word)
-            if not is_sound or not is_number(word, layout.comma):
-                expected = "a number" if is_sound else "a number with a decimal comma"
+            wrong = not is_number(word, layout.comma) or (layout.comma and "." in word)
+            if wrong and name not in (*layout.text, *layout.optional):
+                comma = " with a decimal comma" * layout.comma
                 found = repr(word.strip()[:SHOWN]) if word.strip() else "nothing"
-                return ReadError(
-                    f"{where}: expected {expected} in the column {name}, found {found}"
-                )
+                expected = f"expected a number{comma} in the column {name}"
+                return ReadError(f"{where}{expected}, found {found}")
     return ReadError(f"{snapshot.path}: cannot be read as a table of {width} columns")
 
 
@@ -370,27 +311,3 @@ def text_of(snapshot: Snapshot) -> bytes:
         stream.seek(snapshot.start)
         data = stream.read(max(stop - snapshot.start, 0))
     return data.removeprefix(b"\xef\xbb\xbf") if snapshot.start == 0 else data
-
-
-def lines_above(snapshot: Snapshot) -> int:
-    """How many lines of the file stand before the snapshot."""
-    if snapshot.start == 0:
-        return 0
-    with open(plain(snapshot.path), "rb") as stream:
-        lines, left = 0, snapshot.start
-        while left > 0 and (part := stream.read(min(left, PIECE))):
-            lines += part.count(b"\n")
-            left -= len(part)
-    return lines
-
-
-def skip_rows(stream: IO[bytes], count: int) -> int:
-    """Go behind so many lines; returns how many there were (the last one may have no newline)."""
-    left = count
-    while left > 0 and (piece := stream.read(PIECE)):
-        here = piece.count(b"\n")
-        if here >= left:
-            ends = np.flatnonzero(np.frombuffer(piece, np.uint8) == ord("\n"))
-            stream.seek(int(ends[left - 1]) + 1 - len(piece), 1)
-        left -= min(here, left)
-    return count - left

@@ -1,19 +1,35 @@
-"""What a writer plugin offers and what it answers; the writers that are installed."""
+"""
+What a writer plugin offers and answers, the writers that are installed, and a packing as arrays.
+
+All writers take the arrays from here, so that readers find the same names in every format.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping
 from functools import cache
-from importlib.metadata import entry_points
+from itertools import chain
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
-from scanfab.base.errors import UnknownFormatError
-from scanfab.base.plugins import Offer, having, load_offers
-from scanfab.io.registry import lacking
+import numpy as np
+import numpy.typing as npt
+
+from scanfab.base.errors import PackingError, ReadError, UnknownFormatError
+from scanfab.base.plugins import Offer, having, load_plugins
+from scanfab.io.columns import DIAMETER_NAMES, first_of, other_size
+from scanfab.io.reader import BODIES, WALLS, plugin_named
+from scanfab.packing.bodies import CLUMP_COLUMNS
+from scanfab.packing.cell import Cell
+from scanfab.packing.contacts import ContactList
 from scanfab.packing.packing import Packing
 
+Columns = dict[str, npt.NDArray[Any]]
+
 GROUP = "scanfab.writers"
+# columns of a source may not have these names, in any spelling
+TAKEN = {"id", "x", "y", "z", "radius", "position"}
 
 
 class Left(NamedTuple):
@@ -63,30 +79,165 @@ def installed_writers() -> dict[str, Offer]:
         extensions=tuple,
         write=Callable,
     )
-    return load_offers(entry_points(group=GROUP), "writer", lambda writer: make(writer()))
+    return load_plugins(GROUP, "writer", lambda writer: make(writer()))
 
 
 def writer_named(name: str) -> Writer:
     """The writer that a user names; UnknownFormatError lists those that exist."""
-    writers = installed_writers()
-    if name not in writers:
-        raise UnknownFormatError(
-            f"there is no writer called {name!r}; the writers are {', '.join(writers)}"
-        )
-    writer: Writer = writers[name].plugin
-    advice = lacking(writer)
-    if advice is not None:
-        raise UnknownFormatError(f"{name} needs another package: {advice}")
+    writer: Writer = plugin_named(installed_writers(), "writer", name)
     return writer
 
 
 def writer_for(path: Path) -> Writer:
     """The writer of a suffix; UnknownFormatError lists those that exist."""
-    endings = {name: one.plugin.extensions for name, one in installed_writers().items()}
-    for name, known in endings.items():
-        if path.name.lower().endswith(known):
+    every = {name: offer.plugin.extensions for name, offer in installed_writers().items()}
+    for name, endings in every.items():
+        if path.name.lower().endswith(endings):
             return writer_named(name)
-    every = dict.fromkeys(ending for known in endings.values() for ending in known)
-    raise UnknownFormatError(
-        f"{path}: no format has this suffix: expected one of {' '.join(every)}, or its name as `to`"
+    known = " ".join(dict.fromkeys(chain(*every.values())))
+    expected = f"expected one of {known}, or the name of a format as `to`"
+    raise UnknownFormatError(f"{path}: no format has this suffix: {expected}")
+
+
+class Arrays(NamedTuple):
+    """A packing as arrays, under the names by which readers know them; positions are not here."""
+
+    grains: Columns
+    """``id``, ``radius``, and the numbers of bodies and of contacts with walls if there are any."""
+    own: Columns
+    """The other columns of the source, as numbers and texts; (N, K) arrays stay what they are."""
+    notes: list[str]
+    """Which columns of the source got another name or were left out."""
+    frame: dict[str, Any]
+    """What is known of ``step`` and ``time``, and the cell: ``cell``, ``origin``, ``periodic``."""
+    contacts: Columns
+    """``id1``, ``id2``, ``image``, and ``force`` on the second grain or else ``force_n``."""
+
+
+def as_arrays(packing: Packing) -> Arrays:
+    """The arrays of a packing that is to be written."""
+    bodies, cell, listed = packing.bodies, packing.cell, packing.contacts
+    numbers = None if bodies is None else bodies.number
+    if bodies is None and first_of(CLUMP_COLUMNS, packing.columns) is not None:
+        # without this column, a reader would join the spheres that another column numbers
+        numbers = np.full(len(packing), -1)
+    walls = packing.wall_contacts if packing.wall_contacts.any() else None
+    grains = {"id": packing.id, "radius": packing.radius, BODIES: numbers, WALLS: walls}
+    frame: dict[str, Any] = {"step": packing.step, "time": packing.time}
+    if cell is not None:
+        frame |= {"cell": cell.vectors, "origin": cell.origin, "periodic": np.array(cell.periodic)}
+    contacts: dict[str, Any] = {}
+    if listed is not None:
+        id1, id2 = packing.id[listed.pairs].T
+        contacts = {"id1": id1, "id2": id2, "image": listed.image, "force": listed.force}
+        contacts["force_n"] = listed.force_n if listed.force is None else None
+    return Arrays(_known(grains), *_own_columns(packing), _known(frame), _known(contacts))
+
+
+def _known(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def _own_columns(packing: Packing) -> tuple[Columns, list[str]]:
+    """
+    The columns of the source, and notes on those that were changed.
+
+    A column that a reader would take for something else gets another name.
+    """
+    found: Columns = {}
+    notes: list[str] = []
+    for name, values in packing.columns.items():
+        if values.dtype.kind == "S":
+            values = np.char.decode(values, "utf-8", "replace")
+        elif values.dtype.kind == "O":
+            values = values.astype(str)
+        elif values.dtype in (np.float16, np.longdouble):
+            values = values.astype(np.float64)
+        if values.dtype.kind not in "biufU":
+            notes.append(f"the column {name} is left out: it holds {values.dtype}")
+            continue
+        plain = re.sub(r"[^a-z0-9]", "", name.lower())
+        is_size = plain in DIAMETER_NAMES and other_size(packing.radius, values) is not None
+        free = name
+        if is_size or plain in TAKEN or name in (BODIES, WALLS):
+            free = f"{name}_of_dump"
+            while free in found or free in packing.columns:
+                free += "_"
+            notes.append(f"the column {name} is called {free}: {name} is what grains are read from")
+        found[free] = values
+    return found, notes
+
+
+def flat(columns: Mapping[str, npt.NDArray[Any]]) -> Columns:
+    """Columns of one value for each grain: ``v_x v_y v_z`` for vectors, 0 and 1 for truths."""
+    found: Columns = {}
+    for name, values in columns.items():
+        table = values.astype(np.int64) if values.dtype.kind == "b" else values
+        names = [name]
+        if table.ndim > 1:
+            table = table.reshape(len(table), int(np.prod(table.shape[1:])))
+            axes = "xyz" if table.shape[1] == 3 else range(table.shape[1])
+            names = [f"{name}_{axis}" for axis in axes]
+        found |= zip(names, np.atleast_2d(table.T), strict=True)
+    return found
+
+
+def table_columns(packing: Packing) -> tuple[Columns, Columns, list[str]]:
+    """The columns of a table that readers know, those of the source, and notes on the latter."""
+    arrays = as_arrays(packing)
+    place = dict(zip("xyz", packing.position.T, strict=True))
+    split = [
+        f"the column {name} stands as {', '.join(flat({name: values}))}"
+        for name, values in arrays.own.items()
+        if values.ndim > 1
+    ]
+    return {"id": packing.id, **place, **arrays.grains}, flat(arrays.own), [*arrays.notes, *split]
+
+
+def more_columns(packing: Packing) -> Columns:
+    """
+    All that there is of the grains but id, position and radius, in columns of one value a grain.
+
+    Parameters
+    ----------
+    packing : Packing
+        To be written.
+
+    Returns
+    -------
+    dict of str to ndarray, shape (N,)
+        By names that a reader takes for what they are.
+    """
+    known, own, _ = table_columns(packing)
+    return {name: known[name] for name in known if name not in TAKEN} | own
+
+
+def csv_bytes(
+    columns: Mapping[str, Any], separator: str = ",", *, with_names: bool = True
+) -> bytes:
+    """A table as text, with all digits; texts are in quotes where need be if it has names."""
+    import polars
+
+    quotes: Any = "necessary" if with_names else "never"
+    table = polars.DataFrame(dict(columns))
+    text = table.write_csv(separator=separator, include_header=with_names, quote_style=quotes)
+    return text.encode()
+
+
+def cell_of(path: Path, arrays: Mapping[str, Any]) -> Cell | None:
+    """The cell among the arrays of a frame; ReadError if it is none."""
+    if "cell" not in arrays:
+        return None
+    try:
+        vectors, origin = (np.asarray(arrays[name], np.float64) for name in ("cell", "origin"))
+        x, y, z = (bool(one) for one in np.ravel(arrays["periodic"]))
+        return Cell(vectors.reshape(3, 3), (x, y, z), origin.reshape(3))
+    except (KeyError, TypeError, ValueError, PackingError) as error:
+        raise ReadError(f"{path}: cell, origin and periodic are no cell: {error}") from None
+
+
+def contacts_of(pairs: npt.NDArray[Any], arrays: Mapping[str, Any]) -> ContactList:
+    """The contacts among the arrays of a file; the packing checks them."""
+    return ContactList(
+        pairs, arrays.get("image"), arrays.get("force"), force_n=arrays.get("force_n")
     )

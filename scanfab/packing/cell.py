@@ -16,6 +16,9 @@ from scanfab.base.spelling import spelt_place
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.lattice import Lattice, reduced_lattice
 
+# longest periodic edge over the smallest height: the search for images cannot count further
+WIDEST = 1e9
+
 
 def _three_truths(periodic: Sequence[bool]) -> tuple[bool, bool, bool]:
     if isinstance(periodic, str) or np.shape(periodic) != (3,):
@@ -45,7 +48,7 @@ class Cell:
     Raises
     ------
     PackingError
-        If the vectors span no volume.
+        If the vectors span no volume, or one that repeats is absurdly longer than the cell is high.
 
     Examples
     --------
@@ -85,6 +88,12 @@ class Cell:
         edges = np.linalg.norm(self.vectors, axis=1)
         if np.any(edges == 0) or abs(np.linalg.det(self.vectors / edges[:, None])) < 1e-6:
             raise PackingError(f"the cell's vectors span no volume: {self.vectors.tolist()}")
+        along = list(self.periodic)
+        if edges[along].max(initial=0.0) > WIDEST * self.heights[along].min(initial=np.inf):
+            raise PackingError(
+                f"the cell is more than {WIDEST:g} times as long as it is high: one of its numbers "
+                f"is wrong: {self.vectors.tolist()}"
+            )
 
     def __repr__(self) -> str:
         edges = np.diag(self.vectors)

@@ -59,24 +59,26 @@ def own_shares(packing: Packing, directions: Callable[[int], FloatArray]) -> Flo
             continue
         for part in np.array_split(np.arange(len(pairs)), 1 + pairs.size * len(rays) // CHUNK):
             some = pairs[part]
-            into, out = _along_rays(position, radius, one[some], two[some], rays)
-            share[two[some[:, 0]]] -= _beyond(into, out, nearest[part], space.dimension)
+            other, own = one[some], two[some]
+            place = (position[other] - position[own]) / radius[own][..., None]
+            ratio = radius[other] / radius[own]
+            share[own[:, 0]] -= _beyond(place, ratio, nearest[part], rays, space.dimension)
     return share
 
 
-def _along_rays(
-    position: FloatArray, radius: FloatArray, one: IntArray, two: IntArray, rays: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Where rays enter and leave others, in radii of theirs, shape (spheres, others, rays)."""
-    place = (position[one] - position[two]) / radius[two][..., None]
+def _beyond(
+    place: FloatArray, radius: FloatArray, nearest: IntArray, rays: FloatArray, dimension: int
+) -> FloatArray:
+    """
+    The part of spheres' volumes that others cover beyond what the nearest does.
+
+    Places and radii of the others, shape (spheres, others), are in radii of their sphere.
+    """
     depth = place @ rays.T
-    reach = np.square(radius[one] / radius[two]) - np.einsum("...i,...i->...", place, place)
+    reach = np.square(radius) - np.einsum("...i,...i->...", place, place)
     half = np.sqrt(np.maximum(reach[..., None] + depth**2, 0.0))
-    return np.clip(depth - half, 0.0, 1.0), np.clip(depth + half, 0.0, 1.0)
-
-
-def _beyond(into: FloatArray, out: FloatArray, nearest: IntArray, dimension: int) -> FloatArray:
-    """The part of a sphere's volume that others cover beyond what the nearest does."""
+    # where rays enter and leave others
+    into, out = np.clip(depth - half, 0.0, 1.0), np.clip(depth + half, 0.0, 1.0)
     row = np.arange(len(nearest))
     known = (out[row, nearest] ** dimension - into[row, nearest] ** dimension).mean(axis=1)
     order = np.argsort(into, axis=1)

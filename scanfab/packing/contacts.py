@@ -1,8 +1,7 @@
-"""Contacts as a source lists them, and what a packing makes of them."""
+"""Contacts with grains and walls as a source lists them, and what a packing makes of them."""
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, fields, replace
 from typing import Any, Literal, NamedTuple
 
@@ -10,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.arrays import cast, grains_named
-from scanfab.base.errors import PackingError, ScanfabWarning
+from scanfab.base.errors import PackingError, warn
 from scanfab.base.spelling import counted
 from scanfab.base.typing import BoolArray, FloatArray, IntArray
 from scanfab.packing.bodies import Bodies
@@ -317,11 +316,9 @@ def _refuse_long(pairs: IntArray, length: FloatArray, spheres: Spheres) -> None:
 def warn_of_same_centre(pairs: IntArray, id: IntArray) -> None:
     """Say that contacts between grains of one centre are left out."""
     one, two = id[pairs[0]]
-    warnings.warn(
+    warn(
         f"the grains {one} and {two} have the same centre ({len(pairs)} such pairs): a contact "
-        f"between them has no direction and is left out",
-        ScanfabWarning,
-        stacklevel=4,
+        f"between them has no direction and is left out"
     )
 
 
@@ -342,3 +339,56 @@ def _first_of_each(pairs: IntArray, image: IntArray) -> npt.NDArray[np.intp]:
     ) ** 3 + code
     _, first = np.unique(key, return_index=True)
     return np.sort(first)
+
+
+class ListedWallForces(NamedTuple):
+    """
+    What walls press on grains with, as a source says it; a wall is a body not in the table.
+
+    Parameters
+    ----------
+    row : array_like of int, shape (K,)
+        Of the grain.
+    point : array_like, shape (K, 3)
+        Where the wall is touched, dump's length unit; at any of its periodic images.
+    force : array_like, shape (K, 3)
+        On the grain, dump's force unit.
+    """
+
+    row: npt.ArrayLike
+    point: npt.ArrayLike
+    force: npt.ArrayLike
+
+
+class WallForces(NamedTuple):
+    """The forces of walls on grains, K of them."""
+
+    row: IntArray
+    """Of the grain (of a clump the sphere that touches), shape (K,)."""
+    point: FloatArray
+    """Where it touches the wall, next to where the grain is, shape (K, 3); dump's length unit."""
+    force: FloatArray
+    """On the grain, shape (K, 3); dump's force unit."""
+
+
+def resolve_wall_forces(
+    listed: ListedWallForces, position: FloatArray, cell: Cell | None
+) -> WallForces:
+    """
+    Listed forces of walls, each beside its grain.
+
+    Raises
+    ------
+    PackingError
+        If a contact names a row that does not exist, or a number is not finite.
+    """
+    row = cast("wall_forces: row", listed.row, np.int64, (None,))
+    point = cast("wall_forces: point", listed.point, np.float64, (len(row), 3))
+    force = cast("wall_forces: force", listed.force, np.float64, (len(row), 3))
+    if np.any((row < 0) | (row >= len(position))):
+        raise PackingError(f"wall_forces: names a row that is none of {len(position)} grains")
+    if not (np.isfinite(point).all() and np.isfinite(force).all()):
+        raise PackingError("wall_forces: expected finite points and forces")
+    if cell is not None and cell.is_periodic:
+        point = point + cell.nearest_image(point - position[row]) @ cell.vectors
+    return WallForces(row, point, force)

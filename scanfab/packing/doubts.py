@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from scanfab.base.errors import PackingError
-from scanfab.base.note import Note
+from scanfab.base.errors import Note, PackingError
 from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.bodies import CLUMP_COLUMNS, MOLECULE_COLUMNS
@@ -45,9 +44,27 @@ def refuse_impossible(sample: Sample) -> None:
     PackingError
         If the solids do not fit into their own box by far.
     """
-    text = _overfull(sample)
-    if text:
-        raise PackingError(text)
+    packing = sample.packing
+    position, radius = packing.position[sample.grains], packing.radius[sample.grains]
+    # who lists contacts has them from a program that knew the radii; in clumps, spheres may lie on
+    # top of one another
+    listed = packing.contacts is not None and packing.contacts.source == "file"
+    if len(radius) < FEWEST or listed or packing.bodies is not None:
+        return
+    # the box of the grains' surfaces, or the cell
+    reach, space = radius[:, None], packing.space
+    extents = (position + reach).max(axis=0) - (position - reach).min(axis=0)
+    box = float(np.prod(extents[list(space.along)]))
+    if packing.cell is not None and packing.is_periodic:
+        box = min(box, packing.cell.volume)
+    scale = np.cbrt(box) if space.dimension == 3 else np.sqrt(box)
+    solid = float(space.ball * np.sum((radius / scale) ** space.dimension))
+    if solid >= SOLIDS:
+        raise PackingError(
+            f"the grains' volumes add up to {solid:.3g} times that of the box that they lie in "
+            f"(radii {_span(radius)}, centres within {_extent(position):.3g}): check the units of "
+            f"radius and position"
+        )
 
 
 def doubts_of(
@@ -122,36 +139,6 @@ def _plane(packing: Packing) -> str:
         f"all {len(packing)} centres lie in {plane} ({spelt_plane(packing.position, plane)}), but "
         f"are taken for spheres in three dimensions: discs are read with `dim=2`"
     )
-
-
-def _overfull(sample: Sample) -> str:
-    position = sample.packing.position[sample.grains]
-    radius = sample.packing.radius[sample.grains]
-    contacts = sample.packing.contacts
-    # who lists contacts has them from a program that knew the radii; in clumps, spheres may lie on
-    # top of one another
-    listed = contacts is not None and contacts.source == "file"
-    if len(radius) < FEWEST or listed or sample.packing.bodies is not None:
-        return ""
-    solid = _solid_fraction(position, radius, sample.packing)
-    if solid < SOLIDS:
-        return ""
-    return (
-        f"the grains' volumes add up to {solid:.3g} times that of the box that they lie in (radii "
-        f"{_span(radius)}, centres within {_extent(position):.3g}): check the units of radius and "
-        f"position"
-    )
-
-
-def _solid_fraction(position: FloatArray, radius: FloatArray, packing: Packing) -> float:
-    """The volumes of some grains in that of the box of their surfaces, or of the cell."""
-    reach, space = radius[:, None], packing.space
-    extents = (position + reach).max(axis=0) - (position - reach).min(axis=0)
-    box = float(np.prod(extents[list(space.along)]))
-    if packing.cell is not None and packing.is_periodic:
-        box = min(box, packing.cell.volume)
-    scale = np.cbrt(box) if space.dimension == 3 else np.sqrt(box)
-    return float(space.ball * np.sum((radius / scale) ** space.dimension))
 
 
 def _clumps(packing: Packing) -> str:
@@ -280,7 +267,13 @@ def _many_contacts(sample: Sample) -> str:
 def _no_contacts(sample: Sample) -> str:
     if sample.contact_numbers[sample.grains].any() or sample.contacts.source == "file":
         return ""
-    nearest = _nearest(sample.packing)
+    from scipy.spatial import KDTree
+
+    # median distance of a grain's nearest neighbour, in sums of their radii
+    position, radius = sample.packing.position, sample.packing.radius
+    some = np.arange(0, len(radius), len(radius) // 1000 + 1)
+    distance, near = KDTree(position).query(position[some], k=2)
+    nearest = float(np.median(distance[:, 1] / (radius[some] + radius[near[:, 1]])))
     # twice the median gap closes most of the gaps
     tolerance = max(2.0 * (nearest - 1.0), 1e-6)
     wider = f", or use `contact_tolerance={tolerance:.1g}`" if nearest < CLOSED else ""
@@ -289,16 +282,6 @@ def _no_contacts(sample: Sample) -> str:
         f"diameters apart (median): right for a gas, else check the units of radius and "
         f"position{wider}"
     )
-
-
-def _nearest(packing: Packing) -> float:
-    """Median distance of a grain's nearest neighbour, in sums of their radii."""
-    from scipy.spatial import KDTree
-
-    some = np.arange(0, len(packing), len(packing) // 1000 + 1)
-    distance, near = KDTree(packing.position).query(packing.position[some], k=2)
-    reach = packing.radius[some] + packing.radius[near[:, 1]]
-    return float(np.median(distance[:, 1] / reach))
 
 
 def _span(radius: FloatArray) -> str:

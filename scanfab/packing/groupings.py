@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scanfab.base.note import Note
+from scanfab.base.errors import Note
 from scanfab.base.spelling import counted
 from scanfab.base.typing import IntArray
 from scanfab.packing.packing import Packing

@@ -63,17 +63,13 @@ class Lattice:
         inverse = np.linalg.pinv(self.vectors)
         image = -np.rint(branch @ inverse)
         rest = branch @ inverse @ self.vectors + image @ self.vectors
-        if not self._is_orthogonal:
+        gram = self.vectors @ self.vectors.T
+        if np.any(gram - np.diag(np.diagonal(gram))):
             # what is shorter than half of the shortest vector has no shorter image
             far = np.linalg.norm(rest, axis=1) >= 0.5 * self.shortest
             for rows in np.array_split(np.flatnonzero(far), far.sum() // CHUNK + 1):
                 image[rows] += self._steps_to_nearest(rest[rows])
         return image.astype(np.int64) @ self.combination
-
-    @property
-    def _is_orthogonal(self) -> bool:
-        gram = self.vectors @ self.vectors.T
-        return not np.any(gram - np.diag(np.diagonal(gram)))
 
     def _steps_to_nearest(self, rest: FloatArray) -> FloatArray:
         """
@@ -122,25 +118,20 @@ def reduced_lattice(vectors: FloatArray, periodic: tuple[bool, bool, bool]) -> L
 
 
 def _shortening(vectors: FloatArray) -> tuple[int, IntArray] | None:
-    """A vector, and what of the others to add to make it shorter; None if nothing does."""
+    """
+    A vector, and what of the others to add to make it shorter; None if nothing does.
+
+    Long steps along one other vector are tried first, then short ones along all others.
+    """
+    count = len(vectors)
     for place in np.argsort(-np.linalg.norm(vectors, axis=1), kind="stable").tolist():
         length = float(np.linalg.norm(vectors[place]))
-        for weights in _candidates(vectors, place):
+        others = [k for k in range(count) if k != place]
+        steps = np.zeros((len(others) + 3 ** len(others), count), np.int64)
+        for row, k in enumerate(others):
+            steps[row, k] = -np.rint(vectors[place] @ vectors[k] / (vectors[k] @ vectors[k]))
+        steps[len(others) :, others] = list(product((-1, 0, 1), repeat=len(others)))
+        for weights in steps:
             if np.linalg.norm(vectors[place] + weights @ vectors) < length * SHORTER:
                 return place, weights
     return None
-
-
-def _candidates(vectors: FloatArray, place: int) -> list[IntArray]:
-    """Long steps along one other vector, then short ones along all others."""
-    found: list[IntArray] = []
-    others = [k for k in range(len(vectors)) if k != place]
-    for k in others:
-        weights = np.zeros(len(vectors), np.int64)
-        weights[k] = -np.rint(vectors[place] @ vectors[k] / (vectors[k] @ vectors[k]))
-        found.append(weights)
-    for signs in product((-1, 0, 1), repeat=len(others)):
-        weights = np.zeros(len(vectors), np.int64)
-        weights[others] = signs
-        found.append(weights)
-    return found

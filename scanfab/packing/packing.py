@@ -13,13 +13,20 @@ import numpy.typing as npt
 from scanfab.base.arrays import LEAST, MOST, all_within, cast, grains_named
 from scanfab.base.errors import PackingError
 from scanfab.base.space import SPACE, Space
-from scanfab.base.spelling import counted, spelt_range
+from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.packing.bodies import Bodies, bodies_of
 from scanfab.packing.cell import Cell
-from scanfab.packing.contacts import ContactList, Contacts, Spheres, resolve_contacts
+from scanfab.packing.contacts import (
+    ContactList,
+    Contacts,
+    ListedWallForces,
+    Spheres,
+    WallForces,
+    resolve_contacts,
+    resolve_wall_forces,
+)
 from scanfab.packing.plane import cell_in_plane, flat_space, place_of, refuse_outside
-from scanfab.packing.walls import ListedWallForces, WallForces, resolve_wall_forces
 
 # rows whose temporary array stays in a cache: a new one for all would take longer to come by
 PART = 1 << 15
@@ -108,17 +115,22 @@ class Packing:
     ) -> None:
         if not isinstance(cell, Cell | None):
             raise PackingError(f"cell: expected a Cell, such as Cell([1, 1, 1]), found {cell!r}")
-        centres, dim = _centres(position, dim)
+        centres, space = _centres(position, dim)
         count = len(centres)
         radii = np.asarray(radius)
         self.radius: FloatArray = cast(
             "radius", np.full(count, radii) if radii.ndim == 0 else radii, np.float64, (count,)
         )
-        self.id: IntArray = _numbers(count) if id is None else cast("id", id, np.int64, (count,))
+        numbers = np.arange(count) if id is None else id
+        self.id: IntArray = cast("id", numbers, np.int64, (count,))
         check_lengths(centres, self.radius, self.id)
         if id is not None:
             _check_ids(self.id)
-        self.space: Space = _space_of(centres, dim)
+        if isinstance(space, Space):
+            refuse_outside(centres, space)
+        else:
+            space = flat_space(centres) if space == 2 else SPACE
+        self.space: Space = space
         if cell is not None and self.space.is_plane:
             cell = cell_in_plane(cell, self.space)
         turns: IntArray | None = None
@@ -126,11 +138,13 @@ class Packing:
         if cell is not None and not lies_within(cell, centres, 0.0, 1.0):
             self.position, turns = cell.place(centres)
         self.position.flags.writeable = False
-        self.columns: Mapping[str, npt.NDArray[Any]] = _cast_columns(columns or {}, count)
+        self.columns: Mapping[str, npt.NDArray[Any]] = {
+            name: cast(name, values, None, (count, ...)) for name, values in (columns or {}).items()
+        }
         self.bodies: Bodies | None = None
         if bodies is not None:
-            numbers = cast("bodies", bodies, np.int64, (count,))
-            self.bodies = bodies_of(numbers, self.position, self.radius, cell, self.space)
+            named = cast("bodies", bodies, np.int64, (count,))
+            self.bodies = bodies_of(named, self.position, self.radius, cell, self.space)
         self.wall_contacts: IntArray = _wall_contacts(wall_contacts, count)
         self.wall_forces: WallForces | None = None
         if wall_forces is not None:
@@ -149,7 +163,8 @@ class Packing:
     def __repr__(self) -> str:
         radii = ""
         if len(self):
-            radii = f" of radius {spelt_range(self.radius.min(), self.radius.max())}"
+            low, high = self.radius.min(), self.radius.max()
+            radii = f" of radius {low:.4g}" + ("" if low == high else f" to {high:.4g}")
         what = [counted(len(self), "particle") + radii]
         what += [f"2D in {self.space}"] if self.space.is_plane else []
         if self.bodies is not None:
@@ -204,34 +219,20 @@ class Packing:
         return Spheres(self.position, self.radius, self.id, self.cell, turns, self.bodies)
 
 
-def _space_of(position: FloatArray, dim: int | Space) -> Space:
-    """In which positions lie."""
-    if isinstance(dim, Space):
-        refuse_outside(position, dim)
-        return dim
-    return flat_space(position) if dim == 2 else SPACE
-
-
 def _centres(position: npt.ArrayLike, dim: int | Space | None) -> tuple[FloatArray, int | Space]:
     """Positions of three coordinates, from those of three or of two, and their dimension."""
     if dim not in (None, 2, 3) and not isinstance(dim, Space):
         raise PackingError(f"dim: expected 2 or 3, found {dim!r}")
-    if not _are_flat(position):
+    try:
+        shape = np.shape(position)
+    except ValueError:
+        shape = ()  # rows of different lengths
+    if len(shape) != 2 or shape[1] != 2:
         return cast("position", position, np.float64, (None, 3)), dim or 3
     if dim == 3:
         raise PackingError("dim: expected 2, as the positions have two coordinates, found 3")
     flat: FloatArray = cast("position", position, np.float64, (None, 2))
     return np.column_stack([flat, np.zeros(len(flat))]), dim or 2
-
-
-def _are_flat(position: npt.ArrayLike) -> bool:
-    """Whether positions have two coordinates."""
-    try:
-        shape = np.shape(position)
-    except ValueError:
-        # rows of different lengths
-        return False
-    return len(shape) == 2 and shape[1] == 2
 
 
 def _wall_contacts(values: npt.ArrayLike | None, count: int) -> IntArray:
@@ -242,10 +243,6 @@ def _wall_contacts(values: npt.ArrayLike | None, count: int) -> IntArray:
     if np.any(numbers < 0):
         raise PackingError("wall_contacts: expected 0 or more for each grain")
     return numbers
-
-
-def _cast_columns(columns: Mapping[str, npt.ArrayLike], count: int) -> dict[str, npt.NDArray[Any]]:
-    return {name: cast(name, values, None, (count, ...)) for name, values in columns.items()}
 
 
 def check_lengths(position: FloatArray, radius: FloatArray, id: IntArray) -> None:
@@ -261,43 +258,27 @@ def check_lengths(position: FloatArray, radius: FloatArray, id: IntArray) -> Non
         (large, f"a number above {MOST:g} cannot be a length"),
     ]
     wrong, reason = next((wrong, reason) for wrong, reason in reasons if wrong.any())
+    first = int(np.argmax(wrong))
+    place = ", ".join(f"{x:g}" for x in position[first])
     raise PackingError(
-        f"{grains_named(id, wrong)}: {reason}, found {_values(position, radius, wrong)}"
+        f"{grains_named(id, wrong)}: {reason}, found radius {radius[first]:g} at ({place})"
     )
 
 
-def _numbers(count: int) -> IntArray:
-    """The ids of grains that have none."""
-    numbers = np.arange(count, dtype=np.int64)
-    numbers.flags.writeable = False
-    return numbers
-
-
 def _check_ids(id: IntArray) -> None:
-    """PackingError if an id occurs twice."""
-    if not _are_unique(id):
-        unique, counts = np.unique(id, return_counts=True)
+    """PackingError if an id occurs twice; without sorting if ids lie close together, as usual."""
+    if np.all(id[1:] > id[:-1]):
+        return
+    low, high = int(id.min()), int(id.max())
+    if high - low < 8 * id.size:
+        seen = np.zeros(high - low + 1, np.bool_)
+        for start in range(0, id.size, PART):
+            seen[id[start : start + PART] - low] = True
+        if np.count_nonzero(seen) == id.size:
+            return
+    unique, counts = np.unique(id, return_counts=True)
+    if unique.size < id.size:
         raise PackingError(
             f"the id {unique[np.argmax(counts > 1)]} occurs twice: "
             f"{unique.size} ids for {id.size} grains"
         )
-
-
-def _values(position: FloatArray, radius: FloatArray, wrong: npt.NDArray[np.bool_]) -> str:
-    """Of the first of some grains."""
-    first = int(np.argmax(wrong))
-    place = ", ".join(f"{x:g}" for x in position[first])
-    return f"radius {radius[first]:g} at ({place})"
-
-
-def _are_unique(id: IntArray) -> bool:
-    """Whether no number occurs twice; without sorting if they lie close together, as ids do."""
-    if np.all(id[1:] > id[:-1]):
-        return True
-    low, high = int(id.min()), int(id.max())
-    if high - low >= 8 * id.size:
-        return bool(np.unique(id).size == id.size)
-    seen = np.zeros(high - low + 1, np.bool_)
-    for start in range(0, id.size, PART):
-        seen[id[start : start + PART] - low] = True
-    return bool(np.count_nonzero(seen) == id.size)

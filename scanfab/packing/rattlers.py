@@ -133,4 +133,4 @@ def force(touching: Touching) -> BoolArray:
 def installed_rules() -> dict[str, RattlerRule]:
     """The rules by name, those of other packages among them."""
     make = having("a function of scanfab.packing.rattlers.Touching", __call__=Callable)
-    return load_plugins(GROUP, "rattler rule", make)
+    return {name: one.plugin for name, one in load_plugins(GROUP, "rattler rule", make).items()}

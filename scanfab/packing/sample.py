@@ -12,8 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from scanfab.base.arrays import cast
-from scanfab.base.errors import PackingError
-from scanfab.base.note import Note
+from scanfab.base.errors import Note, PackingError
 from scanfab.base.spelling import counted
 from scanfab.base.typing import BoolArray, IntArray
 from scanfab.packing.boundary import BoundaryRule, select_boundary

@@ -81,11 +81,7 @@ def find_contacts(packing: Packing, tolerance: float = 0.0) -> Packing:
     if packing.bodies is not None:
         outer = packing.bodies.between(pairs, image)
         pairs, image = pairs[outer], image[outer]
-    return packing.with_contacts(_contacts(packing, pairs, image))
-
-
-def _contacts(packing: Packing, pairs: IntArray, image: IntArray) -> Contacts:
-    """Normals and points; as of listed contacts, but nothing is to be checked."""
+    # normals and points as of listed contacts, but nothing is to be checked
     vectors = np.zeros((3, 3)) if packing.cell is None else packing.cell.vectors
     normal, point = np.empty((len(pairs), 3)), np.empty((len(pairs), 3))
     sound = np.empty(len(pairs), np.bool_)
@@ -93,7 +89,7 @@ def _contacts(packing: Packing, pairs: IntArray, image: IntArray) -> Contacts:
     if not sound.all():
         warn_of_same_centre(pairs[~sound], packing.id)
         pairs, image, normal, point = pairs[sound], image[sound], normal[sound], point[sound]
-    return Contacts(pairs, image, normal, point, None, "geometric")
+    return packing.with_contacts(Contacts(pairs, image, normal, point, None, "geometric"))
 
 
 def overlapping_pairs(
@@ -129,11 +125,14 @@ def overlapping_pairs(
         moved, turns = np.empty((count, 3)), np.empty((count, 3), np.int64)
         move_into_basis(position, basis, moved, turns)
     grids = list(_grids(moved, radius, scale, basis, vectors))
-    found, room = 0, USUAL_CONTACTS * count
+    room, most = USUAL_CONTACTS * count, MOST_CONTACTS * count
     while True:
-        most = MOST_CONTACTS * count
         pairs = Pairs(np.empty((room, 2), np.int32), np.empty((room, 3), np.int16), most)
-        found = _search(grids, basis, scale, pairs)
+        found = 0
+        for place, grid in enumerate(grids):
+            found = pairs_within(grid, basis, scale, pairs, found)
+            for larger in grids[:place]:
+                found = pairs_between(grid, larger, basis, scale, pairs, found)
         if found > most:
             raise PackingError(
                 f"more than {MOST_CONTACTS} contacts a grain by geometry: {count} grains lie on "
@@ -146,7 +145,10 @@ def overlapping_pairs(
     sort_pairs(Pairs(pairs.rows[:found], pairs.image[:found], most), count, rows, image)
     if turns.any():
         image += turns[rows[:, 0]] - turns[rows[:, 1]]
-    return rows, _in_vectors_of(cell, image, basis)
+    if cell is not None and not np.array_equal(cell.lattice.combination, np.eye(3)):
+        # from vectors of the basis to those of the cell
+        image = image[:, : len(cell.lattice.combination)] @ cell.lattice.combination
+    return rows, image
 
 
 def _basis(position: FloatArray, cell: Cell | None) -> tuple[Basis, FloatArray]:
@@ -158,9 +160,11 @@ def _basis(position: FloatArray, cell: Cell | None) -> tuple[Basis, FloatArray]:
     lattice = np.zeros((0, 3)) if cell is None else cell.lattice.vectors
     repeating = len(lattice)
     # what does not repeat is orthogonal to what does
-    across = _orthogonal_complement(lattice)
+    across = np.eye(3)
+    if repeating:
+        unit = lattice / np.linalg.norm(lattice, axis=1)[:, None]
+        across = np.asarray(np.linalg.svd(unit)[2][repeating:])
     low, high = _extents(position, across)
-    low, high = _without_stragglers(position, across, low, high)
     size = np.maximum(high - low, np.finfo(float).tiny ** 0.25)
     vectors = np.vstack([lattice, across * size[:, None]])
     inverse: FloatArray = np.linalg.inv(vectors).astype(np.float64)
@@ -174,36 +178,22 @@ def _basis(position: FloatArray, cell: Cell | None) -> tuple[Basis, FloatArray]:
 
 
 def _extents(position: FloatArray, directions: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The smallest and largest coordinate along each direction (shape (K, 3))."""
+    """
+    The smallest and largest coordinate of nearly all grains along each direction (shape (K, 3)).
+
+    The bounds are three times as wide as those of 98 % of the grains at most. A few grains that
+    flew far away would make all bins large. They go to the outermost bins: that brings no
+    neighbours apart.
+    """
     low, high = np.empty(len(directions)), np.empty(len(directions))
     # one after the other: that needs a third of the memory
     for k, direction in enumerate(directions):
         along = np.einsum("ij,j->i", position, direction)
         low[k], high[k] = along.min(), along.max()
-    return low, high
-
-
-def _without_stragglers(
-    position: FloatArray, across: FloatArray, low: FloatArray, high: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """
-    Bounds of nearly all grains, three times as wide as those of 98 % at most.
-
-    A few grains that flew far away would make all bins large. They go to the outermost bins: that
-    brings no neighbours apart.
-    """
-    some = position[:: len(position) // SAMPLE + 1] @ across.T
+    some = position[:: len(position) // SAMPLE + 1] @ directions.T
     least, most = np.quantile(some, [0.01, 0.99], axis=0)
     width = most - least
     return np.maximum(low, least - width), np.minimum(high, most + width)
-
-
-def _orthogonal_complement(vectors: FloatArray) -> FloatArray:
-    """Unit vectors orthogonal to some and to each other, shape (3 - K, 3)."""
-    if len(vectors) == 0:
-        return np.eye(3)
-    unit = vectors / np.linalg.norm(vectors, axis=1)[:, None]
-    return np.asarray(np.linalg.svd(unit)[2][len(vectors) :])
 
 
 def _grids(
@@ -246,23 +236,3 @@ def _empty_grid(count: int, edge: float, heights: FloatArray, basis: Basis) -> G
         bins,
         np.maximum(reach, 1),
     )
-
-
-def _search(grids: list[Grid], basis: Basis, scale: float, pairs: Pairs) -> int:
-    """All pairs, of grains of like size and of others; how many there are."""
-    found = 0
-    for place, grid in enumerate(grids):
-        found = pairs_within(grid, basis, scale, pairs, found)
-        for larger in grids[:place]:
-            found = pairs_between(grid, larger, basis, scale, pairs, found)
-    return found
-
-
-def _in_vectors_of(cell: Cell | None, image: IntArray, basis: Basis) -> IntArray:
-    """Images in vectors of the cell, from those in vectors of the basis."""
-    if cell is None or not cell.is_periodic:
-        return image
-    combination = cell.lattice.combination
-    if np.array_equal(combination, np.eye(3, dtype=np.int64)):
-        return image
-    return image[:, : len(combination)] @ combination

@@ -5,24 +5,22 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from scanfab.base.errors import PackingError, SettingsError
-from scanfab.base.note import Note, tell
+from scanfab.base.errors import Note, PackingError, SettingsError, tell
 from scanfab.base.option import options_of, refuse_unknown
 from scanfab.base.spelling import counted
 from scanfab.io.options import parse_frames
-from scanfab.packing.sample import Sample
 from scanfab.pipeline.calibration_ladders import (
     PAPER_CUTOFF,
     PAPER_SPACING,
+    SENTENCES,
     StepRow,
     first_steady,
     judged,
     largest,
-    sentence,
     sentence_of_recommended,
 )
 from scanfab.pipeline.frame import OTHER_CUTOFFS, compute_frame
@@ -30,12 +28,11 @@ from scanfab.pipeline.frames import Frames, Source
 from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.plan import Plan, make_plan
 from scanfab.pipeline.settings import Settings
-from scanfab.pipeline.tolerance import TOLERANCE_MISSED, missing_work
+from scanfab.pipeline.tolerance import EACH_VARIANT, TOLERANCE_MISSED, missing_work
 from scanfab.pipeline.values import Length
 from scanfab.pipeline.window_settings import SHAPES, settings_in
-from scanfab.scan.directions import DirectionRule, direction_rule, rule_of, usual_rule
+from scanfab.scan.directions import direction_rule, rule_of, usual_rule
 from scanfab.table.plots import Plots
-from scanfab.table.row import Row
 
 LOGGER = logging.getLogger("scanfab")
 
@@ -91,8 +88,8 @@ class Calibration:
     def __repr__(self) -> str:
         steps = counted(len(self.rows), "step of a variant", "steps of variants")
         options = ", ".join(f"{name}={value!r}" for name, value in self.options.items())
-        lines = [*self.findings, f"recommended: {options}"]
-        return "\n  ".join([f"Calibration: {steps}", *lines])
+        lines = [f"Calibration: {steps}", *self.findings, f"recommended: {options}"]
+        return "\n  ".join(lines)
 
     @property
     def plot(self) -> Plots:
@@ -153,7 +150,7 @@ def calibrate(
 
 
 class _Calibrator:
-    """One frame, and the plan-making first frame of its series."""
+    """One frame, and the first frame of its series that has grains, which makes the plan."""
 
     def __init__(self, source: Source, settings: Settings, frame: int) -> None:
         if len(settings.rvs) > 1:
@@ -162,20 +159,78 @@ class _Calibrator:
                 f"{len(settings.rvs)}"
             )
         frames = Frames(source, replace(settings, frames=parse_frames(frame, "frame")))
-        self.name = frames.name
-        self.first, self.number, self.sample = _samples(frames)
+        self.number, wanted = frames.one()
+        first = frames.first()
+        if first is None:
+            raise PackingError("no frame has any grains: there is nothing to calibrate")
+        number, readable, self.first = first
+        tell(frames.notes(readable, self.first))
+        sample = self.first if number == self.number else frames.sample(self.number, wanted)
+        if sample is None or not sample.grains.any():
+            raise PackingError(f"frame {self.number} has no grains: choose another frame")
+        self.name, self.sample = frames.name, sample
         self.space = self.first.packing.space
         self.settings = settings_in(settings, self.space)
-        tell(self.sample.doubts_of_escaped(), f"frame {self.number}")
-        radius = self.first.packing.radius[self.first.grains]
-        self.r_min = float(radius.min())
-        # what it says concerns every step
+        tell(sample.doubts_of_escaped(), f"frame {self.number}")
+        self.r_min = float(self.first.packing.radius[self.first.grains].min())
+        # these notes concern every step
         tell(make_plan(self.settings, self.first).notes)
 
     def all(self) -> Calibration:
         """The ladders, what they say, and what follows."""
-        cutoffs = list(self._cutoffs())
-        with_fabric = {row.variant for row in cutoffs if row.alpha_vs_axial is not None}
+        settings = self.settings
+        cutoffs = self._cutoffs()
+        # a surface that a file draws is an RV without a ladder of sizes
+        has_sizes = settings.needs_window and settings.rv_shape in SHAPES
+        ladders = {
+            "spacing": judged(self._ladder("spacing", self._spacings())),
+            "directions": judged(self._ladder("directions", self._directions())),
+            "cutoff": cutoffs,
+            "rv": judged(self._ladder("rv", self._rvs() if has_sizes else {}), self.space),
+        }
+        cutoff = settings.cutoff.value if settings.cutoff.unit == "rmin" else PAPER_CUTOFF
+        at_cutoff = [row for row in cutoffs if row.value == cutoff] or cutoffs
+        sample = largest(at_cutoff, "alpha_vs_axial_sample_se")
+        target = max(settings.tolerance, OF_SAMPLE * (sample or 0.0))
+        best, options = self._recommended(ladders["spacing"], ladders["directions"], target)
+        findings = [SENTENCES[ladder](rows) for ladder, rows in ladders.items() if rows]
+        if settings.needs_window and not has_sizes:
+            findings.append(
+                f"RV: its size is left out, as {settings.rv_shape} draws it: to try others, "
+                f"scale that surface"
+            )
+        findings.append(sentence_of_recommended(best, target, sample))
+        rows = [row for ladder in ladders.values() for row in ladder]
+        return Calibration((*rows, *best), tuple(findings), options)
+
+    def _spacings(self) -> dict[float, Settings]:
+        rule = self.settings.directions or usual_rule(self.space)
+        lengths = {value: Length(value, "rmin") for value in SPACINGS}
+        return {
+            value: replace(self.settings, spacing=length, directions=rule)
+            for value, length in lengths.items()
+        }
+
+    def _directions(self) -> dict[float, Settings]:
+        spacing = self.settings.spacing or Length(FIXED_SPACING, "rmin")
+        if self.space.is_plane:
+            rules = [rule_of(count, self.space) for count in STEPS]
+        else:
+            rules = [direction_rule(f"lebedev:{degree}") for degree in DEGREES]
+        return {
+            len(rule): replace(self.settings, spacing=spacing, directions=rule) for rule in rules
+        }
+
+    def _rvs(self) -> dict[float, Settings]:
+        variants = "".join(variant for variant in self.settings.variants if variant in "cd")
+        words: dict[str, Any] = {"rv_radius": None, "rv_size": (), "variants": variants}
+        return {value: replace(self.settings, rv=value, **words) for value in RV_FRACTIONS}
+
+    def _cutoffs(self) -> list[StepRow]:
+        """One scan for all cut-offs; SettingsError if a variant has no void fabric at any."""
+        lengths = tuple(Length(value, "rmin") for value in CUTOFFS)
+        rows, _ = self._measured("cutoff", None, replace(self.settings, cutoffs=lengths))
+        with_fabric = {row.variant for row in rows if row.alpha_vs_axial is not None}
         for variant in self.settings.variants:
             if variant not in with_fabric:
                 grains = self.sample.number(self.sample.grains)
@@ -184,131 +239,60 @@ class _Calibrator:
                     f"the sample ({grains} grains) is too small for it, "
                     f"there is no void, or all its grains are rattlers"
                 )
-        ladders = {
-            "spacing": judged(self._spacings()),
-            "directions": judged(self._directions()),
-            "cutoff": cutoffs,
-            "rv": judged(self._rvs(), self.space.dimension) if self._rv_has_sizes else [],
-        }
-        sample = largest(cutoffs, "alpha_vs_axial_sample_se", self._default_cutoff())
-        target = max(self.settings.tolerance, OF_SAMPLE * (sample or 0.0))
-        best, options = self._recommended(ladders["spacing"], ladders["directions"], target)
-        findings = [sentence(ladder, rows) for ladder, rows in ladders.items() if rows]
-        if self.settings.needs_window and not self._rv_has_sizes:
-            findings.append(
-                f"RV: its size is left out, as {self.settings.rv_shape} draws it: to try others, "
-                f"scale that surface"
-            )
-        findings.append(sentence_of_recommended(best, target, sample))
-        rows = [row for ladder in ladders.values() for row in ladder]
-        return Calibration((*rows, *best), tuple(findings), options)
+        return rows
 
-    def _default_cutoff(self) -> float:
-        cutoff = self.settings.cutoff
-        return cutoff.value if cutoff.unit == "rmin" else PAPER_CUTOFF
-
-    def _spacings(self) -> Iterator[StepRow]:
-        rule = self.settings.directions or usual_rule(self.space)
-        for value in SPACINGS:
-            step = replace(self.settings, spacing=Length(value, "rmin"), directions=rule)
-            yield from self._step("spacing", value, step)
-
-    def _directions(self) -> Iterator[StepRow]:
-        spacing = self.settings.spacing or Length(FIXED_SPACING, "rmin")
-        for rule in self._ladder_of_rules():
-            step = replace(self.settings, spacing=spacing, directions=rule)
-            yield from self._step("directions", len(rule), step)
-
-    def _ladder_of_rules(self) -> list[DirectionRule]:
-        if self.space.is_plane:
-            return [rule_of(count, self.space) for count in STEPS]
-        return [direction_rule(f"lebedev:{degree}") for degree in DEGREES]
-
-    def _cutoffs(self) -> Iterator[StepRow]:
-        cutoffs = tuple(Length(value, "rmin") for value in CUTOFFS)
-        yield from self._step("cutoff", None, replace(self.settings, cutoffs=cutoffs))
-
-    @property
-    def _rv_has_sizes(self) -> bool:
-        """Whether there is an RV, and not one that a file draws."""
-        return self.settings.needs_window and self.settings.rv_shape in SHAPES
-
-    def _rvs(self) -> Iterator[StepRow]:
-        variants = "".join(variant for variant in self.settings.variants if variant in "cd")
-        for value in RV_FRACTIONS:
-            step = replace(self.settings, rv=value, rv_radius=None, rv_size=(), variants=variants)
-            yield from self._step("rv", value, step)
-
-    def _step(self, ladder: str, value: float | None, settings: Settings) -> Iterator[StepRow]:
-        """The rows of one step; none if its settings do not fit the sample."""
-        try:
-            yield from self._measured(ladder, value, settings)[0]
-        except SettingsError as error:
-            if ladder == "cutoff":
-                raise
-            tell([Note("step_left_out", f"{ladder} {value:g} left out: {error}")])
+    def _ladder(self, ladder: str, steps: Mapping[float, Settings]) -> Iterator[StepRow]:
+        """The rows of all steps but those whose settings do not fit the sample."""
+        for value, settings in steps.items():
+            try:
+                rows, _ = self._measured(ladder, value, settings)
+            except SettingsError as error:
+                tell([Note("step_left_out", f"{ladder} {value:g} left out: {error}")])
+            else:
+                yield from rows
 
     def _measured(
         self, ladder: str, value: float | None, settings: Settings
     ) -> tuple[list[StepRow], Measurement]:
-        """The rows of one step, and what they were made from."""
+        """The rows of one step, and what they were made from; no value: that of each cut-off."""
         begun = time.perf_counter()
         plan = make_plan(settings, self.first)
-        self._check_budget(ladder, plan)
+        if ladder in ("spacing", "directions"):
+            self._check_budget(plan)
         result = compute_frame(self.sample, plan, number=self.number, source=self.name)
         seconds = time.perf_counter() - begun
         LOGGER.info("%s %s: %.2g s", ladder, "" if value is None else f"{value:g}", seconds)
-        rows = [
-            self._row(row, ladder, value, plan, seconds, _told(result.notes, row.variant))
-            for row in result.rows
-        ]
+        of_step: dict[str, Any] = {
+            "ladder": ladder,
+            "rule": plan.rule.name,
+            "degree": plan.rule.degree,
+            "rule_bias": plan.rule.bias,
+            "seconds": seconds,
+            "steady": None,
+        }
+        rows = []
+        for row in result.rows:
+            window = plan.window if row.variant in "cd" else None
+            same = {one.name: row[one.name] for one in fields(StepRow) if one.name in row}
+            step = StepRow(
+                **same,
+                **of_step,
+                value=round(row.cutoff / self.r_min, 9) if value is None else value,
+                rv_radius=window.radius if window else None,
+                note=_told(result.notes, row.variant),
+            )
+            rows.append(step)
         return rows, result.measurements[0]
 
-    def _check_budget(self, ladder: str, plan: Plan) -> None:
+    def _check_budget(self, plan: Plan) -> None:
         """Refuse a step of fixed lines that would cut more chords than allowed."""
         shadow = self.space.shadow(self.sample.packing.radius[self.sample.grains])
         chords = self.space.lines(shadow, plan.spacing) * plan.replicates * len(plan.rule)
-        if ladder in ("spacing", "directions") and chords > self.settings.max_chords:
+        if chords > self.settings.max_chords:
             raise SettingsError(
                 f"it would cut {chords:.2g} chords from the grains, more than `max_chords` "
                 f"{self.settings.max_chords:g}"
             )
-
-    def _row(
-        self,
-        row: Row,
-        ladder: str,
-        value: float | None,
-        plan: Plan,
-        seconds: float,
-        note: str,
-    ) -> StepRow:
-        if value is None:
-            assert row.cutoff is not None
-            value = round(row.cutoff / self.r_min, 9)
-        return StepRow(
-            source=self.name,
-            frame=self.number,
-            ladder=ladder,
-            value=value,
-            variant=row.variant,
-            rule=plan.rule.name,
-            degree=plan.rule.degree,
-            rule_bias=plan.rule.bias,
-            directions=row.directions,
-            replicates=row.replicates,
-            spacing=row.spacing,
-            cutoff=row.cutoff,
-            rv_radius=plan.window.radius if plan.window and row.variant in "cd" else None,
-            segments=row.segments,
-            seconds=seconds,
-            mean_length=row.mean_length,
-            alpha_vs_axial=row.alpha_vs_axial,
-            alpha_vs_axial_se=row.alpha_vs_axial_se,
-            alpha_vs_axial_sample_se=row.alpha_vs_axial_sample_se,
-            steady=None,
-            note=note,
-        )
 
     def _recommended(
         self, spacings: list[StepRow], directions: list[StepRow], target: float
@@ -322,38 +306,22 @@ class _Calibrator:
         spacing = min(first_steady(spacings) or PAPER_SPACING, FIXED_SPACING)
         steady = first_steady(directions) or len(usual_rule(self.space))
         rule = rule_of(int(steady), self.space)
+        other_lines = replace(self.settings, tolerance=target, seed=self.settings.seed + 1)
         for _ in range(ROUNDS):
-            settings = replace(
-                self.settings,
-                spacing=Length(spacing, "rmin"),
-                directions=rule,
-                tolerance=target,
-                seed=self.settings.seed + 1,
-            )
-            found = self._measured("recommended", len(rule), settings)[1]
-            missing = missing_work(found.sums, found.plan, settings.variants)
+            trial = replace(other_lines, spacing=Length(spacing, "rmin"), directions=rule)
+            _, found = self._measured("recommended", len(rule), trial)
+            sums, plan = found.sums, found.plan
+            errors = [EACH_VARIANT.errors(sums, plan, one) for one in plan.variants]
+            missing = missing_work(errors, plan, sums.replicates)
             if missing <= 1.0:
                 break
             wanted = len(rule) * missing
             if wanted > MOST_DIRECTIONS:
                 spacing = float(f"{spacing * self.space.apart(MOST_DIRECTIONS / wanted):.2g}")
             rule = rule_of(min(math.ceil(wanted), MOST_DIRECTIONS), self.space)
-        settings = replace(self.settings, spacing=Length(spacing, "rmin"), directions=rule)
-        rows = self._measured("recommended", len(rule), settings)[0]
+        best = replace(self.settings, spacing=Length(spacing, "rmin"), directions=rule)
+        rows, _ = self._measured("recommended", len(rule), best)
         return rows, {"spacing": f"{spacing:g}rmin", "directions": rule.name}
-
-
-def _samples(frames: Frames) -> tuple[Sample, int, Sample]:
-    """The first frame that has grains, and the wanted one with its number."""
-    number, one = frames.one()
-    first = frames.first()
-    if first is None:
-        raise PackingError("no frame has any grains: there is nothing to calibrate")
-    tell(frames.notes(*first[1:]))
-    sample = first[2] if first[0] == number else frames.sample(number, one)
-    if sample is None or not sample.grains.any():
-        raise PackingError(f"frame {number} has no grains: choose another frame")
-    return first[2], number, sample
 
 
 def _told(notes: Iterable[Note], variant: str) -> str:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 from typing import Annotated
 
 from scanfab.base.column import LENGTH
+from scanfab.base.space import SPACE, Space
 from scanfab.table.row import Record
 
 # of the 2017 paper, in r_min; its RV as fractions of the sample's radius
@@ -75,15 +76,16 @@ class StepRow(Record):
     note: Annotated[str, "what makes the step doubtful"]
 
 
-def judged(rows: Iterator[StepRow], dimension: int = 3) -> list[StepRow]:
-    """The rows of a ladder with ``steady`` filled in, variant by variant; of discs in 2D."""
+def judged(rows: Iterable[StepRow], space: Space = SPACE) -> list[StepRow]:
+    """The rows of a ladder with ``steady`` filled in, variant by variant."""
     every = list(rows)
     found: list[StepRow] = []
     most = _most_errors([row.variant for row in every])
     for row in reversed(every):
         later = [one for one in found if one.variant == row.variant]
-        steady = _is_sound(row) and all(
-            one.steady and _agree(row, one, most, dimension) for one in later
+        is_sound = None not in (row.alpha_vs_axial, row.alpha_vs_axial_se) and not row.note
+        steady = is_sound and all(
+            one.steady and _agree(row, one, most, space.dimension) for one in later
         )
         found.append(replace(row, steady=int(steady)))
     return found[::-1]
@@ -98,31 +100,24 @@ def _most_errors(variants: list[str]) -> float:
     return float(stdtrit(FREEDOM, 1.0 - 0.5 * CHANCE / max(pairs, 1)))
 
 
-def _is_sound(row: StepRow) -> bool:
-    return row.alpha_vs_axial is not None and row.alpha_vs_axial_se is not None and not row.note
-
-
 def _agree(one: StepRow, other: StepRow, most: float, dimension: int) -> bool:
-    """Whether two values differ by no more than so many standard errors of their difference."""
+    """
+    Whether two values differ by no more than so many standard errors of their difference.
+
+    Of two RVs one lies in the other, and they have the grains of the smaller one in common. The
+    variance of a mean over grains falls with their number, so the sample's part in the variance of
+    the difference is the difference of the variances; both follow from the larger RV's, which is
+    the better known.
+    """
     if one.alpha_vs_axial is None or other.alpha_vs_axial is None:
         return False
-    errors = [row.alpha_vs_axial_se or 0.0 for row in (one, other)]
-    nested = _nested_error(one, other, dimension) if one.ladder == "rv" else 0.0
-    error = math.hypot(*errors, nested)
+    nested = 0.0
+    if one.ladder == "rv":
+        small, large = sorted((one, other), key=lambda row: row.rv_radius or 0.0)
+        more = ((large.rv_radius or 0.0) / (small.rv_radius or 1.0)) ** dimension
+        nested = (large.alpha_vs_axial_sample_se or 0.0) * math.sqrt(max(more - 1.0, 0.0))
+    error = math.hypot(one.alpha_vs_axial_se or 0.0, other.alpha_vs_axial_se or 0.0, nested)
     return abs(one.alpha_vs_axial - other.alpha_vs_axial) <= most * error
-
-
-def _nested_error(one: StepRow, other: StepRow, dimension: int) -> float:
-    """
-    The sample's standard error of the difference between two RVs, one inside the other.
-
-    They have the grains of the smaller one in common. The variance of a mean over grains falls with
-    their number, so that of the difference of two such means is the difference of the variances;
-    both follow from the larger RV's, which is the better known.
-    """
-    small, large = sorted((one, other), key=lambda row: row.rv_radius or 0.0)
-    more = ((large.rv_radius or 0.0) / (small.rv_radius or 1.0)) ** dimension
-    return (large.alpha_vs_axial_sample_se or 0.0) * math.sqrt(max(more - 1.0, 0.0))
 
 
 def first_steady(rows: Sequence[StepRow]) -> float | None:
@@ -135,28 +130,23 @@ def first_steady(rows: Sequence[StepRow]) -> float | None:
     return next((step[0].value for step in steps[:-1] if all(row.steady for row in step)), None)
 
 
-def largest(rows: Sequence[StepRow], name: str, value: float | None = None) -> float | None:
-    """The largest of the variants, of the step with this value or of all."""
-    chosen = [row for row in rows if value is None or row.value == value] or rows
-    found: list[float | None] = [getattr(row, name) for row in chosen]
-    return max((one for one in found if one is not None), default=None)
+def largest(rows: Sequence[StepRow], name: str) -> float | None:
+    """The largest value of a column."""
+    return max((row[name] for row in rows if row[name] is not None), default=None)
 
 
 def _of_spacing(rows: Sequence[StepRow]) -> str:
     steady, finest = first_steady(rows), [row for row in rows if row.value == PAPER_SPACING]
-    said = "spacing: " + (
-        "no step agrees with all finer ones"
-        if steady is None
-        else f"from {steady:g} r_min on nothing changes within the errors"
-    )
+    said = "spacing: no step agrees with all finer ones"
+    if steady is not None:
+        said = f"spacing: from {steady:g} r_min on nothing changes within the errors"
     if not finest:
         return f"{said}; the paper's r_min/10 would take too many lines here"
     widest = [row for row in rows if row.value == steady] or finest
     return (
-        f"{said}; the paper's r_min/10 has an error of {_spell(finest, 'alpha_vs_axial_se')} with "
+        f"{said}; the paper's r_min/10 has an error of {_spelt_error(finest)} with "
         f"{finest[0].directions} directions and takes {finest[0].seconds:.2g} s, "
-        f"{widest[0].value:g} r_min {_spell(widest, 'alpha_vs_axial_se')} "
-        f"and {widest[0].seconds:.2g} s"
+        f"{widest[0].value:g} r_min {_spelt_error(widest)} and {widest[0].seconds:.2g} s"
     )
 
 
@@ -201,11 +191,7 @@ SENTENCES = {
     "cutoff": _of_cutoff,
     "rv": _of_rv,
 }
-
-
-def sentence(ladder: str, rows: Sequence[StepRow]) -> str:
-    """What a ladder shows, in one sentence."""
-    return SENTENCES[ladder](rows)
+"""What the rows of a ladder show, in one sentence."""
 
 
 def sentence_of_recommended(rows: Sequence[StepRow], target: float, sample: float | None) -> str:
@@ -219,11 +205,12 @@ def sentence_of_recommended(rows: Sequence[StepRow], target: float, sample: floa
             f"lines that are drawn; more directions make it smaller"
         )
     return (
-        f"recommended: scan's error {_spell(rows, 'alpha_vs_axial_se')} (wanted {target:.2g}; the "
-        f"sample's own is {own}) in {rows[0].seconds:.2g} s{missed}"
+        f"recommended: scan's error {_spelt_error(rows)} (wanted {target:.2g}; the sample's own is "
+        f"{own}) in {rows[0].seconds:.2g} s{missed}"
     )
 
 
-def _spell(rows: Sequence[StepRow], name: str) -> str:
-    value = largest(rows, name)
+def _spelt_error(rows: Sequence[StepRow]) -> str:
+    """The largest standard error by the scan."""
+    value = largest(rows, "alpha_vs_axial_se")
     return "unknown" if value is None else f"{value:.2g}"

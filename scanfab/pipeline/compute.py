@@ -14,8 +14,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from scanfab.base.errors import PackingError, ReadError
-from scanfab.base.note import SKIPPED, Note, tell
+from scanfab.base.errors import SKIPPED, Note, PackingError, ReadError, tell
 from scanfab.base.option import options_of, takes_options, unusable
 from scanfab.io.frame import Frame
 from scanfab.packing.cell import Cell

@@ -7,11 +7,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from scanfab.base.errors import PackingError
-from scanfab.base.note import Note, joined
+from scanfab.base.errors import Note, PackingError, joined
 from scanfab.base.spelling import spelt_apart
 from scanfab.fabric.state import VOLUMETRIC_STRAIN
-from scanfab.io.dimension import other_space
+from scanfab.io.series import other_space
 from scanfab.packing.columns import RV_COLUMN
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import VARIANTS, Sample

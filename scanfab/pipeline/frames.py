@@ -10,11 +10,13 @@ from functools import cached_property
 from typing import Any, Protocol
 
 from scanfab.base.errors import (
+    SKIPPED,
+    Note,
     PackingError,
     ReadError,
     SettingsError,
+    tell,
 )
-from scanfab.base.note import SKIPPED, Note, tell
 from scanfab.io.follow import FollowedSeries
 from scanfab.io.reader import Carries
 from scanfab.io.series import ENDLESS, Series

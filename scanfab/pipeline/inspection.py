@@ -9,8 +9,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from scanfab.base.column import LENGTH
-from scanfab.base.errors import PackingError, ReadError, ScanfabNote
-from scanfab.base.note import tell
+from scanfab.base.errors import PackingError, ReadError, ScanfabNote, note, tell
 from scanfab.io.frame import Frame
 from scanfab.io.series import Series
 from scanfab.packing.doubts import cell_doubt, cell_hint, doubts_of, refuse_impossible
@@ -177,5 +176,5 @@ def _hints(frame: Frame, sample: Sample, settings: Settings) -> list[str]:
     hints += [no_cell] if no_cell else []
     hints += [one.text for one in sample.doubts_of_escaped()]
     if not no_cell and (hint := cell_hint(sample, frame.carries)):
-        warnings.warn(hint, ScanfabNote, stacklevel=2)
+        note(hint)
     return hints

@@ -1,47 +1,50 @@
-"""The computation of a table under way: its rows, those of earlier runs among them, its files."""
+"""The computation of a table under way: new rows, those of earlier runs, and the files for them."""
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager, nullcontext
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from scanfab.base.errors import ReadError, ScanfabNote, SettingsError
+from scanfab.base.errors import ReadError, SettingsError, note
 from scanfab.base.files import check_folder
 from scanfab.io.follow import FollowedSeries
 from scanfab.io.series import Series
 from scanfab.pipeline.compute import Observer, compute_rows
 from scanfab.pipeline.frames import NoChosenFrameError, chosen_frames
-from scanfab.pipeline.manifest import (
+from scanfab.pipeline.record import (
+    FREE,
+    FrameRows,
     Inputs,
+    Refuse,
+    as_json,
     asked_for,
+    check_inputs,
     default_settings,
+    files_of_rows,
     manifest,
-    with_frames,
+    named_files,
+    read_finished,
+    rows_by_frame,
     write_manifest,
 )
-from scanfab.pipeline.resume import FinishedTable, InputsOfRows, check_part, finished_table
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.told import Told
-from scanfab.table.reading import read_rows
-from scanfab.table.result_file import ResultFile
+from scanfab.table.formats import read_rows
 from scanfab.table.row import Row
-from scanfab.table.writing import ALL
-
-Advance = Callable[..., object]
-"""Called after each finished frame, with ``new=False`` if an earlier run has computed it."""
+from scanfab.table.writing import ALL, ResultFile, differing_settings, write_rows
 
 
 class Job:
     """
     One table of some series, computed frame by frame; an interrupted one can be gone on with.
 
-    Rows come from three places: from FILE.part, which holds the first ones as an interrupted run
-    has left them; from a complete FILE, where its frames are asked for again; all others from now.
+    Each frame that FILE.part or a complete FILE holds is taken over; all others are computed. In
+    the end FILE is written with all rows in the order of series and frames.
 
     Parameters
     ----------
@@ -57,12 +60,12 @@ class Job:
         Go on with what earlier runs have left.
     manifest_path : Path, optional
         A manifest there too.
+    more : mapping, optional
+        Further entries of the manifest.
     observers : sequence of callable, optional
         For each series what is called with the result of each frame that is computed now.
     told : Told, optional
         What is told meanwhile, for the manifest.
-    keep : bool, optional
-        Keep all rows in memory too.
     executor : concurrent.futures.Executor, optional
         As for :func:`scanfab.compute`.
 
@@ -82,9 +85,9 @@ class Job:
         reading: Mapping[str, Any],
         resume: bool = False,
         manifest_path: Path | None = None,
+        more: Mapping[str, Any] | None = None,
         observers: Sequence[Observer] = (),
         told: Told | None = None,
-        keep: bool = False,
         executor: Executor | None = None,
     ) -> None:
         names = [one.name for one in series]
@@ -102,36 +105,41 @@ class Job:
         self.resume = resume
         excerpt = ALL if result is None else result.excerpt
         self.asked = asked_for(sources, reading, settings, excerpt)
-        """What decides the bytes of the result."""
-        self.done = 0
-        """Finished frames, those of earlier runs among them."""
+        """The settings that decide the bytes of the result."""
+        self.taken_over = 0
+        """How many frames earlier runs have finished."""
         self.is_over = False
         """Whether all rows have come: the table is being made of them."""
-        self.table: FinishedTable | None = None
-        """The complete FILE that is gone on with."""
-        self.kept: list[dict[str, Any]] = []
-        """The rows, if they are to be kept."""
         self.found_void_fabric = False
         """Whether any row has one."""
+        self._finished: FrameRows = {}
+        self._warnings: list[str] = []
+        """What the user was told of the rows of a complete FILE."""
+        self._more = more or {}
         self._told = told or Told()
-        self._keep = keep
         self._executor = executor
         self._observers: Sequence[Observer | None] = observers or [None] * len(series)
-        self._part: list[dict[str, Any]] = []
-        self._has_gaps = False
         self._inputs = Inputs()
-        self._inputs_of_rows = InputsOfRows(series, settings, self._inputs)
-        self._manifests = [
-            *([] if result is None else [result.manifest]),
-            *([] if manifest_path is None else [manifest_path]),
-        ]
+        files = [] if result is None else [result.manifest]
+        self._manifests = [*files, *([] if manifest_path is None else [manifest_path])]
 
     @property
     def is_good(self) -> bool:
-        """Whether no frame was skipped, now or by an earlier run, and one has a void fabric."""
-        skipped = bool(self._told.skipped) or self._has_gaps
+        """Whether no frame was skipped, and one has a void fabric."""
         # a table without frames, of a job that none was left for, lacks nothing
-        return not skipped and (self.found_void_fabric or not self.done)
+        return not self._told.skipped and (self.found_void_fabric or not self.done)
+
+    @property
+    def done(self) -> int:
+        """How many frames are finished, those of earlier runs among them."""
+        return len(self._finished)
+
+    @property
+    def every_row(self) -> list[Row]:
+        """The rows of all finished frames, in the order of the series and of their frames."""
+        place = {one.name: number for number, one in enumerate(self.series)}
+        frames = sorted(self._finished, key=lambda key: (place[key[0]], key[1]))
+        return [row for key in frames for row in self._finished[key]]
 
     def frames(self) -> int:
         """About how many frames there are to be finished, those of earlier runs among them."""
@@ -140,38 +148,52 @@ class Job:
         return max(expected, self.done)
 
     @contextmanager
-    def begun(self) -> Iterator[None]:
+    def begun(self, needed: Iterable[str] = ()) -> Iterator[None]:
         """
         Keep other runs away from the file in the block; if resumed, find what they have left.
+
+        Parameters
+        ----------
+        needed : iterable of str, optional
+            Columns that a complete FILE must have.
 
         Raises
         ------
         ScanfabError
             If another run writes to the file.
         SettingsError
-            If what is there was made with other settings or of other inputs.
+            If the rows there were made with other settings or of other inputs.
         """
         with nullcontext() if self.result is None else self.result.alone():
             if self.resume and self.result is not None:
-                self._find_rows(self.result)
+                self._take_over(self.result, needed)
             yield
 
-    def rows(self, advance: Advance = lambda new: None) -> Iterator[Row]:
-        """The rows behind those of FILE.part; a frame is finished once its rows are taken."""
-        for number, row in enumerate(self._rows(), start=1):
-            self.found_void_fabric = self.found_void_fabric or row.alpha_vs is not None
-            if self._keep:
-                self.kept.append(dict(row))
-            yield row
-            if number % self.settings.rows_per_frame == 0:
-                self.done += 1
-                advance(new=not self._is_taken_over(row))
+    def rows(self, advance: Callable[[], object] = lambda: None) -> Iterator[Row]:
+        """The rows that are computed now; a frame is finished once its rows are taken."""
+        for one, observe in zip(self.series, self._observers, strict=True):
+            done = {frame for source, frame in self._finished if source == one.name}
+            computed = compute_rows(
+                one, self.settings, done=done, observe=observe, executor=self._executor
+            )
+            own: list[Row] = []
+            try:
+                for row in computed:
+                    yield row
+                    own.append(row)
+                    if len(own) == self.settings.rows_per_frame:
+                        self._finish({(row.source, row.frame): own})
+                        own = []
+                        advance()
+            except NoChosenFrameError as none:
+                # of an array of more jobs than frames some have nothing to do
+                note(f"{str(none).removeprefix('frames: ')}: it has no row in this table")
         self.is_over = True
         for one in self.series:
             if isinstance(one, FollowedSeries):
                 one.end()
 
-    def write(self, advance: Advance = lambda new: None) -> None:
+    def write(self, advance: Callable[[], object] = lambda: None) -> None:
         """
         Write the rows to the file as they come; it is complete or untouched.
 
@@ -184,113 +206,157 @@ class Job:
         """
         result = self.result
         assert result is not None
-        # it loses its manifest when it is replaced
-        replaces = result.has_table and not self.resume
-        with result.writer(self.asked, self.resume, self._save_manifest) as writer:
-            for row in self.rows(advance):
-                if replaces:
-                    _note_replaced(result.path)
-                    replaces = False
-                result.record(self._inputs_of_rows.new(row))
-                writer.write(row)
-            if replaces and read_rows(result.path):
-                raise SettingsError(
-                    f"{result.path}: this run has no rows, and the table that is there stays as it "
-                    f"is: choose frames that there are (`frames`), or another file"
-                )
+        replaces = not self.resume and result.path.is_file() and result.manifest.is_file()
+        with result.alone():
+            with result.writer(self.asked, self.resume):
+                frame, known = None, set[Path]()
+                for row in self.rows(advance):
+                    if replaces:
+                        note(
+                            f"{result.path}: the table that is there will be replaced at the end "
+                            f"of this run; `resume` would go on with it"
+                        )
+                        replaces = False
+                    if frame != (row.source, row.frame):
+                        frame = row.source, row.frame
+                        result.record(self._new_inputs(row, known))
+                    result.write(row)
+                if replaces and read_rows(result.path):
+                    raise SettingsError(
+                        f"{result.path}: this run has no rows, and the table that is there stays "
+                        f"as it is: choose frames that there are (`frames`), or another file"
+                    )
+            write_rows(result.path, self.every_row, result.columns, result.excerpt)
+            self.save_manifests()
+            result.remove_part()
 
-    def save_manifests(self, more: Mapping[str, Any] | None = None) -> None:
-        """Write the manifest beside the file, and where it was asked for, with some ``more``."""
-        for path in self._manifests:
-            self._save_manifest(path, more)
-
-    def _save_manifest(self, path: Path, more: Mapping[str, Any] | None = None) -> None:
-        # what was told of the rows that an earlier run has finished
-        before = [] if self.table is None else self.table.warnings
-        texts = [*dict.fromkeys([*before, *self._told.warnings])]
+    def save_manifests(self) -> None:
+        """Write the manifest beside the file, and where it was asked for."""
+        if not self._manifests:
+            return
+        texts = list(dict.fromkeys([*self._warnings, *self._told.warnings]))
         found = manifest(self.asked, self.series, texts, self._told.notes, self._inputs)
-        write_manifest(path, {**found, **(more or {})})
+        for path in self._manifests:
+            write_manifest(path, {**found, **self._more})
 
-    @property
-    def _there(self) -> list[Series]:
-        """The series as they are now, also those that are followed."""
-        return [one.as_it_is if isinstance(one, FollowedSeries) else one for one in self.series]
+    def _finish(self, rows: FrameRows, tells: bool = True) -> None:
+        """Add finished frames; without a column that ``tells``, they count as having a fabric."""
+        self._finished |= rows
+        every = [row for some in rows.values() for row in some]
+        has_fabric = any((row.alpha_vs, row.alpha_vs_axial) != (None, None) for row in every)
+        self.found_void_fabric |= has_fabric or (bool(every) and not tells)
 
-    def _find_rows(self, result: ResultFile) -> None:
-        """
-        The rows of earlier runs; what is asked for gets their frames too.
+    def _new_inputs(self, row: Row, known: set[Path]) -> list[dict[str, Any]]:
+        """Size and hash of the files up to the frame of a row that are not ``known`` yet."""
+        strains, surfaces = named_files(self.asked)
+        found = [*strains, *surfaces, *files_of_rows(self.series, row, known)]
+        new = [file for file in dict.fromkeys(found) if file not in known]
+        known.update(new)
+        return [self._inputs.entry(file) for file in new]
 
-        A part is of the run that was interrupted last, so it counts, whatever FILE holds.
-        """
-        series = self._there
+    def _take_over(self, result: ResultFile, needed: Iterable[str]) -> None:
+        """Take over the frames of a complete FILE, and of FILE.part."""
+        # the series as they are now, also those that are followed
+        series = [one.as_it_is if isinstance(one, FollowedSeries) else one for one in self.series]
         if result.path.is_file():
             try:
-                self.table = finished_table(result.path, self.asked, series, self.settings)
-                frames = self.table.with_frames(series, self.settings.frames)
-                self.settings = replace(self.settings, frames=frames)
-                self.asked = with_frames(self.asked, frames)
+                self._take_table(result.path, series, needed)
             except (SettingsError, ReadError):
+                # the run that was interrupted last has left FILE.part, whatever made FILE
                 if not result.has_part:
                     raise
-                self.table = None
-        rows_per_frame = self.settings.rows_per_frame
-        self._part = result.finished_rows(self.asked, rows_per_frame, default_settings())
-        of_part = {"settings": self.asked, "inputs": result.recorded_inputs()}
-        check_part(result.part, of_part, self._part, series, self.settings)
-        in_part = any(row["alpha_vs"] is not None for row in self._part)
-        in_table = self.table is not None and self.table.has_void_fabric
-        self.found_void_fabric = in_part or in_table
-        self._has_gaps = any(map(self._lacks_frames, series))
-        self.kept = list(self._part) if self._keep else []
-        self.done = len(self._part) // self.settings.rows_per_frame
+        if result.has_part:
+            self._take_part(result, series)
+        self.taken_over = self.done
 
-    def _lacks_frames(self, series: Series) -> bool:
-        """Whether FILE.part lacks frames of a series before the last one that it has."""
-        written = {row["frame"] for row in self._part if row["source"] == series.name}
-        if not written:
-            return False
-        chosen = chosen_frames(series, self.settings.frames)
-        return len(range(chosen.start, max(written) + 1, chosen.step)) > len(written)
-
-    def _is_taken_over(self, row: Row) -> bool:
-        """Whether a row stands in the complete FILE."""
-        return self.table is not None and row.frame in self.table.rows[row.source]
-
-    def _rows(self) -> Iterator[Row]:
-        last = self._part[-1] if self._part else None
-        names = [one.name for one in self.series]
-        first = names.index(last["source"]) if last is not None else 0
-        for one, observe in list(zip(self.series, self._observers, strict=True))[first:]:
-            start = last["frame"] + 1 if last is not None and one.name == last["source"] else 0
-            of_table = {} if self.table is None else self.table.rows[one.name]
-            ready = {frame: rows for frame, rows in of_table.items() if frame >= start}
-            done = {*range(start), *ready}
-            computed = compute_rows(
-                one, self.settings, done=done, observe=observe, executor=self._executor
+    def _take_table(self, path: Path, series: Sequence[Series], needed: Iterable[str]) -> None:
+        refuse = _refusal(path)
+        before, rows = read_finished(path, refuse)
+        if differing := differing_settings(before["settings"], self.asked, FREE):
+            raise refuse(f"it was made with other settings ({', '.join(differing)})")
+        found = self._checked(rows, before["inputs"], before["settings"], series, refuse)
+        columns = set(rows[0]) if rows else set()
+        if found and (lacking := [name for name in needed if name not in columns]):
+            raise SettingsError(
+                f"{path}: its rows lack {', '.join(lacking)} (`fields`), which the figure needs: "
+                f"leave out `plot`, or `resume` to compute all frames again"
             )
-            try:
-                yield from _in_order(ready, computed)
-            except NoChosenFrameError as none:
-                # of an array of more jobs than frames some have nothing to do
-                text = str(none).removeprefix("frames: ")
-                warnings.warn(f"{text}: it has no row in this table", ScanfabNote, stacklevel=3)
+        frames = self._joined_frames(path, {frame for _, frame in found}, before, series)
+        self.settings = replace(self.settings, frames=frames)
+        self.asked = {**self.asked, "frames": as_json(frames)}
+        self._warnings = [str(one) for one in before["warnings"]]
+        self._finish(found, tells=bool({"alpha_vs", "alpha_vs_axial"} & columns))
+
+    def _take_part(self, result: ResultFile, series: Sequence[Series]) -> None:
+        refuse = _refusal(result.part)
+        rows, inputs = result.finished_rows(
+            self.asked, self.settings.rows_per_frame, default_settings()
+        )
+        found = self._checked(rows, inputs, self.asked, series, refuse)
+        chosen = {one.name: chosen_frames(one, self.settings.frames) for one in series}
+        for source, frame in sorted(found):
+            if frame not in chosen[source]:
+                raise refuse(f"it holds frame {frame}, which is not chosen now")
+        self._finish(found)
+
+    def _checked(
+        self,
+        rows: Sequence[Mapping[str, Any]],
+        inputs: Sequence[Mapping[str, Any]],
+        asked: Mapping[str, Any],
+        series: Sequence[Series],
+        refuse: Refuse,
+    ) -> FrameRows:
+        """The rows of finished frames, if they are those that this run would compute."""
+        found, _ = rows_by_frame(rows, self.settings)
+        others = {source for source, _ in found} - {one.name for one in series}
+        if others:
+            raise refuse(f"its source {min(others)} is not named now")
+        if rows:
+            check_inputs(inputs, asked, series, found, refuse)
+        return found
+
+    def _joined_frames(
+        self, path: Path, known: set[int], before: Mapping[str, Any], series: Sequence[Series]
+    ) -> slice:
+        """
+        The frames of a complete FILE and those that are chosen now, as one slice.
+
+        Raises
+        ------
+        SettingsError
+            If together they make none: no frame of FILE may be lost.
+        """
+        chosen, last = self.settings.frames, max(known, default=0)
+        if all(known <= set(_up_to(one, chosen, last)) for one in series):
+            return chosen
+        asked = slice(*(before["settings"].get("frames") or (None,)))
+        more = {frame for one in series for frame in _up_to(one, chosen, last + 1)}
+        # frames that were skipped leave no hole
+        skipped = {frame for one in series for frame in _up_to(one, asked, last) if frame < last}
+        every = sorted(known | more | skipped)
+        steps = {right - left for left, right in pairwise(every)} or {1}
+        if len(steps) > 1:
+            raise SettingsError(
+                f"frames: {path} holds frames {min(known)} to {last}, which with those chosen now "
+                f"make no slice A:B:C: choose `frames` so that they do, or another `output=FILE`"
+            )
+        (step,) = steps
+        stop = None if chosen.stop is None else every[-1] + 1
+        return slice(every[0], stop, None if step == 1 else step)
 
 
-def _in_order(ready: dict[int, list[Row]], computed: Iterator[Row]) -> Iterator[Row]:
-    """Rows that are there and rows that come, by frame."""
-    waiting = sorted(ready, reverse=True)
-    for row in computed:
-        while waiting and waiting[-1] < row.frame:
-            yield from ready[waiting.pop()]
-        yield row
-    while waiting:
-        yield from ready[waiting.pop()]
+def _up_to(series: Series, frames: slice, last: int) -> list[int]:
+    """The chosen frames; of a slice without an end those up to a number, and at least one."""
+    chosen = chosen_frames(series, frames)
+    if frames.stop is None and (frames.start or 0) >= 0 and (frames.step or 1) > 0:
+        chosen = chosen[: max(len(range(chosen.start, last + 1, chosen.step)), 1)]
+    return list(chosen)
 
 
-def _note_replaced(output: Path) -> None:
-    warnings.warn(
-        f"{output}: the table that is there will be replaced at the end of this run; `resume` "
-        f"would go on with it",
-        ScanfabNote,
-        stacklevel=3,
+def _refusal(path: Path) -> Refuse:
+    """Errors for rows that a run cannot go on with."""
+    return lambda reason: SettingsError(
+        f"{path}: `resume` cannot go on with it: {reason}: name another `output=FILE`, or leave "
+        f"out `resume` to compute all frames again"
     )

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.convex import Convex
-from scanfab.base.note import Note
+from scanfab.base.errors import Note
 from scanfab.base.shapes import sphere
 from scanfab.base.typing import FloatArray
 from scanfab.packing.sample import Sample, Variant

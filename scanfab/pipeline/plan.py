@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from scanfab.base.convex import Convex
-from scanfab.base.errors import SettingsError
-from scanfab.base.note import Note
+from scanfab.base.errors import Note, SettingsError
 from scanfab.base.shapes import circle
 from scanfab.base.space import SPACE, Space
 from scanfab.packing.doubts import refuse_impossible

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shlex
 from collections.abc import Collection, Mapping
 from pathlib import Path
@@ -14,45 +13,9 @@ from scanfab.base.spelling import shortest
 from scanfab.io.options import READING_OPTIONS
 from scanfab.io.series import Series
 from scanfab.io.sources import READING, open_sources
-from scanfab.pipeline.manifest import asked_for
 from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings, is_map
+from scanfab.pipeline.record import asked_for
 from scanfab.pipeline.settings import Settings
-from scanfab.table.result_file import manifest_of
-
-
-def read_manifest(table: Path) -> dict[str, Any] | None:
-    """
-    The manifest beside a table; None if there is none.
-
-    Raises
-    ------
-    ReadError
-        If it is not a manifest.
-    """
-    path = manifest_of(table)
-    if not path.is_file():
-        return None
-    try:
-        found = json.loads(path.read_text("utf-8"))
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
-        raise ReadError(f"{path}: cannot be read as JSON: {error}") from None
-    if not _is_manifest(found):
-        raise ReadError(f"{path}: expected a manifest of scanfab compute, found something else")
-    return dict(found)
-
-
-def _is_manifest(found: Any) -> bool:
-    """Whether the parts are of the right kinds; settings are checked where they are used."""
-    if not isinstance(found, dict) or not isinstance(found.get("settings"), dict):
-        return False
-    inputs = found.get("inputs", [])
-    return (
-        isinstance(found["settings"].get("sources"), list)
-        and isinstance(inputs, list)
-        and all(isinstance(one, dict) for one in inputs)
-        and isinstance(found.get("versions", {}), dict)
-        and isinstance(found.get("warnings", []), list)
-    )
 
 
 def repeat_command(
@@ -73,7 +36,7 @@ def repeat_command(
 
     Examples
     --------
-    >>> from scanfab.pipeline.manifest import asked_for
+    >>> from scanfab.pipeline.record import asked_for
     >>> from scanfab.pipeline.repeat import repeat_command
     >>> from scanfab.pipeline.settings import Settings
     >>> repeat_command(asked_for(["dumps"], {}, Settings(boundary="type=2", seed=3)))

@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scanfab.base.convex import Convex
-from scanfab.base.errors import SettingsError
-from scanfab.base.note import Note
+from scanfab.base.errors import Note, SettingsError
 from scanfab.base.shapes import (
     box,
     circle,

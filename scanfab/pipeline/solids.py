@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from scanfab.base.typing import FloatArray
-from scanfab.packing.inner import inner_ellipsoid
 from scanfab.packing.sample import Sample
-from scanfab.packing.window import Window
+from scanfab.packing.window import Window, inner_ellipsoid
 from scanfab.scan.edges import CLIP, ENDS, START
 from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.solids import Inner, Solids, margin_of

@@ -14,9 +14,9 @@ from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.fabric.forces import ContactForces
 from scanfab.fabric.state import SampleState, love_weber
 from scanfab.packing.clump_volumes import lens_volumes, own_shares
+from scanfab.packing.contacts import WallForces
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import Sample, Variant
-from scanfab.packing.walls import WallForces
 from scanfab.packing.window import Window
 from scanfab.scan.directions import direction_rule, plane_rule
 

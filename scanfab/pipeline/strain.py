@@ -7,9 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from scanfab.base.errors import SettingsError
-from scanfab.base.note import Note
-from scanfab.io.frame_csv import FrameFile
+from scanfab.base.errors import Note, SettingsError
+from scanfab.io.layout import FrameFile
 from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.settings import Settings

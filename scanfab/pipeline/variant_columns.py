@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from scanfab.base.note import Note
+from scanfab.base.errors import Note
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.forces import doubts_of_forces
 from scanfab.fabric.jackknife import BlockedSums, blocks_of

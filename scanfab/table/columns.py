@@ -1,15 +1,16 @@
-"""The columns of the fabric table, in the order that scripts rely on; new ones come behind."""
+"""The columns of the fabric table and of maps, in the order that scripts rely on."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import is_dataclass
+from collections.abc import Collection, Iterable, Mapping
 from functools import cache
 from typing import Any
 
-from scanfab.base.column import Column, columns_of_fields, no_column
+from scanfab.base.column import LENGTH, Column
+from scanfab.fabric.contact import Contact
 from scanfab.fabric.registry import GROUPS, OWN_FABRICS, Fabric, load_fabrics
 from scanfab.fabric.spectrum import PREDICTED_ALPHA
+from scanfab.fabric.void import Void
 from scanfab.fabric.window import WINDOW_ALPHA
 from scanfab.packing.columns import RV_COLUMN, SAMPLE_COLUMNS
 from scanfab.scan.columns import EDGE_COLUMNS, SCAN_COLUMNS
@@ -20,37 +21,28 @@ FRAME_COLUMNS = (
     Column("frame", int, "", "index in the series, from 0"),
     Column("step", int, "", "of the dump"),
     Column("time", float, "time", "of the dump"),
-    Column(
-        "strain",
-        float,
-        "",
-        "axial strain 1 - L/L0 along the loading axis, positive in compression",
-    ),
+    Column("strain", float, "", "strain 1 - L/L0 along the loading axis, positive in compression"),
     Column("variant", str, "", "a whole sample, b without rattlers, c RV, d RV without rattlers"),
 )
-SHEAR_STRAIN = Column(
-    "shear_strain",
-    float,
-    "",
-    "of a cell that repeats along all its vectors, since the first frame: √(2/3 e:e) of the "
-    "logarithmic strain's deviator e; else empty",
+SHEAR = (
+    "√(2/3 e:e) of the logarithmic strain's deviator e since the first frame, of a cell that "
+    "repeats along all its vectors; else empty"
 )
+SHEAR_STRAIN = Column("shear_strain", float, "", SHEAR)
+# the columns of halves are newer than the shear strain and stand behind it
+OF_FABRICS = {name: fabric.columns for name, fabric in OWN_FABRICS.items()}
+OF_FABRICS["halves"] = (SHEAR_STRAIN, *OF_FABRICS["halves"])
 
-
-def _own_columns() -> Iterator[Column]:
-    yield from (*FRAME_COLUMNS, *SAMPLE_COLUMNS, *SCAN_COLUMNS)
-    for name, fabric in OWN_FABRICS.items():
-        if name == "halves":  # which are newer than the shear strain
-            yield SHEAR_STRAIN
-        yield from fabric.columns
-
-
-OWN_COLUMNS = tuple(_own_columns())
+OWN_COLUMNS: tuple[Column, ...] = (
+    *FRAME_COLUMNS,
+    *SAMPLE_COLUMNS,
+    *SCAN_COLUMNS,
+    *(column for columns in OF_FABRICS.values() for column in columns),
+)
 """Those of every fabric table."""
 
 COLUMNS: tuple[str, ...] = tuple(one.name for one in OWN_COLUMNS)
 """Their names."""
-
 
 MORE_COLUMNS = (
     RV_COLUMN,
@@ -60,6 +52,29 @@ MORE_COLUMNS = (
     *(column for group in GROUPS.values() for column in group.columns),
 )
 """Those of tables of which more is asked than the default."""
+
+SHELL_COLUMNS = (
+    Column("r_inner", float, LENGTH, "of a map: where the shell begins, from the centre"),
+    Column("r_outer", float, LENGTH, "of a map: where the shell ends"),
+)
+SCATTER = "the sample's own scatter of coordination, by a jackknife over eight parts of the block"
+MAP_COLUMNS = (
+    *FRAME_COLUMNS[:-1],
+    Column("block", int, "", "of a map: its number from 0; those along x count fastest"),
+    *(Column(name, float, LENGTH, f"of a map: {name} of the block's middle") for name in "xyz"),
+    FRAME_COLUMNS[-1],
+    *SAMPLE_COLUMNS,
+    *(one for one in SCAN_COLUMNS if one.name != "lines"),
+    *Void.columns,
+    *Contact.columns,
+    Column("coordination_se", float, "", f"of a map: {SCATTER}"),
+    Column("solid_fraction_se", float, "", "of a map: likewise of solid_fraction"),
+    Column("mean_length_se", float, LENGTH, "of a map: likewise of mean_length"),
+    Column("alpha_vs_axial_sample_se", float, "", "of a map: likewise of alpha_vs_axial"),
+    Column("alpha_c_axial_sample_se", float, "", "of a map: likewise of alpha_c_axial"),
+)
+LOSES = "1 for blocks that lose void segments at the surface of the sample or the RV; else 0"
+AT_SURFACE = Column("at_surface", int, "", f"of a map: {LOSES}")
 
 
 @cache
@@ -79,11 +94,15 @@ def table_columns(more: Collection[str] = ()) -> tuple[Column, ...]:
     return (*OWN_COLUMNS, *asked, *others)
 
 
-def columns_of(kind: type | Sequence[Column]) -> tuple[Column, ...]:
-    """The columns of a kind of rows: the fabric table's, or the fields of a dataclass; or these."""
-    if not isinstance(kind, type):
-        return tuple(kind)
-    return columns_of_fields(kind) if is_dataclass(kind) else table_columns()
+def map_columns(more: Collection[str] = (), *, shells: bool = False) -> tuple[Column, ...]:
+    """The columns of a map; ``more`` are the names of further ones that its options ask for."""
+    asked = (one for one in EDGE_COLUMNS if one.name in more)
+    return (*MAP_COLUMNS, *(SHELL_COLUMNS if shells else ()), AT_SURFACE, *asked)
+
+
+def row_of(columns: Iterable[Column], values: Mapping[str, Any]) -> Row:
+    """A row with a value for each column, None where there is none."""
+    return Row(**{one.name: values.get(one.name) for one in columns})
 
 
 def complete_row(values: Mapping[str, Any], more: Collection[str] = ()) -> Row:
@@ -103,10 +122,6 @@ def complete_row(values: Mapping[str, Any], more: Collection[str] = ()) -> Row:
     3
     """
     names = [one.name for one in table_columns(more)]
-    for name in values:
-        if name not in names:
-            raise TypeError(no_column(name, names))
-    missing = [name for name in names if name not in values]
-    if missing:
-        raise TypeError(f"a row needs a value for each column, None for none: {', '.join(missing)}")
+    if wrong := sorted({*names} ^ {*values}):
+        raise TypeError(f"a row has a value for each column, None for none: {', '.join(wrong)}")
     return Row(**{name: values[name] for name in names})

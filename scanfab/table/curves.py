@@ -1,8 +1,8 @@
-"""Rows of fabric tables as curves to draw: one for each source and variant."""
+"""Rows of fabric tables as curves: one for each source and variant, and what it is drawn over."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Any
@@ -10,13 +10,17 @@ from typing import Any
 import numpy as np
 
 from scanfab.base.typing import FloatArray
-from scanfab.table.abscissa import STRAINS, strain_column
-from scanfab.table.reading import number_of, total_error, variant_of
+from scanfab.table.row import Rows, column_of, groups_of, number_of, numbers_of, total_error
 
-Rows = Sequence[Mapping[str, Any]]
-
+# columns of strains: in words, and as the symbol of figures
+STRAINS = {
+    "strain": ("axial strain", r"$\varepsilon_a$"),
+    "shear_strain": ("shear strain", r"$\varepsilon_q$"),
+}
+# strains that differ by less are one strain: a rounding error is no deformation
+SAME = 1e-9
 LONGEST_NAME = 32
-# beyond it nothing can be drawn: in units of the axis it would be infinite
+# matplotlib cannot draw larger values: in units of the axis they would be infinite
 LARGEST = 1e100
 # contact fabric is anisotropic for certain if its intensity is so many standard errors (about one
 # without any anisotropy), and turned if less than this part of it shows along the loading axis
@@ -25,52 +29,151 @@ CERTAIN, ALONG = 5.0, 0.5
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """One source and variant over its frames; NaN where a value does not exist, shape (F,)."""
+    """One source and variant over its frames."""
 
     source: str
     variant: str
     """With the size of its RV, where there are several."""
     x: FloatArray
-    """Strain in per cent, or the number of the frame."""
-    void: FloatArray
-    """alpha_vs_axial, dimensionless."""
-    void_scan: FloatArray
-    """The scan's part of its standard error."""
-    void_total: FloatArray
-    """Its standard error, of scan and sample together."""
-    contact: FloatArray
-    """alpha_c_axial, dimensionless."""
-    contact_total: FloatArray
-    """Its standard error, which is the sample's; as if contacts were independent where the curve
-    has no other."""
-    contact_alone: bool
-    """Whether contacts are taken as independent."""
-    void_intensity: FloatArray
-    """alpha_vs, dimensionless."""
-    contact_intensity: FloatArray
-    """alpha_c, dimensionless."""
-    angle: FloatArray
-    """Between both major axes, degrees."""
+    """Strain in per cent, or the number of the frame, shape (F,)."""
     rows: Rows
     """What it is made of."""
 
     def values(self, name: str) -> FloatArray:
-        """Any column; NaN where there is no number."""
-        return _array([number_of(row, name) for row in self.rows])
+        """A column of the table, shape (F,); NaN where there is no number, or none to draw."""
+        return _drawable(column_of(self.rows, name))
+
+    def errors(self, name: str) -> FloatArray:
+        """Standard errors in a column; tables come from anywhere: a negative number is none."""
+        return np.where(self.values(name) < 0, np.nan, self.values(name))
+
+    def total_errors(self, name: str) -> FloatArray:
+        """
+        Of ``alpha_vs_axial``, by scan and sample; of ``alpha_c_axial`` the sample's.
+
+        A curve without the latter has the error of contacts that are independent.
+        """
+        if name == "alpha_c_axial" and self.contact_alone:
+            return self.errors("alpha_c_axial_se")
+        found = np.array([total_error(row, name) for row in self.rows], np.float64)
+        return np.where(found < 0, np.nan, _drawable(found))
+
+    @property
+    def contact_alone(self) -> bool:
+        """Whether contacts are taken as independent."""
+        return not np.isfinite(self.errors("alpha_c_axial_sample_se")).any()
 
 
 def curves_of(rows: Iterable[Mapping[str, Any]]) -> list[Curve]:
     """The curves of a table, in the order in which they first appear."""
     rows = list(rows)
     abscissa = strain_column(rows)
-    groups: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
-    for row in rows:
-        groups.setdefault((row["source"], variant_of(row)), []).append(row)
+    groups = groups_of(rows)
     names = short_names(source for source, _ in groups)
     return [
-        _curve(names[source], variant, group, abscissa)
+        Curve(
+            names[source],
+            variant,
+            _drawable(column_of(group, abscissa or "frame")) * (100.0 if abscissa else 1.0),
+            group,
+        )
         for (source, variant), group in groups.items()
     ]
+
+
+def _drawable(array: FloatArray) -> FloatArray:
+    return np.where(np.abs(array) < LARGEST, array, np.nan)
+
+
+def strain_column(rows: Rows) -> str | None:
+    """
+    The column that tells how far the frames of all sources have deformed.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Of fabric tables; those without a void fabric do not matter.
+
+    Returns
+    -------
+    str or None
+        ``strain``; ``shear_strain`` where the axial strain of a source is missing or the same in
+        all its frames; None where that is so of both. Then frames have only their number.
+
+    Examples
+    --------
+    >>> from scanfab.table.curves import strain_column
+    >>> rows = [dict(source="s", frame=k, strain=0.0, shear_strain=0.1 * k, alpha_vs_axial=0.0)
+    ...         for k in range(3)]
+    >>> strain_column(rows)
+    'shear_strain'
+    """
+    found = [name for name in STRAINS if not _lacking(rows, name)]
+    return found[0] if found and numbers_of(rows, "alpha_vs_axial") else None
+
+
+def why_not_strain(rows: Rows) -> str | None:
+    """A hint if the axial strain of some source is no abscissa; None if all have one, or none."""
+    lacking = _lacking(rows, "strain")
+    if not lacking or not numbers_of(rows, "strain"):
+        return None
+    instead, cure = "the frame's number", "says what length it is taken from"
+    if strain_column(rows) is not None:
+        instead, cure = "shear_strain", "takes another length"
+    return (
+        f"{instead} stands in for the axial strain, as {'; '.join(lacking)}: `strain` of compute "
+        f"{cure}"
+    )
+
+
+def _lacking(rows: Rows, column: str) -> list[str]:
+    """What is wrong with the strain of each source, in words."""
+    sources: dict[str, dict[int, float | None]] = {}
+    for row in rows:
+        if number_of(row, "alpha_vs_axial") is not None:
+            sources.setdefault(row["source"], {})[row["frame"]] = number_of(row, column)
+    said = []
+    for source, strains in sources.items():
+        without = [frame for frame, strain in strains.items() if strain is None]
+        known = [strain for strain in strains.values() if strain is not None]
+        if without:
+            said.append(f"{source} has none" + (f" in frame {without[0]}" if known else ""))
+        elif len(known) > 1 and max(known) - min(known) < SAME:
+            said.append(f"{source} has the same in all frames ({known[0]:g})")
+    return said
+
+
+def frame_strain_column(row: Mapping[str, Any]) -> str | None:
+    """The strain column of a single frame: one that is not 0 there, if any is."""
+    known = [name for name in STRAINS if number_of(row, name) is not None]
+    moved = [name for name in known if abs(row[name]) >= SAME]
+    return next(iter([*moved, *known]), None)
+
+
+def spelt_strain(row: Mapping[str, Any], column: str | None, *, symbol: bool = False) -> str:
+    """
+    The strain of a frame for its title; empty where there is none.
+
+    Parameters
+    ----------
+    row : mapping
+        Of a fabric table.
+    column : str or None
+        See :func:`strain_column`.
+    symbol : bool, optional
+        For a figure, where words take too much room.
+
+    Examples
+    --------
+    >>> from scanfab.table.curves import spelt_strain
+    >>> spelt_strain({"strain": 0.0, "shear_strain": 0.123}, "shear_strain")
+    'shear strain 12.3 %'
+    """
+    value = None if column is None else number_of(row, column)
+    if column is None or value is None:
+        return ""
+    words, sign = STRAINS[column]
+    return f"{f'{sign} =' if symbol else words} {100 * value:.3g} %"
 
 
 def abscissa_label(rows: Rows) -> str:
@@ -80,7 +183,7 @@ def abscissa_label(rows: Rows) -> str:
 
 
 def abscissa_words(rows: Rows) -> str:
-    """What the abscissa is, in a sentence."""
+    """The same in a sentence."""
     column = strain_column(rows)
     return "the number of the frame" if column is None else f"the {STRAINS[column][0]}"
 
@@ -90,74 +193,29 @@ def is_turned(rows: Rows) -> bool:
     Whether the axial anisotropies miss the fabric, as its axes are not the loading axis.
 
     So it is in simple shear. The frame whose contacts are most certainly anisotropic tells; where
-    none is, so does what the frames are drawn over.
+    no frame is certain, rows that are drawn over the shear strain count as turned.
     """
-    known = [row for row in rows if None not in _contact_intensity(row)]
-    certainty, along = max(map(_certainty, known), default=(0.0, 1.0))
-    return along < ALONG if certainty > CERTAIN else strain_column(known) == "shear_strain"
-
-
-def _contact_intensity(row: Mapping[str, Any]) -> list[float | None]:
     names = ("alpha_c", "alpha_c_axial", "alpha_c_axial_se", "alpha_vs")
-    return [number_of(row, name) for name in names]
-
-
-def _certainty(row: Mapping[str, Any]) -> tuple[float, float]:
-    """The intensity over its error, and the part of it that shows along the loading axis."""
-    intensity, axial, error = row["alpha_c"], row["alpha_c_axial"], row["alpha_c_axial_se"]
-    if intensity <= 0 or error <= 0:
-        return 0.0, 1.0
-    return intensity / error, abs(axial) / intensity
-
-
-def _curve(source: str, variant: str, group: Rows, abscissa: str | None) -> Curve:
-    def column(name: str) -> FloatArray:
-        return _array([number_of(row, name) for row in group])
-
-    sample = _error([total_error(row, "alpha_c_axial") for row in group])
-    alone = not np.isfinite(sample).any()
-    return Curve(
-        source=source,
-        variant=variant,
-        x=column("frame") if abscissa is None else 100.0 * column(abscissa),
-        void=column("alpha_vs_axial"),
-        void_scan=_error([number_of(row, "alpha_vs_axial_se") for row in group]),
-        void_total=_error([total_error(row, "alpha_vs_axial") for row in group]),
-        contact=column("alpha_c_axial"),
-        contact_total=(
-            _error([number_of(row, "alpha_c_axial_se") for row in group]) if alone else sample
-        ),
-        contact_alone=alone,
-        void_intensity=column("alpha_vs"),
-        contact_intensity=column("alpha_c"),
-        angle=column("coaxiality_deg"),
-        rows=group,
-    )
-
-
-def _array(values: Iterable[float | None]) -> FloatArray:
-    array = np.array([np.nan if value is None else value for value in values], np.float64)
-    return np.where(np.abs(array) < LARGEST, array, np.nan)
-
-
-def _error(values: Iterable[float | None]) -> FloatArray:
-    """Tables come from anywhere: what is below zero is no error."""
-    array = _array(values)
-    return np.where(array < 0, np.nan, array)
+    known = [row for row in rows if None not in [number_of(row, name) for name in names]]
+    certainty, along = 0.0, 1.0
+    for row in known:
+        intensity, error = row["alpha_c"], row["alpha_c_axial_se"]
+        if intensity > 0 and error > 0:
+            axial = abs(row["alpha_c_axial"]) / intensity
+            certainty, along = max((certainty, along), (intensity / error, axial))
+    return along < ALONG if certainty > CERTAIN else strain_column(known) == "shear_strain"
 
 
 def short_names(sources: Iterable[str], longest: int = LONGEST_NAME) -> dict[str, str]:
     """Sources by the last part of their path, and not too long, where that tells them apart."""
     sources = list(dict.fromkeys(sources))
-    for shorten in (_last_part, str):
-        names = {source: middle_out(shorten(source), longest) for source in sources}
-        if len(set(names.values())) == len(names):
-            return names
-    return {source: f"{number}: {names[source]}" for number, source in enumerate(sources, 1)}
-
-
-def _last_part(source: str) -> str:
-    return PurePath(source).name or source
+    for kept in ([PurePath(source).name or source for source in sources], sources):
+        names = [middle_out(name, longest) for name in kept]
+        if len(set(names)) == len(names):
+            break
+    else:
+        names = [f"{number}: {name}" for number, name in enumerate(names, 1)]
+    return dict(zip(sources, names, strict=True))
 
 
 def middle_out(name: str, longest: int) -> str:

@@ -1,28 +1,32 @@
-"""File formats of tables, by suffix: CSV, TSV, JSON, JSON lines, Parquet, and those of plugins."""
+"""Files of tables: CSV, TSV, JSON, JSON lines, Parquet, and the formats of plugins."""
 
 from __future__ import annotations
 
 import csv
 import io
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
-from itertools import chain
+from itertools import chain, islice
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any, Protocol
 
 from scanfab.base.column import Column
 from scanfab.base.errors import ReadError, SettingsError
-from scanfab.base.files import named_errors
+from scanfab.base.files import check_file, named_errors
 from scanfab.base.plugins import having, load_plugins
 from scanfab.table.columns import MORE_COLUMNS, OWN_COLUMNS
 
 if TYPE_CHECKING:
     import polars
 
-# columns of words, which may look like numbers: a source may be called 2024
+Rows = Iterable[Mapping[str, Any]]
+Columns = Sequence[Column]
+
+# cells of these columns stay words, even if they look like numbers: a source may be called 2024
 TEXT_COLUMNS = {one.name for one in (*OWN_COLUMNS, *MORE_COLUMNS) if one.kind is str}
+BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 
 class TableFormat(Protocol):
@@ -49,50 +53,49 @@ class TableFormat(Protocol):
         """The rows of a file's content; ReadError if it is broken, with the file's name."""
         ...
 
-    def write(
-        self, stream: IO[Any], rows: Iterable[Mapping[str, Any]], columns: Sequence[Column]
-    ) -> None:
+    def write(self, stream: IO[Any], rows: Rows, columns: Columns) -> None:
         """Write rows, whose values are of these columns and in their order."""
         ...
 
 
-@dataclass
-class SeparatedText:
-    """CSV or TSV."""
+class OwnFormat:
+    """What the formats of the package share: they are told by the first characters of a file."""
 
-    suffix: str
-    delimiter: str
-    description: str
-    is_text: bool = True
+    is_text = holds_lists = True
+    start = b""
 
     def recognises(self, data: bytes) -> bool:
-        """By the separator in the first line."""
-        return self.delimiter.encode() in data.split(b"\n", 1)[0]
+        """Whether a file begins as the format does."""
+        return data.removeprefix(BYTE_ORDER_MARK).lstrip().startswith(self.start)
+
+
+class SeparatedText(OwnFormat):
+    """CSV or TSV; any text that is no other format is read as one of them."""
+
+    holds_lists = False
+
+    def __init__(self, suffix: str, delimiter: str, description: str) -> None:
+        self.suffix, self.delimiter, self.description = suffix, delimiter, description
 
     def read(self, data: bytes, name: str) -> list[dict[str, Any]]:
         """The rows; an empty cell is None."""
         text = _text(data, name)
-        first = text.split("\n", 1)[0]
-        reader = csv.reader(io.StringIO(text), delimiter="\t" if "\t" in first else ",")
+        delimiter = "\t" if "\t" in text.split("\n", 1)[0] else ","
+        lines = csv.reader(io.StringIO(text), delimiter=delimiter)
+        rows = []
         try:
-            names = next(reader, [])
-            rows = []
-            for row in reader:
-                if len(row) != len(names):
-                    raise ReadError(
-                        f"{name}, line {reader.line_num}: expected {len(names)} cells, "
-                        f"found {len(row)}"
-                    )
-                rows.append({key: _value(key, cell) for key, cell in zip(names, row, strict=True)})
+            names = next(lines, [])
+            for line in lines:
+                if len(line) != len(names):
+                    raise csv.Error(f"expected {len(names)} cells, found {len(line)}")
+                rows.append({key: _value(key, cell) for key, cell in zip(names, line, strict=True)})
         except csv.Error as error:
-            raise ReadError(f"{name}, line {reader.line_num}: {error}") from None
+            raise ReadError(f"{name}, line {lines.line_num}: {error}") from None
         if not names:
             raise ReadError(f"{name}: expected a table, found nothing")
         return rows
 
-    def write(
-        self, stream: IO[str], rows: Iterable[Mapping[str, Any]], columns: Sequence[Column]
-    ) -> None:
+    def write(self, stream: IO[str], rows: Rows, columns: Columns) -> None:
         """
         Write each row as soon as it comes, floats in the shortest form that reads back the same.
 
@@ -100,71 +103,68 @@ class SeparatedText:
         """
         writer = csv.writer(stream, delimiter=self.delimiter, lineterminator="\n")
         name = getattr(stream, "name", "")
-        rows = iter(rows)
-        first = list(next(rows, {}).values())
-        lines = chain([[one.name for one in columns], first], (row.values() for row in rows))
-        for line in filter(None, lines):
+        lines = (row.values() for row in rows)
+        first = list(islice(lines, 1))
+        for line in chain([[one.name for one in columns]], first, lines):
             with named_errors("standard output" if name == "<stdout>" else name):
-                writer.writerow([repr(cell) if isinstance(cell, float) else cell for cell in line])
+                writer.writerow(line)
                 stream.flush()
 
 
 def _value(name: str, cell: str) -> int | float | str | None:
-    if cell == "":
-        return None
     if name not in TEXT_COLUMNS:
         for kind in (int, float):
             try:
                 return kind(cell)
             except ValueError:
                 continue
-    return cell
+    return cell or None
 
 
-class JsonArray:
+def _text(data: bytes, name: str) -> str:
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise ReadError(f"{name}: expected a table as text or Parquet, found other bytes") from None
+
+
+class JsonArray(OwnFormat):
     """One array of objects."""
 
     suffix = ".json"
     description = "one array of objects; a missing value is null"
-    is_text = True
-    holds_lists = True
-
-    def recognises(self, data: bytes) -> bool:
-        """By the bracket that an array starts with."""
-        return _first_character(data) == b"["
+    start = b"["
 
     def read(self, data: bytes, name: str) -> list[dict[str, Any]]:
         """The objects."""
-        return _objects(name, _parsed(name, _text(data, name)))
+        try:
+            rows = self._parsed(_text(data, name))
+        except (ValueError, RecursionError) as error:  # also an integer of too many digits
+            raise ReadError(f"{name}: cannot be read as JSON: {error}") from None
+        if not all(isinstance(row, dict) for row in rows):
+            raise ReadError(f"{name}: expected JSON objects, one for each row")
+        return rows
 
-    def write(
-        self, stream: IO[str], rows: Iterable[Mapping[str, Any]], columns: Sequence[Column]
-    ) -> None:
+    def _parsed(self, text: str) -> list[Any]:
+        return list(json.loads(text))
+
+    def write(self, stream: IO[str], rows: Rows, columns: Columns) -> None:
         """Write an object a line between brackets."""
         lines = ",\n".join(json_line(row) for row in rows)
         stream.write(f"[\n{lines}\n]\n" if lines else "[]\n")
 
 
-class JsonLines:
+class JsonLines(JsonArray):
     """One object a line."""
 
     suffix = ".jsonl"
     description = "JSON lines: one object a line"
-    is_text = True
-    holds_lists = True
+    start = b"{"
 
-    def recognises(self, data: bytes) -> bool:
-        """By the brace that an object starts with."""
-        return _first_character(data) == b"{"
+    def _parsed(self, text: str) -> list[Any]:
+        return [json.loads(line) for line in text.split("\n") if line.strip()]
 
-    def read(self, data: bytes, name: str) -> list[dict[str, Any]]:
-        """The objects."""
-        lines = [line for line in _text(data, name).split("\n") if line.strip()]
-        return _objects(name, [_parsed(name, line) for line in lines])
-
-    def write(
-        self, stream: IO[str], rows: Iterable[Mapping[str, Any]], columns: Sequence[Column]
-    ) -> None:
+    def write(self, stream: IO[str], rows: Rows, columns: Columns) -> None:
         """Write an object a line; there is no header."""
         stream.writelines(json_line(row) + "\n" for row in rows)
 
@@ -177,41 +177,13 @@ def json_line(row: Mapping[str, Any]) -> str:
         raise SettingsError(f"a row holds what JSON cannot: {error}") from None
 
 
-def _first_character(data: bytes) -> bytes:
-    return data.removeprefix(b"\xef\xbb\xbf").lstrip()[:1]
-
-
-def _text(data: bytes, name: str) -> str:
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        raise ReadError(f"{name}: expected a table as text or Parquet, found other bytes") from None
-
-
-def _parsed(name: str, text: str) -> Any:
-    try:
-        return json.loads(text)
-    except (ValueError, RecursionError) as error:  # also an integer of too many digits
-        raise ReadError(f"{name}: cannot be read as JSON: {error}") from None
-
-
-def _objects(name: str, rows: list[Any]) -> list[dict[str, Any]]:
-    if not all(isinstance(row, dict) for row in rows):
-        raise ReadError(f"{name}: expected JSON objects, one for each row")
-    return rows
-
-
-class Parquet:
+class Parquet(OwnFormat):
     """A file whose columns have the kinds that they are declared with."""
 
     suffix = ".parquet"
     description = "Apache Parquet"
     is_text = False
-    holds_lists = True
-
-    def recognises(self, data: bytes) -> bool:
-        """By its magic number."""
-        return data.startswith(b"PAR1")
+    start = b"PAR1"
 
     def read(self, data: bytes, name: str) -> list[dict[str, Any]]:
         """The rows."""
@@ -222,32 +194,38 @@ class Parquet:
         except Exception as error:  # polars raises kinds of its own
             raise ReadError(f"{name}: cannot be read as Parquet: {error}") from None
 
-    def write(
-        self, stream: IO[bytes], rows: Iterable[Mapping[str, Any]], columns: Sequence[Column]
-    ) -> None:
+    def write(self, stream: IO[bytes], rows: Rows, columns: Columns) -> None:
         """Write the file when all rows are known."""
         data_frame(list(rows), columns).write_parquet(stream)
 
 
-def data_frame(rows: Sequence[Mapping[str, Any]], columns: Sequence[Column]) -> polars.DataFrame:
-    """Rows as a data frame of polars; columns of lists have the kind of their entries."""
+def data_frame(rows: Sequence[Mapping[str, Any]], columns: Columns) -> polars.DataFrame:
+    """
+    Rows, whose values are of Python's own kinds, as a data frame of polars.
+
+    A column has the kind that is declared, or, in tables of other programs, one that holds all its
+    values: fractions among the counts, words among the numbers.
+    """
     import polars
 
     kinds = {int: polars.Int64, float: polars.Float64, str: polars.String}
-    return polars.DataFrame(
-        [polars.Series(one.name, [row[one.name] for row in rows], kinds.get(one.kind))
-         for one in columns]
-    )  # fmt: skip
+    found = []
+    for one in columns:
+        values = [row.get(one.name) for row in rows]
+        try:
+            series = polars.Series(one.name, values, kinds.get(one.kind))
+        except (TypeError, ValueError, OverflowError):
+            series = polars.Series(one.name, values, strict=False)
+        if series.null_count() > values.count(None):
+            raise SettingsError(f"{one.name}: its values are of kinds that no column can hold")
+        found.append(series)
+    return polars.DataFrame(found)
 
 
 # In the order in which they are listed. A file is recognised in the opposite order, as any text
 # may be separated by commas.
 OWN_FORMATS: tuple[TableFormat, ...] = (
-    SeparatedText(
-        ".csv",
-        ",",
-        "comma-separated values; numbers read back the same, a missing value is an empty cell",
-    ),
+    SeparatedText(".csv", ",", "comma-separated values; a missing value is an empty cell"),
     SeparatedText(".tsv", "\t", "the same with tabs"),
     JsonArray(),
     JsonLines(),
@@ -264,7 +242,8 @@ def foreign_formats() -> tuple[TableFormat, ...]:
         is_text=bool,
         **dict.fromkeys(("recognises", "read", "write"), Callable),
     )
-    return tuple(load_plugins("scanfab.table_formats", "table format", make).values())
+    offers = load_plugins("scanfab.table_formats", "table format", make)
+    return tuple(one.plugin for one in offers.values())
 
 
 def known_formats() -> dict[str, TableFormat]:
@@ -283,8 +262,7 @@ def format_of(path: Path) -> TableFormat:
     """
     suffix = path.suffix.lower()
     # other packages are asked only where they are needed, which takes a while
-    own = next((one for one in OWN_FORMATS if one.suffix == suffix), None)
-    found = own or known_formats().get(suffix)
+    found = {one.suffix: one for one in OWN_FORMATS}.get(suffix) or known_formats().get(suffix)
     if found is None:
         raise SettingsError(
             f"{path}: results can be written as {', '.join(known_formats())}, "
@@ -293,12 +271,51 @@ def format_of(path: Path) -> TableFormat:
     return found
 
 
-def reading_format(path: Path, data: bytes) -> TableFormat:
-    """The format that recognises a file's content; plugins come first unless the suffix is own."""
-    own = {one.suffix: one for one in OWN_FORMATS}
-    if not data and path.suffix.lower() == ".jsonl":
-        return own[".jsonl"]  # an empty file has no content to be recognised by
-    others: Iterator[TableFormat] = iter(() if path.suffix.lower() in own else foreign_formats())
-    recognised = (one for one in chain(others, reversed(OWN_FORMATS)) if one.recognises(data))
-    # the rest is text with one column, or broken
-    return next(recognised, own[".csv"])
+def read_rows(path: Path | str, *, whole: bool = False) -> list[dict[str, Any]]:
+    """
+    The rows of a table by column; a missing value is None.
+
+    The content tells the format. A format of another package comes first, unless the suffix is
+    that of an own one.
+
+    Parameters
+    ----------
+    path : path
+        A file, or ``-`` for standard input.
+    whole : bool, optional
+        Refuse a text whose last line has no end: a number there reads well without its last digits.
+
+    Returns
+    -------
+    list of dict
+        :func:`scanfab.load` makes a table of them.
+
+    Raises
+    ------
+    ReadError
+        If the file cannot be read as a table; names the line of a text file.
+
+    Examples
+    --------
+    >>> from scanfab.table.formats import read_rows
+    >>> rows = read_rows("sample_data/yade_triaxial/engine.csv")
+    >>> rows[0]["contacts"]
+    2076
+    """
+    check_file(Path(path), "a table", "as - in place of its name")
+    try:
+        data = sys.stdin.buffer.read() if str(path) == "-" else Path(path).read_bytes()
+    except OSError as error:
+        raise ReadError(f"{path}: cannot be read: {error.strerror}") from None
+    suffix = Path(path).suffix.lower()
+    if not data and suffix == ".jsonl":
+        return []
+    others = () if suffix in [one.suffix for one in OWN_FORMATS] else foreign_formats()
+    found = next(one for one in (*others, *reversed(OWN_FORMATS)) if one.recognises(data))
+    rows = found.read(data, str(path))
+    if whole and found.is_text and not data.endswith(b"\n"):
+        raise ReadError(
+            f"{path}: its last line has no end, so it may be cut off: copy it again, or remove it "
+            f"and run its command again"
+        )
+    return rows

@@ -16,25 +16,24 @@ from scanfab.base.column import no_column
 from scanfab.base.option import refuse_unknown
 from scanfab.base.plugins import load_plugins
 
-GROUP = "scanfab.figures"
-
 
 @cache
 def installed_figures() -> dict[str, Any]:
     """The classes of all figures by name, those of the package first."""
-    found = load_plugins(GROUP, "figure", _figure)
+
+    def checked(plugin: Any) -> Any:
+        if not hasattr(plugin, "kind") or not hasattr(plugin, "order"):
+            raise TypeError("expected a subclass of scanfab.viz.figures.figure.Figure")
+        return plugin
+
+    offers = load_plugins("scanfab.figures", "figure", checked)
+    found = {name: one.plugin for name, one in offers.items()}
     return dict(sorted(found.items(), key=lambda one: one[1].order))
 
 
 def figures_of(kind: str) -> dict[str, Any]:
     """Those of a kind of data: ``table``, ``frames``, ``calibration`` or ``map``."""
     return {name: one for name, one in installed_figures().items() if one.kind == kind}
-
-
-def _figure(plugin: Any) -> Any:
-    if not hasattr(plugin, "kind") or not hasattr(plugin, "order"):
-        raise TypeError("expected a subclass of scanfab.viz.figures.figure.Figure")
-    return plugin
 
 
 class Plots:
@@ -62,25 +61,22 @@ class Plots:
         figures = figures_of(self._kind)
         if name not in figures:
             raise AttributeError(no_column(name, figures).replace("column", "figure"))
-        return _plot(name, figures[name], self._data)
+        figure, data = figures[name], self._data
+        options = [*signature(figure).parameters.values()][1:]
+
+        def plot(ax: Any = None, **given: Any) -> Any:
+            refuse_unknown(f"the figure {name}", given, [option.name for option in options])
+            return figure(data, **given).on(ax)
+
+        # a notebook shows the help and the options of the figure
+        axes = Parameter("ax", Parameter.POSITIONAL_OR_KEYWORD, default=None)
+        named = [one.replace(kind=Parameter.KEYWORD_ONLY) for one in options]
+        plot.__name__, plot.__doc__ = name, figure.__doc__
+        plot.__signature__ = Signature([axes, *named])  # type: ignore[attr-defined]
+        return plot
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *figures_of(self._kind)]
 
     def __repr__(self) -> str:
         return f"Plots({', '.join(figures_of(self._kind))})"
-
-
-def _plot(name: str, figure: Any, data: Any) -> Callable[..., Any]:
-    """A function of the Axes and of the figure's options, which a notebook shows with its help."""
-    options = [*signature(figure).parameters.values()][1:]
-
-    def plot(ax: Any = None, **given: Any) -> Any:
-        refuse_unknown(f"the figure {name}", given, [option.name for option in options])
-        return figure(data, **given).on(ax)
-
-    axes = Parameter("ax", Parameter.POSITIONAL_OR_KEYWORD, default=None)
-    named = [one.replace(kind=Parameter.KEYWORD_ONLY) for one in options]
-    plot.__name__, plot.__doc__ = name, figure.__doc__
-    plot.__signature__ = Signature([axes, *named])  # type: ignore[attr-defined]
-    return plot

@@ -1,49 +1,61 @@
-"""Rows of tables: read-only mappings whose values are attributes as well."""
+"""A row of a table, the numbers in its columns, and how people see rows in a session."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import html
+import math
+import sys
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields
-from typing import Any, NoReturn, Self
+from typing import Any
 
-from scanfab.base.column import NoColumnError, no_column
+import numpy as np
 
-# of a repr: a name and its value side by side, so many to a line
-NAME_WIDTH, PAIRS = 26, 3
+from scanfab.base.column import NoColumnError
+from scanfab.base.spelling import counted
+from scanfab.base.typing import FloatArray
+
+Rows = Sequence[Mapping[str, Any]]
+
+# the repr of a row shows so many pairs of name and value on a line, each so wide
+WIDTH, PAIRS = 26, 3
+# the columns of a fabric table that are shown, with their titles; other tables show the first ones
+SHOWN = {
+    "source": "source",
+    "frame": "frame",
+    "strain": "strain",
+    "shear_strain": "shear strain",
+    "variant": "variant",
+    "rv": "RV",
+    "cutoff": "cut-off",
+    "grains": "grains",
+    "contacts": "contacts",
+    "alpha_vs_axial": "α_vs axial",
+    "alpha_c_axial": "α_c axial",
+}
+ANISOTROPIES = ("alpha_vs_axial", "alpha_c_axial")
+# columns that are left out if all rows have the same value
+OFTEN_SAME = ("source", "strain", "shear_strain", "cutoff")
+MOST_COLUMNS = 8
+# so many rows are shown at each end of a long table
+ENDS = 5
 
 
 class Record(Mapping[str, Any]):
-    """
-    A row whose columns are the fields of a dataclass.
-
-    Examples
-    --------
-    >>> from scanfab.table.comparison_rows import DifferenceRow
-    >>> row = DifferenceRow(source="s", frame=0, strain=None, variants="a-b", difference=0.1,
-    ...                     difference_se=None)
-    >>> row["difference"] == row.difference == dict(row)["difference"]
-    True
-    """
+    """A row whose columns are the fields of a dataclass."""
 
     __slots__ = ()
 
     def __getitem__(self, name: str) -> Any:
-        if name not in self:
-            raise NoColumnError(no_column(name, self))
+        if name not in list(self):
+            raise NoColumnError(name, tuple(self))
         return getattr(self, name)
-
-    def __contains__(self, name: object) -> bool:
-        return any(name == one for one in self)
 
     def __iter__(self) -> Iterator[str]:
         return (one.name for one in fields(self))  # type: ignore[arg-type]
 
     def __len__(self) -> int:
         return len(fields(self))  # type: ignore[arg-type]
-
-    def get(self, name: str, default: Any = None) -> Any:
-        """The value of a column that need not exist."""
-        return getattr(self, name) if name in self else default
 
 
 class Row(Mapping[str, Any]):
@@ -80,22 +92,19 @@ class Row(Mapping[str, Any]):
     _values: dict[str, Any]
 
     def __init__(self, **values: Any) -> None:
-        object.__setattr__(self, "_values", values)
+        self._values = values
 
     def __getitem__(self, name: str) -> Any:
         try:
             return self._values[name]
         except KeyError:
-            raise NoColumnError(no_column(name, self)) from None
+            raise NoColumnError(name, tuple(self)) from None
 
     def __getattr__(self, name: str) -> Any:
-        # what Python itself looks for is no column
+        # Python itself looks for names like __deepcopy__
         if name.startswith("_"):
             raise AttributeError(name)
         return self[name]
-
-    def __contains__(self, name: object) -> bool:
-        return name in self._values
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._values)
@@ -103,66 +112,145 @@ class Row(Mapping[str, Any]):
     def __len__(self) -> int:
         return len(self._values)
 
-    def __hash__(self) -> int:
-        return hash(tuple(self._values.values()))
-
-    def get(self, name: str, default: Any = None) -> Any:
-        """
-        The value of a column that need not exist.
-
-        Parameters
-        ----------
-        name : str
-            Of the column.
-        default : object, optional
-            In place of a column that does not exist.
-
-        Returns
-        -------
-        object
-        """
-        return self._values.get(name, default)
-
-    def with_values(self, **values: Any) -> Self:
-        """
-        The same row with other values, or with more columns behind.
-
-        Parameters
-        ----------
-        **values
-            By the names of the columns.
-
-        Returns
-        -------
-        Row
-        """
-        return type(self)(**{**self._values, **values})
-
-    def __setattr__(self, name: str, value: Any) -> NoReturn:
-        raise AttributeError(f"{name}: a row cannot be changed; with_values makes a new one")
-
-    def __delattr__(self, name: str) -> NoReturn:
-        self.__setattr__(name, None)
-
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *self]
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return _unpickled, (self._values,)
-
     def __repr__(self) -> str:
-        # the values without each octant are for fits, not for eyes
-        shown = [name for name in self if "_without_" not in name and "_half_" not in name]
-        pairs = [f"{name}={spelt_value(self[name])}" for name in shown if self[name] is not None]
-        cells = [one.ljust(NAME_WIDTH) for one in pairs]
+        # a fit needs the values without each octant, a reader does not
+        names = [name for name in self if "_without_" not in name and "_half_" not in name]
+        spelt = {n: f"{v:.4g}" if isinstance(v := self[n], float) else repr(v) for n in names}
+        cells = [f"{n}={text}".ljust(WIDTH) for n, text in spelt.items() if self[n] is not None]
         lines = ["  ".join(cells[k : k + PAIRS]).rstrip() for k in range(0, len(cells), PAIRS)]
         return "Row({})".format("\n    ".join(lines))
 
 
-def _unpickled(values: dict[str, Any]) -> Row:
-    return Row(**values)
+def is_number(value: object) -> bool:
+    """Whether a value is a finite number: no truth value, and no integer beyond all floats."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return abs(value) <= sys.float_info.max
 
 
-def spelt_value(value: Any) -> str:
-    """A value as a repr shows it: four digits say enough."""
-    return f"{value:.4g}" if isinstance(value, float) else repr(value)
+def number_of(row: Mapping[str, Any], name: str) -> float | None:
+    """A row's number in a column that need not exist; None for anything else there."""
+    value = row.get(name)
+    return float(value) if is_number(value) else None  # type: ignore[arg-type]
+
+
+def numbers_of(rows: Iterable[Mapping[str, Any]], name: str) -> list[float]:
+    """The numbers of such a column."""
+    return [value for row in rows if (value := number_of(row, name)) is not None]
+
+
+def column_of(rows: Iterable[Mapping[str, Any]], name: str) -> FloatArray:
+    """Such a column as an array, with NaN where a row has no number."""
+    return np.array([number_of(row, name) for row in rows], np.float64)
+
+
+def variant_of(row: Mapping[str, Any]) -> str:
+    """
+    What tells the curves of a source apart: the variant, and the size of its RV if there are more.
+
+    Examples
+    --------
+    >>> from scanfab.table.row import variant_of
+    >>> variant_of({"variant": "a", "rv": None}), variant_of({"variant": "c", "rv": 0.4})
+    ('a', 'c RV 0.4')
+    """
+    rv = number_of(row, "rv")
+    return str(row["variant"]) if rv is None else f"{row['variant']} RV {rv:g}"
+
+
+def groups_of(rows: Iterable[Mapping[str, Any]]) -> dict[tuple[str, str], list[Any]]:
+    """Rows by source and :func:`variant_of`, in the order in which these first appear."""
+    groups: dict[tuple[str, str], list[Any]] = {}
+    for row in rows:
+        groups.setdefault((row["source"], variant_of(row)), []).append(row)
+    return groups
+
+
+def total_error(row: Mapping[str, Any], name: str) -> float | None:
+    """
+    The standard error to quote beside an anisotropy: of the scan and of the sample together.
+
+    Parameters
+    ----------
+    row : mapping
+        Of a fabric table.
+    name : str
+        ``alpha_vs_axial``: √(scan² + sample²), None where either part is not known.
+        ``alpha_c_axial``: the sample's, as contacts are counted, not scanned.
+
+    Examples
+    --------
+    >>> from scanfab.table.row import total_error
+    >>> row = {"alpha_vs_axial_se": 3e-4, "alpha_vs_axial_sample_se": 4e-4}
+    >>> round(total_error(row, "alpha_vs_axial"), 7)
+    0.0005
+    """
+    sample = number_of(row, f"{name}_sample_se")
+    if name == "alpha_c_axial":
+        return sample
+    scan = number_of(row, f"{name}_se")
+    return None if scan is None or sample is None else math.hypot(scan, sample)
+
+
+def as_text(rows: Rows, names: Sequence[str]) -> str:
+    """A few lines: how many rows, and those at both ends."""
+    lines = _lines(rows, names) if rows else []
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    padded = ["  ".join(map(str.rjust, line, widths)) for line in lines]
+    return "\n".join([f"Table of {counted(len(rows), 'row')}", *padded])
+
+
+def as_html(rows: Rows, names: Sequence[str]) -> str:
+    """The same for a notebook."""
+    heads, *lines = [[html.escape(cell) for cell in line] for line in _lines(rows, names)]
+    head = "".join(f"<th>{one}</th>" for one in heads)
+    body = "".join(f"<tr><td>{'</td><td>'.join(line)}</td></tr>" for line in lines)
+    return (
+        f"<table><caption>Table of {counted(len(rows), 'row')}</caption>"
+        f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+    )
+
+
+def with_error(value: float | None, error: float | None) -> str:
+    """
+    A value to two digits of its standard error; a dash for none.
+
+    Examples
+    --------
+    >>> from scanfab.table.row import with_error
+    >>> with_error(0.0123456, 0.00078)
+    '0.01235 ± 0.00078'
+    """
+    if value is None:
+        return "-"
+    if error is None or not error > 0:
+        return f"{value:.3g}"
+    decimals = max(0, 1 - math.floor(math.log10(error)))
+    return f"{value:.{decimals}f} ± {error:.{decimals}f}"
+
+
+def _lines(rows: Rows, names: Sequence[str]) -> list[list[str]]:
+    """Titles, and the cells of each row; dots for the rows in the middle of a long table."""
+    shown = list(names[:MOST_COLUMNS])
+    if any(name in names for name in ANISOTROPIES):
+        same = [name for name in OFTEN_SAME if len({row.get(name) for row in rows}) <= 1]
+        shown = [name for name in SHOWN if name in names and name not in same]
+    is_long = len(rows) > 2 * ENDS + 1
+    at_ends = [*rows[:ENDS], *rows[-ENDS:]] if is_long else rows
+    lines = [[_cell(row, name) for name in shown] for row in at_ends]
+    if is_long:
+        lines.insert(ENDS, ["..."] * len(shown))
+    return [[SHOWN.get(name, name) for name in shown], *lines]
+
+
+def _cell(row: Mapping[str, Any], name: str) -> str:
+    value = row.get(name)
+    if name in ANISOTROPIES:
+        # the error of the scan alone would say too little
+        return with_error(number_of(row, name), total_error(row, name))
+    if isinstance(value, float):
+        return f"{value:.3g}"
+    return "-" if value is None else str(value)

@@ -6,14 +6,13 @@ import math
 import os
 import reprlib
 import textwrap
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from scanfab.base.errors import ScanfabWarning, SettingsError
+from scanfab.base.errors import SettingsError, warn
 from scanfab.table.columns import MORE_COLUMNS, OWN_COLUMNS
-from scanfab.table.reading import is_number, variant_of
+from scanfab.table.row import is_number, variant_of
 
 Rows = list[dict[str, Any]]
 
@@ -22,12 +21,10 @@ NAMES = ("source", "variant")
 NUMBERS = tuple(one.name for one in (*OWN_COLUMNS, *MORE_COLUMNS) if one.kind in (int, float))
 # columns that no fabric table has, and the table that they give away
 OTHER_TABLES = {
-    ("alpha_vs_axial_norm", "alpha_c_axial_norm"): "a table of scanfab compare",
-    ("slope", "slope_origin"): "the summary of scanfab compare",
-    ("variants", "difference"): "the differences of scanfab compare",
-    ("ladder", "value"): "a table of scanfab calibrate",
-    ("block", "at_surface"): "a table of scanfab map",
-    ("radius_min", "contacts_from"): "the frames of scanfab inspect",
+    "alpha_vs_axial_norm": "a table of scanfab compare",
+    "slope_origin": "the summary of scanfab compare",
+    "difference": "the differences of scanfab compare",
+    "at_surface": "a table of scanfab map",
 }
 # cut-offs that agree in three digits, as they are printed for people, are the same
 ROUNDING = 5e-3
@@ -46,8 +43,7 @@ def choose_rows(
     Parameters
     ----------
     tables : iterable of (name, rows)
-        The name, for messages, and the rows by column, as
-        :func:`scanfab.table.reading.read_rows` returns them.
+        The name, for messages, and the rows by column, as :func:`scanfab.read_rows` returns them.
     cutoff : float, optional
         Keep the rows of this cut-off, in the unit of the tables, to three digits.
     labels : sequence of str, optional
@@ -69,24 +65,22 @@ def choose_rows(
     >>> [(row["source"], row["cutoff"]) for row in rows]
     [('new', 2.0)]
     """
-    named = [(str(name), [_with_source(row) for row in rows]) for name, rows in tables]
+    named = [(str(name), [dict(row) for row in rows]) for name, rows in tables]
     if labels and len(labels) != len(named):
         raise SettingsError(
             f"labels: expected one for each table, in their order: found {len(labels)} for "
             f"{len(named)}"
         )
-    chosen = []
-    for name, rows in named:
+    for number, (name, rows) in enumerate(named):
+        for row in rows:
+            if row.get("source", "") is None:
+                row["source"] = ""  # the source of a packing without a name, which CSV leaves empty
         check_rows(rows, name)
-        chosen.append((name, rows if cutoff is None else _of_cutoff(name, rows, cutoff)))
+        if cutoff is not None:
+            named[number] = name, _of_cutoff(name, rows, cutoff)
     if labels:
-        return [_labelled(rows, label) for (_, rows), label in zip(chosen, labels, strict=True)]
-    return _each_once(chosen)
-
-
-def _with_source(row: Mapping[str, Any]) -> dict[str, Any]:
-    """A packing without a name has an empty source, which CSV cannot tell from none."""
-    return {**row, "source": ""} if "source" in row and row["source"] is None else dict(row)
+        return [_labelled(rows, label) for (_, rows), label in zip(named, labels, strict=True)]
+    return _each_once(named)
 
 
 def check_rows(rows: Sequence[Mapping[str, Any]], table: str = "") -> None:
@@ -96,37 +90,24 @@ def check_rows(rows: Sequence[Mapping[str, Any]], table: str = "") -> None:
     Tables come from anywhere: a word or a list among the numbers must not go on as one.
     """
     before = f"{table}: " if table else ""
-    if rows:
-        _check_columns(before, rows[0])
     for number, row in enumerate(rows, start=1):
-        where = f"{before}row {number}"
-        _check_columns(f"{where}: ", row)
-        for name in NAMES:
-            if not isinstance(row[name], str):
-                raise SettingsError(f"{where}: {name}: expected a name, {_found(row[name])}")
-        for name in NUMBERS:
-            if row.get(name) is not None and not is_number(row[name]):
-                raise SettingsError(f"{where}: {name}: expected a number, {_found(row[name])}")
-        if row["frame"] is None or row["frame"] % 1 != 0:
-            raise SettingsError(f"{where}: frame: expected a whole number, {_found(row['frame'])}")
-
-
-def _check_columns(where: str, row: Mapping[str, Any]) -> None:
-    for columns, other in OTHER_TABLES.items():
-        if all(name in row for name in columns):
+        where = f"{before}row {number}: "
+        other = [text for name, text in OTHER_TABLES.items() if name in row]
+        missing = [name for name in NEEDED if name not in row]
+        if other or missing:
+            problem = f"this is {other[0]}" if other else f"there is no column {', '.join(missing)}"
             raise SettingsError(
-                f"{where}this is {other}: expected one of scanfab compute, from which it was made"
+                f"{where if number > 1 else before}{problem}: expected a table of scanfab compute, "
+                f"found the columns {textwrap.shorten(', '.join(map(str, row)), 200)}"
             )
-    missing = [name for name in NEEDED if name not in row]
-    if missing:
-        raise SettingsError(
-            f"{where}there is no column {', '.join(missing)}: expected a table of scanfab compute, "
-            f"found the columns {textwrap.shorten(', '.join(map(str, row)), 200)}"
-        )
-
-
-def _found(value: object) -> str:
-    return f"found {reprlib.repr(value)}"
+        wrong = [(name, "a name") for name in NAMES if not isinstance(row[name], str)]
+        numbers = [name for name in NUMBERS if row.get(name) is not None]
+        wrong += [(name, "a number") for name in numbers if not is_number(row[name])]
+        if not wrong and (row["frame"] is None or row["frame"] % 1 != 0):
+            wrong = [("frame", "a whole number")]
+        for name, expected in wrong:
+            found = reprlib.repr(row[name])
+            raise SettingsError(f"{where}{name}: expected {expected}, found {found}")
 
 
 def _of_cutoff(name: str, rows: Rows, cutoff: float) -> Rows:
@@ -138,16 +119,13 @@ def _of_cutoff(name: str, rows: Rows, cutoff: float) -> Rows:
         raise SettingsError(
             f"{name}: no row has the cut-off {cutoff:g}: expected one of the table's: {there}"
         )
-    empty = {
-        (row["source"], row["frame"], variant_of(row)): row
-        for row in reversed(rows)
-        if row.get("cutoff") is None
-    }
-    return [
-        row for row in rows
-        if row.get("cutoff") == nearest
-        or row is empty.get((row["source"], row["frame"], variant_of(row)))
-    ]  # fmt: skip
+    kept: dict[tuple[Any, ...], dict[str, Any]] = {}
+    for place, row in enumerate(rows):
+        if row.get("cutoff") == nearest:
+            kept[place,] = row
+        elif row.get("cutoff") is None:
+            kept.setdefault((row["source"], row["frame"], variant_of(row)), row)
+    return list(kept.values())
 
 
 def _labelled(rows: Rows, label: str) -> Rows:
@@ -158,25 +136,17 @@ def _labelled(rows: Rows, label: str) -> Rows:
 
 def _each_once(tables: Sequence[tuple[str, Rows]]) -> list[Rows]:
     """Without the rows that an earlier table holds, however the path of the source is spelt."""
-    known: dict[tuple[Any, ...], tuple[str, Mapping[str, Any]]] = {}
-    chosen = []
+    known: dict[tuple[Any, ...], tuple[str, dict[str, Any]]] = {}
+    chosen: list[Rows] = []
     for name, rows in tables:
-        new = []
+        chosen.append([])
         for row in rows:
-            key = (_place(row["source"]), row["frame"], variant_of(row), row.get("cutoff"))
+            source = row["source"]
+            place = os.path.abspath(source) if source not in ("", "-") else source
+            key = (place, row["frame"], variant_of(row), row.get("cutoff"))
             earlier, twin = known.setdefault(key, (name, row))
-            if twin is row or {**twin, "source": ""} != {**row, "source": ""}:
-                new.append(row)
+            if twin is row or {**twin, "source": source} != row:
+                chosen[-1].append(row)
             else:
-                warnings.warn(
-                    f"{name}: rows of {row['source']} that {earlier} holds already count once",
-                    ScanfabWarning,
-                    stacklevel=3,
-                )
-        chosen.append(new)
+                warn(f"{name}: rows of {source} that {earlier} holds already count once")
     return chosen
-
-
-def _place(source: str) -> str:
-    """One spelling of a source that is a path."""
-    return os.path.abspath(source) if source not in ("", "-") else source

@@ -10,21 +10,21 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.column import DEFAULT_DIGITS, Column, NoColumnError, no_column
-from scanfab.base.errors import SettingsError
+from scanfab.base.column import DEFAULT_DIGITS, Column, NoColumnError, columns_of_fields
+from scanfab.base.errors import ReadError, SettingsError
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.tensor import COMPONENTS
-from scanfab.table.columns import MORE_COLUMNS, columns_of, table_columns
+from scanfab.table.columns import MORE_COLUMNS, table_columns
+from scanfab.table.formats import data_frame, read_rows
 from scanfab.table.plots import Plots
-from scanfab.table.preview import as_html, as_text
-from scanfab.table.reading import read_rows
-from scanfab.table.row import Row
+from scanfab.table.row import Row, as_html, as_text
+from scanfab.table.writing import Excerpt, plain, write_rows
 
 if TYPE_CHECKING:
     import pandas
     import polars
 
-    from scanfab.table.comparison_rows import Comparison
+    from scanfab.table.compare import Comparison
 
 
 def load(path: Path | str) -> Table:
@@ -53,7 +53,11 @@ def load(path: Path | str) -> Table:
     >>> table[0].contacts
     2076
     """
-    return Table(read_rows(path))
+    rows = read_rows(path)
+    try:
+        return Table(rows)
+    except SettingsError as error:
+        raise ReadError(f"{path}: {error}") from None
 
 
 class Table(Sequence[Row]):
@@ -86,24 +90,20 @@ class Table(Sequence[Row]):
         self, rows: Iterable[Mapping[str, Any]] = (), columns: Sequence[Column] | None = None
     ) -> None:
         given = list(rows)
-        self.columns = _columns(given) if columns is None else tuple(columns)
-        names = [column.name for column in self.columns]
-        self.rows = tuple(
-            row if isinstance(row, Row) and len(row) == len(names) else _filled(row, names)
-            for row in given
-        )
+        found = [{name: plain(value) for name, value in row.items()} for row in given]
+        if columns is None and given and is_dataclass(given[0]):
+            columns = columns_of_fields(type(given[0]))
+        self.columns = _columns(found) if columns is None else tuple(columns)
+        self._frame = data_frame(found, self.columns)
 
     def __len__(self) -> int:
-        return len(self.rows)
+        return self._frame.height
 
     def __iter__(self) -> Iterator[Row]:
-        return iter(self.rows)
+        return (Row(**values) for values in self._frame.iter_rows(named=True))
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Table) and self.rows == other.rows
-
-    def __hash__(self) -> int:
-        return hash(self.rows)
+        return isinstance(other, Table) and self._frame.equals(other._frame)
 
     @overload
     def __getitem__(self, key: int) -> Row: ...
@@ -113,13 +113,19 @@ class Table(Sequence[Row]):
     def __getitem__(self, key: str) -> npt.NDArray[Any]: ...
     def __getitem__(self, key: int | slice | str) -> Row | Table | npt.NDArray[Any]:
         if isinstance(key, slice):
-            return Table(self.rows[key], self.columns)
+            return Table(self._frame[key].to_dicts(), self.columns)
         if not isinstance(key, str):
-            return self.rows[key]
-        self._check(key)
-        values = [row[key] for row in self.rows]
-        text = any(isinstance(value, str) for value in values)
-        return np.array(values if text else [np.nan if v is None else v for v in values])
+            return Row(**self._frame.row(range(len(self))[key], named=True))
+        if key not in self.names:
+            raise NoColumnError(key, self.names)
+        values = self._frame[key]
+        is_number = values.dtype.is_numeric()
+        return values.to_numpy(writable=True) if is_number else np.array(values.to_list())
+
+    @property
+    def rows(self) -> tuple[Row, ...]:
+        """All rows."""
+        return tuple(self)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -156,9 +162,7 @@ class Table(Sequence[Row]):
         >>> [row.contacts for row in table.select(frame=0)]
         [2076]
         """
-        for name in wanted:
-            self._check(name)
-        chosen = (row for row in self.rows if all(row[k] == value for k, value in wanted.items()))
+        chosen = (row for row in self if all(row[k] == value for k, value in wanted.items()))
         return Table(chosen, self.columns)
 
     def tensor(self, name: str) -> FloatArray:
@@ -250,8 +254,6 @@ class Table(Sequence[Row]):
         ...     scanfab.load(f"{folder}/table.csv") == table
         True
         """
-        from scanfab.table.writing import Excerpt, write_rows
-
         write_rows(Path(path), self, self.columns, Excerpt.make(self.columns, fields, digits))
 
     def to_pandas(self) -> pandas.DataFrame:
@@ -289,41 +291,24 @@ class Table(Sequence[Row]):
         >>> Table([dict(frame=0, alpha_vs=0.01), dict(frame=1)]).to_polars()["alpha_vs"].to_list()
         [0.01, None]
         """
-        from scanfab.table.formats import data_frame
-        from scanfab.table.writing import ALL
-
-        return data_frame([ALL.of(row) for row in self], self.columns)
+        return self._frame.clone()
 
     def __repr__(self) -> str:
-        return as_text(self.rows, self.names)
+        return as_text(list(self), self.names)
 
     def _repr_html_(self) -> str:
-        return as_html(self.rows, self.names)
-
-    def _check(self, name: str) -> None:
-        if name not in self.names:
-            raise NoColumnError(no_column(name, self.names))
+        return as_html(list(self), self.names)
 
 
 def _columns(rows: Sequence[Mapping[str, Any]]) -> tuple[Column, ...]:
-    """The columns of rows, as they are declared where they are known."""
+    """The columns of rows, as they are declared, or else by their values."""
     if not rows:
         return table_columns()
-    if is_dataclass(rows[0]):
-        return columns_of(type(rows[0]))
-    known = {column.name: column for column in (*table_columns(), *MORE_COLUMNS)}
+    columns = {column.name: column for column in (*table_columns(), *MORE_COLUMNS)}
     names = dict.fromkeys(name for row in rows for name in row)
-    return tuple(known.get(name) or _found(name, rows) for name in names)
-
-
-def _found(name: str, rows: Sequence[Mapping[str, Any]]) -> Column:
-    """A column that is not the fabric table's, by its values."""
-    from scanfab.table.writing import plain
-
-    kinds = {type(plain(row[name])) for row in rows if row.get(name) is not None}
-    kind = next((kind for kind in (list, str, float, int) if kind in kinds), float)
-    return Column(name, kind, "", "")
-
-
-def _filled(row: Mapping[str, Any], names: Sequence[str]) -> Row:
-    return Row(**{name: row.get(name) for name in names})
+    for name in names:
+        if name not in columns:
+            kinds = {type(row.get(name)) for row in rows}
+            kind = next((kind for kind in (list, str, float, int) if kind in kinds), float)
+            columns[name] = Column(name, kind, "", "")
+    return tuple(columns[name] for name in names)

@@ -1,7 +1,6 @@
 """A conformance kit, by which readers and writers of packings from any package try themselves."""
 
-from scanfab.testing.packings import differences, made_up_packings
 from scanfab.testing.readers import check_reader
-from scanfab.testing.writers import check_writer
+from scanfab.testing.writers import check_writer, differences, made_up_packings
 
 __all__ = ["check_reader", "check_writer", "differences", "made_up_packings"]

@@ -11,12 +11,12 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from random import Random
-from typing import Any, get_args
+from typing import TypeVar, get_args
 
 import numpy as np
 
 from scanfab.base.errors import ReadError, ScanfabError, ScanfabNote, ScanfabWarning
-from scanfab.base.typing import IntArray
+from scanfab.io.files import bare_name, plain
 from scanfab.io.reader import FileKind, GrainTable, Reader, ReadOptions, Snapshot
 from scanfab.packing.packing import Packing
 
@@ -35,6 +35,7 @@ FOREIGN = {
 }
 TOKENS = (b"nan", b"-1", b"1e400", b"9" * 30, b"", b"\xff\xfe", b"99999999999", b"\n", b"x")
 WORD = re.compile(rb"[^\s,;<>=\"]+")
+T = TypeVar("T")
 
 
 def check_reader(
@@ -71,7 +72,7 @@ def check_reader(
     --------
     >>> import tempfile
     >>> from pathlib import Path
-    >>> from scanfab.io.registry import reader_named
+    >>> from scanfab.io.reader import reader_named
     >>> from scanfab.testing import check_reader
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     file = Path(folder) / "two.xyz"
@@ -80,52 +81,39 @@ def check_reader(
     """
     options = ReadOptions() if options is None else options
     folder.mkdir(exist_ok=True)
-    _check_members(reader)
-    for name, data in FOREIGN.items():
-        _check_foreign(reader, _put(folder, f"{name}.bin", data), options)
-    assert files, "expected at least one file to try the reader on"
-    for file in files:
-        _check_sound(reader, file, folder, options)
-        _check_damaged(reader, file, folder, options, counts)
-
-
-def _check_members(reader: Reader) -> None:
     assert re.fullmatch(r"[a-z0-9][a-z0-9-]*", reader.name), (
         f"the name {reader.name!r} is typed behind --format: small letters, digits and -"
     )
     assert len(reader.description.splitlines()) == 1, "the description is one line"
     assert isinstance(reader.extensions, tuple), "the extensions are a tuple"
     assert all(one.startswith(".") for one in reader.extensions), "extensions begin with a dot"
-
-
-def _check_foreign(reader: Reader, path: Path, options: ReadOptions) -> None:
-    with _quiet(path):
-        known = _only_read_errors(path, "recognises", lambda: reader.recognises(path))
+    for name, data in FOREIGN.items():
+        path = _put(folder, f"{name}.bin", data)
+        known = _asked("recognises", reader.recognises, path)
         assert not known, f"{path.name}: recognises() takes it for its own, which it is not"
         _try_all(reader, path, options)
+    assert files, "expected at least one file to try the reader on"
+    for file in files:
+        grains = _check_sound(reader, file, folder, options)
+        _check_damaged(reader, file, folder, options, grains if counts else 0)
 
 
-def _check_sound(reader: Reader, file: Path, folder: Path, options: ReadOptions) -> None:
+def _check_sound(reader: Reader, file: Path, folder: Path, options: ReadOptions) -> int:
+    """Read a sound file twice, and packed; how many grains it has."""
     before = file.read_bytes()
+    packed = _put(folder, f"packed_{bare_name(file)}.gz", gzip.compress(plain(file).read_bytes()))
     with _quiet(file):
         if not getattr(reader, "generic", False):
             assert reader.recognises(file) is True, f"{file.name}: recognises() must be True"
         kind = reader.kind(file)
         assert kind in get_args(FileKind), f"{file.name}: kind() is {kind!r}"
-        tables = _grains(reader, file, options)
-        again = _grains(reader, file, options)
-        packed = _put(folder, f"packed_{file.name}.gz", gzip.compress(before))
-        unpacked = [] if _is_packed(before) else _grains(reader, packed, options)
+        tables, again, unpacked = (_grains(reader, one, options) for one in (file, file, packed))
     assert tables, f"{file.name}: snapshots() found no frame"
-    for one, two in zip(tables, again, strict=True):
+    for one, two, three in zip(tables, again, unpacked, strict=True):
         assert _same(one, two), f"{file.name}: read twice, it gives different grains"
-    for one, two in zip(tables, unpacked, strict=bool(unpacked)):
-        assert _same(one, two), f"{file.name}.gz: gives other grains (use scanfab.io.plain)"
+        assert _same(one, three), f"{packed.name}: gives other grains (use scanfab.io.plain)"
     assert file.read_bytes() == before, f"{file.name}: was changed by reading it"
-
-
-def _is_packed(data: bytes) -> bool:
-    return data.startswith((b"\x1f\x8b", b"BZh", b"\xfd7zXZ\x00"))
+    return sum(len(table.radius) for table in tables)
 
 
 def _grains(reader: Reader, path: Path, options: ReadOptions) -> list[GrainTable]:
@@ -136,60 +124,41 @@ def _grains(reader: Reader, path: Path, options: ReadOptions) -> list[GrainTable
         assert snapshot.step is None or isinstance(snapshot.step, int), "a step is an int or None"
         table = reader.read_grains(snapshot, options)
         assert isinstance(table, GrainTable), f"{path.name}: read_grains() gives a GrainTable"
-        packing = Packing(
-            table.position,
-            table.radius,
-            id=table.id,
-            columns=table.columns,
-            contacts=table.contacts,
-            wall_contacts=table.wall_contacts,
-            wall_forces=table.wall_forces,
-            cell=table.cell,
-        )
-        assert len(packing) == len(table.radius)
+        names = ("id", "columns", "contacts", "wall_contacts", "wall_forces", "cell")
+        more = {name: getattr(table, name) for name in names}
+        assert len(Packing(table.position, table.radius, **more)) == len(table.radius)
         found.append(table)
     return found
 
 
-def _ids(table: GrainTable) -> IntArray:
-    return np.zeros(0, np.int64) if table.id is None else table.id
-
-
 def _same(one: GrainTable, two: GrainTable) -> bool:
-    return (
-        np.array_equal(one.position, two.position)
-        and np.array_equal(one.radius, two.radius)
-        and (one.id is None) == (two.id is None)
-        and np.array_equal(_ids(one), _ids(two))
-        and list(one.columns) == list(two.columns)
-    )
+    """Whether two tables have the same grains."""
+    ids = (np.zeros(0) if table.id is None else table.id for table in (one, two))
+    pairs = ((one.position, two.position), (one.radius, two.radius), tuple(ids))
+    is_same = all(np.array_equal(*pair) for pair in pairs)
+    return is_same and list(one.columns) == list(two.columns)
 
 
 def _check_damaged(
-    reader: Reader, file: Path, folder: Path, options: ReadOptions, counts: bool
+    reader: Reader, file: Path, folder: Path, options: ReadOptions, least: int
 ) -> None:
+    """Cut the file anywhere, which may not leave fewer grains than ``least``, and change it."""
     data, random = file.read_bytes(), Random(0)
-    whole = sum(len(table.radius) for table in _grains(reader, file, options))
-    for place in sorted({random.randrange(len(data)) for _ in range(CUTS)} if data else ()):
-        path = _put(folder, f"cut_{file.name}", data[:place])
-        with _quiet(path):
-            found = _try_all(reader, path, options)
+    for place in sorted({random.randrange(len(data)) for _ in range(CUTS)}):
+        found = _try_all(reader, _put(folder, f"cut_{file.name}", data[:place]), options)
         # nothing but blanks may be missing without harm
-        if counts and found is not None and data[place:].strip():
-            assert found >= whole, (
-                f"{file.name} cut off after {place} bytes is read as {found} of {whole} grains: a "
-                f"part of a file must be an error"
-            )
+        assert found is None or found >= least or not data[place:].strip(), (
+            f"{file.name} cut off after {place} bytes is read as {found} of {least} grains: a part "
+            f"of a file must be an error"
+        )
     for _ in range(DAMAGES):
-        path = _put(folder, f"damaged_{file.name}", _damaged(data, random))
-        with _quiet(path):
-            _try_all(reader, path, options)
+        _try_all(reader, _put(folder, f"damaged_{file.name}", _damaged(data, random)), options)
 
 
 def _damaged(data: bytes, random: Random) -> bytes:
     """The data with one bit, byte or word changed, or a part left out."""
-    kind, place = random.randrange(4), random.randrange(max(len(data), 1))
-    if kind == 0 and data:
+    kind, place = random.randrange(4), random.randrange(len(data))
+    if kind == 0:
         changed = bytearray(data)
         changed[place] ^= 1 << random.randrange(8)
         return bytes(changed)
@@ -198,44 +167,41 @@ def _damaged(data: bytes, random: Random) -> bytes:
     if kind == 2:
         return data[:place] + random.choice(TOKENS) + data[place:]
     words = list(WORD.finditer(data))
-    if not words:
-        return data
     word = random.choice(words[:30] if random.random() < 0.5 else words)
     return data[: word.start()] + random.choice(TOKENS) + data[word.end() :]
 
 
 def _try_all(reader: Reader, path: Path, options: ReadOptions) -> int | None:
     """Everything that a reader is asked about a file; the number of grains if it can be read."""
+
+    def count(path: Path) -> int:
+        tables = (reader.read_grains(snapshot, options) for snapshot in reader.snapshots(path))
+        return sum(len(table.radius) for table in tables)
+
     began = time.monotonic()
-
-    def grains() -> int:
-        return sum(
-            len(reader.read_grains(snapshot, options).radius) for snapshot in reader.snapshots(path)
-        )
-
-    _only_read_errors(path, "recognises", lambda: reader.recognises(path))
-    _only_read_errors(path, "kind", lambda: reader.kind(path))
-    found = _only_read_errors(path, "read_grains", grains)
+    _asked("recognises", reader.recognises, path)
+    _asked("kind", reader.kind, path)
+    found = _asked("read_grains", count, path)
     took = time.monotonic() - began
     assert took < LONGEST, f"{path.name}: took {took:.0f} s"
-    return found if isinstance(found, int) else None
+    return found
 
 
-def _only_read_errors(path: Path, what: str, call: Callable[[], Any]) -> Any:
+def _asked(what: str, call: Callable[[Path], T], path: Path) -> T | None:
     """What a call gives, None if it raises an error of scanfab's; anything else is wrong."""
-    try:
-        return call()
-    except ReadError as error:
-        if path.name in str(error):
-            return None
-        raise AssertionError(f"{what}(): the error does not name the file: {error}") from error
-    except ScanfabError:
-        return None
-    except BaseException as error:
-        raise AssertionError(
-            f"{path}: {what}() raises {type(error).__name__}: {error}; whatever a file holds, it "
-            f"must raise ReadError and nothing else"
-        ) from error
+    with _quiet(path):
+        try:
+            return call(path)
+        except ScanfabError as error:
+            told = error
+        except BaseException as error:
+            raise AssertionError(
+                f"{path}: {what}() raises {type(error).__name__}: {error}; whatever a file holds, "
+                f"it must raise ReadError and nothing else"
+            ) from error
+    is_named = path.name in str(told) or not isinstance(told, ReadError)
+    assert is_named, f"{what}(): the error does not name the file: {told}"
+    return None
 
 
 @contextlib.contextmanager

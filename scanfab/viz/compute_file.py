@@ -20,9 +20,8 @@ from scanfab.pipeline.job import Job
 from scanfab.pipeline.maps.settings import BLOCK_OPTIONS, MapSettings, is_map
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.told import recorded
-from scanfab.table.result_file import ResultFile
 from scanfab.table.table import Table, load
-from scanfab.table.writing import Excerpt
+from scanfab.table.writing import Excerpt, ResultFile
 from scanfab.viz.paraview import vtk_folders
 
 Source = Series | PathLike
@@ -131,13 +130,12 @@ def compute_file(
             executor=executor,
         )
 
-        def advance(new: bool) -> None:
+        def advance() -> None:
             if progress is not None:
                 progress(job.done, job.frames())
 
         with job.begun():
             job.write(advance)
-        job.save_manifests()
     return load(Path(output))
 
 

@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from scanfab.base.errors import (
+    Note,
     PackingError,
     ReadError,
     SettingsError,
+    tell,
 )
-from scanfab.base.note import Note, tell
 from scanfab.io.series import Series
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.frames import Frames
@@ -20,7 +21,7 @@ from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.strain import StrainFile, axial_length, shear_strain
 from scanfab.pipeline.values import STRAIN_MODES, Vector
 from scanfab.pipeline.window_settings import settings_in
-from scanfab.table.abscissa import frame_strain_column, is_ambiguous
+from scanfab.table.curves import SAME, frame_strain_column
 from scanfab.viz.scene import Scene, about_window, scene_of
 
 
@@ -117,7 +118,8 @@ def _strain_column(
     frames: Frames, strains: dict[str, float | None], first: Sample | None, settings: Settings
 ) -> str | None:
     """That of the frame; where no strain has begun, that of the last frame that can be read."""
-    for number, frame in reversed(list(frames) if is_ambiguous(strains) else []):
+    has_begun = any(value is None or abs(value) >= SAME for value in strains.values())
+    for number, frame in reversed([] if has_begun else list(frames)):
         with suppress(PackingError, ReadError):
             last = frames.read(frame)
             return frame_strain_column(_strains(number, last, first, settings))

@@ -22,8 +22,7 @@ from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.settings import Settings
 from scanfab.scan.lines import line_triads
 from scanfab.scan.segments import Segments, sample_segments
-from scanfab.table.reading import number_of
-from scanfab.table.row import Row
+from scanfab.table.row import Row, number_of
 from scanfab.viz import vtk_files as vtk
 from scanfab.viz.scene import contact_lines, grains_of
 

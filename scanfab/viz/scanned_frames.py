@@ -20,10 +20,9 @@ from scanfab.pipeline.frame import FrameResult
 from scanfab.pipeline.frames import Frames
 from scanfab.pipeline.measurement import Measurement
 from scanfab.pipeline.settings import Settings
-from scanfab.table.abscissa import spelt_strain, strain_column
+from scanfab.table.curves import spelt_strain, strain_column
 from scanfab.table.plots import Plots
-from scanfab.table.reading import number_of, variant_of
-from scanfab.table.row import Row
+from scanfab.table.row import Row, number_of, variant_of
 
 Rows = Sequence[Mapping[str, Any]]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated
 
-from scanfab.base.column import LENGTH, Column, NoColumnError, columns_of_fields, no_column
+from scanfab.base.column import LENGTH, Column, NoColumnError, columns_of_fields
 
 
 @dataclass
@@ -24,8 +24,7 @@ def test_fields_are_columns_with_kind_unit_and_meaning():
 
 
 def test_a_column_that_does_not_exist_is_told_without_quotes_with_those_that_do():
-    assert no_column("alpha_v", ["alpha_vs"]).endswith("'alpha_v': did you mean alpha_vs?")
-    assert no_column(3, ["frame", "alpha_vs"]).endswith("3: the columns are frame, alpha_vs")
-    error = NoColumnError("there is no column 'x'")
-    assert isinstance(error, KeyError | AttributeError)
-    assert str(error) == "there is no column 'x'"
+    error = NoColumnError(3, ["frame", "alpha_vs"])
+    assert isinstance(error, KeyError)
+    assert isinstance(error, AttributeError)
+    assert str(error) == "there is no column 3: the columns are frame, alpha_vs"

@@ -33,10 +33,7 @@ def test_the_sense_of_the_triangles_and_how_often_corners_are_listed_say_nothing
     assert shape.planes.shape == (6, 4)
     assert shape.volume == pytest.approx(8 * HALF.prod(), rel=1e-6 + 2e-7 * shift)
     assert center == pytest.approx(np.full(3, shift), abs=1e-6 + 1e-7 * shift)
-
-
-def test_faces_in_one_plane_are_one():
-    """The face of a box in four triangles about its middle."""
+    # nor into how many triangles a face is cut: four about its middle
     middle = CORNERS[[0, 1, 3, 2]].mean(axis=0)
     fan = [[0, 1, 8], [1, 3, 8], [3, 2, 8], [2, 0, 8]]
     shape, _ = polyhedron(np.vstack([CORNERS, middle]), np.concatenate([OF_A_BOX[2:], fan]))
@@ -53,24 +50,20 @@ def test_the_centroid_is_that_of_the_body():
     assert center == pytest.approx(inside[within].mean(axis=0), abs=0.02)
 
 
-def notched():
-    """A box with a corner pushed in, by little."""
-    points = np.vstack([CORNERS, 0.999 * CORNERS[0]])
-    return points, np.where(OF_A_BOX == 0, 8, OF_A_BOX)
+# a corner pushed in, by little; and a hole in the middle
+NOTCHED = np.vstack([CORNERS, 0.999 * CORNERS[0]]), np.where(OF_A_BOX == 0, 8, OF_A_BOX)
+HOLLOW = np.vstack([CORNERS, 0.2 * CORNERS]), np.vstack([OF_A_BOX, OF_A_BOX + 8])
 
 
 @pytest.mark.parametrize(
     ("surface", "words"),
     [
         ((CORNERS, OF_A_BOX[1:]), "not closed, or not convex: .* 0.916667 times the volume"),
-        (notched(), "not closed, or not convex"),
+        (NOTCHED, "not closed, or not convex"),
         ((CORNERS * [1, 1, 0], OF_A_BOX), "encloses no volume"),
         ((CORNERS[:0], OF_A_BOX[:0]), "encloses no volume"),
         ((CORNERS, OF_A_BOX[:1]), "encloses no volume"),
-        (
-            (np.vstack([CORNERS, 0.2 * CORNERS]), np.vstack([OF_A_BOX, OF_A_BOX + 8])),
-            "not closed, or not convex: .* 1.008 times the volume",
-        ),
+        (HOLLOW, "not closed, or not convex: .* 1.008 times the volume"),
     ],
     ids=["open", "notched", "flat", "empty", "one triangle", "hollow"],
 )

@@ -31,7 +31,7 @@ import numpy as np
 from scanfab.base.shapes import sphere
 from scanfab.fabric.tensor import axial
 from scanfab.packing.cell import Cell
-from scanfab.packing.inner import inner_ellipsoid
+from scanfab.packing.window import inner_ellipsoid
 from scanfab.scan.directions import direction_rule
 from scanfab.scan.edges import EDGES
 from scanfab.scan.kernels.periodic import CellGrains

@@ -89,7 +89,7 @@ def fuzz(reader: str, runs: int, out: Path, folder: Path, only: tuple[str, ...])
     import atheris
 
     with atheris.instrument_imports(include=["scanfab", "meshio.vtk", "meshio.vtu", "meshio.xdmf"]):
-        from scanfab.io.registry import installed_readers
+        from scanfab.io.reader import installed_readers
         from tests.helpers import fuzzing, sound_files
 
         installed_readers()

@@ -54,8 +54,8 @@ class Damaged(NamedTuple):
 def task_damage(folder: str, runs: int, seed: int, readers: list[str]) -> list[Damaged]:
     """Sound and damaged files of each format; run in the tree and environment of the base."""
     from scanfab.base.errors import ScanfabError
-    from scanfab.io.registry import reader_named
     from tests.helpers import fuzzing, sound_files
+    from tests.helpers.fuzzing import reader_named
 
     kinds = {
         "cut": fuzzing._cut,

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import scanfab
-from scanfab.table.reading import total_error
+from scanfab.table.row import total_error
 
 TABLE = Path(__file__).parents[2] / "sample_data" / "paper" / "others.csv"
 HARD_SPHERES = "karambola/demo/hard_spheres/input_xyz"

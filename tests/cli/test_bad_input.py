@@ -19,9 +19,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from scanfab.base import plugins
 from scanfab.cli.main import run
-from scanfab.io import registry
-from scanfab.table.result_file import PartWriter
+from scanfab.io import reader
+from scanfab.table.writing import ResultFile
 from tests.helpers.dumps import (
     PAIRS,
     cubic_rows,
@@ -178,7 +179,7 @@ def test_a_count_that_is_too_large_is_refused_at_once(tmp_path, refusal, count):
     _, most = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     is_huge = len(count) > 18  # more than any whole number of the file can be
-    words = f"NUMBER OF ATOMS, found '{count}'" if is_huge else f"counts {count} rows"
+    words = "expected a whole number after ITEM: NUMBER OF" if is_huge else f"counts {count} rows"
     assert words in message
     assert seconds < 5
     assert most < 50e6
@@ -266,7 +267,7 @@ def test_a_contact_file_of_other_ids(tmp_path, refusal):
     write(tmp_path / "pairs_0.txt", pairs_text(pairs))
     message = refusal(tmp_path)
     assert f"{tmp_path}/pairs_0.txt: " in message
-    assert "the ids may belong to another step" in message
+    assert "no two columns are surely the ids of grains of this step" in message
 
 
 # folders and series
@@ -503,14 +504,14 @@ def test_a_folder_that_does_not_exist_is_wrong_usage(tmp_path, compute):
 def test_a_full_disk_leaves_the_old_result(tmp_path, compute, monkeypatch):
     file, output = grains(tmp_path), tmp_path / "table.csv"
     output.write_text("precious")
-    write_row = PartWriter.write
+    write_row = ResultFile.write
 
     def full(writer, row):
         if row["variant"] == "c":
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         write_row(writer, row)
 
-    monkeypatch.setattr(PartWriter, "write", full)
+    monkeypatch.setattr(ResultFile, "write", full)
     answer = compute(file, "-o", output)
     assert (answer.code, answer.out) == (1, "")
     assert "scanfab: error: " in answer.err
@@ -559,14 +560,14 @@ def test_a_plugin_that_fails_is_a_warning(tmp_path, compute, monkeypatch, failur
     file = grains(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.delitem(sys.modules, "brokenplugin", raising=False)
-    broken = EntryPoint("pfc", "brokenplugin:Reader", registry.GROUP)
-    points = registry.entry_points
-    monkeypatch.setattr(registry, "entry_points", lambda group: [*points(group=group), broken])
-    registry.installed_readers.cache_clear()
+    broken = EntryPoint("pfc", "brokenplugin:Reader", reader.GROUP)
+    points = plugins.entry_points
+    monkeypatch.setattr(plugins, "entry_points", lambda group: [*points(group=group), broken])
+    reader.installed_readers.cache_clear()
     try:
         answer = compute(file)
     finally:
-        registry.installed_readers.cache_clear()
+        reader.installed_readers.cache_clear()
     assert answer.code == 0
     assert len(answer.rows) == 4
     assert "warning: the reader 'pfc' of unknown package cannot be loaded" in answer.err

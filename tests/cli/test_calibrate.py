@@ -9,10 +9,10 @@ from dataclasses import replace
 
 import pytest
 
+from scanfab.base.column import columns_of_fields
 from scanfab.cli.main import run
 from scanfab.pipeline.calibration import Calibration
 from scanfab.pipeline.calibration_ladders import StepRow
-from scanfab.table.columns import columns_of
 from tests.cli.test_windows import surface
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.truth import TRIAXIAL
@@ -44,7 +44,7 @@ def test_rows_on_one_stream_and_words_on_the_other(calibrate, capsys, tmp_path):
     figure = tmp_path / "ladders.png"
     out, err = calibrate(TRIAXIAL, *QUICK, "--plot", figure)
     rows = list(csv.DictReader(io.StringIO(out)))
-    assert list(rows[0]) == [column.name for column in columns_of(StepRow)]
+    assert list(rows[0]) == [column.name for column in columns_of_fields(StepRow)]
     assert {row["frame"] for row in rows} == {"6"}
     assert figure.stat().st_size > 10_000
     assert "cut-off: it decides what is measured" in err

@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from scanfab.cli.main import run
-from scanfab.table.formats import OWN_FORMATS
-from scanfab.table.reading import read_rows
+from scanfab.table.formats import OWN_FORMATS, read_rows
 from tests.helpers.dumps import write
 from tests.helpers.tables import curve
 
@@ -87,7 +86,7 @@ def test_the_rows_of_one_cutoff_are_chosen(tmp_path, compare, capsys):
     rows = [{**row, "cutoff": c, "frame": row["frame"]} for row in curve() for c in (0.0, 0.5, 1.0)]
     given = table(tmp_path, rows)
     assert run(["compare", given]) == 1
-    assert "choose the rows of one cut-off with --cutoff" in capsys.readouterr().err
+    assert "choose one cut-off with --cutoff" in capsys.readouterr().err
     assert len(compare(given, "--cutoff", "0.5")) == 5
     assert run(["compare", given, "--cutoff", "0.7"]) == 1
     assert "no row has the cut-off 0.7: expected one of the table's: 0, 0.5, 1" in (
@@ -98,7 +97,7 @@ def test_the_rows_of_one_cutoff_are_chosen(tmp_path, compare, capsys):
 def test_labels_name_the_tables(tmp_path, compare, capsys):
     given = [table(tmp_path, curve(factor=k), f"{k}.jsonl") for k in (1.0, 2.0)]
     assert run(["compare", *given]) == 1
-    assert "--label NAME, once for each table" in capsys.readouterr().err
+    assert "by --label NAME" in capsys.readouterr().err
     rows = compare(*given, "--summary", "--label", "coarse", "--label", "fine")
     assert [row["source"] for row in rows] == ["coarse", "fine"]
     assert run(["compare", *given, "--label", "coarse"]) == 2

@@ -7,6 +7,7 @@ import re
 import pytest
 
 from scanfab.cli.console import KEYS, MORE, print_table
+from scanfab.table.columns import table_columns
 from scanfab.table.row import Row
 from scanfab.table.writing import Excerpt
 from tests.table.test_table import a_row
@@ -98,7 +99,7 @@ def test_error_is_that_of_scan_and_sample_together(shown):
 
 
 def test_columns_and_digits_that_were_asked_for_are_shown(shown):
-    excerpt = Excerpt.make(Row, "variant,alpha_vs_axial", 5)
+    excerpt = Excerpt.make(table_columns(), "variant,alpha_vs_axial", 5)
     assert [line.split() for line in shown(80, excerpt)[:2]] == [
         ["variant", "alpha_vs_axial"],
         ["d", "-0.012346"],

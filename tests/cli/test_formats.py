@@ -5,7 +5,7 @@ from __future__ import annotations
 from click.testing import CliRunner
 
 from scanfab.cli.formats import formats
-from scanfab.io.registry import installed_readers
+from scanfab.io.reader import installed_readers
 
 
 def test_every_reader_is_listed_with_its_package() -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from scanfab.cli.main import PLAIN_LETTERS, _shown, run
-from scanfab.table.reading import read_rows
+from scanfab.table.formats import read_rows
 from tests.helpers.interruptions import PROGRAM, write_series
 
 FAST = ["--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin", "--variants", "ac"]

@@ -222,7 +222,7 @@ def test_unfinished_parts_are_named(parts, refused):
     assert f"{part}: lacks frame 4" in refused(*parts)
     part.write_text("".join(lines))
     manifest.unlink()
-    assert f"{part}: expected {manifest.name} beside it" in refused(*parts)
+    assert f"{part}: there is no {manifest.name}" in refused(*parts)
     manifest.write_text(text)
     part.rename(f"{part}.part")
     assert f"{part}: is not finished" in refused(*parts)

@@ -14,8 +14,8 @@ from scanfab.base.option import GROUPS, option, options_of, takes_options, whole
 from scanfab.cli import options as cli_options
 from scanfab.cli.compute import compute
 from scanfab.cli.sources import SourceCommand
-from scanfab.pipeline.manifest import asked_for
 from scanfab.pipeline.options import OPTIONS
+from scanfab.pipeline.record import asked_for
 from scanfab.pipeline.settings import Settings
 
 DOCS = Path(__file__).parents[2] / "docs"

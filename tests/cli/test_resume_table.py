@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gzip
 import json
-import os
 import shutil
 from pathlib import Path
 
@@ -15,7 +14,7 @@ import pyvista
 from scanfab.cli import talk
 from scanfab.cli.main import run
 from scanfab.pipeline import measurement
-from scanfab.pipeline.repeat import read_manifest
+from scanfab.pipeline.record import read_manifest
 from tests.cli.test_resume import _wait_for_frames_under_way
 from tests.helpers.dumps import cubic_rows, dump_text, write
 from tests.helpers.interruptions import interrupted_at_row, write_series
@@ -231,7 +230,7 @@ def test_what_is_interrupted_again_goes_on_with_part_and_table(
     assert compute(table, "--frames=1:3") == (0, 2)
     before = table.read_bytes()
     add_frames(five_frames, dumps)
-    with interrupted_at_row(monkeypatch, 8):
+    with interrupted_at_row(monkeypatch, 4):
         assert compute(table, "--resume", "--workers", "1")[0] == 130
     _wait_for_frames_under_way()
     assert "interrupted after 3 of 5 frames; the same command goes on" in capsys.readouterr().err
@@ -453,32 +452,23 @@ def test_a_cell_beside_the_grains_is_an_input(compute, tmp_path, capsys, grains,
     assert f"{cells[0]} " in capsys.readouterr().err
 
 
-def test_a_run_killed_before_its_manifest_has_its_name_is_complete(compute, dumps, tmp_path):
-    """FILE stands, and is gone on with and merged; beside FILE.part it would be the one before."""
-    table, merged = tmp_path / "t.csv", tmp_path / "m.csv"
-    settled, coming = (tmp_path / f"t.csv.manifest.json{ending}" for ending in ("", ".new"))
-    assert compute(table) == (0, 3)
-    settled.rename(coming)
-    assert run(["merge", str(table), "-o", str(merged)]) == 0
-    assert merged.read_bytes() == table.read_bytes()
-    part = tmp_path / "t.csv.part"
-    part.touch()
-    assert read_manifest(table) is None
-    part.unlink()
+@pytest.mark.parametrize("last", ["write_rows", "write_manifest"])
+def test_a_run_killed_before_its_table_or_its_manifest_is_written_is_not_finished(
+    compute, tmp_path, monkeypatch, capsys, last
+):
+    """FILE.part is still there, and the same command ends what was begun."""
+    table, whole = tmp_path / "t.csv", tmp_path / "whole.csv"
+
+    def killed(*_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(f"scanfab.pipeline.job.{last}", killed)
+        assert compute(table) == (130, 3)
+    assert run(["merge", str(table)]) == 1
+    assert f"{table}: is not finished" in capsys.readouterr().err
     assert compute(table, "--resume") == (0, 0)
-    assert settled.exists()
-    assert not coming.exists()
-    assert merged.read_bytes() == table.read_bytes()
-
-
-def test_the_manifest_is_there_before_its_table(compute, tmp_path, monkeypatch):
-    replace, found = os.replace, []
-
-    def noted(source, target):
-        if Path(target).name == "t.csv":
-            found.append(json.loads((tmp_path / "t.csv.manifest.json.new").read_text())["settings"])
-        replace(source, target)
-
-    monkeypatch.setattr(os, "replace", noted)
-    assert compute(tmp_path / "t.csv") == (0, 3)
-    assert found == [read_manifest(tmp_path / "t.csv")["settings"]]
+    assert compute(whole) == (0, 3)
+    assert table.read_bytes() == whole.read_bytes()
+    assert read_manifest(table) == read_manifest(whole)
+    assert {one.name for one in tmp_path.glob("t.*")} == {"t.csv", "t.csv.manifest.json"}

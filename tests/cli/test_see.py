@@ -17,7 +17,7 @@ from scanfab.cli.main import run
 from scanfab.io.sources import read_series
 from scanfab.pipeline.strain import shear_strain
 from scanfab.table.compare import compare_tables
-from scanfab.table.reading import read_rows
+from scanfab.table.formats import read_rows
 from scanfab.viz.figures.correlation import fits_of
 from scanfab.viz.overlay import add_words
 from tests.conftest import ROOT, SAMPLE

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from scanfab.cli.main import run
-from scanfab.pipeline.repeat import read_manifest, repeat_command
+from scanfab.pipeline.record import read_manifest
+from scanfab.pipeline.repeat import repeat_command
 from tests.helpers.dumps import cubic_rows, dump_text, write
 
 FAST = 'directions = 9\nspacing = "0.5rmin"\ncutoff = "0.2rmin"\n'

@@ -80,13 +80,12 @@ def test_a_part_without_rows_and_half_a_file_are_removed(tmp_path, rows):
         tmp_path,
         f"""
 from pathlib import Path
-from scanfab.table.columns import COLUMNS, complete_row
-from scanfab.table.row import Row
+from scanfab.table.columns import COLUMNS, complete_row, table_columns
 from scanfab.base.files import whole_file
-from scanfab.table.result_file import ResultFile
+from scanfab.table.writing import ResultFile
 
 def run(args):
-    with ResultFile(Path("table.csv"), Row).writer({{}}) as writer:
+    with ResultFile(Path("table.csv"), table_columns()).writer({{}}) as writer:
         for _ in range({rows}):
             writer.write(complete_row(dict.fromkeys(COLUMNS)))
         with whole_file(Path("figure.png")) as part:

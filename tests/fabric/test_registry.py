@@ -8,10 +8,9 @@ import pytest
 import scanfab
 from scanfab import Column, ScanfabError, ScanfabWarning
 from scanfab.table import columns
-from scanfab.table.columns import COLUMNS, complete_row
-from scanfab.table.formats import OWN_FORMATS
-from scanfab.table.reading import read_rows
-from scanfab.table.result_file import ResultFile
+from scanfab.table.columns import COLUMNS, complete_row, table_columns
+from scanfab.table.formats import OWN_FORMATS, read_rows
+from scanfab.table.writing import ResultFile
 from tests.helpers.lattices import simple_cubic
 from tests.helpers.plugins import offer
 
@@ -62,8 +61,7 @@ def test_its_columns_are_computed_and_stand_behind_the_own_ones():
 def test_its_columns_are_written_and_read_back(tmp_path, suffix):
     path = tmp_path / f"t{suffix}"
     values = dict.fromkeys(COLUMNS) | {"frame": 0, "c_fourth": 0.5, "vs_longest": None}
-    with ResultFile(path, scanfab.Row).writer({}) as writer:
-        writer.write(complete_row(values))
+    ResultFile(path, table_columns()).save([complete_row(values)])
     (row,) = read_rows(path)
     assert row == values
 
@@ -72,7 +70,7 @@ def test_its_columns_are_written_and_read_back(tmp_path, suffix):
 def test_a_value_that_it_forgets_is_an_error():
     with pytest.raises(TypeError, match="a value for each column, None for none: vs_longest"):
         complete_row(dict.fromkeys(COLUMNS) | {"c_fourth": 0.5})
-    with pytest.raises(TypeError, match="there is no column 'c_forth': did you mean c_fourth"):
+    with pytest.raises(TypeError, match="None for none: c_forth, c_fourth"):
         complete_row(dict.fromkeys(COLUMNS) | {"c_forth": 0.5, "vs_longest": None})
 
 
@@ -97,7 +95,7 @@ def computed():
 BROKEN = [
     (Foreign(name="alpha_vs"), "its column 'alpha_vs' is one of scanfab's own"),
     (Foreign(name="strain"), "its column 'strain' is one of scanfab's own"),
-    (3, "found 3 without columns"),
+    (3, "found 3, whose columns is None"),
     (Foreign, "found the class Foreign itself"),
     (Foreign(kind=list), "columns that hold int, float or str"),
 ]

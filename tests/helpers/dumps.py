@@ -49,25 +49,22 @@ def binary_dump(
     flags: Sequence[int] = (1, 1, 1, 1, 1, 1),
     tilt: Sequence[float] = (),
     blocks: int = 1,
-    order: str = "<",
 ) -> bytes:
     """One snapshot of a binary dump: of the new layout with names, else of the old one."""
     numbers = np.asarray(rows, dtype=np.float64)
     header = b""
     if names is not None:
-        header = struct.pack(f"{order}q10sii", -10, b"DUMPCUSTOM", 1, 2)
-    header += struct.pack(f"{order}qqi", step, len(rows), bool(len(tilt)))
-    header += struct.pack(f"{order}6i", *flags)
-    header += struct.pack(f"{order}6d{len(tilt)}d", 0, 1, 0, 1, 0, 1, *tilt)
-    header += struct.pack(f"{order}i", numbers.shape[1])
+        header = struct.pack("<q10sii", -10, b"DUMPCUSTOM", 1, 2)
+    header += struct.pack("<qqi", step, len(rows), bool(len(tilt)))
+    header += struct.pack("<6i", *flags)
+    header += struct.pack(f"<6d{len(tilt)}d", 0, 1, 0, 1, 0, 1, *tilt)
+    header += struct.pack("<i", numbers.shape[1])
     if names is not None:
-        header += struct.pack(f"{order}i", 0) + (
-            b"\0" if time is None else struct.pack(f"{order}bd", 1, time)
-        )
-        header += struct.pack(f"{order}i", len(names)) + names.encode()
-    header += struct.pack(f"{order}i", blocks)
+        header += struct.pack("<i", 0) + (b"\0" if time is None else struct.pack("<bd", 1, time))
+        header += struct.pack("<i", len(names)) + names.encode()
+    header += struct.pack("<i", blocks)
     for part in np.array_split(numbers, blocks):
-        header += struct.pack(f"{order}i", part.size) + part.astype(f"{order}f8").tobytes()
+        header += struct.pack("<i", part.size) + part.astype("<f8").tobytes()
     return header
 
 

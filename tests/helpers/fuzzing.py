@@ -13,8 +13,7 @@ from random import Random
 from scanfab.base.errors import ScanfabError, ScanfabNote, ScanfabWarning
 from scanfab.io.families import Family
 from scanfab.io.mesh import read_mesh
-from scanfab.io.reader import ReadOptions
-from scanfab.io.registry import reader_for, reader_named
+from scanfab.io.reader import ReadOptions, reader_for, reader_named
 from scanfab.io.series import Series
 from tests.helpers.sound_files import companion_grains, entry
 

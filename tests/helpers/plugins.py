@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 
 from scanfab.base import plugins
-from scanfab.fabric import registry
 
 
 def offer(monkeypatch: pytest.MonkeyPatch, group: str, name: str, load: Callable[[], Any]) -> None:
@@ -21,5 +20,4 @@ def offer(monkeypatch: pytest.MonkeyPatch, group: str, name: str, load: Callable
     def found(group: str, asked: str = group) -> list[Any]:
         return [*before(group=group), *([point] if group == asked else [])]
 
-    for module in (plugins, registry):
-        monkeypatch.setattr(module, "entry_points", found)
+    monkeypatch.setattr(plugins, "entry_points", found)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache, partial
 from importlib import import_module
+from itertools import product
 from pathlib import Path
 from tempfile import mkdtemp
 
@@ -17,8 +18,7 @@ import pyvista
 from scanfab.io.convert import convert
 from scanfab.io.families import Family
 from scanfab.io.files import COMPRESSED_SUFFIXES, DECOMPRESSORS
-from scanfab.io.reader import GrainTable, ReadOptions
-from scanfab.io.registry import reader_named
+from scanfab.io.reader import GrainTable, ReadOptions, reader_named
 from scanfab.testing import made_up_packings
 from tests.helpers.dumps import (
     PAIRS,
@@ -49,25 +49,17 @@ def companion_grains(format: str) -> tuple[GrainTable, Family]:
     """Sound grains to read contacts with: the table, and the file."""
     format = "table" if format in TITLED else format
     if format in SMALL:
-        folder = Path(mkdtemp(prefix="companion-"))
-        path = SMALL[format](folder)[0]
-        reader = reader_named(format)
-        snapshot = reader.snapshots(path)[-1]
-        grains = reader.read_grains(snapshot, ReadOptions())
-        return grains, Family(str(path), {1: path}, reader, "grains")
-    path = {
-        "lammps": FLOOR / "shuffled.txt",
-        "liggghts": FLOOR / "shuffled.txt",
-        "npz": FLOOR / "grains_30000.vtp",
-        "on-dem": FLOOR / "grains_30000.vtp",
-        "table": FLOOR / "truth_grains.csv",
-        "xyz": FLOOR / "grains_30000.vtp",
-        "vtk": FLOOR / "grains_30000.vtp",
-        "yade": YADE / "id-spheres-00000000.vtk.gz",
-    }[format]
+        path = SMALL[format](Path(mkdtemp(prefix="companion-")))[0]
+    else:
+        path = {
+            "lammps": FLOOR / "shuffled.txt",
+            "liggghts": FLOOR / "shuffled.txt",
+            "table": FLOOR / "truth_grains.csv",
+            "yade": YADE / "id-spheres-00000000.vtk.gz",
+        }.get(format, FLOOR / "grains_30000.vtp")
     reader = reader_named("vtk" if path.suffix == ".vtp" else format)
-    grains = reader.read_grains(reader.snapshots(path)[0], ReadOptions())
-    return grains, Family(str(path), {1: path}, reader_named(reader.name), "grains")
+    grains = reader.read_grains(reader.snapshots(path)[-1], ReadOptions())
+    return grains, Family(str(path), {1: path}, reader, "grains")
 
 
 def seeds(format: str, folder: Path) -> list[Seed]:
@@ -96,22 +88,30 @@ def seeds(format: str, folder: Path) -> list[Seed]:
     return [(path.name, path.read_bytes()) for path in (*made, *samples)]
 
 
+def _is_for(format: str, path: Path) -> bool:
+    """Whether a file of sample_data is one for the reader of a format."""
+    is_yade = YADE in path.parents
+    return {
+        "vtk": path.name.removesuffix(".gz")[-4:] in (".vtk", ".vtp", ".vtu"),
+        "lammps": path.suffix == ".txt" and not is_yade,
+        "liggghts": not is_yade,
+        "yade": is_yade,
+    }.get(format, False)
+
+
+def _written(folder: Path, files: Mapping[str, str | bytes]) -> list[Path]:
+    """Files with these contents, by name."""
+    for name, data in files.items():
+        (folder / name).write_bytes(data.encode() if isinstance(data, str) else data)
+    return [folder / name for name in files]
+
+
 def entry(format: str, path: Path) -> Path:
     """The file to read: for the file of one of ESyS' workers a header beside it, which names it."""
     if format != "esys" or not path.read_bytes()[:1].isdigit():
         return path
     head = path.with_name(f"{path.stem}_head_0.txt")
     return write(head, esys.HEADER.format(step=1, files=path.name))
-
-
-def _is_for(format: str, path: Path) -> bool:
-    if format == "vtk":
-        return path.name.removesuffix(".gz")[-4:] in (".vtk", ".vtp", ".vtu")
-    if format in ("npz", "on-dem", "table", "xyz", *TITLED, *SMALL):
-        return False
-    if format == "lammps":
-        return path.suffix == ".txt" and YADE not in path.parents
-    return (YADE in path.parents) == (format == "yade")
 
 
 def _groups(path: Path) -> Path:
@@ -126,16 +126,6 @@ def _groups(path: Path) -> Path:
     return path
 
 
-def _mercury_files(folder: Path) -> list[Path]:
-    files = {
-        "run.data": mercurydpm.data_frame(0.1) + mercurydpm.data_frame(0.2),
-        "flat.data": "1 0.5 0 0 1 2 \n0.1 1 9 9 0.1 0 0 0\n",
-        "run.fstat": mercurydpm.fstat_frame(0.2, mercurydpm.contacts_at(0.2)),
-        "run.restart": mercurydpm.restart(),
-    }
-    return [write(folder / name, text) for name, text in files.items()]
-
-
 SMALL: dict[str, Callable[[Path], list[Path]]] = {
     "esys": lambda folder: [
         esys.run(folder, prefix=""),
@@ -144,19 +134,29 @@ SMALL: dict[str, Callable[[Path], list[Path]]] = {
     ],
     "gsd": lambda folder: [gsd.gsd_file(folder / "a.gsd", gsd.frame(0), gsd.frame(5, count=2))],
     "kratos": lambda folder: [
-        write(folder / "a.mdpa", kratos.MDPA),
+        *_written(folder, {"a.mdpa": kratos.MDPA}),
         _groups(folder / "a.hdf5"),
     ],
-    "lf-dem": lambda folder: [
-        write(folder / "par.dat", lf_dem.grains_text()),
-        write(folder / "int.dat", lf_dem.pairs_text()),
-    ],
-    "mercurydpm": _mercury_files,
-    "mfix": lambda folder: [
-        write(folder / "a.dat", mfix.version_2()),
-        write(folder / "particle_input_f_1.dat", "0.1 0.2 0.5D-1 2650 7 8\n"),
-    ],
-    "musen": lambda folder: [write(folder / "a.txt", musen.export(*musen.ROWS))],
+    "lf-dem": lambda folder: _written(
+        folder, {"par.dat": lf_dem.grains_text(), "int.dat": lf_dem.pairs_text()}
+    ),
+    "mercurydpm": lambda folder: _written(
+        folder,
+        {
+            "run.data": mercurydpm.data_frame(0.1) + mercurydpm.data_frame(0.2),
+            "flat.data": "1 0.5 0 0 1 2 \n0.1 1 9 9 0.1 0 0 0\n",
+            "run.fstat": mercurydpm.fstat_frame(0.2, mercurydpm.contacts_at(0.2)),
+            "run.restart": mercurydpm.restart(),
+        },
+    ),
+    "mfix": lambda folder: _written(
+        folder,
+        {
+            "a.dat": mfix.version_2(),
+            "particle_input_f_1.dat": "0.1 0.2 0.5D-1 2650 7 8\n",
+        },
+    ),
+    "musen": lambda folder: _written(folder, {"a.txt": musen.export(*musen.ROWS)}),
 }
 
 
@@ -176,12 +176,9 @@ def _lammps_files(folder: Path) -> list[Path]:
             f"0 2 ylo yhi\n-1 3 zlo zhi\n0.5 0 0.25 xy xz yz\n\nAtoms # sphere\n\n{rows}\n"
             "Velocities\n\n1 0 0 0 0 0 0\n"
         ),
+        "a.yaml": yaml_text(100) + yaml_text(200),
     }
-    paths = [folder / name for name in files]
-    for path in paths:
-        path.write_text(files[path.name])
-    (folder / "a.yaml").write_text(yaml_text(100) + yaml_text(200))
-    paths += [folder / "a.yaml", netcdf(folder / "a.nc", written=2)]
+    paths = [*_written(folder, files), netcdf(folder / "a.nc", written=2)]
     return [*paths, *_binary_dumps(folder, new=True), *_binary_dumps(folder)]
 
 
@@ -191,16 +188,13 @@ def _binary_dumps(folder: Path, new: bool = False) -> list[Path]:
     grains = {
         "one": binary_dump(**more),
         "two": binary_dump(blocks=2, **more) + binary_dump(step=100, tilt=(0.2, 0.1, 0.0), **more),
-        "swapped": binary_dump(order=">", **more),
         "walled": binary_dump(flags=(1, 1, 0, 0, 3, 2), blocks=3, **more),
         "empty": binary_dump(np.zeros((0, 6)), **more),
     }
     if not new:
         grains["pairs"] = binary_dump([(*pair, 0.1, 1.5, 0, 0) for pair in PAIRS])
-    paths = [folder / f"{'new' if new else 'old'}_{name}.bin" for name in grains]
-    for path, data in zip(paths, grains.values(), strict=True):
-        path.write_bytes(data)
-    return paths
+    kind = "new" if new else "old"
+    return _written(folder, {f"{kind}_{name}.bin": data for name, data in grains.items()})
 
 
 def _liggghts_files(folder: Path) -> list[Path]:
@@ -219,13 +213,10 @@ def _liggghts_files(folder: Path) -> list[Path]:
         "plain.data": data_file(),
         "hybrid.data": data_file("hybrid", behind=" 7 0 0 1"),
     }
-    paths = [folder / name for name in files]
-    for path in paths:
-        path.write_text(files[path.name])
     spheres = folder / "named.vtk"
     pyvista.PolyData(_centres()).save(spheres, binary=False)
     spheres.write_bytes(spheres.read_bytes().replace(b"vtk output", b"Generated by LIGGGHTS"))
-    return [*paths, spheres, *_binary_dumps(folder)]
+    return [*_written(folder, files), spheres, *_binary_dumps(folder)]
 
 
 def _table_files(folder: Path) -> list[Path]:
@@ -253,24 +244,26 @@ def _table_files(folder: Path) -> list[Path]:
         "pairs.csv": text(pushes, ",", "id1 id2 fx fy fz"),
         "kinds.csv": "contact_type,id1,id2,fn,ix,iy,iz\nSS,1,2,.5,0,0,0\nSA,2,1,1,0,0,0\n",
     }
-    paths = [folder / name for name in files]
-    for path in paths:
-        path.write_text(files[path.name])
-    (folder / "wide.csv").write_bytes(files["named.csv"].encode("utf-16"))
-    np.savez(folder / "a.npz", **columns)
-    np.savez_compressed(folder / "b.npz", position=numbers[:, 1:4], r=numbers[:, 4])
-    parquet.write_table(pyarrow.table(columns), folder / "a.parquet", compression="zstd")
-    parquet.write_table(pyarrow.table(columns), folder / "b.parquet", compression="none")
+    paths = _written(folder, files)
     one, two, *pushed = np.array(pushes).T
     listed = {"id1": one.astype(int), "id2": two.astype(int)}
-    listed.update(zip(("fx", "fy", "fz"), pushed, strict=True))
+    listed |= zip(("fx", "fy", "fz"), pushed, strict=True)
+    np.savez(folder / "a.npz", **columns)
+    np.savez_compressed(folder / "b.npz", position=numbers[:, 1:4], r=numbers[:, 4])
     np.savez(folder / "pairs.npz", **listed)
+    parquet.write_table(pyarrow.table(columns), folder / "a.parquet", compression="zstd")
+    parquet.write_table(pyarrow.table(columns), folder / "b.parquet", compression="none")
     parquet.write_table(pyarrow.table(listed), folder / "pairs.parquet")
-    rows = np.column_stack([*list(columns.values())[:3], np.ones(12)])
-    (folder / "a.xyzd").write_bytes(rows.astype("<f8").tobytes())
-    names = "wide.csv a.npz b.npz pairs.npz a.parquet b.parquet pairs.parquet a.xyzd"
-    more = [folder / name for name in names.split()]
-    return [*paths, *more, *_packed(folder / "named.csv"), *_packed(folder / "pairs.csv")]
+    more = "a.npz b.npz pairs.npz a.parquet b.parquet pairs.parquet"
+    rows = np.column_stack([*list(columns.values())[:3], np.ones(12)]).astype("<f8")
+    return [
+        *paths,
+        *_written(folder, {"wide.csv": files["named.csv"].encode("utf-16")}),
+        *(folder / name for name in more.split()),
+        *_written(folder, {"a.xyzd": rows.tobytes()}),
+        *_packed(folder / "named.csv"),
+        *_packed(folder / "pairs.csv"),
+    ]
 
 
 def _packed(path: Path) -> list[Path]:
@@ -303,15 +296,17 @@ TITLED = {
 
 
 def _titled(format: str, folder: Path) -> list[Path]:
-    grains, contacts = TITLED[format]
+    names, titles = TITLED[format]
     rows = "".join(f"{i},{x},{y},{z},{r}\n" for i, _, x, y, z, r in ROWS)
     more = ",0,.5,0" * (format == "edem")
     pairs = "".join(f"{one},{two},0.1,1.5,0{more}\n" for one, two in PAIRS)
-    return [
-        write(folder / "grains.csv", f"{grains}\n{rows}"),
-        write(folder / "pairs.csv", f"{contacts}\n{pairs}"),
-        write(folder / "grains.txt", f"{grains}\n{rows}".replace(",", "\t")),
-    ]
+    grains = f"{names}\n{rows}"
+    files = {
+        "grains.csv": grains,
+        "pairs.csv": f"{titles}\n{pairs}",
+        "grains.txt": grains.replace(",", "\t"),
+    }
+    return _written(folder, files)
 
 
 def _on_dem_files(folder: Path) -> list[Path]:
@@ -337,18 +332,14 @@ def _packings(endings: tuple[str, ...], folder: Path) -> list[Path]:
 def _yade_files(folder: Path) -> list[Path]:
     grains, _ = companion_grains("yade")
     ends = grains.position[[[0, 1], [1, 2]]]
-    head = "#format x_y_z_r_attrs\n# x y z r one two\n"
-    text = folder / "attrs.txt"
-    text.write_text(head + "0 0 0 1 2 3\n2 0 0 1 4 5\n")
-    pack = folder / "pack.txt"
-    pack.write_text("##PERIODIC:: 4 4 4\n0 0 0 1 -1\n2 0 0 1 -1\n")
-    save = folder / "save.xml"
-    save.write_text(small_save())
+    files = {
+        "attrs.txt": "#format x_y_z_r_attrs\n# x y z r one two\n0 0 0 1 2 3\n2 0 0 1 4 5\n",
+        "pack.txt": "##PERIODIC:: 4 4 4\n0 0 0 1 -1\n2 0 0 1 -1\n",
+        "save.xml": small_save(),
+    }
     vectors = {"normalForce": [[1, 0, 0]] * 2, "shearForce": [[0, 1, 0]] * 2}
     return [
-        text,
-        pack,
-        save,
+        *_written(folder, files),
         yade_spheres(folder / "spheres.vtk", grains.position[:3], [1, 1, 1], id=[0, 1, 2]),
         yade_lines(folder / "lines.vtk", ends, vectors, id1=[0, 1], id2=[1, 2]),
         *_recorders(folder, "forceN"),
@@ -381,24 +372,21 @@ def _vtk_files(folder: Path) -> list[Path]:
         files.append(folder / name)
         plain.write(files[-1], **how)
     files += _hdf_files(folder, cloud, grid)
-    files += [
-        write(
-            folder / f"all.{ending}",
-            f'<VTKFile type="{kind}"><{kind}><{tag} {key}="{file}" index="0"/></{kind}></VTKFile>',
-        )
-        for ending, kind, tag, key, file in (
-            ("pvtp", "PPolyData", "Piece", "Source", "cloud_ascii.vtp"),
-            ("pvtu", "PUnstructuredGrid", "Piece", "Source", "grid_binary.vtu"),
-            ("vtm", "vtkMultiBlockDataSet", "DataSet", "file", "cloud_binary.vtp"),
-        )
-    ]
-    index = folder / "list.pvd"
-    index.write_text(
+    pieces = {
+        "pvtp": ("PPolyData", 'Piece Source="cloud_ascii.vtp"'),
+        "pvtu": ("PUnstructuredGrid", 'Piece Source="grid_binary.vtu"'),
+        "vtm": ("vtkMultiBlockDataSet", 'DataSet file="cloud_binary.vtp"'),
+    }
+    lists = {
+        f"all.{ending}": f'<VTKFile type="{kind}"><{kind}><{piece} index="0"/></{kind}></VTKFile>'
+        for ending, (kind, piece) in pieces.items()
+    }
+    steps = "".join(f'<DataSet timestep="{step}" file="grid_ascii.vtu"/>\n' for step in range(2))
+    lists["list.pvd"] = (
         '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n<Collection>\n'
-        + "".join(f'<DataSet timestep="{step}" file="grid_ascii.vtu"/>\n' for step in range(2))
-        + "</Collection>\n</VTKFile>\n"
+        f"{steps}</Collection>\n</VTKFile>\n"
     )
-    return [*files, index]
+    return [*files, *_written(folder, lists)]
 
 
 def _hdf_files(folder: Path, cloud: pyvista.PolyData, grid) -> list[Path]:
@@ -421,26 +409,26 @@ def _hdf_files(folder: Path, cloud: pyvista.PolyData, grid) -> list[Path]:
 
 def _recorders(folder: Path, force: str) -> list[Path]:
     """Lines between points with their forces, in each encoding of the XML format."""
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
+
     mesh = pyvista.PolyData(_centres(), lines=[2, 0, 1, 2, 1, 2])
     mesh.cell_data[force] = np.array([[1.0, 0, 0], [2.0, 0, 0]])
     mesh.cell_data["id1"], mesh.cell_data["id2"] = np.array([0, 1]), np.array([1, 2])
     files = []
-    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
-
-    for mode in ("Ascii", "Binary", "Appended"):
-        for packed in (False, True):
-            for base64 in (False, True):
-                if (mode == "Ascii" and (packed or base64)) or (mode == "Binary" and base64):
-                    continue
-                writer = vtkXMLPolyDataWriter()
-                writer.SetInputData(mesh)
-                getattr(writer, f"SetDataModeTo{mode}")()
-                writer.SetEncodeAppendedData(base64)
-                if not packed:
-                    writer.SetCompressorTypeToNone()
-                files.append(folder / f"lines_{mode}_{packed:d}{base64:d}.vtp")
-                writer.SetFileName(str(files[-1]))
-                writer.Write()
+    for mode, packed, base64 in product(
+        ("Ascii", "Binary", "Appended"), (False, True), (False, True)
+    ):
+        if (mode == "Ascii" and (packed or base64)) or (mode == "Binary" and base64):
+            continue
+        writer = vtkXMLPolyDataWriter()
+        writer.SetInputData(mesh)
+        getattr(writer, f"SetDataModeTo{mode}")()
+        writer.SetEncodeAppendedData(base64)
+        if not packed:
+            writer.SetCompressorTypeToNone()
+        files.append(folder / f"lines_{mode}_{packed:d}{base64:d}.vtp")
+        writer.SetFileName(str(files[-1]))
+        writer.Write()
     for binary in (False, True):
         files.append(folder / f"lines_{binary:d}.vtk")
         mesh.save(files[-1], binary=binary)

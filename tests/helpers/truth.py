@@ -47,6 +47,16 @@ def vectors_by_pair(first_id, second_id, vectors) -> dict[tuple[int, int], np.nd
     }
 
 
+def centres(truth, prefix: str = "") -> np.ndarray:
+    """The columns x y z of a truth file, or those of another vector, such as nx ny nz."""
+    return np.column_stack([truth[f"{prefix}{axis}"] for axis in "xyz"])
+
+
+def true_vectors(truth, prefix: str) -> dict[tuple[int, int], np.ndarray]:
+    """A vector of each contact of a truth file, as ``vectors_by_pair`` turns them."""
+    return vectors_by_pair(truth["id1"], truth["id2"], centres(truth, prefix))
+
+
 def normals_by_pair(packing) -> dict[tuple[int, int], np.ndarray]:
     """Unit normals, towards the grain with the larger id."""
     ids = packing.id[packing.contacts.pairs]

@@ -56,7 +56,7 @@ def test_a_column_that_is_not_there_is_an_error_that_names_those_that_are(tmp_pa
 
 @pytest.mark.parametrize("value", [1.5, "nan", 1e300])
 def test_numbers_that_are_not_whole_are_an_error(tmp_path, value):
-    with pytest.raises(ReadError, match=r"expected whole numbers in the column clump, found"):
+    with pytest.raises(ReadError, match=r"the column clump: .* whole numbers"):
         dump(tmp_path, "clump", [1, 1, value, 2])
 
 

@@ -9,7 +9,6 @@ import struct
 import sys
 import tempfile
 import zlib
-from shutil import disk_usage
 
 import numpy as np
 import pytest
@@ -100,15 +99,15 @@ def test_what_does_not_fit_into_memory_is_told(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("start", "unit", "told"),
     [
-        (HEAD, b"<a/>", "no body and no contact in"),
-        (HEAD, b"<a>", "elements stand in one another"),
-        (HEAD + b"<a>", b"x", "no body and no contact in"),
-        (HEAD + b'<a b="', b"x", "no body and no contact in"),
-        (HEAD + b"<item><px>", b"<a/>", "no body and no contact in"),
+        (HEAD, b"<a/>", "no body in"),
+        (HEAD, b"<a>", r"elements [\d,]+ deep"),
+        (HEAD + b"<a>", b"x", "no body in"),
+        (HEAD + b'<a b="', b"x", "no body in"),
+        (HEAD + b"<item><px>", b"<a/>", "no body in"),
     ],
 )
 def test_endless_xml_is_left_early(tmp_path, monkeypatch, start, unit, told):
-    monkeypatch.setattr(yade_save, "BARREN", 50_000)
+    monkeypatch.setattr(yade_save, "BARREN", 1 << 21)
     path = tmp_path / "save.xml.bz2"
     # streams one behind the other are one file
     path.write_bytes(bz2.compress(start) + 1000 * bz2.compress(unit * (BLOCK // len(unit))))
@@ -141,33 +140,17 @@ def test_rows_that_cannot_be_those_counted_are_not_parsed(tmp_path, monkeypatch,
         scanfab.read(path)
 
 
-def test_a_copy_does_not_fill_the_disk(tmp_path, monkeypatch):
-    path = tmp_path / "dump.gz"
-    # not so empty that it is refused for that
-    noise = np.random.default_rng(0).bytes(1 << 17)
-    path.write_bytes(gzip.compress(noise + bytes(files.SMALL + files.PART - len(noise))))
-    usage = disk_usage(tmp_path)
-    monkeypatch.setattr(
-        files.shutil, "disk_usage", lambda _: usage._replace(free=files.PART, total=1 << 40)
-    )
-    with pytest.raises(ReadError, match=r"its content fills the disk of .* by TMPDIR"):
-        files.plain(path)
-    # what is small is read on a disk that is nearly full, as it always was
-    path.write_bytes(gzip.compress(bytes(files.PART)))
-    assert files.plain(path).stat().st_size == files.PART
-
-
 def test_a_folder_for_copies_that_cannot_be_used_is_named(tmp_path, monkeypatch):
     path = tmp_path / "dump.gz"
     path.write_bytes(gzip.compress(dump_text().encode()))
     gone = tmp_path / "gone"
     monkeypatch.setattr(tempfile, "tempdir", str(gone))
     told = rf"^dump: its content cannot be written to {gone}: No such file .* by TMPDIR"
-    monkeypatch.setattr(files, "_folder", [])
+    monkeypatch.setattr(files, "_folder", files._folder.__wrapped__)
     with pytest.raises(ReadError, match=told):
         files.plain(path)
     # made by this process, and removed by someone else since
-    monkeypatch.setattr(files, "_folder", [str(gone / "scanfab-1")])
+    monkeypatch.setattr(files, "_folder", lambda process: str(gone / "scanfab-1"))
     with pytest.raises(ReadError, match=told):
         files.plain(path)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import scanfab
-from scanfab.base.errors import ReadError, UnknownFormatError
+from scanfab.base.errors import ReadError
 from tests.helpers.dumps import dump_text, write
 
 STEPLESS = "x,y,z,radius\n0,0,0,1\n"
@@ -13,7 +13,6 @@ STEPLESS = "x,y,z,radius\n0,0,0,1\n"
 
 def opened(tmp_path, names, text=None, **options):
     for name in names:
-        (tmp_path / name).parent.mkdir(exist_ok=True)
         write(tmp_path / name, dump_text() if text is None else text)
     return scanfab.read_series(tmp_path, **options)
 
@@ -47,11 +46,9 @@ def test_the_names_beside_a_single_file_tell_its_step(tmp_path):
     assert scanfab.read(tmp_path / "run2_500_v3.csv").step == 500
     (tmp_path / "run2_600_v3.csv").unlink()
     assert scanfab.read(tmp_path / "run2_500_v3.csv").step is None
-
-
-def test_the_step_comes_from_the_file_not_its_name(tmp_path):
-    (frame,) = opened(tmp_path, ["frame_1.txt"], dump_text(step=5000))
-    assert frame.step == 5000
+    # a step in the file comes before that of its name
+    write(tmp_path / "run2_500_v3.csv", dump_text(step=5000))
+    assert scanfab.read(tmp_path / "run2_500_v3.csv").step == 5000
 
 
 @pytest.mark.parametrize(
@@ -85,11 +82,9 @@ def test_files_of_several_folders_may_be_one_series(tmp_path):
     "names", [("dump_1.txt", "dump_1.txt.gz"), ("dump_01.txt", "dump_1.txt"), ("d.txt", "d.txt.xz")]
 )
 def test_two_files_for_one_step_are_an_error_that_names_both(tmp_path, names):
-    with pytest.raises(
-        ReadError, match=r"two files for one step: .* and .*: name one of them"
-    ) as e:
+    with pytest.raises(ReadError, match=r"two files for one step: .* and .*: name one") as told:
         opened(tmp_path, names)
-    assert all(name in str(e.value) for name in names)
+    assert all(name in str(told.value) for name in names)
 
 
 @pytest.mark.filterwarnings("ignore::scanfab.ScanfabNote")
@@ -106,5 +101,3 @@ def test_the_kind_is_that_of_the_largest_file(tmp_path):
 
 def test_the_named_reader_is_used_for_all(tmp_path):
     assert opened(tmp_path, ["dump_1.txt"], format="lammps").grains.reader.name == "lammps"
-    with pytest.raises(UnknownFormatError, match="no reader called 'rocky'"):
-        scanfab.read_series(tmp_path, format="rocky")

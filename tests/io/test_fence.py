@@ -61,17 +61,10 @@ def test_answers_and_errors_come_through(path):
 
 
 @pytest.mark.parametrize("function", [crash, hang])
-def test_a_file_that_ends_the_worker_is_refused_for_a_while(path, monkeypatch, function):
+def test_a_file_that_ends_the_worker_is_an_error_and_the_next_is_read(path, monkeypatch, function):
     monkeypatch.setattr(fence, "SECONDS", 0.5)
     assert_ended(function, path)
     monkeypatch.undo()
-    assert_ended(read, path)
-    assert not fence._workers  # it was not tried again
-    monkeypatch.setattr(fence, "SECONDS_REFUSED", 0.0)
-    assert_read(path)
-    monkeypatch.undo()
-    assert_ended(read, path)
-    os.utime(path, (0, 0))  # it was written anew
     assert_read(path)
 
 
@@ -95,13 +88,6 @@ def test_memory_that_earlier_files_left_does_not_count(path):
     assert np.diff(counts).tolist() == [1, 1, 1]
 
 
-@pytest.mark.skipif(not hasattr(signal, "alarm"), reason="needs SIGALRM")
-def test_a_worker_that_hangs_ends_also_when_nobody_is_left_to_end_it(path, monkeypatch):
-    monkeypatch.setattr(fence, "SECONDS", -1.0)
-    monkeypatch.setattr(fence.threading.Timer, "start", lambda self: None)
-    assert_ended(hang, path)
-
-
 def test_threads_wait_for_each_other(path):
     found = []
     threads = [threading.Thread(target=lambda: found.append(fenced(read, path))) for _ in range(8)]
@@ -115,7 +101,8 @@ def test_threads_wait_for_each_other(path):
 def test_no_file_of_the_working_folder_is_run(path, tmp_path, monkeypatch):
     (tmp_path / "numpy.py").write_text(f"open({str(tmp_path / 'was run')!r}, 'w')")
     monkeypatch.chdir(tmp_path)
-    fence._end()
+    with pytest.raises(ReadError):
+        fenced(crash, path)
     assert_read(path)
     assert not (tmp_path / "was run").exists()
 

@@ -57,7 +57,7 @@ def test_contacts_end_at_finite_places(tmp_path, value):
     path = yade_lines(tmp_path / "a.vtk", ends)
     grains = GrainTable(np.zeros((1, 3)), np.ones(1), None, {}, None)
     read = VtkReader().read_contacts
-    refuses(read, Snapshot(path), ReadOptions(), grains, match="no finite numbers")
+    refuses(read, Snapshot(path), ReadOptions(), grains, match="finite ends")
 
 
 @pytest.mark.parametrize(("position", "radius"), [(np.nan, 1), (0, np.nan), (0, 0), (0, np.inf)])

@@ -1,19 +1,17 @@
-"""Readers found through entry points: broken plugins, clashes, and foreign plugins at work."""
+"""Readers found through entry points: the built-in ones, foreign plugins, and names of none."""
 
 from __future__ import annotations
-
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import scanfab
-from scanfab.base.errors import ReadError, ScanfabError, ScanfabWarning, UnknownFormatError
-from scanfab.io import registry
-from scanfab.io.reader import GrainTable, JoinedContacts, Snapshot
-from scanfab.io.registry import load_readers, reader_for, reader_named
+from scanfab.base.errors import ReadError, UnknownFormatError
+from scanfab.io import reader as registry
+from scanfab.io.reader import GrainTable, JoinedContacts, Snapshot, reader_for
 from scanfab.packing.contacts import ContactList
 from tests.helpers.dumps import dump_text, write
+from tests.helpers.plugins import offer
 from tests.helpers.truth import FLOOR, YADE
 
 
@@ -48,29 +46,6 @@ class NumbersReader:
             raise ReadError(f"{snapshot.path}: {error}") from None
 
 
-class FailingReader:
-    """A plugin that cannot be made."""
-
-    def __init__(self):
-        raise RuntimeError("needs a licence")
-
-
-class Point:
-    """An entry point of an installed package, without the package."""
-
-    def __init__(self, name, load, package="some-package"):
-        self.name, self.value, self.load = name, name, load
-        self.dist = SimpleNamespace(name=package) if package else None
-
-
-@pytest.fixture
-def with_plugin(monkeypatch):
-    """The built-in readers, and a foreign one."""
-    built_in = dict(registry.installed_readers())
-    foreign = load_readers([Point("numbers", lambda: NumbersReader)])
-    monkeypatch.setattr(registry, "installed_readers", lambda: {**built_in, **foreign})
-
-
 def test_the_built_in_readers_are_installed_like_any_other():
     installed = registry.installed_readers()
     assert {"liggghts", "vtk", "yade"} <= set(installed)
@@ -81,44 +56,28 @@ def test_the_built_in_readers_are_installed_like_any_other():
     assert installed["yade"].package == "scanfab"
 
 
-def test_a_plugin_that_cannot_be_made_is_one_warning_with_its_name():
-    points = [Point("broken", lambda: FailingReader), Point("numbers", lambda: NumbersReader)]
-    with pytest.warns(ScanfabWarning, match="'broken' of some-package .*RuntimeError: needs a lic"):
-        found = load_readers(points)
-    assert list(found) == ["numbers"]
-
-
-def test_two_packages_with_one_name_are_an_error_that_names_both():
-    points = [
-        Point("numbers", lambda: NumbersReader, "one"),
-        Point("numbers", lambda: NumbersReader, "two"),
-    ]
-    with pytest.raises(ScanfabError, match="'numbers': one and two; remove one of them"):
-        load_readers(points)
+@pytest.fixture
+def with_plugin(monkeypatch):
+    """The built-in readers, and a foreign one."""
+    offer(monkeypatch, "scanfab.readers", "numbers", lambda: NumbersReader)
+    registry.installed_readers.cache_clear()
+    yield
+    registry.installed_readers.cache_clear()
 
 
 @pytest.mark.usefixtures("with_plugin")
-def test_a_foreign_plugin_reads_a_series_like_the_built_in_ones(tmp_path):
+@pytest.mark.parametrize("format", [None, "numbers"])
+def test_a_foreign_plugin_reads_a_series_like_the_built_in_ones(tmp_path, format):
     for step in (9, 10):
         write(tmp_path / f"g_{step}.dat", f"numbers of grains\n0 0 0 1\n1.9 0 0 1\n0 0 {step} 1\n")
         write(tmp_path / f"c_{step}.dat", "numbers of contacts\n0 1\n")
-    frames = [frame.read() for frame in scanfab.read_series(tmp_path)]
-    assert [frame.step for frame in frames] == [9, 10]
-    assert [len(frame) for frame in frames] == [3, 3]
+    frames = [frame.read() for frame in scanfab.read_series(tmp_path, format=format)]
+    assert [(frame.step, len(frame)) for frame in frames] == [(9, 3), (10, 3)]
     np.testing.assert_array_equal(frames[1].contacts.pairs, [[0, 1]])
-
-
-@pytest.mark.usefixtures("with_plugin")
-def test_a_foreign_plugin_can_be_named(tmp_path):
-    assert reader_named("numbers").name == "numbers"
-    path = write(tmp_path / "a.txt", "numbers of grains\n0 0 0 1\n")
-    assert len(scanfab.read(path, format="numbers")) == 1
 
 
 def test_a_name_that_does_not_exist_is_an_error_that_lists_those_that_do():
     with pytest.raises(UnknownFormatError, match=r"called 'rocky'.* liggghts, .*, vtk, xyz, yade"):
-        reader_named("rocky")
-    with pytest.raises(UnknownFormatError, match="no reader called 'rocky'"):
         scanfab.read(FLOOR / "tutorial.txt", format="rocky")
 
 
@@ -137,11 +96,7 @@ def test_a_reader_is_found_by_the_content(path, name):
     assert reader_for(path).name == name
 
 
-def test_no_reader_is_found_for_other_files(tmp_path):
-    for name in ("log.txt", "deck.vtk", "notes.dump", "x.vtu"):
-        assert reader_for(write(tmp_path / name, "hello\n")) is None
-
-
 def test_the_name_of_a_file_does_not_matter(tmp_path):
-    assert reader_for(write(tmp_path / "x.vtu", dump_text())).name == "liggghts"
-    assert reader_for(write(tmp_path / "no_ending_at_all", dump_text())).name == "liggghts"
+    for name in ("log.txt", "deck.vtk", "notes.dump", "x.vtu", "no_ending_at_all"):
+        assert reader_for(write(tmp_path / name, "hello\n")) is None
+        assert reader_for(write(tmp_path / name, dump_text())).name == "liggghts"

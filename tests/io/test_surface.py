@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import pyvista
 
-from scanfab import ReadError, polyhedron
+from scanfab import ReadError, ScanfabError, polyhedron
 from scanfab.io.surface import SUFFIXES, read_surface
 from tests.helpers.windows import OF_A_BOX, corners_of_a_box
 
@@ -59,8 +59,6 @@ def test_what_is_no_surface_is_told(tmp_path, suffix, content):
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_a_file_that_ends_too_early_gives_no_other_body(tmp_path, suffix):
-    from scanfab import ScanfabError
-
     path = write(tmp_path / f"box{suffix}", OF_A_BOX)
     whole = path.read_bytes()
     for share in (0.2, 0.5, 0.8):

@@ -52,6 +52,14 @@ def test_an_origin_is_a_point():
         Cell(EDGES, origin=[0, 0])
 
 
+@pytest.mark.parametrize("tilt", [0, 1e31])
+def test_a_cell_with_a_damaged_number_is_refused(tilt):
+    with pytest.raises(PackingError, match="times as long as it is high"):
+        Cell([[1, 0, 0], [0, 1, 0], [tilt, 0, 1e31]])
+    # what does not repeat may be as long as it likes
+    assert Cell([1, 1, 1e31], (True, True, False)).lattice.shortest == 1
+
+
 @pytest.mark.parametrize("wrong", [np.nan, np.inf])
 def test_a_cell_is_finite(wrong):
     with pytest.raises(PackingError, match="must be finite numbers"):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scanfab.packing.inner import inner_ellipsoid
+from scanfab.packing.window import inner_ellipsoid
 from tests.helpers.lattices import ball_points, rotation
 
 

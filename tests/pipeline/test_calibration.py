@@ -16,13 +16,13 @@ from scanfab import (
     compute,
     find_contacts,
 )
+from scanfab.base.column import columns_of_fields
 from scanfab.pipeline.calibration_ladders import (
     StepRow,
     first_steady,
     judged,
     sentence_of_recommended,
 )
-from scanfab.table.columns import columns_of
 from scanfab.viz.figures.calibration import Ladders
 from scanfab.viz.figures.page import drawn_page, save_figures
 from tests.helpers.lattices import shaken_cubic, simple_cubic
@@ -102,7 +102,12 @@ def test_whole_sample_has_no_ladder_of_rvs(packing):
 def step(value, alpha, error, **more):
     words = {"value": value, "variant": "c", "alpha_vs_axial": alpha, "alpha_vs_axial_se": error}
     return StepRow(
-        **{**{column.name: None for column in columns_of(StepRow)}, "note": "", **words, **more}
+        **{
+            **{column.name: None for column in columns_of_fields(StepRow)},
+            "note": "",
+            **words,
+            **more,
+        }
     )
 
 

@@ -14,7 +14,7 @@ from scanfab.cli.main import run
 from scanfab.packing import rattlers
 from scanfab.pipeline.calibration import calibrate
 from scanfab.pipeline.inspection import inspect_series
-from scanfab.table.reading import read_rows
+from scanfab.table.formats import read_rows
 from scanfab.viz.frame_view import look_at
 from tests.helpers.dumps import dump_text, write
 from tests.helpers.lattices import simple_cubic

@@ -10,8 +10,8 @@ import pytest
 from scanfab.base.errors import ReadError
 from scanfab.cli.compute import compute
 from scanfab.cli.main import run
-from scanfab.pipeline.manifest import asked_for
-from scanfab.pipeline.repeat import read_manifest, reopen, repeat_command, restored_settings
+from scanfab.pipeline.record import asked_for, read_manifest
+from scanfab.pipeline.repeat import reopen, repeat_command, restored_settings
 from scanfab.pipeline.settings import Settings
 from tests.conftest import ROOT, SAMPLE
 

@@ -11,8 +11,8 @@ import pytest
 import scanfab
 from scanfab import Cell, ContactList, Packing, Sample, Window, sphere
 from scanfab.base.shapes import box, cylinder
+from scanfab.packing.contacts import ListedWallForces
 from scanfab.packing.sample import VARIANTS
-from scanfab.packing.walls import ListedWallForces
 from scanfab.pipeline.state import cut_volumes, lenses, sample_state, surely_inside
 from tests.fabric.test_forces import directions
 from tests.helpers.lattices import simple_cubic

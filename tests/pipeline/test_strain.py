@@ -103,15 +103,21 @@ def test_other_columns_and_blanks_do_not_matter(tmp_path):
     assert StrainFile(write(tmp_path / "s.csv", text)).at(0, 1000) == 0.5
 
 
-@pytest.mark.parametrize("text", ["", "step,epsilon\n1,2\n", "time,strain\n1,2\n"])
-def test_a_missing_column_is_an_error_that_names_the_file(tmp_path, text):
-    with pytest.raises(ReadError, match=r"s.csv: expected the columns step or frame, and strain"):
+COLUMNS = "the columns step or frame, and strain, found "
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("", "a table"), ("step,epsilon\n1,2\n", COLUMNS), ("time,strain\n1,2\n", COLUMNS)],
+)
+def test_a_missing_column_is_an_error_that_names_the_file(tmp_path, text, expected):
+    with pytest.raises(ReadError, match=rf"s\.csv: expected {expected}"):
         StrainFile(write(tmp_path / "s.csv", text))
 
 
 @pytest.mark.parametrize("row", ["10,high", ",0.1", "10,", "10", "10.7,0.1", "1e999,0.1"])
 def test_a_value_that_is_no_number_is_an_error_that_names_the_line(tmp_path, row):
-    with pytest.raises(ReadError, match=r"s.csv, line 3: expected numbers as step and strain"):
+    with pytest.raises(ReadError, match=r"s\.csv, line 3: expected"):
         StrainFile(write(tmp_path / "s.csv", f"step,strain\n0,0\n{row}\n"))
 
 
@@ -125,7 +131,7 @@ def test_a_file_that_is_no_text_is_an_error(tmp_path):
 @pytest.mark.parametrize("cell", ["9" * 140_000, "0.\0"])
 def test_a_cell_that_no_csv_file_has_is_an_error_that_names_the_file(tmp_path, cell):
     path = write(tmp_path / "s.csv", f"step,strain\n0,{cell}\n")
-    with pytest.raises(ReadError, match=r"s\.csv, line 2: .*expected numbers"):
+    with pytest.raises(ReadError, match=r"s\.csv, line 2: expected .*, found .{,100}$"):
         StrainFile(path)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 
 import numpy as np
 import pytest
@@ -13,35 +12,28 @@ from scanfab.table.compare import compare_tables
 from scanfab.table.table import load
 from tests.helpers.tables import CONTACT, STRAIN, VOID, curve, sheared
 
+OCTANTS = range(1, 9)
+
 
 def summary_of(rows, **options):
     (row,) = compare_tables(rows, **options).summary
     return row
 
 
-def test_each_curve_is_divided_by_its_own_largest_absolute_value():
-    frames = compare_tables(curve()).frames
-    assert [row.alpha_vs_axial for row in frames] == list(VOID)
-    np.testing.assert_allclose([row.alpha_vs_axial_norm for row in frames], np.array(VOID) / 0.05)
-    np.testing.assert_allclose([row.alpha_c_axial_norm for row in frames], np.array(CONTACT) / 0.1)
-
-
-def test_groups_are_source_and_variant():
+def test_each_curve_of_a_source_and_variant_is_divided_by_its_own_largest_absolute_value():
     rows = [*curve("one", "c"), *curve("one", "d", 2.0), *curve("two", "c", 4.0)]
     comparison = compare_tables(rows)
     groups = [(row.source, row.variant) for row in comparison.summary]
     assert groups == [("one", "c"), ("one", "d"), ("two", "c")]
-    assert [row.alpha_vs_axial_norm for row in comparison.frames] == pytest.approx(
-        3 * list(np.array(VOID) / 0.05)
-    )
+    frames = comparison.frames
+    assert frames["alpha_vs_axial"].tolist() == [row["alpha_vs_axial"] for row in rows]
+    assert frames["alpha_vs_axial_norm"] == pytest.approx(3 * [x / 0.05 for x in VOID])
+    assert frames["alpha_c_axial_norm"] == pytest.approx(3 * [x / 0.1 for x in CONTACT])
 
 
 def test_several_rows_of_a_frame_are_refused():
     """Those of several cut-offs would make one curve of many."""
-    with pytest.raises(
-        SettingsError,
-        match=r"one, variant c: several rows for frame 0.*`cutoff`; .*`labels=NAME`",
-    ):
+    with pytest.raises(SettingsError, match=r"one, variant c: several rows for frame 0: choose"):
         compare_tables([*curve("one", "d"), *curve("one", "c"), *curve("one", "c", 2.0)])
 
 
@@ -56,63 +48,45 @@ def test_slopes_are_those_of_least_squares():
     assert row.slope_origin == pytest.approx(origin, rel=1e-12)
 
 
-def test_frames_give_the_slope_no_standard_error():
-    assert summary_of(curve()).slope_se is None
-
-
 def with_octants(rows):
     """Rows with values without each octant, which octant k changes in its own way."""
-    return [
-        {
-            **row,
-            **{f"alpha_vs_axial_without_{k}": row["alpha_vs_axial"] * (1 + 0.01 * k * frame)
-               for k in range(1, 9)},
-            **{f"alpha_c_axial_without_{k}": row["alpha_c_axial"] + 0.001 * k * frame
-               for k in range(1, 9)},
-        }
-        for frame, row in enumerate(rows)
-    ]  # fmt: skip
+    of = {"alpha_vs_axial": void_without, "alpha_c_axial": contact_without}
+    names = [(f"{name}_without_{k}", without, k) for name, without in of.items() for k in OCTANTS]
+    return [row | {name: without(row, k) for name, without, k in names} for row in rows]
+
+
+def void_without(row, octant):
+    return row["alpha_vs_axial"] * (1 + 0.01 * octant * row["frame"])
+
+
+def contact_without(row, octant):
+    return row["alpha_c_axial"] + 0.001 * octant * row["frame"]
 
 
 def test_octants_left_out_in_all_frames_give_the_slope_its_standard_error():
     """√(7/8 Σ (slope_k - mean)²), the slopes by least squares of the values without octant k."""
     slopes = []
-    for k in range(1, 9):
-        void = [one * (1 + 0.01 * k * frame) for frame, one in enumerate(VOID)]
-        contact = [one + 0.001 * k * frame for frame, one in enumerate(CONTACT)]
+    for k in OCTANTS:
+        void, contact = ([of(row, k) for row in curve()] for of in (void_without, contact_without))
         slopes.append(np.polyfit(contact, void, 1)[0])
     expected = math.sqrt(7 * np.var(slopes))
     assert expected > 1e-3
     row = summary_of(with_octants(curve()))
     assert row.slope_se == pytest.approx(expected, rel=1e-9)
     assert row.slope == pytest.approx(summary_of(curve()).slope, rel=1e-12)
-
-
-def test_octants_of_frames_beyond_the_largest_strain_do_not_count():
-    rows = with_octants(curve())
-    assert summary_of(rows, strain_max=0.02).slope_se == pytest.approx(
-        summary_of(rows[:3]).slope_se, rel=1e-12
-    )
-
-
-def test_octants_that_are_alike_give_no_error_at_all():
-    same = {f"{name}_without_{k}": name for name in ("alpha_vs_axial", "alpha_c_axial")
-            for k in range(1, 9)}  # fmt: skip
-    rows = [{**row, **{name: row[whole] for name, whole in same.items()}} for row in curve()]
-    assert summary_of(rows).slope_se == pytest.approx(0.0, abs=1e-15)
+    # those of frames beyond the largest strain do not count
+    first = summary_of(with_octants(curve())[:3]).slope_se
+    assert summary_of(with_octants(curve()), strain_max=0.02).slope_se == first
 
 
 @pytest.mark.parametrize("column", ["alpha_vs_axial_without_3", "alpha_c_axial_without_8"])
-def test_a_frame_without_octants_leaves_the_slope_without_error(column):
+def test_without_octants_of_all_frames_the_slope_has_no_error(column):
     rows = with_octants(curve())
     rows[1][column] = None
-    assert summary_of(rows).slope_se is None
-    rows = [{name: value for name, value in row.items() if name != column} for row in rows]
-    assert summary_of(rows).slope_se is None
-    assert summary_of(rows).slope is not None
-
-
-def test_under_three_frames_there_is_no_error_either():
+    lacking = [{name: value for name, value in row.items() if name != column} for row in rows]
+    for some in (rows, lacking, curve()):
+        assert summary_of(some).slope_se is None
+        assert summary_of(some).slope is not None
     assert summary_of(with_octants(curve())[:2]).slope_se is None
 
 
@@ -131,6 +105,7 @@ def test_under_three_frames_the_slope_is_empty(count):
         assert row.final == VOID[count - 1]
 
 
+@pytest.mark.filterwarnings("error")
 def test_frames_beyond_the_largest_strain_are_out_of_the_fit_alone():
     row = summary_of(curve(), strain_max=0.02)
     assert row.frames == 3
@@ -139,16 +114,11 @@ def test_frames_beyond_the_largest_strain_are_out_of_the_fit_alone():
     assert len(compare_tables(curve(), strain_max=0.02).frames) == 5
 
 
-def test_a_frame_at_the_largest_strain_belongs_to_the_fit_but_for_rounding():
+@pytest.mark.parametrize(("beyond", "frames"), [(0.0, 4), (2e-6, 4), (2e-5, 3)])
+def test_a_frame_at_the_largest_strain_belongs_to_the_fit_but_for_rounding(beyond, frames):
     """Boxes of six digits make 0.1200012 of 12 %."""
-    rows = [dict(row) for row in curve()]
-    inside = summary_of(rows, strain_max=0.03).frames
-    for row in rows:
-        row["strain"] += 2e-6
-    assert summary_of(rows, strain_max=0.03).frames == inside
-    for row in rows:
-        row["strain"] += 2e-5
-    assert summary_of(rows, strain_max=0.03).frames == inside - 1
+    rows = [{**row, "strain": row["strain"] + beyond} for row in curve()]
+    assert summary_of(rows, strain_max=0.03).frames == frames
 
 
 def test_frames_without_a_strain_are_out_of_a_fit_up_to_a_strain():
@@ -158,29 +128,20 @@ def test_frames_without_a_strain_are_out_of_a_fit_up_to_a_strain():
         assert summary_of(rows, strain_max=1.0).frames == 0
 
 
-@pytest.mark.parametrize(("largest", "kind"), [(5.0, ScanfabWarning), (0.5, ScanfabNote)])
-def test_a_largest_strain_that_leaves_out_nothing_says_that_strains_are_fractions(largest, kind):
-    message = rf"{largest:g} leaves out no frame: .* fractions \(5 % is 0.05\), .* 0 and 0.04"
-    with pytest.warns(kind, match=message):
-        assert summary_of(curve(), strain_max=largest).frames == 5
-
-
-def test_a_largest_strain_that_leaves_out_frames_says_nothing():
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        summary_of(curve(), strain_max=0.02)
-
-
-def test_a_largest_strain_that_leaves_out_all_frames_is_a_warning():
-    message = "strain_max: -1 leaves out all frames, so none is fitted: .* between 0 and 0.04"
-    with pytest.warns(ScanfabWarning, match=message):
-        assert summary_of(curve(), strain_max=-1).frames == 0
-
-
-def test_a_largest_strain_that_leaves_too_few_frames_names_the_next_strain():
-    message = "strain_max: 0.01 leaves 2 of 5 frames of .*, and a line needs 3: .* above is 0.02$"
-    with pytest.warns(ScanfabWarning, match=message):
-        assert summary_of(curve(), strain_max=0.01).slope is None
+@pytest.mark.parametrize(
+    ("largest", "frames", "kind", "message"),
+    [
+        (5.0, 5, ScanfabWarning, r"5 leaves out no frame: .* fractions .* between 0 and 0.04"),
+        (0.5, 5, ScanfabNote, r"0.5 leaves out no frame: .* fractions .* between 0 and 0.04"),
+        (-1, 0, ScanfabWarning, "-1 leaves 0 of 5 frames of .* between 0 and 0.04"),
+        (0.01, 2, ScanfabWarning, "0.01 leaves 2 of 5 frames .* needs 3: .* above is 0.02;"),
+    ],
+)
+def test_a_largest_strain_that_leaves_out_nothing_or_too_much_is_told(
+    largest, frames, kind, message
+):
+    with pytest.warns(kind, match=f"strain_max: {message}"):
+        assert summary_of(curve(), strain_max=largest).frames == frames
 
 
 def test_a_largest_strain_that_is_no_number_is_refused():
@@ -188,22 +149,13 @@ def test_a_largest_strain_that_is_no_number_is_refused():
         summary_of(curve(), strain_max=math.nan)
 
 
-def test_of_a_sheared_cell_the_largest_strain_is_the_shear_strain():
-    with pytest.warns(ScanfabNote, match="shear_strain stands in for the axial strain"):
+def test_a_sheared_cell_goes_by_its_shear_strain_and_its_turned_axes_are_told():
+    with pytest.warns(ScanfabNote) as caught:
         row = summary_of(sheared(), strain_max=0.2)
-    assert row.frames == 3
-    assert row.peak_strain == 0.4
-
-
-def test_turned_axes_are_told_where_axial_values_are_compared():
-    with pytest.warns(ScanfabNote) as told:
-        compare_tables(sheared())
-    texts = [str(one.message) for one in told]
-    (text,) = [one for one in texts if "loading axis is not the axis of the contact" in one]
-    assert "slope and peak, miss most of the fabric" in text
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        compare_tables(curve())
+    assert (row.frames, row.peak_strain) == (3, 0.4)
+    told = " ".join(str(one.message) for one in caught)
+    assert "shear_strain stands in for the axial strain" in told
+    assert "the loading axis is not the axis of the contact fabric" in told
 
 
 def test_errors_stand_beside_their_values():
@@ -255,19 +207,9 @@ def test_differences_without_standard_errors_have_none():
     assert [row.difference_se for row in compare_tables(rows).differences[:2]] == [None, None]
 
 
-def test_a_table_without_the_columns_is_refused():
-    rows = curve()
-    rows[1].pop("strain")
-    with pytest.raises(SettingsError, match=r"row 2: there is no column strain: expected a"):
-        compare_tables(rows)
-
-
-@pytest.mark.parametrize("column", ["strain", "alpha_vs_axial", "alpha_c_axial"])
-@pytest.mark.parametrize("value", ["abc", float("nan"), float("inf"), [1]])
-def test_a_word_among_the_numbers_is_named(column, value):
-    rows = [*curve()[:2], {**curve()[2], column: value}]
-    with pytest.raises(SettingsError, match=f"row 3: {column}: expected a number, found "):
-        compare_tables(rows)
+def test_rows_of_no_fabric_table_are_refused():
+    with pytest.raises(SettingsError, match="row 6: strain: expected a number, found 'abc'"):
+        compare_tables([*curve(), {**curve()[2], "strain": "abc"}])
 
 
 def noisy_replicates(rows, random):

@@ -13,7 +13,7 @@ PACKAGE = Path(__file__).parents[1] / "packages" / "scanfab-mycode"
 KIT = """
 import sys
 from pathlib import Path
-from scanfab.io.registry import reader_named
+from scanfab.io.reader import reader_named
 from scanfab.io.writer import writer_named
 from scanfab.testing import check_reader, check_writer
 

@@ -7,7 +7,7 @@ import warnings
 import pytest
 
 import scanfab
-from scanfab.io.registry import reader_named
+from scanfab.io.reader import reader_named
 from scanfab.io.writer import installed_writers, writer_named
 from scanfab.testing import check_reader, check_writer, made_up_packings
 from tests.helpers.sound_files import seeds
@@ -52,7 +52,8 @@ def test_readers_of_dumps_pass(tmp_path, name):
         for path in made
         if path.is_file() and reader.recognises(path) and reader.kind(path) == "grains"
     ]
-    check_reader(reader, grains[:4], tmp_path / "damaged")
+    # behind these, some need options
+    check_reader(reader, grains[:3], tmp_path / "damaged")
 
 
 def test_vtk_files_of_any_program_pass(tmp_path):

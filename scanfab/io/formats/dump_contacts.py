@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import accumulate
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.io.columns import refuse_named_twice
+from scanfab.io.columns import refuse_named_twice, whole_numbers
 from scanfab.io.contacts import branches, join_ids, rows_of_ids
 from scanfab.io.reader import GrainTable, JoinedContacts
 
@@ -40,22 +40,30 @@ class Places(NamedTuple):
     """Whether all pairs in the list touch; LAMMPS lists all within a cut-off."""
 
 
+@np.errstate(all="ignore")
 def join_places(
     path: Path, values: FloatArray, places: Places, grains: GrainTable
 ) -> JoinedContacts:
-    """The pairs that touch, and the force on the second grain of each."""
-    listed = values[:, places.ids]
-    if not (are_whole(listed) and np.all(np.abs(listed) < 2.0**53)):
-        first, second = (place + 1 for place in places.ids)
-        raise ReadError(f"{path}: expected ids in the columns {first} and {second}")
-    ids, force, normal = listed.astype(np.int64), None, None
-    if places.force:
-        force = -sum((values[:, triple] for triple in places.force[1:]), values[:, places.force[0]])
-    if places.normal is not None:
-        normal = -values[:, places.normal]
+    """
+    The pairs that touch, and the force on the second grain of each.
+
+    Of a list within a cut-off the pairs with a force touch, or if none is known those that overlap;
+    all touch if no gap is wide.
+    """
+    first, second = places.ids
+    where = f", columns {first + 1} and {second + 1}"
+    ids = np.column_stack([whole_numbers(path, values[:, k], where) for k in places.ids])
+    triples = [values[:, triple] for triple in places.force]
+    force = -np.sum(triples, axis=0) if triples else None
+    normal = None if places.normal is None else -values[:, places.normal]
     if not places.touch:
-        rows = _touching(grains, rows_of_ids(grains, ids), force)
-        ids, force = ids[rows], None if force is None else force[rows]
+        rows = rows_of_ids(grains, ids)
+        known, gap = (rows >= 0).all(axis=1), np.zeros(len(rows))
+        gap[known] = _gaps(grains, rows[known])
+        if np.any(gap > ROUNDING):
+            # ids that no grain has stay, for the error that names them
+            touches = ~known | (gap < 0 if force is None else force.any(axis=1))
+            ids, force = ids[touches], None if force is None else force[touches]
     return join_ids(path, grains, ids, force, walls=False, force_n=normal)
 
 
@@ -78,45 +86,35 @@ def named_places(path: Path, told: str, names: list[str]) -> Places:
     pairs = [part.partition("=") for part in told.split(",")]
     named = {key.strip(): own.strip() for key, _, own in pairs}
     known = ({*IDS}, {*IDS, *FORCE}, {*IDS, *FORCE, *TANGENTIAL})
-    wrong = set(named) not in known or len(named) < len(pairs)
-    if wrong or not set(named.values()) <= set(names):
+    if set(named) not in known or len(named) < len(pairs) or not {*named.values()} <= {*names}:
         raise ReadError(
-            f"{path}: `contact_columns`: expected id1=NAME,id2=NAME, and fx, fy, fz (with tx, ty, "
-            f"tz) for the force on the first grain, found {told!r}; the columns are "
-            f"{', '.join(names)}"
+            f"{path}: `contact_columns`: expected id1=NAME,id2=NAME, and fx, fy, fz (tx, ty, tz) "
+            f"for the force on the first grain, found {told!r}; the columns are {', '.join(names)}"
         )
     refuse_named_twice(path, {key: named[key] for key in IDS}, "contact_columns")
-    place = {key: names.index(own) for key, own in named.items()}
-    triples = [[place[key] for key in triple if key in place] for triple in (FORCE, TANGENTIAL)]
-    ids = [place[key] for key in IDS]
-    return Places(ids, [triple for triple in triples if triple], touch=False)
+    triples = [triple for triple in (FORCE, TANGENTIAL) if triple[0] in named]
+    ids, *force = ([names.index(named[key]) for key in keys] for keys in (IDS, *triples))
+    return Places(ids, force, touch=False)
 
 
 def _keyword_places(path: Path, told: str, width: int) -> Places:
-    sizes, asked = dict(PAIR_VALUES), set()
-    for word in told.split():
-        name, _, count = word.partition(":")
-        if name == "history" and count.isdecimal():
-            sizes[name] = int(count)
-        asked.add(name)
-    if not asked <= sizes.keys() or "id" not in asked:
+    """Columns by the keywords of compute pair/gran/local; history:N says how many values it has."""
+    asked = dict(word.partition(":")[::2] for word in told.split())
+    sizes = {name: size for name, size in PAIR_VALUES.items() if name in asked}
+    if asked.get("history", "").isdecimal():
+        sizes["history"] = int(asked["history"])
+    count = sum(sizes.values())
+    if len(sizes) < len(asked) or "id" not in asked or count != width:
         raise ReadError(
             f"{path}: `contact_columns`: expected id1=NAME,id2=NAME, or keywords of compute "
-            f"pair/gran/local, id among them ({', '.join(sizes)}), found {told!r}"
+            f"pair/gran/local, id among them ({', '.join(PAIR_VALUES)}), which make {width} "
+            f"columns; {told!r} makes {count}"
         )
-    columns, place = {}, 0
-    for name in [name for name in sizes if name in asked]:
-        columns[name] = list(range(place, place + sizes[name]))
-        place += sizes[name]
-    if place != width:
-        raise ReadError(
-            f"{path}: `contact_columns={told!r}` makes {place} columns, the file has {width}"
-        )
-    normal, tangential = columns.get("force_normal"), columns.get("force_tangential")
-    force = [columns["force"]] if "force" in columns else []
-    if not force and normal and tangential:
-        force = [normal, tangential]
-    return Places(columns["id"][:2], force, normal)
+    starts = dict(zip(sizes, accumulate(sizes.values(), initial=0), strict=False))
+    triple = {name: [start, start + 1, start + 2] for name, start in starts.items()}
+    normal, tangential = triple.get("force_normal"), triple.get("force_tangential")
+    parts = [normal, tangential] if normal and tangential else []
+    return Places(triple["id"][:2], [triple["force"]] if "force" in triple else parts, normal)
 
 
 def are_whole(values: FloatArray) -> bool:
@@ -151,15 +149,14 @@ def id_column(values: FloatArray, grains: GrainTable, *, is_flagged: bool) -> in
         if not all(are_ids(column, grains) for column in pairs.T):
             continue
         if is_flagged:
-            fits = np.isin(values[:, place + 2], (0, 1)).all() and np.all(
-                pairs[:, 0] != pairs[:, 1]
-            )
+            is_pair = np.isin(values[:, place + 2], (0, 1)) & (pairs[:, 0] != pairs[:, 1])
+            fits = bool(is_pair.all())
         else:
             rows = rows_of_ids(grains, pairs)
-            fits = (
-                np.mean(_gaps(grains, rows[(rows >= 0).all(axis=1)]) < NEIGHBOURS - 1) > NEARLY_ALL
-            )
-            fits &= len(np.unique(np.sort(pairs, axis=1), axis=0)) >= 0.5 * len(pairs)
+            gaps = _gaps(grains, rows[(rows >= 0).all(axis=1)])
+            single = len(np.unique(np.sort(pairs, axis=1), axis=0))
+            is_near = bool(np.mean(gaps < NEIGHBOURS - 1) > NEARLY_ALL)
+            fits = is_near and single >= 0.5 * len(pairs)
         if fits:
             found.append(place)
     return found[0] if len(found) == 1 else None
@@ -184,22 +181,3 @@ def _gaps(grains: GrainTable, rows: IntArray) -> FloatArray:
     length = np.linalg.norm(branches(grains, rows), axis=1)
     gaps: FloatArray = length / grains.radius[rows].sum(axis=1) - 1.0
     return gaps
-
-
-@np.errstate(all="ignore")
-def _touching(
-    grains: GrainTable, rows: IntArray, force: FloatArray | None
-) -> npt.NDArray[np.bool_]:
-    """
-    Which pairs touch: all, if there is no wide gap between any; else those with a force.
-
-    If no forces are known, the pairs that overlap touch. Ids that no grain has stay, for the error
-    that names them.
-    """
-    known = (rows >= 0).all(axis=1)
-    gap = np.zeros(len(rows))
-    gap[known] = _gaps(grains, rows[known])
-    if not np.any(gap > ROUNDING):
-        return np.ones(len(rows), dtype=bool)
-    touches = gap < 0 if force is None else force.any(axis=1)
-    return np.asarray(touches | ~known)

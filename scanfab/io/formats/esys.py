@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import numpy as np
 from scanfab.base.errors import ReadError
 from scanfab.io.files import file_inside, first_bytes
 from scanfab.io.formats.shared import GrainsOnly, cell_of, numbers
+from scanfab.io.mesh import joined_arrays
 from scanfab.io.reader import Snapshot
 from scanfab.io.text import Columns, Layout, read_rows, spelt, text_of
 from scanfab.packing.cell import Cell
@@ -23,19 +25,12 @@ HEADER = re.compile(
 )
 # centre, radius, id, tag, mass; first and last centre, velocity, force, shift through the box
 BASIC = "x y z radius id tag mass x0 y0 z0 xo yo zo vx vy vz fx fy fz sx sy sz"
-ROTATING = "q0 q1 q2 q3 wx wy wz"
-# snapshots and checkpoints, without and with rotation
-LAYOUTS = {
-    len(names.split()): tuple(names.split())
-    for names in (
-        BASIC,
-        f"{BASIC} {ROTATING}",
-        f"{BASIC} is_dynamic",
-        f"{BASIC} is_dynamic inertia {ROTATING} is_rot",
-    )
-}
-# names of a header and of a worker's file, and the first line of the latter
-NAME, PART = re.compile(r"(.*_)0(\.\w+)"), re.compile(r"(.*_t=\d+_)[1-9]\d*(\.\w+)")
+TURNS = "q0 q1 q2 q3 wx wy wz"
+# snapshots and checkpoints, without and with rotation; by the number of their columns
+TITLES = (BASIC, f"{BASIC} {TURNS}", f"{BASIC} is_dynamic", f"{BASIC} is_dynamic i {TURNS} is_rot")
+LAYOUTS = {len(one.split()): Layout(tuple(one.split()), whole=["id"]) for one in TITLES}
+# name of a worker's file, and the number of particles in its first line
+PART = re.compile(r"(.*_t=\d+_)[1-9]\d*(\.\w+)")
 COUNT = re.compile(rb"\s*(\d{1,15})[ \t]*\r?\n")
 LONGEST = 1 << 20
 
@@ -59,10 +54,8 @@ class EsysReader(GrainsOnly):
 
     def beside(self, path: Path) -> list[Path]:
         """The files of the workers, called like their header but for the last number."""
-        match = NAME.fullmatch(path.name)
-        if match is None:
-            return []
-        pattern = re.compile(re.escape(match[1]) + r"[1-9]\d*" + re.escape(match[2]))
+        stem, suffix = re.escape(path.stem[:-1]), re.escape(path.suffix)
+        pattern = re.compile(rf"{stem}[1-9]\d*{suffix}")
         return sorted(one for one in path.parent.iterdir() if pattern.fullmatch(one.name))
 
     def listed_by(self, path: Path) -> Path | None:
@@ -76,17 +69,19 @@ class EsysReader(GrainsOnly):
         # the names are absolute where the run was: the files lie beside their header
         names = [word.decode("utf-8", "replace").replace("\\", "/") for word in head[8].split()]
         files = [file_inside(path, name.rpartition("/")[2]) for name in names]
-        if not files or len(set(files)) < len(files):
-            raise ReadError(f"{path}: expected the names of its workers' files, found {names}")
-        parts = [_particles(file) for file in files]
-        shared = min(parts, key=len)
-        columns = {name: np.concatenate([part[name] for part in parts]) for name in shared}
+        # the program writes no line end behind the last name: a header may be cut at any of them
+        lost = {one.name for one in self.beside(path)} - {one.name for one in files}
+        if lost or not files or len(set(files)) < len(files):
+            raise ReadError(
+                f"{path}: expected the name of each worker's file once, found {names}, and beside "
+                f"it {len(lost)} others: it was cut, or these are of another run"
+            )
+        columns = joined_arrays([_particles(file) for file in files])
         low, high = np.reshape(numbers(f"{path}: BoundingBox", head[3], 6), (2, 3))
-        along, edges = [one == b"1" for one in head.group(4, 5, 6)], high - low
-        if head[7] == b"2" and edges[2] <= 0:
-            # a plane is not periodic across, whatever the header says
-            along[2], edges[2] = False, max(edges[:2])
-        return columns, cell_of(f"{path}: BoundingBox", edges, along, low)
+        # a plane is not periodic across, whatever the header says
+        along = [one == b"1" for one in head.group(4, 5, 6)]
+        along[2] &= head[7] == b"3" or bool(low[2] < high[2])
+        return columns, cell_of(f"{path}: BoundingBox", high - low, along, low)
 
 
 def _header(path: Path) -> re.Match[bytes]:
@@ -97,20 +92,15 @@ def _header(path: Path) -> re.Match[bytes]:
 
 
 def _particles(file: Path) -> Columns:
-    """The first block of a worker's file: a count, and as many rows; bonds follow."""
+    """The first block of a worker's file: a count, and as many rows; groups of bonds follow."""
     data = text_of(Snapshot(file))
     head = COUNT.match(data)
     if head is None:
         raise ReadError(f"{file}: expected the number of particles, found {spelt(data[:80])}")
-    count, rest = int(head[1]), data[head.end() :]
-    lines = rest.split(b"\n", count)
-    behind = lines[count] if len(lines) > count else b""
-    if len(behind.lstrip().partition(b"\n")[0].split()) in LAYOUTS:
-        raise ReadError(f"{file}: its first line counts {count} particles, but more rows follow")
-    width = len(lines[0].split()) if count else len(BASIC.split())
-    if width not in LAYOUTS:
-        expected = ", ".join(map(str, LAYOUTS))
-        raise ReadError(f"{file}: expected {expected} columns of particles, found {width}")
-    layout = Layout(LAYOUTS[width], line=data.count(b"\n", 0, head.end()) + 1, whole=["id"])
-    rows = rest[: len(rest) - len(behind)]
-    return read_rows(Snapshot(file), rows, layout, count=count, what="particles")
+    lines = data[head.end() :].split(b"\n")
+    found = [*takewhile(lambda line: len(line.split()) in LAYOUTS, lines)]
+    layout = LAYOUTS[len(found[0].split()) if found else len(BASIC.split())]
+    layout = layout._replace(line=data.count(b"\n", 0, head.end()) + 1)
+    # the last row has its line end if anything stands behind it
+    rows = b"\n".join([*found, *[b""] * (len(found) < len(lines))])
+    return read_rows(Snapshot(file), rows, layout, count=int(head[1]), what="particles")

@@ -14,11 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.errors import ReadError
-from scanfab.io.columns import has_radius
-from scanfab.io.fence import fenced, needed
+from scanfab.io.fence import fenced
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.shared import GrainsOnly, cell_of, numbered_frames
-from scanfab.io.reader import FileKind, Snapshot
+from scanfab.io.reader import Snapshot
 from scanfab.io.text import Columns
 from scanfab.packing.cell import Cell
 
@@ -40,11 +39,9 @@ class GsdReader(GrainsOnly):
         """By the first bytes."""
         return first_bytes(path, len(MAGIC)) == MAGIC
 
-    def kind(self, path: Path) -> FileKind:
-        """Grains, or points if no diameters were ever written."""
-        if not self.recognises(path):
-            return "other"
-        return "grains" if has_radius([_bare(name) for name in _read(path, None)[1]]) else "points"
+    def names(self, path: Path) -> list[str]:
+        """Those of all frames: without diameters there are no radii."""
+        return [name.rpartition("/")[2] for name in _read(path, None)[1]]
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """The frames with their steps; ``start`` of a snapshot is the number of its frame."""
@@ -52,37 +49,36 @@ class GsdReader(GrainsOnly):
 
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
         """What the frame, or else the first one, has of each particle."""
-        path = snapshot.path
-        _, _, arrays = _read(path, snapshot.start)
-        count = arrays.pop("particles/N", np.zeros(0)).tolist()
+        path, where = snapshot.path, f"{snapshot.path}, frame {snapshot.start}"
+        arrays = _read(path, snapshot.start)[2]
         position = arrays.pop("particles/position", np.zeros((0, 3), np.float32))
-        if position.shape[1:] != (3,) or (count and [len(position)] != count):
-            found = f"{count} particles, but positions of shape {position.shape}"
-            raise ReadError(f"{path}, frame {snapshot.start}: {found}")
+        count = arrays.pop("particles/N", np.array([0])).tolist()
+        box = arrays.get("configuration/box", np.zeros(0)).astype(np.float64).tolist()
+        if position.shape != (*count, 3) or len(box) not in (0, 6):
+            raise ReadError(
+                f"{where}: expected positions of shape {(*count, 3)} and six numbers as box, found "
+                f"{position.shape} and {box}"
+            )
         columns: Columns = {"position": position.astype(np.float64)}
         for name, values in arrays.items():
             # the first frame may have had another number of particles; types are texts
             is_column = PARTICLES in name and name != "particles/types"
             if is_column and len(values) == len(position):
-                columns[_bare(name)] = values
-        box, where = arrays.get("configuration/box"), f"{path}: configuration/box"
-        if box is None:
+                columns[name.removeprefix("log/").removeprefix(PARTICLES)] = values
+        if not box:
             return columns, None
-        if box.shape != (6,):
-            raise ReadError(f"{where}: expected six numbers, found {box.tolist()}")
         # edges and tilt factors (of the second and third edge), about the origin
-        lx, ly, lz, xy, xz, yz = box.astype(np.float64).tolist()
+        lx, ly, lz, xy, xz, yz = box
         flat = arrays.get("configuration/dimensions", np.array([3])).tolist() == [2]
         if flat:
             # the edge across the plane means nothing, and may be 0
             lz, xz, yz = max(lx, ly), 0.0, 0.0
         vectors = np.array([[lx, 0, 0], [xy * ly, ly, 0], [xz * lz, yz * lz, lz]])
-        along = (True, True, not flat)
-        return columns, cell_of(where, vectors, along, -0.5 * vectors.sum(axis=0))
+        origin = -0.5 * vectors.sum(axis=0)
+        return columns, cell_of(f"{where}: its box", vectors, (True, True, not flat), origin)
 
 
 def _read(path: Path, frame: int | None) -> tuple[list[int], list[str], Columns]:
-    needed(path, "gsd", "gsd")
     return fenced(read_in_worker, path, frame)
 
 
@@ -105,11 +101,6 @@ def read_in_worker(path: str, frame: int | None) -> tuple[list[int], list[str], 
             return np.asarray(file.read_chunk(frame=own[0], name=name) if own else "")
 
         if frame is None:
-            steps = (array(number, STEP) for number in range(file.nframes))
-            return [int(step.item() or 0) for step in steps], names, {}
+            return [int(array(k, STEP).item() or 0) for k in range(file.nframes)], names, {}
         found = {name: array(frame, name) for name in names}
         return [], names, {name: own for name, own in found.items() if own.dtype.kind in "biuf"}
-
-
-def _bare(name: str) -> str:
-    return name.removeprefix("log/").removeprefix(PARTICLES)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
@@ -12,8 +12,11 @@ from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray
 from scanfab.io.contacts import join_ids
 from scanfab.io.files import first_bytes
-from scanfab.io.formats import binary_dump, dump_contacts, lammps_data, lammps_netcdf, text_dump
-from scanfab.io.formats.dump import Dump, dump_grains
+from scanfab.io.formats import dump_contacts
+from scanfab.io.formats.binary_dump import BinaryDump, NetcdfDump
+from scanfab.io.formats.lammps_data import DataFile
+from scanfab.io.formats.shared import GrainsOnly
+from scanfab.io.formats.text_dump import TextDump
 from scanfab.io.formats.vtk import VtkReader
 from scanfab.io.reader import (
     Carries,
@@ -28,85 +31,50 @@ from scanfab.io.reader import (
 
 # LIGGGHTS writes neither of these items, and its bounds with six digits
 LAMMPS_ITEMS = re.compile(
-    rb"^ITEM: (?:UNITS|TIME)[ \t]*\r?$"
-    rb"|^ITEM: BOX BOUNDS[^\n]*\n-?\d\.\d{16}e[-+]\d+ "
-    rb"|^ITEM: BOX BOUNDS abc origin",
-    re.MULTILINE,
+    rb"^ITEM: (?:(?:UNITS|TIME)\s|BOX BOUNDS(?: abc|[^\n]*\n-?\d\.\d{16}e))", re.MULTILINE
 )
 # LIGGGHTS begins a restart with a flag, the length of its version, and the version
 RESTART = re.compile(rb"LammpS RestartT|\0{4}.{2}\0\0[^\0]{0,100}LIGGGHTS", re.DOTALL)
-
-
-class Form(Protocol):
-    """A module that reads one of the forms in which LAMMPS and LIGGGHTS write grains."""
-
-    carries: Carries
-
-    def fits(self, head: bytes) -> bool:
-        """Whether a file has this form, by its first bytes."""
-        ...
-
-    def kind(self, path: Path) -> FileKind:
-        """What a file holds, by the names of its columns."""
-        ...
-
-    def snapshots(self, path: Path) -> list[Snapshot]:
-        """The snapshots of a file."""
-        ...
-
-    def read(self, snapshot: Snapshot, options: ReadOptions) -> Dump:
-        """One snapshot."""
-        ...
-
-
-FORMS: tuple[Form, ...] = (text_dump, lammps_data, lammps_netcdf, binary_dump)
-
-
-def is_restart(head: bytes) -> bool:
-    """Whether a file is what ``write_restart`` writes."""
-    return RESTART.match(head) is not None
-
-
-def form_of(path: Path) -> Form | None:
-    """The form of a file, by its first bytes; None if it is VTK, or something else."""
-    head = first_bytes(path)
-    if is_restart(head):
-        raise ReadError(
-            f"{path}: a binary restart, which only the program that wrote it can read: let it "
-            f"read_restart, and write the grains with dump custom ... id type x y z radius"
-        )
-    return next((form for form in FORMS if form.fits(head)), None)
+FORMS: tuple[GrainsOnly, ...] = (TextDump(), DataFile(), NetcdfDump(), BinaryDump())
 
 
 class DumpReader(VtkReader):
-    """What the readers of LAMMPS' and LIGGGHTS' dumps have in common."""
+    """What the readers of LAMMPS' and LIGGGHTS' dumps have in common: a reader for each form."""
 
     generic = False
     lists_contacts = False
     lists_walls = False
     """Whether there are lists of contacts with walls, which are known by their values."""
 
+    def recognises(self, path: Path) -> bool:
+        """By what only one of both programs writes."""
+        return _program(path) == self.name
+
+    def form(self, path: Path) -> GrainsOnly | VtkReader:
+        """The reader of the form that a file has, by its first bytes; VTK's for all others."""
+        if RESTART.match(first_bytes(path)):
+            raise ReadError(
+                f"{path}: a binary restart, which only the program that wrote it can read: let it "
+                f"read_restart, and write the grains with dump custom ... id type x y z radius"
+            )
+        vtk: Any = super()
+        return next((form for form in FORMS if form.recognises(path)), vtk)
+
     def kind(self, path: Path) -> FileKind:
         """By the names of the columns; whatever a text dump counts but ATOMS are contacts."""
-        form = form_of(path)
-        return super().kind(path) if form is None else form.kind(path)
+        return self.form(path).kind(path)
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """By ``ITEM: TIMESTEP``; a data file is one."""
-        form = form_of(path)
-        return super().snapshots(path) if form is None else form.snapshots(path)
+        return self.form(path).snapshots(path)
 
     def carries(self, path: Path) -> Carries:
         """A data file has a box without boundary flags, a VTK file at most the box beside it."""
-        form = form_of(path)
-        return super().carries(path) if form is None else form.carries
+        return self.form(path).carries(path)
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         """Columns by their names; of a data file by the atom style."""
-        form = form_of(snapshot.path)
-        if form is None:
-            return super().read_grains(snapshot, options)
-        return dump_grains(snapshot, form.read(snapshot, options), options)
+        return self.form(snapshot.path).read_grains(snapshot, options)
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
@@ -117,15 +85,11 @@ class DumpReader(VtkReader):
         Which column is what follows from ``contact_columns``, or from the values if these leave no
         doubt.
         """
-        path, form, told = snapshot.path, form_of(snapshot.path), options.contact_columns
-        if form is None:
-            return super().read_contacts(snapshot, options, grains)
-        if form is not text_dump:
-            raise ReadError(
-                f"{path}: contacts are read from text: write them by dump local, no .bin"
-            )
-        dump = form.read(snapshot, options)
-        values = np.column_stack([dump.columns[name] for name in dump.names]).astype(np.float64)
+        path, told, form = snapshot.path, options.contact_columns, self.form(snapshot.path)
+        if not isinstance(form, TextDump):
+            return form.read_contacts(snapshot, options, grains)
+        columns, _ = form.table(snapshot)
+        values = np.column_stack(list(columns.values())).astype(np.float64)
         if not len(values) or grains.id is None:
             return join_ids(path, grains, np.zeros((0, 2), np.int64), None, walls=False)
         dump_contacts.refuse_rounded_ids(path, values, grains)
@@ -133,15 +97,13 @@ class DumpReader(VtkReader):
         if isinstance(found, JoinedContacts):
             return found
         if told is not None:
-            found = dump_contacts.named_places(path, told, dump.names)
+            found = dump_contacts.named_places(path, told, list(columns))
         if found is None:
             may_be_ids = sum(map(dump_contacts.are_whole, values.T)) > 1
             raise (OtherGrainsError if may_be_ids else NotContactsError)(
-                f"{path}: cannot tell which columns are the two ids of a contact: the ids may "
-                f"belong to another step; or name the columns with "
-                f'`contact_columns="id1=NAME,id2=NAME"`, which are {", ".join(dump.names)}, or the '
-                f'keywords of LIGGGHTS\' compute with `contact_columns="pos id force ..."`; a dump '
-                f'of LAMMPS is read with `format="lammps"`'
+                f"{path}: no two columns are surely the ids of grains of this step: name them (out "
+                f'of {", ".join(columns)}) by `contact_columns="id1=NAME,id2=NAME"`, or '
+                f'LIGGGHTS\' keywords: "pos id force ..."'
             )
         return dump_contacts.join_places(path, values, found, grains)
 
@@ -153,21 +115,29 @@ class DumpReader(VtkReader):
         return None if place is None else dump_contacts.Places([place, place + 1], touch=False)
 
 
+def _program(path: Path) -> str | None:
+    """Which of both programs wrote a file; None if neither did."""
+    head = first_bytes(path)
+    first, _, rest = head.partition(b"\n")
+    if head.startswith(b"# vtk DataFile"):
+        return "liggghts" if b"LIGGGHTS" in rest.partition(b"\n")[0] else None
+    form = next((form for form in FORMS if form.recognises(path)), None)
+    if RESTART.match(head) or isinstance(form, DataFile):
+        # the first line is free, or holds the version of the program
+        is_liggghts = b"LIGGGHTS" in first[:1000].upper()
+    elif isinstance(form, BinaryDump):
+        # the columns of LIGGGHTS' binary dumps have no names
+        is_liggghts = form.names(path)[:1] == ["1"]
+    elif form is None:
+        return None
+    else:
+        is_liggghts = head.startswith(b"ITEM: ") and LAMMPS_ITEMS.search(head) is None
+    return "liggghts" if is_liggghts else "lammps"
+
+
 class LammpsReader(DumpReader):
     """Reader plugin for what LAMMPS dumps."""
 
     name = "lammps"
     description = "LAMMPS dump custom (text, binary, yaml, netcdf), dump local (text), write_data"
     extensions = (".lammpstrj", ".lmp", ".data", ".local", ".bin", ".yaml", ".nc")
-
-    def recognises(self, path: Path) -> bool:
-        """What LAMMPS writes and LIGGGHTS does not: units, time, bounds with all digits."""
-        head = first_bytes(path)
-        if head.startswith(b"ITEM: "):
-            return LAMMPS_ITEMS.search(head) is not None
-        if lammps_data.fits(head) or is_restart(head):
-            return not lammps_data.of_liggghts(head)
-        if text_dump.fits(head) or lammps_netcdf.fits(head):
-            return True
-        # LIGGGHTS' binary dumps have numbered columns
-        return (binary_dump.names_in(head) or ["1"])[0] != "1"

@@ -9,13 +9,11 @@ import numpy as np
 
 from scanfab.base.errors import ReadError
 from scanfab.io.files import first_bytes
-from scanfab.io.formats.dump import Dump, box_cell, numbers_as_names
-from scanfab.io.reader import Carries, FileKind, ReadOptions, Snapshot
+from scanfab.io.formats.shared import GrainsOnly, box_cell, grains_of, numbered, numbers
+from scanfab.io.reader import Carries, FileKind, GrainTable, ReadOptions, Snapshot
 from scanfab.io.text import Columns, Layout, read_rows, text_of
 from scanfab.packing.cell import Cell
 
-carries: Carries = "box"
-FIRST_LINE = re.compile(rb"LAMMPS data file[^\n]*")
 # the first line is a comment; these two must stand below it
 ATOMS = re.compile(rb"^[ \t]*\d{1,15}[ \t]+atoms[ \t]*(?:#[^\n]*)?\r?$", re.MULTILINE)
 BOX = re.compile(rb"^[^\n]*[ \t]xlo[ \t]+xhi\b", re.MULTILINE)
@@ -23,132 +21,109 @@ STEP = re.compile(rb"timestep = (\d{1,18})\b")
 # a section begins with a line of words, at times with a style behind a #; Python finds the end of
 # the line before it much faster than beginnings of lines
 SECTION = re.compile(rb"\n[ \t]*([A-Z][A-Za-z ]*?)[ \t]*(?:#[ \t]*(\S+)[^\n]*)?\r?$", re.MULTILINE)
+# the box in the header: bounds and perhaps a tilt, or vectors and their origin
+BOUNDS, TILT = (b"xlo xhi", b"ylo yhi", b"zlo zhi"), b"xy xz yz"
+VECTORS = (b"avec", b"bvec", b"cvec", b"abc origin")
 # orders of the columns; image flags, and of hybrid styles the columns of others, stand behind
 PLAIN = ("id", "type", "diameter", "density", "x", "y", "z")
 HYBRID = ("id", "type", "x", "y", "z", "diameter", "density")
 STYLES = ("", "sphere", "granular", "hybrid")
 FLAGS = ("ix", "iy", "iz")
 # what atoms may be that are no spheres: their third column is a flag, not a diameter
-NO_SPHERES = ("ellipsoids", "lines", "triangles", "bodies")
+NO_SPHERES = (b"ellipsoids", b"lines", b"triangles", b"bodies")
 # YADE writes this first line, and radii in the column of diameters
 OF_YADE = b"LIGGGHTS Description"
 
 
-def fits(head: bytes) -> bool:
-    """Whether a file starts as data files do."""
-    return FIRST_LINE.match(head) is not None or (
-        ATOMS.search(head) is not None and BOX.search(head) is not None
-    )
+class DataFile(GrainsOnly):
+    """What DumpReader needs of data files."""
+
+    # without boundary flags nothing is periodic unless the user says so
+    has_cell: Carries = "box"
+
+    def recognises(self, path: Path) -> bool:
+        """By the first line, or the number of atoms and the box below it."""
+        head = first_bytes(path)
+        has_both = ATOMS.search(head) is not None and BOX.search(head) is not None
+        return has_both or head.startswith(b"LAMMPS data file")
+
+    def kind(self, path: Path) -> FileKind:
+        """Grains that a simulation starts from, or an error: columns have no names."""
+        return "start" if self.recognises(path) else "other"
+
+    def snapshots(self, path: Path) -> list[Snapshot]:
+        """One, with the step that the first line of LAMMPS names."""
+        step = STEP.search(first_bytes(path).partition(b"\n")[0])
+        return [Snapshot(path, step=None if step is None else int(step[1]))]
+
+    def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
+        """
+        The Atoms section, by the order of the atom style, or by numbers if the user numbers it.
+
+        Raises
+        ------
+        ReadError
+            If the atoms are no spheres, or a line is not as it should be.
+        """
+        path, data = snapshot.path, text_of(snapshot)
+        # a header of one line is at most a comment
+        sections = SECTION.finditer(data, max(data.find(b"\n"), 0))
+        atoms = next((one for one in sections if one[1] == b"Atoms"), None)
+        header = _header(data[: atoms.start()]) if atoms else {}
+        count = header.get(b"atoms", b"")
+        if atoms is None or not re.fullmatch(rb"\d{1,15}", count):
+            raise ReadError(f"{path}: expected a line 'N atoms' and a section Atoms below it")
+        behind = SECTION.search(data, atoms.end())
+        rows = data[atoms.end() : behind.start() + 1 if behind else None]
+        rows = re.sub(rb"[ \t]*#[^\n]*", b"", rows) if b"#" in rows else rows
+        names = numbered(len(rows.lstrip().partition(b"\n")[0].split()) or len(PLAIN))
+        id, line = f"{options.columns.get('id', 1)}", data.count(b"\n", 0, atoms.end()) + 1
+        layout = Layout(tuple(names), line=line, whole=(id,))
+        columns = read_rows(snapshot, rows, layout, count=int(count), what="atoms")
+        cell = _cell(path, header)
+        own = {f"{name}" for name in options.columns.values()}
+        if not own or not own <= {*names}:
+            style = (atoms[2] or b"").decode("utf-8", "replace")
+            others = [one.decode() for one in NO_SPHERES if header.get(one, b"0") != b"0"]
+            others += [f"'Atoms # {style}'"] if style not in STYLES else []
+            others += ["YADE's radii in their place"] if data.startswith(OF_YADE) else []
+            if others:
+                raise ReadError(
+                    f"{path}: expected diameters of spheres (atom_style sphere), found "
+                    f"{', '.join(others)}: write the grains with dump custom ... id type x y z "
+                    f'radius, or name the columns: `columns="id=1,radius=3,x=5,y=6,z=7"`'
+                )
+            columns = _named(path, style, columns, cell)
+        return grains_of(snapshot, columns, cell, options)
 
 
-def kind(path: Path) -> FileKind:
-    """Grains that a simulation starts from, or an error: columns have no names."""
-    return "start"
-
-
-def of_liggghts(head: bytes) -> bool:
-    """Whether the first line, which is free, or the version in a restart names LIGGGHTS."""
-    return b"LIGGGHTS" in head.partition(b"\n")[0][:1000].upper()
-
-
-def snapshots(path: Path) -> list[Snapshot]:
-    """The only snapshot of a file, with the step that the first line of LAMMPS names."""
-    step = STEP.search(first_bytes(path).partition(b"\n")[0])
-    return [Snapshot(path, step=None if step is None else int(step[1]))]
-
-
-def read(snapshot: Snapshot, options: ReadOptions) -> Dump:
-    """
-    The Atoms section; the box has no boundary flags, so nothing is periodic unless the user says.
-
-    The columns have names by the order of the atom style, or numbers if the user numbers them.
-
-    Raises
-    ------
-    ReadError
-        If the atoms are no spheres, or a line is not as it should be.
-    """
-    path, data = snapshot.path, text_of(snapshot)
-    # a header of one line is at most a comment
-    sections = list(SECTION.finditer(data, max(data.find(b"\n"), 0)))
-    place = next((place for place, one in enumerate(sections) if one[1] == b"Atoms"), None)
-    if place is None:
-        raise ReadError(f"{path}: expected a section Atoms, found none")
-    header = _header(data[: sections[0].start()].decode("utf-8", "replace"))
-    count, cell = "".join(header.get("atoms", [])), _cell(path, header)
-    if not re.fullmatch(r"\d{1,15}", count):
-        raise ReadError(f"{path}: expected a line 'N atoms' in the header, found none")
-    begin = sections[place].end()
-    end = sections[place + 1].start() + 1 if place + 1 < len(sections) else len(data)
-    rows = data[begin:end]
-    rows = re.sub(rb"[ \t]*#[^\n]*", b"", rows) if b"#" in rows else rows
-    names = numbers_as_names(len(rows.lstrip().partition(b"\n")[0].split()) or len(PLAIN))
-    own = {f"{name}" for name in options.columns.values()}
-    is_numbered = bool(own) and own <= {*names}
-    id = f"{options.columns.get('id', 1)}"
-    layout = Layout(tuple(names), line=data.count(b"\n", 0, begin) + 1, whole=(id,))
-    columns = read_rows(snapshot, rows, layout, count=int(count), what="atoms")
-    if not is_numbered:
-        style = (sections[place][2] or b"").decode("utf-8", "replace")
-        _refuse_others(path, style, header, data)
-        names = _names(path, style, columns, cell)
-        columns = dict(zip(names, columns.values(), strict=True))
-    return Dump(names, columns, cell)
-
-
-def _header(text: str) -> dict[str, list[str]]:
-    """The words before each keyword such as ``atoms`` or ``xlo xhi``; the first line is free."""
+def _header(text: bytes) -> dict[bytes, bytes]:
+    """The numbers before each keyword such as ``atoms`` or ``xlo xhi``; the first line is free."""
     found = {}
     for line in text.splitlines()[1:]:
-        words = line.partition("#")[0].split()
-        count = next((place for place, word in enumerate(words) if word[0].isalpha()), len(words))
-        found[" ".join(words[count:])] = words[:count]
+        words = line.partition(b"#")[0].split()
+        count = next((k for k, word in enumerate(words) if word[:1].isalpha()), len(words))
+        found[b" ".join(words[count:])] = b" ".join(words[:count])
     return found
 
 
-def _cell(path: Path, header: dict[str, list[str]]) -> Cell | None:
+def _cell(path: Path, header: dict[bytes, bytes]) -> Cell | None:
     """The box, from its lower and upper bounds and its tilt, or from three vectors."""
-    keys = ["xlo xhi", "ylo yhi", "zlo zhi"]
-    try:
-        if "avec" in header:
-            columns = [*zip(*(header[key] for key in ("avec", "bvec", "cvec")), strict=True)]
-            columns.append(tuple(header["abc origin"]))
-        else:
-            columns = [*zip(*(header[key] for key in keys), strict=True)]
-            columns += [tuple(header["xy xz yz"])] if "xy xz yz" in header else []
-        bounds = np.array(columns, dtype=np.float64).T
-    except (KeyError, ValueError):
-        bounds = np.zeros((0, 0))
-    if bounds.shape not in ((3, 2), (3, 3), (3, 4)):
-        found = ", ".join(filter(None, header)) or "none"
-        raise ReadError(
-            f"{path}: expected the box in the header: two numbers before each of "
-            f"{', '.join(keys)}, found {found}"
-        )
+    keys, count = (VECTORS, 12) if VECTORS[0] in header else (BOUNDS, 6)
+    if TILT in header:
+        keys, count = (*BOUNDS, TILT), 9
+    text = b" ".join(header.get(key, b"") for key in keys)
+    found = np.array(numbers(f"{path}: {b', '.join(keys).decode()}", text, count))
+    bounds = found.reshape(3, 2) if count == 6 else found[:-3].reshape(3, -1)
+    if count > 6:
+        bounds = np.column_stack([bounds, found[-3:]])
     return box_cell(path, bounds, (False, False, False), is_around=False)
 
 
-def _refuse_others(path: Path, style: str, header: dict[str, list[str]], data: bytes) -> None:
-    """ReadError for atoms that are no spheres, and for radii among diameters."""
-    if style not in STYLES:
-        raise ReadError(
-            f"{path}: expected 'Atoms # sphere' (atom_style sphere), found 'Atoms # {style}': "
-            f"write the grains with dump custom ... id type x y z radius"
-        )
-    for kind in NO_SPHERES:
-        if header.get(kind, ["0"]) != ["0"]:
-            raise ReadError(f"{path}: expected spheres, found '{header[kind][0]} {kind}'")
-    if data.startswith(OF_YADE):
-        raise ReadError(
-            f"{path}: YADE writes radii in the column of diameters of such files, so LIGGGHTS "
-            f"takes grains for half as large as they are: say which they are to be, by "
-            f'`columns="id=1,type=2,radius=3,x=5,y=6,z=7"` or by diameter=3'
-        )
-
-
-def _names(path: Path, style: str, columns: Columns, cell: Cell | None) -> list[str]:
+@np.errstate(invalid="ignore")
+def _named(path: Path, style: str, columns: Columns, cell: Cell | None) -> Columns:
     """
-    The names of the columns, of atom_style sphere or of a hybrid with it.
+    The columns by the names of atom_style sphere or of a hybrid with it.
 
     A file that does not name its style has the order of a hybrid if it has more columns than the
     seven of atom_style sphere and the three image flags. ReadError if diameters or densities are
@@ -158,24 +133,22 @@ def _names(path: Path, style: str, columns: Columns, cell: Cell | None) -> list[
     more = len(values) - len(PLAIN)
     has_flags = more >= 3 and all(np.all(one == np.rint(one)) for one in values[-3:])
     flags, more = (FLAGS, more - 3) if has_flags else ((), more)
-    order = HYBRID if style == "hybrid" or (more > 0 and not style) else PLAIN
-    is_wide = more >= 0 if order is HYBRID else more == 0
-    if not is_wide or not (style or _fits(dict(zip(order, values, strict=False)), cell)):
+    is_hybrid = style == "hybrid" or (more > 0 and not style)
+    order = HYBRID if is_hybrid else PLAIN
+    named = dict(zip(order, values, strict=False))
+    fits = more >= 0 if is_hybrid else more == 0
+    if fits and not style:
+        # a grain may reach out of the box, and a periodic one lie there
+        centres = np.column_stack([named[axis] for axis in "xyz"])
+        place = np.full_like(centres, np.nan) if cell is None else cell.fractional(centres)
+        are_inside, are_whole = (place > -0.5) & (place < 1.5), named["type"] % 1 == 0
+        are_sizes = (named["diameter"] > 0) & (named["density"] > 0)
+        fits = bool(are_inside.all() and are_whole.all() and are_sizes.all())
+    if not fits:
         raise ReadError(
-            f"{path}: expected the columns {' '.join(PLAIN)} of atom_style sphere (or, in a hybrid "
-            f"style, {' '.join(HYBRID)} and others), found {len(columns)} columns below 'Atoms' "
-            f"that cannot be these: name them by their numbers, for instance "
-            f'`columns="id=1,type=2,diameter=3,x=5,y=6,z=7"`'
+            f"{path}: expected {' '.join(PLAIN)} of atom_style sphere (or a hybrid's "
+            f"{' '.join(HYBRID)}), found {len(columns)} columns below 'Atoms' that cannot be "
+            f'these: name them by their numbers, `columns="id=1,diameter=3,x=5,y=6,z=7"`'
         )
-    return [*order, *["mol", *list(columns)[len(PLAIN) + 1 :]][:more], *flags]
-
-
-@np.errstate(invalid="ignore")
-def _fits(column: Columns, cell: Cell | None) -> bool:
-    """Whether the columns can be what their names say."""
-    is_positive = np.all(column["diameter"] > 0) and np.all(column["density"] > 0)
-    if cell is None or not is_positive or np.any(column["type"] != np.rint(column["type"])):
-        return False
-    fraction = cell.fractional(np.column_stack([column[axis] for axis in "xyz"]))
-    # a grain may reach out of the box, and a periodic one lie there
-    return bool(np.all((fraction > -0.5) & (fraction < 1.5)))
+    names = [*order, *["mol", *list(columns)[len(PLAIN) + 1 :]][:more], *flags]
+    return dict(zip(names, values, strict=True))

@@ -14,14 +14,12 @@ import numpy as np
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray
 from scanfab.io.contacts import branches, count_walls, rows_of_ids
-from scanfab.io.files import first_bytes
-from scanfab.io.formats import binary_dump, lammps_data
 from scanfab.io.formats.dump_contacts import MOST_ROWS, Places, are_ids, are_whole, id_column
-from scanfab.io.formats.lammps import DumpReader, is_restart
+from scanfab.io.formats.lammps import DumpReader
 from scanfab.io.formats.vtk import vectors
 from scanfab.io.mesh import Mesh
 from scanfab.io.reader import GrainTable, JoinedContacts
-from scanfab.packing.walls import ListedWallForces
+from scanfab.packing.contacts import ListedWallForces
 
 # damping makes the force of a few contacts attractive; the others push
 PUSHES = 0.9
@@ -41,29 +39,15 @@ class LiggghtsReader(DumpReader):
     walls = False
     says_sign = True
 
-    def recognises(self, path: Path) -> bool:
-        """An ``ITEM:`` dump, or a data file, restart or legacy VTK file that names LIGGGHTS."""
-        head = first_bytes(path)
-        if lammps_data.fits(head) or is_restart(head):
-            return lammps_data.of_liggghts(head)
-        if head.startswith(b"# vtk DataFile"):
-            return b"LIGGGHTS" in head.partition(b"\n")[2].partition(b"\n")[0]
-        # LAMMPS' binary dumps name their columns, these are numbered
-        return head.startswith(b"ITEM: ") or (binary_dump.names_in(head) or [""])[0] == "1"
-
-    def force_on_second(self, mesh: Mesh) -> FloatArray | None:
-        """The force in VTK, at times its normal and tangential part."""
+    def forces(self, mesh: Mesh) -> tuple[FloatArray | None, FloatArray | None]:
+        """The force in VTK, at times its normal and tangential part, and the normal part."""
         force = vectors(mesh, "force")
         normal, tangential = vectors(mesh, "force_normal"), vectors(mesh, "force_tangential")
         if force is None and normal is not None and tangential is not None:
             force = normal + tangential
-        return None if force is None else -force
+        return None if force is None else -force, None if normal is None else -normal
 
-    def normal_force(self, mesh: Mesh) -> FloatArray | None:
-        """The normal part in VTK."""
-        force = vectors(mesh, "force_normal")
-        return None if force is None else -force
-
+    @np.errstate(over="ignore", invalid="ignore")
     def found(
         self, path: Path, values: FloatArray, grains: GrainTable
     ) -> Places | JoinedContacts | None:
@@ -77,17 +61,12 @@ class LiggghtsReader(DumpReader):
         if place is None:
             return _walls(path, values, grains)
         force = [place + 3, place + 4, place + 5]
-        is_force = place + 6 <= values.shape[1] and _pushes(
-            values[:, force], values[:, place : place + 2], grains
-        )
+        is_force = False
+        if place + 6 <= values.shape[1]:
+            branch = branches(grains, rows_of_ids(grains, values[:, place : place + 2]))
+            along = np.sum(values[:, force] * branch, axis=1)
+            is_force = bool(np.mean(along < 0) > PUSHES)
         return Places([place, place + 1], [force] if is_force else [])
-
-
-@np.errstate(over="ignore", invalid="ignore")
-def _pushes(force: FloatArray, ids: FloatArray, grains: GrainTable) -> bool:
-    """Whether three columns push the first grain off the second."""
-    branch = branches(grains, rows_of_ids(grains, ids))
-    return bool(np.mean(np.sum(force * branch, axis=1) < 0) > PUSHES)
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -110,10 +89,8 @@ def _walls(path: Path, values: FloatArray, grains: GrainTable) -> JoinedContacts
             if np.mean(away < 0.01 * radius) <= MOST_ROWS:
                 continue
             if np.any(rows < 0):
-                raise ReadError(
-                    f"{path}: names the grain {values[np.argmin(rows), place]:g}, which is not in "
-                    f"the grain file: do both files belong to the same step?"
-                )
+                name = f"the grain {values[np.argmin(rows), place]:g}"
+                raise ReadError(f"{path}: names {name}, which is not in the grain file")
             point, force = values[:, max(start - 3, 0) : start], values[:, place + 1 : place + 4]
             forces = None
             if point.shape[1] == force.shape[1] == 3:

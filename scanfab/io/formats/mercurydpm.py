@@ -9,28 +9,30 @@ grains by their ids, in rows of words and numbers.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from scanfab.base.errors import ReadError
-from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.columns import grain_table, whole_numbers
 from scanfab.io.contacts import join_ids
-from scanfab.io.files import bare_name, first_bytes, plain
+from scanfab.io.files import bare_name, first_bytes
 from scanfab.io.formats import shared
-from scanfab.io.formats.shared import HEADER_BYTES, numbers
-from scanfab.io.growing import leave_out_last
 from scanfab.io.reader import Carries, FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
-from scanfab.io.text import Layout, read_rows, skip_rows, spelt, text_of
+from scanfab.io.text import Columns, Layout, read_rows, spelt, text_of
 from scanfab.packing.cell import Cell
 
+# the columns of a frame in the plane and in space, by the number of words in the line above it
 PLANE = "x y vx vy radius angle omega species"
 SPACE = "x y z vx vy vz radius q1 q2 q3 wx wy wz species"
-# by the number of words above a frame
 LAYOUTS = {6: Layout(tuple(PLANE.split()), line=2), 8: Layout(tuple(SPACE.split()), line=2)}
-ABOVE = "the number of grains, time and bounds above a frame"
+# these lines: the number of grains, the time, and bounds
+FRAMES = {
+    width: re.compile(
+        rb"(?m)^\d{1,15}[ \t]+(\S+)(?:[ \t]+[-+.\deEinfa]+){%d}[ \t]*\r?\n" % (width - 2)
+    )
+    for width in LAYOUTS
+}
 # time, both rows, contact point, overlaps, normal and tangential force, normal, tangent
 FSTAT = "t i j x y z delta deltat fn ft nx ny nz tx ty tz"
 FSTAT_HEAD = re.compile(
@@ -40,23 +42,25 @@ FSTAT_FRAME = re.compile(rb"#[ \t]+(\S+)[ \t]+[01][ \t]*\r?\n")
 RESTART = re.compile(rb"(?:restart_version|MercuryDPM)[ \t]+[\d.]+")
 TIME = re.compile(rb"^(?:timeStep|dt) \S+ (?:time|t) (\S+)", re.MULTILINE)
 DOMAIN = re.compile(rb"(?im)^xmin (\S+) xmax (\S+) ymin (\S+) ymax (\S+) zmin (\S+) zmax (\S+)")
-# rows of a restart; versions 2 and 3 have centre, velocity and radius of a sphere without words
+# rows of a restart; versions 1 to 3 have centre, velocity and radius without words
 SPHERE = re.compile(
-    rb"(?!\w*(?:SuperQuadric|NonSpherical|Clump|Multi))\w*Particle id (\S+) indSpecies (\S+) "
-    rb"position (\S+) (\S+) (\S+) .*\bradius (\S+)"
+    rb"(?!\w*(?:SuperQuadric|NonSpherical|Clump|Multi))\w*Particle id (?P<id>\S+) indSpecies "
+    rb"(?P<species>\S+) position (?P<x>\S+) (?P<y>\S+) (?P<z>\S+) .*\bradius (?P<radius>\S+)"
 )
-OLD_SPHERE = re.compile(rb"TSP BP (\S+) (\S+) (\S+) \S+ \S+ \S+ (\S+)")
-PAIR = re.compile(rb"\w+ particleIds (\S+) (\S+) .*?\bforce (\S+) (\S+) (\S+)")
-AT_WALL = re.compile(rb"\w+ particleWallIds (\S+) \S+ ")
+OLD_SPHERE = re.compile(rb"TSP BP (?P<x>\S+) (?P<y>\S+) (?P<z>\S+) \S+ \S+ \S+ (?P<radius>\S+)")
+PAIR = re.compile(
+    rb"\w+ particle(?:Wall)?Ids (?P<i>\S+) (?P<j>\S+) .*?"
+    rb"\bforce (?P<fx>\S+) (?P<fy>\S+) (?P<fz>\S+)"
+)
 PERIOD = re.compile(
-    rb"PeriodicBoundary .*?normal (\S+) (\S+) (\S+) .*?(?:position_left|distanceLeft) (\S+) "
-    rb".*?shift (\S+) (\S+) (\S+)"
+    rb"PeriodicBoundary .*?normal (?P<nx>\S+) (?P<ny>\S+) (?P<nz>\S+) .*?"
+    rb"(?:position_left|distanceLeft) (?P<left>\S+) .*?shift (?P<x>\S+) (?P<y>\S+) (?P<z>\S+)"
 )
-# boundaries that repeat in another way than by a shift
-OTHER_PERIODS = re.compile(rb"\w*(?:LeesEdwards|Periodic|Maser|StressStrain|Circular)\w*")
+# boundaries that repeat, most of them in another way than by a shift
+PERIODS = re.compile(rb"\w*(?:LeesEdwards|Periodic|Maser|StressStrain|Circular)")
 
 
-class MercuryReader:
+class MercuryReader(shared.GrainsOnly):
     """Reader plugin for the files of MercuryDPM."""
 
     name = "mercurydpm"
@@ -65,48 +69,60 @@ class MercuryReader:
     lists_contacts = True
 
     def recognises(self, path: Path) -> bool:
-        """A restart by its first word, contacts by three lines, grains by a line of bounds."""
-        return _form(path) is not None
+        """A restart by its first word, contacts by three lines, grains by the line above them."""
+        head = first_bytes(path, shared.HEADER_BYTES)
+        first, second = (line.split() for line in (*head.split(b"\n", 2), b"")[:2])
+        if RESTART.match(head) or FSTAT_HEAD.match(head):
+            return True
+        if len(first) not in FRAMES or not FRAMES[len(first)].match(head):
+            return False
+        # below an empty frame there is another one, or nothing
+        is_empty = int(first[0]) == 0 and ".data" in bare_name(path)
+        return is_empty or len(second) == len(LAYOUTS[len(first)].names)
 
     def kind(self, path: Path) -> FileKind:
         """Contacts are in ``.fstat`` files."""
-        form = _form(path)
-        return "other" if form is None else "contacts" if form == "fstat" else "grains"
+        is_list = FSTAT_HEAD.match(first_bytes(path, shared.HEADER_BYTES)) is not None
+        return "contacts" if is_list else super().kind(path)
 
     def snapshots(self, path: Path) -> list[Snapshot]:
-        """Frames one behind the other, with their times."""
-        head = first_bytes(path, HEADER_BYTES)
+        """Frames one behind the other, with their times; a restart is one."""
+        head = first_bytes(path, shared.HEADER_BYTES)
         if RESTART.match(head):
             found = TIME.search(head)
-            time = None if found is None else numbers(f"{path}: time", found[1], 1)[0]
-            return [Snapshot(path, time=time)]
+            return [Snapshot(path, time=found and shared.numbers(f"{path}: time", found[1], 1)[0])]
         if FSTAT_HEAD.match(head):
             return shared.marked_frames(path, FSTAT_FRAME)
-        return _grain_frames(path)
+        width = _width(head)
+
+        def lack(frame: bytes) -> str | None:
+            line, _, rows = frame.partition(b"\n")
+            return shared.lack_of_rows(rows, int(line.split()[0]), len(LAYOUTS[width].names))
+
+        return shared.marked_frames(path, FRAMES[width], lack=lack)
 
     def carries(self, path: Path) -> Carries:
         """A restart has its periodic boundaries; the bounds in ``.data`` may repeat or not."""
         return "cell" if RESTART.match(first_bytes(path)) else "box"
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
-        """Rows of numbers; a restart has words in its rows, and contacts."""
-        path, data = snapshot.path, text_of(snapshot)
-        if RESTART.match(data):
-            return _read_restart(path, data, options)
-        line, _, rows = data.partition(b"\n")
-        bounds = _bounds(line)
-        if bounds is None:
-            raise ReadError(f"{path}: expected {ABOVE}, found {spelt(line)}")
-        layout = LAYOUTS[len(bounds)]
-        columns = read_rows(snapshot, rows, layout, count=int(bounds[0]), what="grains")
-        low, high = np.reshape(bounds[2:], (2, -1))
-        with np.errstate(invalid="ignore"):
-            edges = high - low
+        """A restart has words in its rows, and contacts."""
+        if RESTART.match(first_bytes(snapshot.path)):
+            return _restart(snapshot.path, text_of(snapshot), options)
+        return super().read_grains(snapshot, options)
+
+    @np.errstate(invalid="ignore")
+    def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
+        """The rows of ``.data``; nothing is known to repeat."""
+        path, (line, _, rows) = snapshot.path, text_of(snapshot).partition(b"\n")
+        where, width = f"{path}: number of grains, time and bounds above a frame", _width(line)
+        count, _, *bounds = shared.numbers(where, line, width)
+        columns = read_rows(snapshot, rows, LAYOUTS[width], count=int(count), what="grains")
+        low, high = np.reshape(bounds, (2, -1))
+        edges = high - low
         if len(low) == 2:
             low, edges = np.append(low, 0.0), np.append(edges, edges.max())
-        # nothing is known to repeat
-        cell = shared.cell_of(path, edges, (False, False, False), low)
-        return grain_table(path, shared.in_space(columns), cell, options)
+        return shared.in_space(columns), shared.cell_of(path, edges, (False, False, False), low)
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
@@ -123,165 +139,81 @@ class MercuryReader:
             raise ReadError(f"{path}: contacts are read from .fstat files with whole headers")
         layout = Layout(tuple(FSTAT.split()), line=4, whole="ij")
         columns = read_rows(snapshot, data[head.end() :], layout, what="contacts")
-        rows = np.column_stack([whole_numbers(path, columns[name]) for name in "ij"])
+        pairs = np.column_stack([whole_numbers(path, columns[name]) for name in "ij"])
         normal, tangent = (np.column_stack([columns[f"{v}{x}"] for x in "xyz"]) for v in "nt")
         with np.errstate(over="ignore", invalid="ignore"):
             force = -(columns["fn"][:, None] * normal + columns["ft"][:, None] * tangent)
-        # rows of the grain file, whatever ids these have; no grain has the number of a wall
+        # rows of the grain file, whatever ids these have
         numbered = grains._replace(id=np.arange(len(grains.radius)))
-        at_wall = rows[:, 1] < 0
-        return _joined(path, numbered, rows[~at_wall], force[~at_wall], rows[at_wall, 0])
+        force = shared.finite_forces(path, force)
+        return join_ids(path, numbered, pairs, force, walls="negative")
 
 
-def _form(path: Path) -> str | None:
-    """``restart``, ``fstat`` or ``data``; None if it is no file of MercuryDPM."""
-    head = first_bytes(path, HEADER_BYTES)
-    if RESTART.match(head):
-        return "restart"
-    if FSTAT_HEAD.match(head):
-        return "fstat"
-    first, second = (*head.split(b"\n", 2), b"")[:2]
-    bounds, width = _bounds(first), len(second.split())
-    if bounds is None:
-        return None
-    # an empty frame is followed by another one; alone it may be anything
-    is_data = _bounds(second) is not None if width else ".data" in bare_name(path)
-    if bounds[0] > 0:
-        is_data = width == len(LAYOUTS[len(bounds)].names)
-    return "data" if is_data else None
+def _width(text: bytes) -> int:
+    """The number of words in the line above a frame."""
+    return 6 if len(text.partition(b"\n")[0].split()) == 6 else 8
 
 
-def _bounds(line: bytes) -> list[float] | None:
-    """Number of grains, time, low and high corner in 2D or 3D; None if it is no such line."""
-    words = line.split()
-    if len(words) not in LAYOUTS or not re.fullmatch(rb"[0-9]{1,15}", words[0]):
-        return None
-    try:
-        found = [float(word) for word in words]
-    except ValueError:
-        return None
-    low, high = np.reshape(found[2:], (2, -1))
-    return found if np.all(low <= high) and found[1] >= 0 else None
-
-
-def _grain_frames(path: Path) -> list[Snapshot]:
-    """The frames of a ``.data`` file; a last one that is cut is left out with a warning."""
-    found: list[Snapshot] = []
-    with open(plain(path), "rb") as stream:
-        while line := stream.readline(HEADER_BYTES):
-            start, bounds, is_whole = stream.tell() - len(line), _bounds(line), line[-1:] == b"\n"
-            if not line.strip():
-                continue
-            if bounds is None and is_whole:
-                raise ReadError(f"{path}: expected {ABOVE}, found {spelt(line)}")
-            rows = 0 if bounds is None else skip_rows(stream, int(bounds[0]))
-            if bounds is None or not is_whole or rows < bounds[0]:
-                leave_out_last(path, len(found), f"found {rows} rows below {spelt(line)}")
-                break
-            found.append(Snapshot(path, time=bounds[1], start=start, stop=stream.tell()))
-    if not found:
-        raise ReadError(f"{path}: the file is empty")
-    return found
-
-
-def _joined(
-    path: Path, grains: GrainTable, pairs: IntArray, force: FloatArray, at_wall: IntArray
-) -> JoinedContacts:
-    """Contacts of two grains, with the force on the second, and how often a grain is at a wall."""
-    joined = join_ids(path, grains, pairs, shared.finite_forces(path, force), walls=False)
-    # the second id of a contact with a wall is one that no grain has
-    none = np.full(len(at_wall), -1 if grains.id is None else grains.id.max(initial=0) + 1)
-    walls = join_ids(path, grains, np.column_stack([at_wall, none]), None, walls=True)
-    return joined._replace(wall_contacts=walls.wall_contacts)
-
-
-def _read_restart(path: Path, data: bytes, options: ReadOptions) -> GrainTable:
+def _restart(path: Path, data: bytes, options: ReadOptions) -> GrainTable:
     """The particles, and the interactions, whose force acts on the first grain."""
     if not data.endswith(b"\n"):
         raise ReadError(f"{path}: the last line has no end: the file is incomplete")
-    particles, interactions = (_section(path, data, one) for one in (b"Particles", b"Interactions"))
-    if particles is None:
-        raise ReadError(f"{path}: expected a line 'Particles N', found none")
-    is_old = bool(particles) and OLD_SPHERE.match(particles[0]) is not None
-    if is_old:
-        x, y, z, radius = _numbers(path, particles, OLD_SPHERE, "spheres (TSP BP)").T
-        id, species = np.arange(len(x)), np.zeros(len(x))
-    else:
-        id, species, x, y, z, radius = _numbers(path, particles, SPHERE, "spheres").T
-    columns = {"id": id, "species": species, "x": x, "y": y, "z": z, "radius": radius}
+    rows = _section(path, data, b"Particles")
+    is_old = any(OLD_SPHERE.match(row) for row in rows[:1])
+    columns = _columns(path, rows, OLD_SPHERE if is_old else SPHERE, "spheres")
+    columns = {"id": np.arange(len(rows)), "species": np.zeros(len(rows)), **columns}
     told = options.cell is not None or options.beside is not None
     grains = grain_table(path, columns, None if told else _cell(path, data), options)
-    if interactions is None:
-        if is_old or not particles:
-            return grains
-        raise ReadError(f"{path}: expected a line 'Interactions N': the file is incomplete")
-    walls = [row for row in interactions if b" particleWallIds " in row]
-    between = [row for row in interactions if b" particleWallIds " not in row]
-    values = _numbers(path, between, PAIR, "interactions of particleIds with a force")
-    pairs = np.column_stack([whole_numbers(path, values[:, end]) for end in (0, 1)])
-    at_wall = whole_numbers(path, _numbers(path, walls, AT_WALL, "particleWallIds")[:, 0])
-    joined = _joined(path, grains, pairs, -values[:, 2:], at_wall)
+    if is_old or not rows:
+        return grains
+    rows = _section(path, data, b"Interactions")
+    found = _columns(path, rows, PAIR, "interactions of particleIds with a force")
+    pairs = np.column_stack([whole_numbers(path, found[end]) for end in "ij"])
+    # walls have numbers from 0, too
+    pairs[[b" particleWallIds " in row for row in rows], 1] = -1
+    force = -np.column_stack([found[name] for name in ("fx", "fy", "fz")])
+    force = shared.finite_forces(path, force)
+    joined = join_ids(path, grains, pairs, force, walls="negative")
     return grains._replace(contacts=joined.contacts, wall_contacts=joined.wall_contacts)
 
 
-def _section(path: Path, data: bytes, name: bytes) -> list[bytes] | None:
+def _section(path: Path, data: bytes, name: bytes) -> list[bytes]:
     """The rows below the line that counts them."""
-    head = re.search(rb"^" + name + rb"[ \t]+(\S+)[ \t]*\r?\n", data, re.MULTILINE)
+    what = name.decode()
+    head = re.search(rb"^" + name + rb"[ \t]+(\d{1,12})[ \t]*\r?\n", data, re.MULTILINE)
     if head is None:
-        return None
-    if not re.fullmatch(rb"\d{1,12}", head[1]):
-        raise ReadError(f"{path}: expected a number of {name.decode()}, found {spelt(head[1])}")
-    count = int(head[1])
-    *rows, behind = data[head.end() :].split(b"\n", count)
-    is_more = rows and behind.split(b" ", 1)[0] == rows[-1].split(b" ", 1)[0]
-    if len(rows) < count or is_more:
+        raise ReadError(f"{path}: expected a line '{what} N': the file is incomplete or damaged")
+    *rows, behind = data[head.end() :].split(b"\n", int(head[1]))
+    is_more = bool(rows) and behind.split(b" ", 1)[0] == rows[-1].split(b" ", 1)[0]
+    if len(rows) < int(head[1]) or is_more:
         found = f"more: {spelt(behind)}" if is_more else f"{len(rows)}: the file is incomplete"
-        raise ReadError(f"{path}: expected {count} {name.decode()}, found {found}")
+        raise ReadError(f"{path}: expected {head[1].decode()} {what}, found {found}")
     return rows
 
 
-def _numbers(
-    path: Path, rows: Sequence[bytes], pattern: re.Pattern[bytes], what: str
-) -> FloatArray:
-    """The numbers that stand in the groups of a pattern, shape (rows, groups)."""
-    found = []
-    for row in rows:
+def _columns(path: Path, rows: list[bytes], pattern: re.Pattern[bytes], what: str) -> Columns:
+    """The numbers that stand in the groups of a pattern, by their names."""
+    table = np.zeros((len(rows), pattern.groups))
+    for place, row in enumerate(rows):
         match = pattern.match(row)
-        if match is None:
-            raise ReadError(f"{path}: expected {what}, found {spelt(row)}")
-        words = b" ".join(match.groups())
-        found.append(numbers(f"{path}: {what} in {spelt(row)}", words, pattern.groups))
-    return np.reshape(np.array(found, dtype=np.float64), (-1, pattern.groups))
+        words = b" ".join(match.groups()) if match else b""
+        table[place] = shared.numbers(f"{path}: {what} in {spelt(row)}", words, pattern.groups)
+    return dict(zip(pattern.groupindex, table.T, strict=True))
 
 
 def _cell(path: Path, data: bytes) -> Cell | None:
     """The domain, with the shift of each periodic boundary as the edge along its normal."""
-    where = f"{path}: its domain and periodic boundaries make no cell"
     domain = DOMAIN.search(data)
-    bounds = numbers(f"{where}: xMin xMax ...", b" ".join(domain.groups()) if domain else b"", 6)
-    low, high = np.array(bounds[::2]), np.array(bounds[1::2])
-    vectors, normals, offsets = np.diag(high - low), np.eye(3), low
-    rows = _section(path, data, b"Boundaries") or []
-    for row in rows:
-        name = row.split(b" ", 1)[0]
-        if name != b"PeriodicBoundary" and OTHER_PERIODS.match(name):
-            raise ReadError(
-                f"{path}: a {spelt(name)} repeats in a way that is not read: name the cell with "
-                f"`cell=(LX, LY, LZ)`"
-            )
-    periodic = np.zeros(3, dtype=bool)
-    periods = [row for row in rows if row.startswith(b"PeriodicBoundary ")]
-    for period in _numbers(path, periods, PERIOD, "normal, distanceLeft and shift"):
-        axis = int(np.argmax(np.abs(period[:3])))
-        if periodic[axis]:
-            raise ReadError(f"{path}: two periodic boundaries along the axis {'xyz'[axis]}")
-        periodic[axis] = True
-        normals[axis], offsets[axis], vectors[axis] = period[:3], period[3], period[4:]
-    # a domain may be flat where nothing repeats: any thickness will do
-    flat = np.flatnonzero(~periodic & (vectors.diagonal() <= 0) & periodic.any())
-    vectors[flat, flat] = np.abs(vectors).max()
-    try:
-        origin = np.linalg.solve(normals, offsets)
-    except np.linalg.LinAlgError as error:
-        raise ReadError(f"{where}: {error}") from None
+    words = b" ".join(domain.groups()) if domain else b""
+    bounds = np.array(shared.numbers(f"{path}: its domain xMin xMax ...", words, 6))
+    origin, vectors = bounds[::2], np.diag(bounds[1::2] - bounds[::2])
+    rows = [row for row in _section(path, data, b"Boundaries") if PERIODS.match(row)]
+    expected = "a PeriodicBoundary (or name the cell: `cell=(LX, LY, LZ)`)"
+    found = np.column_stack([*_columns(path, rows, PERIOD, expected).values()])
+    which, axes = np.nonzero(found[:, :3])
+    if len({*axes.tolist()}) < len(axes) or len(axes) != len(rows):
+        raise ReadError(f"{path}: expected periodic boundaries along the axes, one along each")
+    origin[axes] = found[which, 3] / found[which, axes]
+    vectors[axes] = found[which, 4:]
+    where, periodic = f"{path}: its domain and periodic boundaries", np.isin(np.arange(3), axes)
     return shared.cell_of(where, vectors, periodic, origin)

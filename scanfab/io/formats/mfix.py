@@ -9,26 +9,20 @@ import numpy as np
 
 from scanfab.base.errors import ReadError
 from scanfab.io.files import bare_name, first_bytes
-from scanfab.io.formats.shared import GrainsOnly, numbers
+from scanfab.io.formats.shared import GrainsOnly, in_space, numbers
 from scanfab.io.reader import Carries, Snapshot
-from scanfab.io.text import Columns, Layout, read_rows, text_of
+from scanfab.io.text import Columns, Layout, read_rows, spelt, text_of
 from scanfab.packing.cell import Cell
 
 VERSION = re.compile(rb"[ \t]*Version[ \t]+(\d+\.\d+)[ \t]*\r?\n", re.IGNORECASE)
 NAME = re.compile(r"(?i).*particle_input.*\.dat")
-# version 1 by its number of columns, in the plane and in space
-ALONE = {
-    6: ("x", "y", "radius", "density", "u", "v"),
-    8: ("x", "y", "z", "radius", "density", "u", "v", "w"),
-}
-# numbers of a header, and lines such as "Diameter:  F  0.0017": whether a column has the values, or
-# what all grains have
-VALUE = re.compile(rb"^[ \t]*(Dimension|Particles):[ \t]*(\d{1,15})\b", re.MULTILINE)
-LINE = re.compile(
-    rb"^[ \t]*(Phase_ID|Diameter|Density|Velocity):[ \t]*([TF])[ \t]*(\S*)", re.MULTILINE
-)
-NAMES = {b"Phase_ID": ["phase_id"], b"Diameter": ["diameter"], b"Density": ["density"]}
-NAMES |= {b"Velocity": ["u", "v", "w"]}
+# the columns of version 1 by their number, in the plane and in space
+ALONE = {6: "x y radius density u v", 8: "x y z radius density u v w"}
+# lines such as "Particles:  2000" and "Diameter:  F  0.0017": T if a column has the values, F if
+# all grains have this one
+FIELD = re.compile(rb"^[ \t]*(\w+):[ \t]*(\S*)[ \t]*(\S*)", re.MULTILINE)
+ASKED = (b"Dimension", b"Particles", b"Phase_ID", b"Diameter", b"Density", b"Velocity")
+ANSWERS = re.compile(rb"[23] \d{1,15}(?: [TF]){4}")
 RULE = re.compile(rb"^=+[ \t]*\r?\n", re.MULTILINE)
 HEADER_BYTES = 1 << 14
 
@@ -44,57 +38,41 @@ class MfixReader(GrainsOnly):
     def recognises(self, path: Path) -> bool:
         """By the first line; rows alone by the name that MFiX looks for, and their width."""
         head = first_bytes(path, HEADER_BYTES)
-        if VERSION.match(head) is not None:
+        if VERSION.match(head):
             return b"Dimension:" in head and b"Particles:" in head
-        return NAME.fullmatch(bare_name(path)) is not None and _width(head) in ALONE
+        return bool(NAME.fullmatch(bare_name(path))) and _width(head) in ALONE
 
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
         """Rows of numbers, with Fortran's exponents (5d-3) or others."""
-        data = text_of(snapshot)
-        begin, count, diameter = 0, None, None
-        names = ALONE.get(_width(data), ALONE[8])
-        if VERSION.match(data):
-            begin, count, names, diameter = _header(snapshot.path, data)
-        layout = Layout(names, line=data.count(b"\n", 0, begin) + 1)
-        rows = _with_e(data[begin:])
-        columns = read_rows(snapshot, rows, layout, count=count, what="particles")
-        if diameter is not None:
+        path, data = snapshot.path, text_of(snapshot)
+        version = VERSION.match(data)
+        if version is None:
+            layout = Layout(tuple(ALONE.get(_width(data), ALONE[8]).split()))
+            return in_space(read_rows(snapshot, data, layout)), None
+        begin = max((rule.end() for rule in RULE.finditer(data[:HEADER_BYTES])), default=0)
+        fields = {name: words for name, *words in FIELD.findall(data[:begin])}
+        answers = b" ".join(fields.get(name, [b""])[0] for name in ASKED)
+        if version[1] != b"2.0" or not ANSWERS.fullmatch(answers):
+            raise ReadError(
+                f"{path}: expected version 2.0 with 2 or 3, a number, T or F ... for "
+                f"{b', '.join(ASKED).decode()}, found {version[1].decode()} with {spelt(answers)}: "
+                f"else read it as a table: --format table --skip N --columns ..."
+            )
+        dimension, count = (int(word) for word in answers.split()[:2])
+        names = [*"xyz"[:dimension]]
+        for name in ASKED[2:]:
+            own = ["u", "v", "w"][:dimension] if name == b"Velocity" else [name.decode().lower()]
+            names += own if fields[name][0] == b"T" else []
+        # temperature, species and the like stand behind, and have no names
+        names += [f"{place + 1}" for place in range(len(names), _width(data[begin:]))]
+        layout = Layout(tuple(names), line=data.count(b"\n", 0, begin) + 1)
+        columns = read_rows(snapshot, data[begin:], layout, count=count, what="particles")
+        if "diameter" not in columns:
+            where, word = f"{path}: Diameter: expected T, or F and a number", fields[b"Diameter"][1]
+            diameter = numbers(where, word.upper().replace(b"D", b"E"), 1)
             columns["diameter"] = np.full(len(columns["x"]), diameter)
-        return columns, None
+        return in_space(columns), None
 
 
 def _width(text: bytes) -> int:
     return len(text.partition(b"\n")[0].split())
-
-
-def _with_e(text: bytes) -> bytes:
-    """Numbers with e in place of Fortran's d."""
-    return text.replace(b"D", b"E").replace(b"d", b"e")
-
-
-def _header(path: Path, data: bytes) -> tuple[int, int, tuple[str, ...], float | None]:
-    """Where the rows begin, how many there are, their columns, and the diameter of all grains."""
-    head = data[:HEADER_BYTES]
-    values = {name: int(number) for name, number in VALUE.findall(head)}
-    lines = {name: (letter == b"T", default) for name, letter, default in LINE.findall(head)}
-    dimension = values.get(b"Dimension")
-    version = VERSION.match(head)
-    assert version is not None
-    lost = sorted(NAMES.keys() - lines.keys())
-    if version[1] != b"2.0" or dimension not in (2, 3) or b"Particles" not in values or lost:
-        raise ReadError(
-            f"{path}: expected version 2.0, found {version[1].decode()}, with 'Dimension: 2 or 3', "
-            f"'Particles: N' and lines 'NAME: T or F, default', found none of "
-            f"{b', '.join(lost).decode() or 'these numbers'}: read it as a table: --format table "
-            f"--skip N --columns ..."
-        )
-    names = list("xyz"[:dimension])
-    for name, own in NAMES.items():
-        names += own[:dimension] if lines[name][0] else []
-    begin = max((rule.end() for rule in RULE.finditer(head)), default=0)
-    # temperature, species and the like stand behind, and have no names
-    names += [f"{place + 1}" for place in range(len(names), _width(data[begin:]))]
-    is_column, default = lines[b"Diameter"]
-    where = f"{path}: Diameter: expected T, or F and a number"
-    diameter = None if is_column else numbers(where, _with_e(default), 1)[0]
-    return begin, values[b"Particles"], tuple(names), diameter

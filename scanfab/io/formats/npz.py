@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 
 from scanfab.base.errors import ReadError
-from scanfab.io import written
-from scanfab.io.beside import companion_kind, read_contacts
 from scanfab.io.binary_tables import IS_NPZ, npz_shapes, read_npz
 from scanfab.io.columns import grain_table
+from scanfab.io.companions import companion_kind, read_contacts
 from scanfab.io.files import first_bytes
 from scanfab.io.reader import (
     BODIES,
@@ -24,13 +23,15 @@ from scanfab.io.reader import (
     ReadOptions,
     Snapshot,
 )
-from scanfab.io.writer import Left
+from scanfab.io.writer import Left, as_arrays, cell_of, contacts_of
 from scanfab.packing.packing import Packing
 
 # the array that makes it a packing; its value is the version of the layout
 MARK = "scanfab_packing"
 # stands before the names of the columns of the grains
 COLUMN = "columns/"
+# contacts name the rows of grains
+IDS = ("id1", "id2")
 
 
 class NpzFormat:
@@ -60,13 +61,13 @@ class NpzFormat:
         """One, whose step and time are those of the packing."""
         if self.kind(path) != "grains":
             return [Snapshot(path)]
-        moment: list[float | None] = [None, None]
-        for name, values in read_npz(path, ("step", "time")).items():
-            if values.size != 1 or values.dtype.kind not in "iuf" or not np.isfinite(values).all():
-                raise ReadError(f"{path}: {name}: expected one number")
-            moment[name == "time"] = values.item()
-        step = None if moment[0] is None else int(moment[0])
-        return [Snapshot(path, step, moment[1], stepless=step is None)]
+        found = read_npz(path, ("step", "time"))
+        try:
+            step = int(found["step"].item()) if "step" in found else None
+            time = float(found["time"].item()) if "time" in found else None
+        except (TypeError, ValueError, OverflowError) as error:
+            raise ReadError(f"{path}: step and time: expected a number each: {error}") from None
+        return [Snapshot(path, step, time, stepless=step is None)]
 
     def carries(self, path: Path) -> Carries:
         """The cell is among the arrays, or there is none."""
@@ -81,10 +82,10 @@ class NpzFormat:
         columns |= {k.removeprefix(COLUMN): v for k, v in arrays.items() if k.startswith(COLUMN)}
         if len({values.shape[:1] for values in columns.values()}) != 1:
             raise ReadError(f"{path}: expected arrays with a row for each grain")
-        grains = grain_table(path, columns, written.cell_of(path, arrays), options)
+        grains = grain_table(path, columns, cell_of(path, arrays), options)
         if "pairs" not in arrays:
             return grains
-        return grains._replace(contacts=written.contacts_of(path, arrays["pairs"], arrays))
+        return grains._replace(contacts=contacts_of(arrays["pairs"], arrays))
 
     def left_out(self, path: Path) -> list[str]:
         """Of what scanfab writes nothing is left out."""
@@ -94,26 +95,18 @@ class NpzFormat:
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
     ) -> JoinedContacts:
         """Those that lie beside a file of grains."""
-        if first_bytes(snapshot.path, 2) == IS_NPZ:
-            raise ReadError(
-                f"{snapshot.path}: expected contacts, found a packing: read it by itself"
-            )
         return read_contacts(snapshot.path, grains)
 
     def write(self, packing: Packing, path: Path) -> Left:
         """Write one frame; it holds everything."""
-        own, notes = written.own_columns(packing)
-        arrays: dict[str, Any] = {
-            MARK: 1,
-            "position": packing.position,
-            "radius": packing.radius,
-            **written.standard_columns(packing),
-            **{f"{COLUMN}{name}": values for name, values in own.items()},
-            **written.frame_arrays(packing),
-        }
+        found = as_arrays(packing)
+        arrays: dict[str, Any] = {MARK: 1, "position": packing.position}
+        arrays |= found.grains | found.frame
+        arrays |= {f"{COLUMN}{name}": values for name, values in found.own.items()}
         if packing.contacts is not None:
-            arrays |= {"pairs": packing.contacts.pairs, **written.contact_arrays(packing)}
+            arrays["pairs"] = packing.contacts.pairs
+            arrays |= {name: found.contacts[name] for name in found.contacts if name not in IDS}
         stream = io.BytesIO()
         np.savez_compressed(stream, **arrays)
         path.write_bytes(stream.getvalue())
-        return Left(no_step=False, notes=tuple(notes))
+        return Left(no_step=False, notes=tuple(found.notes))

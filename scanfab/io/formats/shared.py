@@ -1,9 +1,10 @@
-"""What readers share: frames below one another, numbers in headers, cells, a base class."""
+"""What readers share: a base class, frames below one another, numbers in headers, cells."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,8 @@ import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.typing import FloatArray
-from scanfab.io.columns import grain_table
-from scanfab.io.files import check_lines, plain
-from scanfab.io.growing import leave_out_last
+from scanfab.io.columns import grain_table, has_radius
+from scanfab.io.files import check_lines, grows, leave_out_last, plain
 from scanfab.io.reader import (
     Carries,
     FileKind,
@@ -38,19 +38,27 @@ class GrainsOnly(Reader):
     Base class of readers whose files hold grains and no contacts.
 
     A reader says by ``recognises`` which files are of its format, and by ``table`` which
-    columns and which cell a frame has. It overrides ``snapshots`` if a file
-    may hold several frames.
+    columns and which cell a frame has. It overrides ``snapshots`` if a file may hold several
+    frames, and ``names`` if a file may lack radii.
     """
 
+    name = description = ""
+    extensions: tuple[str, ...] = ()
     has_cell: Carries = "cell"
 
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
         """All columns of a frame by their names, and its cell."""
         raise NotImplementedError
 
+    def names(self, path: Path) -> Sequence[str]:
+        """The names of the columns; without a radius among them the file holds points."""
+        return ("radius",)
+
     def kind(self, path: Path) -> FileKind:
-        """Grains, if the file is one of this format."""
-        return "grains" if self.recognises(path) else "other"
+        """Grains or points, if the file is one of this format."""
+        if not self.recognises(path):
+            return "other"
+        return "grains" if has_radius(self.names(path)) else "points"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """One."""
@@ -61,9 +69,8 @@ class GrainsOnly(Reader):
         return self.has_cell
 
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
-        """The columns by their names; what lies in the plane has no column z."""
-        columns, cell = self.table(snapshot)
-        return grain_table(snapshot.path, in_space(columns), cell, options)
+        """The columns by their names."""
+        return grains_of(snapshot, *self.table(snapshot), options)
 
     def read_contacts(
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
@@ -72,11 +79,28 @@ class GrainsOnly(Reader):
         raise ReadError(f"{snapshot.path}: {self.name} files hold no contacts of grains")
 
 
+def numbered(width: int) -> list[str]:
+    """The names of columns that have none: their numbers from 1."""
+    return [f"{place + 1}" for place in range(width)]
+
+
+def grains_of(
+    snapshot: Snapshot, columns: Columns, cell: Cell | None, options: ReadOptions
+) -> GrainTable:
+    """The grains in the columns of a frame; ReadError if these have no names and users none."""
+    if "1" in columns and not options.columns:
+        raise ReadError(
+            f"{snapshot.path}: this dump does not name its {len(columns)} columns: name them by "
+            f'their numbers, as the deck lists them: `columns="id=1,x=3,y=4,z=5,radius=6"`'
+        )
+    named = {key: f"{own}" for key, own in options.columns.items()}
+    where = "" if snapshot.step is None else f", step {snapshot.step}"
+    return grain_table(snapshot.path, columns, cell, replace(options, columns=named), where)
+
+
 def in_space(columns: Columns) -> Columns:
     """The columns, with z = 0 for grains in the plane."""
-    if "x" in columns and "z" not in columns:
-        columns["z"] = np.zeros(len(columns["x"]))
-    return columns
+    return columns if "z" in columns else {**columns, "z": np.zeros(len(columns["x"]))}
 
 
 def numbers(where: str, text: bytes, count: int) -> list[float]:
@@ -101,19 +125,71 @@ def finite_forces(path: Path, force: FloatArray) -> FloatArray:
 def cell_of(
     where: str | Path, vectors: npt.ArrayLike, periodic: Iterable[bool], origin: npt.ArrayLike
 ) -> Cell | None:
-    """A :class:`Cell`; None if the vectors span no volume and the packing is not periodic."""
+    """
+    A :class:`Cell`; None if the vectors span no volume and the packing is not periodic.
+
+    A periodic packing may be flat along an axis that does not repeat: any thickness will do there.
+    """
     x, y, z = (bool(one) for one in periodic)
+    edges = np.array(vectors, dtype=np.float64)
+    edges = np.diag(edges) if edges.ndim == 1 else edges
+    flat = np.flatnonzero(~edges.any(axis=1) & ~np.array([x, y, z]) & (x or y or z))
+    edges[flat, flat] = np.abs(edges).max()
     try:
-        return Cell(vectors, (x, y, z), origin)
+        return Cell(edges, (x, y, z), origin)
     except PackingError as error:
         if x or y or z:
             raise ReadError(f"{where}: {error}") from None
         return None
 
 
+@np.errstate(over="ignore", invalid="ignore")
+def box_cell(
+    where: str | Path, bounds: FloatArray, periodic: Iterable[bool], *, is_around: bool = True
+) -> Cell | None:
+    """
+    The cell of a box of LAMMPS; None if the box has no volume and is not periodic.
+
+    Parameters
+    ----------
+    where : str or Path
+        The beginning of error messages.
+    bounds : ndarray, shape (3, 2), (3, 3) or (3, 4)
+        The lower and the upper bound of each axis, then the tilt (xy, xz, yz) if there is one. Or
+        three vectors (rows) with the coordinates of the origin behind them. Dump's length unit.
+    periodic : iterable of bool
+        Along which vectors the box repeats.
+    is_around : bool, optional
+        Whether the bounds are those of the box *around* the tilted box, as in dumps. Data files
+        have the bounds of the box before it was tilted.
+
+    Raises
+    ------
+    ReadError
+        If the box is periodic and has no volume.
+    """
+    if bounds.shape[1] == 4:
+        return cell_of(where, bounds[:, :3], periodic, bounds[:, 3])
+    low, high = bounds[:, 0], bounds[:, 1]
+    xy, xz, yz = bounds[:, 2] if bounds.shape[1] == 3 else np.zeros(3)
+    if is_around:
+        low = low - [min(0.0, xy, xz, xy + xz), min(0.0, yz), 0.0]
+        high = high - [max(0.0, xy, xz, xy + xz), max(0.0, yz), 0.0]
+    edges = high - low
+    vectors = np.array([[edges[0], 0, 0], [xy, edges[1], 0], [xz, yz, edges[2]]])
+    return cell_of(where, np.zeros((3, 3)) if np.any(edges <= 0) else vectors, periodic, low)
+
+
 def lack_of_end(frame: bytes) -> str | None:
     """The ``lack`` of frames without a count."""
     return None if frame.endswith(b"\n") else "its last line has no end"
+
+
+def lack_of_rows(rows: bytes, count: int, width: int) -> str | None:
+    """The ``lack`` of frames with a count; the last row may lack its end if it lacks no word."""
+    is_row = len(rows[rows.rfind(b"\n") + 1 :].split()) == width and not grows()
+    found = rows.count(b"\n") + is_row
+    return f"it has {found} rows of {count}" if found < count else None
 
 
 def marked_frames(
@@ -151,32 +227,38 @@ def marked_frames(
     check_lines(path, plain(path))
     starts: list[int] = []
     found: list[Snapshot] = []
+    size, has_end = 0, True
     # not mapped into memory: if a mapped file is cut meanwhile, the process dies
     with open(plain(path), "rb") as stream:
-        place = 0
         # pieces of whole lines, so that no mark is cut in two
         while piece := stream.read(PIECE) + stream.readline():
-            found_here = (one.start() for one in mark.finditer(piece))
-            starts += [place + at for at in found_here if piece[at - 1 : at] in (b"", b"\n")]
-            place += len(piece)
-        start = min(starts, default=0)
+            here = (one.start() for one in mark.finditer(piece))
+            starts += [size + at for at in here if piece[at - 1 : at] in (b"", b"\n")]
+            size, has_end = size + len(piece), piece.endswith(b"\n")
+        start = min(starts, default=size)
         lost = NO_COMMENT.search(text_of(Snapshot(path, stop=start)))
         if lost:
             raise ReadError(f"{path}: expected the header of a frame above {spelt(lost[0])}")
-        for stop in [*starts[1:], place] if starts else ():
-            is_last = found and stop == place
-            if is_last and (reason := lack(text_of(Snapshot(path, start=start)))):
-                leave_out_last(path, len(found), reason)
-                break
+        for stop in [*starts[1:], size][: len(starts)]:
+            end = stop
+            if stop == size and (found or not has_end):
+                frame = text_of(Snapshot(path, start=start))
+                whole, reason = frame[: frame.rfind(b"\n") + 1], lack(frame)
+                if reason and found:
+                    leave_out_last(path, len(found), reason)
+                    break
+                if not (reason or has_end or lack(whole)):
+                    # the line that is cut is the header of another frame
+                    leave_out_last(path, len(found) + 1, "its header is incomplete")
+                    end = start + len(whole)
             stream.seek(start)
             head = stream.read(min(HEADER_BYTES, stop - start))
             at = moment(path, head) if moment else (None, _time(path, mark.match(head)))
             if at is not None:
-                found.append(Snapshot(path, *at, start, stop))
+                found.append(Snapshot(path, *at, start, end))
                 start = stop
     if not found:
-        expected = "expected the header of a frame, found none"
-        raise ReadError(f"{path}: {expected if place else 'the file is empty'}")
+        raise ReadError(f"{path}: expected frames, found none: the file is empty or incomplete")
     return sorted(found, key=lambda one: one.step or 0)
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 import unicodedata
-import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
-from scanfab.base.errors import ReadError, ScanfabWarning
+import numpy as np
+
+from scanfab.base.errors import ReadError, warn
 from scanfab.io.columns import (
     DIAMETER_NAMES,
     ID_NAMES,
@@ -16,7 +17,8 @@ from scanfab.io.columns import (
     refuse_cylindrical,
     refuse_named_twice,
 )
-from scanfab.io.layout import unique
+from scanfab.io.layout import TextTable
+from scanfab.io.text import Columns
 
 Names = Mapping[str, tuple[str, ...]]
 """The names that a column may have, by what it is; as :func:`plain_name` has them."""
@@ -25,61 +27,49 @@ Names = Mapping[str, tuple[str, ...]]
 FRAME_NAMES = ("step", "timestep", "time.step", "frame", "time", "time.s", "time.ms")
 # those that may, and may be a property of grains, too
 PERHAPS_FRAMES = ("t", "iteration", "iter", "cycle", "cycles", "snapshot", "increment")
-# what has one unit in a table of grains
-LENGTHS = ("x", "y", "z", "radius", "diameter")
-# what a contact table must have, and what it may
-IDS = ("id1", "id2")
-# the force on either grain, the image of the second, the force on the first or second, the normal
-# and the tangential part
-FORCES = {
-    **{f"f{axis}": (f"f{axis}", f"force.{axis}", f"f.{axis}") for axis in "xyz"},
+# of contacts: the force on either grain, the image of the second, the force on the first or second,
+# the normal and the tangential part; names behind the first ones are PFC's and EDEM's
+FORCES: Names = {
+    **{
+        f"f{axis}": (
+            *(f"f{axis}", f"force.{axis}", f"f.{axis}"),
+            *(f"contact.force.global.{axis}", f"force.global.{axis}"),
+        )
+        for axis in "xyz"
+    },
     **{f"i{axis}": (f"i{axis}", f"image.{axis}") for axis in "xyz"},
     **{name: (name,) for axis in "xyz" for name in (f"f{axis}1", f"f{axis}2")},
-    **{name: (name,) for axis in "xyz" for name in (f"fn{axis}", f"ft{axis}")},
-    "fn": ("fn", "force.n", "normal.force"),
+    **{f"fn{axis}": (f"fn{axis}", f"contact.normal.force.{axis}") for axis in "xyz"},
+    **{f"ft{axis}": (f"ft{axis}", f"contact.tangential.force.{axis}") for axis in "xyz"},
+    "fn": ("fn", "force.n", "normal.force", "contact.force.normal", "force.normal"),
     "kind": ("contact.type", "kind"),
 }
+ENDS = (
+    *("id{}", "id.{}", "grain{}", "particle{}", "particle.{}", "body{}"),
+    *("contact.end{}.id", "contact.end{}", "end{}.id", "end{}", "contact.id{}"),
+)
 TABLE: Names = {
     **{
-        axis: (axis, f"pos.{axis}", f"pos{axis}", f"position.{axis}", f"points.{number}")
+        axis: (
+            *(axis, f"pos.{axis}", f"pos{axis}", f"position.{axis}", f"points.{number}"),
+            *(f"ball.pos.{axis}", f"ball.position.{axis}", f"ball.{axis}"),
+            f"particle.position.{axis}",
+        )
         for number, axis in enumerate("xyz")
     },
-    "radius": (*RADIUS_NAMES, "f.radius"),
-    "diameter": DIAMETER_NAMES,
-    "id": (*ID_NAMES, "particle.id", "body.id"),
-    "id1": ("id1", "id.1", "grain1", "particle1", "particle.1", "body1", "geoa", "i"),
-    "id2": ("id2", "id.2", "grain2", "particle2", "particle.2", "body2", "geob", "j"),
+    "radius": (*RADIUS_NAMES, "f.radius", "ball.radius", "particle.radius"),
+    "diameter": (*DIAMETER_NAMES, "ball.diameter", "particle.diameter"),
+    "id": (*ID_NAMES, "particle.id", "body.id", "ball.id"),
+    "id1": (*(end.format(1) for end in ENDS), "geoa", "i", "contact.idfirst", "contact.id.first"),
+    "id2": (*(end.format(2) for end in ENDS), "geob", "j", "contact.idsecond", "contact.id.second"),
     **FORCES,
 }
-PFC: Names = {
-    **{
-        axis: (f"ball.pos.{axis}", f"pos.{axis}", f"ball.position.{axis}", f"ball.{axis}", axis)
-        for axis in "xyz"
-    },
-    "radius": ("ball.radius", "radius", "rad"),
-    "diameter": ("ball.diameter", "diameter"),
-    "id": ("ball.id", "id"),
-    "id1": ("contact.end1.id", "contact.end1", "end1.id", "end1", "contact.id1", "id1"),
-    "id2": ("contact.end2.id", "contact.end2", "end2.id", "end2", "contact.id2", "id2"),
-    **FORCES,
-    **{
-        f"f{axis}": (f"contact.force.global.{axis}", f"force.global.{axis}", f"force.{axis}")
-        for axis in "xyz"
-    },
-    "fn": ("contact.force.normal", "force.normal"),
-    "kind": ("contact.type", "type"),
-}
-EDEM: Names = {
-    **{axis: (f"particle.position.{axis}", f"position.{axis}") for axis in "xyz"},
-    **{what: (f"particle.{what}", what) for what in ("radius", "diameter", "volume", "id")},
-    "id1": ("contact.idfirst", "contact.id.first", "contact.first.id"),
-    "id2": ("contact.idsecond", "contact.id.second", "contact.second.id"),
-    **{f"fn{axis}": (f"contact.normal.force.{axis}",) for axis in "xyz"},
-    **{f"ft{axis}": (f"contact.tangential.force.{axis}",) for axis in "xyz"},
-}
+PFC: Names = {**TABLE, "kind": ("contact.type", "type")}
+EDEM: Names = {**TABLE, "volume": ("particle.volume", "volume")}
 
 # EDEM numbers its queries: "Q05 : Particle Position X:"
 QUERY = re.compile(r"^q[0-9]+[\s:.]+")
+CUBE = re.compile(r"^cu |(\^|\*\*)?3$")
 UNIT = re.compile(r"\s*[\[(]\s*([^\])]*)\s*[\])]\s*$")
 
 
@@ -89,34 +79,23 @@ def plain_name(name: str) -> str:
     return re.sub(r"[^a-z0-9]+", ".", text).strip(".")
 
 
-def is_of_contacts(standard: str) -> bool:
-    """Whether a column says something of a contact that a packing has: its grains, image, force."""
-    return standard in (*IDS, "kind", "ix", "iy", "iz") or standard.startswith("f")
-
-
 def is_frame_name(name: str) -> bool:
     """Whether a column tells frames of one file apart."""
     return plain_name(name) in FRAME_NAMES
 
 
-def is_contacts(found: Mapping[str, str]) -> bool:
-    """Whether columns are of a contact table: both ids, and not a grain's place and size."""
-    is_grain = {"x", "y", "z"} <= found.keys() and found.keys() & {"radius", "diameter", "volume"}
-    return set(IDS) <= found.keys() and not is_grain
-
-
 def find_columns(
-    path: Path, names: Sequence[str], known: Names, named: Mapping[str, str], option: str
+    path: Path, table: TextTable, known: Names, named: Mapping[str, str], option: str
 ) -> dict[str, str]:
     """
-    The file's own name of each column that is known, as :func:`unique` has it, by what it is.
+    The key of each column that is known (its name in the layout), by what it is.
 
     Parameters
     ----------
     path : Path
         For messages.
-    names : sequence of str
-        Of all columns.
+    table : TextTable
+        With the names of all columns.
     known : mapping
         The usual names.
     named : mapping of str to str
@@ -128,46 +107,38 @@ def find_columns(
     ------
     ReadError
         If the user names a column that is not there or twice, two columns have a name that
-        matters, or lengths have different units.
+        matters, or a radius may be a distance from an axis.
     """
-    found: dict[str, str] = {}
-    keys = unique(names)
-    for standard, own in named.items():
-        found[standard] = _column(path, names, str(own), standard, option)
-    refuse_named_twice(path, found, option)
-    plain = [plain_name(name) for name in names]
-    for standard, usual in known.items():
-        if standard in found:
-            continue
-        places = next(
-            (p for one in usual if (p := [k for k, name in enumerate(plain) if name == one])), []
-        )
+    names, plain = table.own, [plain_name(name) for name in table.own]
+
+    def key(standard: str, places: list[int]) -> str:
         if len(places) > 1:
             listed = ", ".join(f"{names[place]!r} (column {place + 1})" for place in places)
             raise ReadError(
                 f"{path}: several columns may be {standard}: {listed}: choose one by its number: "
                 f'`{option}={{"{standard}": {places[0] + 1}}}`'
             )
-        if places and keys[places[0]] not in found.values():
-            found[standard] = keys[places[0]]
-            if standard == "radius" and not named.keys() & {"radius", "diameter"}:
-                refuse_cylindrical(path, names[places[0]], names)
+        return table.layout.names[places[0]]
+
+    found: dict[str, str] = {}
+    for standard, given in named.items():
+        own = str(given)
+        places = [place for place, name in enumerate(names) if name == own]
+        if not places and re.fullmatch(r"[0-9]{1,6}", own) and 1 <= int(own) <= len(names):
+            places = [int(own) - 1]
+        if not places:
+            told = f"there is no column {own!r} to serve as {standard}"
+            raise ReadError(f"{path}: {told}; the columns are {', '.join(names)}")
+        found[standard] = key(standard, places)
+    refuse_named_twice(path, found, option)
+    for standard in [one for one in known if one not in found]:
+        word = next((one for one in known[standard] if one in plain), None)
+        places = [place for place, name in enumerate(plain) if name == word]
+        if places and (own := key(standard, places)) not in found.values():
+            found[standard] = own
+            if standard == "radius" and "diameter" not in named:
+                refuse_cylindrical(path, own, names)
     return found
-
-
-def _column(path: Path, names: Sequence[str], own: str, standard: str, option: str) -> str:
-    if list(names).count(own) > 1:
-        raise ReadError(
-            f"{path}: there are several columns {own!r}: choose one by its number in `{option}`"
-        )
-    if own in names:
-        return own
-    if re.fullmatch(r"[0-9]{1,6}", own) and 1 <= int(own) <= len(names):
-        return unique(names)[int(own) - 1]
-    raise ReadError(
-        f"{path}: there is no column {own!r} to serve as {standard}; the columns are "
-        f"{', '.join(names)}"
-    )
 
 
 def check_units(path: Path, found: Mapping[str, str], contacts: bool = False) -> None:
@@ -179,32 +150,34 @@ def check_units(path: Path, found: Mapping[str, str], contacts: bool = False) ->
     ReadError
         If the names of the columns say two units.
     """
-    what = "forces" if contacts else "lengths"
-    wanted = [one for one in found if one.startswith("f")] if contacts else LENGTHS
-    units = {found[one]: _unit_of(found[one]) for one in wanted if one in found}
+    lengths = ("x", "y", "z", "radius", "diameter", "volume")
+    units: dict[str, str] = {}
+    for what, name in found.items():
+        if what.startswith("f") if contacts else what in lengths:
+            # micro has two letters that look alike, and a cube many spellings
+            unit = UNIT.search(unicodedata.normalize("NFKC", name))
+            text = unit[1].strip() if unit else ""
+            units[name] = CUBE.sub("", text) if what == "volume" else text
     named = [name for name, unit in units.items() if unit]
     if len({units[name] for name in named}) > 1:
-        raise ReadError(f"{path}: {what} of one unit are expected, found {', '.join(named)}")
-    if contacts or not named:
-        return
-    unit = units[named[0]]
-    cube = _unit_of(found.get("volume", ""))
-    if cube and cube not in (f"{unit}^3", f"{unit}3", f"{unit}**3", f"cu {unit}"):
-        raise ReadError(
-            f"{path}: volumes in the cube of the unit of lengths, {unit}, are expected, found "
-            f"{found['volume']}"
-        )
-    if len(named) < len(units):
+        what = "forces" if contacts else "lengths (and volumes in its cube)"
+        raise ReadError(f"{path}: expected {what} of one unit, found {', '.join(named)}")
+    if named and len(named) < len(units) and not contacts:
         lacking = ", ".join(name for name in units if name not in named)
-        warnings.warn(
-            f"{path}: {', '.join(named)} name a unit, {lacking} none: all are taken to be in the "
-            f"same one",
-            ScanfabWarning,
-            stacklevel=3,
-        )
+        warn(f"{path}: {', '.join(named)} name a unit, {lacking} none: it is taken for all")
 
 
-def _unit_of(name: str) -> str | None:
-    """The unit in brackets behind the name of a column; micro has two letters that look alike."""
-    match = UNIT.search(name)
-    return unicodedata.normalize("NFKC", match[1]).strip() if match else None
+def refuse_frames(path: Path, columns: Columns) -> None:
+    """ReadError, or a warning if it is not sure, for a table of several frames."""
+    for name, values in columns.items():
+        plain = plain_name(name)
+        if values.dtype.kind not in "iuf" or plain not in (*FRAME_NAMES, *PERHAPS_FRAMES):
+            continue
+        count = len(np.unique(values))
+        told = f"{path}: the column {name} has {count} values"
+        if count > 1 and plain in FRAME_NAMES:
+            raise ReadError(f"{told}: expected one frame in a file")
+        blocks = np.count_nonzero(np.diff(values)) + 1
+        if 1 < count == blocks <= len(values) / 2:
+            told += ", each in rows that follow each other"
+            warn(f"{told}: if these are frames, write each to a file of its own")

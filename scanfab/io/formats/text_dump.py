@@ -8,6 +8,7 @@ line: ``ITEM: ATOMS id type x y z radius``. A header in YAML is translated into 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,26 +17,20 @@ import numpy as np
 from scanfab.base.errors import ReadError
 from scanfab.io.columns import has_radius
 from scanfab.io.files import first_bytes
-from scanfab.io.formats.dump import Dump, box_cell, numbers_as_names
-from scanfab.io.formats.shared import HEADER_BYTES, marked_frames
-from scanfab.io.growing import grows
-from scanfab.io.reader import Carries, FileKind, ReadOptions, Snapshot
-from scanfab.io.text import Layout, read_rows, text_of
+from scanfab.io.formats import shared
+from scanfab.io.reader import FileKind, Snapshot
+from scanfab.io.text import Columns, Layout, read_rows, text_of
 from scanfab.packing.cell import Cell
 
-carries: Carries = "cell"
 # a snapshot begins with the first of these lines
 MARK, YAML_MARK = re.compile(rb"ITEM: (?:UNITS|TIME|TIMESTEP)\b"), re.compile(rb"---[ \t\r]*\n")
 # the words behind ITEM:, and the lines below them
 SECTION = re.compile(rb"^ITEM: ([^\r\n]*)\r?\n((?:(?!ITEM: )[^\n]*\n)*)", re.MULTILINE)
-YAML = re.compile(rb"---[ \t]*\r?\ncreator:[ \t]*LAMMPS[ \t]*\r?\n")
-YAML_VALUE = re.compile(r"^(\w+):[ \t]*(.*)$", re.MULTILINE)
-YAML_BOX = re.compile(r"^box:[ \t]*\n((?:[ \t]*-[^\n]*\n){1,4})", re.MULTILINE)
-YAML_ROWS, YAML_END = re.compile(rb"^data:[ \t]*\r?\n", re.MULTILINE), b"\n..."
+YAML_VALUE = re.compile(r"^(\w+):(.*(?:\n[ \t]+-.*)*)", re.MULTILINE)
+YAML_ROWS = re.compile(rb"^data:[ \t]*\r?\n", re.MULTILINE)
+YAML_KEYS = {"timestep": "TIMESTEP", "time": "TIME", "natoms": "NUMBER OF ATOMS"}
 # the kind of box, and two letters for each axis: its lower and its upper face
-BOX_KEY = re.compile(r"BOX BOUNDS(?: (abc origin|xy xz yz))?((?: (?:pp|[fsm]{2})){3})?")
-# numbers in each line of a box of this kind
-BOX_WIDTHS = {None: 2, "xy xz yz": 3, "abc origin": 4}
+BOX_KEY = re.compile(r"BOX BOUNDS(?: abc origin| xy xz yz)?((?: (?:pp|[fsm]{2})){3})?")
 # columns of words
 WORDS = ("element", "lattice")
 
@@ -43,111 +38,110 @@ WORDS = ("element", "lattice")
 class Header(NamedTuple):
     """What stands above the rows of a snapshot, as it stands there: nothing is checked yet."""
 
-    sections: dict[str, list[str]]
-    """The lines below each ``ITEM:`` line, by the words in it."""
-    names: list[str]
-    """Of the columns; none in dumps of old versions."""
-    begin: int
-    """The first byte of the rows; 0 if they are not there."""
-    end: int | None
-    """The byte behind the rows; None: the end of the snapshot."""
+    sections: dict[str, str]
+    """What stands below each ``ITEM:`` line, by the words in it."""
+    words: Sequence[str] = ()
+    """Of the line above the rows: what is counted (ATOMS, ENTRIES) and the names of the columns,
+    which dumps of old versions lack. None if the header is incomplete."""
+    rows: bytes = b""
+    line: int = 1
+    """Number of the first row's line."""
 
     @property
-    def number(self) -> str:
-        """What ``NUMBER OF ...`` says."""
-        return "".join(self.sections.get(f"NUMBER OF {self.what}", [])[:1]).strip()
-
-    @property
-    def what(self) -> str:
-        """What is counted: ATOMS, or ENTRIES (or a label of the deck) in lists of contacts."""
-        keys = (key for key in self.sections if key.startswith("NUMBER OF "))
-        return next(keys, "NUMBER OF ATOMS").removeprefix("NUMBER OF ")
+    def row_count(self) -> int | None:
+        """How many rows there are; None if the header does not say it."""
+        number = self.sections.get(f"NUMBER OF {''.join(self.words[:1])}", "")
+        return int(number) if re.fullmatch(r"\d{1,18}", number) else None
 
 
-def fits(head: bytes) -> bool:
-    """Whether a file starts as these dumps do."""
-    return head.startswith(b"ITEM: ") or YAML.match(head) is not None
+class TextDump(shared.GrainsOnly):
+    """What DumpReader needs of dumps of text."""
 
+    def recognises(self, path: Path) -> bool:
+        """By the first words."""
+        head = first_bytes(path)
+        is_yaml = YAML_MARK.match(head) is not None and b"creator: LAMMPS" in head[:100]
+        return is_yaml or head.startswith(b"ITEM: ")
 
-def kind(path: Path) -> FileKind:
-    """Atoms are grains if they have a radius; whatever else is counted are contacts."""
-    header = _header(first_bytes(path, HEADER_BYTES))
-    if header.what != "ATOMS":
-        return "contacts"
-    return "grains" if has_radius(header.names) else "points" if header.sections else "other"
+    def kind(self, path: Path) -> FileKind:
+        """Atoms are grains if they have a radius; whatever else is counted are contacts."""
+        what, *names = _whole_header(f"{path}", first_bytes(path, shared.HEADER_BYTES)).words
+        return "contacts" if what != "ATOMS" else "grains" if has_radius(names) else "points"
 
+    def snapshots(self, path: Path) -> list[Snapshot]:
+        """In the order of their steps; an incomplete last one is left out."""
+        mark = YAML_MARK if first_bytes(path, 3) == b"---" else MARK
+        return shared.marked_frames(path, mark, _moment, _lack)
 
-def snapshots(path: Path) -> list[Snapshot]:
-    """The snapshots of a file, in the order of their steps; an incomplete last one is left out."""
-    mark = YAML_MARK if first_bytes(path, 3) == b"---" else MARK
-    return marked_frames(path, mark, _moment, _lack)
+    def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
+        """
+        Words of elements stay words, all other columns are numbers; by numbers without names.
 
-
-def read(snapshot: Snapshot, options: ReadOptions) -> Dump:
-    """
-    One snapshot; words of elements stay words, all other columns are numbers.
-
-    Raises
-    ------
-    ReadError
-        If the header or a line is not as it should be; names the line.
-    """
-    data, where = text_of(snapshot), f"{snapshot.path}, step {snapshot.step}"
-    header = _header(data)
-    if not (header.begin and re.fullmatch(r"\d{1,18}", header.number)):
-        raise ReadError(
-            f"{where}: the header is incomplete: expected a whole number after ITEM: NUMBER OF "
-            f"{header.what}, found {header.number[:80]!r}, and rows below ITEM: {header.what} (in "
-            f"YAML below data:, with ... at their end)"
-        )
-    rows = data[header.begin : header.end]
-    if header.end is not None:
-        # entries such as "  - [ 1, 0.5, ]", one a line; without a run of blanks they parse faster
-        rows = rows.replace(b"  - [ ", b"").replace(b"- [", b"").translate(None, b"],")
-    names = header.names or numbers_as_names(len(rows.partition(b"\n")[0].split()))
-    line = data.count(b"\n", 0, header.begin) + 1
-    layout = Layout(tuple(names), line=line, whole=("id",), text=WORDS)
-    columns = read_rows(snapshot, rows, layout, count=int(header.number))
-    return Dump(names, columns, _cell(where, header.sections))
+        Raises
+        ------
+        ReadError
+            If the header or a line is not as it should be; names the line.
+        """
+        data, where = text_of(snapshot), f"{snapshot.path}, step {snapshot.step}"
+        header = _whole_header(where, data)
+        what, *names = header.words
+        # LAMMPS called ids tags until 2008
+        names = ["id" if name == "tag" else name for name in names]
+        names = names or shared.numbered(len(header.rows.partition(b"\n")[0].split()))
+        text = WORDS if what == "ATOMS" else ()
+        layout = Layout(tuple(names), line=header.line, whole=("id",), text=text)
+        columns = read_rows(snapshot, header.rows, layout, count=header.row_count)
+        return columns, _cell(where, header.sections)
 
 
 def _header(data: bytes) -> Header:
     if data.startswith(b"---"):
         return _yaml_header(data)
-    sections: dict[str, list[str]] = {}
-    for one in SECTION.finditer(data[:HEADER_BYTES]):
+    sections: dict[str, str] = {}
+    for one in SECTION.finditer(data[: shared.HEADER_BYTES]):
         key = one[1].decode("utf-8", "replace").strip()
         if f"NUMBER OF {key.partition(' ')[0]}" in sections:
-            return Header(sections, key.split()[1:], one.start(2), None)
-        sections[key] = one[2].decode("utf-8", "replace").splitlines()
-    return Header(sections, [], 0, None)
+            line = data.count(b"\n", 0, one.start(2)) + 1
+            return Header(sections, key.split(), data[one.start(2) :], line)
+        sections[key] = one[2].decode("utf-8", "replace").strip()
+    return Header(sections)
+
+
+def _whole_header(where: str, data: bytes) -> Header:
+    """ReadError if the header is incomplete."""
+    header = _header(data)
+    if header.row_count is None:
+        raise ReadError(
+            f"{where}: the header is incomplete: expected a whole number after ITEM: NUMBER OF "
+            f"ATOMS (or ENTRIES), and the names of the columns behind it"
+        )
+    return header
 
 
 def _yaml_header(data: bytes) -> Header:
     """The header of a document, as the sections of a text dump."""
-    rows = YAML_ROWS.search(data, 0, HEADER_BYTES)
-    begin, end = (0, 0) if rows is None else (rows.end(), data.rfind(YAML_END) + 1)
-    text = data[: begin or HEADER_BYTES].decode("utf-8", "replace").replace("\r", "")
-    values = {key: value.strip() for key, value in YAML_VALUE.findall(text)}
-
-    def listed(text: str) -> list[str]:
-        """The words of a list such as ``[ p, p, f, f, ]``; names may have brackets, too."""
-        return text.strip(" -").removeprefix("[").removesuffix("]").replace(",", " ").split()
-
-    letters = listed(values.get("boundary", ""))
-    flags = [low + high for low, high in zip(letters[::2], letters[1::2], strict=False)]
-    found = YAML_BOX.search(text)
-    box = [listed(line) for line in found[1].splitlines()] if found else []
-    if len(box) == 4:
-        # the tilt stands in a line of its own
-        box = [[*line, tilt] for line, tilt in zip(box, box[3], strict=False)]
-        flags = ["xy", "xz", "yz", *flags]
-    keys = {"timestep": "TIMESTEP", "time": "TIME", "natoms": "NUMBER OF ATOMS"}
-    sections = {keys[key]: [value] for key, value in values.items() if key in keys}
-    if box:
-        sections[" ".join(["BOX BOUNDS", *flags])] = [" ".join(line) for line in box]
-    names = listed(values.get("keywords", ""))
-    return Header(sections, names, begin if begin <= end else 0, end)
+    begin = YAML_ROWS.search(data, 0, shared.HEADER_BYTES)
+    head = data[: begin.end() if begin else shared.HEADER_BYTES]
+    # lists such as "- [ p, p, f, f, ]" as their words; names may have brackets, too
+    values = {
+        key: [word for word in value.replace(",", " ").split() if word not in ("-", "[", "]")]
+        for key, value in YAML_VALUE.findall(head.decode("utf-8", "replace").replace("\r", ""))
+    }
+    sections = {YAML_KEYS[key]: " ".join(values[key]) for key in values if key in YAML_KEYS}
+    faces, box = "".join(values.get("boundary", [])), values.get("box", [])
+    tilt = box[6:9]
+    if tilt:
+        # it stands behind the bounds of all axes
+        box = [word for axis, one in enumerate(tilt) for word in (*box[2 * axis :][:2], one)]
+    key = f"BOX BOUNDS {'xy xz yz ' * bool(tilt)}{faces[:2]} {faces[2:4]} {faces[4:]}"
+    sections[key] = " ".join(box)
+    if begin is None:
+        return Header(sections)
+    # the document ends with a line of dots
+    rows = data[begin.end() : data.rfind(b"\n.") + 1 or None]
+    # rows such as "  - [ 1, 0.5, ]"; without a run of blanks they parse faster
+    rows = rows.replace(b"  - [ ", b"").replace(b"- [", b"").translate(None, b"],")
+    return Header(sections, ["ATOMS", *values.get("keywords", [])], rows, head.count(b"\n") + 1)
 
 
 def _moment(path: Path, head: bytes) -> tuple[int, float | None] | None:
@@ -155,47 +149,31 @@ def _moment(path: Path, head: bytes) -> tuple[int, float | None] | None:
     sections = _header(head).sections
     if sections and sections.keys() <= {"UNITS", "TIME", "TIMESTEP"}:
         return None
-    step = "".join(sections.get("TIMESTEP", [])[:1]).strip()
+    step, time = sections.get("TIMESTEP", ""), sections.get("TIME")
     if not re.fullmatch(r"-?\d{1,18}", step):
-        raise ReadError(
-            f"{path}: expected a whole number after ITEM: TIMESTEP, found {step[:80]!r}"
-        )
-    try:
-        return int(step), float(sections["TIME"][0]) if "TIME" in sections else None
-    except (LookupError, ValueError):
-        raise ReadError(f"{path}, step {step}: expected a number after ITEM: TIME") from None
+        raise ReadError(f"{path}: expected a whole number as ITEM: TIMESTEP, found {step[:80]!r}")
+    where = f"{path}, step {step}: ITEM: TIME"
+    return int(step), None if time is None else shared.numbers(where, time.encode(), 1)[0]
 
 
 def _lack(data: bytes) -> str | None:
-    """What the last snapshot of a file lacks."""
+    """What the last snapshot of a file lacks; a count that is none is told when it is read."""
     header = _header(data)
-    if not header.begin:
-        return "its header or its end is missing"
-    last = data[data.rfind(b"\n") + 1 :].split()
-    # the last line may lack its end if it lacks no word
-    is_line = len(last) == max(len(header.names), 1) and not grows()
-    rows = data.count(b"\n", header.begin, header.end) + is_line
-    # a count that is none is told where the snapshot is read
-    if header.number.isdecimal() and rows < int(header.number[:18]):
-        return f"it has {rows} rows of {header.number}"
-    return None
+    if not header.words:
+        return "its header is incomplete"
+    return shared.lack_of_rows(header.rows, header.row_count or 0, max(len(header.words) - 1, 1))
 
 
-def _cell(where: str, sections: dict[str, list[str]]) -> Cell | None:
+def _cell(where: str, sections: dict[str, str]) -> Cell | None:
     """The box, periodic along the axes with the flag pp; very old dumps have no flags."""
     key = next((key for key in sections if key.startswith("BOX BOUNDS")), None)
     if key is None:
         return None
     where = f"{where}: ITEM: {key}"
     match = BOX_KEY.fullmatch(" ".join(key.split()))
-    try:
-        bounds = np.array([line.split() for line in sections[key][:3]], dtype=np.float64)
-    except ValueError:
-        bounds = np.zeros(0)
-    if match is None or bounds.shape != (3, BOX_WIDTHS[match[1]]):
-        raise ReadError(
-            f"{where}: expected three boundary flags such as pp, ff, fs or mm, and three lines of "
-            f"two numbers (of three with xy xz yz, of four with abc origin)"
-        )
-    x, y, z = (flag == "pp" for flag in (match[2] or "ff ff ff").split())
-    return box_cell(where, bounds, (x, y, z))
+    if match is None:
+        raise ReadError(f"{where}: expected three boundary flags such as pp, ff, fs or mm")
+    # numbers in a line: two bounds and perhaps a tilt, or a vector and a coordinate of the origin
+    width, flags = 4 if "abc" in key else 3 if "xy" in key else 2, match[1] or "ff ff ff"
+    bounds = np.reshape(shared.numbers(where, sections[key].encode(), 3 * width), (3, width))
+    return shared.box_cell(where, bounds, [flag == "pp" for flag in flags.split()])

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+from itertools import islice
 from pathlib import Path
-from typing import IO, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from scanfab.base.errors import ReadError
-from scanfab.io.columns import has_radius
-from scanfab.io.files import bare_name, first_bytes, plain
+from scanfab.io.files import bare_name, check_lines, first_bytes, leave_out_last, plain
 from scanfab.io.formats.shared import GrainsOnly, cell_of, numbers
-from scanfab.io.growing import leave_out_last
-from scanfab.io.reader import Carries, FileKind, Snapshot
-from scanfab.io.text import Columns, Layout, read_rows, skip_rows, spelt, text_of
+from scanfab.io.reader import Carries, Snapshot
+from scanfab.io.text import Columns, Layout, read_rows, spelt, text_of
 from scanfab.packing.cell import Cell
 
 COUNT = re.compile(rb"\A(?:\xef\xbb\xbf)?[ \t]*([0-9]{1,15})[ \t]*\r?\n")
@@ -40,41 +40,38 @@ class XyzReader(GrainsOnly):
         count = COUNT.match(head)
         if count is None:
             return False
-        line = head[count.end() :].partition(b"\n")[0]
-        names_columns = re.search(rb"\bProperties\s*=", line) is not None
-        return names_columns or bare_name(path).lower().endswith(self.extensions)
+        names_columns = re.search(rb"\bProperties\s*=", head[count.end() :].partition(b"\n")[0])
+        return bool(names_columns) or bare_name(path).lower().endswith(self.extensions)
 
-    def kind(self, path: Path) -> FileKind:
-        """Grains, with or without a radius."""
-        return "grains" if has_radius([one[0] for one in _first_head(path).columns]) else "points"
+    def names(self, path: Path) -> Sequence[str]:
+        """Of the columns of the first frame."""
+        return [name for name, _, _ in _first(path).columns]
 
     def carries(self, path: Path) -> Carries:
         """The line above the rows has a cell, or none."""
-        return "nothing" if _cell(_first_head(path)) is None else "cell"
+        return "nothing" if _first(path).cell(path) is None else "cell"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """One behind the other."""
         found: list[Snapshot] = []
+        check_lines(path, plain(path))
         with open(plain(path), "rb") as stream:
-            size = stream.seek(0, 2)
-            start = stream.seek(0)
-            while (head := _next_head(path, stream)) is not None:
-                rows = skip_rows(stream, head.rows)
-                if rows == head.rows - 1:  # the last line of the file may have no end
-                    stream.seek(max(size - HEAD, 0))
-                    rows += bool(stream.read().rpartition(b"\n")[2].strip())
+            start = 0
+            while first := stream.readline():
+                if not first.strip():
+                    continue
+                head = _head(path, first + stream.readline())
+                rows = sum(1 for _ in islice(stream, head.rows))
                 if rows < head.rows:
                     reason = f"expected {head.rows} rows, the file ends after {rows}"
                     leave_out_last(path, len(found), reason)
                     break
-                stop = stream.tell()
-                steps = [head.words.get(key, "") for key in ("step", "timestep")]
-                step = next(
-                    (int(one) for one in steps if re.fullmatch(r"[-+]?[0-9]{1,18}", one)), None
-                )
-                time = head.numbers("time", 1)
-                found.append(Snapshot(path, step, time[0] if time else None, start, stop))
-                start = stop
+                words = (head.words.get(key, "") for key in ("step", "timestep"))
+                steps = [int(one) for one in words if re.fullmatch(r"[-+]?[0-9]{1,18}", one)]
+                time = head.numbers(path, "time", 1)
+                moment = steps[0] if steps else None, time[0] if time else None
+                found.append(Snapshot(path, *moment, start, stream.tell()))
+                start = stream.tell()
         if not found:
             raise ReadError(f"{path}: the file is empty")
         return found
@@ -96,88 +93,68 @@ class XyzReader(GrainsOnly):
         rows = read_rows(snapshot, data[start:], layout, count=head.rows)
         found: Columns = {}
         for name, kind, width in head.columns:
-            own = [rows[part] for part in parts[name]]
-            values = own[0] if width == 1 else np.column_stack(own)
-            where = f"{path}: the column {name}"
+            values = np.column_stack([rows[part] for part in parts[name]])
             if kind == "L":
                 values = np.char.upper(values.astype(str))
-                if not np.isin(values, list(TRUTHS)).all():
-                    raise ReadError(f"{where}: expected T or F in each row")
+                if not np.isin(values, [*TRUTHS]).all():
+                    raise ReadError(f"{path}: the column {name}: expected T or F in each row")
                 values = np.isin(values, [word for word, truth in TRUTHS.items() if truth])
             if kind == "I" and values.dtype.kind != "i":
-                raise ReadError(f"{where}: expected whole numbers")
+                raise ReadError(f"{path}: the column {name}: expected whole numbers")
             is_position = name.lower() in POSITIONS and "position" not in found
-            if is_position and values.shape[1:] != (3,):
-                raise ReadError(f"{where}: expected three coordinates in each row")
-            found["position" if is_position else name] = values
-        return found, _cell(head)
+            if is_position and width != 3:
+                raise ReadError(f"{path}: the column {name}: expected three coordinates")
+            found["position" if is_position else name] = values if width > 1 else values[:, 0]
+        return found, head.cell(path)
 
 
 class _Head(NamedTuple):
     """The two lines above the rows of a frame."""
 
-    path: Path
     rows: int
     words: dict[str, str]
     columns: list[tuple[str, str, int]]
     """Name, kind and width of each."""
 
-    def numbers(self, key: str, count: int) -> list[float] | None:
+    def numbers(self, path: Path, key: str, count: int) -> list[float] | None:
         """The numbers behind a key; None without it."""
-        if key not in self.words:
+        text = self.words.get(key)
+        return None if text is None else numbers(f"{path}: {key}", text.encode(), count)
+
+    def cell(self, path: Path) -> Cell | None:
+        """Of ``Lattice``, ``Origin`` and ``pbc``."""
+        vectors = self.numbers(path, "lattice", 9)
+        if vectors is None:
             return None
-        return numbers(f"{self.path}: {key}", self.words[key].encode(), count)
+        periodic = [TRUTHS.get(one) for one in self.words.get("pbc", "T T T").upper().split()]
+        if len(periodic) != 3 or None in periodic:
+            raise ReadError(f"{path}: pbc: expected three of T and F, found {self.words['pbc']}")
+        origin = self.numbers(path, "origin", 3) or [0.0, 0.0, 0.0]
+        return cell_of(f"{path}: Lattice", np.reshape(vectors, (3, 3)), map(bool, periodic), origin)
 
 
-def _cell(head: _Head) -> Cell | None:
-    """Of ``Lattice``, ``Origin`` and ``pbc``."""
-    vectors = head.numbers("lattice", 9)
-    if vectors is None:
-        return None
-    periodic = [TRUTHS.get(one) for one in head.words.get("pbc", "T T T").upper().split()]
-    if len(periodic) != 3 or None in periodic:
-        raise ReadError(f"{head.path}: pbc: expected three of T and F, found {head.words['pbc']}")
-    origin = head.numbers("origin", 3) or [0.0, 0.0, 0.0]
-    vectors_by_row = np.reshape(vectors, (3, 3))
-    return cell_of(f"{head.path}: Lattice", vectors_by_row, map(bool, periodic), origin)
-
-
-def _first_head(path: Path) -> _Head:
-    with open(plain(path), "rb") as stream:
-        head = _next_head(path, stream)
-    if head is None:
-        raise ReadError(f"{path}: expected a number of rows, found the end of the file")
-    return head
-
-
-def _next_head(path: Path, stream: IO[bytes]) -> _Head | None:
-    """The head of the next frame; None at the end."""
-    first = stream.readline(100)
-    while first and not first.strip():
-        first = stream.readline(100)
-    return _head(path, first + stream.readline(HEAD)) if first else None
+def _first(path: Path) -> _Head:
+    """The head of the first frame."""
+    lines = first_bytes(path, HEAD).lstrip().split(b"\n", 2)[:2]
+    return _head(path, b"".join(line + b"\n" for line in lines))
 
 
 def _head(path: Path, lines: bytes) -> _Head:
     """The head in two lines."""
     count = COUNT.match(lines)
     if count is None or not lines.endswith(b"\n"):
-        raise ReadError(
-            f"{path}: expected a number of rows and a line with Properties=, found {spelt(lines)}"
-        )
+        expected = "expected a number of rows and a line with Properties="
+        raise ReadError(f"{path}: {expected}, found {spelt(lines)}")
     line = lines[count.end() :].decode("utf-8", "replace")
     words = {key.lower(): quoted or bare for key, quoted, bare in PAIR.findall(line)}
     if "properties" not in words:
         raise ReadError(
-            f"{path}: this is plain XYZ, which does not say what its columns are: expected "
-            f"Properties=... in its second line; read it as a table, for instance "
-            f'`format="table", skip=2, columns="x=2,y=3,z=4,radius=5"`'
+            f"{path}: this is plain XYZ, whose second line has no Properties=...: read it as a "
+            f'table, for instance `format="table", skip=2, columns="x=2,y=3,z=4,radius=5"`'
         )
     parts = words["properties"].split(":")
     if not PROPERTIES.fullmatch(words["properties"]) or len(set(parts[::3])) < len(parts) // 3:
-        raise ReadError(
-            f"{path}: expected Properties=NAME:KIND:WIDTH:... with the kinds S, I, R and L, and "
-            f"each name once, found {words['properties'][:100]!r}"
-        )
+        expected = "expected Properties=NAME:KIND:WIDTH:... (kinds S, I, R, L), each name once"
+        raise ReadError(f"{path}: {expected}, found {words['properties'][:100]!r}")
     columns = list(zip(parts[::3], parts[1::3], map(int, parts[2::3]), strict=True))
-    return _Head(path, int(count[1]), words, columns)
+    return _Head(int(count[1]), words, columns)

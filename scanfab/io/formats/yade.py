@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from scanfab.base.arrays import MOST
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.typing import FloatArray
 from scanfab.io.columns import grain_table
@@ -13,14 +12,7 @@ from scanfab.io.files import first_bytes
 from scanfab.io.formats.vtk import VtkReader, vectors
 from scanfab.io.formats.yade_save import is_binary_save, is_save, read_save, snapshot_of_save
 from scanfab.io.mesh import Mesh
-from scanfab.io.reader import (
-    Carries,
-    FileKind,
-    GrainTable,
-    JoinedContacts,
-    ReadOptions,
-    Snapshot,
-)
+from scanfab.io.reader import Carries, FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
 from scanfab.io.text import Layout, read_rows, text_of
 from scanfab.packing.cell import Cell
 
@@ -77,13 +69,8 @@ class YadeReader(VtkReader):
         self, snapshot: Snapshot, options: ReadOptions, grains: GrainTable
     ) -> JoinedContacts:
         """Lines between centres; a wall's end is where no grain is."""
-        if _is_text(snapshot.path):
-            raise ReadError(f"{snapshot.path}: YADE's text export holds no contacts")
-        if is_save(snapshot.path):
-            raise ReadError(
-                f"{snapshot.path}: a saved simulation is no contact list for other grains: "
-                f"compute it by itself"
-            )
+        if _is_text(snapshot.path) or is_save(snapshot.path):
+            raise ReadError(f"{snapshot.path}: expected contacts, found grains")
         return super().read_contacts(snapshot, options, grains)
 
     def carries(self, path: Path) -> Carries:
@@ -91,20 +78,14 @@ class YadeReader(VtkReader):
         says = first_bytes(path).startswith(PERIODIC_HEAD) or is_save(path)
         return "cell" if says else super().carries(path)
 
-    def force_on_second(self, mesh: Mesh) -> FloatArray | None:
-        """YADE's forces act on the second body."""
+    def forces(self, mesh: Mesh) -> tuple[FloatArray | None, FloatArray | None]:
+        """YADE's forces act on the second body; VTKRecorder's normal force is a number."""
         normal, shear = vectors(mesh, "normalForce"), vectors(mesh, "shearForce")
-        if normal is None or shear is None:
-            return vectors(mesh, "force")
-        return normal + shear
-
-    def normal_force(self, mesh: Mesh) -> FloatArray | None:
-        """A vector on the second body, or what VTKRecorder writes beside absolute values."""
-        force = vectors(mesh, "normalForce")
-        if force is not None:
-            return force
+        force = vectors(mesh, "force") if normal is None or shear is None else normal + shear
         recorded = mesh.line_arrays.get("forceN")
-        return recorded if recorded is not None and recorded.shape == (len(mesh.lines),) else None
+        if normal is None and recorded is not None and recorded.shape == (len(mesh.lines),):
+            normal = recorded
+        return force, normal
 
 
 def _is_text(path: Path) -> bool:
@@ -113,35 +94,21 @@ def _is_text(path: Path) -> bool:
 
 def _read_text(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
     """Columns by the names in the first line, or in the second one for attributes."""
-    path, text = snapshot.path, text_of(snapshot)
-    lines = first_bytes(path, 1 << 14).decode("utf-8", "replace").splitlines()
-    rows = COMMENT.sub(b"", text)
-    words = rows.lstrip().split(b"\n", 1)[0].split()
-    names, cell = _names_and_cell(path, lines, len(words) or None)
-    if words and len(names) != len(words):
-        raise ReadError(
-            f"{path}: the first line names {len(names)} columns, the rows have {len(words)}"
-        )
-    columns = read_rows(snapshot, rows, Layout(tuple(names)))
-    return grain_table(path, columns, cell, options)
-
-
-def _names_and_cell(
-    path: Path, lines: list[str], count: int | None
-) -> tuple[list[str], Cell | None]:
-    """Names of the columns and the cell, from the first lines; count is None without rows."""
-    head = lines[0]
+    path = snapshot.path
+    rows = COMMENT.sub(b"", text_of(snapshot))
+    width = len(rows.lstrip().split(b"\n", 1)[0].split())
+    head, second = [*first_bytes(path, 1 << 14).decode("utf-8", "replace").splitlines(), ""][:2]
+    cell, names = None, head.removeprefix("#format").strip().split("_")
     if head.startswith("##PERIODIC::"):
+        names = ["x", "y", "z", "r", "clumpId"][: width or None]
         try:
-            edges = [float(word) for word in head.removeprefix("##PERIODIC::").split()]
-            if not all(abs(edge) < MOST for edge in edges):
-                raise ValueError
-            return ["x", "y", "z", "r", "clumpId"][:count], Cell(edges)
+            cell = Cell([float(word) for word in head.removeprefix("##PERIODIC::").split()])
         except (ValueError, PackingError):
             raise ReadError(f"{path}, line 1: expected three lengths, found {head!r}") from None
-    names = head.removeprefix("#format").strip().split("_")
-    if names[-1] == "attrs":
-        named = re.fullmatch(r"#\s*(x y z r( .*)?)", lines[1]) if len(lines) > 1 else None
+    elif names[-1] == "attrs":
+        named = re.fullmatch(r"#\s*(x y z r( .*)?)", second)
         names = named[1].split() if named else names[:-1]
-        names += [f"attr{number}" for number in range(1, (count or 0) - len(names) + 1)]
-    return names, None
+        names += [f"attr{number}" for number in range(1, width - len(names) + 1)]
+    if width not in (0, len(names)):
+        raise ReadError(f"{path}: the first line names {len(names)} columns, the rows have {width}")
+    return grain_table(path, read_rows(snapshot, rows, Layout(tuple(names))), cell, options)

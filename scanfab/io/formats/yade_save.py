@@ -1,36 +1,49 @@
-"""YADE's ``O.save`` as XML: the whole simulation, of which spheres, contacts and cell are read."""
+"""
+What YADE writes beside text and VTK: ``O.save`` as XML, and cells beside the VTK files of spheres.
+
+Of a saved simulation spheres, contacts and the cell are read. The VTK files of spheres have no cell
+themselves. ``VTKRecorder`` numbers spheres and cells by the step. ``VTKExporter`` numbers a cell by
+how many files of *interactions* it has written, so that a cell may be overwritten, or bear the
+number of another frame: it is taken only where there is one cell for each file of spheres, in their
+order.
+"""
 
 from __future__ import annotations
 
+import glob
 import re
-import warnings
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from scanfab.base.arrays import MOST
-from scanfab.base.errors import PackingError, ReadError, ScanfabWarning
-from scanfab.base.typing import FloatArray, IntArray
+from scanfab.base.errors import PackingError, ReadError, note, warn
+from scanfab.base.typing import FloatArray
 from scanfab.io.columns import grain_table, whole_numbers
 from scanfab.io.contacts import join_ids, rows_of_ids
-from scanfab.io.files import first_bytes, unpacked
+from scanfab.io.files import Stamp, bare_name, first_bytes, pieces, stamp_of
+from scanfab.io.mesh import read_mesh
 from scanfab.io.reader import GrainTable, ReadOptions, Snapshot
 from scanfab.packing.cell import Cell
-from scanfab.packing.walls import ListedWallForces
+from scanfab.packing.contacts import ListedWallForces
 
 STEP = re.compile(rb"<iter>\s*(\d{1,18})\s*</iter>")
-TIME = re.compile(rb"<time>\s*(\d[-+.\deE]*)\s*</time>")
+TIME = re.compile(rb"<time>\s*(\d+\.?\d*(?:e[-+]?\d+)?)\s*</time>")
+# bytes that are parsed at a time; bytes without a body or contact after which none is expected;
+# and how deep elements stand in one another
+PIECE, BARREN, DEPTH = 1 << 16, 1 << 23, 200
 
-# bytes that are parsed at a time; elements without a body or contact after which none will come
-# (32 bytes of the file count as one more element); and how deep elements stand in one another
-PIECE, BARREN, DEPTH = 1 << 16, 500_000, 200
-
-# where the scene's own values stand
-SCENE = ["boost_serialization", "scene", "px"]
+# files of spheres by VTKExporter and VTKRecorder, and those of cells
+EXPORTED = re.compile(r"(.*)-spheres-(\d+)\.vtk")
+RECORDED = re.compile(r"(.*)spheres\.(\d+)\.vtu")
+CELL_FILE = re.compile(r".*-periCell-\d+\.vtk|.*pericell\.\d+\.vtu")
+# corners of a cell in both kinds of file, and those at the ends of its vectors
+CORNERS, ORIGIN, ENDS = 8, 4, (7, 5, 0)
+# in cells: YADE wraps spheres into the cell, but writes six digits
+ROUNDING = 1e-4
 
 
 def is_save(path: Path) -> bool:
@@ -48,11 +61,7 @@ def snapshot_of_save(path: Path) -> Snapshot:
     """The one frame, with step and time."""
     head = first_bytes(path)
     step, time = STEP.search(head), TIME.search(head)
-    try:
-        seconds = None if time is None else float(time[1])
-    except ValueError:
-        seconds = None
-    return Snapshot(path, step=None if step is None else int(step[1]), time=seconds)
+    return Snapshot(path, step and int(step[1]), time and float(time[1]))
 
 
 def read_save(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
@@ -65,172 +74,84 @@ def read_save(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         If the file is not as YADE writes it.
     """
     path = snapshot.path
-    scene = _Scene()
+    ids: list[float] = []
+    spheres: list[list[float]] = []
+    contacts: list[list[float]] = []
+    # a class is spelled out once only, and named by its number afterwards
+    shapes: dict[str, str] = {}
+    is_periodic, size = False, np.zeros((0, 3))
     try:
-        _walk(path, scene)
-    except (ElementTree.ParseError, LookupError, ValueError, OverflowError) as error:
-        raise ReadError(
-            f"{path}: cannot be read as a simulation that YADE saved (O.save): {error}"
-        ) from None
-    spheres = np.array(scene.spheres, dtype=np.float64).reshape(-1, 7)
-    id, mask, clump, radius = spheres[:, :4].T
-    columns = {"id": id, "mask": mask, "position": spheres[:, 4:], "radius": radius}
-    if np.any(clump >= 0):
-        columns["clumpId"] = clump
-    grains = grain_table(path, columns, _cell(path, scene), options)
-    listed = np.array(scene.contacts, dtype=np.float64).reshape(-1, 11)
-    pairs = whole_numbers(path, listed[:, :2].ravel()).reshape(-1, 2)
-    unknown = ~np.isin(pairs, scene.bodies)
-    if unknown.any():
-        raise ReadError(f"{path}: a contact names the body {pairs[unknown][0]}, which is not there")
-    # contacts of walls with walls are not ours
-    ours = np.isin(pairs, id).any(axis=1)
-    pairs, listed = pairs[ours], listed[ours]
-    force: FloatArray | None = listed[:, 5:8]
-    lacking = np.isnan(listed[:, 5])
-    if 0 < np.count_nonzero(lacking) < len(lacking):
-        warnings.warn(
-            f"{path}: {np.count_nonzero(lacking)} of {len(lacking)} contacts have no normalForce "
-            f"and shearForce: all forces are left out",
-            ScanfabWarning,
-            stacklevel=2,
-        )
-    if lacking.any():
-        force = None
-    image = None
-    if grains.cell is not None and grains.cell.is_periodic:
-        image = whole_numbers(path, listed[:, 2:5].ravel()).reshape(-1, 3)
-    joined = join_ids(path, grains, pairs, force, walls=True, image=image)
-    return grains._replace(
-        contacts=joined.contacts,
-        wall_contacts=joined.wall_contacts,
-        wall_forces=_wall_forces(pairs, force, listed[:, 8:], grains),
-    )
+        for element in _elements(path):
+            if element.tag == "isPeriodic":
+                is_periodic = (element.text or "").strip() == "1"
+            elif element.tag == "hSize":
+                numbers = [_number(element, f"m{row}{column}") for row, column in np.ndindex(3, 3)]
+                size = np.reshape(numbers, (3, 3))
+            elif element.find("iterMadeReal") is not None:
+                contacts.append(_contact(element))
+            else:
+                ids.append(_number(element, "id"))
+                spheres += _sphere(element, shapes)
+        # the vectors of the cell are the columns of hSize
+        cell = Cell(size.T) if is_periodic and len(size) else None
+    except (ElementTree.ParseError, PackingError, LookupError, ValueError, OverflowError) as error:
+        reason = f"cannot be read as a simulation that YADE saved (O.save): {error}"
+        raise ReadError(f"{path}: {reason}") from None
+    table = np.array(spheres).reshape(-1, 7)
+    columns = dict(zip(("id", "mask", "clumpId", "radius"), table.T, strict=False))
+    if np.all(columns["clumpId"] < 0):
+        del columns["clumpId"]
+    grains = grain_table(path, {**columns, "position": table[:, 4:]}, cell, options)
+    return _with_contacts(path, grains, np.array(contacts).reshape(-1, 15), np.array(ids))
 
 
-def _wall_forces(
-    pairs: IntArray, force: FloatArray | None, point: FloatArray, grains: GrainTable
-) -> ListedWallForces | None:
-    """Of contacts between a sphere and a wall; None if their points or forces are missing."""
-    rows = rows_of_ids(grains, pairs)
-    first, second = (rows >= 0).T
-    at = first != second
-    if not at.any() or force is None or np.isnan(point).any():
-        return None
-    # forces are those on the second body
-    own = np.where(second, 1.0, -1.0)[:, None] * force
-    return ListedWallForces(rows.max(axis=1)[at], point[at], own[at])
-
-
-def _cell(path: Path, scene: _Scene) -> Cell | None:
-    """The periodic cell, whose vectors are the columns of hSize."""
-    vectors = np.array(scene.size).reshape(-1, 3).T
-    if not scene.is_periodic or vectors.shape != (3, 3) or not np.all(np.abs(vectors) < MOST):
-        return None
-    try:
-        return Cell(vectors)
-    except PackingError as error:
-        raise ReadError(f"{path}: {error}") from None
-
-
-@dataclass
-class _Scene:
-    """What is read of a simulation."""
-
-    bodies: list[float] = field(default_factory=list)
-    """Ids of all bodies, of spheres and of walls."""
-    spheres: list[list[float]] = field(default_factory=list)
-    """Id, mask, clump (-1 if it stands alone), radius and centre of each."""
-    contacts: list[list[float]] = field(default_factory=list)
-    """Two ids, the image, the force and the point of each; NaN for what the file lacks."""
-    size: list[float] = field(default_factory=list)
-    is_periodic: bool = False
-    shapes: dict[str, str] = field(default_factory=dict)
-    """Names of shapes by their class, which is spelled out once only."""
-
-
-def _walk(path: Path, scene: _Scene) -> None:
-    """Go through the elements; the file never stands in memory as a whole."""
+def _elements(path: Path) -> Iterator[ElementTree.Element]:
+    """Bodies, contacts, ``hSize`` and ``isPeriodic``; memory never holds the whole file."""
     parser: ElementTree.XMLPullParser[Any] = ElementTree.XMLPullParser(("start", "end"))
-    above: list[ElementTree.Element] = []
-    # how deep the body or contact stands that is read, and how many elements came without any
-    part: int | None = None
-    barren = 0
-    with unpacked(path) as stream:
-        while piece := stream.read(PIECE):
-            parser.feed(piece)
-            barren += PIECE // 32
-            events: Iterator[Any] = parser.read_events()
-            for event, element in events:
-                if event == "start":
-                    is_item = element.tag == "px" and above and above[-1].tag == "item"
-                    if part is None and (is_item or element.tag == "hSize"):
-                        part = len(above)
-                    above.append(element)
-                    continue
-                above.pop()
-                barren += 1
-                if part is None or part == len(above) or element.tag == "px":
-                    barren = 0 if _take(scene, above, element) else barren
-                if part is None or part == len(above):
-                    part = None
-                    if above:
-                        # the parser holds on to it by the one above
-                        del above[-1][:]
-            if len(above) > DEPTH:
-                raise ValueError(f"elements stand in one another {len(above)} deep")
-            if barren > BARREN:
-                raise ValueError("no body and no contact in half a million elements")
+    barren = depth = 0
+    for piece in pieces(path, PIECE):
+        parser.feed(piece)
+        barren += len(piece)
+        events: Iterator[Any] = parser.read_events()
+        for event, element in events:
+            depth += 1 if event == "start" else -1
+            if event == "end" and element.tag in ("isPeriodic", "hSize"):
+                yield element
+            elif event == "end" and element.tag == "px":
+                # a contact, which stands in the first body that has it, or a body that is there
+                has = [element.find(name) is not None for name in ("iterMadeReal", "id", "state")]
+                if has[0] or all(has[1:]):
+                    yield element
+                    element.clear()
+                    barren = 0
+        if barren > BARREN or depth > DEPTH:
+            raise ValueError(f"no body in {barren:,} bytes, or elements {depth:,} deep")
     parser.close()
 
 
-def _take(scene: _Scene, above: list[ElementTree.Element], element: ElementTree.Element) -> bool:
-    """Read a complete element, which stands in those above; whether it is a body or contact."""
-    tags = [one.tag for one in above]
-    if element.tag == "px" and element.find("iterMadeReal") is not None:
-        # inside the first body that has it, as YADE writes it
-        _take_contact(scene, element)
-        element.clear()
-        return True
-    if element.tag == "px" and tags[-2:] == ["body", "item"]:
-        _take_body(scene, element)
-        return True
-    if element.tag == "isPeriodic" and tags == SCENE:
-        scene.is_periodic = (element.text or "").strip() == "1"
-    elif element.tag == "hSize" and tags == [*SCENE, "cell", "px"]:
-        scene.size = [_number(element, f"m{row}{column}") for row, column in np.ndindex(3, 3)]
-    return False
+def _sphere(body: ElementTree.Element, shapes: dict[str, str]) -> list[list[float]]:
+    """Id, mask, clump (-1 if it stands alone), radius and centre; nothing of another body."""
+    shape = body.find("shape/px")
+    attributes = {} if shape is None else shape.attrib
+    number = attributes.get("class_id") or attributes.get("class_id_reference") or ""
+    if "class_name" in attributes:
+        shapes[number] = attributes["class_name"].rpartition("::")[2]
+    if shape is None or shapes.get(number) != "Sphere":
+        return []
+    clump = float(body.findtext("clumpId", "-1"))
+    place = [_number(body, f"state/px/se3/position/{axis}") for axis in "xyz"]
+    return [
+        [_number(body, "id"), _number(body, "groupMask"), clump, _number(shape, "radius"), *place]
+    ]
 
 
-def _take_body(scene: _Scene, body: ElementTree.Element) -> None:
-    if body.find("id") is None:
-        return  # erased
-    scene.bodies.append(_number(body, "id"))
-    shape, place = body.find("shape/px"), body.find("state/px/se3/position")
-    if shape is None:
-        return
-    number = shape.get("class_id") or shape.get("class_id_reference") or ""
-    if "class_name" in shape.attrib:
-        scene.shapes[number] = shape.attrib["class_name"].rpartition("::")[2]
-    if scene.shapes.get(number) != "Sphere":
-        return
-    if place is None:
-        raise ValueError("a sphere has no position")
-    own = [_number(body, "id"), _number(body, "groupMask"), float(body.findtext("clumpId", "-1"))]
-    scene.spheres.append([*own, _number(shape, "radius"), *_vector(place)])
-
-
-def _take_contact(scene: _Scene, contact: ElementTree.Element) -> None:
-    # YADE also keeps pairs that are near each other
-    if _number(contact, "iterMadeReal") < 0:
-        return
-    shift = contact.find("cellDist")
-    found = [next(contact.iter(one), None) for one in ("normalForce", "shearForce", "contactPoint")]
-    normal, shear, point = ([np.nan] * 3 if one is None else _vector(one) for one in found)
-    force = [one + other for one, other in zip(normal, shear, strict=True)]
-    ids = [_number(contact, "id1"), _number(contact, "id2")]
-    image = [0.0] * 3 if shift is None else _vector(shift)
-    scene.contacts.append([*ids, *image, *force, *point])
+def _contact(contact: ElementTree.Element) -> list[float]:
+    """Step since when it is real, two ids, image, both forces, point; NaN for what is not there."""
+    row = [_number(contact, name) for name in ("iterMadeReal", "id1", "id2")]
+    for name in ("cellDist", "normalForce", "shearForce", "contactPoint"):
+        found = next(contact.iter(name), None)
+        row += [np.nan] * 3 if found is None else [_number(found, axis) for axis in "xyz"]
+    return row
 
 
 def _number(element: ElementTree.Element, name: str) -> float:
@@ -240,5 +161,134 @@ def _number(element: ElementTree.Element, name: str) -> float:
     return float(text)
 
 
-def _vector(element: ElementTree.Element) -> list[float]:
-    return [_number(element, name) for name in "xyz"]
+def _with_contacts(
+    path: Path, grains: GrainTable, table: FloatArray, bodies: FloatArray
+) -> GrainTable:
+    """The grains with their contacts, and with the forces of walls on them."""
+    # YADE also keeps pairs that are near each other
+    table = table[table[:, 0] >= 0]
+    pairs = whole_numbers(path, table[:, 1:3].ravel()).reshape(-1, 2)
+    unknown = ~np.isin(pairs, bodies)
+    if unknown.any():
+        raise ReadError(f"{path}: a contact names the body {pairs[unknown][0]}, which is not there")
+    rows = rows_of_ids(grains, pairs)
+    # contacts of walls with walls are not ours
+    ours = np.any(rows >= 0, axis=1)
+    rows, pairs = rows[ours], pairs[ours]
+    shift, normal, shear, point = np.split(table[ours, 3:], 4, axis=1)
+    forces = normal + shear
+    lacking = np.count_nonzero(np.isnan(forces).any(axis=1))
+    if 0 < lacking < len(pairs):
+        warn(f"{path}: {lacking} of {len(pairs)} contacts have no force: all forces are left out")
+    force = None if lacking else forces
+    is_periodic = grains.cell is not None and grains.cell.is_periodic
+    image = whole_numbers(path, shift.ravel()).reshape(-1, 3) if is_periodic else None
+    joined = join_ids(path, grains, pairs, force, walls=True, image=image)
+    first, second = (rows >= 0).T
+    at, walls = first != second, None
+    if at.any() and force is not None and not np.isnan(point).any():
+        # forces are those on the second body
+        own = np.where(second, 1.0, -1.0)[at, None] * forces[at]
+        walls = ListedWallForces(rows.max(axis=1)[at], point[at], own)
+    return grains._replace(
+        contacts=joined.contacts, wall_contacts=joined.wall_contacts, wall_forces=walls
+    )
+
+
+def is_cell_file(path: Path) -> bool:
+    """Whether a file is named as YADE names those of a cell."""
+    return CELL_FILE.fullmatch(bare_name(path)) is not None
+
+
+def cell_beside(path: Path, position: FloatArray) -> Cell | None:
+    """
+    The cell of a file of spheres.
+
+    Parameters
+    ----------
+    path : Path
+        What ``VTKExporter`` or ``VTKRecorder`` has written.
+    position : ndarray, shape (N, 3)
+        The spheres' centres as they stand there, dump's length unit.
+
+    Raises
+    ------
+    ReadError
+        If spheres lie outside: then it is not their cell.
+    """
+    file = cell_file(path)
+    if file is None:
+        exported = EXPORTED.fullmatch(bare_name(path))
+        if exported and _numbered(path.parent, exported[1], stamp_of(path.parent))["-periCell-"]:
+            warn(
+                f"{path.parent / exported[1]}-periCell-*: not read, as there is not one cell for "
+                f'each file of spheres: name the cells with `cell="FILE.csv"`'
+            )
+        return None
+    cell = _read_cell(file)
+    if cell is None:
+        return None
+    fractions = cell.fractional(position)
+    outside = np.any((fractions < -ROUNDING) | (fractions > 1.0 + ROUNDING), axis=1)
+    if outside.any():
+        raise ReadError(
+            f"{path}: {np.count_nonzero(outside)} grains lie outside the cell of {file}: name the "
+            f'right one with `cell=(LX, LY, LZ)` or `cell="FILE.csv"`'
+        )
+    pattern = re.sub(r"\d+", "*", file.name)
+    note(f"the cell is read from {file.parent / pattern}, beside the grains")
+    return cell
+
+
+def cell_file(path: Path) -> Path | None:
+    """The file that has the cell of a file of spheres; None if there is none, or a doubt."""
+    folder, name = path.parent, bare_name(path)
+    if exported := EXPORTED.fullmatch(name):
+        # its number counts files; that of a saved state is a step
+        files = _numbered(folder, exported[1], stamp_of(folder))
+        spheres, cells = files["-spheres-"], files["-periCell-"]
+        # behind the interactions of its frame a cell has the next number, before them the same one
+        pairs = dict(zip(sorted(spheres), sorted(cells), strict=False))
+        if len(spheres) != len(cells) or any(pairs[one] - one not in (0, 1) for one in pairs):
+            return None
+        return cells.get(pairs.get(int(exported[2]), -1))
+    recorded = RECORDED.fullmatch(name)
+    if recorded is None:
+        return None
+    step = int(recorded[2])
+    found = _numbered(folder, recorded[1], stamp_of(folder))["pericell."]
+    # or else a saved state of this step, whose name has the number of the step, too
+    saved = [
+        file
+        for file in folder.glob(f"{glob.escape(recorded[1])}*.xml*")
+        if step not in found
+        and step in map(int, re.findall(r"\d+", bare_name(file)))
+        and is_save(file)
+        and snapshot_of_save(file).step == step
+    ]
+    return found.get(step, saved[0] if len(saved) == 1 else None)
+
+
+# listed once for all files of a folder, as long as none comes or goes
+@lru_cache(maxsize=8)
+def _numbered(folder: Path, base: str, stamp: Stamp) -> dict[str, dict[int, Path]]:
+    """The files of spheres and cells whose names begin so, by kind and number."""
+    found: dict[str, dict[int, Path]] = {"-spheres-": {}, "-periCell-": {}, "pericell.": {}}
+    name = re.compile(rf"({'|'.join(map(re.escape, found))})(\d+)\.vt[ku]")
+    for file in sorted(folder.glob(f"{glob.escape(base)}*")):
+        if match := name.fullmatch(bare_name(file).removeprefix(base)):
+            found[match[1]][int(match[2])] = file
+    return found
+
+
+def _read_cell(file: Path) -> Cell | None:
+    """The cell in a file of either kind; None if a saved state does not repeat."""
+    if not is_cell_file(file):
+        return read_save(snapshot_of_save(file), ReadOptions()).cell
+    corners = read_mesh(file).points
+    if len(corners) != CORNERS:
+        raise ReadError(f"{file}: expected {CORNERS} corners of a cell, found {len(corners)}")
+    try:
+        return Cell(corners[list(ENDS)] - corners[ORIGIN], origin=corners[ORIGIN])
+    except PackingError as error:
+        raise ReadError(f"{file}: {error}") from None

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.base.typing import FloatArray
-from scanfab.io.writer import Left
-from scanfab.io.written import csv_bytes, more_columns, table_columns
+from scanfab.io.writer import Left, csv_bytes, more_columns, table_columns
+from scanfab.packing.cell import Cell
 from scanfab.packing.packing import Packing
 
 # whole numbers up to here are the same as decimals
@@ -60,18 +60,11 @@ class LammpsDataWriter:
         kinds = {"type": np.ones(len(packing), np.int64), "density": np.ones(len(packing))}
         held = [name for name in kinds if name in own and _is_data(name, own[name])]
         kinds |= {name: own[name].astype(kinds[name].dtype) for name in held}
-        rows = {
-            "id": packing.id,
-            "type": kinds["type"],
-            "diameter": 2.0 * packing.radius,
-            "density": kinds["density"],
-            **dict(zip("xyz", packing.position.T, strict=True)),
-        }
+        rows = {"id": packing.id, "type": kinds["type"], "diameter": 2.0 * packing.radius}
+        rows |= {"density": kinds["density"], **dict(zip("xyz", packing.position.T, strict=True))}
         low, high, tilt, is_turned = _box(packing)
-        box = "".join(
-            f"{a!r} {b!r} {axis}lo {axis}hi\n"
-            for a, b, axis in zip(low.tolist(), high.tolist(), "xyz", strict=True)
-        )
+        sides = zip(low.tolist(), high.tolist(), "xyz", strict=True)
+        box = "".join(f"{a!r} {b!r} {axis}lo {axis}hi\n" for a, b, axis in sides)
         if tilt.any():
             box += f"{' '.join(map(repr, tilt.tolist()))} xy xz yz\n"
         step = f", timestep = {packing.step}" if packing.step is not None else ""
@@ -108,38 +101,35 @@ def _box(packing: Packing) -> tuple[FloatArray, FloatArray, FloatArray, bool]:
     LAMMPS has its first vector along x and its second in x and y. For another cell it is the box
     around it, and the last value is True. Without a cell it is the box of the grains' surfaces.
     """
-    cell, none = packing.cell, np.zeros(3)
-    if cell is not None and (
-        np.any(np.triu(cell.vectors, 1)) or np.any(np.diag(cell.vectors) <= 0)
-    ):
-        corners = cell.origin + np.array(list(np.ndindex(2, 2, 2))) @ cell.vectors
-        return corners.min(axis=0), corners.max(axis=0), none, True
-    if cell is not None:
-        high = cell.origin + np.diag(cell.vectors)
-        return cell.origin, high, cell.vectors[[1, 2, 2], [0, 0, 1]], False
-    if len(packing) == 0:
-        return none, np.ones(3), none, False
-    radius = packing.radius[:, None]
-    low, high = (packing.position - radius).min(axis=0), (packing.position + radius).max(axis=0)
-    return low, high, none, False
+    cell, no_tilt = packing.cell, np.zeros(3)
+    if cell is None and not len(packing):
+        return np.zeros(3), np.ones(3), no_tilt, False
+    if cell is None:
+        place, radius = packing.position, packing.radius[:, None]
+        return (place - radius).min(axis=0), (place + radius).max(axis=0), no_tilt, False
+    if np.any(np.triu(cell.vectors, 1)) or np.any(np.diag(cell.vectors) <= 0):
+        return *_around(cell), no_tilt, True
+    high = cell.origin + np.diag(cell.vectors)
+    return cell.origin, high, cell.vectors[[1, 2, 2], [0, 0, 1]], False
+
+
+def _around(cell: Cell) -> tuple[FloatArray, FloatArray]:
+    """Lower and upper corner of the box around a cell."""
+    corners = cell.origin + np.array(list(np.ndindex(2, 2, 2))) @ cell.vectors
+    return corners.min(axis=0), corners.max(axis=0)
 
 
 def _bounds(packing: Packing) -> str:
     """The box of a dump: its bounds as older readers know them, or else by three vectors."""
     cell = packing.cell
     along = (False,) * 3 if cell is None else cell.periodic
-    flags = " ".join("pp" if repeats else "ff" for repeats in along)
     low, high, tilt, is_turned = _box(packing)
     kind, columns = "", [low, high]
     if cell is not None and is_turned:
         kind, columns = "abc origin ", [*cell.vectors.T, cell.origin]
-    elif tilt.any():
-        # the bounds are those of the box around the tilted box
-        xy, xz, yz = tilt
-        low = low + np.array([min(0.0, xy, xz, xy + xz), min(0.0, yz), 0.0])
-        high = high + np.array([max(0.0, xy, xz, xy + xz), max(0.0, yz), 0.0])
-        kind, columns = "xy xz yz ", [low, high, tilt]
-    rows = np.column_stack(columns).tolist()
+    elif cell is not None and tilt.any():
+        kind, columns = "xy xz yz ", [*_around(cell), tilt]
     # with all digits, as LAMMPS writes bounds
-    lines = "".join(" ".join(f"{x:.16e}" for x in row) + "\n" for row in rows)
-    return f"{kind}{flags}\n{lines}"
+    rows = (" ".join(f"{x:.16e}" for x in row) for row in np.column_stack(columns).tolist())
+    flags = " ".join("pp" if repeats else "ff" for repeats in along)
+    return "\n".join([f"{kind}{flags}", *rows, ""])

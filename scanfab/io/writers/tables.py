@@ -11,16 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from scanfab.io.formats.table_names import is_frame_name
-from scanfab.io.writer import Left
-from scanfab.io.written import (
-    Columns,
-    csv_bytes,
-    flat,
-    frame_arrays,
-    own_columns,
-    standard_columns,
-    table_columns,
-)
+from scanfab.io.writer import Columns, Left, as_arrays, csv_bytes, flat, table_columns
 from scanfab.packing.packing import Packing
 
 # letters of extended XYZ by numpy's kinds
@@ -38,14 +29,12 @@ class CsvWriter:
     def write(self, packing: Packing, path: Path) -> Left:
         """Write the columns id, x, y, z, radius and all that do not tell frames apart."""
         known, own, notes = table_columns(packing)
-        left = [
-            name
-            for name, values in own.items()
-            if is_frame_name(name) and values.dtype.kind in "iuf" and len(np.unique(values)) > 1
-        ]
-        held = {name: values for name, values in own.items() if name not in left}
+        numbers = {name: values for name, values in own.items() if values.dtype.kind in "iuf"}
+        left = {one for one in numbers if is_frame_name(one) and len(np.unique(numbers[one])) > 1}
+        held = {name: own[name] for name in own if name not in left}
         path.write_bytes(self.table({**known, **held}))
-        return Left(True, bool(frame_arrays(packing)), tuple(left), tuple(notes))
+        columns = tuple(name for name in own if name in left)
+        return Left(contacts=True, frame=True, columns=columns, notes=tuple(notes))
 
     def table(self, columns: Columns) -> bytes:
         """The bytes of the file."""
@@ -73,7 +62,7 @@ class ParquetWriter(CsvWriter):
         import polars
 
         stream = io.BytesIO()
-        polars.DataFrame({name: np.array(v) for name, v in columns.items()}).write_parquet(stream)
+        polars.DataFrame(columns).write_parquet(stream)
         return stream.getvalue()
 
 
@@ -86,12 +75,11 @@ class XyzWriter:
 
     def write(self, packing: Packing, path: Path) -> Left:
         """Write one frame; texts that are no single words lie beside it."""
-        own, notes = own_columns(packing)
-        held = {name: values for name, values in own.items() if _is_xyz(name, values)}
-        columns = {"pos": packing.position, "radius": packing.radius, **standard_columns(packing)}
+        arrays = as_arrays(packing)
+        held = {name: values for name, values in arrays.own.items() if _is_xyz(name, values)}
         properties: list[str] = []
         rows: Columns = {}
-        for name, values in {**columns, **held}.items():
+        for name, values in {"pos": packing.position, **arrays.grains, **held}.items():
             width = int(np.prod(values.shape[1:]))
             properties.append(f"{name}:{LETTERS[values.dtype.kind]}:{width}")
             words = np.where(values, "T", "F") if values.dtype.kind == "b" else values
@@ -101,21 +89,20 @@ class XyzWriter:
         line = f"{_line(packing)}Properties={':'.join(properties)}"
         table = csv_bytes(rows, " ", with_names=False)
         path.write_bytes(f"{len(packing)}\n{line}\n".encode() + table)
-        left = flat({name: values for name, values in own.items() if name not in held})[0]
-        return Left(contacts=True, columns=tuple(left), notes=tuple(notes))
+        left = flat({name: values for name, values in arrays.own.items() if name not in held})
+        return Left(contacts=True, columns=tuple(left), notes=tuple(arrays.notes))
 
 
 def _line(packing: Packing) -> str:
     """Cell, step and time, as the line above the rows names them."""
     cell, words = packing.cell, ""
     if cell is not None:
-        vectors, origin = (
-            " ".join(map(repr, one.ravel().tolist())) for one in (cell.vectors, cell.origin)
-        )
+        vectors = " ".join(map(repr, cell.vectors.ravel().tolist()))
+        origin = " ".join(map(repr, cell.origin.tolist()))
         along = " ".join("FT"[one] for one in cell.periodic)
         words = f'Lattice="{vectors}" Origin="{origin}" pbc="{along}" '
-    step = "" if packing.step is None else f"Timestep={packing.step} "
-    return words + step + ("" if packing.time is None else f"Time={packing.time!r} ")
+    words += "" if packing.step is None else f"Timestep={packing.step} "
+    return words + ("" if packing.time is None else f"Time={packing.time!r} ")
 
 
 def _is_xyz(name: str, values: npt.NDArray[Any]) -> bool:

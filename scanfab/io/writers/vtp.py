@@ -10,9 +10,8 @@ from xml.sax.saxutils import escape
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.io import written
 from scanfab.io.files import first_bytes
-from scanfab.io.writer import Left
+from scanfab.io.writer import Left, as_arrays, cell_of, contacts_of
 from scanfab.packing.cell import Cell
 from scanfab.packing.contacts import ContactList
 from scanfab.packing.packing import Packing
@@ -46,25 +45,22 @@ class VtpWriter:
         from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
         from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
 
-        own, notes = written.own_columns(packing)
-        frame, cells = written.frame_arrays(packing), written.contact_arrays(packing)
-        contacts = packing.contacts
+        arrays, contacts = as_arrays(packing), packing.contacts
+        frame = arrays.frame
         fields = {FIELDS[name]: np.ravel(values)[None] for name, values in frame.items()}
         fields[KNOWN] = np.array([int(contacts is not None)])
-        columns = {**written.standard_columns(packing), "radius": packing.radius, **own}
         data, points, lines = vtkPolyData(), vtkPoints(), vtkCellArray()
         points.SetData(_array("Points", packing.position))
         data.SetPoints(points)
         if contacts is not None and len(contacts):
             lines.SetData(2, _array("", contacts.pairs.ravel()))
             data.SetLines(lines)
-            cells |= zip(("id1", "id2"), packing.id[contacts.pairs].T, strict=True)
-        for place, arrays in (
-            (data.GetPointData(), columns),
-            (data.GetCellData(), cells),
+        for place, columns in (
+            (data.GetPointData(), arrays.grains | arrays.own),
+            (data.GetCellData(), arrays.contacts),
             (data.GetFieldData(), fields),
         ):
-            for name, values in arrays.items():
+            for name, values in columns.items():
                 place.AddArray(_array(name, values))
         writer = vtkXMLPolyDataWriter()
         writer.SetInputData(data)
@@ -75,12 +71,10 @@ class VtpWriter:
         writer.WriteToOutputStringOn()
         writer.Write()
         text = writer.GetOutputString()
-        moment = "".join(
-            f" {FIELDS[one]}={frame[one]!r}" for one in ("step", "time") if one in frame
-        )
-        mark = f"<!--{moment} -->\n".encode()
-        path.write_bytes(mark + (text if isinstance(text, bytes) else text.encode()))
-        return Left(no_step=False, notes=tuple(notes))
+        said = [f"{FIELDS[one]}={frame[one]!r}" for one in ("step", "time") if one in frame]
+        mark = " ".join(["<!--", *said, "-->\n"])
+        path.write_bytes(mark.encode() + (text if isinstance(text, bytes) else text.encode()))
+        return Left(no_step=False, notes=tuple(arrays.notes))
 
 
 def _array(name: str, values: npt.NDArray[Any]) -> Any:
@@ -105,9 +99,9 @@ def _array(name: str, values: npt.NDArray[Any]) -> Any:
 def moment_of(path: Path) -> tuple[int | None, float | None]:
     """Step and time, if they stand in the first bytes of a file."""
     found = dict(MOMENT.findall(first_bytes(path, HEAD)))
+    step, time = found.get(b"scanfab_step"), found.get(b"TimeValue")
     try:
-        step = int(found[b"scanfab_step"]) if b"scanfab_step" in found else None
-        return step, float(found[b"TimeValue"]) if b"TimeValue" in found else None
+        return None if step is None else int(step), None if time is None else float(time)
     except ValueError:
         return None, None
 
@@ -126,7 +120,5 @@ def packing_of(path: Path, mesh: Mesh) -> tuple[Cell | None, ContactList | None]
     """The cell and the contacts of a packing; None if they are not known."""
     fields = mesh.field_arrays
     cell = {name: fields[own] for name, own in FIELDS.items() if own in fields}
-    contacts = None
-    if np.any(fields[KNOWN]):
-        contacts = written.contacts_of(path, mesh.lines, mesh.line_arrays)
-    return written.cell_of(path, cell), contacts
+    contacts = contacts_of(mesh.lines, mesh.line_arrays) if np.any(fields[KNOWN]) else None
+    return cell_of(path, cell), contacts

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import threading
 import uuid
-import warnings
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import Executor, Future, InvalidStateError, ThreadPoolExecutor
@@ -14,7 +13,7 @@ from pathlib import Path
 from typing import Any, Protocol
 from weakref import WeakSet
 
-from scanfab.base.errors import ScanfabError, ScanfabWarning, SettingsError
+from scanfab.base.errors import ScanfabError, SettingsError, warn
 from scanfab.base.spelling import counted
 from scanfab.io.families import PathLike
 from scanfab.pipeline.cluster.connection import (
@@ -233,11 +232,10 @@ class DaskExecutor(Executor):
             if theirs != mine:
                 raise outdated(worker, theirs, mine)
         if not found:
-            warnings.warn(
+            # a warning, so that --quiet shows it too: nothing else tells why nothing happens
+            warn(
                 f"{self.address}: the scheduler has no workers yet: frames wait for them, "
-                f"without a limit: start some with `dask worker {self.address}`",
-                ScanfabWarning,  # also with --quiet: nothing else tells why nothing happens
-                stacklevel=4,
+                f"without a limit: start some with `dask worker {self.address}`"
             )
 
     def _check_files(self, job: Any) -> None:

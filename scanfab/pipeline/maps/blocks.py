@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from scanfab.base.errors import SettingsError
-from scanfab.base.note import Note
+from scanfab.base.errors import Note, SettingsError
 from scanfab.base.typing import BoolArray, FloatArray
 from scanfab.packing.cell import Cell
 from scanfab.packing.sample import Sample

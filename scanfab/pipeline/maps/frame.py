@@ -10,13 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from scanfab.base.note import Note, joined
+from scanfab.base.errors import Note, joined
 from scanfab.base.space import SPACE
 from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray
-from scanfab.fabric.blocks import jackknife_errors, ratio_jackknife
+from scanfab.fabric.blocks import homogeneity_of, jackknife_errors, ratio_jackknife
 from scanfab.fabric.contact import axial_error, contact_fabric
-from scanfab.fabric.homogeneity import homogeneity_of
 from scanfab.fabric.tensor import FabricTensor, axial, tensor_values
 from scanfab.packing.packing import Packing
 from scanfab.packing.sample import VARIANTS, Sample, Variant
@@ -33,7 +32,7 @@ from scanfab.pipeline.maps.region import Region
 from scanfab.pipeline.plan import Plan
 from scanfab.pipeline.variant_columns import doubts_of_lines, edge_of, left_out_of
 from scanfab.scan.blocks import Blocks
-from scanfab.table.map_columns import map_row
+from scanfab.table.columns import row_of
 
 HOMOGENEITY = "homogeneity"
 """The code of a note: whether the blocks of a variant scatter more than their errors."""
@@ -85,7 +84,7 @@ def _mapped(sample: Sample, plan: Plan, number: int, source: str) -> MapResult:
     if not sample.grains.any():
         nothing = {**known, "grains": 0, "rattlers": 0, "contacts": 0}
         rows = [
-            map_row(columns, {**nothing, "variant": variant, "block": block})
+            row_of(columns, {**nothing, "variant": variant, "block": block})
             for variant in plan.variants
             for block in range(plan.map_settings.blocks)
         ]
@@ -97,7 +96,7 @@ def _mapped(sample: Sample, plan: Plan, number: int, source: str) -> MapResult:
         for one in (VARIANTS[name] for name in plan.variants)
     ]
     rows = [
-        map_row(columns, {**known, "variant": one.variant.name, **values})
+        row_of(columns, {**known, "variant": one.variant.name, **values})
         for one in variants
         for values in one.rows()
     ]

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scanfab.base.arrays import concatenated
-from scanfab.base.note import Note
+from scanfab.base.errors import Note
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.blocks import BlockFabrics, WithoutParts
 from scanfab.packing.sample import Sample
@@ -17,7 +17,7 @@ from scanfab.pipeline.maps.blocks import splits_of
 from scanfab.pipeline.measurement import coarse_spacing
 from scanfab.pipeline.plan import Plan
 from scanfab.pipeline.solids import solids_of
-from scanfab.pipeline.tolerance import Errors, scan_to_tolerance
+from scanfab.pipeline.tolerance import Errors, Goal, scan_to_tolerance
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.directions import DirectionRule, design_of
 from scanfab.scan.edges import CLIP, START
@@ -66,7 +66,7 @@ class MapSums:
 
 
 @dataclass(frozen=True, eq=False)
-class MedianBlock:
+class MedianBlock(Goal):
     """The error of the median block of each variant is to meet the tolerance."""
 
     blocks: tuple[Blocks, Blocks]
@@ -91,18 +91,14 @@ class MedianBlock:
         }
         return MapSums(fabrics, ScanSums.concatenate([one.scan for one in parts]))
 
-    def errors(self, sums: MapSums, plan: Plan, variant: str) -> Errors | None:
+    def errors(self, sums: MapSums, plan: Plan, variant: str) -> Errors:
         """The median of the blocks that hold any segment: of many, it is sure enough to plan by."""
         found = sums.fabrics[variant]
+        if not found.is_met.any():
+            return Errors(math.inf, math.inf, 1.0)
         errors = np.where(found.exists, found.axial_errors(np.asarray(plan.axis)), np.inf)
-        median = float(np.median(errors[found.is_met])) if found.is_met.any() else math.inf
-        return Errors(median, median) if math.isfinite(median) else None
-
-    def empty_share(self, sums: MapSums, variant: str) -> float:
-        """Of the median block that holds any segment."""
-        found = sums.fabrics[variant]
-        empty = found.filled.mean(axis=0)[found.is_met]
-        return float(np.median(empty)) if len(empty) else 1.0
+        median = float(np.median(errors[found.is_met]))
+        return Errors(median, median, float(np.median(found.filled.mean(axis=0)[found.is_met])))
 
 
 @dataclass(frozen=True, eq=False)

@@ -118,7 +118,7 @@ class MapSettings(Settings):
     @property
     def columns(self) -> tuple[Column, ...]:
         """Of the table."""
-        from scanfab.table.map_columns import map_columns
+        from scanfab.table.columns import map_columns
 
         return map_columns(self.more_columns, shells=self.shells is not None)
 

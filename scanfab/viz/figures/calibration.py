@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from scanfab.base.errors import SettingsError
 from scanfab.table.curves import short_names
-from scanfab.table.reading import total_error
+from scanfab.table.row import total_error
 from scanfab.viz.figures.figure import Figure
 from scanfab.viz.figures.style import LOOKS, VOID_AXIAL, VOID_UNIT, WIDTH, band, plain
 

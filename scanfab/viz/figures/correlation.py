@@ -9,11 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from scanfab.base.typing import FloatArray
-from scanfab.table.compare import compare_tables
-from scanfab.table.comparison_rows import Comparison
+from scanfab.table.compare import Comparison, compare_tables
 from scanfab.table.curves import Curve, is_turned
-from scanfab.table.reading import is_of_discs
-from scanfab.table.row import Row
+from scanfab.table.row import Row, number_of
 from scanfab.table.table import Table
 from scanfab.viz.figures.figure import Figure
 from scanfab.viz.figures.groups import Drawn, Group, group_of, groups_of
@@ -105,7 +103,9 @@ class Correlation(Figure):
         super().__init__(data)
         self.groups = groups_of(data)
         self.turned = is_turned(data)
-        self.in_plane = is_of_discs(data)
+        self.in_plane = any(
+            number_of(row, f"gvs_{axis}") == 0.0 for row in data for axis in ("xx", "yy", "zz")
+        )
         self.fits = fits_of(compare_tables(data) if comparison is None else comparison)
 
     @property
@@ -191,8 +191,8 @@ def _points(axes: Axes, one: Drawn, fit: Fit | None, legend: _Legend, turned: bo
     points = axes.errorbar(
         1e2 * x,
         1e3 * y,
-        xerr=None if turned else _bars(1e2 * one.curve.contact_total),
-        yerr=None if turned else _bars(1e3 * one.curve.void_total),
+        xerr=None if turned else _bars(1e2 * one.curve.total_errors("alpha_c_axial")),
+        yerr=None if turned else _bars(1e3 * one.curve.total_errors("alpha_vs_axial")),
         ls="none",
         elinewidth=0.5,
         capsize=0,
@@ -211,9 +211,8 @@ def _points(axes: Axes, one: Drawn, fit: Fit | None, legend: _Legend, turned: bo
 
 
 def _values(curve: Curve, turned: bool) -> tuple[FloatArray, FloatArray]:
-    if turned:
-        return curve.contact_intensity, curve.void_intensity
-    return curve.contact, curve.void
+    ending = "" if turned else "_axial"
+    return curve.values(f"alpha_c{ending}"), curve.values(f"alpha_vs{ending}")
 
 
 def _bars(error: FloatArray) -> FloatArray | None:
@@ -235,8 +234,10 @@ def _errors(group: Group, legend: _Legend, turned: bool) -> None:
     if turned:
         return
     curves = [one.curve for one in group.drawn]
-    void = any(np.isfinite(curve.void_total).any() for curve in curves)
-    contact = any(np.isfinite(curve.contact_total).any() for curve in curves)
+    void, contact = (
+        any(np.isfinite(curve.total_errors(name)).any() for curve in curves)
+        for name in ("alpha_vs_axial", "alpha_c_axial")
+    )
     # the bars themselves: a line without a point would look like the axis through zero
     shape = {(True, True): "+", (True, False): "|", (False, True): "_"}.get((void, contact))
     if shape is not None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scanfab.base.typing import FloatArray
-from scanfab.table.reading import number_of, total_error
+from scanfab.table.row import number_of, total_error
 from scanfab.viz.figures.figure import FrameFigure
 from scanfab.viz.figures.style import (
     COLUMN,

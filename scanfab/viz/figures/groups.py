@@ -77,7 +77,7 @@ def grouped(curves: Sequence[Curve]) -> list[Group]:
 def groups_of(rows: Sequence[Mapping[str, Any]]) -> list[Group]:
     """The groups of a table; SettingsError if it has nothing to draw."""
     curves = curves_of(rows)
-    if not any(np.isfinite(curve.void).any() for curve in curves):
+    if not any(np.isfinite(curve.values("alpha_vs_axial")).any() for curve in curves):
         raise SettingsError("there is nothing to draw: no row of the table has a void fabric")
     return grouped(curves)
 

@@ -11,7 +11,7 @@ import numpy as np
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.distribution import HIGHEST_DEGREE, direction_points, harmonics_of
-from scanfab.table.reading import number_of, total_error
+from scanfab.table.row import number_of, total_error
 from scanfab.viz.figures.hemisphere import CONCENTRATION, Hemisphere
 
 if TYPE_CHECKING:

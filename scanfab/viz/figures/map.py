@@ -11,7 +11,7 @@ import numpy as np
 
 from scanfab.base.errors import SettingsError
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.table.reading import number_of, total_error
+from scanfab.table.row import number_of, total_error
 from scanfab.viz.figures.figure import Figure
 from scanfab.viz.figures.style import (
     CONTACT_AXIAL,

@@ -41,36 +41,36 @@ MOST_MARKERS = 25
 
 @dataclass(frozen=True)
 class Quantity:
-    """What a column of panels shows: names of a curve's arrays, and the factor of the axis."""
+    """What a column of panels shows: a column of the table, and the factor of the axis."""
 
     label: str
     factor: float
     values: str
-    total: str | None = None
-    scan: str | None = None
     words: str = ""
-    """What it is called in a caption if it has errors."""
+    """What it is called in a caption; empty without errors."""
+    scan: str = ""
+    """The column of the scan's part of its errors."""
     smallest: float = 1.0
     """The axis spans at least this, so that noise does not look like a signal."""
 
 
 AXIAL = (
-    Quantity(VOID_UNIT + VOID_AXIAL, 1e3, "void", "void_total", "void_scan", "voids"),
-    Quantity(CONTACT_UNIT + CONTACT_AXIAL, 1e2, "contact", "contact_total", words="contacts"),
+    Quantity(VOID_UNIT + VOID_AXIAL, 1e3, "alpha_vs_axial", "voids", "alpha_vs_axial_se"),
+    Quantity(CONTACT_UNIT + CONTACT_AXIAL, 1e2, "alpha_c_axial", "contacts"),
 )
 # where the principal axes are not the loading axis
 TURNED = (
-    Quantity(VOID_UNIT + VOID_INTENSITY, 1e3, "void_intensity"),
-    Quantity(CONTACT_UNIT + CONTACT_INTENSITY, 1e2, "contact_intensity"),
-    Quantity("coaxiality, degrees", 1.0, "angle"),
+    Quantity(VOID_UNIT + VOID_INTENSITY, 1e3, "alpha_vs"),
+    Quantity(CONTACT_UNIT + CONTACT_INTENSITY, 1e2, "alpha_c"),
+    Quantity("coaxiality, degrees", 1.0, "coaxiality_deg"),
 )
 NORMALISED = (
-    Quantity(f"{VOID_AXIAL} / largest", 1.0, "void", "void_total", words="voids"),
-    Quantity(f"{CONTACT_AXIAL} / largest", 1.0, "contact", "contact_total", words="contacts"),
+    Quantity(f"{VOID_AXIAL} / largest", 1.0, "alpha_vs_axial", "voids"),
+    Quantity(f"{CONTACT_AXIAL} / largest", 1.0, "alpha_c_axial", "contacts"),
 )
 NORMALISED_TURNED = (
-    Quantity(f"{VOID_INTENSITY} / largest", 1.0, "void_intensity"),
-    Quantity(f"{CONTACT_INTENSITY} / largest", 1.0, "contact_intensity"),
+    Quantity(f"{VOID_INTENSITY} / largest", 1.0, "alpha_vs"),
+    Quantity(f"{CONTACT_INTENSITY} / largest", 1.0, "alpha_c"),
 )
 
 
@@ -110,7 +110,8 @@ class StrainCurves(Figure):
             angle = ", and the angle between their major axes" if self._has_angle else ""
             drawn = f"Intensity of {what}{angle}"
         divided = ", each curve divided by its own largest absolute value" if self.share else ""
-        banded = [one.words for one in self._quantities if one.total and self._has(one.total)]
+        with_errors = [one for one in self._quantities if one.words and self._has_errors(one)]
+        banded = [one.words for one in with_errors]
         errors = f"with total standard errors of {' and '.join(banded)}"
         return (
             f"{drawn}, over {abscissa_words(self.data)}{divided}; "
@@ -157,8 +158,8 @@ class StrainCurves(Figure):
     def _curves(self) -> list[Curve]:
         return [one.curve for group in self.groups for one in group.drawn]
 
-    def _has(self, errors: str) -> bool:
-        return any(np.isfinite(getattr(curve, errors)).any() for curve in self._curves)
+    def _has_errors(self, one: Quantity) -> bool:
+        return any(np.isfinite(curve.total_errors(one.values)).any() for curve in self._curves)
 
     @property
     def _entries(self) -> dict[str, dict[str, Any]]:
@@ -196,16 +197,16 @@ def set_abscissa(axes: Axes, label: str, groups: Sequence[Group]) -> None:
 def _draw_curves(axes: Axes, drawn: Sequence[Drawn], quantity: Quantity, share: bool) -> None:
     """One panel: values, their total errors as bands, the scan's part as bars."""
     for one in drawn:
-        values = getattr(one.curve, quantity.values)
+        values = one.curve.values(quantity.values)
         largest = np.nanmax(np.abs(values), initial=0.0)
         factor = quantity.factor if not share else 1.0 / largest if largest > 0 else np.nan
-        if quantity.total:
-            error = factor * getattr(one.curve, quantity.total)
+        if quantity.words:
+            error = factor * one.curve.total_errors(quantity.values)
             band(axes, one.curve.x, factor * values, error, one.look["color"])
         every = max(1, -(-len(values) // MOST_MARKERS))
         axes.plot(one.curve.x, factor * values, markevery=every, **one.look)
         if quantity.scan:
-            _bars(axes, one, factor * values, factor * getattr(one.curve, quantity.scan))
+            _bars(axes, one, factor * values, factor * one.curve.errors(quantity.scan))
     axes.set_ylabel(quantity.label)
     axes.axhline(0, color="0.6", lw=0.6, zorder=0)
     widen(axes, quantity.smallest)
@@ -225,10 +226,10 @@ def _bars(axes: Axes, one: Drawn, values: FloatArray, error: FloatArray) -> None
 
 def _note(curves: Sequence[Curve], quantities: Sequence[Quantity], share: bool) -> str:
     """What bands and bars are."""
-    if not any(quantity.total for quantity in quantities):
+    if not any(quantity.words for quantity in quantities):
         return "without errors: the table has those of the axial values only"
     lines = [_band_note(curves)]
-    scan = np.concatenate([curve.void_scan for curve in curves])
+    scan = np.concatenate([curve.errors("alpha_vs_axial_se") for curve in curves])
     if np.isfinite(scan).any() and not share:
         largest = f"{1e3 * np.nanmax(scan):.2g}"
         lines.append(rf"bars: the scan's part, at most ${largest}\times10^{{-3}}$")
@@ -236,8 +237,10 @@ def _note(curves: Sequence[Curve], quantities: Sequence[Quantity], share: bool) 
 
 
 def _band_note(curves: Sequence[Curve]) -> str:
-    void = any(np.isfinite(curve.void_total).any() for curve in curves)
-    contact = any(np.isfinite(curve.contact_total).any() for curve in curves)
+    void, contact = (
+        any(np.isfinite(curve.total_errors(name)).any() for curve in curves)
+        for name in ("alpha_vs_axial", "alpha_c_axial")
+    )
     alone = any(curve.contact_alone for curve in curves)
     which = "contacts taken as independent" if alone else "the sample's"
     parts = [f"of {VOID} scan and sample together"] if void else []

@@ -9,7 +9,7 @@ from typing import Any
 
 from scanfab.base.errors import SettingsError
 from scanfab.scan.directions import direction_rule
-from scanfab.table.reading import number_of, numbers_of, variant_of
+from scanfab.table.row import number_of, numbers_of, variant_of
 
 # scatter of alpha_vs_axial between samples of N grains: seen 3.5e-4 for 4,600 and some 1e-3 for 500
 SCATTER = 0.024

@@ -14,7 +14,7 @@ from scanfab.packing.window import SurfaceBox
 from scanfab.pipeline.repeat import reopen, restored_settings
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import Length, Vector
-from scanfab.table.reading import number_of
+from scanfab.table.row import number_of
 from scanfab.viz.figures.page import make_figures
 from scanfab.viz.frame_view import Look, look_at
 from scanfab.viz.report.inputs import Input

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from scanfab.base.errors import SettingsError
-from scanfab.pipeline.repeat import read_manifest
-from scanfab.table.abscissa import spelt_strain, strain_column
-from scanfab.table.reading import numbers_of, read_rows
+from scanfab.pipeline.record import read_manifest
+from scanfab.table.curves import spelt_strain, strain_column
+from scanfab.table.formats import read_rows
+from scanfab.table.row import numbers_of
 from scanfab.table.selection import choose_rows
 
 

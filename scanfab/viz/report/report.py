@@ -14,8 +14,7 @@ from scanfab.base.errors import ScanfabError, ScanfabNote, ScanfabWarning, Setti
 from scanfab.io.families import PathLike
 from scanfab.pipeline.options import as_options
 from scanfab.pipeline.repeat import repeat_command
-from scanfab.table.compare import compare_tables
-from scanfab.table.comparison_rows import Comparison
+from scanfab.table.compare import Comparison, compare_tables
 from scanfab.viz.figures.page import make_figures
 from scanfab.viz.report.caveats import caveats_of
 from scanfab.viz.report.frames import show_frames

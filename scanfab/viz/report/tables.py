@@ -7,10 +7,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from scanfab.table.abscissa import STRAINS, spelt_strain, strain_column
-from scanfab.table.curves import is_turned
-from scanfab.table.reading import number_of, numbers_of, total_error, variant_of
+from scanfab.table.curves import STRAINS, is_turned, spelt_strain, strain_column
 from scanfab.table.row import Row as TableRow
+from scanfab.table.row import number_of, numbers_of, total_error, variant_of
 from scanfab.viz.report.page import Part
 
 Row = Mapping[str, Any]

@@ -1,4 +1,4 @@
-"""Snapshots of ESyS-Particle, as its source writes them."""
+"""Snapshots of ESyS-Particle, as its source writes them: no line end closes a header."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ ESyS-Particle 2.3.5-1200
 BoundingBox 0 -1 0 4 5 6
 PeriodicBoundaries 1 0 0
 Dimension 3D
-{files}
-"""
+{files}"""
 # the other vectors of a particle lie elsewhere
 OTHERS = " 2500 9 9 9 8 8 8 7 7 7 6 6 6 0 0 0"
 TURNS = " 1 0 0 0 5 5 5"

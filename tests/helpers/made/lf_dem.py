@@ -50,20 +50,8 @@ def chain_texts(pairs=((0, 1), (1, 2)), lubrication=SIGNED, push=abs):
         normal = (CHAIN[two] - CHAIN[one]) / 2
         on_first = -THROUGH if one < two else THROUGH
         tangential = on_first - (on_first @ normal) * normal
-        numbers = [
-            one,
-            two,
-            2,
-            *normal,
-            -0.01,
-            7,
-            7,
-            7,
-            7,
-            push(-on_first @ normal),
-            *tangential,
-            7,
-        ]
+        lubrication_forces, push_on_first = [7] * 4, push(-on_first @ normal)
+        numbers = [one, two, 2, *normal, -0.01, *lubrication_forces, push_on_first, *tangential, 7]
         rows += " ".join(map(str, numbers)) + " \n"
     legend = FORCES.format(lubrication=lubrication)
     return HEAD + GRAINS + head + grains, HEAD + legend + head + rows

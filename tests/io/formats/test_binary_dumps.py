@@ -10,46 +10,42 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab.base.errors import ReadError, ScanfabWarning
-from scanfab.io.registry import reader_for
+from scanfab import ReadError, ScanfabWarning
 from tests.helpers.dumps import NAMES, ROWS, binary_dump
 
 COLUMNS = {name: str(place) for place, name in enumerate(NAMES.split(), start=1)}
 
 
-def write(path, data):
+def written(tmp_path, data):
+    path = tmp_path / "dump.bin"
     path.write_bytes(data)
     return path
 
 
-def assert_right(path, **options):
-    packing, rows = scanfab.read(path, **options), np.array(ROWS)
-    np.testing.assert_array_equal(packing.id, rows[:, 0])
-    np.testing.assert_array_equal(packing.columns["type"], rows[:, 1])
-    np.testing.assert_array_equal(packing.position, rows[:, 2:5])
-    np.testing.assert_array_equal(packing.radius, rows[:, 5])
-    assert packing.step == 7
-    return packing
-
-
-@pytest.mark.parametrize("order", ["<", ">"])
 @pytest.mark.parametrize("blocks", [1, 3, 5])
-def test_the_new_layout_names_its_columns_and_the_old_one_asks_for_them(tmp_path, blocks, order):
-    data = binary_dump(names=NAMES, step=7, time=0.25, blocks=blocks, order=order)
-    path = write(tmp_path / "new.bin", data)
-    assert reader_for(path).name == "lammps"
-    assert assert_right(path).time == 0.25
-    path = write(tmp_path / "old.bin", binary_dump(step=7, blocks=blocks))
-    assert reader_for(path).name == "liggghts"
-    with pytest.raises(ReadError, match=r'does not name its 6 columns.*`columns="id=1,type=2'):
-        scanfab.read(path)
-    for format in (None, "lammps", "liggghts"):
-        assert_right(path, columns=COLUMNS, format=format)
+@pytest.mark.parametrize(
+    ("more", "format", "options"),
+    [
+        ({"names": NAMES, "time": 0.25}, "lammps", [{}]),
+        ({}, "liggghts", [{"columns": COLUMNS}, {"columns": COLUMNS, "format": "lammps"}]),
+    ],
+)
+def test_both_layouts_hold_the_grains(tmp_path, blocks, more, format, options):
+    path = written(tmp_path, binary_dump(step=7, blocks=blocks, **more))
+    for one in options:
+        series, rows = scanfab.read_series(path, **one), np.array(ROWS)
+        assert series.grains.reader.name == one.get("format", format)
+        packing = series[0].read()
+        np.testing.assert_array_equal(packing.id, rows[:, 0])
+        np.testing.assert_array_equal(packing.columns["type"], rows[:, 1])
+        np.testing.assert_array_equal(packing.position, rows[:, 2:5])
+        np.testing.assert_array_equal(packing.radius, rows[:, 5])
+        assert (packing.step, packing.time) == (7, more.get("time"))
 
 
 def test_the_box_repeats_where_both_faces_do(tmp_path):
     data = binary_dump(names=NAMES, flags=(0, 0, 0, 1, 2, 3), tilt=(0.2, 0.1, -0.05))
-    cell = scanfab.read(write(tmp_path / "dump.bin", data)).cell
+    cell = scanfab.read(written(tmp_path, data)).cell
     assert cell.periodic == (True, False, False)
     # the bounds are those of the box around the tilted one: 1 - (0.3 - 0), 1 - 0.05, 1
     np.testing.assert_allclose(cell.vectors, [[0.7, 0, 0], [0.2, 0.95, 0], [0.1, -0.05, 1]])
@@ -59,11 +55,10 @@ def test_the_box_repeats_where_both_faces_do(tmp_path):
 def test_snapshots_are_frames_and_an_incomplete_last_one_is_left_out(tmp_path):
     empty = np.zeros((0, 6))
     data = binary_dump(empty, names=NAMES, step=20) + binary_dump(names=NAMES, step=10)
-    path = write(tmp_path / "dump.bin", data)
-    frames = [(frame.step, len(frame.read())) for frame in scanfab.read_series(path)]
-    assert frames == [(10, 3), (20, 0)]
+    frames = scanfab.read_series(written(tmp_path, data))
+    assert [(frame.step, len(frame.read())) for frame in frames] == [(10, 3), (20, 0)]
     for cut in (1, 100, 250):
-        path = write(tmp_path / f"cut{cut}.bin", data[:-cut])
+        path = written(tmp_path, data[:-cut])
         with pytest.warns(ScanfabWarning, match=r"number 2, is incomplete.*left out"):
             assert [frame.step for frame in scanfab.read_series(path)] == [20]
 
@@ -72,18 +67,21 @@ ONE, BLOCK = binary_dump(names=NAMES), struct.pack("<i", 18)
 
 
 @pytest.mark.parametrize(
-    "data",
+    ("data", "told"),
     [
-        ONE[:-1],
-        ONE[:200],
-        ONE.replace(struct.pack("<q", 3), struct.pack("<q", 4), 1),
-        *(ONE.replace(BLOCK, struct.pack("<i", size), 1) for size in (17, -18, 2**31 - 1)),
+        (binary_dump(), r'does not name its 6 columns.*`columns="id=1,x=3'),
+        (ONE[:-1], "incomplete"),
+        (ONE[:200], "incomplete"),
+        (ONE.replace(struct.pack("<q", 3), struct.pack("<q", 4), 1), "4 rows are not 18 numbers"),
+        *(
+            (ONE.replace(BLOCK, struct.pack("<i", size), 1), "incomplete")
+            for size in (17, -18, 2**31 - 1)
+        ),
     ],
 )
-def test_counts_that_lie_are_told(tmp_path, data):
-    assert data != ONE
-    with pytest.raises(ReadError, match=r"whole binary snapshot: .*incomplete"):
-        scanfab.read(write(tmp_path / "dump.bin", data))
+def test_what_cannot_be_read_is_told(tmp_path, data, told):
+    with pytest.raises(ReadError, match=rf"dump.bin.*{told}"):
+        scanfab.read(written(tmp_path, data))
 
 
 DECK = """
@@ -109,7 +107,7 @@ run 0
 
 @pytest.mark.skipif(shutil.which("lmp") is None, reason="LAMMPS is not installed")
 def test_lammps_own_dumps_are_the_same_packing(tmp_path):
-    write(tmp_path / "deck", DECK.encode())
+    (tmp_path / "deck").write_text(DECK)
     subprocess.run(["lmp", "-in", "deck"], cwd=tmp_path, check=True, capture_output=True)
     text, bits = (scanfab.read(tmp_path / name) for name in ("t.0.txt", "b.0.bin"))
     np.testing.assert_array_equal(text.position, bits.position)

@@ -82,63 +82,50 @@ FLAGGED = [(*pair, 0, -1, 0, 0) for pair in PAIRS]
 ROUNDED = [(f"{one:g}", f"{two:g}", 0, -1, 0, 0) for one, two in chain(1234561)[1]]
 TRIPLES = [(*pair, 1.5) for pair in PAIRS]
 TWO = "id1=c_con[1],id2=c_con[2]"
+# no ids; two choices; types; ids of other grains
+UNSURE = [[(1.5, 2.5), (2.5, 3.5)], [(1, 2, 3), (2, 3, 1)], [(1, 2)] * 5, [(10, 20), (20, 30)]]
+WRONG = ["id1=c_con[1]", f"{TWO},fx=c_con[3]", f"{TWO},size=c_con[3]", "id1=,id2"]
+WRONG += [f"{TWO},tx=c_con[3],ty=c_con[3],tz=c_con[3]"]
 
 
 @pytest.mark.parametrize(
-    ("local", "rows", "columns", "told"),
+    ("local", "rows", "columns", "format", "told"),
     [
-        ([(1, 2, 0), (2, 3, 0), (3, 4, 0), (4, 99, 0)], chain(0)[0], None, "grain 99"),
-        ([(101, 102, 0), (102, 103, 0)], ROWS, None, "another step"),
-        ([(1, 2, 0, 2, 3, 0), (2, 3, 0, 1, 2, 0)], ROWS, None, "cannot tell which col"),
-        (FLAGGED, ROWS, "pos force", "id among them"),
-        (FLAGGED, ROWS, "", "id among them"),
-        (FLAGGED, ROWS, "id forces", "keywords of compute pair/gran/local"),
-        (FLAGGED, ROWS, "id force torque", "makes 9 columns, the file has 6"),
-        (FLAGGED, ROWS, "id force history:2", "makes 8 columns, the file has 6"),
-        (FLAGGED, ROWS, "id1=c_con[2],id2=c_con[9]", r"c_con\[9\].*; the columns are c_con\[1\]"),
-        (FLAGGED, ROWS, "id1=c_con[1],id2=c_con[1]", "named twice"),
-        (ROUNDED, chain(1234561)[0], None, r"rounded to six digits.*%\.0f"),
+        ([(1, 2, 0), (2, 3, 0), (3, 4, 0), (4, 99, 0)], chain(0)[0], None, "liggghts", "grain 99"),
+        ([(101, 102, 0), (102, 103, 0)], ROWS, None, "liggghts", "of this step"),
+        ([(1, 2, 0, 2, 3, 0), (2, 3, 0, 1, 2, 0)], ROWS, None, "liggghts", "no two columns"),
+        *((rows, ROWS, None, "lammps", "no two columns are surely the ids") for rows in UNSURE),
+        ([(1.5, 2), (2.5, 3)], ROWS, TWO, "lammps", "columns 1 and 2: ids must be whole"),
+        ([(1, 2), (2, 77)], ROWS, TWO, "lammps", "contact 2 names the grain 77, which is not in"),
+        (FLAGGED, ROWS, "pos force", None, "id among them"),
+        (FLAGGED, ROWS, "", None, "id among them"),
+        (FLAGGED, ROWS, "id forces", None, "keywords of compute pair/gran/local"),
+        (FLAGGED, ROWS, "id force torque", None, "make 6 columns.* makes 9"),
+        (FLAGGED, ROWS, "id force history:2", None, "make 6 columns.* makes 8"),
+        (FLAGGED, ROWS, "id1=c_con[2],id2=c_con[9]", None, r"c_con\[9\].*; the columns are c_con"),
+        (FLAGGED, ROWS, "id1=c_con[1],id2=c_con[1]", None, "named twice"),
+        (ROUNDED, chain(1234561)[0], None, "liggghts", r"rounded to six digits.*%\.0f"),
         # each rounded id is that of another grain
-        (ROUNDED, chain(1234560, 0.01)[0], "id force", r"rounded to six digits.*%\.0f"),
-        *(
-            (TRIPLES, ROWS, columns, "expected id1=NAME,id2=NAME")
-            for columns in (
-                "id1=c_con[1]",
-                f"{TWO},fx=c_con[3]",
-                f"{TWO},tx=c_con[3],ty=c_con[3],tz=c_con[3]",
-                f"{TWO},size=c_con[3]",
-                "id1,id2",
-            )
-        ),
+        (ROUNDED, chain(1234560, 0.01)[0], "id force", None, r"rounded to six digits.*%\.0f"),
+        *((TRIPLES, ROWS, columns, None, "expected id1=NAME,id2=NAME") for columns in WRONG),
     ],
 )
-def test_contacts_that_cannot_be_right_are_refused(tmp_path, local, rows, columns, told):
-    for format in ("liggghts", "lammps") if columns is not None else ("liggghts",):
+def test_contacts_that_cannot_be_right_are_refused(tmp_path, local, rows, columns, format, told):
+    for name in ("liggghts", "lammps") if format is None else (format,):
         with pytest.raises(ReadError, match=told):
-            joined(tmp_path, local_text(local), rows, columns, format)
-
-
-@pytest.mark.parametrize(
-    ("rows", "columns", "told"),
-    [
-        ([(1.5, 2), (2.5, 3)], TWO, "expected ids in the columns 1 and 2"),
-        ([(1, 2), (2, 77)], TWO, "contact 2 names the grain 77, which is not in the grain"),
-        *(
-            (rows, None, "cannot tell which columns are the two ids")
-            for rows in (
-                [(1.5, 2.5), (2.5, 3.5)],  # no ids
-                [(1, 2, 3), (2, 3, 1)],  # two choices
-                [(1, 2)] * 5,  # types
-                [(10, 20), (20, 30)],  # of other grains
-            )
-        ),
-    ],
-)
-def test_contacts_of_lammps_that_cannot_be_told_are_asked_for(tmp_path, rows, columns, told):
-    with pytest.raises(ReadError, match=told):
-        joined(tmp_path, local_text(rows), ROWS, columns, "lammps")
+            joined(tmp_path, local_text(local), rows, columns, name)
 
 
 def test_contacts_by_id_need_ids_in_the_grain_file(tmp_path):
     with pytest.raises(ReadError, match="the grain file has no ids"):
         joined(tmp_path, pairs_text(), [row[1:] for row in ROWS], names="type x y z radius")
+
+
+@pytest.mark.filterwarnings("ignore:skipped")
+@pytest.mark.parametrize("source", [".", "dump_0.txt"])
+def test_contacts_that_are_cut_in_their_header_are_an_error(tmp_path, source):
+    write(tmp_path / "dump_0.txt", dump_text())
+    write(tmp_path / "pairs_0.txt", pairs_text()[:60])
+    with pytest.raises(ReadError, match=r"pairs_0.txt.*incomplete.*`contacts=\"geometric\"`"):
+        scanfab.read(tmp_path / source)
+    assert scanfab.read(tmp_path / source, contacts="geometric").contacts is None

@@ -25,6 +25,7 @@ FLOOR_CELL = {"cell": (0.014, 0.013, 0.04), "periodic": "xy"}
 TEXT = ["tutorial.txt", "tutorial.txt.gz", "shuffled.txt", "scaled.txt", "unwrapped.txt"]
 TEXT += ["diameter.txt", "blanks.txt", "label.txt", "padded_000030000.txt", "precise.txt"]
 VTK = [f"grains_{kind}30000.{end}" for kind in ("", "binary_") for end in ("vtk", "vtp", "vtu")]
+OTHERS = ["dump.txt", "scaled.txt", "unwrapped.txt", "precise.txt", "grains_30000.vtk"]
 KEYWORDS = {
     "pairs_all.txt.gz": "pos vel id force torque history contactArea",
     "pairs_pos_id_force.txt": "force id pos",
@@ -67,29 +68,23 @@ def assert_true_forces(packing):
 
 
 @pytest.mark.parametrize(
-    ("name", "options"),
+    ("folder", "name", "options"),
     [
-        *((name, {}) for name in TEXT),
-        *((name, {"periodic": "xy"}) for name in VTK),
-        ("atom_30000.vtu", FLOOR_CELL),
+        *((FLOOR, name, {}) for name in TEXT),
+        *((FLOOR, name, {"periodic": "xy"}) for name in VTK),
+        (FLOOR, "atom_30000.vtu", FLOOR_CELL),
+        *((PERIODIC, name, {"periodic": "xyz"}) for name in OTHERS),
     ],
 )
-def test_every_form_gives_the_same_grains(name, options):
-    packing = scanfab.read(FLOOR / name, **options)
+def test_every_form_gives_the_same_grains(folder, name, options):
+    packing = scanfab.read(folder / name, **options)
     # VTK files have no step, and single ones none by their names
-    assert packing.step == (None if ".vt" in name else 30000)
-    assert packing.cell.periodic == (True, True, False)
-    assert_true_grains(packing, FLOOR, 1e-12 if name == "precise.txt" else SIX_DIGITS)
+    assert (packing.step is None) == (".vt" in name)
+    assert packing.cell.periodic == (True, True, folder is PERIODIC)
+    assert_true_grains(packing, folder, 1e-12 if name == "precise.txt" else SIX_DIGITS)
     if name == "shuffled.txt":
+        assert packing.step == 30000
         assert sorted(packing.columns) == ["c_ca", "mass", "type", "vx"]
-
-
-@pytest.mark.parametrize(
-    "name", ["dump.txt", "scaled.txt", "unwrapped.txt", "precise.txt", "grains_30000.vtk"]
-)
-def test_the_periodic_state_has_the_same_grains_in_every_form(name):
-    packing = scanfab.read(PERIODIC / name, periodic="xyz")
-    assert_true_grains(packing, PERIODIC, 1e-12 if name == "precise.txt" else SIX_DIGITS)
 
 
 def test_a_file_with_several_snapshots_holds_them_all():
@@ -97,13 +92,6 @@ def test_a_file_with_several_snapshots_holds_them_all():
     assert len(frames[0]) == 0
     assert [frame.step for frame in frames] == [0, 15000, 30000]
     assert_true_grains(frames[-1], FLOOR)
-
-
-def test_a_dump_without_a_radius_takes_the_users():
-    with pytest.raises(ReadError, match=r"noradius.txt, step 30000: no radius.*`columns.*`radius`"):
-        scanfab.read(FLOOR / "noradius.txt")
-    packing = scanfab.read(FLOOR / "noradius.txt", radius=0.00125)
-    np.testing.assert_array_equal(packing.radius, 0.00125)
 
 
 @pytest.mark.parametrize("name", KEYWORDS)
@@ -146,28 +134,24 @@ def test_wall_contacts_count_for_their_grains():
 @pytest.mark.parametrize("columns", [None, "pos id force", "id1=c_a[1],id2=c_a[2]"])
 @pytest.mark.parametrize("grains", ["tutorial.txt", "shuffled.txt", "precise.txt"])
 def test_wall_contacts_alone_leave_the_contacts_to_geometry(grains, columns):
+    walls = FLOOR / "walls_all.txt"
     with pytest.warns(scanfab.ScanfabWarning, match=r"walls_all.txt: lists contacts with walls on"):
-        packing = scanfab.read(
-            FLOOR / grains, contacts=FLOOR / "walls_all.txt", contact_columns=columns
-        )
-    assert packing.contacts is None
-    assert packing.wall_contacts.sum() == 25
+        packing = scanfab.read(FLOOR / grains, contacts=walls, contact_columns=columns)
+    assert (packing.contacts, packing.wall_contacts.sum()) == (None, 25)
 
 
-BOXES = [
-    f"grains_{kind}boundingBox_30000.{end}" for kind in ("", "binary_") for end in ("vtk", "vtr")
-]
+NO_GRAINS = ["mesh_30000.vtk", "decomposition_30000.vtk", "grains_boundingBox_30000.vtk"]
+NO_GRAINS += ["grains_binary_boundingBox_30000.vtk", "grains_boundingBox_30000.vtr"]
 
 
 @pytest.mark.parametrize(
     ("name", "told"),
     [
-        *((name, "no grains: expected points with a radius") for name in BOXES),
-        ("mesh_30000.vtk", "no grains: expected points with a radius"),
-        ("decomposition_30000.vtk", "no grains: expected points with a radius"),
+        *((name, "no grains: expected points with a radius") for name in NO_GRAINS),
         ("mesh_30000.stl", "no reader knows the format"),
         ("binary_30000.bin", "does not name its 6 columns: name them"),
         ("pairs_id_force.txt", r"no grains.*found contacts \(pairs_id_force.txt\)"),
+        ("noradius.txt", r"noradius.txt, step 30000: no radius.*`columns.*`radius`"),
     ],
 )
 def test_files_without_grains_are_told(name, told):
@@ -199,6 +183,5 @@ def test_the_pieces_of_a_vtm_file_are_read_by_themselves():
 
 
 def test_a_contact_across_a_face_without_a_cell_asks_for_it():
-    contacts = FLOOR / "pairs_pos_id_force_30000.vtk"
-    with pytest.raises(scanfab.PackingError, match="name its cell \\(`cell` and `periodic`\\)"):
-        scanfab.read(FLOOR / "grains_30000.vtk", contacts=contacts)
+    with pytest.raises(scanfab.PackingError, match="name its cell"):
+        scanfab.read(FLOOR / "grains_30000.vtk", contacts=FLOOR / "pairs_pos_id_force_30000.vtk")

@@ -122,7 +122,21 @@ def test_a_last_frame_that_is_cut_is_left_out(run, ending):
         assert len(series[0].read().contacts) == 0
     assert len(series) == (2 if ending == "data" else 3)
     with pytest.raises(ReadError, match=r"the file is incomplete"):
-        scanfab.read(write(run / "b.data", data_frame(1)[:-9]))
+        scanfab.read(write(run / "b.data", data_frame(1)[:-50]))
+
+
+def test_a_frame_whose_header_is_cut_is_left_out(tmp_path):
+    path = write(tmp_path / "a.data", data_frame(1) + data_frame(2)[:9])
+    with pytest.warns(ScanfabWarning, match="number 2, is incomplete.*header"):
+        assert [len(frame.read()) for frame in scanfab.read_series(path)] == [3]
+
+
+def test_a_text_that_begins_with_a_number_is_no_frame(tmp_path):
+    path = write(
+        tmp_path / "a.txt", "2 samples of sand from France\nwere sheared by hand in a wooden box\n"
+    )
+    with pytest.raises(scanfab.ScanfabError, match="no reader knows the format"):
+        scanfab.read(path)
 
 
 @pytest.mark.filterwarnings("error")

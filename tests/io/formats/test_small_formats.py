@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import warnings
-from contextlib import suppress
-from random import Random
+import shutil
 
 import h5py
 import numpy as np
@@ -12,13 +10,11 @@ import pytest
 
 import scanfab
 from scanfab import ReadError, ScanfabNote
-from scanfab.io import fence, registry
+from scanfab.io import reader as readers
 from scanfab.io.formats import musen as musen_reader
-from scanfab.io.reader import ReadOptions
-from scanfab.io.registry import reader_named
+from scanfab.io.reader import ReadOptions, reader_named
 from scanfab.testing import check_reader
 from tests.helpers.dumps import write
-from tests.helpers.fuzzing import mutate
 from tests.helpers.made import esys, gsd, musen
 from tests.helpers.made.kratos import MDPA
 from tests.helpers.made.mfix import version_2
@@ -27,25 +23,26 @@ from tests.helpers.sound_files import SMALL
 # file, what is replaced in it, by what, and words of the message
 WRONG = {
     "esys": [
-        ("snap_t=30_0.txt", "_2.txt", "_1.txt", "expected the names of its workers' files"),
+        ("snap_t=30_0.txt", "_2.txt", "_1.txt", "each worker's file once"),
         ("snap_t=30_0.txt", "_2.txt", "_7.txt", "there is no such file"),
+        ("snap_t=30_0.txt", " snap_t=30_2.txt", "", "beside it 1 others: it was cut"),
         ("snap_t=30_1.txt", "2\n1 1", "9\n1 1", "30_1.txt: the header counts 9 particles"),
-        ("snap_t=30_1.txt", "2\n1 1", "1\n1 1", "30_1.txt: .* counts 1 particles, but more rows"),
-        ("snap_t=30_1.txt", "0.25 4 77", "0.25 4", "30_1.txt: .* columns of particles, found 21"),
-        ("snap_t=30_1.txt", "0.25 5 77", "0.25 5", "30_1.txt, line 3: expected 22 columns"),
+        ("snap_t=30_1.txt", "2\n1 1", "1\n1 1", "30_1.txt: .* counts 1 particles, found 2"),
+        ("snap_t=30_1.txt", "0.25 4 77", "0.25 4", "30_1.txt: .* counts 2 particles, found 0"),
+        ("snap_t=30_1.txt", "0.25 5 77", "0.25 5", "30_1.txt: .* counts 2 particles, found 1"),
         ("snap_t=30_2.txt", "1\n3.75", "x\n3.75", "30_2.txt: expected the number of particles"),
     ],
     "kratos": [
-        ("a.mdpa", "7  1 0.2\n", "", "the sphere at node 7 and 0 more have no radius"),
-        ("a.mdpa", "7 0.5 0.25", "8 0.5 0.25", "the node 7 has a radius, but no place"),
-        ("a.mdpa", "SphericParticle3D", "Cluster3D", "expected elements that are spheres"),
+        ("a.mdpa", "7  1 0.2\n", "", "no place or RADIUS for 1 nodes, one is 7"),
+        ("a.mdpa", "7 0.5 0.25", "8 0.5 0.25", "no place or RADIUS for 1 nodes, one is 7"),
+        ("a.mdpa", "SphericParticle3D", "Cluster3D", "elements that are spheres"),
         ("a.mdpa", "7  1 0.2", "7  1", "line 21: expected 3 columns, found 2"),
         ("a.mdpa", "End Nodes", "", "incomplete"),
-        ("a.mdpa", "End SubModelPart\n", "", "has no end: the file is incomplete"),
+        ("a.mdpa", "End SubModelPart\n", "", "incomplete"),
         ("a.mdpa", "RADIUS", "MASS", "no grains: expected points with a radius"),
     ],
     "lf-dem": [
-        ("par.dat", "# Lz 6", "# Lz", "lines '# Lx', .*: expected 3 numbers"),
+        ("par.dat", "# Lz 6", "# Lz", "'# Lz': expected 4 numbers"),
         ("par.dat", "#2: radius", "#2: size", "no reader knows|expected points with a radius"),
         ("par.dat", "0 1 0 0 2.5 9", "0 1 0 0 2.5 9 9", "line 13: expected 8 columns, found 9"),
         ("par.dat", "#6-8:", "#0:", "line 13: expected 5 columns, found 8"),
@@ -53,32 +50,33 @@ WRONG = {
         ("par.dat", "# 0.0 1.0", "# 0.0 x", "above '0 1 0 0 2.5"),
     ],
     "mercurydpm": [
-        ("run.restart", "BaseParticle id 10", "SuperQuadricParticle id 10", "expected spheres"),
+        ("run.restart", "BaseParticle id 10", "SuperQuadricParticle id 10", "spheres in 'SuperQ"),
         ("run.restart", "Particles 3", "Particles 30", "expected 30 Particles, found"),
         ("run.restart", "Particles 3", "Particles 2", "expected 2 Particles, found more"),
-        ("run.restart", "Interactions 4", "Interactions -1", "number of Interactions, found '-1'"),
+        ("run.restart", "Interactions 4", "Interactions -1", "Interactions N.*damaged"),
         ("run.restart", "Interactions 4", "Interactions 3", "expected 3 Interactions, found more"),
-        ("run.restart", "Interactions 4", "Interaction 4", "Interactions N.*the file is incompl"),
+        ("run.restart", "Interactions 4", "Interaction 4", "Interactions N.*incomplete"),
         ("run.restart", "radius 0.1", "radius", "spheres in .* expected 6 numbers"),
-        ("run.restart", "particleIds 10 30", "particleIds 10 31", "names the grain 31, which is"),
-        ("run.restart", "force -2 0.5", "force nan 0.5", "expected finite numbers as contact forc"),
-        ("run.restart", "PeriodicBoundary", "LeesEdwardsBoundary", "LeesEdwardsBoundary' repeats"),
+        ("run.restart", "particleIds 10 30", "particleIds 10 31", "names the grain 31"),
+        ("run.restart", "force -2 0.5", "force nan 0.5", "finite numbers"),
+        ("run.restart", "PeriodicBoundary", "LeesEdwardsBoundary", "a PeriodicBoundary"),
         ("run.restart", "xMin 0", "zmin 0", "expected 6 numbers"),
-        ("run.restart", "shift 1 0 0", "shift 0 0 0", "make no cell"),
+        ("run.restart", "shift 1 0 0", "shift 0 0 0", "no volume"),
         ("run.data", "0.29 1 1", "0.29 x 1", "run.data, line 3: expected a number in the column y"),
     ],
     "mfix": [
-        ("a.dat", "Version 2.0", "Version 3.0", "expected version 2.0, found 3.0"),
+        ("a.dat", "Version 2.0", "Version 3.0", "version 2.0 .* found 3.0"),
         ("a.dat", "Particles:    2", "Particles:    3", "the header counts 3 particles, found 2"),
-        ("a.dat", "F  0.0017", "F  none", "expected T, or F and a number"),
-        ("a.dat", "Density: ", "Weight: ", "found none of Density"),
+        ("a.dat", "F  0.0017", "F  none", "Diameter: expected T, or F and a number"),
+        ("a.dat", "Density: ", "Weight: ", "T or F .* Density"),
         ("a.dat", "0.15 0.25 1.0", "0.15 0.25", "line 20: expected 7 columns, found 6"),
     ],
     "musen": [
-        ("a.txt", "0 1 1 1 5 0.1", "0 1 1 1 5 word", "line 2: expected 12 numbers, found '1 word"),
+        ("a.txt", "0 1 1 1 5 0.1", "0 1 1 1 5 word", "line 2: expected a number"),
         ("a.txt", "0 1 1 1 5 0.1", "0 1 1 5 0.1", "line 2: expected 0 ID 1 TYPE 5"),
-        ("a.txt", "0 1 1 1 5 0.1 0.4", "0 1 1 1 5 0.1", "line 2: expected the properties of the"),
-        ("a.txt", " 36 9", " 99 9", "line 1: expected properties 0 ID"),
+        ("a.txt", "0 1 1 1 5 0.1 0.4", "0 1 1 1 5 0.1", "line 2: expected [0-9]+ columns"),
+        ("a.txt", "0 1 1 1 5 0.1 0.4 23", "0 1 1 1 5 0.1 0.4 22", "properties of the first sphere"),
+        ("a.txt", " 36 9", " 99 9", "expected properties 0 ID"),
         ("a.txt", "28 0 0", "28 1 1", "its periodic domain"),
     ],
 }
@@ -104,17 +102,16 @@ def test_the_kit(tmp_path, format):
     (tmp_path / "damaged").mkdir()
     paths = SMALL[format](tmp_path)
     for path in paths if format == "esys" else []:
-        (tmp_path / "damaged" / path.name).write_bytes(path.read_bytes())
+        shutil.copy(path, tmp_path / "damaged")
     for path in paths:
         if reader.kind(path) == "grains":
             check_reader(reader, [path], tmp_path / "damaged", counts=path.name in COUNTED)
 
 
 def test_there_are_no_contacts(tmp_path):
-    path = SMALL["mfix"](tmp_path)[0]
+    path, reader = SMALL["mfix"](tmp_path)[0], reader_named("mfix")
     with pytest.raises(ReadError, match="expected contacts, found grains"):
         scanfab.read(path, contacts=path)
-    reader = reader_named("mfix")
     snapshot = reader.snapshots(path)[0]
     grains = reader.read_grains(snapshot, ReadOptions())
     with pytest.raises(ReadError, match="mfix files hold no contacts"):
@@ -144,17 +141,6 @@ def test_esys_snapshots_are_a_series_of_their_headers(tmp_path, source):
     assert [(frame.step, len(frame.read())) for frame in series] == [(30, 3), (200, 3), (1000, 3)]
     names = [one.name for one in reader_named("esys").beside(path)]
     assert names == ["snap_t=1000_1.txt", "snap_t=1000_2.txt"]
-
-
-def test_esys_damaged_files_of_workers_give_grains_or_an_error(tmp_path):
-    header = esys.run(tmp_path)
-    worker = tmp_path / "snap_t=30_1.txt"
-    sound, random = worker.read_bytes(), Random(0)
-    for _ in range(300):
-        worker.write_bytes(mutate(sound, random))
-        with suppress(scanfab.ScanfabError), warnings.catch_warnings():
-            warnings.simplefilter("ignore", scanfab.ScanfabWarning)
-            scanfab.read(header)
 
 
 def test_gsd_frames_have_what_they_or_the_first_one_say(tmp_path):
@@ -189,20 +175,23 @@ def test_gsd_of_another_schema_or_without_the_package(tmp_path, monkeypatch):
         file.end_frame()
     with pytest.raises(ReadError, match="its schema is 'mine', expected 'hoomd'"):
         scanfab.read(path)
-    monkeypatch.setattr(fence, "find_spec", lambda name: None)
-    monkeypatch.setattr(registry, "find_spec", lambda name: None)
+    monkeypatch.setattr(readers, "find_spec", lambda name: None)
     for format in (None, "gsd"):
         with pytest.raises(scanfab.ScanfabError, match=r'pip install "scanfab\[gsd\]"'):
             scanfab.read(path, format=format)
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize(
-    ("diameter", "size", "radius"), [("F  0.17D-2", "", 0.00085), ("T  0.0017", "0.1 ", 0.05)]
+    ("diameter", "size", "radius", "dimension", "behind"),
+    [
+        ("F  0.17D-2", "", 0.00085, 2, ""),
+        ("F  0.17D-2", "", 0.00085, 3, " 300 0.5"),
+        ("T  0.0017", "0.1 ", 0.05, 2, " 300 0.5"),
+        ("T  0.0017", "0.1 ", 0.05, 3, ""),
+    ],
 )
-@pytest.mark.parametrize("behind", ["", " 300 0.5"])
 def test_mfix_diameters_of_the_header_or_the_rows(
-    tmp_path, diameter, size, radius, behind, dimension
+    tmp_path, diameter, size, radius, dimension, behind
 ):
     text = version_2(diameter, size, dimension, behind=behind)
     packing = scanfab.read(write(tmp_path / "a.dat", text))
@@ -215,20 +204,17 @@ def test_mfix_diameters_of_the_header_or_the_rows(
     assert list(scanfab.read(tmp_path / "a.dat").columns)[-3:] == ["5", "6", "7"]
 
 
-@pytest.mark.parametrize(
-    ("row", "place"),
-    [
+def test_mfix_rows_alone_have_radii(tmp_path):
+    for row, place in (
         ("0.1D0 0.2 0.5250D-01 2650 7 8", [0.1, 0.2, 0]),
         ("0.1 0.2 3 0.0525 2650 7 8 9", [0.1, 0.2, 3]),
-    ],
-)
-def test_mfix_rows_alone_have_radii(tmp_path, row, place):
-    packing = scanfab.read(write(tmp_path / "particle_input.dat", f"{row}\n"))
-    np.testing.assert_array_equal(packing.radius, 0.0525)
-    np.testing.assert_array_equal(packing.position, [place])
-    # rows of numbers by another name may be anything
-    with pytest.raises(scanfab.ScanfabError):
-        scanfab.read(write(tmp_path / "other.dat", f"{row}\n"))
+    ):
+        packing = scanfab.read(write(tmp_path / "particle_input.dat", f"{row}\n"))
+        np.testing.assert_array_equal(packing.radius, 0.0525)
+        np.testing.assert_array_equal(packing.position, [place])
+        # rows of numbers by another name may be anything
+        with pytest.raises(scanfab.ScanfabError):
+            scanfab.read(write(tmp_path / "other.dat", f"{row}\n"))
 
 
 def test_kratos_nodes_with_a_radius_are_spheres(tmp_path):
@@ -295,7 +281,7 @@ def test_musen_domains_times_and_cut_files(tmp_path):
     late = musen.sphere(9, 0.85).replace(" 2 0.5 ", " 2 0.75 ")
     series = scanfab.read_series(write(tmp_path / "a.txt", musen.export(*musen.ROWS, late)))
     assert len(series[0].read()) == 3
-    with pytest.raises(ReadError, match=r"sphere 9 has no state at the time 0\.5"):
+    with pytest.raises(ReadError, match=r"no state at the time 0\.5"):
         series[1].read()
     with pytest.raises(ReadError, match="the last line has no end"):
         scanfab.read(write(tmp_path / "a.txt", musen.export(*musen.ROWS)[:-100]))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 import scanfab
 from scanfab import ReadError, ScanfabWarning
 from scanfab.io.formats import shared
-from scanfab.io.registry import reader_named
+from scanfab.io.reader import reader_named
 from tests.helpers.dumps import NAMES, ROWS, dump_text, write
 from tests.helpers.made.lammps import yaml_text
 
@@ -133,66 +134,59 @@ def test_only_a_periodic_box_must_have_a_volume(tmp_path, edge):
         read(tmp_path, dump_text(box=box, flags=" ff pp ff"))
 
 
-BAD = (2, 1, "oops", 0.5, 0.5, 0.1)
+COUNTS = [("ATOMS\n3", f"ATOMS\n{bad}", "whole number") for bad in ("", "many", "-1", "9" * 30)]
+STEPS = [("STEP\n0", f"STEP\n{bad}", "whole number") for bad in ("", "ten", "1.5", "9" * 5000)]
+BOXES = [("ff ff ff", flags, "BOX BOUNDS.*expected") for flags in ("zz zz zz", "pp pp", "xy xz yz")]
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("old", "new", "told"),
     [
-        ("ITEM: NUMBER OF ATOMS\n0\n", "expected the header of a frame"),
-        (dump_text()[:60], "step 0: the header is incomplete"),
-        (dump_text(ROWS[:2]).replace("ATOMS\n2", "ATOMS\n3"), "step 0: .*counts 3 rows, found 2"),
-        ("ITEM: TIMESTEP\n0\n", "expected the header of a frame"),
-        (dump_text().replace("ATOMS\n3", "ATOMS\n9"), "counts 9 rows.*incomplete"),
-        (dump_text().replace("ATOMS\n3", "ATOMS\n2"), "counts 2 rows, found 3"),
-        (dump_text().replace("ATOMS\n3", "ATOMS\n999999999999"), "counts 999999999999 rows"),
-        *(
-            (dump_text().replace("ATOMS\n3", f"ATOMS\n{count}"), "whole number after ITEM: NUMBER")
-            for count in ("", "many", "-1", "9" * 30)
-        ),
-        *(
-            (dump_text().replace("STEP\n0", f"STEP\n{step}"), "whole number after ITEM: TIMESTEP")
-            for step in ("", "ten", "1.5", "9" * 5000)
-        ),
-        (dump_text(before=TIMES.format("now")), "step 0: expected a number after ITEM: TIME"),
-        (dump_text([ROWS[0], BAD, ROWS[2]]), "dump, line 11: .* found 'oops'"),
-        (dump_text([ROWS[0], ROWS[1][:4], ROWS[2]]), "dump, line 11: expected 6 columns, found 4"),
-        (dump_text(step=-1) + dump_text([*ROWS[:2], BAD]), "dump, line 24: .* found 'oops'"),
-        *(
-            (dump_text(flags=flags, box=box), "BOX BOUNDS.*expected three")
-            for flags, box in (
-                (" zz zz zz", ((0, 1),) * 3),
-                (" pp pp", ((0, 1),) * 3),
-                (" ff ff ff", ((0, 1),) * 2),
-                (" ff ff ff", ((0, "one"), (0, 1), (0, 1))),
-                (" xy xz yz pp pp pp", ((0, 1),) * 3),
-            )
-        ),
-        (yaml_text().replace("natoms: 3", "natoms: 4"), "counts 4 rows, found 3"),
-        (yaml_text().replace("natoms: 3", "natoms: x"), "whole number after ITEM: NUMBER"),
-        (yaml_text().replace(", -3, ]\n  -", ", ]\n  -"), "line 18: expected 7 columns, found 6"),
-        (yaml_text().replace("0.39", "word"), "line 19: expected a number .* found 'word'"),
-        (yaml_text().replace("p, f", "p, q"), "expected three boundary flags"),
-        (yaml_text(""), "whole number after ITEM: TIMESTEP"),
-        (yaml_text().replace("...", ""), "step 100: the header is incomplete"),
+        *COUNTS,
+        *STEPS,
+        *BOXES,
+        ("ITEM: TIMESTEP\n0\n", "", "expected the header of a frame"),
+        ("BOX BOUNDS ff ff ff\n0 1\n", "BOX BOUNDS ff ff ff\n", "BOX BOUNDS.*expected 6 numbers"),
+        ("ff ff ff\n0 1", "ff ff ff\n0 one", "BOX BOUNDS.*expected 6 numbers"),
+        ("ITEM: TIMESTEP", TIMES.format("now") + "ITEM: TIMESTEP", "ITEM: TIME: expected 1 num"),
+        ("ATOMS\n3", "ATOMS\n9", "step 0: .*counts 9 rows, found 3: the file is incomplete"),
+        ("ATOMS\n3", "ATOMS\n2", "counts 2 rows, found 3"),
+        ("ATOMS\n3", "ATOMS\n999999999999", "counts 999999999999 rows"),
+        ("0.39", "oops", "dump, line 1[19]: .* found 'oops'"),
+        ("2 1 0.39", "2 1", "dump, line 11: expected 6 columns, found 5"),
+        ("natoms: 3", "natoms: 4", "counts 4 rows, found 3"),
+        ("natoms: 3", "natoms: x", "whole number"),
+        (", -3, ]\n  -", ", ]\n  -", "line 18: expected 7 columns, found 6"),
+        ("p, f", "p, q", "expected three boundary flags"),
+        ("box:", "bax:", "expected 6 numbers"),
+        ("timestep: 100", "timestep:", "whole number as ITEM: TIMESTEP"),
+        ("data:\n  - [", "", "whole number"),
     ],
 )
-def test_what_is_wrong_with_a_dump(tmp_path, text, told):
-    with pytest.raises(ReadError, match=told):
-        scanfab.read_series(write(tmp_path / "dump", text), format="liggghts")[-1].read()
+def test_what_is_wrong_with_a_dump(tmp_path, old, new, told):
+    texts = [text for text in (dump_text(), yaml_text()) if old in text]
+    assert texts
+    for text in texts:
+        with pytest.raises(ReadError, match=told):
+            read(tmp_path, text.replace(old, new, 1), format="liggghts")
+
+
+def test_a_bad_line_of_a_later_snapshot_is_counted_from_the_first(tmp_path):
+    text = dump_text(step=-1) + dump_text().replace("0.58", "oops")
+    with pytest.raises(ReadError, match=r"dump, line 24: .* found 'oops'"):
+        read(tmp_path, text, frame=-1)
 
 
 @pytest.mark.parametrize("left", [0, 100, 8192, 20000])
 def test_a_file_that_is_cut_while_it_is_indexed_is_an_error(tmp_path, monkeypatch, left):
     """A program starts again and writes the dump anew: whoever has it mapped is killed."""
     path = write(tmp_path / "dump", "".join(dump_text(step=step) for step in range(200)))
-
-    def cut(found, *lines):
-        with open(path, "r+b") as other:
-            other.truncate(left)
-        return real(found, *lines)
-
     real = shared.text_of
+
+    def cut(snapshot):
+        os.truncate(path, left)
+        return real(snapshot)
+
     monkeypatch.setattr(shared, "text_of", cut)
-    with pytest.raises(ReadError, match="expected a whole number after ITEM: TIMESTEP"):
+    with pytest.raises(ReadError, match="expected a whole number as ITEM: TIMESTEP"):
         reader_named("liggghts").snapshots(path)

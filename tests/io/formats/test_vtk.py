@@ -9,7 +9,7 @@ import pyvista
 
 import scanfab
 from scanfab.base.errors import ReadError, ScanfabNote, ScanfabWarning
-from scanfab.io.registry import reader_for
+from scanfab.io.reader import reader_for
 from tests.helpers.dumps import write
 from tests.helpers.truth import FLOOR
 
@@ -60,14 +60,12 @@ def test_every_form_holds_the_same_grains(tmp_path, form):
 
 
 @pytest.mark.parametrize("name", ["radius", "radii", "RADIUS", "rad", "r", "diameter", "Diameter"])
-@pytest.mark.parametrize("place", ["points", "cells"])
+@pytest.mark.parametrize("place", ["point_data", "cell_data"])
 def test_a_radius_has_many_names_and_stands_at_points_or_vertices(tmp_path, place, name):
-    values = 2 * RADIUS if "iameter" in name else RADIUS
     cells = [("vertex", np.arange(4)[:, None])]
-    arrays = (
-        {"point_data": {name: values}} if place == "points" else {"cell_data": {name: [values]}}
-    )
-    meshio.Mesh(POSITION, cells, **arrays).write(tmp_path / "a.vtu")
+    values = 2 * RADIUS if "iameter" in name else RADIUS
+    arrays = {name: [values] if place == "cell_data" else values}
+    meshio.Mesh(POSITION, cells, **{place: arrays}).write(tmp_path / "a.vtu")
     np.testing.assert_allclose(scanfab.read(tmp_path / "a.vtu").radius, RADIUS)
 
 
@@ -109,26 +107,18 @@ def test_lines_with_ids_name_grains_by_id(tmp_path):
 
 @pytest.mark.parametrize("name", ["a.vtk", "a.vtp", "a.stl", "a.vti"])
 def test_walls_and_images_hold_no_grains(tmp_path, name):
-    mesh = (
-        pyvista.Plane().triangulate() if name != "a.vti" else pyvista.ImageData(dimensions=[3] * 3)
-    )
+    wall, image = pyvista.Plane().triangulate(), pyvista.ImageData(dimensions=[3] * 3)
+    mesh = image if name == "a.vti" else wall
     mesh["radius"] = np.ones(mesh.n_points)
     mesh.save(tmp_path / name)
     with pytest.raises(ReadError, match=r"no grains|no reader knows"):
         scanfab.read(tmp_path / name)
 
 
-@pytest.mark.parametrize(
-    "head",
-    [
-        "STRUCTURED_POINTS\nDIMENSIONS 2 2 2\nORIGIN 0 0 0\nSPACING 1 1 1\n",
-        "RECTILINEAR_GRID\nDIMENSIONS 2 2 2\nX_COORDINATES 2 double\n0 1\n"
-        "Y_COORDINATES 2 double\n0 1\nZ_COORDINATES 2 double\n0 1\n",
-    ],
-)
-def test_boxes_are_neither_grains_nor_contacts(tmp_path, head):
-    path = write(tmp_path / "a.vtk", f"# vtk DataFile Version 3.0\nbox\nASCII\nDATASET {head}")
-    assert reader_for(path).kind(path) == "other"
+@pytest.mark.parametrize("box", [pyvista.ImageData(dimensions=[2] * 3), pyvista.RectilinearGrid()])
+def test_boxes_are_neither_grains_nor_contacts(tmp_path, box):
+    box.save(tmp_path / "a.vtk")
+    assert reader_for(tmp_path / "a.vtk").kind(tmp_path / "a.vtk") == "other"
 
 
 @pytest.mark.parametrize("name", ["all_30000.vtm", "liggghts_simulation.pvd"])

@@ -99,8 +99,8 @@ def collection(path, *entries):
 
 
 @pytest.mark.parametrize("one", ['part="{}"', 'group="{}"', 'group="a{}" part="0"'])
-@pytest.mark.parametrize("name", ["f/out_{1}_{0}.vtp"])
-def test_the_parts_of_one_time_are_one_frame(tmp_path, one, name):
+def test_the_parts_of_one_time_are_one_frame(tmp_path, one):
+    name = "f/out_{1}_{0}.vtp"
     rows = {(5, 0): [0, 1], (5, 1): [2, 3], (6, 0): [3], (6, 1): [2, 1, 0]}
     for (step, part), own in rows.items():
         cloud(tmp_path / name.format(step, part), own)
@@ -132,11 +132,11 @@ def test_parts_that_number_their_grains_alike_are_refused(tmp_path):
 def test_one_part_of_one_time_is_listed_once(tmp_path, more):
     names = [cloud(tmp_path / f"{part}.vtp", [0, 1]).name for part in "ab"]
     path = collection(tmp_path / "run.pvd", *((name, more) for name in names))
-    with pytest.raises(ReadError, match=r"a\.vtp and b\.vtp have .* the same part and group"):
+    with pytest.raises(ReadError, match=r"a\.vtp and b\.vtp have the same timestep"):
         scanfab.read(path)
 
 
-@pytest.mark.parametrize("more", ["", 'part="0"', 'group="" part="0" timestep="7"'])
+@pytest.mark.parametrize("more", ["", 'group="" part="0" timestep="7"'])
 def test_a_list_of_one_file_is_a_frame(tmp_path, more):
     cloud(tmp_path / "a_3.vtp", [0, 1, 2])
     packing = scanfab.read(collection(tmp_path / "run.pvd", ("a_3.vtp", more)))

@@ -7,17 +7,18 @@ import pytest
 
 import scanfab
 from scanfab.base.errors import ReadError
-from scanfab.io.registry import reader_for
+from scanfab.io.reader import reader_for
 from tests.helpers.dumps import small_save, write
 from tests.helpers.truth import (
     YADE,
     assert_same_vectors,
+    centres,
     csv_rows,
     forces_by_pair,
     id_pairs,
     normals_by_pair,
     true_pairs,
-    vectors_by_pair,
+    true_vectors,
 )
 
 PERIODIC, BOX = YADE / "periodic.xml.bz2", YADE / "formats.xml.bz2"
@@ -27,25 +28,19 @@ def truth(path, what):
     return csv_rows(YADE / f"{'periodic_' if path == PERIODIC else ''}truth_{what}.csv")
 
 
-def true_vectors(contacts, letter):
-    vectors = np.column_stack([contacts[f"{letter}{axis}"] for axis in "xyz"])
-    return vectors_by_pair(contacts["id1"], contacts["id2"], vectors)
-
-
 @pytest.mark.parametrize("path", [PERIODIC, BOX])
 def test_spheres_are_those_that_yade_holds(path):
     packing, bodies = scanfab.read(path), truth(path, "bodies")
     np.testing.assert_array_equal(packing.id, bodies["id"])
     np.testing.assert_array_equal(packing.radius, bodies["r"])
-    centres = np.column_stack([bodies[axis] for axis in "xyz"])
-    if packing.cell is not None:
-        centres = packing.cell.wrap(centres)
-    np.testing.assert_array_equal(packing.position, centres)
+    cell, expected = packing.cell, centres(bodies)
+    expected = expected if cell is None else cell.wrap(expected)
+    np.testing.assert_array_equal(packing.position, expected)
 
 
 def test_the_cell_is_yades():
     cell, rows = scanfab.read(PERIODIC).cell, truth(PERIODIC, "cell")
-    np.testing.assert_array_equal(cell.vectors, np.column_stack([rows[axis] for axis in "xyz"]))
+    np.testing.assert_array_equal(cell.vectors, centres(rows))
     assert cell.periodic == (True, True, True)
     assert scanfab.read(BOX).cell is None
 
@@ -58,23 +53,6 @@ def test_contacts_are_the_real_ones_with_normals_and_forces(path):
     assert id_pairs(packing) == true_pairs(contacts)
     assert_same_vectors(normals_by_pair(packing), true_vectors(contacts, "n"), atol=1e-12)
     assert_same_vectors(forces_by_pair(packing), true_vectors(contacts, "f"), atol=1e-12)
-
-
-def test_images_are_yades_own():
-    """From positions outside the cell, as YADE has them."""
-    packing, contacts = scanfab.read(PERIODIC), truth(PERIODIC, "contacts")
-    bodies = truth(PERIODIC, "bodies")
-    centres = np.column_stack([bodies[axis] for axis in "xyz"])
-    row = {int(id): place for place, id in enumerate(bodies["id"])}
-    one, two = ([row[int(id)] for id in contacts[name]] for name in ("id1", "id2"))
-    shift = np.column_stack([contacts[f"cell_{axis}"] for axis in "xyz"])
-    branch = centres[two] - centres[one] + shift @ packing.cell.vectors
-    expected = vectors_by_pair(contacts["id1"], contacts["id2"], branch)
-    pairs, image = packing.contacts.pairs, packing.contacts.image
-    ours = packing.position[pairs[:, 1]] - packing.position[pairs[:, 0]]
-    ours = ours + image @ packing.cell.vectors
-    ids = packing.id[pairs]
-    assert_same_vectors(vectors_by_pair(ids[:, 0], ids[:, 1], ours), expected, atol=1e-12)
 
 
 def test_walls_are_counted_for_their_spheres():
@@ -118,13 +96,12 @@ def test_potential_contacts_are_none(tmp_path):
     ("old", "new", "message"),
     [
         ("</scene>", "</scen>", "cannot be read as a simulation that YADE saved"),
+        (small_save()[-9:], "", "cannot be read as a simulation that YADE saved"),
+        (small_save()[900:], "", "cannot be read as a simulation that YADE saved"),
         ("<radius>0.1</radius>", "", "<px> has no <radius>"),
-        ("<radius>0.1</radius>", "<radius>big</radius>", "could not convert string to float"),
         ("<radius>0.1</radius>", "<radius>nan</radius>", "must be finite"),
-        ("<se3>", "<se4>", "cannot be read as a simulation"),
         ("<id>1</id>", "<id>1.5</id>", "ids must be whole numbers"),
         ("<id>3</id>", "<id>0</id>", "names the body 3, which is not there"),
-        ("<id2>1</id2>", "<id2>77</id2>", "names the body 77, which is not there"),
         ("<m00>1.0</m00>", "<m00>0.0</m00>", "span no volume"),
     ],
 )
@@ -133,14 +110,6 @@ def test_what_is_wrong_with_a_save(tmp_path, old, new, message):
     assert old in text
     path = write(tmp_path / "a.xml", text.replace(old, new, 1))
     with pytest.raises(scanfab.ScanfabError, match=message):
-        scanfab.read(path)
-
-
-@pytest.mark.parametrize("part", [0.3, 0.6, 0.99])
-def test_a_truncated_save_is_an_error(tmp_path, part):
-    text = small_save()
-    path = write(tmp_path / "a.xml", text[: int(part * len(text))])
-    with pytest.raises(ReadError, match="cannot be read as a simulation that YADE saved"):
         scanfab.read(path)
 
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 import scanfab
 from scanfab.pipeline.settings import Settings
-from scanfab.table.reading import total_error
+from scanfab.table.row import total_error
 from scanfab.viz.figures.cutoffs import CutoffCurve, Cutoffs
 from scanfab.viz.figures.page import drawn_page
 from scanfab.viz.scanned_frames import ScannedFrames

@@ -7,7 +7,7 @@ import pytest
 
 from scanfab.base.errors import ScanfabNote
 from scanfab.table.curves import abscissa_label
-from scanfab.table.reading import total_error
+from scanfab.table.row import total_error
 from scanfab.viz.figures.page import make_figures
 from tests.helpers.figures import fitted, legend_of, save_rows, titles_of, with_samples
 from tests.helpers.tables import curve, sheared

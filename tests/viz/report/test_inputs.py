@@ -10,7 +10,7 @@ import pytest
 
 from scanfab.base.errors import SettingsError
 from scanfab.cli.main import run
-from scanfab.table.reading import read_rows
+from scanfab.table.formats import read_rows
 from scanfab.viz.report.report import make_report
 from tests.conftest import ROOT, SAMPLE
 from tests.helpers.dumps import write
@@ -50,7 +50,7 @@ def test_a_table_of_compare_is_refused(copied, tmp_path, capsys, words):
     assert run(["report", str(other), "-o", str(page)]) == 1
     told = capsys.readouterr().err
     assert re.search(r"other.csv: this is (a table|the \w+) of scanfab compare: ", told)
-    assert "expected one of scanfab compute" in told
+    assert "expected a table of scanfab compute" in told
     assert not page.exists()
 
 
@@ -93,7 +93,7 @@ def several_cutoffs(tmp_path_factory):
 def test_one_of_several_cut_offs_is_reported(several_cutoffs, tmp_path, capsys):
     page = tmp_path / "r.html"
     assert run(["report", str(several_cutoffs), "-o", str(page)]) == 1
-    assert "choose the rows of one cut-off with --cutoff" in capsys.readouterr().err
+    assert "choose one cut-off with --cutoff" in capsys.readouterr().err
     assert run(["report", str(several_cutoffs), "--cutoff", "0.001", "-o", str(page)]) == 0
     text = words_of(page.read_text("utf-8"))
     assert "cut-off 0.001, 1.98 smallest radii" in text

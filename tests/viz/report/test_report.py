@@ -19,7 +19,7 @@ from scanfab.base.errors import ReadError, SettingsError
 from scanfab.cli.main import run
 from scanfab.io.sources import read_series
 from scanfab.pipeline.compute import compute_rows
-from scanfab.table.reading import read_rows
+from scanfab.table.formats import read_rows
 from scanfab.table.table import Table
 from scanfab.viz.report.page import MOST_GRAINS, Picture, view_data
 from scanfab.viz.report.report import make_report

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from scanfab.base.errors import SkippedFrameWarning
-from scanfab.base.note import SKIPPED, Note, joined, tell
+from scanfab.base.errors import SKIPPED, Note, SkippedFrameWarning, joined, tell
 
 
 def test_a_sentence_is_said_once_of_all_its_variants():
@@ -13,10 +12,8 @@ def test_a_sentence_is_said_once_of_all_its_variants():
     assert joined(notes) == (Note("a", "dense", ("b", "d")), Note("a", "loose", ("c",)))
 
 
-def test_it_says_what_it_is_about():
-    assert Note("a", "dense").told("") == "dense"
-    assert Note("a", "dense").told("frame 1") == "frame 1: dense"
-    assert Note("a", "dense", ("c",)).told("frame 1") == "frame 1, variant c: dense"
+def test_without_a_place_it_says_the_sentence_alone():
+    assert Note("a", "dense", ("c",)).told("") == "dense"
 
 
 def test_a_frame_that_was_left_out_is_a_warning_of_its_kind():

@@ -3,59 +3,48 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-from scanfab.base.errors import ReadError, ScanfabWarning, SettingsError
+from scanfab.base.errors import ReadError, SettingsError, warn
 from scanfab.base.files import check_folder
 from scanfab.base.spelling import counted
 from scanfab.io.families import PathLike
 from scanfab.io.options import parse_frames
-from scanfab.pipeline.manifest import default_settings, with_frames, write_manifest
-from scanfab.pipeline.repeat import read_manifest, restored_settings
-from scanfab.pipeline.resume import written_row
+from scanfab.pipeline.record import (
+    FREE,
+    FrameRows,
+    as_json,
+    read_finished,
+    rows_by_frame,
+    write_manifest,
+)
+from scanfab.pipeline.repeat import restored_settings
 from scanfab.pipeline.settings import Settings
 from scanfab.table.formats import format_of
-from scanfab.table.reading import read_finished_rows
-from scanfab.table.result_file import ResultFile, differing_settings, is_finished
 from scanfab.table.row import Row
 from scanfab.table.table import Table
-from scanfab.table.writing import Excerpt
-
-# what the parts of one table may differ in: their frames, and of which series these are
-FREE = ("frames", "sources")
+from scanfab.table.writing import Excerpt, ResultFile, differing_settings, part_of
 
 
-@dataclass(frozen=True, eq=False)
-class _Part:
+class _Part(NamedTuple):
     """The table of one job, and its manifest."""
 
     path: Path
     manifest: Mapping[str, Any]
-    asked: dict[str, Any]
-    """Its settings."""
     settings: Settings
-    rows: dict[tuple[str, int], list[Row]]
-    """By source and frame."""
+    rows: FrameRows
     columns: frozenset[str] | None
     """Those that were written; None without a row."""
+    counts: dict[str, int]
+    """How many frames each series has."""
 
     @property
-    def sources(self) -> tuple[str, ...]:
-        """What it was made of, as it was named."""
-        return tuple(map(str, self.asked["sources"]))
-
-    @property
-    def counts(self) -> dict[str, int]:
-        """How many frames each series has."""
-        found = dict.fromkeys((source for source, _ in self.rows), 0)
-        for source, frame in self.rows:
-            found[source] = max(found[source], frame + 1)
-        return {**found, **self.manifest.get("frames", {})}
+    def asked(self) -> dict[str, Any]:
+        """Its settings as the manifest lists them."""
+        return dict(self.manifest["settings"])
 
     def frames(self, source: str) -> Iterable[int]:
         """The frames of a series that this job was to compute."""
@@ -83,9 +72,7 @@ class Merged:
         """Write the table and its manifest; each is complete or untouched."""
         columns = self.settings.columns
         result = ResultFile(output, columns, self.excerpt)
-        excerpt = self.excerpt
-        if not getattr(format_of(output), "holds_lists", False):
-            excerpt = excerpt.without_lists(columns)
+        excerpt = self.excerpt.for_format(format_of(output), columns)
         lacking = [one.name for one in excerpt.columns(columns) if one.name not in self.columns]
         if lacking:
             raise SettingsError(
@@ -155,31 +142,6 @@ def merge_tables(
     return found.table
 
 
-def merged(paths: Sequence[Path], frames: slice) -> Merged:
-    """What :func:`merge_tables` makes of some parts."""
-    if not paths:
-        raise SettingsError("expected the parts of a table, found none")
-    parts = [_read(path) for path in dict.fromkeys(paths)]
-    first = parts[0]
-    for part in parts[1:]:
-        _check_like(first, part)
-    _check_inputs(parts)
-    series = _series(parts)
-    rows = [row for source in series for row in _rows(source, frames, parts)]
-    asked = with_frames(first.asked, frames)
-    asked["sources"] = list(dict.fromkeys(one for part in parts for one in part.sources))
-    excerpt = Excerpt(tuple(asked.get("fields") or ()), asked.get("digits", Excerpt.digits))
-    found = {**first.manifest, "settings": asked, "frames": series}
-    inputs = {one.get("path"): one for part in parts for one in part.manifest.get("inputs", [])}
-    found["inputs"] = [inputs[path] for path in sorted(inputs)]
-    for name in ("warnings", "notes"):
-        told = (text for part in parts for text in part.manifest.get(name, []))
-        found[name] = list(dict.fromkeys(told))
-    every = frozenset(one.name for one in first.settings.columns)
-    columns = every.intersection(*(part.columns for part in parts if part.columns is not None))
-    return Merged(rows, first.settings, excerpt, found, columns)
-
-
 def check_output(output: Path, paths: Sequence[Path]) -> None:
     """SettingsError if the output cannot be written, or would replace a part."""
     format_of(output)
@@ -188,91 +150,98 @@ def check_output(output: Path, paths: Sequence[Path]) -> None:
         raise SettingsError(f"{output}: is one of the parts: name another `output=FILE`")
 
 
+def merged(paths: Sequence[Path], frames: slice) -> Merged:
+    """The table that :func:`merge_tables` makes of some parts."""
+    if not paths:
+        raise SettingsError("expected the parts of a table, found none")
+    parts = [_read(path) for path in dict.fromkeys(paths)]
+    first = parts[0]
+    for part in parts[1:]:
+        _check_like(first, part)
+    inputs = _joined_inputs(parts)
+    series: dict[str, int] = {}
+    for part in parts:
+        series |= {name: max(count, series.get(name, 0)) for name, count in part.counts.items()}
+    rows = [
+        row
+        for source, count in series.items()
+        for row in _rows(source, range(count)[frames], parts)
+    ]
+    sources = list(dict.fromkeys(str(one) for part in parts for one in part.asked["sources"]))
+    asked = {**first.asked, "frames": as_json(frames), "sources": sources}
+    told = {
+        name: list(dict.fromkeys(text for part in parts for text in part.manifest[name]))
+        for name in ("warnings", "notes")
+    }
+    found = {**first.manifest, "settings": asked, "inputs": inputs, **told, "frames": series}
+    excerpt = Excerpt(tuple(asked.get("fields") or ()), asked.get("digits", Excerpt.digits))
+    every = frozenset(one.name for one in first.settings.columns)
+    columns = every.intersection(*(part.columns for part in parts if part.columns is not None))
+    return Merged(rows, first.settings, excerpt, found, columns)
+
+
 def _read(path: Path) -> _Part:
-    part = path.with_name(path.name + ".part")
-    if part.exists() and not is_finished(path):
+    if part_of(path).exists():
         raise ReadError(
-            f"{path}: is not finished: {part.name} is there, which holds the rows of a run under "
-            f"way, or of one that was interrupted: the same command with `resume` goes on with it"
+            f"{path}: is not finished: {part_of(path).name} is there, which holds the rows of a "
+            f"run under way, or of one that was interrupted: the same command with `resume` goes "
+            f"on with it"
         )
     if not path.exists():
         raise ReadError(f"{path}: there is no such part: its job has not been run, or has failed")
-    manifest = read_manifest(path)
-    if manifest is None:
-        raise ReadError(
-            f"{path}: expected {path.name}.manifest.json beside it, which says what made it, found "
-            f"none: run its job again"
-        )
-    asked = {**default_settings(), **manifest["settings"]}
+    manifest, rows = read_finished(
+        path, lambda reason: ReadError(f"{path}: {reason}: run its job again")
+    )
     try:
-        settings = restored_settings(asked)
+        settings = restored_settings(manifest["settings"])
     except SettingsError as error:
         raise ReadError(f"{path}: {error}") from None
-    rows = read_finished_rows(path)
-    if rows and not {"source", "frame"} <= set(rows[0]):
-        raise ReadError(f"{path}: lacks the columns source and frame, which tell its rows apart")
-    columns = frozenset(rows[0]) if rows else None
-    return _Part(path, manifest, asked, settings, _by_frame(path, rows, settings), columns)
-
-
-def _by_frame(
-    path: Path, rows: list[dict[str, Any]], settings: Settings
-) -> dict[tuple[str, int], list[Row]]:
-    found = {}
-    for (source, frame), group in groupby(rows, key=lambda row: (row["source"], row["frame"])):
-        own = [written_row(row, settings.columns) for row in group]
-        if len(own) != settings.rows_per_frame or (source, frame) in found:
-            raise ReadError(
-                f"{path}: expected {settings.rows_per_frame} rows of frame {frame} of {source}, "
-                f"one after the other, found {len(own)}: run its job again"
-            )
-        found[source, frame] = own
-    return found
+    found, broken = rows_by_frame(rows, settings)
+    for source, frame, count in broken:
+        raise ReadError(
+            f"{path}: expected {settings.rows_per_frame} rows of frame {frame} of {source}, one "
+            f"after the other, found {count}: run its job again"
+        )
+    counts: dict[str, int] = {}
+    for source, frame in found:
+        counts[source] = max(counts.get(source, 0), frame + 1)
+    counts |= manifest.get("frames", {})
+    return _Part(path, manifest, settings, found, frozenset(rows[0]) if rows else None, counts)
 
 
 def _check_like(first: _Part, part: _Part) -> None:
     """ReadError if two parts are not of one table."""
-    differing = differing_settings(first.asked, part.asked, FREE)
-    if differing:
+    if differing := differing_settings(first.asked, part.asked, FREE):
         raise ReadError(
             f"{part.path}: was made with other settings ({', '.join(differing)}) than {first.path}"
         )
     shared = [source for source in part.counts if source in first.counts]
-    if shared and part.sources != first.sources:
+    sources, others = part.asked["sources"], first.asked["sources"]
+    if shared and sources != others:
         raise ReadError(
             f"{part.path}: its series {shared[0]} was made of other files than that of "
-            f"{first.path}: {', '.join(part.sources[:3])} in place of "
-            f"{', '.join(first.sources[:3])}"
+            f"{first.path}: {', '.join(map(str, sources[:3]))} in place of "
+            f"{', '.join(map(str, others[:3]))}"
         )
 
 
-def _check_inputs(parts: Sequence[_Part]) -> None:
-    """ReadError if a file has changed between two jobs."""
-    known: dict[str, tuple[str, Path]] = {}
+def _joined_inputs(parts: Sequence[_Part]) -> list[Mapping[str, Any]]:
+    """The inputs of all parts; ReadError if a file has changed between two jobs."""
+    known: dict[str, tuple[Mapping[str, Any], Path]] = {}
     for part in parts:
-        for one in part.manifest.get("inputs", []):
-            path, digest = str(one.get("path")), str(one.get("sha256"))
-            before, other = known.setdefault(path, (digest, part.path))
-            if before != digest:
+        for one in part.manifest["inputs"]:
+            before, other = known.setdefault(str(one.get("path")), (one, part.path))
+            if before.get("sha256") != one.get("sha256"):
                 raise ReadError(
-                    f"{part.path}: was made of another {path} than {other}: it has changed between "
-                    f"the two: run these jobs again"
+                    f"{part.path}: was made of another {one.get('path')} than {other}: it has "
+                    f"changed between the two: run these jobs again"
                 )
+    return [known[path][0] for path in sorted(known)]
 
 
-def _series(parts: Sequence[_Part]) -> dict[str, int]:
-    """How many frames each series has, in the order in which one command would name them."""
-    found: dict[str, int] = {}
-    for part in parts:
-        for source, count in part.counts.items():
-            found[source] = max(found.get(source, 0), count)
-    return found
-
-
-def _rows(source: str, frames: slice, parts: Sequence[_Part]) -> Iterator[Row]:
+def _rows(source: str, chosen: range, parts: Sequence[_Part]) -> Iterator[Row]:
     """The rows of one series in the order of its frames, each once."""
     own = [part for part in parts if source in part.counts]
-    chosen = range(max(part.counts[source] for part in own))[frames]
     for frame in chosen if chosen.step > 0 else chosen[::-1]:
         having = [part for part in own if (source, frame) in part.rows]
         for part in having[1:]:
@@ -284,15 +253,14 @@ def _rows(source: str, frames: slice, parts: Sequence[_Part]) -> Iterator[Row]:
 
 
 def _check_same(first: _Part, part: _Part, source: str, frame: int) -> None:
-    one, other = first.rows[source, frame], part.rows[source, frame]
-    differing = next((pair for pair in zip(one, other, strict=True) if pair[0] != pair[1]), None)
-    if differing is not None:
-        before, now = differing
-        name = next(name for name in before if before[name] != now[name])
-        raise ReadError(
-            f"{part.path}: frame {frame} of {source} is in {first.path} too, with other values: "
-            f"{name} is {now[name]} here and {before[name]} there"
-        )
+    """ReadError if a frame has other values in two parts."""
+    for before, now in zip(first.rows[source, frame], part.rows[source, frame], strict=True):
+        for name in before:
+            if before[name] != now[name]:
+                raise ReadError(
+                    f"{part.path}: frame {frame} of {source} is in {first.path} too, with other "
+                    f"values: {name} is {now[name]} here and {before[name]} there"
+                )
 
 
 def _check_skipped(source: str, frame: int, parts: Sequence[_Part]) -> None:
@@ -308,8 +276,4 @@ def _check_skipped(source: str, frame: int, parts: Sequence[_Part]) -> None:
         )
     if asked.settings.on_error != "skip":
         raise ReadError(f"{asked.path}: lacks frame {frame} of {source}: run its job again")
-    warnings.warn(
-        f"{asked.path}: frame {frame} of {source} was skipped, see its manifest",
-        ScanfabWarning,
-        stacklevel=6,
-    )
+    warn(f"{asked.path}: frame {frame} of {source} was skipped, see its manifest")

@@ -12,7 +12,7 @@ import pytest
 
 import scanfab
 from scanfab.cli.main import run
-from scanfab.pipeline.manifest import asked_for, manifest
+from scanfab.pipeline.record import asked_for, manifest
 from scanfab.pipeline.settings import Settings
 from tests.helpers.dumps import cubic_rows, dump_text, pairs_text, write
 

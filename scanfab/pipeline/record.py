@@ -1,0 +1,340 @@
+"""
+What a table was made of: settings, versions, and the inputs with size and hash.
+
+A manifest says it of FILE, and FILE.manifest.json.part of FILE.part. By it a run that goes on with
+finished rows, or a merge of several tables, tells whether they are what it would compute now.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict
+from importlib.metadata import version
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from scanfab.base.errors import ReadError, ScanfabError
+from scanfab.base.files import whole_file
+from scanfab.base.option import options_of
+from scanfab.io.series import Series
+from scanfab.pipeline.settings import Settings
+from scanfab.pipeline.values import STRAIN_MODES, UsualAxis
+from scanfab.pipeline.window_settings import SHAPES
+from scanfab.scan.directions import DirectionRule
+from scanfab.table.columns import row_of
+from scanfab.table.formats import read_rows
+from scanfab.table.row import Row
+from scanfab.table.writing import ALL, Excerpt, manifest_of
+
+PACKAGES = (
+    "scanfab", "numpy", "numba", "scipy", "meshio", "pyvista", "click", "rich", "h5py",
+    "matplotlib", "jinja2", "polars",
+)  # fmt: skip
+# Settings that may differ where rows are taken over from a complete table or merged: such rows are
+# of other frames, or of other series, and their inputs are compared by content.
+FREE = ("frames", "sources")
+# bytes of a file that are read at a time
+PIECE = 1 << 20
+
+FrameRows = dict[tuple[str, int], list[Row]]
+"""The rows of each frame, by its source and number."""
+Refuse = Callable[[str], ScanfabError]
+"""The error for rows that cannot be used, made from the reason."""
+
+
+def asked_for(
+    sources: Sequence[str],
+    reading: Mapping[str, Any],
+    settings: Settings,
+    excerpt: Excerpt = ALL,
+) -> dict[str, Any]:
+    """
+    The settings that decide the bytes of a result, in the types of JSON.
+
+    Parameters
+    ----------
+    sources : sequence of str
+        As given.
+    reading : mapping
+        Options of ``read_series``.
+    settings : Settings
+        Of the computation. The number of workers changes no result, so it is left out.
+    excerpt : Excerpt, optional
+        Columns and digits of the result.
+    """
+    named = {"scanfab": version("scanfab"), "sources": list(sources)}
+    return {**named, **as_json(dict(reading)), **_chosen(settings), **excerpt.asked()}
+
+
+def default_settings() -> dict[str, Any]:
+    """The defaults, for manifests that are older than a setting and do not name it."""
+    return _chosen(Settings())
+
+
+def _chosen(settings: Settings) -> dict[str, Any]:
+    options = [one.name for one in options_of(type(settings)) if one.meaning]
+    return {name: as_json(getattr(settings, name)) for name in options}
+
+
+def as_json(value: Any) -> Any:
+    """A value of a setting in the types of JSON."""
+    if isinstance(value, DirectionRule):
+        return value.asked_as
+    if isinstance(value, UsualAxis):
+        # the grains decide which axis that is
+        return None
+    if isinstance(value, slice):
+        return [value.start, value.stop, value.step]
+    if isinstance(value, dict):
+        return {key: as_json(item) for key, item in value.items()}
+    if isinstance(value, tuple | list):
+        return [as_json(item) for item in value]
+    if hasattr(value, "__dataclass_fields__"):
+        return as_json(asdict(value))
+    return str(value) if isinstance(value, Path) else value
+
+
+def named_files(asked: Mapping[str, Any]) -> tuple[list[Path], list[Path]]:
+    """The files that the settings name: of strains (``strain``), and of surfaces (``rv_shape``)."""
+    strain, shape = asked.get("strain", "auto"), asked.get("rv_shape", "sphere")
+    strains = [] if strain in STRAIN_MODES else [Path(strain)]
+    return strains, [] if shape in SHAPES else [Path(shape)]
+
+
+class Inputs:
+    """Size and hash of files; a file is read again only if it has changed."""
+
+    def __init__(self) -> None:
+        self._known: dict[Path, tuple[tuple[int, int], dict[str, Any]]] = {}
+
+    def entry(self, path: Path) -> dict[str, Any]:
+        """The entry of a file in a manifest."""
+        found = path.stat()
+        stamp = (found.st_size, found.st_mtime_ns)
+        if path not in self._known or self._known[path][0] != stamp:
+            # a simulation may write more meanwhile
+            digest, _ = _hash(path, found.st_size)
+            entry = {"path": str(path), "size": found.st_size, "sha256": digest}
+            self._known[path] = stamp, entry
+        return self._known[path][1]
+
+
+def _hash(path: Path, size: int) -> tuple[str, bool]:
+    """The SHA-256 of the first bytes of a file, and whether a line ends with them."""
+    digest, piece = hashlib.sha256(), b"\n"
+    with open(path, "rb") as stream:
+        while size and (piece := stream.read(min(size, PIECE))):
+            digest.update(piece)
+            size -= len(piece)
+        ends = piece.endswith(b"\n") or stream.read(1) in (b"", b"\r", b"\n")
+    return digest.hexdigest(), ends
+
+
+def manifest(
+    asked: Mapping[str, Any],
+    series: Iterable[Series],
+    warnings: Sequence[str] = (),
+    notes: Sequence[str] = (),
+    inputs: Inputs | None = None,
+) -> dict[str, Any]:
+    """
+    The manifest of a finished result.
+
+    Parameters
+    ----------
+    asked : mapping
+        From :func:`asked_for`.
+    series : iterable of Series
+        What was read.
+    warnings, notes : sequence of str, optional
+        What the user was told.
+    inputs : Inputs, optional
+        Those that have been looked at already.
+    """
+    inputs, series = inputs or Inputs(), list(series)
+    strains, surfaces = named_files(asked)
+    files = {*strains, *surfaces, *(path for one in series for path in one.files())}
+    versions = {name: version(name) for name in PACKAGES}
+    return {
+        "settings": asked,
+        "seed": asked["seed"],
+        "versions": {"python": platform.python_version(), **versions},
+        "inputs": [inputs.entry(path) for path in sorted(files)],
+        "warnings": list(warnings),
+        "notes": list(notes),
+        # of the whole series, so that a merge of parts knows which frames are missing
+        "frames": {one.name: len(one) for one in series},
+    }
+
+
+def write_manifest(path: Path, found: Mapping[str, Any]) -> None:
+    """Write a manifest as JSON; the file is complete or untouched."""
+    text = json.dumps(found, indent=1, ensure_ascii=False)
+    with whole_file(path) as part:
+        # file names may hold bytes that are no text
+        part.write_text(text + "\n", encoding="utf-8", errors="backslashreplace")
+
+
+def read_manifest(table: Path) -> dict[str, Any] | None:
+    """
+    The manifest beside a table; None if there is none.
+
+    Raises
+    ------
+    ReadError
+        If it is not a manifest.
+    """
+    path = manifest_of(table)
+    if not path.is_file():
+        return None
+    try:
+        found = json.loads(path.read_text("utf-8"))
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError) as error:
+        raise ReadError(f"{path}: cannot be read as JSON: {error}") from None
+    # the settings are checked where they are used
+    kinds = {"settings": dict, "inputs": list, "versions": dict, "warnings": list}
+    if (
+        not isinstance(found, dict)
+        or not all(isinstance(found.get(name, kind()), kind) for name, kind in kinds.items())
+        or not isinstance(found.get("settings", {}).get("sources"), list)
+        or not all(isinstance(one, dict) for one in found.get("inputs", []))
+    ):
+        raise ReadError(f"{path}: expected a manifest of scanfab compute, found something else")
+    return found
+
+
+def read_finished(table: Path, refuse: Refuse) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """The manifest of a finished table, with all settings, and its rows."""
+    found = read_manifest(table)
+    if found is None:
+        raise refuse(f"there is no {table.name}.manifest.json, which says what made it")
+    rows = read_rows(table, whole=True)
+    if rows and not {"source", "frame"} <= set(rows[0]):
+        raise refuse("it lacks the columns source and frame, which tell its rows apart")
+    settings = {**default_settings(), **found["settings"]}
+    return {"inputs": [], "warnings": [], "notes": [], **found, "settings": settings}, rows
+
+
+def rows_by_frame(
+    rows: Iterable[Mapping[str, Any]], settings: Settings
+) -> tuple[FrameRows, list[tuple[str, int, int]]]:
+    """
+    The rows of each frame, and which frames lack rows.
+
+    Returns
+    -------
+    dict
+        Rows by source and frame, of frames that have all of their rows.
+    list of tuple
+        Source, frame and number of rows of the others.
+    """
+    found: FrameRows = {}
+    broken = []
+    for (source, frame), group in groupby(rows, key=lambda row: (row["source"], row["frame"])):
+        own = [row_of(settings.columns, row) for row in group]
+        if len(own) == settings.rows_per_frame and (source, frame) not in found:
+            found[source, frame] = own
+        else:
+            broken.append((source, frame, len(own)))
+    return found, broken
+
+
+def check_inputs(
+    inputs: Iterable[Mapping[str, Any]],
+    asked: Mapping[str, Any],
+    series: Sequence[Series],
+    rows: FrameRows,
+    refuse: Refuse,
+) -> None:
+    """
+    Refuse rows whose inputs are not what they were.
+
+    New frames may have come behind the last one, as files or at the end of the last file. A file
+    whose frame was skipped may have been mended.
+
+    Parameters
+    ----------
+    inputs : iterable of mapping
+        Path, size and hash of each file that was read for the rows.
+    asked : mapping
+        The settings of the rows.
+    series : sequence of Series
+        What is read now.
+    rows : mapping
+        The rows by source and frame.
+    refuse : callable
+        Makes the error.
+    """
+    before = {str(one.get("path")): one for one in inputs}
+    strains, surfaces = named_files(asked)
+    cells = [one.cells.path for one in series if one.cells is not None]
+    read = {*strains, *surfaces, *cells, *(file for one in series for file in one.files())}
+    for gone in before.keys() - {str(file) for file in read}:
+        raise refuse(f"{gone} is not among the files that are read now")
+    for one in series:
+        _check_frames(one, before, rows, refuse)
+    for file in surfaces:
+        if not _is_same(file, before):
+            raise refuse(f"{file} has changed since")
+    lacks_strain = any(row.strain is None for some in rows.values() for row in some)
+    for file in (*strains, *cells):
+        # new lines may name the strain of a frame that had none
+        may_grow = file in cells or not lacks_strain
+        if not _is_same(file, before, may_grow, by_lines=True):
+            raise refuse(f"{file} has changed since, in more than new lines at its end")
+
+
+def _check_frames(
+    series: Series, before: Mapping[str, Any], rows: FrameRows, refuse: Refuse
+) -> None:
+    """Refuse what has changed of the files of a series, and of those read with them."""
+    grains = series.grains.files
+    steps = [step for step, file in grains.items() if str(file) in before]
+    last = max((step for step in steps if step is not None), default=None)
+    for step, file in (f for one in (series.grains, *series.contacts) for f in one.files.items()):
+        if str(file) not in before:
+            if steps and (step is None or last is None or step <= last):
+                raise refuse(f"{file} is new, and not behind the last frame")
+            continue
+        beside = series.beside(file) if grains.get(step) == file else []
+        changed = [one for one in beside if not _is_same(one, before)]
+        if not _is_same(file, before, may_grow=step is None or step == last):
+            changed.append(file)
+        if changed and not _was_skipped(series, step, rows):
+            what = "has changed since" if str(changed[0]) in before else "is new, beside the grains"
+            raise refuse(f"{changed[0]} {what}")
+
+
+def _is_same(
+    file: Path, before: Mapping[str, Any], may_grow: bool = False, by_lines: bool = False
+) -> bool:
+    """Whether a file is what it was, or begins as it was: with whole lines if ``by_lines``."""
+    known = before.get(str(file), {})
+    size, length = known.get("size"), file.stat().st_size
+    if not isinstance(size, int) or length < size or (length > size and not may_grow):
+        return False
+    digest, ends_line = _hash(file, size)
+    # a number at the end may have got more digits
+    return digest == known.get("sha256") and (ends_line or not by_lines)
+
+
+def _was_skipped(series: Series, step: int | None, rows: FrameRows) -> bool:
+    """Whether the files of a step have given no row."""
+    frames = [number for number, frame in enumerate(series) if frame.name_step == step]
+    # a broken file counts as one frame: if it has more now, later frames have other numbers
+    return len(frames) == 1 and (series.name, frames[0]) not in rows
+
+
+def files_of_rows(series: Sequence[Series], row: Row, known: set[Path]) -> Iterator[Path]:
+    """The files that the rows up to one are made of, but for those that are known already."""
+    for one in series:
+        if one.cells is not None:
+            yield one.cells.path
+        if one.name == row.source:
+            yield from one.files_through(row.frame, known)
+            return
+        yield from one.files()
