@@ -64,24 +64,18 @@ def test_the_python_page_is_fresh_and_has_every_public_name_once() -> None:
     )
 
 
-def test_the_rooms_are_drawn_as_they_are() -> None:
-    architecture = script("make_architecture")
-    page = (DOCS / "architecture.md").read_text(encoding="utf-8")
-    assert page == architecture.page(), "run python docs/make_architecture.py"
+def test_the_architecture_page_is_short_and_names_what_there_is() -> None:
+    text = (DOCS / "architecture.md").read_text(encoding="utf-8")
+    assert len(text.split()) <= 1000
+    package = ROOT / "scanfab"
+    for room in [path.parent.name for path in package.glob("*/__init__.py")]:
+        assert re.search(rf"^\d .*\b{room}\b", text, re.MULTILINE), room
+    for name in re.findall(r"`(\w+/[\w/.]*)`", text):
+        assert (package / name).exists(), name
 
 
-def test_the_house_stays_small() -> None:
-    """What a reader can hold in mind; see docs/architecture.md."""
-    architecture = script("make_architecture")
-    rooms = architecture.rooms()
-    package = architecture.PACKAGE
-    assert len([path for path in package.iterdir() if path.name != "__pycache__"]) <= 12
-    assert max(map(architecture.floor, rooms)) <= 7
-    assert sum(len(architecture.arrows(room)) for room in rooms) <= 35
-    for folder in [path for path in package.rglob("*") if path.is_dir()]:
-        assert len(list(folder.glob("*.py"))) <= 35, folder
-        assert len(folder.relative_to(package).parts) <= 2 or folder.name == "__pycache__", folder
-    for path in package.rglob("*.py"):
+def test_no_file_is_long() -> None:
+    for path in (ROOT / "scanfab").rglob("*.py"):
         assert len(path.read_text(encoding="utf-8").splitlines()) <= 400, path
 
 
@@ -128,13 +122,6 @@ def test_every_direction_rule_is_on_the_method_page() -> None:
     text = (DOCS / "method.md").read_text(encoding="utf-8")
     for name, (_, argument) in RULES.items():
         assert f"`{name}:{argument}`" in text
-
-
-def test_every_module_is_on_the_architecture_page() -> None:
-    text = (DOCS / "architecture.md").read_text(encoding="utf-8")
-    for path in (ROOT / "scanfab").rglob("*.py"):
-        if path.name != "__init__.py":
-            assert f"{path.stem}.py" in text, path
 
 
 def test_every_dependency_is_justified() -> None:
