@@ -36,7 +36,7 @@ from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.told import Told
 from scanfab.table.formats import read_rows
 from scanfab.table.row import Row
-from scanfab.table.writing import ALL, ResultFile, differing_settings, write_rows
+from scanfab.table.writing import ALL, ResultFile, differing_settings, prepared_table
 
 
 class Job:
@@ -113,6 +113,8 @@ class Job:
         self.found_void_fabric = False
         """Whether any row has one."""
         self._finished: FrameRows = {}
+        self._keeps_table = False
+        """Whether rows of a complete FILE are among them."""
         self._warnings: list[str] = []
         """What the user was told of the rows of a complete FILE."""
         self._more = more or {}
@@ -226,8 +228,8 @@ class Job:
                         f"{result.path}: this run has no rows, and the table that is there stays "
                         f"as it is: choose frames that there are (`frames`), or another file"
                     )
-            write_rows(result.path, self.every_row, result.columns, result.excerpt)
-            self.save_manifests()
+            with prepared_table(result.path, self.every_row, result.columns, result.excerpt):
+                self.save_manifests()
             result.remove_part()
 
     def save_manifests(self) -> None:
@@ -236,8 +238,9 @@ class Job:
             return
         texts = list(dict.fromkeys([*self._warnings, *self._told.warnings]))
         found = manifest(self.asked, self.series, texts, self._told.notes, self._inputs)
+        outdated = None if self.result is None or self._keeps_table else self.result.path
         for path in self._manifests:
-            write_manifest(path, {**found, **self._more})
+            write_manifest(path, {**found, **self._more}, outdated)
 
     def _finish(self, rows: FrameRows, tells: bool = True) -> None:
         """Add finished frames; without a column that ``tells``, they count as having a fabric."""
@@ -285,6 +288,7 @@ class Job:
         self.settings = replace(self.settings, frames=frames)
         self.asked = {**self.asked, "frames": as_json(frames)}
         self._warnings = [str(one) for one in before["warnings"]]
+        self._keeps_table = True
         self._finish(found, tells=bool({"alpha_vs", "alpha_vs_axial"} & columns))
 
     def _take_part(self, result: ResultFile, series: Sequence[Series]) -> None:

@@ -26,7 +26,7 @@ from scanfab.pipeline.settings import Settings
 from scanfab.table.formats import format_of
 from scanfab.table.row import Row
 from scanfab.table.table import Table
-from scanfab.table.writing import Excerpt, ResultFile, differing_settings, part_of
+from scanfab.table.writing import Excerpt, ResultFile, differing_settings, is_unfinished, part_of
 
 
 class _Part(NamedTuple):
@@ -181,7 +181,7 @@ def merged(paths: Sequence[Path], frames: slice) -> Merged:
 
 
 def _read(path: Path) -> _Part:
-    if part_of(path).exists():
+    if is_unfinished(path):
         raise ReadError(
             f"{path}: is not finished: {part_of(path).name} is there, which holds the rows of a "
             f"run under way, or of one that was interrupted: the same command with `resume` goes "

@@ -171,12 +171,19 @@ def manifest(
     }
 
 
-def write_manifest(path: Path, found: Mapping[str, Any]) -> None:
-    """Write a manifest as JSON; the file is complete or untouched."""
+def write_manifest(path: Path, found: Mapping[str, Any], outdated: Path | None = None) -> None:
+    """
+    Write a manifest as JSON; the file is complete or untouched.
+
+    An ``outdated`` table, which it does not describe, is removed before the manifest appears: they
+    would look like a pair if the process were killed between the two.
+    """
     text = json.dumps(found, indent=1, ensure_ascii=False)
     with whole_file(path) as part:
         # file names may hold bytes that are no text
         part.write_text(text + "\n", encoding="utf-8", errors="backslashreplace")
+        if outdated is not None and outdated.is_file():
+            outdated.unlink()
 
 
 def read_manifest(table: Path) -> dict[str, Any] | None:

@@ -5,8 +5,8 @@ Rows of a computation go to FILE.part as JSON lines with all columns and digits.
 written as FILE. The settings of the run, and what the input files of each frame held, go to
 FILE.manifest.json.part, so that nobody goes on with other settings or other files. No finished row
 is ever lost: a part that a new run does not go on with is kept under another name, and a part that
-another run writes to is left alone. FILE.part is removed last: while it is there, FILE is not
-finished.
+another run writes to is left alone. FILE appears after its manifest, in one step, and FILE.part is
+removed last. So a run is finished once FILE is there and not older than FILE.part.
 """
 
 from __future__ import annotations
@@ -148,12 +148,23 @@ def write_rows(
     path: Path, rows: Iterable[Mapping[str, Any]], columns: Sequence[Column], excerpt: Excerpt = ALL
 ) -> None:
     """Write a table to a file, which is complete or untouched."""
+    with prepared_table(path, rows, columns, excerpt):
+        pass
+
+
+@contextmanager
+def prepared_table(
+    path: Path, rows: Iterable[Mapping[str, Any]], columns: Sequence[Column], excerpt: Excerpt = ALL
+) -> Iterator[None]:
+    """Write a table under another name; at the end of the block it becomes the file."""
     table_format = format_of(path)
     check_folder(path)
     text: Any = {"mode": "w", "newline": "", "encoding": "utf-8"}
     way = text if table_format.is_text else {"mode": "wb"}
-    with whole_file(path) as part, open(part, **way) as stream:
-        write_to(stream, table_format, rows, columns, excerpt)
+    with whole_file(path) as part:
+        with open(part, **way) as stream:
+            write_to(stream, table_format, rows, columns, excerpt)
+        yield
 
 
 class ResultFile:
@@ -332,6 +343,14 @@ def _json_lines(entries: Iterable[Mapping[str, Any]]) -> str:
 def _whole_lines(path: Path) -> list[bytes]:
     """The lines of a file that were written to their end."""
     return [line for line in path.read_bytes().splitlines(keepends=True) if line.endswith(b"\n")]
+
+
+def is_unfinished(path: Path) -> bool:
+    """Whether a table has a FILE.part with rows that it lacks: rows come before their table."""
+    part = part_of(path)
+    if not part.exists():
+        return False
+    return not path.exists() or path.stat().st_mtime_ns < part.stat().st_mtime_ns
 
 
 def part_of(path: Path) -> Path:

@@ -452,12 +452,15 @@ def test_a_cell_beside_the_grains_is_an_input(compute, tmp_path, capsys, grains,
     assert f"{cells[0]} " in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("last", ["write_rows", "write_manifest"])
-def test_a_run_killed_before_its_table_or_its_manifest_is_written_is_not_finished(
-    compute, tmp_path, monkeypatch, capsys, last
-):
-    """FILE.part is still there, and the same command ends what was begun."""
+@pytest.mark.parametrize("last", ["prepared_table", "write_manifest", "ResultFile.remove_part"])
+@pytest.mark.parametrize("is_new", [True, False])
+def test_a_run_killed_before_its_last_step(compute, tmp_path, monkeypatch, capsys, last, is_new):
+    """FILE.part is still there; a table that is complete counts, others go on to the same bytes."""
     table, whole = tmp_path / "t.csv", tmp_path / "whole.csv"
+    assert compute(whole) == (0, 3)
+    # a table of other settings, which is not to be taken for one of these
+    assert is_new or compute(table, "--tolerance", "0.5") == (0, 3)
+    merge = ["merge", str(table), "-o", str(tmp_path / "merged.csv")]
 
     def killed(*_):
         raise KeyboardInterrupt
@@ -465,10 +468,13 @@ def test_a_run_killed_before_its_table_or_its_manifest_is_written_is_not_finishe
     with monkeypatch.context() as patch:
         patch.setattr(f"scanfab.pipeline.job.{last}", killed)
         assert compute(table) == (130, 3)
-    assert run(["merge", str(table)]) == 1
-    assert f"{table}: is not finished" in capsys.readouterr().err
+    if last == "ResultFile.remove_part":
+        assert run(merge) == 0
+        assert (tmp_path / "merged.csv").read_bytes() == whole.read_bytes()
+    else:
+        assert run(merge) == 1
+        assert f"{table}: is not finished" in capsys.readouterr().err
     assert compute(table, "--resume") == (0, 0)
-    assert compute(whole) == (0, 3)
     assert table.read_bytes() == whole.read_bytes()
     assert read_manifest(table) == read_manifest(whole)
     assert {one.name for one in tmp_path.glob("t.*")} == {"t.csv", "t.csv.manifest.json"}
