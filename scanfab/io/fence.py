@@ -55,46 +55,40 @@ def fenced(function: Callable[..., Answer], path: Path, *more: Any) -> Answer:
     size = file.stat().st_size
     check_memory(path, 2.0 * size)
     limits = min(MEMORY + GROWTH * size, free_memory()), SECONDS + size / PER_SECOND
-    lock, workers = _own(os.getpid())
+    lock, idle = _own(os.getpid())
     with lock:
-        if not workers:
-            workers.append(_start())
-        worker = workers[0]
+        worker = idle.pop() if idle else _start()
         try:
-            question = function, (str(file.resolve()), *more), *limits
-            pickle.dump(question, worker.stdin)  # type: ignore[arg-type]
-            worker.stdin.flush()  # type: ignore[union-attr]
-            is_sound, answer = pickle.load(worker.stdout)  # type: ignore[arg-type]
-        except BaseException as error:
-            # it ended, or we were interrupted, and its next answer would be to this question
-            workers.clear()
-            with suppress(OSError), worker:
-                worker.kill()
-            if not isinstance(error, OSError | EOFError | pickle.UnpicklingError):
-                raise
+            pickle.dump((function, (str(file.resolve()), *more), *limits), worker.stdin)
+            worker.stdin.flush()
+            is_sound, answer = pickle.load(worker.stdout)
+            idle.append(worker)
+        except (OSError, EOFError, pickle.UnpicklingError):
             is_sound, answer = False, "its library crashed, or took too much time or memory"
+        finally:
+            # it ended; or we were interrupted, and its next answer would be to this question
+            if not idle:
+                with suppress(OSError), worker:
+                    worker.kill()
     if not is_sound:
         raise ReadError(f"{path}: cannot be read: {answer}")
     return answer  # type: ignore[no-any-return]
 
 
 @cache
-def _own(process: int) -> tuple[threading.Lock, list[subprocess.Popen[bytes]]]:
-    """The lock and the worker, if one is running, of a process; a forked process has its own."""
+def _own(process: int) -> tuple[threading.Lock, list[Any]]:
+    """The lock of a process, and its worker if that waits; a forked process has its own."""
     return threading.Lock(), []
 
 
-def _start() -> subprocess.Popen[bytes]:
-    """Start a worker that imports what we import, and that Ctrl-C does not reach."""
+def _start() -> Any:
+    """A worker that imports what we import, on one thread, and that Ctrl-C does not reach."""
     places = os.pathsep.join(os.path.abspath(one) for one in sys.path if one)
-    one_thread = {"OPENBLAS_NUM_THREADS": "1", "VTK_SMP_MAX_THREADS": "1"}
+    more = {"PYTHONPATH": places, "OPENBLAS_NUM_THREADS": "1", "VTK_SMP_MAX_THREADS": "1"}
+    words = [sys.executable, "-P", "-m", "scanfab.io.fence"]
+    pipe, none = subprocess.PIPE, subprocess.DEVNULL
     worker = subprocess.Popen(
-        [sys.executable, "-P", "-m", "scanfab.io.fence"],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-        env={**os.environ, "PYTHONPATH": places, **one_thread},
+        words, stdin=pipe, stdout=pipe, stderr=none, start_new_session=True, env=os.environ | more
     )
     at_end(worker.kill)
     return worker
@@ -115,24 +109,22 @@ def _serve() -> None:
     """Answer until there are no more questions; whatever libraries print goes nowhere."""
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-    answer: tuple[bool, Any]
-    while True:
-        try:
+    # the questions end with the process that asks them
+    with suppress(EOFError):
+        while True:
             function, arguments, memory, seconds = pickle.load(sys.stdin.buffer)
-        except EOFError:
-            return
-        _limit_memory(memory)
-        # ends the worker from a thread of its own, even while a library hangs
-        faulthandler.dump_traceback_later(seconds, exit=True)
-        try:
-            answer = True, function(*arguments)
-        # libraries raise whatever they meet, and exit for what they do not know
-        except (Exception, SystemExit) as error:
-            answer = False, (str(error).splitlines() or [type(error).__name__])[0]
-        faulthandler.cancel_dump_traceback_later()
-        _limit_memory(memory)
-        pickle.dump(answer, answers, protocol=pickle.HIGHEST_PROTOCOL)
-        answers.flush()
+            _limit_memory(memory)
+            # ends the worker from a thread of its own, even while a library hangs
+            faulthandler.dump_traceback_later(seconds, exit=True)
+            try:
+                answer: tuple[bool, Any] = True, function(*arguments)
+            # libraries raise whatever they meet, and exit for what they do not know
+            except (Exception, SystemExit) as error:
+                answer = False, (str(error).splitlines() or [type(error).__name__])[0]
+            faulthandler.cancel_dump_traceback_later()
+            _limit_memory(memory)
+            pickle.dump(answer, answers, protocol=pickle.HIGHEST_PROTOCOL)
+            answers.flush()
 
 
 if __name__ == "__main__":

@@ -12,8 +12,6 @@ import numpy.typing as npt
 from scanfab.io.fence import fenced
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
-# filters that are part of HDF5 and h5py; for any other one, HDF5 would load code from the disk
-FILTERS = {1, 2, 3, 4, 5, 6, 32000}  # deflate, shuffle, fletcher32, szip, nbit, scaleoffset, lzf
 
 
 class HdfFile(NamedTuple):
@@ -52,8 +50,7 @@ def read_hdf_file(path: Path, with_data: bool = True) -> HdfFile:
     Raises
     ------
     ReadError
-        If the file is damaged, if data stand in other files, or if foreign code would have to
-        unpack them.
+        If the file is damaged, or if data stand in other files.
     """
     return fenced(read_in_worker, path, with_data)
 
@@ -62,24 +59,21 @@ def read_in_worker(path: str, with_data: bool) -> HdfFile:
     """Arrays and attributes; ValueError says what cannot be read."""
     import h5py
 
-    arrays, attributes = HdfFile({}, {})
+    found = HdfFile({}, {})
     with h5py.File(path, "r") as file:
         waiting = [("", file)]
         while waiting:
-            name, group = waiting.pop(0)
-            attributes[name] = _attributes(group)
-            for key in group:
-                here = f"{name}/{key}".lstrip("/")
-                link = group.get(key, getlink=True)
+            name, one = waiting.pop(0)
+            if isinstance(one, h5py.Dataset) and one.shape is not None:
+                _take(name, one, with_data, found.arrays)
+            found.attributes[name] = _attributes(one)
+            for key in one if isinstance(one, h5py.Group) else ():
+                here, link = f"{name}/{key}".lstrip("/"), one.get(key, getlink=True)
                 if isinstance(link, h5py.ExternalLink):
                     raise ValueError(f"{here} stands in another file ({link.filename})")
-                one = None if isinstance(link, h5py.SoftLink) else group[key]
-                if isinstance(one, h5py.Group):
-                    waiting.append((here, one))
-                elif isinstance(one, h5py.Dataset) and one.shape is not None:
-                    _take(here, one, with_data, arrays)
-                    attributes[here] = _attributes(one)
-    return HdfFile(arrays, attributes)
+                if isinstance(link, h5py.HardLink):
+                    waiting.append((here, one[key]))
+    return found
 
 
 def _take(name: str, one: Any, with_data: bool, arrays: dict[str, npt.NDArray[Any]]) -> None:
@@ -88,13 +82,8 @@ def _take(name: str, one: Any, with_data: bool, arrays: dict[str, npt.NDArray[An
 
     if one.is_virtual or one.external:
         raise ValueError(f"the data of {name} stand in another file")
-    properties = one.id.get_create_plist()
-    used = {properties.get_filter(k)[0] for k in range(properties.get_nfilters())}
-    if not used <= FILTERS:
-        raise ValueError(f"{name} is packed by a filter ({max(used - FILTERS)}) that is not HDF5's")
     if h5py.check_string_dtype(one.dtype) is not None:
-        text = one.asstr(errors="replace")[()] if with_data else []
-        arrays[name] = np.array(text, dtype=str)
+        arrays[name] = np.array(one.asstr(errors="replace")[()] if with_data else [], dtype=str)
     elif one.dtype.kind in "biuf":
         values = np.asarray(one[()]) if with_data else np.zeros(0, one.dtype)
         arrays[name] = values.astype(values.dtype.newbyteorder("="), copy=False)
@@ -104,10 +93,10 @@ def _attributes(one: Any) -> dict[str, Any]:
     """The attributes that are numbers or texts; h5py does not know all other types."""
     found: dict[str, Any] = {}
     for name in one.attrs:
-        with suppress(OSError, TypeError, ValueError):
+        with suppress(OSError, TypeError, ValueError, AttributeError):
             value = one.attrs[name]
-            if isinstance(value, bytes | str):
-                found[name] = value if isinstance(value, str) else value.decode("utf-8", "replace")
-            elif isinstance(value, np.ndarray | np.generic) and value.dtype.kind in "biuf":
-                found[name] = value.tolist()
+            if isinstance(value, bytes):
+                found[name] = value.decode("utf-8", "replace")
+            elif isinstance(value, str) or value.dtype.kind in "biuf":
+                found[name] = value if isinstance(value, str) else value.tolist()
     return found

@@ -3,13 +3,15 @@ One mesh from any file of VTK: points, lines between them, and the arrays of bot
 
 VTK's own readers do the work, in the worker process of `fence`, because a damaged header may crash
 them. They raise no errors: they write into VTK's output window, which is a string here, and any
-text in it is an error. Two faults are not told even there. Of a legacy file that was cut off, VTK
-fills the arrays with zeros: so an array is appended to the file, and must be found behind all
-others. What VTK does not notice in XML, `vtk_checks` looks for.
+text in it is an error. Two faults are not told even there. VTK fills the arrays of a legacy file
+that was cut off with zeros: so an array is appended to the file, and must be found behind all
+others. VTK drops the values of an XML array that are more than its piece counts: so they are
+counted before VTK reads the file.
 """
 
 from __future__ import annotations
 
+import base64
 import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
@@ -25,7 +27,6 @@ from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.fence import fenced
 from scanfab.io.files import check_memory, file_inside, first_bytes, plain
 from scanfab.io.hdf import is_hdf, read_hdf_file
-from scanfab.io.vtk_checks import check_xml, damaged
 
 Arrays = dict[str, npt.NDArray[Any]]
 
@@ -34,7 +35,7 @@ MESHES = {"polydata", "unstructuredgrid", "unstructured_grid", "rectilineargrid"
 MESHES |= {"rectilinear_grid", "multiblockdataset", "partitioneddatasetcollection"}
 PIECES = ("PPolyData", "PUnstructuredGrid")
 # VTK's numbers for kinds of cells
-VERTEX, POLY_VERTEX, LINE, POLY_LINE, POLYGON = 1, 2, 3, 4, 7
+VERTEX, POLY_VERTEX, LINE, POLY_LINE = 1, 2, 3, 4
 # bit of vtkGhostType: the point belongs to another piece
 DUPLICATE = 1
 # VTK itself writes a NaN into keys that describe arrays, and cannot read it
@@ -159,14 +160,12 @@ def listed(path: Path, tag: str, key: str) -> list[Path]:
 
 def joined_arrays(parts: Sequence[Arrays]) -> Arrays:
     """The arrays that all parts have, with as many components, one behind the other."""
-    found = {
-        name: [one[name] for one in parts] for name in parts[0] if all(name in one for one in parts)
-    }
-    return {
-        name: np.concatenate(own)
-        for name, own in found.items()
-        if len({one.shape[1:] for one in own}) == 1
-    }
+    found: Arrays = {}
+    for name in parts[0]:
+        own = [one[name] for one in parts if name in one]
+        if len(own) == len(parts) and len({one.shape[1:] for one in own}) == 1:
+            found[name] = np.concatenate(own)
+    return found
 
 
 def _joined(path: Path, parts: Sequence[Mesh]) -> Mesh:
@@ -211,15 +210,17 @@ def faces_in_worker(path: str) -> tuple[FloatArray, list[IntArray]]:
     return points, [named.reshape(-1, 3)]
 
 
+def damaged(reason: str) -> ValueError:
+    """The error for a file that does not hold what its headers say."""
+    return ValueError(f"the file is damaged or incomplete: {reason}")
+
+
 def _read_by_vtk(path: str) -> Any:
     """What VTK reads of a file; ValueError if it has written anything into its output window."""
     from vtkmodules.vtkCommonCore import vtkOutputWindow, vtkStringOutputWindow
 
-    with open(path, "rb") as stream:
-        head = stream.read(4096)
-    is_legacy = head.startswith(b"# vtk")
-    reader = _legacy_reader(path, head) if is_legacy else _other_reader(path, head)
-    reader.SetFileName(path)
+    content = Path(path).read_bytes()
+    reader = _reader(path, content)
     window = vtkStringOutputWindow()
     vtkOutputWindow.SetInstance(window)
     reader.Update()
@@ -228,7 +229,7 @@ def _read_by_vtk(path: str) -> Any:
     if told or data is None:
         reason = re.sub(r"^.*(\n.*\((0x[0-9a-f]+|nullptr)\):)?", "", told[0] if told else "no data")
         raise damaged(" ".join(reason.split()))
-    if is_legacy:
+    if content.startswith(b"# vtk"):
         places = (data.GetFieldData(), data.GetPointData(), data.GetCellData())
         last = next((one for one in places if one.HasArray(END)), None)
         # behind the number of rows stands at least the header of an array
@@ -238,34 +239,86 @@ def _read_by_vtk(path: str) -> Any:
     return data
 
 
-def _legacy_reader(path: str, head: bytes) -> Any:
-    """VTK's reader of a legacy file, to whose bytes an array is appended."""
-    from vtkmodules.vtkIOLegacy import vtkGenericDataObjectReader
+def _reader(path: str, content: bytes) -> Any:
+    """VTK's reader of a file; that of a legacy file reads the content with an array behind it."""
+    reader: Any
+    if content.startswith(b"# vtk"):
+        from vtkmodules.vtkIOLegacy import vtkGenericDataObjectReader
 
-    reader: Any = vtkGenericDataObjectReader()
-    for kind in ("Scalars", "Vectors", "Normals", "Tensors", "ColorScalars", "TCoords", "Fields"):
-        getattr(reader, f"ReadAll{kind}On")()
-    # bytes that were cut off would swallow empty lines
-    data = Path(path).read_bytes() + b"\n\n" * bool(TEXT.match(head)) + APPENDED
-    reader.ReadFromInputStringOn()
-    reader.SetBinaryInputString(data, len(data))
+        reader = vtkGenericDataObjectReader()
+        for kind in ("Scalars", "Vectors", "Normals", "Tensors", "ColorScalars", "Fields"):
+            getattr(reader, f"ReadAll{kind}On")()
+        # bytes that were cut off would swallow empty lines
+        content += b"\n\n" * bool(TEXT.match(content)) + APPENDED
+        reader.ReadFromInputStringOn()
+        reader.SetBinaryInputString(content, len(content))
+        return reader
+    if is_hdf(content):
+        from vtkmodules.vtkIOHDF import vtkHDFReader
+
+        reader = vtkHDFReader()
+    elif b"<Xdmf" in content[:4096]:
+        from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
+
+        reader = vtkXdmfReader()
+    else:
+        from vtkmodules.vtkIOXML import vtkXMLGenericDataObjectReader
+
+        _check_counts(content)
+        reader = vtkXMLGenericDataObjectReader()
+    reader.SetFileName(path)
     return reader
 
 
-def _other_reader(path: str, head: bytes) -> Any:
-    """VTK's reader of HDF5, XDMF or XML, which is looked at as far as VTK does not."""
-    if is_hdf(head):
-        from vtkmodules.vtkIOHDF import vtkHDFReader
+def _check_counts(content: bytes) -> None:
+    """ValueError if an array of an XML file has fewer or more values than its piece counts."""
+    end = content.find(b"<AppendedData")
+    try:
+        # behind the elements may stand bytes
+        root = ElementTree.fromstring(content if end < 0 else content[:end] + b"</VTKFile>")
+        for piece in root.iter("Piece"):
+            counts = {name: int(word) for name, word in piece.items() if name[:8] == "NumberOf"}
+            points = counts.pop("NumberOfPoints", 0)
+            rows = {"Points": points, "PointData": points, "CellData": sum(counts.values())}
+            for section, array in ((one.tag, array) for one in piece for array in one):
+                if section not in rows or array.get("type") == "String":
+                    continue
+                expected = rows[section] * int(array.get("NumberOfComponents") or 1)
+                stored = _stored(content, array, root, end)
+                name = array.get("Name", section)
+                if section == "CellData" and stored > expected:
+                    # VTK would give the values to other lines than theirs
+                    raise ValueError(
+                        f"{name} has {stored} values for {expected} contacts: YADE's VTKRecorder "
+                        f"loses those that cross a periodic cell: use export.VTKExporter for "
+                        f'contacts, or `contacts="geometric"`'
+                    )
+                if stored != expected:
+                    raise ValueError(f"{name} has {stored} of {expected} values")
+    except (ElementTree.ParseError, ValueError, LookupError, TypeError) as error:
+        raise damaged(str(error)) from None
 
-        return vtkHDFReader()
-    if b"<Xdmf" in head:
-        from vtkmodules.vtkIOXdmf2 import vtkXdmfReader
 
-        return vtkXdmfReader()
-    from vtkmodules.vtkIOXML import vtkXMLGenericDataObjectReader
-
-    check_xml(Path(path).read_bytes())
-    return vtkXMLGenericDataObjectReader()
+def _stored(content: bytes, array: ElementTree.Element, root: ElementTree.Element, end: int) -> int:
+    """How many values an array has: its words, or as the sizes before its bytes say."""
+    text = " ".join([array.text or "", *(child.tail or "" for child in array)]).strip()
+    if array.get("format") == "ascii":
+        return len(text.split())
+    width = 8 if root.get("header_type") == "UInt64" else 4
+    head = text[: 4 * width].encode()
+    if array.get("format") == "appended":
+        start = content.index(b"_", end) + 1 + int(array.attrib["offset"])
+        head = content[start : start + 4 * width]
+    if array.get("format") != "appended" or b"raw" not in content[end : end + 100]:
+        digits = head.split(b"=")[0]
+        head = base64.b64decode(digits + b"=" * (-len(digits) % 4))
+    order = ">" if root.get("byte_order") == "BigEndian" else "<"
+    head = head.ljust(3 * width, b"\0")
+    size, full, last = np.frombuffer(head, f"{order}u{width}", 3).tolist()
+    if root.get("compressor"):
+        # there are so many blocks, which are all full but perhaps the last one
+        size = size * full - (full - last if size and last else 0)
+    return int(size) // np.dtype(array.attrib["type"].lower()).itemsize
 
 
 def _numpy(array: Any) -> npt.NDArray[Any]:
@@ -280,27 +333,24 @@ def _arrays(attributes: Any, rows: int | None) -> Arrays:
     for place in range(attributes.GetNumberOfArrays()):
         one = attributes.GetAbstractArray(place)
         name = one.GetName()
-        # VTK gives bytes if they are no UTF-8
-        name = name.decode("utf-8", "replace") if isinstance(name, bytes) else name
         if one.IsA("vtkStringArray"):
             values = np.array([one.GetValue(k) for k in range(one.GetNumberOfValues())], dtype=str)
         else:
             values = _numpy(one)
         if rows is not None and len(values) != rows:
             raise damaged(f"{name} has {len(values)} of {rows} rows")
-        if name:
+        # VTK gives bytes if they are no UTF-8
+        if name and isinstance(name, str):
             found[name] = values
     return found
 
 
 def _cells(cells: Any, points: int) -> tuple[IntArray, IntArray]:
     """Where the points of each cell begin and the last end, and the points of all cells."""
+    if not cells.IsValid():
+        raise damaged("the offsets of the cells are wrong")
     offsets = _numpy(cells.GetOffsetsArray()).astype(np.int64)
     named = _numpy(cells.GetConnectivityArray()).astype(np.int64)
-    if len(offsets) == 0:
-        offsets = np.zeros(1, np.int64)
-    if offsets[0] != 0 or np.any(np.diff(offsets) < 0) or offsets[-1] != len(named):
-        raise damaged("the offsets of the cells are wrong")
     if named.size and not 0 <= named.min() <= named.max() < points:
         raise damaged("a cell names a point that does not exist")
     return offsets, named
@@ -308,53 +358,33 @@ def _cells(cells: Any, points: int) -> tuple[IntArray, IntArray]:
 
 def _mesh_of(data: Any) -> Mesh:
     """The mesh of one of VTK's data sets."""
-    if data.IsA("vtkRectilinearGrid"):
-        if not data.GetNumberOfPoints():
-            raise damaged("expected coordinates along three axes")
+    count = data.GetNumberOfPoints() if data.IsA("vtkDataSet") else 0
+    if data.IsA("vtkRectilinearGrid") and count:
         return Mesh(np.array(data.GetBounds()).reshape(3, 2).T, {}, NO_LINES, {}, False, {})
     if not data.IsA("vtkPointSet"):
         raise ValueError(f"a {data.GetClassName()} holds neither grains nor contacts")
-    count = data.GetNumberOfPoints()
     points = doubles(_numpy(data.GetPoints().GetData())) if count else np.zeros((0, 3))
     arrays = _arrays(data.GetPointData(), count)
     cell_arrays = _arrays(data.GetCellData(), data.GetNumberOfCells())
-    offsets, named, types = _all_cells(data, count)
+    if data.IsA("vtkPolyData"):
+        # the arrays of cells begin with the rows of vertices
+        cells, start = data.GetLines(), data.GetNumberOfVerts()
+        types = np.full(data.GetNumberOfLines(), POLY_LINE)
+        has_faces = data.GetNumberOfPolys() + data.GetNumberOfStrips() > 0
+    else:
+        cells, start, one_by_one = data.GetCells(), 0, data.GetCellTypesArray()
+        # since VTK 9.6, cells that are all of one type have no such array
+        types = np.array(data.GetCellTypes()) if one_by_one is None else _numpy(one_by_one)
+        has_faces = not np.all(np.isin(types, (VERTEX, POLY_VERTEX, LINE, POLY_LINE)))
+    offsets, named = _cells(cells, count)
     rows = np.flatnonzero(np.isin(types, (LINE, POLY_LINE)))
-    has_faces = not np.all(np.isin(types, (VERTEX, POLY_VERTEX, LINE, POLY_LINE)))
-    is_grid = not data.IsA("vtkPolyData")
-    if is_grid and len(types) == count and not has_faces and np.array_equal(named, range(count)):
-        # one cell for each point, whose arrays are those of the points
-        arrays.update(cell_arrays)
-    first, last = offsets[rows], offsets[rows + 1] - 1
-    if np.any(last < first):
-        raise damaged("a line has no points")
-    lines = np.column_stack([named[first], named[last]])
-    line_arrays = {name: values[rows] for name, values in cell_arrays.items()}
+    if len(types) != len(offsets) - 1 or np.any(np.diff(offsets)[rows] < 2):
+        raise damaged("types and points of the cells do not fit")
+    lines = np.column_stack([named[offsets[rows]], named[offsets[rows + 1] - 1]])
+    line_arrays = {name: values[start + rows] for name, values in cell_arrays.items()}
     own = (arrays.get("vtkGhostType", np.zeros(count, np.uint8)) & DUPLICATE) == 0
     if not own.all():
         if len(lines):
             raise ValueError("points of other pieces (vtkGhostType) and lines between points")
         points, arrays = points[own], {name: values[own] for name, values in arrays.items()}
     return Mesh(points, arrays, lines, line_arrays, has_faces, _arrays(data.GetFieldData(), None))
-
-
-def _all_cells(data: Any, points: int) -> tuple[IntArray, IntArray, npt.NDArray[Any]]:
-    """Offsets, points and types of all cells, in the order of the rows of their arrays."""
-    if not data.IsA("vtkPolyData"):
-        offsets, named = _cells(data.GetCells(), points)
-        array = data.GetCellTypesArray()
-        # since VTK 9.6, cells that are all of one type have no such array
-        types = np.array(data.GetCellTypes()) if array is None else _numpy(array)
-        if len(types) != len(offsets) - 1 or np.any(np.diff(offsets)[types == LINE] != 2):
-            raise damaged("types and points of the cells do not fit")
-        return offsets, named, types
-    kinds = (data.GetVerts(), data.GetLines(), data.GetPolys(), data.GetStrips())
-    parts = [_cells(one, points) for one in kinds]
-    counts = [len(offsets) - 1 for offsets, _ in parts]
-    starts = np.cumsum([0, *(len(named) for _, named in parts)])
-    ends = [offsets[1:] + start for (offsets, _), start in zip(parts, starts, strict=False)]
-    return (
-        np.concatenate([[0], *ends]),
-        np.concatenate([named for _, named in parts]),
-        np.repeat([VERTEX, POLY_LINE, POLYGON, POLYGON], counts),
-    )

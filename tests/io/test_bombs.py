@@ -17,7 +17,6 @@ import scanfab
 from scanfab.base.errors import ReadError
 from scanfab.io import files
 from scanfab.io import text as text_table
-from scanfab.io.formats import yade_save
 from scanfab.io.mesh import read_mesh
 from tests.helpers.dumps import dump_text
 
@@ -66,7 +65,6 @@ def some_points(count: int) -> str:
             "its library crashed",
         ),
         (polydata(600 * BLOCK, packed(zeros=600)), "Points has 78643200 of|its library crashed"),
-        (polydata(30_000, some_points(30_000), lines=10**12), "damaged|its library crashed"),
     ],
 )
 def test_arrays_that_are_far_too_long_are_refused(tmp_path, data, told):
@@ -96,22 +94,12 @@ def test_what_does_not_fit_into_memory_is_told(tmp_path, monkeypatch):
         scanfab.read(path)
 
 
-@pytest.mark.parametrize(
-    ("start", "unit", "told"),
-    [
-        (HEAD, b"<a/>", "no body in"),
-        (HEAD, b"<a>", r"elements [\d,]+ deep"),
-        (HEAD + b"<a>", b"x", "no body in"),
-        (HEAD + b'<a b="', b"x", "no body in"),
-        (HEAD + b"<item><px>", b"<a/>", "no body in"),
-    ],
-)
-def test_endless_xml_is_left_early(tmp_path, monkeypatch, start, unit, told):
-    monkeypatch.setattr(yade_save, "BARREN", 1 << 21)
+@pytest.mark.parametrize("unit", [b"<a/>", b"<a>", b"x"])
+def test_endless_xml_is_left_early(tmp_path, unit):
     path = tmp_path / "save.xml.bz2"
     # streams one behind the other are one file
-    path.write_bytes(bz2.compress(start) + 1000 * bz2.compress(unit * (BLOCK // len(unit))))
-    with pytest.raises(ReadError, match=f"as a simulation that YADE saved .*{told}"):
+    path.write_bytes(bz2.compress(HEAD) + 1000 * bz2.compress(unit * (BLOCK // len(unit))))
+    with pytest.raises(ReadError, match=r"save\.xml\.bz2: .* unpack to more than 1000 times"):
         scanfab.read(path)
 
 

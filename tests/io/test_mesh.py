@@ -188,7 +188,7 @@ def test_data_that_are_no_mesh_are_refused(tmp_path, dataset):
         refuses(write(tmp_path / "a.vtk", text), "expected a VTK file with points")
 
 
-@pytest.mark.parametrize("count", [10**8, 10**15, 10**30, -1, "many"])
+@pytest.mark.parametrize("count", [10**8, 10**30, "many"])
 @pytest.mark.parametrize("name", ["Points", "Polys", "Verts"])
 def test_counts_of_xml_are_those_of_the_file(tmp_path, name, count):
     counts = {"Points": 1, "Verts": 0, "Lines": 0, "Strips": 0, "Polys": 0, name: count}

@@ -16,8 +16,6 @@ from scanfab.base.typing import FloatArray
 from scanfab.io.contacts import branches, count_walls, rows_of_ids
 from scanfab.io.formats.dump_contacts import MOST_ROWS, Places, are_ids, are_whole, id_column
 from scanfab.io.formats.lammps import DumpReader
-from scanfab.io.formats.vtk import vectors
-from scanfab.io.mesh import Mesh
 from scanfab.io.reader import GrainTable, JoinedContacts
 from scanfab.packing.contacts import ListedWallForces
 
@@ -37,15 +35,8 @@ class LiggghtsReader(DumpReader):
     lists_walls = True
     # in VTK a contact list names grains only, and the force acts on the first grain
     walls = False
-    says_sign = True
-
-    def forces(self, mesh: Mesh) -> tuple[FloatArray | None, FloatArray | None]:
-        """The force in VTK, at times its normal and tangential part, and the normal part."""
-        force = vectors(mesh, "force")
-        normal, tangential = vectors(mesh, "force_normal"), vectors(mesh, "force_tangential")
-        if force is None and normal is not None and tangential is not None:
-            force = normal + tangential
-        return None if force is None else -force, None if normal is None else -normal
+    force_arrays = ("force", "force_normal", "force_tangential")
+    sign = -1.0
 
     @np.errstate(over="ignore", invalid="ignore")
     def found(

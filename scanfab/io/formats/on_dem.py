@@ -1,12 +1,14 @@
 """
 ON-DEM's exchange format (VTKHDF with a group ONDEM), read and written.
 
-Of drafts 0.1 and 0.2, which differ in more than names: the normal force is positive in compression
-in the first, and in traction in the second.
+Drafts 0.1 and 0.2 are read, and 0.1 is written. They differ in more than names: the normal force is
+positive in compression in the first, and in traction in the second. What the draft has no name for
+(the cell, images, the whole force) has a name of ours.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,22 +18,27 @@ from scanfab.base.arrays import doubles
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray
 from scanfab.io.columns import grain_table, whole_numbers
-from scanfab.io.contacts import join_ids
+from scanfab.io.contacts import join_ids, rows_of_ids
 from scanfab.io.files import first_bytes
 from scanfab.io.formats.shared import GrainsOnly
 from scanfab.io.hdf import HdfFile, is_hdf, read_hdf_file
 from scanfab.io.mesh import Arrays, joined_arrays
 from scanfab.io.reader import Carries, GrainTable, ReadOptions, Snapshot
-from scanfab.io.writer import cell_of
-from scanfab.io.writers.on_dem import SCENE, STROKE, write_on_dem
+from scanfab.io.writer import Left, as_arrays, cell_of
+from scanfab.packing.packing import Packing
 
 # what a positive normal force means, by draft: +1 compression
 SIGNS = {"0.1": 1.0, "0.2": -1.0}
-INTERACTIONS = "ONDEM/Interactions"
-CELL = {"cell": "cell", "origin": "cell_origin", "periodic": "cell_periodic"}
+SCENE, BODIES, INTERACTIONS = "ONDEM/Scene", "ONDEM/Bodies/sphere", "ONDEM/Interactions"
+# attributes of the scene, by the names of writer.Arrays
+FRAME = {"step": "iteration", "time": "time", "cell": "cell"}
+FRAME |= {"origin": "cell_origin", "periodic": "cell_periodic"}
 # the columns of interactions that matter, and the shapes of their values
 COLUMNS: dict[str, tuple[int, ...]] = {"id1": (), "id2": (), "virtual": (), "normal_force": ()}
 COLUMNS |= dict.fromkeys(("normal", "shear_force", "force", "image"), (3,))
+NONE: Arrays = {"id1": np.zeros(0), "id2": np.zeros(0)}
+# stands for / in the names of columns, which would make a group
+STROKE = "\u2215"
 
 
 class OnDemReader(GrainsOnly):
@@ -41,7 +48,6 @@ class OnDemReader(GrainsOnly):
     description = "ON-DEM's VTKHDF (drafts 0.1 and 0.2): spheres and contacts with forces"
     extensions: tuple[str, ...] = (".vtkhdf",)
     lists_contacts = True
-    write = staticmethod(write_on_dem)
 
     def recognises(self, path: Path) -> bool:
         """By the groups VTKHDF and ONDEM."""
@@ -64,11 +70,64 @@ class OnDemReader(GrainsOnly):
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         """The bodies with a radius, and the interactions between them."""
         path, file = snapshot.path, read_hdf_file(snapshot.path)
-        # the drafts have no cell, but scanfab writes one
         scene = file.attributes.get(SCENE, {})
-        arrays = {name: scene[own] for name, own in CELL.items() if own in scene}
-        grains = grain_table(path, _spheres(path, file), cell_of(path, arrays), options)
+        cell = cell_of(path, {name: scene[own] for name, own in FRAME.items() if own in scene})
+        grains = grain_table(path, _spheres(path, file), cell, options)
         return grains if INTERACTIONS not in file.attributes else _joined(path, file, grains)
+
+    def write(self, packing: Packing, path: Path) -> Left:
+        """Write one frame; it holds everything."""
+        import h5py
+
+        arrays, count = as_arrays(packing), len(packing)
+        columns = {**arrays.grains, **arrays.own}
+        columns["body_id"] = columns.pop("id")
+        # VTK reads no texts at points
+        texts = {name: values for name, values in columns.items() if values.dtype.kind == "U"}
+        # in memory first: on a full disk HDF5 ends the process
+        with h5py.File(path, "w", driver="core", backing_store=False, track_order=True) as file:
+            file.attrs.update(file_format="ON-DEM VTKHDF", file_format_version="0.1-draft")
+            file.attrs["source_code"] = "scanfab"
+            # PolyData with a vertex at each point, so that ParaView shows them
+            group = file.create_group("VTKHDF", track_order=True)
+            group.attrs.update(Type=np.bytes_("PolyData"), Version=np.array([2, 0]))
+            group["NumberOfPoints"] = np.array([count])
+            group["Points"] = packing.position
+            for cells, filled in {
+                "Vertices": count,
+                "Lines": 0,
+                "Polygons": 0,
+                "Strips": 0,
+            }.items():
+                group[f"{cells}/NumberOfCells"] = np.array([filled])
+                group[f"{cells}/NumberOfConnectivityIds"] = np.array([filled])
+                group[f"{cells}/Connectivity"] = np.arange(filled)
+                group[f"{cells}/Offsets"] = np.arange(filled + 1)
+            points = group.create_group("PointData", track_order=True)
+            _write(points, {name: one for name, one in columns.items() if name not in texts})
+            if texts:
+                _write(file.create_group(BODIES), {"body_id": packing.id, **texts})
+            scene = file.create_group(SCENE)
+            scene.attrs["scanfab"] = 1
+            for name, value in arrays.frame.items():
+                scene.attrs[FRAME[name]] = np.int8(value) if name == "periodic" else value
+            if (contacts := packing.contacts) is not None:
+                group = file.create_group(INTERACTIONS)
+                group.attrs["count"] = len(contacts)
+                # as the draft has them, and the whole force, which no rounding has touched
+                table = {**arrays.contacts, "virtual": np.zeros(len(contacts), np.int8)}
+                table |= {"normal": contacts.normal, "contact_point": contacts.point}
+                table.pop("force_n", None)
+                if contacts.force_n is not None:
+                    table["normal_force"] = contacts.force_n
+                if contacts.force is not None and contacts.force_n is not None:
+                    normal_part = contacts.force_n[:, None] * contacts.normal
+                    table["shear_force"] = contacts.force - normal_part
+                _write(group, table)
+            file.flush()
+            image = file.id.get_file_image()
+        path.write_bytes(image)
+        return Left(no_step=False, notes=tuple(arrays.notes))
 
 
 def _scene(path: Path) -> dict[str, Any]:
@@ -77,55 +136,46 @@ def _scene(path: Path) -> dict[str, Any]:
 
 def _spheres(path: Path, file: HdfFile) -> Arrays:
     """The columns of the bodies that have a radius: no other body is a sphere."""
-    blocks = ["VTKHDF", *(f"VTKHDF/{name}" for name in file.groups("VTKHDF"))]
-    parts = [_points(path, file, one) for one in blocks if f"{one}/Points" in file.arrays]
-    if not parts or not all("radius" in one for one in parts):
-        raise ReadError(f"{path}: expected Points with a radius in PointData, found {blocks}")
-    columns = joined_arrays(parts)
-    radius = columns["radius"]
-    if radius.dtype.kind not in "iuf" or radius.ndim != 1:
-        raise ReadError(f"{path}: expected numbers as radius, found {radius.dtype}")
+    parts = []
+    for block in ["VTKHDF", *(f"VTKHDF/{name}" for name in file.groups("VTKHDF"))]:
+        if f"{block}/Steps" in file.attributes:
+            raise ReadError(f"{path}: {block} holds steps in time: write one file for each")
+        if (points := file.arrays.get(f"{block}/Points")) is not None:
+            parts.append({**file.below(f"{block}/PointData"), "position": points})
+    columns = joined_arrays(parts or [{}])
+    shapes = {name: one.shape for name, one in columns.items()}
+    radius = columns.get("radius", np.zeros(0, str))
+    if radius.dtype.kind not in "iuf" or {one[:1] for one in shapes.values()} != {radius.shape}:
+        raise ReadError(f"{path}: expected Points, and a radius for each in PointData: {shapes}")
     spheres = ~np.isnan(doubles(radius))
     columns = {name.replace(STROKE, "/"): values[spheres] for name, values in columns.items()}
     if "body_id" not in columns:
         return columns
     id = whole_numbers(path, columns.pop("body_id"))
     # draft 0.2 has more columns in a group of spheres, which has an order of its own
-    own = file.below("ONDEM/Bodies/sphere")
-    listed = own.pop("body_id", np.zeros(0, np.int64))
-    order = np.argsort(listed)
-    if len(np.unique(listed)) == len(listed) and np.all(np.isin(id, listed)):
-        rows = order[np.searchsorted(listed[order], id)]
+    own = file.below(BODIES)
+    listed, rows = np.unique(own.pop("body_id", np.zeros(0, np.int64)), return_index=True)
+    if len(listed) and np.all(np.isin(id, listed)):
+        rows = rows[np.searchsorted(listed, id)]
         own = {name: one[rows] for name, one in own.items() if len(one) == len(listed)}
         columns = {**own, **columns}
     return {"id": id, **columns}
 
 
-def _points(path: Path, file: HdfFile, block: str) -> Arrays:
-    """The arrays of the points of one block, and their position."""
-    if f"{block}/Steps" in file.attributes:
-        raise ReadError(f"{path}: {block} holds steps in time: write one file for each")
-    points, columns = file.arrays[f"{block}/Points"], file.below(f"{block}/PointData")
-    lengths = {name: len(values) for name, values in columns.items()}
-    lengths["NumberOfPoints"] = int(np.sum(file.arrays.get(f"{block}/NumberOfPoints", len(points))))
-    wrong = [f"{name} has {length}" for name, length in lengths.items() if length != len(points)]
-    if wrong or points.shape != (len(points), 3):
-        raise ReadError(f"{path}: {block}: Points have the shape {points.shape}, {wrong} rows")
-    flat = {name: one[:, 0] if one.shape[1:] == (1,) else one for name, one in columns.items()}
-    return {**flat, "position": doubles(points)}
-
-
 def _joined(path: Path, file: HdfFile, grains: GrainTable) -> GrainTable:
     """The grains with their contacts: interactions with bodies that are no spheres are walls'."""
-    if grains.id is None:
-        raise ReadError(f"{path}: names grains by id, but the points have no body_id")
     # draft 0.2 has a group for each type
     groups = [INTERACTIONS, *(f"{INTERACTIONS}/{one}" for one in file.groups(INTERACTIONS))]
-    parts = [_real(path, own) for one in groups if "id1" in (own := file.below(one))]
-    table = joined_arrays(parts or [dict.fromkeys(("id1", "id2"), np.zeros(0))])
+    parts = [file.below(one) for one in groups if f"{one}/id1" in file.arrays] or [NONE]
+    parts = [{"virtual": np.zeros(len(one["id1"])), **one} for one in parts]
+    table = {name: one for name, one in joined_arrays(parts).items() if name in COLUMNS}
+    for name in {"id2", *table}:
+        values, shape = table.get(name, np.zeros(0)), (len(table["id1"]), *COLUMNS[name])
+        if values.shape != shape or values.dtype.kind not in "biuf":
+            raise ReadError(f"{path}: {INTERACTIONS}: {name}: expected numbers of shape {shape}")
     ids = np.column_stack([whole_numbers(path, table[name]) for name in ("id1", "id2")])
     # two bodies that are no spheres are none of ours
-    ours = np.isin(ids, grains.id).any(axis=1)
+    ours = np.any(rows_of_ids(grains, ids) >= 0, axis=1) & (table["virtual"] <= 0)
     table = {name: values[ours] for name, values in table.items()}
     image = table.get("image")
     if image is not None:
@@ -134,18 +184,6 @@ def _joined(path: Path, file: HdfFile, grains: GrainTable) -> GrainTable:
     joined = join_ids(path, grains, ids[ours], force, walls=True, image=image, force_n=force_n)
     walls = joined.wall_contacts if grains.wall_contacts is None else grains.wall_contacts
     return grains._replace(contacts=joined.contacts, wall_contacts=walls)
-
-
-def _real(path: Path, own: Arrays) -> Arrays:
-    """The interactions that are not virtual, of the columns that matter."""
-    count = len(own["id1"])
-    found = {name: own.get(name, np.zeros(0)) for name in COLUMNS if name in {*own, "id2"}}
-    for name, values in found.items():
-        shape = (count, *COLUMNS[name])
-        if values.shape != shape or values.dtype.kind not in "biuf":
-            raise ReadError(f"{path}: {INTERACTIONS}: {name}: expected numbers of shape {shape}")
-    is_real = found.pop("virtual", np.zeros(count)) <= 0
-    return {name: values[is_real] for name, values in found.items()}
 
 
 def _force(path: Path, file: HdfFile, table: Arrays) -> tuple[FloatArray | None, FloatArray | None]:
@@ -164,3 +202,14 @@ def _force(path: Path, file: HdfFile, table: Arrays) -> tuple[FloatArray | None,
     if not {"normal", "shear_force"} <= table.keys():
         return None, normal
     return doubles(normal[:, None] * table["normal"] + table["shear_force"]), None
+
+
+def _write(group: Any, columns: Mapping[str, Any]) -> None:
+    import h5py
+
+    for name, values in columns.items():
+        plain = name.replace("/", STROKE)
+        if values.dtype.kind == "U":
+            group.create_dataset(plain, data=values.astype(object), dtype=h5py.string_dtype())
+        else:
+            group[plain] = values.astype(np.uint8) if values.dtype.kind == "b" else values

@@ -5,16 +5,16 @@ from __future__ import annotations
 import re
 from pathlib import Path
 from typing import Literal
-from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from scanfab.base.arrays import MOST, doubles
+from scanfab.base.arrays import doubles
 from scanfab.base.errors import ReadError, note
 from scanfab.base.typing import FloatArray
 from scanfab.io.columns import grain_table, has_radius, whole_numbers
 from scanfab.io.contacts import join_ids, join_positions, proved_force
 from scanfab.io.files import bare_name, file_inside, plain
+from scanfab.io.formats.shared import cell_of, numbers
 from scanfab.io.formats.yade_save import cell_beside, cell_file, is_cell_file
 from scanfab.io.mesh import Mesh, elements, form_of, holds_mesh, listed, read_mesh
 from scanfab.io.reader import Carries, FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
@@ -39,8 +39,10 @@ class VtkReader:
     lists_contacts = True
     # whether an id that no grain has is a wall's, see join_ids
     walls: bool | Literal["unknown"] = "unknown"
-    # whether the format says on which grain of a contact its force acts
-    says_sign = False
+    # the arrays of a contact's force, of its normal and its tangential part
+    force_arrays = ("force", "", "")
+    # +1: forces act on the second grain, -1: on the first, None: the format does not say
+    sign: float | None = None
 
     def recognises(self, path: Path) -> bool:
         """By the first line of legacy VTK, or the root element of the XML formats."""
@@ -75,18 +77,18 @@ class VtkReader:
     def read_grains(self, snapshot: Snapshot, options: ReadOptions) -> GrainTable:
         """Points and their arrays, with the box of LIGGGHTS or the cell of YADE beside them."""
         path, parts = snapshot.path, snapshot.parts
-        mesh = None if form_of(path) in BLOCKS else read_mesh(path, parts)
-        if parts and (mesh is None or is_packing(mesh)):
-            raise ReadError(
-                f"{path}: holds all of a frame, and cannot be joined with {parts[0].name} of the "
-                f"same timestep: name one as the source"
-            )
-        if mesh is None:
+        if form_of(path) in BLOCKS and not parts:
             return self._read_blocks(path, options)
+        mesh = read_mesh(path, parts)
         columns = {**mesh.point_arrays, "position": mesh.points}
         if is_packing(mesh):
-            cell, contacts = packing_of(path, mesh)
-            return grain_table(path, columns, cell, options)._replace(contacts=contacts)
+            if parts:
+                raise ReadError(
+                    f"{path}: holds all of a frame, and cannot be joined with {parts[0].name} of "
+                    f"the same timestep: name one as the source"
+                )
+            cell, listed = packing_of(path, mesh)
+            return grain_table(path, columns, cell, options)._replace(contacts=listed)
         if len(mesh.points) == 0:
             columns["radius"] = np.zeros(0)
         cell = _read_box(path)
@@ -112,7 +114,6 @@ class VtkReader:
             joined = join_ids(path, grains, pairs, force, walls=self.walls, force_n=force_n)
         else:
             joined = join_positions(path, grains, mesh.points[mesh.lines], force, force_n)
-        assert joined.contacts is not None
         return joined._replace(contacts=self._proved(path, grains, joined.contacts, mesh))
 
     def forces(self, mesh: Mesh) -> tuple[FloatArray | None, FloatArray | None]:
@@ -122,13 +123,17 @@ class VtkReader:
         Shape (M, 3), on the second grain unless the format does not say on which; a normal part
         may also be of shape (M,), compression positive.
         """
-        return vectors(mesh, "force"), None
+        whole, normal, tangential = (_vectors(mesh, name) for name in self.force_arrays)
+        if whole is None and normal is not None and tangential is not None:
+            whole = normal + tangential
+        sign = self.sign or 1.0
+        return None if whole is None else sign * whole, None if normal is None else sign * normal
 
     def _proved(
-        self, path: Path, grains: GrainTable, contacts: ContactList, mesh: Mesh
-    ) -> ContactList:
+        self, path: Path, grains: GrainTable, contacts: ContactList | None, mesh: Mesh
+    ) -> ContactList | None:
         """The contacts with a force whose sign the format says, or the forces themselves."""
-        if self.says_sign:
+        if contacts is None or self.sign is not None:
             return contacts
         names = [one for one in mesh.line_arrays if "force" in one.lower() and one != "force"]
         if names:
@@ -171,47 +176,40 @@ class VtkReader:
 
     def _listed(self, index: Path) -> list[Snapshot]:
         """The frames of a ``.pvd``, in its order: the parts of one time are one frame."""
-        kinds: dict[tuple[str, ...], FileKind] = {}
-        frames: dict[float | None, dict[tuple[str, ...], Path]] = {}
+        kinds: dict[tuple[str, str, str], FileKind] = {}
+        frames: dict[str | None, dict[tuple[str, str], Path]] = {}
         for entry in elements(index).iter("DataSet"):
-            path, time = file_inside(index, entry.get("file", "")), _time(index, entry)
-            part = entry.get("group", ""), entry.get("part", "0")
+            path, part = file_inside(index, entry.get("file", "")), entry.get("part", "0")
+            time, group = entry.get("timestep"), entry.get("group", "")
             # files of one name hold the same; some are boxes and contacts
-            family = re.sub(r"\d+", "*", path.name), *part
+            family = re.sub(r"\d+", "*", path.name), group, part
             if kinds.get(family, "other") == "other":
                 kinds[family] = self.kind(path)
             if kinds[family] not in ("grains", "points"):
                 continue
-            other = frames.setdefault(time, {}).setdefault(part, path)
+            other = frames.setdefault(time, {}).setdefault((group, part), path)
             if other is not path:
                 raise ReadError(
                     f"{index}: {other.name} and {path.name} have the same timestep, part and group"
                 )
-        unlike = {kind: name for (name, *_), kind in kinds.items() if kind in ("grains", "points")}
-        if len(unlike) > 1:
+        names = {kind: name for (name, _, _), kind in kinds.items()}
+        if {"grains", "points"} <= names.keys():
             raise ReadError(
-                f"{index}: {unlike['points']} are points without a radius beside the grains in "
-                f"{unlike['grains']}: take them out of the list, or name the files as the source"
+                f"{index}: {names['points']} are points without a radius beside the grains in "
+                f"{names['grains']}: take them out of the list, or name the files as the source"
             )
-        return [_frame(time, *parts.values()) for time, parts in frames.items()]
+        return [_frame(index, time, *parts.values()) for time, parts in frames.items()]
 
 
-def _time(index: Path, entry: Element) -> float | None:
-    """The time of an entry of a ``.pvd``; None if it has none."""
-    try:
-        return float(entry.attrib["timestep"]) if "timestep" in entry.attrib else None
-    except ValueError as error:
-        raise ReadError(f"{index}: cannot be read as a list of VTK files: {error}") from None
-
-
-def _frame(time: float | None, first: Path, *others: Path) -> Snapshot:
+def _frame(index: Path, word: str | None, first: Path, *others: Path) -> Snapshot:
     """One frame; its step is the last number that the names of all parts have in common."""
+    time = None if word is None else numbers(f"{index}: timestep", word.encode(), 1)[0]
     names = (re.findall(r"\d+", Path(bare_name(file)).stem) for file in (first, *others))
     same = [int(one[0]) for one in zip(*names, strict=False) if len(set(one)) == 1]
     return Snapshot(first, same[-1] if same else None, time, parts=others)
 
 
-def vectors(mesh: Mesh, name: str) -> FloatArray | None:
+def _vectors(mesh: Mesh, name: str) -> FloatArray | None:
     """An array of the lines that holds a vector for each, shape (M, 3); None without it."""
     values = mesh.line_arrays.get(name)
     if values is None or values.shape != (len(mesh.lines), 3) or values.dtype.kind not in "iuf":
@@ -228,12 +226,11 @@ def _box_file(path: Path) -> Path | None:
     return next((file for file in files if file.is_file()), None)
 
 
+@np.errstate(over="ignore")
 def _read_box(path: Path) -> Cell | None:
     """The box that LIGGGHTS writes beside a VTK dump; it does not say what is periodic."""
     file = _box_file(path)
     corners = np.zeros((0, 3)) if file is None else read_mesh(file).points
     if len(corners) == 0:
         return None
-    low, edges = corners.min(axis=0), np.ptp(corners, axis=0)
-    is_box = np.all((edges > 0) & (np.abs(corners).max(axis=0) < MOST))
-    return Cell(edges, (False, False, False), low) if is_box else None
+    return cell_of(path, np.ptp(corners, axis=0), (False, False, False), corners.min(axis=0))

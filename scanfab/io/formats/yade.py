@@ -9,7 +9,7 @@ from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.typing import FloatArray
 from scanfab.io.columns import grain_table
 from scanfab.io.files import first_bytes
-from scanfab.io.formats.vtk import VtkReader, vectors
+from scanfab.io.formats.vtk import VtkReader
 from scanfab.io.formats.yade_save import is_binary_save, is_save, read_save, snapshot_of_save
 from scanfab.io.mesh import Mesh
 from scanfab.io.reader import Carries, FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
@@ -33,7 +33,8 @@ class YadeReader(VtkReader):
     extensions = (".vtk", ".vtu", ".vtp", ".txt", ".xml", ".yade")
     generic = False
     walls = True
-    says_sign = True
+    force_arrays = ("force", "normalForce", "shearForce")
+    sign = 1.0
 
     def recognises(self, path: Path) -> bool:
         """YADE's own first lines, or the arrays of VTKRecorder's interactions."""
@@ -50,7 +51,7 @@ class YadeReader(VtkReader):
                 f"there, and save it as XML: O.save('name.xml.bz2')"
             )
         if RECORDED in first_bytes(path):
-            return "contacts"  # reading them may be refused: see `vtk_checks`
+            return "contacts"  # reading them may be refused: see `mesh`
         return "grains" if _is_text(path) or is_save(path) else super().kind(path)
 
     def snapshots(self, path: Path) -> list[Snapshot]:
@@ -79,13 +80,11 @@ class YadeReader(VtkReader):
         return "cell" if says else super().carries(path)
 
     def forces(self, mesh: Mesh) -> tuple[FloatArray | None, FloatArray | None]:
-        """YADE's forces act on the second body; VTKRecorder's normal force is a number."""
-        normal, shear = vectors(mesh, "normalForce"), vectors(mesh, "shearForce")
-        force = vectors(mesh, "force") if normal is None or shear is None else normal + shear
+        """Those that act on the second body; VTKRecorder's normal force is a number."""
+        force, normal = super().forces(mesh)
         recorded = mesh.line_arrays.get("forceN")
-        if normal is None and recorded is not None and recorded.shape == (len(mesh.lines),):
-            normal = recorded
-        return force, normal
+        is_recorded = normal is None and recorded is not None and recorded.ndim == 1
+        return force, recorded if is_recorded else normal
 
 
 def _is_text(path: Path) -> bool:

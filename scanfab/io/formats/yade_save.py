@@ -16,15 +16,15 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from scanfab.base.errors import PackingError, ReadError, note, warn
+from scanfab.base.errors import ReadError, note, warn
 from scanfab.base.typing import FloatArray
 from scanfab.io.columns import grain_table, whole_numbers
 from scanfab.io.contacts import join_ids, rows_of_ids
-from scanfab.io.files import Stamp, bare_name, first_bytes, pieces, stamp_of
+from scanfab.io.files import Stamp, bare_name, first_bytes, plain, stamp_of
+from scanfab.io.formats.shared import cell_of
 from scanfab.io.mesh import read_mesh
 from scanfab.io.reader import GrainTable, ReadOptions, Snapshot
 from scanfab.packing.cell import Cell
@@ -32,10 +32,12 @@ from scanfab.packing.contacts import ListedWallForces
 
 STEP = re.compile(rb"<iter>\s*(\d{1,18})\s*</iter>")
 TIME = re.compile(rb"<time>\s*(\d+\.?\d*(?:e[-+]?\d+)?)\s*</time>")
-# bytes that are parsed at a time; bytes without a body or contact after which none is expected;
-# and how deep elements stand in one another
-PIECE, BARREN, DEPTH = 1 << 16, 1 << 23, 200
-
+# what is read of a sphere, and what it is if it is not there
+SPHERE = {"id": None, "groupMask": None, "clumpId": "-1", "shape/px/radius": None}
+SPHERE |= {f"state/px/se3/position/{axis}": None for axis in "xyz"}
+# what is read of a contact, whose first number is the step since when it is real
+CONTACT = ("iterMadeReal", "id1", "id2")
+VECTORS = ("cellDist", "normalForce", "shearForce", "contactPoint")
 # files of spheres by VTKExporter and VTKRecorder, and those of cells
 EXPORTED = re.compile(r"(.*)-spheres-(\d+)\.vtk")
 RECORDED = re.compile(r"(.*)spheres\.(\d+)\.vtu")
@@ -44,6 +46,7 @@ CELL_FILE = re.compile(r".*-periCell-\d+\.vtk|.*pericell\.\d+\.vtu")
 CORNERS, ORIGIN, ENDS = 8, 4, (7, 5, 0)
 # in cells: YADE wraps spheres into the cell, but writes six digits
 ROUNDING = 1e-4
+PERIODIC = (True, True, True)
 
 
 def is_save(path: Path) -> bool:
@@ -79,24 +82,24 @@ def read_save(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
     contacts: list[list[float]] = []
     # a class is spelled out once only, and named by its number afterwards
     shapes: dict[str, str] = {}
-    is_periodic, size = False, np.zeros((0, 3))
+    is_periodic, size = False, None
     try:
         for element in _elements(path):
             if element.tag == "isPeriodic":
                 is_periodic = (element.text or "").strip() == "1"
             elif element.tag == "hSize":
-                numbers = [_number(element, f"m{row}{column}") for row, column in np.ndindex(3, 3)]
-                size = np.reshape(numbers, (3, 3))
+                size = [[_number(element, f"m{row}{k}") for row in range(3)] for k in range(3)]
             elif element.find("iterMadeReal") is not None:
                 contacts.append(_contact(element))
             else:
                 ids.append(_number(element, "id"))
-                spheres += _sphere(element, shapes)
-        # the vectors of the cell are the columns of hSize
-        cell = Cell(size.T) if is_periodic and len(size) else None
-    except (ElementTree.ParseError, PackingError, LookupError, ValueError, OverflowError) as error:
+                if _shape(element, shapes) == "Sphere":
+                    spheres.append([_number(element, *one) for one in SPHERE.items()])
+    except (ElementTree.ParseError, LookupError, ValueError, OverflowError) as error:
         reason = f"cannot be read as a simulation that YADE saved (O.save): {error}"
         raise ReadError(f"{path}: {reason}") from None
+    # the vectors of the cell are the columns of hSize
+    cell = cell_of(path, size, PERIODIC, np.zeros(3)) if is_periodic and size else None
     table = np.array(spheres).reshape(-1, 7)
     columns = dict(zip(("id", "mask", "clumpId", "radius"), table.T, strict=False))
     if np.all(columns["clumpId"] < 0):
@@ -107,57 +110,41 @@ def read_save(snapshot: Snapshot, options: ReadOptions) -> GrainTable:
 
 def _elements(path: Path) -> Iterator[ElementTree.Element]:
     """Bodies, contacts, ``hSize`` and ``isPeriodic``; memory never holds the whole file."""
-    parser: ElementTree.XMLPullParser[Any] = ElementTree.XMLPullParser(("start", "end"))
-    barren = depth = 0
-    for piece in pieces(path, PIECE):
-        parser.feed(piece)
-        barren += len(piece)
-        events: Iterator[Any] = parser.read_events()
-        for event, element in events:
-            depth += 1 if event == "start" else -1
-            if event == "end" and element.tag in ("isPeriodic", "hSize"):
+    with open(plain(path), "rb") as stream:
+        for _, element in ElementTree.iterparse(stream):
+            if element.tag in ("isPeriodic", "hSize"):
                 yield element
-            elif event == "end" and element.tag == "px":
+            elif element.tag == "px":
                 # a contact, which stands in the first body that has it, or a body that is there
                 has = [element.find(name) is not None for name in ("iterMadeReal", "id", "state")]
                 if has[0] or all(has[1:]):
                     yield element
                     element.clear()
-                    barren = 0
-        if barren > BARREN or depth > DEPTH:
-            raise ValueError(f"no body in {barren:,} bytes, or elements {depth:,} deep")
-    parser.close()
 
 
-def _sphere(body: ElementTree.Element, shapes: dict[str, str]) -> list[list[float]]:
-    """Id, mask, clump (-1 if it stands alone), radius and centre; nothing of another body."""
+def _shape(body: ElementTree.Element, shapes: dict[str, str]) -> str | None:
+    """The class of a body's shape; `shapes` has the names of classes by their numbers."""
     shape = body.find("shape/px")
     attributes = {} if shape is None else shape.attrib
     number = attributes.get("class_id") or attributes.get("class_id_reference") or ""
     if "class_name" in attributes:
         shapes[number] = attributes["class_name"].rpartition("::")[2]
-    if shape is None or shapes.get(number) != "Sphere":
-        return []
-    clump = float(body.findtext("clumpId", "-1"))
-    place = [_number(body, f"state/px/se3/position/{axis}") for axis in "xyz"]
-    return [
-        [_number(body, "id"), _number(body, "groupMask"), clump, _number(shape, "radius"), *place]
-    ]
+    return shapes.get(number)
 
 
 def _contact(contact: ElementTree.Element) -> list[float]:
-    """Step since when it is real, two ids, image, both forces, point; NaN for what is not there."""
-    row = [_number(contact, name) for name in ("iterMadeReal", "id1", "id2")]
-    for name in ("cellDist", "normalForce", "shearForce", "contactPoint"):
+    """The numbers of CONTACT and VECTORS; NaN for a vector that is not there."""
+    row = [_number(contact, name) for name in CONTACT]
+    for name in VECTORS:
         found = next(contact.iter(name), None)
         row += [np.nan] * 3 if found is None else [_number(found, axis) for axis in "xyz"]
     return row
 
 
-def _number(element: ElementTree.Element, name: str) -> float:
-    text = element.findtext(name)
+def _number(element: ElementTree.Element, name: str, default: str | None = None) -> float:
+    text = element.findtext(name, default)
     if text is None:
-        raise ValueError(f"<{element.tag}> has no <{name}>")
+        raise ValueError(f"<{element.tag}> has no <{name.rpartition('/')[2]}>")
     return float(text)
 
 
@@ -171,25 +158,19 @@ def _with_contacts(
     unknown = ~np.isin(pairs, bodies)
     if unknown.any():
         raise ReadError(f"{path}: a contact names the body {pairs[unknown][0]}, which is not there")
-    rows = rows_of_ids(grains, pairs)
     # contacts of walls with walls are not ours
-    ours = np.any(rows >= 0, axis=1)
-    rows, pairs = rows[ours], pairs[ours]
+    ours = np.any(rows_of_ids(grains, pairs) >= 0, axis=1)
+    pairs, rows = pairs[ours], rows_of_ids(grains, pairs[ours])
     shift, normal, shear, point = np.split(table[ours, 3:], 4, axis=1)
-    forces = normal + shear
-    lacking = np.count_nonzero(np.isnan(forces).any(axis=1))
-    if 0 < lacking < len(pairs):
-        warn(f"{path}: {lacking} of {len(pairs)} contacts have no force: all forces are left out")
-    force = None if lacking else forces
+    force = None if np.isnan(normal + shear).any() else normal + shear
     is_periodic = grains.cell is not None and grains.cell.is_periodic
     image = whole_numbers(path, shift.ravel()).reshape(-1, 3) if is_periodic else None
     joined = join_ids(path, grains, pairs, force, walls=True, image=image)
-    first, second = (rows >= 0).T
-    at, walls = first != second, None
+    at, walls = np.any(rows < 0, axis=1), None
     if at.any() and force is not None and not np.isnan(point).any():
         # forces are those on the second body
-        own = np.where(second, 1.0, -1.0)[at, None] * forces[at]
-        walls = ListedWallForces(rows.max(axis=1)[at], point[at], own)
+        own = np.where(rows[at, 1:] >= 0, 1.0, -1.0) * force[at]
+        walls = ListedWallForces(rows[at].max(axis=1), point[at], own)
     return grains._replace(
         contacts=joined.contacts, wall_contacts=joined.wall_contacts, wall_forces=walls
     )
@@ -219,13 +200,20 @@ def cell_beside(path: Path, position: FloatArray) -> Cell | None:
     file = cell_file(path)
     if file is None:
         exported = EXPORTED.fullmatch(bare_name(path))
-        if exported and _numbered(path.parent, exported[1], stamp_of(path.parent))["-periCell-"]:
+        if exported and _numbered(path.parent, f"{exported[1]}-periCell-", stamp_of(path.parent)):
             warn(
                 f"{path.parent / exported[1]}-periCell-*: not read, as there is not one cell for "
                 f'each file of spheres: name the cells with `cell="FILE.csv"`'
             )
         return None
-    cell = _read_cell(file)
+    if is_cell_file(file):
+        corners = read_mesh(file).points
+        if len(corners) != CORNERS:
+            raise ReadError(f"{file}: expected {CORNERS} corners of a cell, found {len(corners)}")
+        edges = corners[list(ENDS)] - corners[ORIGIN]
+        cell = cell_of(file, edges, PERIODIC, corners[ORIGIN])
+    else:
+        cell = read_save(snapshot_of_save(file), ReadOptions()).cell
     if cell is None:
         return None
     fractions = cell.fractional(position)
@@ -242,11 +230,11 @@ def cell_beside(path: Path, position: FloatArray) -> Cell | None:
 
 def cell_file(path: Path) -> Path | None:
     """The file that has the cell of a file of spheres; None if there is none, or a doubt."""
-    folder, name = path.parent, bare_name(path)
+    folder, name, stamp = path.parent, bare_name(path), stamp_of(path.parent)
     if exported := EXPORTED.fullmatch(name):
         # its number counts files; that of a saved state is a step
-        files = _numbered(folder, exported[1], stamp_of(folder))
-        spheres, cells = files["-spheres-"], files["-periCell-"]
+        spheres = _numbered(folder, f"{exported[1]}-spheres-", stamp)
+        cells = _numbered(folder, f"{exported[1]}-periCell-", stamp)
         # behind the interactions of its frame a cell has the next number, before them the same one
         pairs = dict(zip(sorted(spheres), sorted(cells), strict=False))
         if len(spheres) != len(cells) or any(pairs[one] - one not in (0, 1) for one in pairs):
@@ -255,40 +243,23 @@ def cell_file(path: Path) -> Path | None:
     recorded = RECORDED.fullmatch(name)
     if recorded is None:
         return None
-    step = int(recorded[2])
-    found = _numbered(folder, recorded[1], stamp_of(folder))["pericell."]
+    start, step = recorded[1], int(recorded[2])
     # or else a saved state of this step, whose name has the number of the step, too
     saved = [
         file
-        for file in folder.glob(f"{glob.escape(recorded[1])}*.xml*")
-        if step not in found
-        and step in map(int, re.findall(r"\d+", bare_name(file)))
-        and is_save(file)
-        and snapshot_of_save(file).step == step
+        for file in folder.glob(f"{glob.escape(start)}*{step}.xml*")
+        if is_save(file) and snapshot_of_save(file).step == step
     ]
-    return found.get(step, saved[0] if len(saved) == 1 else None)
+    cells = _numbered(folder, f"{start}pericell.", stamp)
+    return cells.get(step, saved[0] if len(saved) == 1 else None)
 
 
 # listed once for all files of a folder, as long as none comes or goes
 @lru_cache(maxsize=8)
-def _numbered(folder: Path, base: str, stamp: Stamp) -> dict[str, dict[int, Path]]:
-    """The files of spheres and cells whose names begin so, by kind and number."""
-    found: dict[str, dict[int, Path]] = {"-spheres-": {}, "-periCell-": {}, "pericell.": {}}
-    name = re.compile(rf"({'|'.join(map(re.escape, found))})(\d+)\.vt[ku]")
-    for file in sorted(folder.glob(f"{glob.escape(base)}*")):
-        if match := name.fullmatch(bare_name(file).removeprefix(base)):
-            found[match[1]][int(match[2])] = file
+def _numbered(folder: Path, start: str, stamp: Stamp) -> dict[int, Path]:
+    """The VTK files whose names begin so, and then have a number, by this number."""
+    found = {}
+    for file in sorted(folder.glob(f"{glob.escape(start)}*")):
+        if match := re.fullmatch(r"(\d+)\.vt[ku]", bare_name(file).removeprefix(start)):
+            found[int(match[1])] = file
     return found
-
-
-def _read_cell(file: Path) -> Cell | None:
-    """The cell in a file of either kind; None if a saved state does not repeat."""
-    if not is_cell_file(file):
-        return read_save(snapshot_of_save(file), ReadOptions()).cell
-    corners = read_mesh(file).points
-    if len(corners) != CORNERS:
-        raise ReadError(f"{file}: expected {CORNERS} corners of a cell, found {len(corners)}")
-    try:
-        return Cell(corners[list(ENDS)] - corners[ORIGIN], origin=corners[ORIGIN])
-    except PackingError as error:
-        raise ReadError(f"{file}: {error}") from None

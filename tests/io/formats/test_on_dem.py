@@ -88,8 +88,6 @@ def spoilt(file, what):
         file.create_virtual_dataset("VTKHDF/PointData/z", layout)
     elif what == "a bomb":
         file.create_dataset("VTKHDF/PointData/z", (1 << 40,), "f8", chunks=(1 << 16,))
-    elif what == "fewer points":
-        file["VTKHDF/NumberOfPoints"][0] = 2
     elif what == "other rows":
         del file["VTKHDF/PointData/radius"]
         file["VTKHDF/PointData/radius"] = np.ones(4)
@@ -104,7 +102,6 @@ def spoilt(file, what):
         ("data in another file", "stand in another file"),
         ("virtual data", "stand in another file"),
         ("a bomb", "Unable to allocate"),
-        ("fewer points", "NumberOfPoints"),
         ("other rows", "radius"),
         ("steps in time", "steps in time"),
     ],

@@ -60,13 +60,9 @@ def test_every_form_holds_the_same_grains(tmp_path, form):
 
 
 @pytest.mark.parametrize("name", ["radius", "radii", "RADIUS", "rad", "r", "diameter", "Diameter"])
-@pytest.mark.parametrize("place", ["point_data", "cell_data"])
-def test_a_radius_has_many_names_and_stands_at_points_or_vertices(tmp_path, place, name):
-    cells = [("vertex", np.arange(4)[:, None])]
-    values = 2 * RADIUS if "iameter" in name else RADIUS
-    arrays = {name: [values] if place == "cell_data" else values}
-    meshio.Mesh(POSITION, cells, **{place: arrays}).write(tmp_path / "a.vtu")
-    np.testing.assert_allclose(scanfab.read(tmp_path / "a.vtu").radius, RADIUS)
+def test_a_radius_has_many_names(tmp_path, name):
+    path = polydata(tmp_path / "a.vtp", **{name: 2 * RADIUS if "iameter" in name else RADIUS})
+    np.testing.assert_allclose(scanfab.read(path).radius, RADIUS)
 
 
 def test_points_without_a_radius_take_the_users_radius_or_column(tmp_path):
