@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from scanfab.base.typing import FloatArray
+from scanfab.viz.figures.style import rounded_down
 
 # of the picture, pixels
 SIZE = (1200, 900)
@@ -109,12 +110,6 @@ def add_scale(plotter: Any) -> None:
 
     update()
     plotter.camera.AddObserver("ModifiedEvent", update)
-
-
-def rounded_down(value: float) -> float:
-    """1, 2 or 5 times a power of ten, not above the value."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(max(step for step in (power, 2 * power, 5 * power) if step <= value))
 
 
 def _write(plotter: Any, text: str, x: float, y: float, size: int) -> Any:

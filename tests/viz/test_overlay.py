@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scanfab.viz.overlay import BOTTOM, SIZE, TOP, Framing, rounded_down
+from scanfab.viz.figures.style import rounded_down
+from scanfab.viz.overlay import BOTTOM, SIZE, TOP, Framing
 
 UP, LOOK = np.array([0.0, 0.0, 1.0]), np.array([0.3, -1.0, 0.4])
 

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from scanfab.base.errors import SettingsError
+from scanfab.base.typing import FloatArray
 from scanfab.table.curves import short_names
-from scanfab.table.row import total_error
+from scanfab.table.row import column_of, total_error
 from scanfab.viz.figures.figure import Figure
 from scanfab.viz.figures.style import LOOKS, VOID_AXIAL, VOID_UNIT, WIDTH, band, plain
 
@@ -74,38 +74,29 @@ class Ladders(Figure):
         for panel, ladder in zip(panels, PANELS, strict=True):
             _draw(panel, self._steps(ladder), ladder)
         handles, labels = panels[0].get_legend_handles_labels()
-        part.legend(
-            handles,
-            labels,
-            loc="outside upper center",
-            ncols=4,
-            title=f"{_frame(self.data)}bands: one total standard error, of scan and sample together"
-            f"{_missing(self.data)}\nbars: the scan's part; dotted: the choice of the 2017 paper",
-        )
+        part.legend(handles, labels, loc="outside upper center", ncols=4, title=self._note())
         return panels
+
+    def _note(self) -> str:
+        """What was scanned, and what bands, bars and dots are."""
+        lines = ["bands: one total standard error, of scan and sample together"]
+        if np.isnan(_totals(self.data)).any():
+            lines.append("no band where either part is not known")
+        lines.append("bars: the scan's part; dotted: the choice of the 2017 paper")
+        if self.data:
+            source, frame = self.data[0].source, self.data[0].frame
+            name = plain(short_names([source])[source])
+            lines.insert(0, f"{f'{name}, ' if name else ''}frame {frame}")
+        return "\n".join(lines)
 
     def _steps(self, ladder: str) -> list[Any]:
         return [row for row in self.data if row.ladder == ladder]
 
 
-def _frame(rows: Sequence[Any]) -> str:
-    """What was scanned, as a line of its own."""
-    if not rows:
-        return ""
-    name = plain(short_names([rows[0].source])[rows[0].source])
-    return f"{f'{name}, ' if name else ''}frame {rows[0].frame}\n"
-
-
-def _missing(rows: Sequence[Any]) -> str:
-    """That there are steps without a band, as a line of its own."""
-    return "\nno band where either part is not known" if np.isnan(_totals(rows)).any() else ""
-
-
-def _totals(rows: Sequence[Any]) -> npt.NDArray[np.float64]:
+def _totals(rows: Sequence[Any]) -> FloatArray:
     """Total errors of the steps that have a void fabric; NaN where they are not known."""
     known = [row for row in rows if row.alpha_vs_axial is not None]
-    totals = [total_error(row, "alpha_vs_axial") for row in known]
-    return np.array([np.nan if one is None else one for one in totals], np.float64)
+    return column_of([{"total": total_error(row, "alpha_vs_axial")} for row in known], "total")
 
 
 def _draw(panel: Any, rows: Sequence[Any], ladder: str) -> None:
@@ -115,17 +106,11 @@ def _draw(panel: Any, rows: Sequence[Any], ladder: str) -> None:
         steps = [r for r in rows if r.variant == variant and r.alpha_vs_axial is not None]
         values = np.array([row.value for row in steps])
         alphas = 1e3 * np.array([row.alpha_vs_axial for row in steps])
-        band(panel, values, alphas, 1e3 * _totals(steps), LOOKS[variant]["color"])
-        panel.errorbar(
-            values,
-            alphas,
-            yerr=[1e3 * (row.alpha_vs_axial_se or 0.0) for row in steps],
-            label=f"variant {variant}",
-            **LOOKS[variant],
-        )
+        band(panel, values, alphas, 1e3 * _totals(steps), LOOKS[variant])
+        error = [1e3 * (row.alpha_vs_axial_se or 0.0) for row in steps]
+        panel.errorbar(values, alphas, error, label=f"variant {variant}", **LOOKS[variant])
     if paper is not None:
         panel.axvline(paper, color="0.6", linewidth=0.8, linestyle=":")
     if logarithmic:
         panel.set_xscale("log")
-    panel.set_xlabel(label)
-    panel.set_ylabel(VOID_UNIT + VOID_AXIAL)
+    panel.set(xlabel=label, ylabel=VOID_UNIT + VOID_AXIAL)

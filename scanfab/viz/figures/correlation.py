@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,12 +9,12 @@ import numpy as np
 
 from scanfab.base.typing import FloatArray
 from scanfab.table.compare import Comparison, compare_tables
-from scanfab.table.curves import Curve, is_turned
-from scanfab.table.row import Row, number_of
+from scanfab.table.curves import is_turned
+from scanfab.table.row import number_of
 from scanfab.table.table import Table
+from scanfab.viz.figures.curves import ROW
 from scanfab.viz.figures.figure import Figure
 from scanfab.viz.figures.groups import Drawn, Group, group_of, groups_of
-from scanfab.viz.figures.strain_curves import ROW
 from scanfab.viz.figures.style import (
     CONTACT,
     CONTACT_AXIAL,
@@ -48,30 +47,29 @@ class Fit:
     slope: float
     slope_se: float | None
     r2: float | None
-    contact: tuple[float, float]
-    """Smallest and largest contact anisotropy of the fitted frames."""
-    middle: tuple[float, float]
-    """Their mean contact and void anisotropy, which the line goes through."""
+    contact: FloatArray
+    """Smallest and largest contact anisotropy of the fitted frames, shape (2,)."""
+    void: FloatArray
+    """The line's void anisotropy there; it goes through the mean of both, shape (2,)."""
+
+    def __str__(self) -> str:
+        error = "" if self.slope_se is None else rf" $\pm$ {self.slope_se:.3f}"
+        r2 = "" if self.r2 is None else f", $R^2$ = {self.r2:.3f}"
+        return f"{self.slope:.3f}{error}{r2}"
 
 
 def fits_of(comparison: Comparison) -> list[Fit | None]:
     """The line of each source and variant as the comparison's summary has it; None without one."""
-    return [
-        _fit(one, points) for one, points in zip(comparison.summary, comparison.points, strict=True)
-    ]
-
-
-def _fit(summary: Row, points: FloatArray) -> Fit | None:
-    if summary.slope is None:
-        return None
-    middle = points.mean(axis=0)
-    return Fit(
-        slope=summary.slope,
-        slope_se=summary.slope_se,
-        r2=summary.r2,
-        contact=(float(points[:, 0].min()), float(points[:, 0].max())),
-        middle=(float(middle[0]), float(middle[1])),
-    )
+    found: list[Fit | None] = []
+    for one, points in zip(comparison.summary, comparison.points, strict=True):
+        if one.slope is None:
+            found.append(None)
+            continue
+        ends = np.array([points[:, 0].min(), points[:, 0].max()])
+        contact, void = points.mean(axis=0)
+        line = void + one.slope * (ends - contact)
+        found.append(Fit(one.slope, one.slope_se, one.r2, ends, line))
+    return found
 
 
 class Correlation(Figure):
@@ -127,135 +125,85 @@ class Correlation(Figure):
 
     def draw(self, ax: Axes) -> None:
         """With the legend in the panel."""
-        _draw_group(ax, None, group_of(self.groups), self.fits, self.turned, self.in_plane)
+        handles, labels = self._draw_group(ax, group_of(self.groups))
+        ax.legend(handles, labels, title=self._title)
 
     def panels(self, part: Page | SubFigure) -> list[Axes]:
         """A panel for each group, beside it the legend, which has the numbers."""
         panels = part.subplots(len(self.groups), 2, squeeze=False, width_ratios=(3, 2))
         for group, (axes, margin) in zip(self.groups, panels, strict=True):
-            _draw_group(axes, margin, group, self.fits, self.turned, self.in_plane)
+            handles, labels = self._draw_group(axes, group)
             axes.set_title(group.title, loc="left")
+            margin.set_axis_off()
+            place: dict[str, Any] = {"loc": "center left", "borderaxespad": 0, "handlelength": 2.5}
+            margin.legend(handles, labels, title=self._title, **place)
         return [axes for axes, _ in panels]
 
+    @property
+    def _title(self) -> str:
+        return "intensities" if self.turned else f"slope of {VOID} on {CONTACT}, axial"
 
-def _draw_group(
-    axes: Axes,
-    margin: Axes | None,
-    group: Group,
-    fits: Sequence[Fit | None],
-    turned: bool,
-    in_plane: bool,
-) -> None:
-    """
-    The points and lines of one panel.
+    def _draw_group(self, axes: Axes, group: Group) -> tuple[list[Any], list[str]]:
+        """The points and lines of one panel; handles and labels of its legend."""
+        entries = [self._draw_curve(axes, one) for one in group.drawn]
+        if not self.turned:
+            entries += [*self._draw_paper(axes, group), *_errors_entry(group)]
+        contact, void = CONTACT_AXIAL, VOID_AXIAL
+        if self.turned:
+            contact, void = CONTACT_INTENSITY, VOID_INTENSITY
+        axes.set(xlabel=CONTACT_UNIT + contact, ylabel=VOID_UNIT + void)
+        axes.axhline(0, color="0.6", lw=0.6, zorder=0)
+        widen(axes, 1.0)
+        return [handle for handle, _ in entries], [label for _, label in entries]
 
-    The legend stands in the margin, or in the panel itself where there is none.
-    """
-    legend = _Legend()
-    fitted = [] if turned else [fits[one.place] for one in group.drawn]
-    for one in group.drawn:
-        _points(axes, one, None if turned else fits[one.place], legend, turned)
-    _paper(axes, fitted, legend, in_plane)
-    _errors(group, legend, turned)
-    _label(axes, turned)
-    title = "intensities" if turned else f"slope of {VOID} on {CONTACT}, axial"
-    if margin is None:
-        axes.legend(legend.handles, legend.labels, title=title)
-    else:
-        legend.draw(margin, title)
+    def _draw_curve(self, axes: Axes, one: Drawn) -> tuple[Any, str]:
+        """The frames of a curve, with their total errors, and its line."""
+        look = {key: value for key, value in one.look.items() if key != "ls"}
+        style = {"ls": "none", "elinewidth": 0.5, "capsize": 0, "zorder": 2.5, **look}
+        if self.turned:
+            x, y = one.curve.values("alpha_c"), one.curve.values("alpha_vs")
+            return axes.errorbar(1e2 * x, 1e3 * y, **style), one.name
+        x, y = one.curve.values("alpha_c_axial"), one.curve.values("alpha_vs_axial")
+        xerr = _bars(1e2 * one.curve.total_errors("alpha_c_axial"))
+        yerr = _bars(1e3 * one.curve.total_errors("alpha_vs_axial"))
+        points = axes.errorbar(1e2 * x, 1e3 * y, xerr=xerr, yerr=yerr, **style)
+        for bars in points.lines[2]:
+            bars.set_alpha(0.4)
+        fit = self.fits[one.place]
+        if fit is None:
+            return points, f"{one.name}:\nno line"
+        line = {"color": look["color"], "ls": one.look["ls"], "gid": "fit"}
+        (drawn,) = axes.plot(1e2 * fit.contact, 1e3 * fit.void, **line)
+        return (drawn, points), f"{one.name}:\n{fit}"
 
-
-class _Legend:
-    """Lines of a legend that stands in the axes beside the panel."""
-
-    def __init__(self) -> None:
-        self.handles: list[Any] = []
-        self.labels: list[str] = []
-
-    def add(self, handle: Any, label: str) -> None:
-        self.handles.append(handle)
-        self.labels.append(label)
-
-    def draw(self, margin: Axes, title: str) -> None:
-        margin.set_axis_off()
-        margin.legend(
-            self.handles, self.labels, loc="center left", title=title, handlelength=2.5,
-            borderaxespad=0,
-        )  # fmt: skip
-
-
-def _points(axes: Axes, one: Drawn, fit: Fit | None, legend: _Legend, turned: bool) -> None:
-    """The frames of a curve, with their total errors, and its line."""
-    look = {key: value for key, value in one.look.items() if key != "ls"}
-    x, y = _values(one.curve, turned)
-    points = axes.errorbar(
-        1e2 * x,
-        1e3 * y,
-        xerr=None if turned else _bars(1e2 * one.curve.total_errors("alpha_c_axial")),
-        yerr=None if turned else _bars(1e3 * one.curve.total_errors("alpha_vs_axial")),
-        ls="none",
-        elinewidth=0.5,
-        capsize=0,
-        zorder=2.5,
-        **look,
-    )
-    for bars in points.lines[2]:
-        bars.set_alpha(0.4)
-    if fit is None:
-        legend.add(points, one.name if turned else f"{one.name}:\nno line")
-        return
-    ends = np.array(fit.contact)
-    void = fit.middle[1] + fit.slope * (ends - fit.middle[0])
-    (line,) = axes.plot(1e2 * ends, 1e3 * void, color=look["color"], ls=one.look["ls"], gid="fit")
-    legend.add((line, points), f"{one.name}:\n{_spell(fit)}")
-
-
-def _values(curve: Curve, turned: bool) -> tuple[FloatArray, FloatArray]:
-    ending = "" if turned else "_axial"
-    return curve.values(f"alpha_c{ending}"), curve.values(f"alpha_vs{ending}")
+    def _draw_paper(self, axes: Axes, group: Group) -> list[tuple[Any, str]]:
+        """The slope that the paper prints, through the origin, as far as there are contacts."""
+        fits = [fit for one in group.drawn if (fit := self.fits[one.place]) is not None]
+        reach = max((float(fit.contact[1]) for fit in fits), default=0.0)
+        if reach <= 0:
+            return []
+        slope, of = (PAPER_SLOPE_2D, ", 2D") if self.in_plane else (PAPER_SLOPE, "")
+        (line,) = axes.plot([0, 1e2 * reach], [0, 1e3 * slope * reach], "k:", lw=0.9)
+        return [(line, f"2017 paper{of}: {slope:.3f}")]
 
 
 def _bars(error: FloatArray) -> FloatArray | None:
     return np.nan_to_num(error) if np.isfinite(error).any() else None
 
 
-def _paper(axes: Axes, fits: Sequence[Fit | None], legend: _Legend, in_plane: bool) -> None:
-    """The slope that the paper prints, through the origin, as far as there are contacts."""
-    reach = max((fit.contact[1] for fit in fits if fit is not None), default=0.0)
-    slope, of = (PAPER_SLOPE_2D, ", 2D") if in_plane else (PAPER_SLOPE, "")
-    if reach > 0:
-        (line,) = axes.plot([0, 1e2 * reach], [0, 1e3 * slope * reach], "k:", lw=0.9)
-        legend.add(line, f"2017 paper{of}: {slope:.3f}")
-
-
-def _errors(group: Group, legend: _Legend, turned: bool) -> None:
+def _errors_entry(group: Group) -> list[tuple[Any, str]]:
+    """What the bars are: drawn as a cross, as a line alone would look like the axis."""
     from matplotlib.lines import Line2D
 
-    if turned:
-        return
     curves = [one.curve for one in group.drawn]
     void, contact = (
         any(np.isfinite(curve.total_errors(name)).any() for curve in curves)
         for name in ("alpha_vs_axial", "alpha_c_axial")
     )
-    # the bars themselves: a line without a point would look like the axis through zero
-    shape = {(True, True): "+", (True, False): "|", (False, True): "_"}.get((void, contact))
-    if shape is not None:
-        alone = contact and any(curve.contact_alone for curve in curves)
-        which = f",\nof {CONTACT} as if contacts\nwere independent" if alone else ""
-        bars = Line2D([], [], color="0.4", marker=shape, markersize=11, mew=0.6, ls="none")
-        legend.add(bars, f"one total standard error{which}")
-
-
-def _label(axes: Axes, turned: bool) -> None:
-    axes.set_xlabel(CONTACT_UNIT + (CONTACT_INTENSITY if turned else CONTACT_AXIAL))
-    axes.set_ylabel(VOID_UNIT + (VOID_INTENSITY if turned else VOID_AXIAL))
-    axes.axhline(0, color="0.6", lw=0.6, zorder=0)
-    widen(axes, 1.0)
-
-
-def _spell(fit: Fit) -> str:
-    """The slope as the table has it, with its error and R² where they exist."""
-    error = "" if fit.slope_se is None else rf" $\pm$ {fit.slope_se:.3f}"
-    r2 = "" if fit.r2 is None else f", $R^2$ = {fit.r2:.3f}"
-    return f"{fit.slope:.3f}{error}{r2}"
+    if not (void or contact):
+        return []
+    shape = "+" if void and contact else "|" if void else "_"
+    alone = contact and any(curve.contact_alone for curve in curves)
+    which = f",\nof {CONTACT} as if contacts\nwere independent" if alone else ""
+    bars = Line2D([], [], color="0.4", marker=shape, markersize=11, mew=0.6, ls="none")
+    return [(bars, f"one total standard error{which}")]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -10,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scanfab.base.typing import FloatArray
-from scanfab.table.row import number_of, total_error
-from scanfab.viz.figures.figure import FrameFigure
+from scanfab.table.row import column_of, total_error
+from scanfab.viz.figures.figure import OnePanel
 from scanfab.viz.figures.style import (
     COLUMN,
     FRAME_LOOKS,
@@ -23,8 +22,6 @@ from scanfab.viz.figures.style import (
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Page
-    from matplotlib.figure import SubFigure
 
     from scanfab.viz.scanned_frames import ScannedFrame
 
@@ -50,7 +47,7 @@ class CutoffCurve:
     """alpha_vs_axial as the contacts predict it; NaN where they do not."""
 
 
-class Cutoffs(FrameFigure):
+class Cutoffs(OnePanel):
     """
     Void anisotropy over the cut-off, along the lines of the table; a curve for each frame.
 
@@ -90,45 +87,26 @@ class Cutoffs(FrameFigure):
             f"total standard errors."
         )
 
-    def draw(self, ax: Axes) -> None:
-        """With the legend in the panel."""
-        draw_curves(ax, self.curves)
-        ax.legend(title=_note(self.curves))
+    @property
+    def note(self) -> str:
+        """What bands and bars are."""
+        hole = any((np.isfinite(one.alpha) & ~np.isfinite(one.total)).any() for one in self.curves)
+        without = "\n(none where either is not known)" if hole else ""
+        return f"bands: one total standard error, scan and sample{without}\nbars: the scan's part"
 
-    def panels(self, part: Page | SubFigure) -> list[Axes]:
-        """With the legend above the panel."""
-        axes = part.subplots()
-        draw_curves(axes, self.curves)
-        part.legend(loc="outside upper left", title=_note(self.curves))
-        return [axes]
-
-
-def draw_curves(axes: Axes, curves: Sequence[CutoffCurve]) -> None:
-    """A curve for each frame, with the cut-off of the table."""
-    for curve, look in zip(curves, FRAME_LOOKS, strict=False):
-        band(axes, curve.cutoff, 1e3 * curve.alpha, 1e3 * curve.total, look["color"])
-        axes.errorbar(
-            curve.cutoff,
-            1e3 * curve.alpha,
-            yerr=1e3 * np.nan_to_num(curve.error),
-            label=curve.title,
-            elinewidth=0.9,
-            **look,
-        )
-        axes.plot(curve.cutoff, 1e3 * curve.predicted, color=look["color"], lw=1.2, ls="-.")
-    if any(np.isfinite(curve.predicted).any() for curve in curves):
-        axes.plot([], [], color="0.3", lw=1.2, ls="-.", label="predicted from near contacts")
-    axes.axvline(curves[-1].chosen, color="k", lw=0.9, ls=":", label="cut-off of the table")
-    axes.axhline(0, color="0.6", lw=0.6, zorder=0)
-    axes.set(xlabel=r"cut-off / $r_{min}$", ylabel=VOID_UNIT + VOID_AXIAL)
-    widen(axes, 1.0)
-
-
-def _note(curves: Sequence[CutoffCurve]) -> str:
-    """What bands and bars are."""
-    hole = any((np.isfinite(one.alpha) & ~np.isfinite(one.total)).any() for one in curves)
-    without = "\n(none where either is not known)" if hole else ""
-    return f"bands: one total standard error, scan and sample{without}\nbars: the scan's part"
+    def paint(self, ax: Axes) -> None:
+        """A curve for each frame, and the cut-off of the table."""
+        for one, look in zip(self.curves, FRAME_LOOKS, strict=False):
+            band(ax, one.cutoff, 1e3 * one.alpha, 1e3 * one.total, look)
+            error = 1e3 * np.nan_to_num(one.error)
+            ax.errorbar(one.cutoff, 1e3 * one.alpha, error, label=one.title, elinewidth=0.9, **look)
+            ax.plot(one.cutoff, 1e3 * one.predicted, color=look["color"], lw=1.2, ls="-.")
+        if any(np.isfinite(one.predicted).any() for one in self.curves):
+            ax.plot([], [], color="0.3", lw=1.2, ls="-.", label="predicted from near contacts")
+        ax.axvline(self.curves[-1].chosen, color="k", lw=0.9, ls=":", label="cut-off of the table")
+        ax.axhline(0, color="0.6", lw=0.6, zorder=0)
+        ax.set(xlabel=r"cut-off / $r_{min}$", ylabel=VOID_UNIT + VOID_AXIAL)
+        widen(ax, 1.0)
 
 
 def _curve_of(frame: ScannedFrame) -> CutoffCurve:
@@ -143,17 +121,14 @@ def _curve_of(frame: ScannedFrame) -> CutoffCurve:
     each = [
         VariantColumns(measured, VARIANTS[frame.variant], place) for place in range(len(lengths))
     ]
-    rows = [one.columns() for one in each]
-
-    def column(values: Sequence[float | None]) -> FloatArray:
-        return np.array([np.nan if one is None else one for one in values], np.float64)
-
+    rows = [{**one.columns(), "predicted": one.predicted_alpha} for one in each]
+    totals = [{"total": total_error(row, "alpha_vs_axial")} for row in rows]
     return CutoffCurve(
         frame.title,
-        cutoff=column([number_of(row, "cutoff") for row in rows]) / smallest,
-        alpha=column([number_of(row, "alpha_vs_axial") for row in rows]),
-        error=column([number_of(row, "alpha_vs_axial_se") for row in rows]),
-        total=column([total_error(row, "alpha_vs_axial") for row in rows]),
+        cutoff=column_of(rows, "cutoff") / smallest,
+        alpha=column_of(rows, "alpha_vs_axial"),
+        error=column_of(rows, "alpha_vs_axial_se"),
+        total=column_of(totals, "total"),
         chosen=chosen / smallest,
-        predicted=column([one.predicted_alpha for one in each]),
+        predicted=column_of(rows, "predicted"),
     )

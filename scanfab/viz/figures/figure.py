@@ -155,6 +155,31 @@ class FrameFigure(Figure):
         return found
 
 
+class OnePanel(FrameFigure):
+    """A figure of frames in one panel, which needs ``paint``; on a page its legend is above it."""
+
+    @property
+    def note(self) -> str:
+        """What stands above the legend."""
+        return ""
+
+    def paint(self, ax: Axes) -> None:
+        """Draw on one Axes, without the legend."""
+        raise NotImplementedError
+
+    def draw(self, ax: Axes) -> None:
+        """With the legend in the panel."""
+        self.paint(ax)
+        ax.legend(title=self.note or None)
+
+    def panels(self, part: Page | SubFigure) -> list[Axes]:
+        """One panel, with the legend above it."""
+        axes = part.subplots()
+        self.paint(axes)
+        part.legend(loc="outside upper left", title=self.note or None)
+        return [axes]
+
+
 def one_of(which: str | None, known: tuple[str, ...]) -> tuple[str, ...]:
     """The panels to draw: all, or the one that the option ``of`` chooses."""
     if which is None:

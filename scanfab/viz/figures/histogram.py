@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.distribution import direction_points
-from scanfab.viz.figures.figure import FrameFigure
+from scanfab.viz.figures.figure import OnePanel
 from scanfab.viz.figures.style import COLUMN, FRAME_LOOKS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Page
-    from matplotlib.figure import SubFigure
 
     from scanfab.viz.scanned_frames import ScannedFrame
 
@@ -34,7 +31,7 @@ class LengthSample:
     cutoff: float
 
 
-class Histogram(FrameFigure):
+class Histogram(OnePanel):
     """
     Lengths of the void segments, with the cut-off; an outline for each frame.
 
@@ -70,40 +67,21 @@ class Histogram(FrameFigure):
             f"Lengths of the void segments, {self.data.name}; those below the cut-off are dropped."
         )
 
-    def draw(self, ax: Axes) -> None:
-        """With the legend in the panel."""
-        _outlines(ax, self.samples)
-        ax.legend()
-
-    def panels(self, part: Page | SubFigure) -> list[Axes]:
-        """With the legend above the panel."""
-        axes = part.subplots()
-        _outlines(axes, self.samples)
-        part.legend(loc="outside upper left", ncols=1)
-        return [axes]
-
-
-def _outlines(axes: Axes, samples: Sequence[LengthSample]) -> None:
-    """Density of the lengths; what is dropped is grey."""
-    longest = max(float(np.quantile(sample.length, 0.999)) for sample in samples)
-    edges = np.linspace(0, longest, 41)
-    for sample, look in zip(samples, FRAME_LOOKS, strict=False):
-        density, _ = np.histogram(sample.length, edges, density=True)
-        dropped = np.mean(sample.length < sample.cutoff)
-        axes.stairs(
-            density,
-            edges,
-            color=look["color"],
-            ls=look["ls"],
-            lw=1.1,
-            baseline=None,
-            label=f"{sample.title}:\n{100 * dropped:.0f} % dropped",
-        )
-    cutoff = samples[-1].cutoff
-    axes.axvspan(0, cutoff, color="0.92", zorder=0)
-    axes.axvline(cutoff, color="k", lw=0.9, ls=":", label="cut-off")
-    axes.set(yscale="log", xlim=(0, longest), ylabel="probability density")
-    axes.set(xlabel=r"void segment length / $r_{min}$")
+    def paint(self, ax: Axes) -> None:
+        """Density of the lengths; those below the cut-off are on grey."""
+        longest = max(float(np.quantile(sample.length, 0.999)) for sample in self.samples)
+        edges = np.linspace(0, longest, 41)
+        for sample, look in zip(self.samples, FRAME_LOOKS, strict=False):
+            density, _ = np.histogram(sample.length, edges, density=True)
+            dropped = 100 * np.mean(sample.length < sample.cutoff)
+            style: dict[str, Any] = {"color": look["color"], "ls": look["ls"], "lw": 1.1}
+            label = f"{sample.title}:\n{dropped:.0f} % dropped"
+            ax.stairs(density, edges, baseline=None, label=label, **style)
+        cutoff = self.samples[-1].cutoff
+        ax.axvspan(0, cutoff, color="0.92", zorder=0)
+        ax.axvline(cutoff, color="k", lw=0.9, ls=":", label="cut-off")
+        ax.set(yscale="log", xlim=(0, longest), ylabel="probability density")
+        ax.set(xlabel=r"void segment length / $r_{min}$")
 
 
 def _lengths_of(frame: ScannedFrame) -> LengthSample:

@@ -165,7 +165,7 @@ class Map(Figure):
             place, label = _places(rows)
             value = one.scale * _numbers(rows, one.column)
             error = one.scale * _errors(rows, one)
-            band(axes, place, value, error, look["color"])
+            band(axes, place, value, error, look)
             line = {name: look[name] for name in ("color", "marker", "ls")}
             axes.plot(place, value, label=_frame(rows[0]), **line)
             outer = np.array([bool(row.get("at_surface")) for row in rows])

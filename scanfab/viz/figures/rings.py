@@ -52,30 +52,21 @@ class Rings:
 
 
 def rings_of(frame: ScannedFrame, angles: Sequence[float]) -> Rings:
-    space = frame.space
-    rings = {phi: _azimuths(phi) for phi in angles}
+    """What the figure rose shows of a frame, at some polar angles in degrees."""
+    space, normals = frame.space, frame.normals
+    # at the equator θ and θ + 180° are one line
+    rings = {phi: np.arange(0.0, 180.0 if phi == 90 else 360.0, THETA_STEP) for phi in angles}
     axes = np.concatenate([_vectors(theta, phi, space) for phi, theta in rings.items()])
     value, error = _mean_lengths(frame, axes)
-    place, voids = 0, []
-    for phi, theta in rings.items():
-        here = slice(place, place + len(theta))
-        place += len(theta)
-        voids.append(_around(phi, theta, value[here], error[here]))
-    normals = frame.normals
+    ends, voids = np.cumsum([len(theta) for theta in rings.values()])[:-1], []
+    parts = zip(rings.items(), np.split(value, ends), np.split(error, ends), strict=True)
+    for (phi, theta), own, own_error in parts:
+        if phi == 90:
+            theta = np.concatenate([theta, theta + 180.0])
+            own, own_error = np.tile(own, 2), np.tile(own_error, 2)
+        voids.append(Ring(phi, theta, own, own_error))
     contacts = [contact_ring(normals, phi, space) for phi in angles] if len(normals) else []
     return Rings(frame.title, voids, contacts, space)
-
-
-def _azimuths(phi: float) -> FloatArray:
-    """At the equator θ and θ + 180° are one line."""
-    return np.arange(0.0, 180.0 if phi == 90 else 360.0, THETA_STEP)
-
-
-def _around(phi: float, theta: FloatArray, value: FloatArray, error: FloatArray) -> Ring:
-    if phi == 90:
-        theta = np.concatenate([theta, theta + 180.0])
-        value, error = np.tile(value, 2), np.tile(error, 2)
-    return Ring(phi, theta, value, error)
 
 
 def _vectors(theta: FloatArray, phi: float, space: Space) -> FloatArray:
@@ -98,11 +89,10 @@ def _mean_lengths(frame: ScannedFrame, axes: FloatArray) -> tuple[FloatArray, Fl
     # as many lines as give the wanted number of segments
     found = measured.sums.kept(variant)[1].mean()
     spacing = plan.spacing * plan.space.apart(found * REPLICATES / SEGMENTS)
+    weights = np.full(len(axes), 1 / len(axes))
     rose = scan_gaps(
         measured.solids,
-        DirectionRule(
-            "rose", axes, np.full(len(axes), 1 / len(axes)), None, turned=False, space=plan.space
-        ),
+        DirectionRule("rose", axes, weights, None, turned=False, space=plan.space),
         spacing=float(spacing),
         cutoffs=[plan.cutoff],
         blocks=measured.blocks,

@@ -5,49 +5,38 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from scanfab.base.errors import SettingsError
-from scanfab.base.space import SPACE, Space
+from scanfab.base.space import Space
 from scanfab.viz.figures.figure import FrameFigure, one_of
 from scanfab.viz.figures.rings import Ring, Rings, rings_of
-from scanfab.viz.figures.style import COLOURS, DIRECTIONAL, WIDTH
+from scanfab.viz.figures.style import COLOURS, DIRECTIONAL, WIDTH, rounded_down
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Page
     from matplotlib.figure import SubFigure
-    from matplotlib.projections.polar import PolarAxes
 
     from scanfab.viz.scanned_frames import ScannedFrames
 
 
 POLAR_ANGLES = (90.0, 60.0, 30.0)
 EQUATOR = (90.0,)
-RINGS: tuple[dict[str, Any], ...] = (
+LOOKS: tuple[dict[str, Any], ...] = (
     {"color": COLOURS["vermilion"], "marker": "^", "ls": "-"},
     {"color": COLOURS["blue"], "marker": "o", "ls": "--"},
     {"color": COLOURS["green"], "marker": "D", "ls": "-."},
     {"color": COLOURS["purple"], "marker": "s", "ls": ":"},
 )
-USUAL_RINGS = dict(zip((90.0, 60.0, 30.0), RINGS, strict=False))
-# of the legend
+# columns of the legend
 MOST_COLUMNS = 3
 # azimuths of smooth curves, degrees
 AROUND = np.linspace(0, 360, 181)
-
-
-def _are_angles(angles: Sequence[float]) -> bool:
-    return 0 < len(angles) <= len(RINGS) and all(0 < angle <= 90 for angle in angles)
-
-
-def _no_angles(where: str, example: object, found: object) -> SettingsError:
-    return SettingsError(
-        f"{where}: expected one to four polar angles above 0 and up to 90 degrees, such as "
-        f"{example}, found {found!r}"
-    )
+# whose errors the bars of a panel are
+BARS = {"voids": "of the scan", "contacts": "of a count of contacts"}
 
 
 class Rose(FrameFigure):
@@ -98,25 +87,31 @@ class Rose(FrameFigure):
         of: str | None = None,
     ) -> None:
         super().__init__(data, frame)
-        if not _are_angles(angles):
-            raise _no_angles("angles", POLAR_ANGLES, angles)
-        self.angles = tuple(angles)
+        self.angles = _checked_angles(angles, "angles", f"{POLAR_ANGLES}, found {angles!r}")
         self.of = one_of(of, tuple(DIRECTIONAL))
 
     @classmethod
     def parse(cls, argument: str) -> dict[str, Any]:
         """Polar angles such as ``30,60,90``."""
         words = argument.split(",")
-        angles = [float(word) for word in words if re.fullmatch(r"\d+(\.\d+)?", word)]
-        if len(angles) < len(words) or not _are_angles(angles):
-            raise _no_angles("figure", "rose:30,60,90", f"rose:{argument}")
-        return {"angles": tuple(angles)}
+        are_numbers = all(re.fullmatch(r"\d+(\.\d+)?", word) for word in words)
+        angles = [float(word) for word in words] if are_numbers else []
+        example = f"rose:30,60,90, found {f'rose:{argument}'!r}"
+        return {"angles": _checked_angles(angles, "figure", example)}
 
     @cached_property
     def rings(self) -> list[Rings]:
         """What is drawn of each frame."""
-        frames = self.chosen(self.data.frames)
-        return [rings_of(one, _angles_in(one.space, self.angles)) for one in frames]
+        found = []
+        for frame in self.chosen(self.data.frames):
+            if frame.space.is_plane and self.angles not in (POLAR_ANGLES, EQUATOR):
+                angles = ",".join(f"{one:g}" for one in self.angles)
+                raise SettingsError(
+                    f"figure: discs in {frame.space} have no polar angles, found {angles}: choose "
+                    f"`figure=rose`"
+                )
+            found.append(rings_of(frame, EQUATOR if frame.space.is_plane else self.angles))
+        return found
 
     @property
     def space(self) -> Space:
@@ -124,14 +119,17 @@ class Rose(FrameFigure):
         return self.rings[0].space
 
     @property
-    def drawn_angles(self) -> tuple[float, ...]:
-        """Of discs one ring, in their plane."""
-        return _angles_in(self.space, self.angles)
+    def looks(self) -> dict[float, dict[str, Any]]:
+        """The look of each polar angle; a usual angle has the same look in all figures."""
+        angles = EQUATOR if self.space.is_plane else self.angles
+        usual = {phi: LOOKS[k] for k, phi in enumerate(POLAR_ANGLES) if phi in angles}
+        free = iter([look for look in reversed(LOOKS) if look not in usual.values()])
+        return {phi: usual.get(phi) or next(free) for phi in dict.fromkeys(angles)}
 
     @property
     def size(self) -> tuple[float, float]:
         """A row for each frame, and the legend."""
-        entries = -(-len(self.drawn_angles) // MOST_COLUMNS)
+        entries = -(-len(self.looks) // MOST_COLUMNS)
         return WIDTH, 3.0 * len(self.rings) + 0.7 + 0.2 * entries
 
     @property
@@ -144,63 +142,72 @@ class Rose(FrameFigure):
 
     def draw(self, ax: Axes) -> None:
         """Of the last frame, unless another one is asked for."""
-        rings, looks = self.rings[-1], _ring_looks(self.drawn_angles)
-        shown = getattr(rings, self.of[0])
-        reach = max(map(_reach, shown), default=0.02)
-        _draw_rings(cast("PolarAxes", ax), shown, reach, looks)
-        ax.set_title(f"{DIRECTIONAL[self.of[0]]}\n{rings.title}")
-        circles, middle = _named_circles(reach)
-        ax.legend(
-            *_entries(looks, self.space),
-            loc="upper center",
-            bbox_to_anchor=(0.5, -0.08),
-            title=f"{_over(self.space)}, relative to isotropy\ncircles: {circles} about {middle}",
-        )
+        reach = self._draw_column([ax], self.rings[-1:], self.of[0], "center")
+        handles, labels = self._entries()
+        below: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.08)}
+        ax.legend(handles, labels, title=self._note({self.of[0]: reach}), **below)
 
     def panels(self, part: Page | SubFigure) -> list[Axes]:
-        """A row for each frame, a column for each of both."""
-        return draw_roses(part, self.rings, self.drawn_angles, self.of, self.space)
+        """A row for each frame, a column for each of both, and the legend below."""
+        shape, polar = (len(self.rings), len(self.of)), {"projection": "polar"}
+        panels = part.subplots(*shape, squeeze=False, subplot_kw=polar)
+        reaches = {
+            kind: self._draw_column(column, self.rings, kind, "left")
+            for kind, column in zip(self.of, panels.T, strict=True)
+        }
+        handles, labels = self._entries()
+        columns, note = min(len(labels), MOST_COLUMNS), self._note(reaches)
+        part.legend(handles, labels, ncols=columns, title=note, loc="outside lower center")
+        found: list[Axes] = panels.ravel().tolist()
+        return found
 
-
-def _angles_in(space: Space, angles: tuple[float, ...]) -> tuple[float, ...]:
-    """The polar angles to draw; of discs none but that of their plane."""
-    if not space.is_plane:
-        return angles
-    if angles not in (POLAR_ANGLES, EQUATOR):
-        raise SettingsError(
-            f"figure: discs in {space} have no polar angles, found "
-            f"{','.join(f'{one:g}' for one in angles)}: choose `figure=rose`"
-        )
-    return EQUATOR
-
-
-def draw_roses(
-    part: Page | SubFigure,
-    frames: Sequence[Rings],
-    angles: Sequence[float],
-    of: Sequence[str] = tuple(DIRECTIONAL),
-    space: Space = SPACE,
-) -> list[Axes]:
-    """Rings on an empty Figure or SubFigure; the panels of a column share their scale."""
-    looks = _ring_looks(angles)
-    panels = part.subplots(len(frames), len(of), squeeze=False, subplot_kw={"projection": "polar"})
-    reaches = []
-    for column, kind in enumerate(of):
+    def _draw_column(
+        self, column: Sequence[Axes], frames: Sequence[Rings], kind: str, loc: Any
+    ) -> float:
+        """Panels with one scale; how far it reaches from 1."""
         reach = max((_reach(ring) for one in frames for ring in getattr(one, kind)), default=0.02)
-        reaches.append(reach)
-        for axes, one in zip(panels[:, column], frames, strict=True):
-            _draw_rings(axes, getattr(one, kind), reach, looks)
-            axes.set_title(f"{DIRECTIONAL[kind]}\n{one.title}", loc="left")
-    _ring_legend(part, looks, dict(zip(of, reaches, strict=True)), space)
-    found: list[Axes] = panels.ravel().tolist()
-    return found
+        for axes, one in zip(column, frames, strict=True):
+            _draw_rings(axes, getattr(one, kind), reach, self.looks)
+            axes.set_title(f"{DIRECTIONAL[kind]}\n{one.title}", loc=loc)
+        return reach
+
+    def _entries(self) -> tuple[list[Any], list[str]]:
+        """Handles and labels of the legend."""
+        from matplotlib.lines import Line2D
+
+        handles = [Line2D([], [], **look) for look in self.looks.values()]
+        if self.space.is_plane:
+            return handles, [f"in {self.space}"]
+        return handles, [rf"polar angle $\varphi={phi:g}^\circ$" for phi in self.looks]
+
+    def _note(self, reaches: Mapping[str, float]) -> str:
+        """What the angle of the panels is, and what circles and bars are."""
+        over = "over the azimuth $\\theta$ from x"
+        if self.space.is_plane:
+            first, second = ("xyz"[k] for k in sorted(self.space.along))
+            over = f"over the angle from {first} towards {second}"
+        sides = dict(zip(reaches, (" (left)", " (right)"), strict=False))
+        if len(reaches) == 1:
+            sides = dict.fromkeys(reaches, "")
+        circles = []
+        for kind, reach in reaches.items():
+            middle, values = _scale(reach)
+            named = ", ".join(f"{one:g}" for one in values)
+            circles.append(f"{named} about {middle:.3g}{sides[kind]}")
+        errors = ", ".join(f"{BARS[kind]}{sides[kind]}" for kind in reaches)
+        return (
+            f"{over}, relative to isotropy\ncircles: {', '.join(circles)}\n"
+            f"bars: one standard error, {errors}"
+        )
 
 
-def _ring_looks(angles: Sequence[float]) -> dict[float, dict[str, Any]]:
-    """Of each polar angle; the usual ones keep theirs, whichever others there are."""
-    usual = {phi: look for phi, look in USUAL_RINGS.items() if phi in angles}
-    free = iter([look for look in reversed(RINGS) if look not in usual.values()])
-    return {phi: usual.get(phi) or next(free) for phi in dict.fromkeys(angles)}
+def _checked_angles(angles: Sequence[float], where: str, example: str) -> tuple[float, ...]:
+    if not 0 < len(angles) <= len(LOOKS) or not all(0 < angle <= 90 for angle in angles):
+        raise SettingsError(
+            f"{where}: expected one to four polar angles above 0 and up to 90 degrees, such as "
+            f"{example}"
+        )
+    return tuple(angles)
 
 
 def _reach(ring: Ring) -> float:
@@ -211,20 +218,18 @@ def _reach(ring: Ring) -> float:
 
 
 def _draw_rings(
-    axes: PolarAxes, rings: Sequence[Ring], reach: float, looks: Mapping[float, dict[str, Any]]
+    axes: Axes, rings: Sequence[Ring], reach: float, looks: Mapping[float, dict[str, Any]]
 ) -> None:
     for ring in rings:
         look = looks[ring.phi]
         theta, value, error = ring.theta, ring.value, ring.error
         if ring.curve is None:
-            # closed, as the last point is followed by the first
+            # closed: the last point is followed by the first
             theta, value, error = (np.append(a, a[:1]) for a in (theta, value, error))
-        line = look["ls"] if ring.curve is None else "none"
-        axes.errorbar(
-            np.radians(theta), value, yerr=error, elinewidth=0.5, capsize=0, **{**look, "ls": line}
-        )
-        if ring.curve is not None:
+        else:
             axes.plot(np.radians(AROUND), ring.curve(AROUND), color=look["color"], ls=look["ls"])
+            look = {**look, "ls": "none"}
+        axes.errorbar(np.radians(theta), value, error, elinewidth=0.5, capsize=0, **look)
     axes.plot(np.radians(AROUND), np.ones_like(AROUND), color="0.4", lw=0.6)
     middle, circles = _scale(reach)
     axes.set_ylim(middle, 1.0 + 1.1 * reach)
@@ -235,67 +240,7 @@ def _draw_rings(
     axes.spines["polar"].set_color("0.7")
 
 
-def _round_down(value: float) -> float:
-    """1, 2 or 5 times a power of ten, not above the value."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(max(step for step in (power, 2 * power, 5 * power) if step <= value))
-
-
 def _scale(reach: float) -> tuple[float, list[float]]:
     """The value in the middle of a rose, and those of its circles."""
-    middle = max(0.0, 1.0 - 2.0 * reach)
-    step = _round_down(reach)
+    middle, step = max(0.0, 1.0 - 2.0 * reach), rounded_down(reach)
     return middle, [one for one in (1.0 - step, 1.0, 1.0 + step) if one > middle]
-
-
-def _named_circles(reach: float) -> tuple[str, str]:
-    middle, circles = _scale(reach)
-    return ", ".join(f"{one:g}" for one in circles), f"{middle:.3g}"
-
-
-def _over(space: Space) -> str:
-    """What the angle of the panels is."""
-    if not space.is_plane:
-        return "over the azimuth $\\theta$ from x"
-    first, second = ("xyz"[k] for k in sorted(space.along))
-    return f"over the angle from {first} towards {second}"
-
-
-def _entries(looks: Mapping[float, dict[str, Any]], space: Space) -> tuple[list[Any], list[str]]:
-    """Handles and labels of the legend."""
-    from matplotlib.lines import Line2D
-
-    handles = [Line2D([], [], **look) for look in looks.values()]
-    if space.is_plane:
-        return handles, [f"in {space}"]
-    return handles, [rf"polar angle $\varphi={phi:g}^\circ$" for phi in looks]
-
-
-def _ring_legend(
-    part: Page | SubFigure,
-    looks: Mapping[float, dict[str, Any]],
-    reaches: Mapping[str, float],
-    space: Space,
-) -> None:
-    """Below the panels, with what circles and bars are."""
-    sides = {"voids": "left", "contacts": "right"} if len(reaches) > 1 else {}
-    bars = {"voids": "of the scan", "contacts": "of a count of contacts"}
-    beside = {kind: f" ({sides[kind]})" if sides else "" for kind in reaches}
-    scales = [
-        "{} about {}{}".format(*_named_circles(reach), beside[kind])
-        for kind, reach in reaches.items()
-    ]
-    errors = ", ".join(f"{bars[kind]}{beside[kind]}" for kind in reaches)
-    note = (
-        f"{_over(space)}, relative to isotropy\n"
-        f"circles: {', '.join(scales)}\n"
-        f"bars: one standard error, {errors}"
-    )
-    handles, labels = _entries(looks, space)
-    part.legend(
-        handles,
-        labels,
-        loc="outside lower center",
-        ncols=min(len(labels), MOST_COLUMNS),
-        title=note,
-    )

@@ -126,6 +126,12 @@ def save_figure(figure: Figure, path: Path, dpi: int = DPI) -> None:
         part.write_bytes(drawn)
 
 
+def rounded_down(value: float) -> float:
+    """1, 2 or 5 times a power of ten, not above the value."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(max(step for step in (power, 2 * power, 5 * power) if step <= value))
+
+
 def plain(text: str) -> str:
     """A text from a file as a label: a dollar would start a formula."""
     return text.replace("$", r"\$")
@@ -146,8 +152,9 @@ def letter(panels: Iterable[Axes], first: int = 0) -> None:
         axes.set_title(f"({chr(ord('a') + place)}) {title}".rstrip(), loc="left")
 
 
-def band(axes: Axes, x: FloatArray, y: FloatArray, error: FloatArray, colour: Any) -> None:
+def band(axes: Axes, x: FloatArray, y: FloatArray, error: FloatArray, look: Any) -> None:
     """Shade y ± error; about a point that has no neighbours a bar, as an area needs two."""
+    colour = look["color"]
     known = np.isfinite(x + y + error)
     if not known.any():
         return

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from scanfab.base.errors import SettingsError
 from scanfab.io.series import Series
@@ -15,20 +16,24 @@ from scanfab.pipeline.repeat import reopen, restored_settings
 from scanfab.pipeline.settings import Settings
 from scanfab.pipeline.values import Length, Vector
 from scanfab.table.row import number_of
-from scanfab.viz.figures.page import make_figures
+from scanfab.viz.figures.figure import Figure
+from scanfab.viz.figures.page import drawn_page, make_figures
+from scanfab.viz.figures.style import figure_bytes
 from scanfab.viz.frame_view import Look, look_at
 from scanfab.viz.report.inputs import Input
-from scanfab.viz.report.page import Picture, Shown, view_data
-from scanfab.viz.report.pictures import picture_of
+from scanfab.viz.report.page import Picture, view_data
 from scanfab.viz.scanned_frames import ScannedFrames
 
+# CSS pixels an inch, and those of pictures that are pixels
+PIXELS, DPI = 96, 130
+KINDS = {"svg": "image/svg+xml", "png": "image/png"}
 # segments of a scan that takes about half a minute: pictures that would need more are rougher
 MOST_SEGMENTS = 3e8
 
 
-def show_frames(one: Input) -> Shown:
+def show_frames(one: Input) -> dict[str, Any]:
     """
-    Read the source of a table again.
+    Read the source of a table again: its view, the sample in numbers, and pictures.
 
     Raises
     ------
@@ -40,14 +45,24 @@ def show_frames(one: Input) -> Shown:
     asked = manifest["settings"]
     series, settings = reopen(asked), restored_settings(asked)
     if settings.cutoffs:
-        settings = replace(settings, cutoffs=(), cutoff=_shown_cutoff(one, settings))
+        # the one whose rows are reported
+        cutoff = settings.cutoff if one.cutoff is None else Length(one.cutoff)
+        settings = replace(settings, cutoffs=(), cutoff=cutoff)
     look = look_at(series, replace(settings, variants="c"), one.last_frame)
-    return Shown(
-        view=view_data(look.scene, look.axis),
-        view_title=_title(one, look.number),
-        facts=_facts(look, settings),
-        pictures=_pictures(one, series, settings),
-    )
+    return {
+        "view": view_data(look.scene, look.axis),
+        "view_title": _title(one, look.number),
+        "facts": _facts(look, settings),
+        "pictures": _pictures(one, series, settings),
+    }
+
+
+def picture_of(figure: Figure, kind: Literal["svg", "png"]) -> Picture:
+    """A figure with its caption, as lines or as pixels."""
+    with drawn_page([figure]) as page:
+        data = figure_bytes(page, kind, DPI)
+    url = f"data:{KINDS[kind]};base64,{base64.b64encode(data).decode('ascii')}"
+    return Picture(url, figure.caption, round(PIXELS * figure.size[0]))
 
 
 def _check_inputs(manifest: Mapping[str, Any]) -> None:
@@ -56,11 +71,6 @@ def _check_inputs(manifest: Mapping[str, Any]) -> None:
         path = Path(str(one.get("path")))
         if path.exists() and path.stat().st_size != one.get("size"):
             raise SettingsError(f"{path} has changed since the table was computed")
-
-
-def _shown_cutoff(one: Input, settings: Settings) -> Length:
-    """Of several cut-offs that whose rows are reported."""
-    return settings.cutoff if one.cutoff is None else Length(one.cutoff)
 
 
 def _title(one: Input, frame: int) -> str:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -50,51 +50,6 @@ class Part:
     title: str = ""
 
 
-@dataclass(frozen=True)
-class Shown:
-    """What the source of a table shows."""
-
-    view: Mapping[str, Any]
-    """From :func:`view_data`."""
-    view_title: str
-    facts: Sequence[tuple[str, str]]
-    """The sample in numbers: what, and how much."""
-    pictures: Sequence[Picture]
-
-
-@dataclass(frozen=True)
-class Section:
-    """What is known of one computation."""
-
-    title: str
-    missing: str = ""
-    """Why nothing is known."""
-    command: str = ""
-    settings: Sequence[tuple[str, str, str]] = ()
-    versions: Sequence[tuple[str, str]] = ()
-    inputs: Part = field(default_factory=lambda: Part((), ()))
-    shown: Shown | None = None
-    no_view: str = ""
-    """Why nothing is shown."""
-
-
-@dataclass(frozen=True)
-class Content:
-    """All that the page tells."""
-
-    title: str
-    author: str
-    date: str
-    summary: Sequence[str]
-    results: Sequence[Part]
-    """For each source; the first column names the lines."""
-    pictures: Sequence[Picture]
-    warnings: Sequence[str]
-    notes: Sequence[str]
-    sections: Sequence[Section]
-    frames: Part
-
-
 def check_page_file(path: Path) -> None:
     """SettingsError if no page can be written to a file of this name."""
     if path.suffix.lower() not in (".html", ".htm"):
@@ -108,8 +63,13 @@ def save_page(path: Path, page: str) -> None:
         part.write_text(page, encoding="utf-8", errors="backslashreplace")
 
 
-def render_page(content: Content) -> str:
-    """The page."""
+def render_page(**content: Any) -> str:
+    """
+    The page, made of what the template ``page.html`` names.
+
+    ``sections`` are dictionaries, one for each table; of ``shown`` there is one for each table
+    whose source could be read again.
+    """
     import jinja2
 
     # escapes everything, and JSON in scripts too (the filter tojson)
@@ -156,25 +116,18 @@ def view_data(scene: Scene, axis: npt.ArrayLike) -> dict[str, Any]:
     scale = 1000.0 / size
     up = np.asarray(axis, dtype=np.float64)
     turn = _upright(up, scene.space)
-    kinds = np.where(grains.in_window[shown], 0, 1)
-    kinds[grains.rattler[shown]] = 2
-    names = ["grains in the RV", "grains outside", "rattlers"]
-    if scene.window is None:
-        names[1] = "grains"
-    numbers = np.column_stack([position @ turn.T, radius])[nearest] * scale
-    looks = np.column_stack([kinds] if grains.body is None else [kinds, grains.shade[shown]])
+    kinds = np.where(grains.rattler, 2, np.where(grains.in_window, 0, 1))[shown]
+    names = ["grains in the RV", "grains outside" if scene.window else "grains", "rattlers"]
+    shades = [] if grains.body is None else [grains.shade[shown]]
+    numbers = np.rint(np.column_stack([position @ turn.T, radius]) * scale)
+    spheres = np.column_stack([numbers, kinds, *shades]).astype(int)[nearest]
     return {
         "kinds": [
             {"name": name, "colour": colour, "pale": pale}
             for name, (colour, pale) in zip(names, KIND_COLOURS, strict=True)
         ],
-        "spheres": [
-            [*values, *look]
-            for values, look in zip(
-                np.rint(numbers).astype(int).tolist(), looks[nearest].tolist(), strict=True
-            )
-        ],
-        "shades": [1.0] if grains.body is None else SHADES,
+        "spheres": spheres.tolist(),
+        "shades": SHADES if shades else [1.0],
         "axes": _axes(up, turn),
         "rv": None if scene.window is None else round(scene.window.reach * scale),
         "window": None if scene.window is None else _window_data(scene.window, turn, scale),

@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import UTC, date, datetime
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -17,20 +18,16 @@ from scanfab.pipeline.repeat import repeat_command
 from scanfab.table.compare import Comparison, compare_tables
 from scanfab.viz.figures.page import make_figures
 from scanfab.viz.report.caveats import caveats_of
-from scanfab.viz.report.frames import show_frames
+from scanfab.viz.report.frames import picture_of, show_frames
 from scanfab.viz.report.inputs import Input, read_inputs
-from scanfab.viz.report.page import (
-    Content,
-    Picture,
-    Section,
-    Shown,
-    check_page_file,
-    render_page,
-    save_page,
+from scanfab.viz.report.page import Picture, check_page_file, render_page, save_page
+from scanfab.viz.report.tables import (
+    frame_table,
+    input_table,
+    overview,
+    results_tables,
+    settings_table,
 )
-from scanfab.viz.report.pictures import picture_of
-from scanfab.viz.report.settings_table import settings_table
-from scanfab.viz.report.tables import frame_table, input_table, overview, results_tables
 
 
 @dataclass(frozen=True)
@@ -75,14 +72,6 @@ class Report:
         """
         check_page_file(Path(path))
         save_page(Path(path), self.page)
-
-
-@dataclass
-class _Heard:
-    """What the makers of a table were told, and what is told now; each text once."""
-
-    warnings: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
 
 
 def make_report(
@@ -139,28 +128,30 @@ def make_report(
             "expected files of tables, beside which manifests say what made them: save a table, or "
             "compute it by scanfab.compute_file, and name its file"
         )
-    heard = _Heard()
-    with _listening(heard, tell=True):
+    with _Listening() as heard:
         inputs = read_inputs([Path(one) for one in named], cutoff, labels)
         rows = [row for one in inputs for row in one.rows]
         comparison = compare_tables(rows)
         pictures = _table_pictures(rows, comparison)
+    for one in heard.caught:
+        warnings.warn(one.message, one.category, stacklevel=2)
     sections = [_section(one, heard) for one in inputs]
+    shown = [one["shown"]["pictures"] for one in sections if one["shown"]]
     asked = [one.manifest["settings"] for one in inputs if one.manifest is not None]
-    content = Content(
+    doubts = [*heard.warnings, *map(as_options, caveats_of(rows, asked))]
+    page = render_page(
         title=title or _usual_title(rows),
         author=author,
         date=(today or datetime.now(UTC).astimezone().date()).isoformat(),
         summary=[overview(one.path, one.rows) for one in inputs],
         results=results_tables(comparison.summary, rows),
-        pictures=[*pictures, *_frame_pictures(sections)],
-        warnings=list(dict.fromkeys([*heard.warnings, *map(as_options, caveats_of(rows, asked))])),
+        pictures=[*pictures, *chain.from_iterable(shown)],
+        warnings=list(dict.fromkeys(doubts)),
         notes=list(dict.fromkeys(heard.notes)),
         sections=sections,
         frames=frame_table(rows),
     )
-    found = any(row["alpha_vs_axial"] is not None for row in rows)
-    return Report(render_page(content), found)
+    return Report(page, any(row["alpha_vs_axial"] is not None for row in rows))
 
 
 def _usual_title(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -178,64 +169,52 @@ def _table_pictures(rows: Sequence[Mapping[str, Any]], comparison: Comparison) -
     return [picture_of(one, "svg") for one in figures]
 
 
-def _frame_pictures(sections: Sequence[Section]) -> list[Picture]:
-    return [picture for one in sections if one.shown for picture in one.shown.pictures]
-
-
-def _section(one: Input, heard: _Heard) -> Section:
+def _section(one: Input, heard: _Listening) -> dict[str, Any]:
     """What the manifest says, and what the source shows; ``heard`` gets the warnings."""
+    section: dict[str, Any] = {"title": str(one.path), "missing": "", "shown": None, "no_view": ""}
     if one.manifest is None:
         missing = (
             f"There is no {one.path.name}.manifest.json beside {one.path}: settings, versions and "
             f"inputs are not known. scanfab compute writes it with -o."
         )
-        return Section(title=str(one.path), missing=missing)
-    asked = one.manifest["settings"]
+        return {**section, "missing": missing}
+    asked, found = one.manifest["settings"], one.manifest.get("settings_file")
     heard.warnings += map(str, one.manifest.get("warnings") or [])
     heard.notes += map(str, one.manifest.get("notes") or [])
-    shown: Shown | None = None
-    no_view = ""
     if one.rows:
         try:
-            with _listening(heard):
-                shown = show_frames(one)
+            with heard:
+                section["shown"] = show_frames(one)
         except (ScanfabError, OSError) as error:
-            no_view = f"The view is left out: {as_options(error)}."
-    return Section(
-        title=str(one.path),
-        command=repeat_command(asked, one.path.name, _overridden(one.manifest)),
-        settings=settings_table(asked),
-        versions=[(str(k), str(v)) for k, v in (one.manifest.get("versions") or {}).items()],
-        inputs=input_table(one.manifest),
-        no_view=no_view,
-        shown=shown,
-    )
+            section["no_view"] = f"The view is left out: {as_options(error)}."
+    # options of the settings file beside the dumps that the command line has overridden
+    overridden = found.get("not_used", []) if isinstance(found, dict) else []
+    return {
+        **section,
+        "command": repeat_command(asked, one.path.name, [str(name) for name in overridden]),
+        "settings": settings_table(asked),
+        "versions": [(str(k), str(v)) for k, v in (one.manifest.get("versions") or {}).items()],
+        "inputs": input_table(one.manifest),
+    }
 
 
-def _overridden(manifest: Mapping[str, Any]) -> list[str]:
-    """Options of the settings file beside the dumps that the command line has overridden."""
-    found = manifest.get("settings_file")
-    return [str(name) for name in found.get("not_used", [])] if isinstance(found, dict) else []
+class _Listening:
+    """Collects what is told in its blocks, as warnings and as notes."""
 
+    def __init__(self) -> None:
+        self.warnings: list[str] = []
+        self.notes: list[str] = []
 
-class _listening(warnings.catch_warnings):  # noqa: N801
-    """Collect the texts of warnings and notes; ``tell`` them too."""
-
-    def __init__(self, heard: _Heard, tell: bool = False) -> None:
-        super().__init__(record=True)
-        self.heard, self.tell = heard, tell
-
-    def __enter__(self) -> Any:
-        self.caught = super().__enter__()
+    def __enter__(self) -> _Listening:
+        self._block = warnings.catch_warnings(record=True)
+        self.caught: list[Any] = self._block.__enter__()
         warnings.simplefilter("always")
-        return self.caught
+        return self
 
     def __exit__(self, *details: Any) -> None:
-        for one in self.caught or []:
+        self._block.__exit__(*details)
+        for one in self.caught:
             if issubclass(one.category, ScanfabWarning):
-                self.heard.warnings.append(as_options(str(one.message)))
+                self.warnings.append(as_options(str(one.message)))
             elif issubclass(one.category, ScanfabNote):
-                self.heard.notes.append(as_options(str(one.message)))
-        super().__exit__(*details)
-        for one in self.caught or [] if self.tell else []:
-            warnings.warn(one.message, one.category, stacklevel=3)
+                self.notes.append(as_options(str(one.message)))

@@ -7,6 +7,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from scanfab.base.option import flag_of
+from scanfab.pipeline.options import MEANINGS
+from scanfab.pipeline.repeat import spelt_settings
 from scanfab.table.curves import STRAINS, is_turned, spelt_strain, strain_column
 from scanfab.table.row import Row as TableRow
 from scanfab.table.row import number_of, numbers_of, total_error, variant_of
@@ -264,3 +267,25 @@ def input_table(manifest: Mapping[str, Any]) -> Part:
     more = len(files) - len(lines)
     note = f"and {more} more, in the manifest" if more else ""
     return Part(["file", "bytes", "SHA-256"], lines, note)
+
+
+def settings_table(asked: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    """Name, value and meaning of each setting of a manifest."""
+    spelt = spelt_settings(asked)
+    return [
+        (
+            flag_of(name)[2:],
+            _plain(spelt.get(name, "auto" if name in ("spacing", "directions") else "-")),
+            MEANINGS.get(name, ""),
+        )
+        for name in asked
+        if name not in ("scanfab", "sources")
+    ]
+
+
+def _plain(value: Any) -> str:
+    if isinstance(value, tuple):
+        return ", ".join(map(str, value))
+    if isinstance(value, dict):
+        return ", ".join(f"{key}={item}" for key, item in value.items())
+    return str(value)

@@ -10,7 +10,8 @@ from scanfab.base.errors import SettingsError
 from scanfab.pipeline.settings import Settings
 from scanfab.viz.figures.page import drawn_page, find_figure
 from scanfab.viz.figures.rings import Ring, Rings
-from scanfab.viz.figures.rose import Rose, _round_down
+from scanfab.viz.figures.rose import Rose
+from scanfab.viz.figures.style import rounded_down
 from scanfab.viz.scanned_frames import ScannedFrames
 from tests.helpers.figures import frame_figure
 
@@ -94,9 +95,9 @@ def test_no_bar_of_a_rose_is_cut_and_its_circles_are_in_the_legend(rose_of, erro
 
 
 def test_ticks_are_round():
-    assert _round_down(0.0731) == pytest.approx(0.05)
-    assert _round_down(0.72) == pytest.approx(0.5)
-    assert _round_down(0.1) == pytest.approx(0.1)
+    assert rounded_down(0.0731) == pytest.approx(0.05)
+    assert rounded_down(0.72) == pytest.approx(0.5)
+    assert rounded_down(0.1) == pytest.approx(0.1)
 
 
 @pytest.mark.parametrize("text", ["rose:", "rose:0", "rose:91", "rose:x", "rose:1,2,3,4,5"])

@@ -42,7 +42,6 @@ def test_a_biased_rule_is_told_with_its_bias():
             {"alpha_vs_axial_se": 0.012, "alpha_vs_axial_sample_se": 0.016},
             "(0.02 beside 0.05; scan 0.012, sample 0.016). It takes more grains, and more lines",
         ),
-        ({"grains": 20}, "sample 0.0054, guessed from the number of grains)"),
     ],
 )
 def test_what_is_wrong_is_told(values, part):
@@ -79,10 +78,6 @@ def test_a_column_that_is_not_there_is_no_single_replicate():
     (text,) = caveats_of(chosen, [])
     assert "no column alpha_vs_axial_se" in text
     assert "replicate" not in text
-
-
-def test_the_sample_s_own_error_counts_more_than_the_rule_of_thumb():
-    assert caveats_of(rows(grains=20, alpha_vs_axial_sample_se=1e-4), []) == []
 
 
 def test_two_frames_are_too_few_for_a_line():

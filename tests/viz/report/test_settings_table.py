@@ -10,7 +10,7 @@ from pathlib import Path
 from scanfab.io.sources import READING, read_series
 from scanfab.pipeline.options import MEANINGS
 from scanfab.pipeline.settings import Settings
-from scanfab.viz.report.settings_table import settings_table
+from scanfab.viz.report.tables import settings_table
 
 
 def test_every_setting_has_a_meaning():
