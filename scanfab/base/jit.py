@@ -11,6 +11,7 @@ checksum, in a folder that is named by a hash of all kernels.
 from __future__ import annotations
 
 import hashlib
+import operator
 import os
 import pickle
 import sys
@@ -24,9 +25,13 @@ import llvmlite
 import numba
 import numpy as np
 from llvmlite.binding import get_host_cpu_name
+from numba.core import ir, types
 from numba.core.caching import NullCache
-from numba.core.compiler import CompileResult
+from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
+from numba.core.compiler_machinery import FunctionPass, register_pass
+from numba.core.ir_utils import get_definition, guard
 from numba.core.serialize import dumps
+from numba.core.untyped_passes import InlineInlinables, IRProcessing
 from numba.misc import appdirs
 
 from scanfab.base.files import whole_file
@@ -56,9 +61,69 @@ DIGEST_SIZE = 32
 _announcements: list[Callable[[], object]] = []
 
 
+@register_pass(mutates_CFG=False, analysis_only=False)  # type: ignore[no-untyped-call]
+class _KnownFlags(FunctionPass):
+    """
+    Answer ``is None`` and ``is not None`` of arguments, and of fields of their NamedTuples.
+
+    Their types say it. Numba then compiles nothing of the branch that is not taken; by itself it
+    does so only where an argument is None.
+    """
+
+    _name = "scanfab_known_flags"
+
+    def __init__(self) -> None:
+        super().__init__()  # type: ignore[no-untyped-call]
+
+    def run_pass(self, state: Any) -> bool:
+        definitions = state.func_ir._definitions
+        for block in state.func_ir.blocks.values():
+            for line in block.find_insts(ir.Assign):
+                asked = line.value
+                if not isinstance(asked, ir.Expr) or asked.op != "binop":
+                    continue
+                if asked.fn not in (operator.is_, operator.is_not):
+                    continue
+                kind, none = (_type_of(state, one) for one in (asked.lhs, asked.rhs))
+                if kind is not None and none is types.none:
+                    same = isinstance(kind, types.NoneType)
+                    answer = same == (asked.fn is operator.is_)
+                    line.value = ir.Const(answer, asked.loc)  # type: ignore[no-untyped-call]
+                    names = definitions[line.target.name]
+                    names[names.index(asked)] = line.value
+        return True
+
+
+def _type_of(state: Any, variable: Any) -> Any:
+    """The type of an argument, of a field of one or of None; else None."""
+    found = guard(get_definition, state.func_ir, variable)  # type: ignore[no-untyped-call]
+    if isinstance(found, ir.Arg):
+        return state.args[found.index]
+    if isinstance(found, ir.Const) and found.value is None:
+        return types.none
+    if isinstance(found, ir.Expr) and found.op == "getattr":
+        whole = _type_of(state, found.value)
+        if isinstance(whole, types.NamedTuple) and found.attr in whole.fields:
+            return whole.types[whole.fields.index(found.attr)]
+    return None
+
+
+class _Compiler(CompilerBase):
+    """Numba's own passes, and flags before the branches that they choose."""
+
+    def define_pipelines(self) -> list[Any]:
+        define: Any = DefaultPassBuilder.define_nopython_pipeline
+        passes = define(self.state)
+        passes.add_pass_after(_KnownFlags, IRProcessing)
+        # also for those of functions that have become part of this one
+        passes.add_pass_after(_KnownFlags, InlineInlinables)
+        passes.finalize()
+        return [passes]
+
+
 def kernel(function: Function, **options: Any) -> Function:
     """Compile a function that is called from Python."""
-    compiled = njit(nogil=True, **options)(function)
+    compiled = njit(nogil=True, pipeline_class=_Compiler, **options)(function)
     if compiled is not function:  # else Numba is switched off
         compiled._cache = _Cache(function)
     same: Function = compiled
