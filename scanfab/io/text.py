@@ -13,6 +13,7 @@ import os
 import re
 import sys
 from collections.abc import Collection
+from io import BytesIO
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -34,8 +35,8 @@ NUMBER = re.compile(
 LIKE_COMPRESSED = (b"\x1f\x8b", b"x\x01", b"x^", b"x\x9c", b"x\xda", b"(\xb5")
 # how many times its size a text takes in memory: the text, its numbers, and the packing's columns
 IN_MEMORY = 6.0
-# bytes that are handled at a time, and characters of a word or line that a message shows
-PIECE, SHOWN = 1 << 18, 60
+# bytes of a word or line that a message shows
+SHOWN = 80
 # in a process that was forked behind polars, the threads of polars are gone, and it would wait for
 # them without end: only the worker, a new process, can use it there
 _forked_behind_polars: list[bool] = []
@@ -43,6 +44,10 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(
         after_in_child=lambda: _forked_behind_polars.append("polars" in sys.modules)
     )
+
+
+class CutError(ReadError):
+    """A frame ends before all that its header promises, as if the file was cut."""
 
 
 class Layout(NamedTuple):
@@ -106,7 +111,7 @@ def read_rows(
     ------
     ReadError
         If there are not ``count`` rows, a row has more or fewer words than there are names, or a
-        word is no number; names the line.
+        word is no number; names the line. :class:`CutError` if the end of the rows is missing.
 
     Warns
     -----
@@ -123,17 +128,20 @@ def read_rows(
     >>> found["id"].tolist(), found["r"].tolist()
     ([1, 2], [0.5, 0.25])
     """
-    rows, line, has_end = _trimmed(rows, layout.line)
-    layout = layout._replace(line=line)
+    # tabs may be separators, and empty words stand between them
+    edge = None if layout.separator == " " else b" \n"
+    rows = rows.replace(b"\r\n", b"\n")
+    body = rows.lstrip(edge)
+    layout = layout._replace(line=layout.line + rows.count(b"\n", 0, len(rows) - len(body)))
+    has_end = not body or body.rstrip(b" \t").endswith(b"\n")
+    rows = body.rstrip(edge) + b"\n" if body else body
     found = rows.count(b"\n")
     if count is not None and found != count:
         step = "" if snapshot.step is None else f", step {snapshot.step}"
-        raise ReadError(
+        raise (CutError if found < count or not has_end else ReadError)(
             f"{snapshot.path}{step}: the header counts {count} {what}, found {found}: the "
             f"file is incomplete or damaged"
         )
-    if not has_end:
-        warn_of_end(snapshot.path)
     if not rows:
         kinds = {name: np.int64 if name in layout.whole else np.float64 for name in layout.names}
         return {name: np.zeros(0, kind) for name, kind in kinds.items()}
@@ -142,25 +150,16 @@ def read_rows(
     else:
         columns = columns_of("", rows, layout)
     if columns is None:
-        raise _bad_line(snapshot, rows, layout)
+        raise (ReadError if has_end else CutError)(_bad_line(snapshot, rows, layout))
+    if not has_end:
+        warn_of_end(snapshot.path)
     return columns
 
 
-def _trimmed(rows: bytes, line: int) -> tuple[bytes, int, bool]:
-    """The rows without empty lines around them, the first one's line, and whether the last ends."""
-    rows = rows.replace(b"\r\n", b"\n")
-    first, last = len(rows) - len(rows.lstrip()), len(rows.rstrip())
-    if not last:
-        return b"", line, True
-    start, stop = rows.rfind(b"\n", 0, first) + 1, rows.find(b"\n", last) + 1
-    line += rows.count(b"\n", 0, start)
-    return (rows[start:stop], line, True) if stop else (rows[start:] + b"\n", line, False)
-
-
 def warn_of_end(path: Path) -> None:
-    """Warn that the last line has no end; ReadError if the file may still be being written."""
+    """Warn that the last line has no end; CutError if the file may still be being written."""
     if grows():
-        raise ReadError(f"{path}: the last line has no end: the file is still being written")
+        raise CutError(f"{path}: the last line has no end: the file is still being written")
     warn(f"{path}: the last line has no end: if the file was cut, rows or digits may be missing")
 
 
@@ -172,10 +171,9 @@ def columns_of(_path: str, rows: bytes, layout: Layout) -> Columns | None:
     rows = _regular(rows, layout)
     # with a decimal comma a point may stand for thousands, which only words tell
     found = None if layout.comma else _parsed(rows, layout, by_words=False)
-    if found is None:
-        rows = _stripped(rows) if layout.separator == " " else rows
-        found = _parsed(rows, layout, by_words=True)
-    return found
+    if found is not None:
+        return found
+    return _parsed(_stripped(rows) if layout.separator == " " else rows, layout, by_words=True)
 
 
 def _regular(rows: bytes, layout: Layout) -> bytes:
@@ -256,29 +254,26 @@ def _numbers(words: Any, comma: bool, is_whole: bool) -> Any:
     return words
 
 
-def _bad_line(snapshot: Snapshot, rows: bytes, layout: Layout) -> ReadError:
-    """The error for the first row that is not as it should be: each word is looked at."""
+def _bad_line(snapshot: Snapshot, rows: bytes, layout: Layout) -> str:
+    """What is wrong with the first row that is not as it should be: each word is looked at."""
     width, above = len(layout.names), 0
-    if snapshot.start:
-        with open(plain(snapshot.path), "rb") as stream:
-            parts = iter(lambda: stream.read(min(PIECE, snapshot.start - stream.tell())), b"")
-            above = sum(part.count(b"\n") for part in parts)
+    with open(plain(snapshot.path), "rb") if snapshot.start else BytesIO() as stream:
+        while stream.tell() < snapshot.start and stream.readline():
+            above += 1
     for number, row in enumerate(rows.split(b"\n")[:-1], start=above + layout.line):
-        where = f"{snapshot.path}, line {number}: "
+        where = f"{snapshot.path}, line {number}: expected"
         words = words_of(row.decode("utf-8", "replace"), layout.separator)
         if len(words) == width + 1 and not words[-1]:
             words.pop()
         if len(words) != width or row.count(b'"') % 2:
-            shown = spelt(row[:SHOWN])
-            return ReadError(f"{where}expected {width} columns, found {len(words)}: {shown}")
+            return f"{where} {width} columns, found {len(words)}: {spelt(row)}"
         for name, word in zip(layout.names, words, strict=True):
-            wrong = not is_number(word, layout.comma) or (layout.comma and "." in word)
-            if wrong and name not in (*layout.text, *layout.optional):
+            is_sound = is_number(word, layout.comma) and not (layout.comma and "." in word)
+            if not is_sound and name not in (*layout.text, *layout.optional):
                 comma = " with a decimal comma" * layout.comma
-                found = repr(word.strip()[:SHOWN]) if word.strip() else "nothing"
-                expected = f"expected a number{comma} in the column {name}"
-                return ReadError(f"{where}{expected}, found {found}")
-    return ReadError(f"{snapshot.path}: cannot be read as a table of {width} columns")
+                found = spelt(word.encode()) if word.strip() else "nothing"
+                return f"{where} a number{comma} in the column {name}, found {found}"
+    return f"{snapshot.path}: cannot be read as a table of {width} columns"
 
 
 def words_of(line: str, separator: str) -> list[str]:
@@ -296,9 +291,9 @@ def is_number(word: str, comma: bool = False) -> bool:
     return NUMBER.match(word.replace(",", ".", 1) if comma else word) is not None
 
 
-def spelt(line: bytes) -> str:
-    """A line as messages show it."""
-    return repr(line[:80].decode("utf-8", "replace").strip())
+def spelt(text: bytes) -> str:
+    """A word or a line as messages show it."""
+    return repr(text[:SHOWN].decode("utf-8", "replace").strip())
 
 
 def text_of(snapshot: Snapshot) -> bytes:

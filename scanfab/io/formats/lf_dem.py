@@ -8,8 +8,6 @@ from pathlib import Path
 import numpy as np
 
 from scanfab.base.errors import ReadError, warn
-from scanfab.io.columns import whole_numbers
-from scanfab.io.contacts import join_ids
 from scanfab.io.files import first_bytes
 from scanfab.io.formats import shared
 from scanfab.io.reader import FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
@@ -50,14 +48,8 @@ class LfDemReader(shared.GrainsOnly):
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """One behind the other; their time is the strain."""
-        if self.kind(path) == "contacts":
-            return shared.marked_frames(path, FRAME)
-        count, width = int(_sizes(path)[0]), _width(_legend(path))
-
-        def lack(frame: bytes) -> str | None:
-            return shared.lack_of_rows(frame.partition(b"\n")[2], count, width)
-
-        return shared.marked_frames(path, FRAME, lack=lack)
+        check = None if self.kind(path) == "contacts" else self.table
+        return shared.marked_frames(path, FRAME, check)
 
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
         """Columns by their titles; the images above and below are shifted along x."""
@@ -86,9 +78,9 @@ class LfDemReader(shared.GrainsOnly):
         columns, _ = _columns(snapshot, needed)
         is_contact = columns[needed[2]] > 0
         columns = {title: values[is_contact] for title, values in columns.items()}
-        ids = np.column_stack([whole_numbers(path, columns[title]) for title in PAIR])
+        ends = [columns[title] for title in PAIR]
         if not {NORMAL, PUSH, TANGENTIAL} <= columns.keys():
-            return join_ids(path, grains, ids, None, walls=False)
+            return shared.join_pairs(path, grains, ends, None)
         push = columns[PUSH][:, None]
         if len(push) and OF_SIGNED_PUSH not in columns and np.all(push >= 0):
             warn(
@@ -99,7 +91,7 @@ class LfDemReader(shared.GrainsOnly):
         # which points to particle 2, and the tangential part as it is
         with np.errstate(over="ignore", invalid="ignore"):
             force = push * columns[NORMAL] - columns[TANGENTIAL]
-        return join_ids(path, grains, ids, shared.finite_forces(path, force), walls=False)
+        return shared.join_pairs(path, grains, ends, force)
 
 
 def _legend(path: Path) -> dict[str, range]:

@@ -14,8 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from scanfab.base.errors import ReadError
-from scanfab.io.columns import grain_table, whole_numbers
-from scanfab.io.contacts import join_ids
+from scanfab.io.columns import grain_table
 from scanfab.io.files import bare_name, first_bytes
 from scanfab.io.formats import shared
 from scanfab.io.reader import Carries, FileKind, GrainTable, JoinedContacts, ReadOptions, Snapshot
@@ -27,18 +26,13 @@ PLANE = "x y vx vy radius angle omega species"
 SPACE = "x y z vx vy vz radius q1 q2 q3 wx wy wz species"
 LAYOUTS = {6: Layout(tuple(PLANE.split()), line=2), 8: Layout(tuple(SPACE.split()), line=2)}
 # these lines: the number of grains, the time, and bounds
-FRAMES = {
-    width: re.compile(
-        rb"(?m)^\d{1,15}[ \t]+(\S+)(?:[ \t]+[-+.\deEinfa]+){%d}[ \t]*\r?\n" % (width - 2)
-    )
-    for width in LAYOUTS
-}
+FRAME = rb"(?m)^\d{1,15}[ \t]+(\S+)(?:[ \t]+[-+.\deEinfa]+){%d}[ \t]*\r?\n"
+FRAMES = {width: re.compile(FRAME % (width - 2)) for width in LAYOUTS}
 # time, both rows, contact point, overlaps, normal and tangential force, normal, tangent
-FSTAT = "t i j x y z delta deltat fn ft nx ny nz tx ty tz"
-FSTAT_HEAD = re.compile(
-    rb"#[ \t]+\S+[ \t]+[01]\s+#(?:[ \t]+\S+){6}\s+#(?:[ \t]+\S+){6,7}[ \t]*\r?\n"
-)
-FSTAT_FRAME = re.compile(rb"#[ \t]+(\S+)[ \t]+[01][ \t]*\r?\n")
+PAIRS = "t i j x y z delta deltat fn ft nx ny nz tx ty tz"
+FSTAT = re.compile(rb"#[ \t]+(\S+)[ \t]+[01][ \t]*\r?\n")
+# two more lines stand above the contacts of a frame
+FSTAT_HEAD = re.compile(FSTAT.pattern + rb"#(?:[ \t]+\S+){6}\s+#(?:[ \t]+\S+){6,7}[ \t]*\r?\n")
 RESTART = re.compile(rb"(?:restart_version|MercuryDPM)[ \t]+[\d.]+")
 TIME = re.compile(rb"^(?:timeStep|dt) \S+ (?:time|t) (\S+)", re.MULTILINE)
 DOMAIN = re.compile(rb"(?im)^xmin (\S+) xmax (\S+) ymin (\S+) ymax (\S+) zmin (\S+) zmax (\S+)")
@@ -71,14 +65,11 @@ class MercuryReader(shared.GrainsOnly):
     def recognises(self, path: Path) -> bool:
         """A restart by its first word, contacts by three lines, grains by the line above them."""
         head = first_bytes(path, shared.HEADER_BYTES)
-        first, second = (line.split() for line in (*head.split(b"\n", 2), b"")[:2])
-        if RESTART.match(head) or FSTAT_HEAD.match(head):
-            return True
-        if len(first) not in FRAMES or not FRAMES[len(first)].match(head):
-            return False
+        second = head.partition(b"\n")[2].partition(b"\n")[0].split()
         # below an empty frame there is another one, or nothing
-        is_empty = int(first[0]) == 0 and ".data" in bare_name(path)
-        return is_empty or len(second) == len(LAYOUTS[len(first)].names)
+        is_data = len(second) in (8, 14) or ".data" in bare_name(path)
+        known = (RESTART, FSTAT_HEAD, *(FRAMES.values() if is_data else ()))
+        return any(one.match(head) for one in known)
 
     def kind(self, path: Path) -> FileKind:
         """Contacts are in ``.fstat`` files."""
@@ -88,18 +79,12 @@ class MercuryReader(shared.GrainsOnly):
     def snapshots(self, path: Path) -> list[Snapshot]:
         """Frames one behind the other, with their times; a restart is one."""
         head = first_bytes(path, shared.HEADER_BYTES)
-        if RESTART.match(head):
-            found = TIME.search(head)
-            return [Snapshot(path, time=found and shared.numbers(f"{path}: time", found[1], 1)[0])]
         if FSTAT_HEAD.match(head):
-            return shared.marked_frames(path, FSTAT_FRAME)
-        width = _width(head)
-
-        def lack(frame: bytes) -> str | None:
-            line, _, rows = frame.partition(b"\n")
-            return shared.lack_of_rows(rows, int(line.split()[0]), len(LAYOUTS[width].names))
-
-        return shared.marked_frames(path, FRAMES[width], lack=lack)
+            return shared.marked_frames(path, FSTAT)
+        if not RESTART.match(head):
+            return shared.marked_frames(path, FRAMES[6 if FRAMES[6].match(head) else 8], self.table)
+        time = TIME.search(head)
+        return [Snapshot(path, time=time and shared.numbers(f"{path}: time", time[1], 1)[0])]
 
     def carries(self, path: Path) -> Carries:
         """A restart has its periodic boundaries; the bounds in ``.data`` may repeat or not."""
@@ -115,7 +100,8 @@ class MercuryReader(shared.GrainsOnly):
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
         """The rows of ``.data``; nothing is known to repeat."""
         path, (line, _, rows) = snapshot.path, text_of(snapshot).partition(b"\n")
-        where, width = f"{path}: number of grains, time and bounds above a frame", _width(line)
+        where = f"{path}: number of grains, time and bounds above a frame"
+        width = 6 if len(line.split()) == 6 else 8
         count, _, *bounds = shared.numbers(where, line, width)
         columns = read_rows(snapshot, rows, LAYOUTS[width], count=int(count), what="grains")
         low, high = np.reshape(bounds, (2, -1))
@@ -133,61 +119,44 @@ class MercuryReader(shared.GrainsOnly):
         The normal points from the second to the first grain, on which normal and tangential force
         act. That pairs are listed from both sides does no harm.
         """
-        path, data = snapshot.path, text_of(snapshot)
-        head = FSTAT_HEAD.match(data)
-        if head is None:
-            raise ReadError(f"{path}: contacts are read from .fstat files with whole headers")
-        layout = Layout(tuple(FSTAT.split()), line=4, whole="ij")
-        columns = read_rows(snapshot, data[head.end() :], layout, what="contacts")
-        pairs = np.column_stack([whole_numbers(path, columns[name]) for name in "ij"])
+        rows = text_of(snapshot).split(b"\n", 3)[-1]
+        layout = Layout(tuple(PAIRS.split()), line=4, whole="ij")
+        columns = read_rows(snapshot, rows, layout, what="contacts")
         normal, tangent = (np.column_stack([columns[f"{v}{x}"] for x in "xyz"]) for v in "nt")
         with np.errstate(over="ignore", invalid="ignore"):
             force = -(columns["fn"][:, None] * normal + columns["ft"][:, None] * tangent)
         # rows of the grain file, whatever ids these have
         numbered = grains._replace(id=np.arange(len(grains.radius)))
-        force = shared.finite_forces(path, force)
-        return join_ids(path, numbered, pairs, force, walls="negative")
-
-
-def _width(text: bytes) -> int:
-    """The number of words in the line above a frame."""
-    return 6 if len(text.partition(b"\n")[0].split()) == 6 else 8
+        return shared.join_pairs(snapshot.path, numbered, (columns["i"], columns["j"]), force)
 
 
 def _restart(path: Path, data: bytes, options: ReadOptions) -> GrainTable:
     """The particles, and the interactions, whose force acts on the first grain."""
-    if not data.endswith(b"\n"):
-        raise ReadError(f"{path}: the last line has no end: the file is incomplete")
     rows = _section(path, data, b"Particles")
     is_old = any(OLD_SPHERE.match(row) for row in rows[:1])
     columns = _columns(path, rows, OLD_SPHERE if is_old else SPHERE, "spheres")
     columns = {"id": np.arange(len(rows)), "species": np.zeros(len(rows)), **columns}
-    told = options.cell is not None or options.beside is not None
-    grains = grain_table(path, columns, None if told else _cell(path, data), options)
+    is_told = options.cell is not None or options.beside is not None
+    grains = grain_table(path, columns, None if is_told else _cell(path, data), options)
     if is_old or not rows:
         return grains
     rows = _section(path, data, b"Interactions")
     found = _columns(path, rows, PAIR, "interactions of particleIds with a force")
-    pairs = np.column_stack([whole_numbers(path, found[end]) for end in "ij"])
+    first, second, *force = found.values()
     # walls have numbers from 0, too
-    pairs[[b" particleWallIds " in row for row in rows], 1] = -1
-    force = -np.column_stack([found[name] for name in ("fx", "fy", "fz")])
-    force = shared.finite_forces(path, force)
-    joined = join_ids(path, grains, pairs, force, walls="negative")
+    second[[b" particleWallIds " in row for row in rows]] = -1
+    joined = shared.join_pairs(path, grains, (first, second), -np.column_stack(force))
     return grains._replace(contacts=joined.contacts, wall_contacts=joined.wall_contacts)
 
 
 def _section(path: Path, data: bytes, name: bytes) -> list[bytes]:
     """The rows below the line that counts them."""
-    what = name.decode()
     head = re.search(rb"^" + name + rb"[ \t]+(\d{1,12})[ \t]*\r?\n", data, re.MULTILINE)
-    if head is None:
-        raise ReadError(f"{path}: expected a line '{what} N': the file is incomplete or damaged")
-    *rows, behind = data[head.end() :].split(b"\n", int(head[1]))
+    count, below = (int(head[1]), data[head.end() :]) if head else (1, b"")
+    *rows, behind = below.split(b"\n", count)
     is_more = bool(rows) and behind.split(b" ", 1)[0] == rows[-1].split(b" ", 1)[0]
-    if len(rows) < int(head[1]) or is_more:
-        found = f"more: {spelt(behind)}" if is_more else f"{len(rows)}: the file is incomplete"
-        raise ReadError(f"{path}: expected {head[1].decode()} {what}, found {found}")
+    if len(rows) != count or is_more:
+        raise ReadError(f"{path}: expected a line '{name.decode()} N' with N rows below it")
     return rows
 
 
@@ -203,8 +172,7 @@ def _columns(path: Path, rows: list[bytes], pattern: re.Pattern[bytes], what: st
 
 def _cell(path: Path, data: bytes) -> Cell | None:
     """The domain, with the shift of each periodic boundary as the edge along its normal."""
-    domain = DOMAIN.search(data)
-    words = b" ".join(domain.groups()) if domain else b""
+    words = b" ".join(word for one in DOMAIN.findall(data)[:1] for word in one)
     bounds = np.array(shared.numbers(f"{path}: its domain xMin xMax ...", words, 6))
     origin, vectors = bounds[::2], np.diag(bounds[1::2] - bounds[::2])
     rows = [row for row in _section(path, data, b"Boundaries") if PERIODS.match(row)]
@@ -215,5 +183,4 @@ def _cell(path: Path, data: bytes) -> Cell | None:
         raise ReadError(f"{path}: expected periodic boundaries along the axes, one along each")
     origin[axes] = found[which, 3] / found[which, axes]
     vectors[axes] = found[which, 4:]
-    where, periodic = f"{path}: its domain and periodic boundaries", np.isin(np.arange(3), axes)
-    return shared.cell_of(where, vectors, periodic, origin)
+    return shared.cell_of(f"{path}: its boundaries", vectors, np.isin([0, 1, 2], axes), origin)

@@ -12,8 +12,9 @@ import numpy.typing as npt
 
 from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.typing import FloatArray
-from scanfab.io.columns import grain_table, has_radius
-from scanfab.io.files import check_lines, grows, leave_out_last, plain
+from scanfab.io.columns import grain_table, has_radius, whole_numbers
+from scanfab.io.contacts import join_ids
+from scanfab.io.files import check_lines, leave_out_last, plain
 from scanfab.io.reader import (
     Carries,
     FileKind,
@@ -23,7 +24,7 @@ from scanfab.io.reader import (
     ReadOptions,
     Snapshot,
 )
-from scanfab.io.text import Columns, spelt, text_of
+from scanfab.io.text import Columns, CutError, spelt, text_of
 from scanfab.packing.cell import Cell
 
 # the header of a frame is shorter, even with thousands of columns
@@ -115,11 +116,19 @@ def numbers(where: str, text: bytes, count: int) -> list[float]:
     raise ReadError(f"{where}: expected {count} numbers, found {spelt(text)}")
 
 
-def finite_forces(path: Path, force: FloatArray) -> FloatArray:
-    """The forces; ReadError if one is no finite number."""
-    if not np.all(np.isfinite(force)):
+def join_pairs(
+    path: Path, grains: GrainTable, ends: Iterable[npt.ArrayLike], force: FloatArray | None
+) -> JoinedContacts:
+    """
+    Contacts by the ids of their first and second grains; one below 0 is a wall's.
+
+    The force acts on the second grain. ReadError if it, or a normal of which it was made, is no
+    finite number.
+    """
+    if force is not None and not np.all(np.isfinite(force)):
         raise ReadError(f"{path}: expected finite numbers as contact forces and normals")
-    return force
+    ids = np.column_stack([whole_numbers(path, end) for end in ends])
+    return join_ids(path, grains, ids, force, walls="negative")
 
 
 def cell_of(
@@ -180,23 +189,11 @@ def box_cell(
     return cell_of(where, np.zeros((3, 3)) if np.any(edges <= 0) else vectors, periodic, low)
 
 
-def lack_of_end(frame: bytes) -> str | None:
-    """The ``lack`` of frames without a count."""
-    return None if frame.endswith(b"\n") else "its last line has no end"
-
-
-def lack_of_rows(rows: bytes, count: int, width: int) -> str | None:
-    """The ``lack`` of frames with a count; the last row may lack its end if it lacks no word."""
-    is_row = len(rows[rows.rfind(b"\n") + 1 :].split()) == width and not grows()
-    found = rows.count(b"\n") + is_row
-    return f"it has {found} rows of {count}" if found < count else None
-
-
 def marked_frames(
     path: Path,
     mark: re.Pattern[bytes],
+    check: Callable[[Snapshot], object] | None = None,
     moment: Callable[[Path, bytes], tuple[int | None, float | None] | None] | None = None,
-    lack: Callable[[bytes], str | None] = lack_of_end,
 ) -> list[Snapshot]:
     """
     The frames of a text in the order of their steps.
@@ -211,13 +208,13 @@ def marked_frames(
     mark : Pattern
         Matches the beginning of a line with which a frame begins. It is fast if it begins with a
         letter, not with ``^`` or a choice.
+    check : callable, optional
+        Reads the last of several frames, and raises CutError if it is incomplete. Without it a
+        frame is incomplete if its last line has no end.
     moment : callable, optional
-        Says step and time of a frame from its first bytes. None: the frame goes on behind the next
-        mark. Raises ReadError if the bytes do not say it. By default the time is the first group
-        of ``mark``.
-    lack : callable, optional
-        Says what an incomplete frame lacks, from its bytes; None if it is complete. By default the
-        end of its last line.
+        Says step and time of a frame from its first bytes, neither if they were cut. None: the
+        frame goes on behind the next mark. Raises ReadError if the bytes are wrong. By default the
+        time is the first group of ``mark``.
 
     Raises
     ------
@@ -227,39 +224,45 @@ def marked_frames(
     check_lines(path, plain(path))
     starts: list[int] = []
     found: list[Snapshot] = []
-    size, has_end = 0, True
+    size = 0
     # not mapped into memory: if a mapped file is cut meanwhile, the process dies
     with open(plain(path), "rb") as stream:
         # pieces of whole lines, so that no mark is cut in two
         while piece := stream.read(PIECE) + stream.readline():
             here = (one.start() for one in mark.finditer(piece))
             starts += [size + at for at in here if piece[at - 1 : at] in (b"", b"\n")]
-            size, has_end = size + len(piece), piece.endswith(b"\n")
+            size += len(piece)
         start = min(starts, default=size)
         lost = NO_COMMENT.search(text_of(Snapshot(path, stop=start)))
         if lost:
             raise ReadError(f"{path}: expected the header of a frame above {spelt(lost[0])}")
         for stop in [*starts[1:], size][: len(starts)]:
-            end = stop
-            if stop == size and (found or not has_end):
-                frame = text_of(Snapshot(path, start=start))
-                whole, reason = frame[: frame.rfind(b"\n") + 1], lack(frame)
-                if reason and found:
-                    leave_out_last(path, len(found), reason)
-                    break
-                if not (reason or has_end or lack(whole)):
-                    # the line that is cut is the header of another frame
-                    leave_out_last(path, len(found) + 1, "its header is incomplete")
-                    end = start + len(whole)
             stream.seek(start)
             head = stream.read(min(HEADER_BYTES, stop - start))
             at = moment(path, head) if moment else (None, _time(path, mark.match(head)))
-            if at is not None:
-                found.append(Snapshot(path, *at, start, end))
+            # a last frame whose header was cut has no moment
+            if at or stop == size:
+                found.append(Snapshot(path, *(at or (None, None)), start, stop))
                 start = stop
     if not found:
         raise ReadError(f"{path}: expected frames, found none: the file is empty or incomplete")
+    if len(found) > 1 and (reason := _lack(found[-1], check)):
+        del found[-1]
+        leave_out_last(path, len(found), reason)
     return sorted(found, key=lambda one: one.step or 0)
+
+
+def _lack(snapshot: Snapshot, check: Callable[[Snapshot], object] | None) -> str | None:
+    """Why a frame is incomplete; what else is wrong with it is told when it is read."""
+    if check is None:
+        return None if text_of(snapshot).endswith(b"\n") else "its last line has no end"
+    try:
+        check(snapshot)
+    except CutError as error:
+        return f"{error}".removeprefix(f"{snapshot.path}").lstrip(":, ")
+    except ReadError:
+        pass
+    return None
 
 
 def numbered_frames(

@@ -19,7 +19,7 @@ from scanfab.io.columns import has_radius
 from scanfab.io.files import first_bytes
 from scanfab.io.formats import shared
 from scanfab.io.reader import FileKind, Snapshot
-from scanfab.io.text import Columns, Layout, read_rows, text_of
+from scanfab.io.text import Columns, CutError, Layout, read_rows, text_of
 from scanfab.packing.cell import Cell
 
 # a snapshot begins with the first of these lines
@@ -71,7 +71,7 @@ class TextDump(shared.GrainsOnly):
     def snapshots(self, path: Path) -> list[Snapshot]:
         """In the order of their steps; an incomplete last one is left out."""
         mark = YAML_MARK if first_bytes(path, 3) == b"---" else MARK
-        return shared.marked_frames(path, mark, _moment, _lack)
+        return shared.marked_frames(path, mark, self.table, _moment)
 
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
         """
@@ -108,10 +108,10 @@ def _header(data: bytes) -> Header:
 
 
 def _whole_header(where: str, data: bytes) -> Header:
-    """ReadError if the header is incomplete."""
+    """ReadError if the header does not count the rows; CutError if it ends above them."""
     header = _header(data)
     if header.row_count is None:
-        raise ReadError(
+        raise (ReadError if header.words else CutError)(
             f"{where}: the header is incomplete: expected a whole number after ITEM: NUMBER OF "
             f"ATOMS (or ENTRIES), and the names of the columns behind it"
         )
@@ -144,24 +144,18 @@ def _yaml_header(data: bytes) -> Header:
     return Header(sections, ["ATOMS", *values.get("keywords", [])], rows, head.count(b"\n") + 1)
 
 
-def _moment(path: Path, head: bytes) -> tuple[int, float | None] | None:
-    """The step and the time of a snapshot; None if its header goes on below the next mark."""
-    sections = _header(head).sections
-    if sections and sections.keys() <= {"UNITS", "TIME", "TIMESTEP"}:
+def _moment(path: Path, head: bytes) -> tuple[int | None, float | None] | None:
+    """The step and the time of a snapshot; None if its header goes on at the next mark."""
+    header = _header(head)
+    if header.sections and header.sections.keys() <= {"UNITS", "TIME", "TIMESTEP"}:
         return None
-    step, time = sections.get("TIMESTEP", ""), sections.get("TIME")
+    if header.sections and not header.words:
+        return None, None
+    step, time = header.sections.get("TIMESTEP", ""), header.sections.get("TIME")
     if not re.fullmatch(r"-?\d{1,18}", step):
         raise ReadError(f"{path}: expected a whole number as ITEM: TIMESTEP, found {step[:80]!r}")
     where = f"{path}, step {step}: ITEM: TIME"
     return int(step), None if time is None else shared.numbers(where, time.encode(), 1)[0]
-
-
-def _lack(data: bytes) -> str | None:
-    """What the last snapshot of a file lacks; a count that is none is told when it is read."""
-    header = _header(data)
-    if not header.words:
-        return "its header is incomplete"
-    return shared.lack_of_rows(header.rows, header.row_count or 0, max(len(header.words) - 1, 1))
 
 
 def _cell(where: str, sections: dict[str, str]) -> Cell | None:

@@ -89,7 +89,7 @@ def test_a_plane_is_not_periodic_across(tmp_path):
 
 def test_a_count_that_no_frame_has(tmp_path):
     path = write(tmp_path / "par_a.dat", grains_text().replace("# np 3", "# np 4"))
-    with pytest.warns(ScanfabWarning, match="is left out: it has 3 rows of 4"):
+    with pytest.warns(ScanfabWarning, match="is left out: the header counts 4 particles, found 3"):
         first = scanfab.read_series(path)[0]
     with pytest.raises(scanfab.ScanfabError, match="the header counts 4 particles, found 3"):
         first.read()

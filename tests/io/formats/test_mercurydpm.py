@@ -125,12 +125,6 @@ def test_a_last_frame_that_is_cut_is_left_out(run, ending):
         scanfab.read(write(run / "b.data", data_frame(1)[:-50]))
 
 
-def test_a_frame_whose_header_is_cut_is_left_out(tmp_path):
-    path = write(tmp_path / "a.data", data_frame(1) + data_frame(2)[:9])
-    with pytest.warns(ScanfabWarning, match="number 2, is incomplete.*header"):
-        assert [len(frame.read()) for frame in scanfab.read_series(path)] == [3]
-
-
 def test_a_text_that_begins_with_a_number_is_no_frame(tmp_path):
     path = write(
         tmp_path / "a.txt", "2 samples of sand from France\nwere sheared by hand in a wooden box\n"
