@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from scanfab.base.errors import ReadError, note
-from scanfab.base.typing import FloatArray
 from scanfab.io.files import Stamp, first_bytes, stamp_of
 from scanfab.io.formats.shared import GrainsOnly, cell_of, numbered_frames, numbers
 from scanfab.io.reader import Snapshot
@@ -19,17 +18,13 @@ from scanfab.packing.cell import Cell
 # id, type, and its geometry: for a sphere radius and contact radius
 OBJECT = re.compile(rb"0 \d{1,15} 1 (1|9|13|14) 5 ")
 SPHERE, BONDS = b"1", (b"9", b"13")
-ID, TIME, GEOMETRY, PLACE, ACTIVE = b"0", b"2", b"5", b"12", b"24"
-# how many values follow the number of a property, and of how many the first ones are read
+TIME, PLACE = b"2", b"12"
+# how many values follow the number of a property, and what the first ones are if they are read
 SIZES = {
-    ID: 1, b"1": 1, TIME: 1, GEOMETRY: 2, b"10": 3, b"11": 3, PLACE: 3, b"15": 3, b"16": 3,
-    b"17": 3, b"18": 1, b"19": 3, b"20": 3, b"23": 1, ACTIVE: 2, b"31": 4, b"36": 9, b"37": 1,
+    b"0": 1, b"1": 1, TIME: 1, b"5": 2, b"10": 3, b"11": 3, PLACE: 3, b"15": 3, b"16": 3,
+    b"17": 3, b"18": 1, b"19": 3, b"20": 3, b"23": 1, b"24": 2, b"31": 4, b"36": 9, b"37": 1,
 }  # fmt: skip
-READ = {ID: 1, GEOMETRY: 1, ACTIVE: 2, TIME: 1, PLACE: 3}
-# the properties that are read, in a row; times of activity may be missing
-ORDER = re.compile(rb"0 5( 24)?( 2 12)+")
-# column of the first state of a sphere
-FIRST = 4
+READ = {b"0": ["id"], b"5": ["radius"], b"24": ["begin", "end"], TIME: ["time"], PLACE: [*"xyz"]}
 # the periodic domain, if it is switched on: along which axes, its low and its high corner
 PERIODIC = re.compile(rb"^28 1((?: \S+){9})[ \t]*\r?$", re.MULTILINE)
 
@@ -47,35 +42,34 @@ class MusenReader(GrainsOnly):
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """One for each time of the first sphere; ``start`` of a snapshot is its number."""
-        values, *_ = _export(path, stamp_of(path))
-        times = values[0, FIRST::4].tolist()
+        columns, *_ = _export(path, stamp_of(path))
+        times = [columns[name][0].item() for name in columns if name.startswith("time ")]
         return numbered_frames(path, ((None, time) for time in times))
 
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
         """The spheres that are active at the time; objects of other kinds are left out."""
-        path = snapshot.path
-        values, cell, has_bonds = _export(path, stamp_of(path))
+        path, number = snapshot.path, snapshot.start
+        columns, cell, has_bonds = _export(path, stamp_of(path))
         if has_bonds:
             note("MUSEN's bonds are not read: grains that touch are found by geometry")
-        id, radius, begin, end = values[:, :FIRST].T
-        time, *place = values[:, FIRST + 4 * snapshot.start :][:, :4].T
+        time = columns[f"time {number}"]
         if np.any(time != snapshot.time):
             raise ReadError(
                 f"{path}: a sphere has no state at the time {snapshot.time}: export all objects at "
                 f"the same times"
             )
-        is_there = (begin <= time) & (time <= end)
-        columns = {"id": id, "radius": radius, **dict(zip("xyz", place, strict=True))}
-        return {name: values[is_there] for name, values in columns.items()}, cell
+        is_there = (columns.get("begin", -np.inf) <= time) & (time <= columns.get("end", np.inf))
+        own = {"id": "id", "radius": "radius", **{axis: f"{axis} {number}" for axis in "xyz"}}
+        return {name: columns[key][is_there] for name, key in own.items()}, cell
 
 
 @lru_cache(maxsize=1)
-def _export(path: Path, stamp: Stamp) -> tuple[FloatArray, Cell | None, bool]:
+def _export(path: Path, stamp: Stamp) -> tuple[Columns, Cell | None, bool]:
     """
     All spheres of a file, the cell, and whether there are bonds.
 
-    A row holds id, radius, from when and until when the sphere is there, and time and place of each
-    state. The file is parsed once for all its frames while its stamp stays.
+    Columns are id, radius, begin and end of activity, and for each state ``time 0``, ``x 0`` and so
+    on. The file is parsed once for all its frames while its stamp stays.
     """
     data = text_of(Snapshot(path))
     if not data.endswith(b"\n"):
@@ -83,42 +77,40 @@ def _export(path: Path, stamp: Stamp) -> tuple[FloatArray, Cell | None, bool]:
     lines = data.split(b"\n")
     # objects stand above all other lines: one among them is an object whose first word is damaged
     stop = max((k + 1 for k, line in enumerate(lines) if line.startswith(b"0 ")), default=0)
-    wrong = next((k for k, line in enumerate(lines[:stop]) if not OBJECT.match(line)), None)
-    if wrong is not None:
+    kinds = [match and match[1] for match in map(OBJECT.match, lines[:stop])]
+    if None in kinds:
+        wrong = kinds.index(None)
         where = f"{path}, line {wrong + 1}"
         raise ReadError(f"{where}: expected 0 ID 1 TYPE 5 ..., found {spelt(lines[wrong])}")
-    kinds = [line.split(b" ", 4)[3] for line in lines[:stop]]
-    rows = [line for line, kind in zip(lines, kinds, strict=False) if kind == SPHERE]
     cell, domain = None, PERIODIC.search(data)
     if domain is not None:
         where = f"{path}: its periodic domain (28)"
         along, low, high = np.reshape(numbers(where, domain[1], 9), (3, 3))
         cell = cell_of(where, high - low, along != 0, low)
-    return _values(path, rows), cell, not {*kinds}.isdisjoint(BONDS)
+    rows = [line for line, kind in zip(lines, kinds, strict=False) if kind == SPHERE]
+    return _spheres(path, rows) if rows else {}, cell, not {*kinds}.isdisjoint(BONDS)
 
 
-def _values(path: Path, rows: list[bytes]) -> FloatArray:
+def _spheres(path: Path, rows: list[bytes]) -> Columns:
     """What is read of each sphere; all spheres must have the properties of the first one."""
-    words, place = rows[0].split() if rows else [], 0
-    keys: dict[int, bytes] = {}
-    read: list[int] = []
-    while place < len(words) and words[place] in SIZES:
-        key = keys[place] = words[place]
-        read += range(place + 1, place + 1 + READ.get(key, 0))
-        place += 1 + SIZES[key]
-    order = b" ".join(key for key in keys.values() if key in READ)
-    if place != len(words) or not ORDER.fullmatch(order):
+    words, names, states = rows[0].split(), list[str](), 0
+    keys: dict[str, bytes] = {}
+    while len(names) < len(words) and (key := words[len(names)]) in SIZES:
+        states += key == TIME
+        behind = f" {states - 1}" * (key in (TIME, PLACE))
+        own = [f"{name}{behind}" for name in READ.get(key, [])]
+        keys[f"{len(names)}"] = key
+        names += [f"{len(names)}", *own]
+        names += [f"{key.decode()}_{len(names)}_{k}" for k in range(len(own), SIZES[key])]
+    needed = {"id", "radius", *(f"{name} {k}" for k in range(states) for name in ("time", *"xyz"))}
+    if len(names) != len(words) or not states or not needed <= {*names}:
         raise ReadError(
             f"{path}: expected properties 0 ID ... 5 RADIUS ... 2 TIME 12 X Y Z ... in the rows of "
-            f"spheres, found {spelt(b' '.join([*keys.values(), *words[place:]]))}"
+            f"spheres, found {spelt(b' '.join([*keys.values(), *words[len(names) :]]))}"
         )
-    names = tuple(f"{place}" for place in range(place))
-    optional = {*names} - {f"{place}" for place in (*keys, *read)}
-    text = b"\n".join([*rows, b""])
-    columns = read_rows(Snapshot(path), text, Layout(names, optional=optional))
-    if any(np.any(columns[f"{place}"] != float(key)) for place, key in keys.items()):
+    read = {name for name in names if "_" not in name}
+    layout = Layout(tuple(names), optional={*names} - read)
+    columns = read_rows(Snapshot(path), b"\n".join([*rows, b""]), layout)
+    if any(np.any(columns[name] != float(key)) for name, key in keys.items()):
         raise ReadError(f"{path}: expected the properties of the first sphere in the rows of all")
-    values = np.column_stack([columns[f"{place}"] for place in read])
-    if ACTIVE not in keys.values():
-        values = np.insert(values, [2, 2], [-np.inf, np.inf], axis=1)
-    return values
+    return {name: columns[name] for name in read - keys.keys()}

@@ -17,7 +17,7 @@ from scanfab.io.reader import Carries, Snapshot
 from scanfab.io.text import Columns, Layout, read_rows, spelt, text_of
 from scanfab.packing.cell import Cell
 
-COUNT = re.compile(rb"\A(?:\xef\xbb\xbf)?[ \t]*([0-9]{1,15})[ \t]*\r?\n")
+COUNT = re.compile(rb"(?:\xef\xbb\xbf)?[ \t]*([0-9]{1,15})[ \t]*\r?\n")
 # key=value, the value in quotes if it has blanks
 PAIR = re.compile(r"([A-Za-z_][\w.-]*)\s*=\s*(?:\"([^\"]*)\"|([^\s\"]+))")
 PROPERTIES = re.compile(r"[^:]+:[SIRL]:[1-9][0-9]?(:[^:]+:[SIRL]:[1-9][0-9]?)*")
@@ -25,6 +25,15 @@ PROPERTIES = re.compile(r"[^:]+:[SIRL]:[1-9][0-9]?(:[^:]+:[SIRL]:[1-9][0-9]?)*")
 HEAD = 1 << 16
 TRUTHS = {"T": True, "F": False, "TRUE": True, "FALSE": False, "1": True, "0": False}
 POSITIONS = ("pos", "position", "positions")
+
+
+class Head(NamedTuple):
+    """The two lines above the rows of a frame."""
+
+    rows: int
+    words: dict[str, str]
+    columns: list[tuple[str, str, int]]
+    """Name, kind and width of each."""
 
 
 class XyzReader(GrainsOnly):
@@ -45,11 +54,11 @@ class XyzReader(GrainsOnly):
 
     def names(self, path: Path) -> Sequence[str]:
         """Of the columns of the first frame."""
-        return [name for name, _, _ in _first(path).columns]
+        return [name for name, _, _ in _head(path, first_bytes(path, HEAD)).columns]
 
     def carries(self, path: Path) -> Carries:
         """The line above the rows has a cell, or none."""
-        return "nothing" if _first(path).cell(path) is None else "cell"
+        return "nothing" if _cell(path, _head(path, first_bytes(path, HEAD))) is None else "cell"
 
     def snapshots(self, path: Path) -> list[Snapshot]:
         """One behind the other."""
@@ -58,19 +67,18 @@ class XyzReader(GrainsOnly):
         with open(plain(path), "rb") as stream:
             start = 0
             while first := stream.readline():
-                if not first.strip():
-                    continue
-                head = _head(path, first + stream.readline())
-                rows = sum(1 for _ in islice(stream, head.rows))
-                if rows < head.rows:
-                    reason = f"expected {head.rows} rows, the file ends after {rows}"
-                    leave_out_last(path, len(found), reason)
-                    break
-                words = (head.words.get(key, "") for key in ("step", "timestep"))
-                steps = [int(one) for one in words if re.fullmatch(r"[-+]?[0-9]{1,18}", one)]
-                time = head.numbers(path, "time", 1)
-                moment = steps[0] if steps else None, time[0] if time else None
-                found.append(Snapshot(path, *moment, start, stream.tell()))
+                if first.strip():
+                    head = _head(path, first + stream.readline())
+                    rows = sum(1 for _ in islice(stream, head.rows))
+                    if rows < head.rows:
+                        reason = f"expected {head.rows} rows, the file ends after {rows}"
+                        leave_out_last(path, len(found), reason)
+                        break
+                    words = (head.words.get(key, "") for key in ("step", "timestep"))
+                    steps = [int(one) for one in words if re.fullmatch(r"[-+]?[0-9]{1,18}", one)]
+                    time = _numbers(path, head, "time", 1)
+                    moment = steps[0] if steps else None, time[0] if time else None
+                    found.append(Snapshot(path, *moment, start, stream.tell()))
                 start = stream.tell()
         if not found:
             raise ReadError(f"{path}: the file is empty")
@@ -79,74 +87,32 @@ class XyzReader(GrainsOnly):
     def table(self, snapshot: Snapshot) -> tuple[Columns, Cell | None]:
         """Columns by their names; ``pos`` are the centres."""
         path, data = snapshot.path, text_of(snapshot)
-        above = len(data) - len(data.lstrip())
-        start = data.find(b"\n", data.find(b"\n", above) + 1) + 1
-        head = _head(path, data[above:start])
+        head = _head(path, data[:HEAD])
         parts = {name: [f"{name} {k}" for k in range(width)] for name, _, width in head.columns}
         kinds = {part: kind for name, kind, _ in head.columns for part in parts[name]}
-        layout = Layout(
-            tuple(kinds),
-            line=data.count(b"\n", 0, start) + 1,
-            whole=[part for part, kind in kinds.items() if kind == "I"],
-            text=[part for part, kind in kinds.items() if kind in "SL"],
-        )
-        rows = read_rows(snapshot, data[start:], layout, count=head.rows)
+        whole = [part for part, kind in kinds.items() if kind == "I"]
+        text = [part for part, kind in kinds.items() if kind in "SL"]
+        layout = Layout(tuple(kinds), line=3, whole=whole, text=text)
+        rows = read_rows(snapshot, data.split(b"\n", 2)[2], layout, count=head.rows)
         found: Columns = {}
         for name, kind, width in head.columns:
             values = np.column_stack([rows[part] for part in parts[name]])
-            if kind == "L":
-                values = np.char.upper(values.astype(str))
-                if not np.isin(values, [*TRUTHS]).all():
-                    raise ReadError(f"{path}: the column {name}: expected T or F in each row")
-                values = np.isin(values, [word for word, truth in TRUTHS.items() if truth])
-            if kind == "I" and values.dtype.kind != "i":
-                raise ReadError(f"{path}: the column {name}: expected whole numbers")
             is_position = name.lower() in POSITIONS and "position" not in found
-            if is_position and width != 3:
-                raise ReadError(f"{path}: the column {name}: expected three coordinates")
+            if (kind == "I" and values.dtype.kind != "i") or (is_position and width != 3):
+                expected = "three coordinates" if is_position else "whole numbers"
+                raise ReadError(f"{path}: the column {name}: expected {expected}")
             found["position" if is_position else name] = values if width > 1 else values[:, 0]
-        return found, head.cell(path)
+        return found, _cell(path, head)
 
 
-class _Head(NamedTuple):
-    """The two lines above the rows of a frame."""
-
-    rows: int
-    words: dict[str, str]
-    columns: list[tuple[str, str, int]]
-    """Name, kind and width of each."""
-
-    def numbers(self, path: Path, key: str, count: int) -> list[float] | None:
-        """The numbers behind a key; None without it."""
-        text = self.words.get(key)
-        return None if text is None else numbers(f"{path}: {key}", text.encode(), count)
-
-    def cell(self, path: Path) -> Cell | None:
-        """Of ``Lattice``, ``Origin`` and ``pbc``."""
-        vectors = self.numbers(path, "lattice", 9)
-        if vectors is None:
-            return None
-        periodic = [TRUTHS.get(one) for one in self.words.get("pbc", "T T T").upper().split()]
-        if len(periodic) != 3 or None in periodic:
-            raise ReadError(f"{path}: pbc: expected three of T and F, found {self.words['pbc']}")
-        origin = self.numbers(path, "origin", 3) or [0.0, 0.0, 0.0]
-        return cell_of(f"{path}: Lattice", np.reshape(vectors, (3, 3)), map(bool, periodic), origin)
-
-
-def _first(path: Path) -> _Head:
-    """The head of the first frame."""
-    lines = first_bytes(path, HEAD).lstrip().split(b"\n", 2)[:2]
-    return _head(path, b"".join(line + b"\n" for line in lines))
-
-
-def _head(path: Path, lines: bytes) -> _Head:
-    """The head in two lines."""
-    count = COUNT.match(lines)
-    if count is None or not lines.endswith(b"\n"):
+def _head(path: Path, text: bytes) -> Head:
+    """The head in the first two lines of a text."""
+    lines, count = text[:HEAD].split(b"\n", 2), COUNT.match(text)
+    if count is None or len(lines) < 3:
         expected = "expected a number of rows and a line with Properties="
-        raise ReadError(f"{path}: {expected}, found {spelt(lines)}")
-    line = lines[count.end() :].decode("utf-8", "replace")
-    words = {key.lower(): quoted or bare for key, quoted, bare in PAIR.findall(line)}
+        raise ReadError(f"{path}: {expected}, found {spelt(text)}")
+    pairs = PAIR.findall(lines[1].decode("utf-8", "replace"))
+    words = {key.lower(): quoted or bare for key, quoted, bare in pairs}
     if "properties" not in words:
         raise ReadError(
             f"{path}: this is plain XYZ, whose second line has no Properties=...: read it as a "
@@ -157,4 +123,22 @@ def _head(path: Path, lines: bytes) -> _Head:
         expected = "expected Properties=NAME:KIND:WIDTH:... (kinds S, I, R, L), each name once"
         raise ReadError(f"{path}: {expected}, found {words['properties'][:100]!r}")
     columns = list(zip(parts[::3], parts[1::3], map(int, parts[2::3]), strict=True))
-    return _Head(int(count[1]), words, columns)
+    return Head(int(count[1]), words, columns)
+
+
+def _numbers(path: Path, head: Head, key: str, count: int) -> list[float] | None:
+    """The numbers behind a key; None without it."""
+    text = head.words.get(key)
+    return None if text is None else numbers(f"{path}: {key}", text.encode(), count)
+
+
+def _cell(path: Path, head: Head) -> Cell | None:
+    """Of ``Lattice``, ``Origin`` and ``pbc``."""
+    vectors, origin = _numbers(path, head, "lattice", 9), _numbers(path, head, "origin", 3)
+    if vectors is None:
+        return None
+    periodic = [TRUTHS.get(one) for one in head.words.get("pbc", "T T T").upper().split()]
+    if len(periodic) != 3 or None in periodic:
+        raise ReadError(f"{path}: pbc: expected three of T and F, found {head.words['pbc']}")
+    edges = np.reshape(vectors, (3, 3))
+    return cell_of(f"{path}: Lattice", edges, map(bool, periodic), origin or [0.0] * 3)
