@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.arrays import doubles
+from scanfab.base.arrays import MOST, doubles
 from scanfab.base.errors import ReadError
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.io.reader import BODIES, WALLS, GrainTable, ReadOptions
@@ -25,7 +25,6 @@ DIAMETER_NAMES = ("diameter", "diam")
 ID_NAMES = ("id", "ids", "particle_id", "particleid", "body_id", "bodyid")
 # other names that a radius may have, such as c_rad and f_r[1]
 LIKE_A_RADIUS = re.compile(r"(?i)rad(i|$|[^a-z])|(^|_)r($|\[)")
-ANGLES = ("theta", "phi", "azimuth")
 # coordinates in the order of preference, and whether they are fractions of the box
 POSITION_NAMES = (("x y z", False), ("xu yu zu", False), ("xs ys zs", True), ("xsu ysu zsu", True))
 
@@ -33,10 +32,8 @@ POSITION_NAMES = (("x y z", False), ("xu yu zu", False), ("xs ys zs", True), ("x
 # axes are its radius and the exponents 2, within the rounding of six digits
 HALF_AXES, EXPONENTS = ("shapex", "shapey", "shapez"), ("blockiness1", "blockiness2")
 OLD_EXPONENTS, SIX_DIGITS = ("roundness1", "roundness2"), 1e-5
-# no grain is further from a periodic cell, in cells
-MOST_TURNS = 1e9
-# without a cell, no grain is so many times as far away as the others, where there are some
-FAR, FEW = 1e12, 10
+# no grain is so many radii of the largest one from the origin: rounding would leave nothing of it
+FAR = 1e12
 # a diameter that differs from twice the radius by more than this share of it is another size:
 # numbers of few digits are rounded
 ROUNDED = 0.05
@@ -80,7 +77,12 @@ def grain_table(
     cell = user_cell(path, cell, options)
     position = _position(here, rest, options, cell)
     radius = _radius(here, rest, options, len(position))
-    _refuse_far(here, position, radius, cell)
+    away = np.abs(position).max(axis=1, initial=0.0)
+    # what cannot be a length is the packing's to refuse
+    far = np.flatnonzero((away < MOST) & (away > FAR * radius.max(initial=0.0)))
+    if len(far) and np.all(radius > 0):
+        found = f"grain {far[0] + 1} has a coordinate of {away[far[0]]:g}"
+        raise ReadError(f"{here}: {found}, too far away for its radius: is the number damaged?")
     _refuse_superquadrics(here, rest, radius)
     position.flags.writeable = False  # so that the packing need not copy it
     id, bodies, walls = (
@@ -178,24 +180,6 @@ def _position(
     )
 
 
-@np.errstate(over="ignore", invalid="ignore")
-def _refuse_far(where: str, position: FloatArray, radius: FloatArray, cell: Cell | None) -> None:
-    """ReadError if a grain is so far away that rounding leaves nothing of its place or size."""
-    sound = position[np.isfinite(position).all(axis=1)]
-    if cell is not None:
-        turns = np.abs(cell.fractional(sound)[:, list(cell.periodic)]).max(initial=0.0)
-        if turns > MOST_TURNS:
-            raise ReadError(
-                f"{where}: a grain lies {turns:g} cells away: is the cell's unit right?"
-            )
-    elif len(radius) >= FEW and len(sound) == len(position):
-        place = np.abs(position).max(axis=1)
-        row = int(np.argmax(place))
-        if place[row] > FAR * max(radius.max(), np.median(place)):
-            found = f"grain {row + 1} has a coordinate of {place[row]:g}, far from all others"
-            raise ReadError(f"{where}: {found}: is the number damaged?")
-
-
 def _radius(where: str, rest: dict[str, Any], options: ReadOptions, count: int) -> FloatArray:
     """Take the radii out of the columns, or half the diameters; or the user's for all."""
     own = options.columns
@@ -208,17 +192,14 @@ def _radius(where: str, rest: dict[str, Any], options: ReadOptions, count: int) 
             raise ReadError(f"{where}: `radius` is for dumps without radii, but this one has them")
         return np.full(count, options.radius)
     if name is not None:
-        if "radius" not in own:
-            refuse_cylindrical(where, name, list(rest))
         radius = _lengths(where, rest.pop(name), "a radius")
         row = None if other is None else other_size(radius, rest[other])
-        if other is not None and row is not None:
-            sizes_of_row = f"{radius[row]:g} and {rest[other][row]:g}"
-            name, other = own.get("radius", name), own.get("diameter", other)
+        if row is not None:
+            names = own.get("radius", name), own.get("diameter", other)
             raise ReadError(
-                f"{where}: the columns {name!r} and {other!r} contradict each other: grain "
-                f"{row + 1} has {sizes_of_row}, no diameter of twice the radius: say which is "
-                f'right: `columns={{"radius": "{name}"}}` or `columns={{"diameter": "{other}"}}`'
+                f"{where}: the columns {names[0]!r} and {names[1]!r} contradict each other at "
+                f'grain {row + 1}: name the right one: `columns={{"radius": "{names[0]}"}}` or '
+                f'`columns={{"diameter": "{names[1]}"}}`'
             )
         return radius
     if other is not None:
@@ -268,16 +249,6 @@ def _refuse_superquadrics(where: str, rest: Columns, radius: FloatArray) -> None
             )
 
 
-def refuse_cylindrical(where: object, name: str, names: Sequence[str]) -> None:
-    """ReadError for an r that stands beside an angle: it may be the distance from an axis."""
-    angle = first_of(ANGLES, names)
-    if name.lower() == "r" and angle is not None:
-        raise ReadError(
-            f"{where}: the column {name} may be a radius of grains or, beside {angle}, the "
-            f'distance from an axis: name the radius with `columns={{"radius": ...}}`'
-        )
-
-
 def first_of(known: Sequence[str], names: Iterable[str]) -> str | None:
     """The first name that is one of those known, in the order of these; without regard to case."""
     lower = {name.lower(): name for name in reversed([*names])} | {name: name for name in names}
@@ -288,11 +259,10 @@ def whole_numbers(path: Path, values: npt.ArrayLike, where: str = "") -> npt.NDA
     """Ids as whole numbers; ReadError if they are not."""
     numbers = np.asarray(values)
     is_whole = numbers.ndim == 1 and numbers.dtype.kind in "biuf"
-    if is_whole and numbers.dtype.kind == "f":
+    if is_whole and numbers.dtype.kind in "uf":
         # larger decimals may have been rounded; comparisons with NaN are false
-        is_whole = bool(np.all((np.abs(numbers) < EXACT) & (numbers == np.rint(numbers))))
-    if is_whole and numbers.dtype.kind == "u":
-        is_whole = bool(np.all(numbers <= np.iinfo(np.int64).max))
+        most = EXACT if numbers.dtype.kind == "f" else 2.0**63
+        is_whole = bool(np.all((np.abs(numbers) < most) & (numbers == np.rint(numbers))))
     if not is_whole:
         told = "ids must be whole numbers, below 2^53 where they are read as decimals"
         raise ReadError(f"{path}{where}: {told}")

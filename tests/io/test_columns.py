@@ -120,7 +120,7 @@ def test_a_diameter_that_is_not_twice_the_radius_is_an_error_or_was_rounded(radi
         np.testing.assert_array_equal(grains.radius, radii)
         np.testing.assert_array_equal(grains.columns["Diam"], found["Diam"])
         return
-    words = r"'r' and 'Diam' contradict each other: grain 2 has .*\"radius\": \"r\".*\"Diam\""
+    words = r"'r' and 'Diam' contradict each other at grain 2: .*\"radius\": \"r\".*\"Diam\""
     with pytest.raises(ReadError, match=words):
         table(found)
     np.testing.assert_array_equal(table(found, columns={"radius": "r"}).radius, radii)

@@ -127,10 +127,10 @@ def test_coordinates_and_radii_are_lengths(tmp_path, name):
         scanfab.read(path)
 
 
-def test_a_grain_is_not_far_from_its_cell(tmp_path):
+def test_a_grain_is_not_too_far_away_for_its_radius(tmp_path):
     rows = [(1, 1e30, 0.5, 0.5, 0.1)]
     text = dump_text(rows, "id x y z radius", flags=" pp pp pp")
-    refuses(scanfab.read, write(tmp_path / "a.txt", text), match=r"1e\+30 cells away")
+    refuses(scanfab.read, write(tmp_path / "a.txt", text), match=r"coordinate of 1e\+30")
 
 
 @pytest.mark.parametrize("id", ["1e300", "nan", "inf", "0.5"])

@@ -14,7 +14,6 @@ from scanfab.io.columns import (
     DIAMETER_NAMES,
     ID_NAMES,
     RADIUS_NAMES,
-    refuse_cylindrical,
     refuse_named_twice,
 )
 from scanfab.io.layout import TextTable
@@ -106,8 +105,8 @@ def find_columns(
     Raises
     ------
     ReadError
-        If the user names a column that is not there or twice, two columns have a name that
-        matters, or a radius may be a distance from an axis.
+        If the user names a column that is not there or twice, or two columns have a name that
+        matters.
     """
     names, plain = table.own, [plain_name(name) for name in table.own]
 
@@ -136,8 +135,6 @@ def find_columns(
         places = [place for place, name in enumerate(plain) if name == word]
         if places and (own := key(standard, places)) not in found.values():
             found[standard] = own
-            if standard == "radius" and "diameter" not in named:
-                refuse_cylindrical(path, own, names)
     return found
 
 

@@ -153,14 +153,6 @@ def test_a_name_that_stands_twice_is_asked(tmp_path):
     assert_right(read(path, columns="x=1"))
 
 
-def test_a_radius_beside_an_angle_is_asked(tmp_path):
-    columns = np.hypot(*POSITION[:, :2].T), np.arctan2(*POSITION[:, :2].T), POSITION, RADIUS
-    path = rows(tmp_path / "a.csv", *columns, names=["r", "theta", *"xyz", "size"])
-    with pytest.raises(ReadError, match="the column r may be a radius of grains or, beside theta"):
-        read(path)
-    assert_right(read(path, columns="radius=size"))
-
-
 ROWS = "0,0,0,0.5,7\n1,0,0,0.5,7\n"
 
 
