@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache
@@ -49,6 +49,11 @@ class Column:
     kind: type
     unit: str
     meaning: str
+
+
+def numbers(meanings: Mapping[str, str], unit: str = "") -> tuple[Column, ...]:
+    """Columns of floats by their names and meanings; dimensionless if no unit is named."""
+    return tuple(Column(name, float, unit, meaning) for name, meaning in meanings.items())
 
 
 class NoColumnError(ScanfabError, KeyError, AttributeError):

@@ -7,17 +7,12 @@ Conferences 140; the tensor is that of Satake (1982) and Oda (1982).
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.column import Column
 from scanfab.base.space import SPACE, Space
-from scanfab.fabric.tensor import FabricTensor, error_of_mean, tensor_columns, tensor_values
-
-if TYPE_CHECKING:
-    from scanfab.fabric.measured import Measured
+from scanfab.fabric.errors import error_of_mean
+from scanfab.fabric.tensor import FabricTensor
 
 
 def contact_fabric(normals: npt.ArrayLike, space: Space = SPACE) -> FabricTensor | None:
@@ -63,37 +58,3 @@ def axial_error(normals: npt.ArrayLike, axis: npt.ArrayLike, space: Space = SPAC
     """
     cosine = np.asarray(normals, dtype=np.float64) @ np.asarray(axis, dtype=np.float64)
     return error_of_mean(space.axial(cosine**2))
-
-
-class Contact:
-    """The columns of the contact fabric."""
-
-    columns = (
-        *tensor_columns("gc", "contact fabric"),
-        Column(
-            "alpha_c", float, "", "largest minus smallest principal value of the contact fabric"
-        ),
-        Column(
-            "alpha_c_axial",
-            float,
-            "",
-            "signed anisotropy of the contact fabric along the loading axis",
-        ),
-        Column(
-            "alpha_c_axial_se",
-            float,
-            "",
-            "its standard error if contacts were independent; too large by about half in relaxed "
-            "dense packings",
-        ),
-    )
-
-    def values(self, measured: Measured) -> dict[str, Any]:
-        """All None without contacts."""
-        tensor, axis = measured.contact, measured.axis
-        return {
-            **tensor_values("gc", tensor),
-            "alpha_c": tensor.alpha if tensor else None,
-            "alpha_c_axial": tensor.axial(axis) if tensor else None,
-            "alpha_c_axial_se": axial_error(measured.normals, axis, measured.space),
-        }

@@ -69,8 +69,8 @@ def fit_even(
     Examples
     --------
     >>> import numpy as np
-    >>> from scanfab.fabric.distribution import fit_even, sphere_points
-    >>> n = sphere_points()[0]
+    >>> from scanfab.fabric.distribution import direction_points, fit_even
+    >>> n = direction_points()[0]
     >>> f = fit_even(n, 1 + n[:, 2] ** 2, np.ones(len(n)))
     >>> round(float(f([0, 0, 1])), 12)
     2.0
@@ -121,16 +121,15 @@ def mean_length_function(
 
 
 @cache
-def sphere_points() -> tuple[FloatArray, FloatArray]:
-    """Points all over the unit sphere, shape (974, 3), and their quadrature weights, sum 1."""
-    rule = direction_rule("lebedev:53")
-    return np.concatenate([rule.axes, -rule.axes]), np.tile(0.5 * rule.weights, 2)
+def direction_points(space: Space = SPACE) -> tuple[FloatArray, FloatArray]:
+    """
+    Points all over the unit sphere, or around the circle of a plane, and their weights of sum 1.
 
-
-def direction_points(space: Space) -> tuple[FloatArray, FloatArray]:
-    """The same for a space: of a plane points all around its circle."""
+    Shapes (974, 3) and (974,), or (180, 3) and (180,).
+    """
     if not space.is_plane:
-        return sphere_points()
+        rule = direction_rule("lebedev:53")
+        return np.concatenate([rule.axes, -rule.axes]), np.tile(0.5 * rule.weights, 2)
     angle = 2.0 * np.pi * np.arange(POINTS) / POINTS
     first, second = (np.eye(3)[k] for k in sorted(space.along))
     points = np.cos(angle)[:, None] * first + np.sin(angle)[:, None] * second

@@ -19,21 +19,19 @@ their own (Radjai et al. 1998, doi:10.1103/PhysRevLett.80.61).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.column import Column
+from scanfab.base.column import numbers
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.contact import axial_error, contact_fabric
-from scanfab.fabric.tensor import COMPONENTS, FabricTensor
-
-if TYPE_CHECKING:
-    from scanfab.fabric.measured import Measured
-
+from scanfab.fabric.errors import error_of_mean
+from scanfab.fabric.invariants import fabric_deviator
+from scanfab.fabric.measured import Measured
+from scanfab.fabric.tensor import COMPONENTS
 
 # of a tangential to the mean normal force: what remains of it where only digits are left
 NO_FRICTION = 1e-4
@@ -41,166 +39,70 @@ NO_FRICTION = 1e-4
 ROUNDING = 1e-12
 
 
-class ContactForces(NamedTuple):
-    """What the contacts of one variant bear, and what they span."""
-
-    branch: FloatArray
-    """From the first grain's centre to the second's, along the normal; shape (M,), a length."""
-    force_n: FloatArray
-    """Normal force, compression positive; shape (M,), dump's force unit."""
-    force: FloatArray | None
-    """On the second grain, shape (M, 3); None where only its normal part is known."""
-
-
-@dataclass(frozen=True, eq=False)
-class DirectionalMean:
-    """
-    How a mean over the contacts of a direction depends on that: a tensor without trace.
-
-    Attributes
-    ----------
-    matrix : ndarray
-        Shape (3, 3), dimensionless.
-    axial : float
-        Its value along the loading axis less the mean of those across it.
-    axial_se : float or None
-        Standard error of that if contacts were independent; None for fewer than two.
-    """
+class DirectionalMean(NamedTuple):
+    """How a mean over the contacts of a direction depends on that: a tensor without trace."""
 
     matrix: FloatArray
+    """Shape (3, 3), dimensionless."""
     axial: float
+    """Its value along the loading axis less the mean of those across it."""
     axial_se: float | None
+    """Standard error of that if contacts were independent; None for fewer than two."""
 
 
-def branch_fabric(
-    normals: npt.ArrayLike, branch: npt.ArrayLike, axis: npt.ArrayLike, space: Space = SPACE
-) -> DirectionalMean | None:
-    """
-    Anisotropy of the branch length: 15/2 (<b n⊗n>/b0 - I/3).
-
-    Parameters
-    ----------
-    normals : array_like, shape (M, 3)
-        Unit normals.
-    branch : array_like, shape (M,)
-        Branch lengths.
-    axis : array_like, shape (3,)
-        Loading axis, a unit vector.
-
-    Returns
-    -------
-    DirectionalMean or None
-        None without contacts, and where so few of them lie about some direction that
-        1 + n·C·n is not above 0 there.
-
-    References
-    ----------
-    Rothenburg and Bathurst (1989), doi:10.1680/geot.1989.39.4.601.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from scanfab.fabric.forces import branch_fabric
-    >>> found = branch_fabric(np.eye(3), [1.0, 1.0, 2.0], [0, 0, 1])
-    >>> round(found.axial, 9)
-    1.875
-    """
-    vectors = np.asarray(branch, dtype=np.float64)[:, None] * np.asarray(normals)
-    return _mean_by_direction(normals, vectors, np.asarray(branch), space.second_order, axis, space)
-
-
-def normal_force_fabric(
-    normals: npt.ArrayLike, force_n: npt.ArrayLike, axis: npt.ArrayLike, space: Space = SPACE
-) -> DirectionalMean | None:
-    """
-    Anisotropy of the normal force: 15/2 (<f_n n⊗n>/f0 - I/3).
-
-    Parameters
-    ----------
-    normals : array_like, shape (M, 3)
-        Unit normals.
-    force_n : array_like, shape (M,)
-        Normal forces, compression positive.
-    axis : array_like, shape (3,)
-        Loading axis, a unit vector.
-
-    Returns
-    -------
-    DirectionalMean or None
-        As :func:`branch_fabric`; None also if f0 is not compression.
-
-    References
-    ----------
-    Ouadfel and Rothenburg (2001), doi:10.1016/S0167-6636(00)00057-0.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from scanfab.fabric.forces import normal_force_fabric
-    >>> round(normal_force_fabric(np.eye(3), [1.0, 1.0, 2.0], [0, 0, 1]).axial, 9)
-    1.875
-    """
-    vectors = np.asarray(force_n, dtype=np.float64)[:, None] * np.asarray(normals)
-    size = np.asarray(force_n)
-    return _mean_by_direction(normals, vectors, size, space.second_order, axis, space)
-
-
-def tangential_force_fabric(
-    normals: npt.ArrayLike, force: npt.ArrayLike, axis: npt.ArrayLike, space: Space = SPACE
-) -> DirectionalMean | None:
-    """
-    Anisotropy of the tangential force: 5 dev sym <f_t⊗n> / f0.
-
-    Parameters
-    ----------
-    normals : array_like, shape (M, 3)
-        Unit normals from the first grain to the second.
-    force : array_like, shape (M, 3)
-        Forces on the second grain.
-    axis : array_like, shape (3,)
-        Loading axis, a unit vector.
-
-    Returns
-    -------
-    DirectionalMean or None
-        As :func:`normal_force_fabric`.
-
-    References
-    ----------
-    Ouadfel and Rothenburg (2001), doi:10.1016/S0167-6636(00)00057-0.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from scanfab.fabric.forces import tangential_force_fabric
-    >>> n = np.eye(3)
-    >>> found = tangential_force_fabric(n, n, [0, 0, 1])  # normal forces alone
-    >>> np.abs(found.matrix).max()
-    np.float64(0.0)
-    """
-    n, f = np.asarray(normals, dtype=np.float64), np.asarray(force, dtype=np.float64)
-    force_n = np.einsum("ci,ci->c", f, n)
-    factor = 4.0 if space.is_plane else 5.0
-    return _mean_by_direction(n, f - force_n[:, None] * n, force_n, factor, axis, space)
-
-
-def _mean_by_direction(
+def directional_mean(
     normals: npt.ArrayLike,
-    vectors: FloatArray,
-    size: FloatArray,
-    factor: float,
+    size: npt.ArrayLike,
     axis: npt.ArrayLike,
-    space: Space,
+    space: Space = SPACE,
+    across: FloatArray | None = None,
 ) -> DirectionalMean | None:
-    """``factor`` dev sym <v⊗n> / <size>, and its axial value with the error of that."""
+    """
+    Anisotropy of branch length or normal force, 15/2 (<v n⊗n>/<v> - I/3), or 5 dev sym <t⊗n>/<v>.
+
+    Parameters
+    ----------
+    normals : array_like, shape (M, 3)
+        Unit normals n, from the first grain to the second.
+    size : array_like, shape (M,)
+        Branch lengths, or normal forces (compression positive), v.
+    axis : array_like, shape (3,)
+        Loading axis, a unit vector.
+    space : Space, optional
+        The plane in which they lie, if the grains are discs.
+    across : ndarray, shape (M, 3), optional
+        Tangential forces t on the second grain: then the anisotropy is theirs.
+
+    Returns
+    -------
+    DirectionalMean or None
+        None without contacts, where <v> is not above 0, and where so few contacts lie about some
+        direction that 1 + n·C·n is not above 0 there.
+
+    References
+    ----------
+    Rothenburg and Bathurst (1989), doi:10.1680/geot.1989.39.4.601; Ouadfel and Rothenburg (2001),
+    doi:10.1016/S0167-6636(00)00057-0.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab.fabric.forces import directional_mean
+    >>> round(directional_mean(np.eye(3), [1.0, 1.0, 2.0], [0, 0, 1]).axial, 9)
+    1.875
+    """
     n, a = np.asarray(normals, dtype=np.float64), np.asarray(axis, dtype=np.float64)
-    weights, dimension = _weights(n, space), float(space.dimension)
+    sizes, dimension = np.asarray(size, dtype=np.float64), float(space.dimension)
+    weights = _weights(n, space)
     if weights is None:
         return None
     count = len(n)
-    scale = float(weights @ size) / count
+    scale = float(weights @ sizes) / count
     if scale <= 0.0:
         return None
+    vectors, factor = sizes[:, None] * n, space.second_order
+    if across is not None:
+        vectors, factor = across, 4.0 if space.is_plane else 5.0
     product = (weights[:, None] * vectors).T @ n / count
     product = 0.5 * (product + product.T)
     matrix = factor / scale * (product - np.trace(product) / dimension * space.identity)
@@ -211,11 +113,12 @@ def _mean_by_direction(
     # By how much each contact moves the mean, times their number. A contact counts in the mean, and
     # moves C, and so the weights of all: without this second part the error would be several times
     # too large.
-    values = along - ratio * size
+    values = along - ratio * sizes
     through = space.second_order * ((weights**2 * values)[:, None] * n).T @ n / count
-    moved = weights * values - np.einsum("ci,ij,cj->c", n, through, n)
-    error = less * factor / scale * np.std(moved, ddof=1) / np.sqrt(count) if count > 1 else None
-    return DirectionalMean(matrix, less * factor * ratio, None if error is None else float(error))
+    error = error_of_mean(weights * values - np.einsum("ci,ij,cj->c", n, through, n))
+    return DirectionalMean(
+        matrix, less * factor * ratio, None if error is None else less * factor / scale * error
+    )
 
 
 def _weights(normals: FloatArray, space: Space) -> FloatArray | None:
@@ -223,7 +126,7 @@ def _weights(normals: FloatArray, space: Space) -> FloatArray | None:
     fabric = contact_fabric(normals, space)
     if fabric is None:
         return None
-    deviator = space.second_order * (fabric.matrix - space.identity / space.dimension)
+    deviator = fabric_deviator(fabric.matrix, space)
     density = 1.0 + np.einsum("ci,ij,cj->c", normals, deviator, normals)
     return None if density.min() <= 0.0 else 1.0 / density
 
@@ -248,18 +151,22 @@ class Forces:
     """The columns of branches, forces, and strong and weak contacts."""
 
     columns = (
-        *(
-            Column(f"{name}_{one}", float, "", f"{one} of {what}")
-            for name, what in TENSORS.items()
-            for one in COMPONENTS
+        *numbers(
+            {
+                f"{name}_{one}": f"{one} of {what}"
+                for name, what in TENSORS.items()
+                for one in COMPONENTS
+            }
         ),
-        *(
-            Column(f"alpha_{name}_axial{suffix}", float, "", meaning)
-            for name, what in AXIAL.items()
-            for suffix, meaning in (
-                ("", f"{what}, signed, along the loading axis"),
-                ("_se", "its standard error if contacts were independent"),
-            )
+        *numbers(
+            {
+                f"alpha_{name}_axial{suffix}": meaning
+                for name, what in AXIAL.items()
+                for suffix, meaning in (
+                    ("", f"{what}, signed, along the loading axis"),
+                    ("_se", "its standard error if contacts were independent"),
+                )
+            }
         ),
     )
 
@@ -268,45 +175,31 @@ class Forces:
         found: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
         normals, axis, forces = measured.normals, measured.axis, measured.forces
         space = measured.space
-        if forces is None:
+        if forces is None or not len(normals):
             return found
-        found |= _mean_values("bn", branch_fabric(normals, forces.branch, axis, space))
-        found |= _mean_values("fn", normal_force_fabric(normals, forces.force_n, axis, space))
+        means = {
+            "bn": directional_mean(normals, forces.branch, axis, space),
+            "fn": directional_mean(normals, forces.force_n, axis, space),
+        }
         if forces.force is not None:
-            mean = tangential_force_fabric(normals, forces.force, axis, space)
-            found |= _mean_values("ft", mean)
-        if len(normals):
-            # what differs from the mean by rounding alone is equal to it
-            strong = (
-                forces.force_n > forces.force_n.mean() + ROUNDING * np.abs(forces.force_n).max()
-            )
-            found |= _contact_values("gc_strong", normals[strong], axis, space)
-            found |= _contact_values("gc_weak", normals[~strong], axis, space)
+            size = np.einsum("ci,ci->c", forces.force, normals)
+            across = forces.force - size[:, None] * normals
+            means["ft"] = directional_mean(normals, size, axis, space, across)
+        # what differs from the mean by rounding alone is equal to it
+        rounding = ROUNDING * np.abs(forces.force_n).max()
+        strong = forces.force_n > forces.force_n.mean() + rounding
+        for name, chosen in (("gc_strong", strong), ("gc_weak", ~strong)):
+            some = normals[chosen]
+            tensor = contact_fabric(some, space)
+            if tensor is not None:
+                error = axial_error(some, axis, space)
+                means[name] = DirectionalMean(tensor.matrix, tensor.axial(axis), error)
+        for name, mean in means.items():
+            if mean is not None:
+                found |= {f"{name}_{one}": float(mean.matrix[at]) for one, at in COMPONENTS.items()}
+                found[f"alpha_{name}_axial"] = mean.axial
+                found[f"alpha_{name}_axial_se"] = mean.axial_se
         return found
-
-
-def _mean_values(name: str, mean: DirectionalMean | None) -> dict[str, float | None]:
-    if mean is None:
-        return {}
-    components = {f"{name}_{one}": float(mean.matrix[place]) for one, place in COMPONENTS.items()}
-    return {
-        **components,
-        f"alpha_{name}_axial": mean.axial,
-        f"alpha_{name}_axial_se": mean.axial_se,
-    }
-
-
-def _contact_values(
-    name: str, normals: FloatArray, axis: FloatArray, space: Space
-) -> dict[str, float | None]:
-    tensor: FabricTensor | None = contact_fabric(normals, space)
-    if tensor is None:
-        return {}
-    return {
-        **{f"{name}_{one}": value for one, value in tensor.components().items()},
-        f"alpha_{name}_axial": tensor.axial(axis),
-        f"alpha_{name}_axial_se": axial_error(normals, axis, space),
-    }
 
 
 def doubts_of_forces(measured: Measured) -> dict[str, str]:

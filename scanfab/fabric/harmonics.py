@@ -10,56 +10,25 @@ doi:10.1016/0020-7225(84)90090-9, has the tensors of any order.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.column import Column
+from scanfab.base.column import Column, numbers
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
 from scanfab.fabric.distribution import harmonics_of
-from scanfab.fabric.tensor import error_of_mean
-
-if TYPE_CHECKING:
-    from scanfab.fabric.measured import Measured
-    from scanfab.fabric.void import VoidFabric
-
+from scanfab.fabric.errors import error_of_mean
+from scanfab.fabric.measured import Measured
 
 ORDERS = (2, 4)
-
-
-def legendre(order: int, cosine: npt.ArrayLike) -> FloatArray:
-    """
-    The Legendre polynomial of order 2 or 4.
-
-    Parameters
-    ----------
-    order : int
-        2 or 4.
-    cosine : array_like
-        Of the angle to the axis.
-
-    Returns
-    -------
-    ndarray
-        Of the same shape.
-
-    Examples
-    --------
-    >>> from scanfab.fabric.harmonics import legendre
-    >>> float(legendre(4, 1.0)), float(legendre(2, 0.0))
-    (1.0, -0.5)
-    """
-    square = np.asarray(cosine, dtype=np.float64) ** 2
-    if order == 2:
-        return np.asarray(1.5 * square - 0.5)
-    return np.asarray((35.0 * square**2 - 30.0 * square + 3.0) / 8.0)
+FOURTH = "Σ w ℓ nnnn / Σ w ℓ: 81 numbers, the last index counts fastest; in JSON only"
 
 
 def harmonic(order: int, cosine: npt.ArrayLike, space: Space = SPACE) -> FloatArray:
     """
-    What a_l has the mean of: P_l, of discs cos lθ.
+    What a_l has the mean of: the Legendre polynomial P_l, of discs cos lθ.
 
     Parameters
     ----------
@@ -79,13 +48,17 @@ def harmonic(order: int, cosine: npt.ArrayLike, space: Space = SPACE) -> FloatAr
     --------
     >>> from scanfab.base.space import Space
     >>> from scanfab.fabric.harmonics import harmonic
-    >>> float(harmonic(2, 1.0)), float(harmonic(2, 1.0, Space(2)))
-    (1.0, 1.0)
+    >>> float(harmonic(2, 0.0)), float(harmonic(2, 0.0, Space(2)))
+    (-0.5, -1.0)
     """
-    if not space.is_plane:
-        return legendre(order, cosine)
-    double = 2.0 * np.asarray(cosine, dtype=np.float64) ** 2 - 1.0
-    return np.asarray(double if order == 2 else 2.0 * double**2 - 1.0)
+    square = np.asarray(cosine, dtype=np.float64) ** 2
+    # P_2, in a plane cos 2θ
+    second = np.asarray(space.axial(square))
+    if order == 2:
+        return second
+    if space.is_plane:
+        return 2.0 * second**2 - 1.0
+    return np.asarray((35.0 * square**2 - 30.0 * square + 3.0) / 8.0)
 
 
 def tensor4(vectors: npt.ArrayLike, weights: npt.ArrayLike) -> FloatArray:
@@ -121,30 +94,22 @@ def tensor4(vectors: npt.ArrayLike, weights: npt.ArrayLike) -> FloatArray:
     return found
 
 
-def _columns(prefix: str, what: str) -> tuple[Column, ...]:
-    return tuple(
-        column
-        for order in ORDERS
-        for column in (
-            Column(f"{prefix}_a{order}", float, "", f"order {order} of {what} about the axis"),
-            Column(f"{prefix}_a{order}_se", float, "", "its standard error"),
-        )
-    )
-
-
 class Harmonics:
     """The columns of the harmonics; those of the tensors are in JSON alone."""
 
     columns = (
-        *_columns("vs", "the mean void lengths"),
-        *_columns("c", "the contact normals"),
-        Column(
-            "vs_tensor4",
-            list,
-            "",
-            "void fabric tensor of fourth order, Σ w ℓ nnnn / Σ w ℓ: 81 numbers, the last index "
-            "counts fastest; in JSON only",
+        *numbers(
+            {
+                f"{name}_a{order}{suffix}": meaning
+                for name, what in (("vs", "the mean void lengths"), ("c", "the contact normals"))
+                for order in ORDERS
+                for suffix, meaning in (
+                    ("", f"order {order} of {what} about the axis"),
+                    ("_se", "its standard error"),
+                )
+            }
         ),
+        Column("vs_tensor4", list, "", f"void fabric tensor of fourth order, {FOURTH}"),
         Column(
             "c_tensor4", list, "", "contact fabric tensor of fourth order, likewise; in JSON only"
         ),
@@ -153,35 +118,28 @@ class Harmonics:
     def values(self, measured: Measured) -> dict[str, Any]:
         """All None of a fabric that does not exist."""
         found: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
-        if measured.void is not None:
-            found |= _of_voids(measured.void, measured.axis, measured.space)
-        if len(measured.normals):
-            found |= _of_contacts(measured.normals, measured.axis, measured.space)
+        void, axis, space, normals = measured.void, measured.axis, measured.space, measured.normals
+        if void is not None:
+            weights = void.weights * void.mean_lengths
+            weights = weights / weights.sum(axis=1, keepdims=True)
+            for order in ORDERS:
+                # in a plane fewer steps take other orders for this one
+                if space.is_plane and void.axes.shape[1] < order // 2 + 2:
+                    continue
+                # of each replicate: the error is from their scatter, as that of the tensor
+                means = np.sum(weights * harmonic(order, void.axes @ axis, space), axis=1)
+                found |= _mean("vs", order, harmonics_of(order, space) * means)
+            tensor = tensor4(void.axes.reshape(-1, 3), weights.ravel())
+            found["vs_tensor4"] = tensor.ravel().tolist()
+        if len(normals):
+            for order in ORDERS:
+                # of each contact: the error is that of a mean over independent contacts
+                values = harmonics_of(order, space) * harmonic(order, normals @ axis, space)
+                found |= _mean("c", order, values)
+            found["c_tensor4"] = tensor4(normals, np.ones(len(normals))).ravel().tolist()
         return found
 
 
-def _of_voids(void: VoidFabric, axis: FloatArray, space: Space) -> dict[str, Any]:
-    """Of each replicate, then their mean; the error from their scatter, as that of the tensor."""
-    weights = void.weights * void.mean_lengths
-    weights = weights / weights.sum(axis=1, keepdims=True)
-    found: dict[str, Any] = {}
-    for order in ORDERS:
-        # in a plane fewer steps take other orders for this one
-        if space.is_plane and void.axes.shape[1] < order // 2 + 2:
-            continue
-        means = np.sum(weights * harmonic(order, void.axes @ axis, space), axis=1)
-        values = harmonics_of(order, space) * means
-        found[f"vs_a{order}"] = float(values.mean())
-        found[f"vs_a{order}_se"] = error_of_mean(values)
-    tensor = tensor4(void.axes.reshape(-1, 3), weights.ravel())
-    return {**found, "vs_tensor4": tensor.ravel().tolist()}
-
-
-def _of_contacts(normals: FloatArray, axis: FloatArray, space: Space) -> dict[str, Any]:
-    """The error is that of a mean over independent contacts."""
-    found: dict[str, Any] = {}
-    for order in ORDERS:
-        values = harmonics_of(order, space) * harmonic(order, normals @ axis, space)
-        found[f"c_a{order}"] = float(values.mean())
-        found[f"c_a{order}_se"] = error_of_mean(values)
-    return {**found, "c_tensor4": tensor4(normals, np.ones(len(normals))).ravel().tolist()}
+def _mean(name: str, order: int, values: FloatArray) -> dict[str, float | None]:
+    """The columns of one order."""
+    return {f"{name}_a{order}": float(values.mean()), f"{name}_a{order}_se": error_of_mean(values)}

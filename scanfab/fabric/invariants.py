@@ -11,18 +11,16 @@ its few contacts or segments makes it, and the columns ``_bias`` say how much th
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from scanfab.base.column import Column
+from scanfab.base.column import numbers
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray
-from scanfab.fabric.tensor import FabricTensor, error_of_mean
-
-if TYPE_CHECKING:
-    from scanfab.fabric.measured import Measured
-
+from scanfab.fabric.errors import error_of_mean
+from scanfab.fabric.measured import Measured
+from scanfab.fabric.tensor import FabricTensor
 
 # By dimension: components of a tensor's deviator, and the variance of each of n⊗n, of a unit vector
 # n that has any direction alike.
@@ -101,134 +99,91 @@ def intensity(matrix: FloatArray, space: Space = SPACE) -> float:
     return float(math.sqrt(space.intensity) * np.linalg.norm(fabric_deviator(matrix, space)))
 
 
-def _columns() -> tuple[Column, ...]:
-    names = {"vs": "void fabric", "c": "contact fabric"}
-    of = {"vs": "of the scan", "c": "if contacts were independent"}
-    bias = {"vs": "the noise of this scan", "c": "as many independent contacts"}
-    main = [
-        Column(
-            f"f_{one}",
-            float,
-            "",
-            f"a = √(3/2 F:F) of the {what}, F = 15/2 (G - I/3); of discs √(1/2 F:F), "
-            "F = 4 (G - I/2)",
-        )
-        for one, what in names.items()
-    ]
-    main += [
-        Column(f"f_{one}_bias", float, "", f"what {bias[one]} would give f_{one} in the mean")
-        for one in names
-    ]
-    main += [
-        Column(f"g{one}_{k}", float, "", f"principal value of the {what}, {which}")
-        for one, what in names.items()
-        for k, which in ((1, "the largest"), (2, "the middle one"), (3, "the smallest"))
-    ]
-    main += [
-        Column(
-            f"b_{one}",
-            float,
-            "",
-            f"(G2 - G3)/(G1 - G3) of the {what}, 0 to 1; empty where G1 - G3 is below 3/√N, and of "
-            "discs",
-        )
-        for one, what in names.items()
-    ]
-    errors = [
-        Column(f"{name}_se", float, "", f"standard error of {name}, {of[one]}")
-        for one in names
-        for name in (f"f_{one}", *(f"g{one}_{k}" for k in (1, 2, 3)))
-    ]
-    return (*main, *errors)
+FABRICS = {"vs": "void fabric", "c": "contact fabric"}
+PRINCIPAL = {1: "the largest", 2: "the middle one", 3: "the smallest"}
+ERRORS = {"vs": "of the scan", "c": "if contacts were independent"}
+BIAS = {"vs": "the noise of this scan", "c": "as many independent contacts"}
+DISCS = "of discs √(1/2 F:F), F = 4 (G - I/2)"
+NO_B = "empty where G1 - G3 is below 3/√N, and of discs"
 
 
 class Invariants:
     """The columns of the invariants."""
 
-    columns = _columns()
+    columns = numbers(
+        {
+            **{
+                f"f_{one}": f"a = √(3/2 F:F) of the {what}, F = 15/2 (G - I/3); {DISCS}"
+                for one, what in FABRICS.items()
+            },
+            **{
+                f"f_{one}_bias": f"what {what} would give f_{one} in the mean"
+                for one, what in BIAS.items()
+            },
+            **{
+                f"g{one}_{k}": f"principal value of the {what}, {which}"
+                for one, what in FABRICS.items()
+                for k, which in PRINCIPAL.items()
+            },
+            **{
+                f"b_{one}": f"(G2 - G3)/(G1 - G3) of the {what}, 0 to 1; {NO_B}"
+                for one, what in FABRICS.items()
+            },
+            **{
+                f"{name}_se": f"standard error of {name}, {what}"
+                for one, what in ERRORS.items()
+                for name in (f"f_{one}", *(f"g{one}_{k}" for k in PRINCIPAL))
+            },
+        }
+    )
 
     def values(self, measured: Measured) -> dict[str, Any]:
         """All None of a fabric that does not exist."""
         found: dict[str, Any] = dict.fromkeys(column.name for column in self.columns)
-        if measured.void is not None:
-            tensors = measured.void.replicates
-            found |= _values("vs", measured.void.tensor, measured.segment_count)
+        space, void, contact = measured.space, measured.void, measured.contact
+        if void is not None:
+            tensors = void.replicates
+            found |= _values("vs", void.tensor, measured.segment_count, tensors)
             if len(tensors) > 1:
                 # all are of trace 1, so the components of the deviator share what there is of
                 # variance in the mean of the replicates
-                freedom = COMPONENTS_OF_DEVIATOR[measured.space.dimension]
+                freedom = COMPONENTS_OF_DEVIATOR[space.dimension]
                 variance = float(np.sum(np.var(tensors, axis=0, ddof=1))) / freedom / len(tensors)
-                found["f_vs_bias"] = bias_of(measured.space) * math.sqrt(variance)
-            found |= _errors("vs", measured.void.tensor, tensors)
-        if measured.contact is not None:
-            count = len(measured.normals)
-            found |= _values("c", measured.contact, count)
-            variance = CONTACT_VARIANCE[measured.space.dimension]
-            found["f_c_bias"] = bias_of(measured.space) * math.sqrt(variance / count)
-            n = measured.normals
-            found |= _errors("c", measured.contact, np.einsum("ci,cj->cij", n, n))
+                found["f_vs_bias"] = bias_of(space) * math.sqrt(variance)
+        if contact is not None:
+            n, count = measured.normals, len(measured.normals)
+            found |= _values("c", contact, count, np.einsum("ci,cj->cij", n, n))
+            variance = CONTACT_VARIANCE[space.dimension] / count
+            found["f_c_bias"] = bias_of(space) * math.sqrt(variance)
         return found
 
 
-def _values(name: str, tensor: FabricTensor, count: int) -> dict[str, float | None]:
+def _values(
+    name: str, tensor: FabricTensor, count: int, each: FloatArray
+) -> dict[str, float | None]:
+    """
+    a, the principal values and b with their errors.
+
+    G is the mean of each tensor, shape (M, 3, 3), and to first order a and the principal values are
+    linear in G. ``count`` is the number of segments or contacts.
+    """
+    space = tensor.space
     largest, middle, smallest = (float(one) for one in tensor.principal_values)
     alpha = largest - smallest
-    known = count > 0 and not tensor.space.is_plane and alpha >= LEAST_ALPHA / math.sqrt(count)
+    known = count > 0 and not space.is_plane and alpha >= LEAST_ALPHA / math.sqrt(count)
+    forms = {f"g{name}_{k}": np.outer(one, one) for k, one in enumerate(tensor.principal_axes, 1)}
+    deviator = fabric_deviator(tensor.matrix, space)
+    size = float(np.linalg.norm(deviator))
+    if size > 0.0:
+        forms[f"f_{name}"] = math.sqrt(space.intensity) * space.second_order * deviator / size
     return {
-        f"f_{name}": intensity(tensor.matrix, tensor.space),
+        f"f_{name}": intensity(tensor.matrix, space),
         f"g{name}_1": largest,
         f"g{name}_2": middle,
         f"g{name}_3": smallest,
         f"b_{name}": (middle - smallest) / alpha if known else None,
+        **{
+            f"{of}_se": error_of_mean(np.einsum("cij,ij->c", each, form))
+            for of, form in forms.items()
+        },
     }
-
-
-def _errors(name: str, tensor: FabricTensor, each: FloatArray) -> dict[str, float | None]:
-    """
-    Of a and of the principal values: to first order each is linear in G.
-
-    G is the mean of each tensor, shape (M, 3, 3).
-    """
-    space = tensor.space
-    deviator = fabric_deviator(tensor.matrix, space)
-    size = float(np.linalg.norm(deviator))
-    forms = {f"g{name}_{k}": np.outer(one, one) for k, one in enumerate(tensor.principal_axes, 1)}
-    if size > 0.0:
-        forms[f"f_{name}"] = math.sqrt(space.intensity) * space.second_order * deviator / size
-    return {
-        f"{of}_se": error_of_mean(np.einsum("cij,ij->c", each, form)) for of, form in forms.items()
-    }
-
-
-class Orientation:
-    """The columns of the major axes of both fabrics, and of the angle: are they coaxial?"""
-
-    columns = (
-        *(
-            Column(
-                f"{prefix}_axis_{one}",
-                float,
-                "",
-                f"{one} of the direction of the {what}'s largest principal value, a unit vector",
-            )
-            for prefix, what in (("gvs", "void fabric"), ("gc", "contact fabric"))
-            for one in "xyz"
-        ),
-        Column(
-            "coaxiality_deg",
-            float,
-            "degrees",
-            "angle between the major axes of void and contact fabric, 0 to 90",
-        ),
-    )
-
-    def values(self, measured: Measured) -> dict[str, Any]:
-        """Of what there is: an angle needs both fabrics."""
-        void = measured.void.tensor if measured.void else None
-        contact = measured.contact
-        found: dict[str, Any] = {}
-        for prefix, tensor in (("gvs", void), ("gc", contact)):
-            axis = [None] * 3 if tensor is None else tensor.major_axis.tolist()
-            found |= {f"{prefix}_axis_{one}": x for one, x in zip("xyz", axis, strict=True)}
-        found["coaxiality_deg"] = void.angle_to(contact) if void and contact else None
-        return found

@@ -2,17 +2,65 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
 
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.contact import contact_fabric
-from scanfab.fabric.forces import ContactForces
 from scanfab.fabric.jackknife import BlockedSums, Jackknife, contact_jackknife, void_jackknife
-from scanfab.fabric.state import SampleState
 from scanfab.fabric.tensor import FabricTensor
 from scanfab.fabric.void import VoidFabric, void_fabric
+
+# of √(3/2 s:s), s the stress's deviator, to p, below which the stress has no direction
+LEAST_RATIO = 0.02
+
+
+class ContactForces(NamedTuple):
+    """What the contacts of one variant bear, and what they span."""
+
+    branch: FloatArray
+    """From the first grain's centre to the second's, along the normal; shape (M,), a length."""
+    force_n: FloatArray
+    """Normal force, compression positive; shape (M,), dump's force unit."""
+    force: FloatArray | None
+    """On the second grain, shape (M, 3); None where only its normal part is known."""
+
+
+class SampleState(NamedTuple):
+    """What is known of the sample beside its fabric."""
+
+    void_ratio: float | None
+    """Volume of the voids over that of the grains; None without a volume."""
+    coordination_mechanical: float | None
+    """Mean number of contacts of the grains that have two or more."""
+    stress: FloatArray | None
+    """Shape (3, 3), compression positive; None without forces, or without a volume."""
+    space: Space = SPACE
+    """The plane of the sample, if its grains are discs: stress is a force over a length there."""
+
+    @property
+    def mean_stress(self) -> float:
+        """The pressure p."""
+        assert self.stress is not None
+        return float(np.trace(self.stress)) / self.space.dimension
+
+    @property
+    def direction(self) -> FloatArray | None:
+        """The stress deviator over its norm; None for a stress that is nearly isotropic."""
+        if self.stress is None:
+            return None
+        mean = self.mean_stress
+        deviator = self.stress - mean * self.space.identity
+        size = float(np.linalg.norm(deviator))
+        deviatoric = math.sqrt(self.space.dimension / (self.space.dimension - 1.0)) * size
+        if mean <= 0.0 or deviatoric < LEAST_RATIO * mean:
+            return None
+        return deviator / size
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,14 +15,12 @@ from typing import Any, Protocol
 from scanfab.base.column import Column
 from scanfab.base.errors import ScanfabError
 from scanfab.base.plugins import having, load_plugins
-from scanfab.fabric.contact import Contact
 from scanfab.fabric.forces import Forces
 from scanfab.fabric.harmonics import Harmonics
-from scanfab.fabric.invariants import Invariants, Orientation
-from scanfab.fabric.jackknife import Halves, Scatter
+from scanfab.fabric.invariants import Invariants
 from scanfab.fabric.measured import Measured
 from scanfab.fabric.state import State
-from scanfab.fabric.void import Void
+from scanfab.fabric.usual import Contact, Halves, Orientation, Scatter, Void
 
 GROUP = "scanfab.fabrics"
 

@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 from scanfab.base.column import Column
 from scanfab.base.typing import FloatArray
-from scanfab.fabric.tensor import axial
+from scanfab.fabric.tensor import axial, weighted_tensors
 from scanfab.packing.near import NearPairs
 from scanfab.scan.directions import rule_of
 
@@ -88,8 +88,8 @@ def predicted_alpha(
         share[place] = porosity - (cutoff * pairs.shadow - integral) / pairs.volume
     if np.any(number <= 0.0) or np.any(share <= 0.0):
         return None
-    weighted = rule.weights * (cutoff + share / number)
-    tensor = np.einsum("d,di,dj->ij", weighted, rule.axes, rule.axes) / weighted.sum()
+    lengths = rule.weights * (cutoff + share / number)
+    tensor = weighted_tensors(rule.axes[None], lengths[None])[0]
     return float(axial(tensor, axis, pairs.space))
 
 

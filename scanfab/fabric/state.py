@@ -10,26 +10,17 @@ doi:10.1061/(ASCE)EM.1943-7889.0000324) with the direction n_L = s/√(s:s) of t
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.column import Column
-from scanfab.base.space import SPACE, Space
+from scanfab.base.column import Column, numbers
 from scanfab.base.typing import FloatArray
+from scanfab.fabric.errors import error_of_mean
 from scanfab.fabric.invariants import fabric_deviator
-from scanfab.fabric.tensor import COMPONENTS, FabricTensor, error_of_mean
-
-if TYPE_CHECKING:
-    from scanfab.fabric.measured import Measured
-
-
-# of √(3/2 s:s), s the stress's deviator, to p, below which the stress has no direction
-LEAST_RATIO = 0.02
+from scanfab.fabric.measured import Measured
+from scanfab.fabric.tensor import COMPONENTS, FabricTensor
 
 
 def love_weber(force: npt.ArrayLike, branch: npt.ArrayLike, volume: float) -> FloatArray:
@@ -66,41 +57,8 @@ def love_weber(force: npt.ArrayLike, branch: npt.ArrayLike, volume: float) -> Fl
     return np.asarray(0.5 * (product + product.T))
 
 
-@dataclass(frozen=True, eq=False)
-class SampleState:
-    """What is known of the sample beside its fabric."""
-
-    void_ratio: float | None
-    """Volume of the voids over that of the grains; None without a volume."""
-    coordination_mechanical: float | None
-    """Mean number of contacts of the grains that have two or more."""
-    stress: FloatArray | None
-    """Shape (3, 3), compression positive; None without forces, or without a volume."""
-    space: Space = SPACE
-    """The plane of the sample, if its grains are discs: stress is a force over a length there."""
-
-    @cached_property
-    def mean_stress(self) -> float:
-        """The pressure p."""
-        assert self.stress is not None
-        return float(np.trace(self.stress)) / self.space.dimension
-
-    @cached_property
-    def direction(self) -> FloatArray | None:
-        """The stress deviator over its norm; None for a stress that is nearly isotropic."""
-        if self.stress is None:
-            return None
-        deviator = self.stress - self.mean_stress * self.space.identity
-        size = float(np.linalg.norm(deviator))
-        deviatoric = math.sqrt(self.space.dimension / (self.space.dimension - 1.0)) * size
-        if self.mean_stress <= 0.0 or deviatoric < LEAST_RATIO * self.mean_stress:
-            return None
-        return deviator / size
-
-
 # the unit of stresses: force over length squared, as the dump has them
 STRESS = "stress"
-
 VOLUMETRIC_STRAIN = Column(
     "volumetric_strain",
     float,
@@ -108,52 +66,46 @@ VOLUMETRIC_STRAIN = Column(
     "of a cell that repeats along all its vectors, since the first frame: -ln(V/V0), positive in "
     "compression; else empty",
 )
+FABRICS = {"vs": "void fabric", "c": "contact fabric"}
+NO_DIRECTION = "empty for √(3/2 s:s) < 0.02 p"
+WITH_TWO = "mean number of contacts of the grains that have two or more"
+DIRECTION = "direction of the stress deviator s"
+ANGLE = "angle between the major axes of"
 
 
 class State:
     """The columns of void ratio, stress and what follows."""
 
     columns = (
-        Column("void_ratio", float, "", "volume of voids over that of grains, rattlers too"),
-        *(
-            Column(f"stress_{one}", float, STRESS, f"{one} of the stress, compression positive")
-            for one in COMPONENTS
+        *numbers({"void_ratio": "volume of voids over that of grains, rattlers too"}),
+        *numbers(
+            {
+                **{f"stress_{k}": f"{k} of the stress, compression positive" for k in COMPONENTS},
+                "p": "mean stress, a third of the trace, of discs half of it",
+                "q": "stress along the loading axis less the mean across it",
+            },
+            STRESS,
         ),
-        Column("p", float, STRESS, "mean stress, a third of the trace, of discs half of it"),
-        Column("q", float, STRESS, "stress along the loading axis less the mean across it"),
         VOLUMETRIC_STRAIN,
-        Column(
-            "coordination_mechanical",
-            float,
-            "",
-            "mean number of contacts of the grains that have two or more",
+        *numbers({"coordination_mechanical": WITH_TWO}),
+        *numbers(
+            {
+                f"acst_{one}": f"A = F:n of the {what} and the {DIRECTION}; {NO_DIRECTION}"
+                for one, what in FABRICS.items()
+            }
         ),
-        *(
-            Column(
-                f"acst_{one}",
-                float,
-                "",
-                f"A = F:n of the {what} and the direction of the stress deviator s; empty for "
-                "√(3/2 s:s) < 0.02 p",
-            )
-            for one, what in (("vs", "void fabric"), ("c", "contact fabric"))
+        *numbers(
+            {
+                f"angle_{one}_stress": f"{ANGLE} {what} and stress, 0 to 90; {NO_DIRECTION}"
+                for one, what in FABRICS.items()
+            },
+            "degrees",
         ),
-        *(
-            Column(
-                f"angle_{one}_stress",
-                float,
-                "degrees",
-                f"angle between the major axes of {what} and stress, 0 to 90; empty for "
-                "√(3/2 s:s) < 0.02 p",
-            )
-            for one, what in (("vs", "void fabric"), ("c", "contact fabric"))
-        ),
-        Column("acst_vs_se", float, "", "standard error of acst_vs, of the scan"),
-        Column(
-            "acst_c_se",
-            float,
-            "",
-            "standard error of acst_c, of contacts, if they were independent",
+        *numbers(
+            {
+                "acst_vs_se": "standard error of acst_vs, of the scan",
+                "acst_c_se": "standard error of acst_c, of contacts, if they were independent",
+            }
         ),
     )
 
@@ -172,33 +124,28 @@ class State:
         less = state.space.dimension / (state.space.dimension - 1.0)
         found |= {f"stress_{one}": float(state.stress[at]) for one, at in COMPONENTS.items()}
         found |= {"p": state.mean_stress, "q": less * (along - state.mean_stress)}
-        return found | _against_stress(measured, state)
+        if state.direction is not None:
+            found |= _against_stress(measured, state.stress, state.direction)
+        return found
 
 
-def _against_stress(measured: Measured, state: SampleState) -> dict[str, float | None]:
-    """How both fabrics stand to the direction of the stress."""
-    direction = state.direction
-    if direction is None:
-        return {}
-    assert state.stress is not None
-    space = state.space
-    stress = FabricTensor(state.stress / np.trace(state.stress), space)
-    found: dict[str, float | None] = {}
-    if measured.void is not None:
-        each = np.einsum("rij,ij->r", fabric_deviator(measured.void.replicates, space), direction)
-        found |= _values("vs", measured.void.tensor, direction, stress, each)
-    if measured.contact is not None:
-        n = measured.normals
-        each = space.second_order * np.einsum("ci,ij,cj->c", n, direction, n)
-        found |= _values("c", measured.contact, direction, stress, each)
-    return found
-
-
-def _values(
-    name: str, fabric: FabricTensor, direction: FloatArray, stress: FabricTensor, each: FloatArray
+def _against_stress(
+    measured: Measured, stress: FloatArray, direction: FloatArray
 ) -> dict[str, float | None]:
-    return {
-        f"acst_{name}": float(np.sum(fabric_deviator(fabric.matrix, fabric.space) * direction)),
-        f"angle_{name}_stress": fabric.angle_to(stress),
-        f"acst_{name}_se": error_of_mean(each),
-    }
+    """How both fabrics stand to the stress and the direction of its deviator."""
+    space, n = measured.space, measured.normals
+    along = FabricTensor(stress / np.trace(stress), space)
+    fabrics: dict[str, tuple[FabricTensor, FloatArray]] = {}
+    if measured.void is not None:
+        tensors = fabric_deviator(measured.void.replicates, space)
+        each = np.einsum("rij,ij->r", tensors, direction)
+        fabrics["vs"] = measured.void.tensor, each
+    if measured.contact is not None:
+        each = space.second_order * np.einsum("ci,ij,cj->c", n, direction, n)
+        fabrics["c"] = measured.contact, each
+    found: dict[str, float | None] = {}
+    for name, (fabric, each) in fabrics.items():
+        found[f"acst_{name}"] = float(np.sum(fabric_deviator(fabric.matrix, space) * direction))
+        found[f"angle_{name}_stress"] = fabric.angle_to(along)
+        found[f"acst_{name}_se"] = error_of_mean(each)
+    return found

@@ -8,17 +8,12 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.column import Column
+from scanfab.base.column import Column, numbers
 from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import spelt_place
 from scanfab.base.typing import FloatArray
 
 COMPONENTS = {"xx": (0, 0), "yy": (1, 1), "zz": (2, 2), "xy": (0, 1), "xz": (0, 2), "yz": (1, 2)}
-
-
-def error_of_mean(values: FloatArray) -> float | None:
-    """Standard error of the mean of independent values, shape (M,); None for fewer than two."""
-    return float(np.std(values, ddof=1) / np.sqrt(len(values))) if len(values) > 1 else None
 
 
 def axial(tensor: npt.NDArray[np.float64], axis: npt.ArrayLike, space: Space = SPACE) -> FloatArray:
@@ -51,6 +46,27 @@ def axial(tensor: npt.NDArray[np.float64], axis: npt.ArrayLike, space: Space = S
     unit = np.asarray(axis, dtype=np.float64)
     along: FloatArray = np.asarray(space.axial(np.asarray(tensor @ unit @ unit)))
     return along
+
+
+def weighted_tensors(axes: FloatArray, lengths: FloatArray) -> FloatArray:
+    """
+    Σ w ℓ n⊗n / Σ w ℓ over the axes of each replicate.
+
+    Parameters
+    ----------
+    axes : ndarray, shape (R, D, 3)
+        Unit vectors n.
+    lengths : ndarray, shape (R, D, ...)
+        w ℓ, of anything that is measured along the same axes.
+
+    Returns
+    -------
+    ndarray, shape (R, ..., 3, 3)
+        Trace 1.
+    """
+    tensors = np.einsum("rd...,rdi,rdj->r...ij", lengths, axes, axes)
+    tensors /= lengths.sum(axis=1)[..., None, None]
+    return np.asarray(tensors)
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,23 +176,34 @@ class FabricTensor:
         return {name: float(self.matrix[place]) for name, place in COMPONENTS.items()}
 
 
-def tensor_columns(prefix: str, what: str) -> tuple[Column, ...]:
+def tensor_columns(name: str, what: str) -> tuple[Column, ...]:
     """
-    The columns of a tensor's six components.
+    The columns of a tensor: its six components, α and the signed anisotropy.
 
     Examples
     --------
     >>> from scanfab.fabric.tensor import tensor_columns
-    >>> [one.name for one in tensor_columns("gc", "contact fabric")]
-    ['gc_xx', 'gc_yy', 'gc_zz', 'gc_xy', 'gc_xz', 'gc_yz']
+    >>> [one.name for one in tensor_columns("c", "contact fabric")][4:]
+    ['gc_xz', 'gc_yz', 'alpha_c', 'alpha_c_axial']
     """
-    return tuple(
-        Column(f"{prefix}_{name}", float, "", f"{name} of the {what} tensor, whose trace is 1")
-        for name in COMPONENTS
+    components = {f"g{name}_{k}": f"{k} of the {what} tensor, whose trace is 1" for k in COMPONENTS}
+    return numbers(
+        {
+            **components,
+            f"alpha_{name}": f"largest minus smallest principal value of the {what}",
+            f"alpha_{name}_axial": f"signed anisotropy of the {what} along the loading axis",
+        }
     )
 
 
-def tensor_values(prefix: str, tensor: FabricTensor | None) -> dict[str, float | None]:
-    """The values of these columns."""
-    found = tensor.components() if tensor else dict.fromkeys(COMPONENTS)
-    return {f"{prefix}_{name}": value for name, value in found.items()}
+def tensor_values(
+    name: str, tensor: FabricTensor | None, axis: npt.ArrayLike
+) -> dict[str, float | None]:
+    """The values of these columns; all None without a tensor."""
+    if tensor is None:
+        return dict.fromkeys(one.name for one in tensor_columns(name, ""))
+    return {
+        **{f"g{name}_{place}": value for place, value in tensor.components().items()},
+        f"alpha_{name}": tensor.alpha,
+        f"alpha_{name}_axial": tensor.axial(axis),
+    }

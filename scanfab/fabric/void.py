@@ -9,26 +9,15 @@ doi:10.3208/sandf1972.25.3_85. As printed the weights w of the directions are 1;
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from scanfab.base.column import LENGTH, Column
 from scanfab.base.space import SPACE, Space
 from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray, IntArray
-from scanfab.fabric.tensor import (
-    FabricTensor,
-    axial,
-    error_of_mean,
-    tensor_columns,
-    tensor_values,
-)
-
-if TYPE_CHECKING:
-    from scanfab.fabric.measured import Measured
-
+from scanfab.fabric.errors import error_of_mean
+from scanfab.fabric.tensor import FabricTensor, axial, weighted_tensors
 
 MOST_FILLED = 0.5
 # By dimension, the highest degree of a polynomial in the direction that mean lengths are held
@@ -209,9 +198,7 @@ def void_fabric(
         return None
     # an axis that kept nothing in one replicate takes its mean over the others
     mean = np.where(empty, total_length / total_segments, length / np.where(empty, 1, segments))
-    weighted = weights * mean
-    tensors = np.einsum("rd,rdi,rdj->rij", weighted, axes, axes)
-    tensors /= weighted.sum(axis=1)[:, None, None]
+    tensors = weighted_tensors(axes, weights * mean)
     return VoidFabric(
         tensor=FabricTensor(tensors.mean(axis=0), space),
         mean_length=float((weights @ total_length) / (weights @ total_segments)),
@@ -221,38 +208,3 @@ def void_fabric(
         mean_lengths=mean,
         filled=float(empty.mean()),
     )
-
-
-class Void:
-    """The columns of the void fabric."""
-
-    columns = (
-        Column(
-            "mean_length", float, LENGTH, "mean length of the kept segments, Σ w·sum / Σ w·count"
-        ),
-        *tensor_columns("gvs", "void fabric"),
-        Column("alpha_vs", float, "", "largest minus smallest principal value of the void fabric"),
-        Column(
-            "alpha_vs_axial",
-            float,
-            "",
-            "signed anisotropy of the void fabric along the loading axis",
-        ),
-        Column(
-            "alpha_vs_axial_se",
-            float,
-            "",
-            "its standard error from the scan, by the scatter of the replicates",
-        ),
-    )
-
-    def values(self, measured: Measured) -> dict[str, Any]:
-        """All None if there is no void fabric."""
-        fabric, axis = measured.void, measured.axis
-        return {
-            "mean_length": fabric.mean_length if fabric else None,
-            **tensor_values("gvs", fabric.tensor if fabric else None),
-            "alpha_vs": fabric.tensor.alpha if fabric else None,
-            "alpha_vs_axial": fabric.tensor.axial(axis) if fabric else None,
-            "alpha_vs_axial_se": fabric.axial_error(axis) if fabric else None,
-        }

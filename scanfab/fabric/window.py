@@ -18,7 +18,7 @@ import numpy as np
 from scanfab.base.column import Column
 from scanfab.base.convex import Convex
 from scanfab.base.typing import FloatArray
-from scanfab.fabric.tensor import axial
+from scanfab.fabric.tensor import axial, weighted_tensors
 from scanfab.fabric.void import VoidFabric
 
 WINDOW_ALPHA = Column(
@@ -68,6 +68,5 @@ def window_alpha(
     if np.any(number <= 0.0):
         return None
     lengths = fabric.weights * (cutoff + shared / number)
-    tensors = np.einsum("rd,rdi,rdj->rij", lengths, fabric.axes, fabric.axes)
-    tensors /= lengths.sum(axis=1)[:, None, None]
+    tensors = weighted_tensors(fabric.axes, lengths)
     return float(np.mean(axial(tensors, axis, fabric.tensor.space)))

@@ -11,8 +11,8 @@ from scanfab.base.convex import Convex
 from scanfab.base.errors import PackingError
 from scanfab.base.space import SPACE, Space
 from scanfab.base.typing import BoolArray, FloatArray
-from scanfab.fabric.forces import ContactForces
-from scanfab.fabric.state import SampleState, love_weber
+from scanfab.fabric.measured import ContactForces, SampleState
+from scanfab.fabric.state import love_weber
 from scanfab.packing.clump_volumes import lens_volumes, own_shares
 from scanfab.packing.contacts import WallForces
 from scanfab.packing.packing import Packing

@@ -12,11 +12,10 @@ import numpy as np
 from scanfab.base.errors import Note
 from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.forces import doubts_of_forces
-from scanfab.fabric.jackknife import BlockedSums, blocks_of
-from scanfab.fabric.measured import Measured
+from scanfab.fabric.jackknife import BlockedSums
+from scanfab.fabric.measured import Measured, SampleState
 from scanfab.fabric.registry import GROUPS, OWN_FABRICS, checked_values
 from scanfab.fabric.spectrum import LONGEST_GAP, PREDICTED_ALPHA, predicted_alpha
-from scanfab.fabric.state import SampleState
 from scanfab.fabric.window import WINDOW_ALPHA, window_alpha
 from scanfab.packing.columns import RV_COLUMN, sample_values
 from scanfab.packing.near import near_pairs
@@ -181,7 +180,7 @@ class VariantColumns:
             gaps.axes,
             self.measurement.block_rule.weights,
             gaps.kept(*words),
-            [gaps.kept(*words, without=block) for block in range(blocks_of(self.plan.space))],
+            [gaps.kept(*words, without=block) for block in range(2**self.plan.space.dimension)],
         )
 
     def _window(self) -> dict[str, Any]:

@@ -15,7 +15,8 @@ from scanfab.base.column import Column
 from scanfab.base.errors import SettingsError, note, warn
 from scanfab.base.spelling import counted
 from scanfab.base.typing import FloatArray
-from scanfab.fabric.jackknife import BLOCKS, variance_without_noise
+from scanfab.fabric.errors import variance_without_noise
+from scanfab.fabric.jackknife import BLOCKS
 from scanfab.table.columns import MORE_COLUMNS, OWN_COLUMNS
 from scanfab.table.curves import is_turned, strain_column, why_not_strain
 from scanfab.table.row import (
@@ -327,7 +328,7 @@ def _slope_error(fitted: Rows) -> float | None:
             half = np.zeros(len(fitted))
         slopes.append([_fit(contact, void + sign * half)[0] for sign in (1.0, -1.0)])
     # a value that a frame lacks makes the slope, and with it the variance, no number
-    variance = variance_without_noise(np.array(slopes, float))
+    variance = float(variance_without_noise(np.array(slopes, float)))
     return math.sqrt(variance) if variance >= 0 else None
 
 

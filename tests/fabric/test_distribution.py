@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scanfab.fabric.distribution import fit_even, mean_length_function, sphere_points
+from scanfab.fabric.distribution import direction_points, fit_even, mean_length_function
 from scanfab.scan.directions import direction_rule
 
 
@@ -19,7 +19,7 @@ def even(n):
 def test_even_polynomials_of_degree_six_come_back(rule):
     axes = direction_rule(rule).axes
     function = fit_even(axes, even(axes), np.random.default_rng(0).uniform(1, 2, len(axes)))
-    points, _ = sphere_points()
+    points, _ = direction_points()
     assert function.degree == 6
     assert function(points) == pytest.approx(even(points), abs=1e-10)
     assert function(-points) == pytest.approx(function(points), abs=1e-12)
@@ -35,7 +35,7 @@ def test_directions_of_half_the_sphere_do_not_run_wild():
     axes = direction_rule("equal-angle:10").axes
     noise = 1 + 0.01 * np.random.default_rng(1).standard_normal(len(axes))
     function = fit_even(axes, noise, np.ones(len(axes)))
-    assert np.abs(function(sphere_points()[0]) - 1).max() < 0.05
+    assert np.abs(function(direction_points()[0]) - 1).max() < 0.05
 
 
 def test_weights_are_inverse_variances():
@@ -58,7 +58,7 @@ def test_no_segment_at_all_is_no_function():
 
 
 def test_the_points_are_a_rule_for_the_whole_sphere():
-    points, weights = sphere_points()
+    points, weights = direction_points()
     assert weights.sum() == pytest.approx(1)
     second = np.einsum("p,pi,pj->ij", weights, points, points)
     assert second == pytest.approx(np.eye(3) / 3, abs=1e-13)

@@ -7,11 +7,11 @@ import pytest
 
 from scanfab.base.space import SPACE, Space
 from scanfab.fabric.contact import contact_fabric
-from scanfab.fabric.forces import ContactForces, Forces
+from scanfab.fabric.forces import Forces
 from scanfab.fabric.harmonics import Harmonics
 from scanfab.fabric.invariants import Invariants
-from scanfab.fabric.measured import Measured
-from scanfab.fabric.state import SampleState, State
+from scanfab.fabric.measured import ContactForces, Measured, SampleState
+from scanfab.fabric.state import State
 from scanfab.scan.directions import direction_rule, plane_rule
 
 SPACES = {"space": SPACE, "discs": Space(2)}

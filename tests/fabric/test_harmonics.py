@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scanfab.fabric.harmonics import Harmonics, legendre, tensor4
+from scanfab.fabric.harmonics import Harmonics, harmonic, tensor4
 from scanfab.fabric.void import void_fabric
 from scanfab.scan.directions import direction_rule
 from tests.fabric.test_forces import directions
@@ -19,7 +19,7 @@ def drawn(count, rng, a2, a4):
     found, most = np.zeros((0, 3)), 1 + abs(a2) + abs(a4)
     while len(found) < count:
         n = directions(3 * count, rng)
-        density = 1 + a2 * legendre(2, n[:, 2]) + a4 * legendre(4, n[:, 2])
+        density = 1 + a2 * harmonic(2, n[:, 2]) + a4 * harmonic(4, n[:, 2])
         found = np.concatenate([found, n[rng.random(len(n)) * most < density]])
     return found[:count]
 
@@ -28,7 +28,7 @@ def test_legendre_polynomials_are_those_of_numpy():
     x = np.linspace(-1, 1, 7)
     for order in (2, 4):
         expected = np.polynomial.legendre.Legendre.basis(order)(x)
-        np.testing.assert_allclose(legendre(order, x), expected, atol=1e-14)
+        np.testing.assert_allclose(harmonic(order, x), expected, atol=1e-14)
 
 
 @pytest.mark.parametrize(("a2", "a4"), [(0.4, -0.35), (0.0, 0.0), (-0.3, 0.2)])
@@ -49,7 +49,7 @@ def test_lengths_of_known_harmonics_give_them_back():
     axes = direction_rule("lebedev:15").axes[None]
     weights = direction_rule("lebedev:15").weights
     cosine = axes @ Z
-    length = 1 + 0.2 * legendre(2, cosine) - 0.1 * legendre(4, cosine)
+    length = 1 + 0.2 * harmonic(2, cosine) - 0.1 * harmonic(4, cosine)
     void = void_fabric(axes, weights, length, np.ones_like(length))
     found = Harmonics().values(measured_of(np.zeros((0, 3)), void=void))
     assert found["vs_a2"] == pytest.approx(0.2)

@@ -72,15 +72,6 @@ def test_one_replicate_knows_no_bias_and_no_error():
     assert found["b_vs"] is None
 
 
-def test_errors_cover_the_scatter_of_samples():
-    rng = np.random.default_rng(4)
-    found = [values(drawn(2000, rng, 0.7)) for _ in range(300)]
-    for name in ("f_c", "gc_1"):
-        scatter = np.std([one[name] for one in found])
-        error = np.sqrt(np.mean([one[f"{name}_se"] ** 2 for one in found]))
-        assert error == pytest.approx(scatter, rel=0.15)
-
-
 def test_principal_values_and_b():
     normals = np.repeat(np.eye(3), [500, 300, 200], axis=0)
     found = values(normals)

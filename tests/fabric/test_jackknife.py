@@ -4,13 +4,8 @@ import numpy as np
 import pytest
 
 from scanfab import direction_rule
-from scanfab.fabric.jackknife import (
-    BlockedSums,
-    contact_jackknife,
-    jackknife_error,
-    variance_without_noise,
-    void_jackknife,
-)
+from scanfab.fabric.errors import jackknife_variance, variance_without_noise
+from scanfab.fabric.jackknife import BlockedSums, contact_jackknife, void_jackknife
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.gaps import scan_gaps
 from tests.helpers import naive
@@ -35,11 +30,11 @@ def test_error_of_a_mean_is_the_textbook_one():
     """Without one of B numbers at a time, the mean's jackknife error is s/√B."""
     numbers = np.random.default_rng(0).normal(size=8)
     means = (numbers.sum() - numbers) / 7
-    assert jackknife_error(means) == pytest.approx(numbers.std(ddof=1) / np.sqrt(8), rel=1e-12)
-
-
-def test_error_of_equal_values_is_zero():
-    assert jackknife_error(np.full(8, 0.3)) == 0.0
+    assert jackknife_variance(means) == pytest.approx(numbers.var(ddof=1) / 8, rel=1e-12)
+    # parts that hold nothing do not count
+    more, held = np.append(means, np.nan), np.arange(9) < 8
+    assert jackknife_variance(more, held) == pytest.approx(jackknife_variance(means), rel=1e-12)
+    assert jackknife_variance(np.full(8, 0.3)) == 0.0
 
 
 def test_contact_jackknife_is_a_recomputation_without_each_octant():

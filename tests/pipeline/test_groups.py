@@ -11,8 +11,9 @@ import pytest
 import scanfab
 from scanfab import Cell, ContactList, Packing
 from scanfab.base.errors import PackingError, SettingsError
+from scanfab.fabric.measured import SampleState
 from scanfab.fabric.registry import GROUPS
-from scanfab.fabric.state import SampleState, State
+from scanfab.fabric.state import State
 from scanfab.pipeline.values import GROUP_NAMES
 from scanfab.table.columns import COLUMNS
 from tests.helpers.measured import measured_of

@@ -149,9 +149,7 @@ class BlocksOfVariant:
         for block in range(count):
             values = {name: _known(array[block]) for name, array in arrays.items()}
             tensor = FabricTensor(tensors[block]) if self.fabrics.exists[block] else None
-            values |= tensor_values("gvs", tensor)
-            values["alpha_vs"] = tensor.alpha if tensor else None
-            yield {**same, **values, **contacts[block]}
+            yield {**same, **tensor_values("vs", tensor, self.axis), **values, **contacts[block]}
 
     @cached_property
     def _void(self) -> dict[str, FloatArray]:
@@ -240,9 +238,7 @@ class BlocksOfVariant:
             found.append(
                 {
                     "contacts": len(own),
-                    **tensor_values("gc", tensor),
-                    "alpha_c": tensor.alpha if tensor else None,
-                    "alpha_c_axial": tensor.axial(self.axis) if tensor else None,
+                    **tensor_values("c", tensor, self.axis),
                     "alpha_c_axial_se": axial_error(own, self.axis),
                     "alpha_c_axial_sample_se": _known(error),
                 }

@@ -6,7 +6,7 @@ import numpy as np
 
 from scanfab.base.convex import Convex
 from scanfab.base.typing import BoolArray, FloatArray
-from scanfab.fabric.distribution import sphere_points
+from scanfab.fabric.distribution import direction_points
 from scanfab.packing.sample import Sample
 from scanfab.scan.blocks import Blocks
 
@@ -24,7 +24,7 @@ def outlines(blocks: Blocks) -> FloatArray:
     """Places whose hull is a block's, or nearly a shell's outer surface, shape (B, K, 3)."""
     if blocks.edges is None:
         return blocks.corners
-    units = sphere_points()[0][::SOME]
+    units = direction_points()[0][::SOME]
     return np.asarray(blocks.middles[:, None] + blocks.radii[:, 1, None, None] * units)
 
 
@@ -54,7 +54,7 @@ def cut_by_window(blocks: Blocks, window: Convex, center: FloatArray, mean: floa
     """Which blocks do not lie within a window, two mean radii below its surface; shape (B,)."""
     outline = outlines(blocks) - center
     inside = np.ones(outline.shape[:2], bool)
-    for unit in sphere_points()[0][::SOME]:
+    for unit in direction_points()[0][::SOME]:
         moved = outline + DEPTH * mean * unit
         inside &= window.contains(moved.reshape(-1, 3)).reshape(inside.shape)
     return np.asarray(~inside.all(axis=1))

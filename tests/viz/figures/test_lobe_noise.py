@@ -9,7 +9,7 @@ import pytest
 
 from scanfab.base.space import SPACE
 from scanfab.fabric.contact import axial_error
-from scanfab.fabric.distribution import fit_even, sphere_points
+from scanfab.fabric.distribution import direction_points, fit_even
 from scanfab.viz.figures.hemisphere import Hemisphere, disk, smoothed_density
 from scanfab.viz.figures.lobe_noise import contact_noise, noise_notes, void_noise
 
@@ -27,7 +27,7 @@ def unit_vectors(rng, *shape):
 def test_the_noise_of_the_scan_is_that_of_fits_to_noise():
     """Mean lengths that differ from line to line alone, fitted as those of a scan are."""
     rng = np.random.default_rng(1)
-    points, weights = sphere_points()
+    points, weights = direction_points()
     second = 1.5 * points[:, 2] ** 2 - 0.5
     alphas, deviations = [], []
     for _ in range(25):

@@ -1,0 +1,150 @@
+"""
+Standard errors: of means, of a sample by a jackknife over its parts, and what they say of blocks.
+
+The delete-one jackknife leaves out one part of the sample in turn, and asks how much a value moves.
+That says how far another sample of the same material would differ; the error of the scan says
+nothing of it. Efron and Stein (1981), doi:10.1214/aos/1176345462.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from scanfab.base.typing import BoolArray, FloatArray
+
+# blocks without which there is no telling whether they differ
+FEWEST_BLOCKS = 3
+
+
+def error_of_mean(values: FloatArray) -> float | None:
+    """Standard error of the mean of independent values, shape (M,); None for fewer than two."""
+    return float(np.std(values, ddof=1) / np.sqrt(len(values))) if len(values) > 1 else None
+
+
+def jackknife_variance(values: FloatArray, held: BoolArray | bool = True) -> FloatArray:
+    """
+    Squared standard error from the values without each of P parts: (P - 1)/P Σ (θ_p - θ̄)².
+
+    Parameters
+    ----------
+    values : ndarray, shape (P, ...)
+        Without each part.
+    held : ndarray of bool, shape (P, ...), optional
+        Which parts hold anything; the others do not count. All by default.
+
+    Returns
+    -------
+    ndarray, shape (...)
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab.fabric.errors import jackknife_variance
+    >>> x = np.array([1.0, 2.0, 4.0])
+    >>> means = (x.sum() - x) / 2
+    >>> bool(np.isclose(jackknife_variance(means), x.var(ddof=1) / 3))
+    True
+    """
+    held = np.broadcast_to(held, values.shape)
+    number = np.maximum(held.sum(axis=0), 1)
+    mean = np.where(held, values, 0.0).sum(axis=0) / number
+    spread = np.where(held, (values - mean) ** 2, 0.0).sum(axis=0)
+    return np.asarray(spread * (number - 1) / number)
+
+
+def variance_without_noise(values: FloatArray, held: BoolArray | bool = True) -> FloatArray:
+    """
+    Jackknife variance of the mean over replicates, without what their own noise adds.
+
+    Parameters
+    ----------
+    values : ndarray, shape (P, R, ...)
+        Without each of P parts, in each of R replicates, which have the parts in common.
+    held : ndarray of bool, shape (P, ...), optional
+        Which parts hold anything; all by default.
+
+    Returns
+    -------
+    ndarray, shape (...)
+        Unbiased, so negative at times where the noise is the larger part. With one replicate the
+        noise is not known and stays in.
+    """
+    count = values.shape[1]
+    of_mean = jackknife_variance(values.mean(axis=1), held)
+    if count == 1:
+        return of_mean
+    # of one replicate: the sample's scatter, and R times the noise that the mean has
+    in_each = held if isinstance(held, bool) else held[:, None]
+    of_single = jackknife_variance(values, in_each).mean(axis=0)
+    return np.asarray((count * of_mean - of_single) / (count - 1))
+
+
+class Homogeneity(NamedTuple):
+    """What the scatter of blocks says."""
+
+    ratio: float
+    """Of their scatter to what their errors explain: 1 in the mean of homogeneous samples."""
+    chance: float
+    """That blocks of a homogeneous sample scatter so much or more."""
+    blocks: int
+    """How many there are."""
+
+
+def homogeneity_of(
+    values: FloatArray, variances: FloatArray, weights: FloatArray, freedom: float
+) -> Homogeneity | None:
+    """
+    Whether values of blocks scatter more than their errors explain: an analysis of variance.
+
+    With weights w of the sum W, and x̄ = Σ w x / W, the variance ratio is
+    F = Σ w (x - x̄)² / Σ w (1 - w/W) v. Both sums have the same expectation where all blocks have
+    one and errors are right; F then follows Fisher's distribution (Fisher 1925) with B - 1 degrees
+    of freedom and those of the pooled errors, after Satterthwaite (1946), doi:10.2307/3002019.
+
+    Parameters
+    ----------
+    values : ndarray, shape (B,)
+        Of the blocks.
+    variances : ndarray, shape (B,)
+        Squared standard errors v; NaN where there is none: such blocks are left out.
+    weights : ndarray, shape (B,)
+        About proportional to what the inverse of v is expected to be.
+    freedom : float
+        Degrees of freedom of each variance.
+
+    Returns
+    -------
+    Homogeneity or None
+        None of fewer than three blocks.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from scanfab.fabric.errors import homogeneity_of
+    >>> x = np.random.default_rng(3).normal(size=(20, 8))
+    >>> words = x.var(axis=1, ddof=1) / 8, np.ones(20), 7.0
+    >>> homogeneity_of(x.mean(axis=1), *words).chance > 0.05
+    True
+    >>> shifted = x.mean(axis=1) + np.linspace(-1, 1, 20)
+    >>> homogeneity_of(shifted, *words).chance < 0.001
+    True
+    """
+    # loaded here, as few need it
+    from scipy.special import fdtrc
+
+    known = np.isfinite(values) & np.isfinite(variances) & (variances > 0) & (weights > 0)
+    values, variances, weights = values[known], variances[known], weights[known]
+    count = len(values)
+    if count < FEWEST_BLOCKS:
+        return None
+    share = weights / weights.sum()
+    between = float(np.sum(share * (values - share @ values) ** 2))
+    parts = share * (1.0 - share) * variances
+    within = float(parts.sum())
+    pooled = freedom * within**2 / float(np.sum(parts**2))
+    # squares of variances that are themselves uncertain are too large by this in the mean
+    pooled *= 1.0 + 2.0 / freedom
+    statistic = between / within
+    return Homogeneity(np.sqrt(statistic), float(fdtrc(count - 1, pooled, statistic)), count)

@@ -1,0 +1,147 @@
+"""The fabrics of every table: of voids and contacts, with both errors, and their major axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from scanfab.base.column import LENGTH, numbers
+from scanfab.base.typing import FloatArray
+from scanfab.fabric.contact import axial_error
+from scanfab.fabric.jackknife import BLOCKS
+from scanfab.fabric.measured import Measured
+from scanfab.fabric.tensor import tensor_columns, tensor_values
+
+ORDER = (
+    " (-x, -y, -z; x counts fastest; for an oblique loading axis the octants are turned so that "
+    "one of their axes lies along it)"
+)
+FROM_SCAN = "its standard error from the scan, by the scatter of the replicates"
+# the anisotropies, by the names of their columns
+VOID, CONTACT = "alpha_vs_axial", "alpha_c_axial"
+INDEPENDENT = "if contacts were independent; too large by about half in relaxed dense packings"
+SCATTER = "by a jackknife over eight octants, in a plane four quadrants"
+HALF = "half their difference, which tells compare the scan's noise in a slope"
+
+
+class Void:
+    """The columns of the void fabric."""
+
+    columns = (
+        *numbers({"mean_length": "mean length of the kept segments, Σ w·sum / Σ w·count"}, LENGTH),
+        *tensor_columns("vs", "void fabric"),
+        *numbers({f"{VOID}_se": FROM_SCAN}),
+    )
+
+    def values(self, measured: Measured) -> dict[str, Any]:
+        """All None if there is no void fabric."""
+        fabric, axis = measured.void, measured.axis
+        return {
+            "mean_length": fabric.mean_length if fabric else None,
+            **tensor_values("vs", fabric.tensor if fabric else None, axis),
+            f"{VOID}_se": fabric.axial_error(axis) if fabric else None,
+        }
+
+
+class Contact:
+    """The columns of the contact fabric."""
+
+    columns = (
+        *tensor_columns("c", "contact fabric"),
+        *numbers({f"{CONTACT}_se": f"its standard error {INDEPENDENT}"}),
+    )
+
+    def values(self, measured: Measured) -> dict[str, Any]:
+        """All None without contacts."""
+        return {
+            **tensor_values("c", measured.contact, measured.axis),
+            f"{CONTACT}_se": axial_error(measured.normals, measured.axis, measured.space),
+        }
+
+
+class Scatter:
+    """The columns of the sample's own scatter: its error, and each anisotropy without a block."""
+
+    columns = (
+        *numbers(
+            {
+                f"{one}_sample_se": f"the sample's own scatter of {one}, {SCATTER}"
+                for one in (VOID, CONTACT)
+            }
+        ),
+        *numbers(
+            {
+                f"{name}_without_{block}": f"{name} without the {what} of octant {block}"
+                + (ORDER if block == 1 else "")
+                for name, what in ((VOID, "segments"), (CONTACT, "contacts"))
+                for block in range(1, BLOCKS + 1)
+            }
+        ),
+    )
+
+    def values(self, measured: Measured) -> dict[str, Any]:
+        """All None where there is no fabric, or none without some block."""
+        void, axis = measured.void.tensor if measured.void else None, measured.axis
+        found: dict[str, Any] = {}
+        for name, tensor, scatter in (
+            (VOID, void, measured.void_scatter),
+            (CONTACT, measured.contact, measured.contact_scatter),
+        ):
+            found[f"{name}_sample_se"] = None if scatter is None else scatter.error
+            if tensor is None or scatter is None:
+                found |= _by_block(f"{name}_without", [])
+            else:
+                found |= _by_block(f"{name}_without", tensor.axial(axis) + scatter.shift)
+        return found
+
+
+class Halves:
+    """The columns of what the scan's noise makes of the void fabric without each block."""
+
+    columns = numbers(
+        {
+            f"{VOID}_half_{block}": f"{VOID}_without_{block} is the mean of two replicates: {HALF}"
+            for block in range(1, BLOCKS + 1)
+        }
+    )
+
+    def values(self, measured: Measured) -> dict[str, Any]:
+        """All None where there is no void fabric, or none without some block."""
+        scatter = measured.void_scatter
+        return _by_block(f"{VOID}_half", [] if scatter is None else scatter.half)
+
+
+def _by_block(name: str, known: Sequence[float] | FloatArray) -> dict[str, float | None]:
+    """A column for each block; those of blocks that there are not are empty."""
+    values = [*map(float, known), *[None] * (BLOCKS - len(known))]
+    return {f"{name}_{block}": one for block, one in enumerate(values, start=1)}
+
+
+class Orientation:
+    """The columns of the major axes of both fabrics, and of the angle: are they coaxial?"""
+
+    columns = (
+        *numbers(
+            {
+                f"g{one}_axis_{k}": f"{k} of the direction of the {what}'s largest principal "
+                "value, a unit vector"
+                for one, what in (("vs", "void fabric"), ("c", "contact fabric"))
+                for k in "xyz"
+            }
+        ),
+        *numbers(
+            {"coaxiality_deg": "angle between the major axes of void and contact fabric, 0 to 90"},
+            "degrees",
+        ),
+    )
+
+    def values(self, measured: Measured) -> dict[str, Any]:
+        """Of what there is: an angle needs both fabrics."""
+        void = measured.void.tensor if measured.void else None
+        contact = measured.contact
+        found: dict[str, Any] = {}
+        for prefix, tensor in (("gvs", void), ("gc", contact)):
+            axis = [None] * 3 if tensor is None else tensor.major_axis.tolist()
+            found |= {f"{prefix}_axis_{one}": x for one, x in zip("xyz", axis, strict=True)}
+        found["coaxiality_deg"] = void.angle_to(contact) if void and contact else None
+        return found
