@@ -8,7 +8,7 @@ import click
 
 from scanfab.base.column import Column, columns_of_fields
 from scanfab.cli.group import COMMANDS, cli
-from scanfab.pipeline.calibration_ladders import StepRow
+from scanfab.pipeline.calibration import StepRow
 from scanfab.pipeline.inspection import FrameReport
 from scanfab.table.columns import MORE_COLUMNS, OWN_COLUMNS, map_columns
 from scanfab.table.compare import DIFFERENCES, FRAMES, SUMMARY

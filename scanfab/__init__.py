@@ -39,10 +39,10 @@ if TYPE_CHECKING:
     from scanfab.pipeline.cluster.dask_executor import dask_executor
     from scanfab.pipeline.compute import compute
     from scanfab.pipeline.maps.fabric_map import fabric_map
+    from scanfab.pipeline.measurement import solids_of
     from scanfab.pipeline.merge import merge_tables
     from scanfab.pipeline.samples import samples
     from scanfab.pipeline.settings import Settings
-    from scanfab.pipeline.solids import solids_of
     from scanfab.scan.directions import DirectionRule, direction_rule
     from scanfab.scan.scan import ScanSums, scan_lines
     from scanfab.scan.solids import Solids
@@ -112,7 +112,7 @@ _HOME = {
     "samples": "pipeline.samples",
     "scan_frames": "viz.scanned_frames",
     "scan_lines": "scan.scan",
-    "solids_of": "pipeline.solids",
+    "solids_of": "pipeline.measurement",
     "sphere": "base.shapes",
     "void_fabric": "fabric.void",
 }

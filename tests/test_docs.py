@@ -21,7 +21,7 @@ import scanfab
 from scanfab.base.column import Column, columns_of_fields
 from scanfab.cli.group import COMMANDS, cli
 from scanfab.io.reader import installed_readers
-from scanfab.pipeline import calibration_ladders, inspection
+from scanfab.pipeline import calibration, inspection
 from scanfab.scan.directions import RULES
 from scanfab.table import compare
 from scanfab.table.columns import table_columns
@@ -96,7 +96,7 @@ def test_every_option_is_documented(name: str) -> None:
         compare.FRAMES,
         compare.SUMMARY,
         compare.DIFFERENCES,
-        columns_of_fields(calibration_ladders.StepRow),
+        columns_of_fields(calibration.StepRow),
         columns_of_fields(inspection.FrameReport),
     ],
 )

@@ -94,7 +94,7 @@ def columns_of_fields(kind: type) -> tuple[Column, ...]:
     Examples
     --------
     >>> from scanfab.base.column import columns_of_fields
-    >>> from scanfab.pipeline.calibration_ladders import StepRow
+    >>> from scanfab.pipeline.calibration import StepRow
     >>> columns_of_fields(StepRow)[0].meaning
     'the series as given'
     """

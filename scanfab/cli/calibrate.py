@@ -28,7 +28,7 @@ from scanfab.cli.talk import talk_options, tell_inputs, working
 from scanfab.pipeline.options import as_options
 
 if TYPE_CHECKING:
-    from scanfab.pipeline.calibration_ladders import StepRow
+    from scanfab.pipeline.calibration import StepRow
 
 
 # what compute has no use for, or what is recommended instead
@@ -89,8 +89,8 @@ def calibrate(
     """
     from scanfab.base.column import columns_of_fields
     from scanfab.cli.console import announce_compiling, is_readable, print_csv, reported_warnings
+    from scanfab.pipeline.calibration import StepRow
     from scanfab.pipeline.calibration import calibrate as calibrate_series
-    from scanfab.pipeline.calibration_ladders import StepRow
     from scanfab.pipeline.settings import Settings
     from scanfab.table.writing import Excerpt, ResultFile
     from scanfab.viz.figures.page import make_figures, save_figures

@@ -112,7 +112,7 @@ def _complete_fields(
 ) -> list[CompletionItem]:
     """The columns of what a command writes, behind those that are named already."""
     from scanfab.base.column import columns_of_fields
-    from scanfab.pipeline.calibration_ladders import StepRow
+    from scanfab.pipeline.calibration import StepRow
     from scanfab.table.columns import MORE_COLUMNS, map_columns, table_columns
     from scanfab.table.compare import FRAMES, SUMMARY
 

@@ -5,39 +5,35 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from itertools import groupby
+from typing import Annotated, Any
 
+from scanfab.base.column import LENGTH
 from scanfab.base.errors import Note, PackingError, SettingsError, tell
 from scanfab.base.option import options_of, refuse_unknown
 from scanfab.base.spelling import counted
 from scanfab.io.options import parse_frames
-from scanfab.pipeline.calibration_ladders import (
-    PAPER_CUTOFF,
-    PAPER_SPACING,
-    SENTENCES,
-    StepRow,
-    first_steady,
-    judged,
-    largest,
-    sentence_of_recommended,
-)
 from scanfab.pipeline.frame import OTHER_CUTOFFS, compute_frame
 from scanfab.pipeline.frames import Frames, Source
 from scanfab.pipeline.measurement import Measurement
-from scanfab.pipeline.plan import Plan, make_plan
+from scanfab.pipeline.plan import make_plan
 from scanfab.pipeline.settings import Settings
-from scanfab.pipeline.tolerance import EACH_VARIANT, TOLERANCE_MISSED, missing_work
+from scanfab.pipeline.tolerance import TOLERANCE_MISSED, Goal, missing_work
 from scanfab.pipeline.values import Length
 from scanfab.pipeline.window_settings import SHAPES, settings_in
 from scanfab.scan.directions import direction_rule, rule_of, usual_rule
 from scanfab.table.plots import Plots
+from scanfab.table.row import Record
 
 LOGGER = logging.getLogger("scanfab")
 
-# in r_min, down to the spacing of the 2017 paper
-SPACINGS = (4.0, 2.0, 1.0, 0.5, 0.2, 0.1)
+# of the 2017 paper, in r_min
+PAPER_SPACING, PAPER_CUTOFF = 0.1, 1.0
+# in r_min, down to the spacing of the paper
+SPACINGS = (4.0, 2.0, 1.0, 0.5, 0.2, PAPER_SPACING)
 # of the ladder of directions, in r_min: 16 replicates with lines r_min apart
 FIXED_SPACING = 0.25
 DEGREES = (5, 9, 11, 17, 23, 31, 41)
@@ -48,16 +44,53 @@ CUTOFFS = tuple(0.25 * k for k in range(13))
 RV_FRACTIONS = (0.4, 0.5, 0.6, 0.67, 0.7, 0.8)
 # what a scan may add to the sample's own error: a quarter of it adds 3 %
 OF_SAMPLE = 0.25
-MOST_DIRECTIONS = 2905
-ROUNDS = 5
+# of the recommended settings, and how often they are tried
+MOST_DIRECTIONS, ROUNDS = 2905, 5
+# how likely chance alone makes any two steps of a ladder differ, and how sure standard errors of 16
+# replicates are
+CHANCE, FREEDOM = 0.05, 30
+# what findings say of the paper
+PAPER = {"spacing": " (the paper: 0.1)", "rv": " (the paper: 0.67 to 0.7)"}
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class StepRow(Record):
+    """One step of a ladder for one variant; lengths in the dump's unit."""
+
+    source: Annotated[str, "the series as given"]
+    frame: Annotated[int, "index in the series, from 0"]
+    ladder: Annotated[str, "what is changed: spacing, directions, cutoff, rv; or recommended"]
+    value: Annotated[
+        float, "spacing or cut-off in r_min, number of directions, RV over half the smallest extent"
+    ]
+    variant: Annotated[str, "as in the fabric table"]
+    rule: Annotated[str, "the direction rule"]
+    degree: Annotated[int | None, "of the polynomials that the rule integrates exactly"]
+    rule_bias: Annotated[float, "alpha_vs that the rule gives an isotropic sample"]
+    directions: Annotated[int | None, "axes of the rule, in each replicate"]
+    replicates: Annotated[int | None, "number of replicates"]
+    spacing: Annotated[float | None, "between lines of one direction, all replicates", LENGTH]
+    cutoff: Annotated[float | None, "shortest void segment kept", LENGTH]
+    rv_radius: Annotated[float | None, "radius of the ball that holds the RV; a, b: empty", LENGTH]
+    segments: Annotated[int | None, "void segments kept"]
+    seconds: Annotated[float, "time of the step, all variants (and all cut-offs) together", "s"]
+    mean_length: Annotated[float | None, "mean length of the kept segments", LENGTH]
+    alpha_vs_axial: Annotated[float | None, "signed anisotropy of the void fabric along the axis"]
+    alpha_vs_axial_se: Annotated[float | None, "its standard error from the scan"]
+    alpha_vs_axial_sample_se: Annotated[float | None, "its standard error from the sample"]
+    steady: Annotated[
+        int | None,
+        "1 if this step and all later ones differ by no more than chance makes of their standard "
+        "errors (of the scan; for rv also of the sample), else 0; empty for a cut-off, on which "
+        "alpha_vs depends by definition",
+    ]
+    note: Annotated[str, "what makes the step doubtful"]
 
 
 @dataclass(frozen=True)
 class Calibration:
     """
-    What :func:`calibrate` finds.
-
-    ``Table(found.rows)`` shows all steps.
+    What :func:`calibrate` finds; ``Table(found.rows)`` shows all steps.
 
     Attributes
     ----------
@@ -70,15 +103,10 @@ class Calibration:
 
     Examples
     --------
-    >>> import numpy as np
-    >>> from scanfab import Packing, Table, calibrate
-    >>> grid = np.stack(np.meshgrid(*3 * [np.arange(6.0)]), axis=-1).reshape(-1, 3)
-    >>> packing = Packing(grid, 0.5)
-    >>> found = calibrate(packing, variants="c", tolerance=0.01, rv=0.6, contact_tolerance=1e-4)
-    >>> sorted(found.options)
-    ['directions', 'spacing']
-    >>> len(Table(found.rows)) == len(found.rows)
-    True
+    >>> from scanfab import Calibration
+    >>> Calibration((), (), {"spacing": "0.25rmin"})
+    Calibration: 0 steps of variants
+      recommended: spacing='0.25rmin'
     """
 
     rows: tuple[StepRow, ...]
@@ -120,10 +148,9 @@ def calibrate(
     Returns
     -------
     Calibration
-        A row for each step and variant, what they show in words, and recommended settings: the
-        widest spacing and the fewest directions from which nothing changes any more, and then as
-        many directions as bring the scan's error below a quarter of the sample's own (or to the
-        tolerance, if that is larger).
+        With recommended settings: the widest spacing and the fewest directions from which nothing
+        changes any more, and then as many directions as bring the scan's error below a quarter of
+        the sample's own (or to the tolerance, if that is larger).
 
     Raises
     ------
@@ -144,8 +171,8 @@ def calibrate(
     """
     refuse_unknown("calibrate", options, [one.name for one in options_of(Settings)])
     settings = Settings(variants=variants, **options)
-    if settings.lists_gaps:
-        raise SettingsError("calibrate: cutoffs and moment have no meaning for its ladders")
+    if settings.lists_gaps or len(settings.rvs) > 1:
+        raise SettingsError("calibrate: its ladders take neither cutoffs, moment nor several rv")
     return _Calibrator(source, settings, frame).all()
 
 
@@ -153,11 +180,6 @@ class _Calibrator:
     """One frame, and the first frame of its series that has grains, which makes the plan."""
 
     def __init__(self, source: Source, settings: Settings, frame: int) -> None:
-        if len(settings.rvs) > 1:
-            raise SettingsError(
-                f"rv: expected one size, as a calibration has RVs of its own beside it, found "
-                f"{len(settings.rvs)}"
-            )
         frames = Frames(source, replace(settings, frames=parse_frames(frame, "frame")))
         self.number, wanted = frames.one()
         first = frames.first()
@@ -168,8 +190,7 @@ class _Calibrator:
         sample = self.first if number == self.number else frames.sample(self.number, wanted)
         if sample is None or not sample.grains.any():
             raise PackingError(f"frame {self.number} has no grains: choose another frame")
-        self.name, self.sample = frames.name, sample
-        self.space = self.first.packing.space
+        self.name, self.sample, self.space = frames.name, sample, self.first.packing.space
         self.settings = settings_in(settings, self.space)
         tell(sample.doubts_of_escaped(), f"frame {self.number}")
         self.r_min = float(self.first.packing.radius[self.first.grains].min())
@@ -180,76 +201,69 @@ class _Calibrator:
         """The ladders, what they say, and what follows."""
         settings = self.settings
         cutoffs = self._cutoffs()
-        # a surface that a file draws is an RV without a ladder of sizes
-        has_sizes = settings.needs_window and settings.rv_shape in SHAPES
-        ladders = {
-            "spacing": judged(self._ladder("spacing", self._spacings())),
-            "directions": judged(self._ladder("directions", self._directions())),
-            "cutoff": cutoffs,
-            "rv": judged(self._ladder("rv", self._rvs() if has_sizes else {}), self.space),
-        }
+        ladders = {name: list(self._ladder(name)) for name in ("spacing", "directions")}
+        ladders |= {"cutoff": cutoffs, "rv": list(self._ladder("rv"))}
+        for name in ("spacing", "directions", "rv"):
+            ladders[name] = judged(ladders[name], self.space.dimension)
         cutoff = settings.cutoff.value if settings.cutoff.unit == "rmin" else PAPER_CUTOFF
         at_cutoff = [row for row in cutoffs if row.value == cutoff] or cutoffs
-        sample = largest(at_cutoff, "alpha_vs_axial_sample_se")
+        sample = _largest(at_cutoff, "alpha_vs_axial_sample_se")
         target = max(settings.tolerance, OF_SAMPLE * (sample or 0.0))
         best, options = self._recommended(ladders["spacing"], ladders["directions"], target)
-        findings = [SENTENCES[ladder](rows) for ladder, rows in ladders.items() if rows]
-        if settings.needs_window and not has_sizes:
-            findings.append(
-                f"RV: its size is left out, as {settings.rv_shape} draws it: to try others, "
-                f"scale that surface"
-            )
-        findings.append(sentence_of_recommended(best, target, sample))
+        findings = [_finding(name, rows) for name, rows in ladders.items() if rows]
+        reached, own = (
+            "unknown" if one is None else f"{one:.2g}"
+            for one in (_largest(best, "alpha_vs_axial_se"), sample)
+        )
+        findings.append(
+            f"recommended: scan's error {reached} (wanted {target:.2g}; the sample's own is {own}) "
+            f"in {best[0].seconds:.2g} s"
+        )
         rows = [row for ladder in ladders.values() for row in ladder]
         return Calibration((*rows, *best), tuple(findings), options)
 
-    def _spacings(self) -> dict[float, Settings]:
-        rule = self.settings.directions or usual_rule(self.space)
-        lengths = {value: Length(value, "rmin") for value in SPACINGS}
-        return {
-            value: replace(self.settings, spacing=length, directions=rule)
-            for value, length in lengths.items()
-        }
-
-    def _directions(self) -> dict[float, Settings]:
-        spacing = self.settings.spacing or Length(FIXED_SPACING, "rmin")
-        if self.space.is_plane:
-            rules = [rule_of(count, self.space) for count in STEPS]
-        else:
+    def _steps(self, ladder: str) -> dict[float, Settings]:
+        """The settings of each step, by the value that is changed."""
+        settings, space = self.settings, self.space
+        if ladder == "spacing":
+            rule = settings.directions or usual_rule(space)
+            lengths = {value: Length(value, "rmin") for value in SPACINGS}
+            return {
+                value: replace(settings, spacing=length, directions=rule)
+                for value, length in lengths.items()
+            }
+        if ladder == "directions":
+            spacing = settings.spacing or Length(FIXED_SPACING, "rmin")
             rules = [direction_rule(f"lebedev:{degree}") for degree in DEGREES]
-        return {
-            len(rule): replace(self.settings, spacing=spacing, directions=rule) for rule in rules
-        }
-
-    def _rvs(self) -> dict[float, Settings]:
-        variants = "".join(variant for variant in self.settings.variants if variant in "cd")
+            if space.is_plane:
+                rules = [rule_of(count, space) for count in STEPS]
+            return {len(one): replace(settings, spacing=spacing, directions=one) for one in rules}
+        # a surface that a file draws is an RV without a ladder of sizes
+        if not settings.needs_window or settings.rv_shape not in SHAPES:
+            return {}
+        variants = "".join(variant for variant in settings.variants if variant in "cd")
         words: dict[str, Any] = {"rv_radius": None, "rv_size": (), "variants": variants}
-        return {value: replace(self.settings, rv=value, **words) for value in RV_FRACTIONS}
+        return {value: replace(settings, rv=value, **words) for value in RV_FRACTIONS}
+
+    def _ladder(self, ladder: str) -> Iterator[StepRow]:
+        """The rows of all steps but those whose settings do not fit the sample."""
+        for value, settings in self._steps(ladder).items():
+            try:
+                yield from self._measured(ladder, value, settings)[0]
+            except SettingsError as error:
+                tell([Note("step_left_out", f"{ladder} {value:g} left out: {error}")])
 
     def _cutoffs(self) -> list[StepRow]:
         """One scan for all cut-offs; SettingsError if a variant has no void fabric at any."""
         lengths = tuple(Length(value, "rmin") for value in CUTOFFS)
         rows, _ = self._measured("cutoff", None, replace(self.settings, cutoffs=lengths))
-        with_fabric = {row.variant for row in rows if row.alpha_vs_axial is not None}
         for variant in self.settings.variants:
-            if variant not in with_fabric:
-                grains = self.sample.number(self.sample.grains)
+            if all(row.alpha_vs_axial is None for row in rows if row.variant == variant):
                 raise SettingsError(
                     f"frame {self.number}: no cut-off leaves a void fabric in variant {variant}: "
-                    f"the sample ({grains} grains) is too small for it, "
-                    f"there is no void, or all its grains are rattlers"
+                    f"its grains are too few, or rattlers, or there is no void"
                 )
         return rows
-
-    def _ladder(self, ladder: str, steps: Mapping[float, Settings]) -> Iterator[StepRow]:
-        """The rows of all steps but those whose settings do not fit the sample."""
-        for value, settings in steps.items():
-            try:
-                rows, _ = self._measured(ladder, value, settings)
-            except SettingsError as error:
-                tell([Note("step_left_out", f"{ladder} {value:g} left out: {error}")])
-            else:
-                yield from rows
 
     def _measured(
         self, ladder: str, value: float | None, settings: Settings
@@ -257,42 +271,35 @@ class _Calibrator:
         """The rows of one step, and what they were made from; no value: that of each cut-off."""
         begun = time.perf_counter()
         plan = make_plan(settings, self.first)
-        if ladder in ("spacing", "directions"):
-            self._check_budget(plan)
+        shadow = self.space.shadow(self.sample.packing.radius[self.sample.grains])
+        chords = self.space.lines(shadow, plan.spacing) * plan.replicates * len(plan.rule)
+        if ladder in ("spacing", "directions") and chords > settings.max_chords:
+            raise SettingsError(
+                f"it would cut {chords:.2g} chords from the grains, more than `max_chords` "
+                f"{settings.max_chords:g}"
+            )
         result = compute_frame(self.sample, plan, number=self.number, source=self.name)
         seconds = time.perf_counter() - begun
         LOGGER.info("%s %s: %.2g s", ladder, "" if value is None else f"{value:g}", seconds)
-        of_step: dict[str, Any] = {
-            "ladder": ladder,
-            "rule": plan.rule.name,
-            "degree": plan.rule.degree,
-            "rule_bias": plan.rule.bias,
-            "seconds": seconds,
-            "steady": None,
-        }
-        rows = []
+        rows, window = [], plan.window
         for row in result.rows:
-            window = plan.window if row.variant in "cd" else None
-            same = {one.name: row[one.name] for one in fields(StepRow) if one.name in row}
+            # errors at other cut-offs than the scan's stand in the rows themselves
+            own = [n for n in result.notes if row.variant in n.variants and n.code != OTHER_CUTOFFS]
+            whole = [one for one in result.notes if one.code == TOLERANCE_MISSED]
             step = StepRow(
-                **same,
-                **of_step,
+                **{one.name: row[one.name] for one in fields(StepRow) if one.name in row},
+                ladder=ladder,
                 value=round(row.cutoff / self.r_min, 9) if value is None else value,
-                rv_radius=window.radius if window else None,
-                note=_told(result.notes, row.variant),
+                rule=plan.rule.name,
+                degree=plan.rule.degree,
+                rule_bias=plan.rule.bias,
+                rv_radius=window.radius if window and row.variant in "cd" else None,
+                seconds=seconds,
+                steady=None,
+                note="; ".join(one.text for one in (*own, *whole)),
             )
             rows.append(step)
         return rows, result.measurements[0]
-
-    def _check_budget(self, plan: Plan) -> None:
-        """Refuse a step of fixed lines that would cut more chords than allowed."""
-        shadow = self.space.shadow(self.sample.packing.radius[self.sample.grains])
-        chords = self.space.lines(shadow, plan.spacing) * plan.replicates * len(plan.rule)
-        if chords > self.settings.max_chords:
-            raise SettingsError(
-                f"it would cut {chords:.2g} chords from the grains, more than `max_chords` "
-                f"{self.settings.max_chords:g}"
-            )
 
     def _recommended(
         self, spacings: list[StepRow], directions: list[StepRow], target: float
@@ -304,15 +311,13 @@ class _Calibrator:
         scan with lines of their own must not find a larger error.
         """
         spacing = min(first_steady(spacings) or PAPER_SPACING, FIXED_SPACING)
-        steady = first_steady(directions) or len(usual_rule(self.space))
-        rule = rule_of(int(steady), self.space)
+        rule = rule_of(int(first_steady(directions) or len(usual_rule(self.space))), self.space)
         other_lines = replace(self.settings, tolerance=target, seed=self.settings.seed + 1)
         for _ in range(ROUNDS):
             trial = replace(other_lines, spacing=Length(spacing, "rmin"), directions=rule)
             _, found = self._measured("recommended", len(rule), trial)
-            sums, plan = found.sums, found.plan
-            errors = [EACH_VARIANT.errors(sums, plan, one) for one in plan.variants]
-            missing = missing_work(errors, plan, sums.replicates)
+            errors = [Goal().errors(found.sums, found.plan, one) for one in found.plan.variants]
+            missing = missing_work(errors, found.plan, found.sums.replicates)
             if missing <= 1.0:
                 break
             wanted = len(rule) * missing
@@ -324,9 +329,72 @@ class _Calibrator:
         return rows, {"spacing": f"{spacing:g}rmin", "directions": rule.name}
 
 
-def _told(notes: Iterable[Note], variant: str) -> str:
-    """What the scan itself said of one row."""
-    # errors at other cut-offs than the scan's stand in the rows themselves
-    own = [one for one in notes if variant in one.variants and one.code != OTHER_CUTOFFS]
-    whole = [one for one in notes if one.code == TOLERANCE_MISSED]
-    return "; ".join(one.text for one in (*own, *whole))
+def judged(rows: Sequence[StepRow], dimension: int = 3) -> list[StepRow]:
+    """The rows of a ladder with ``steady`` filled in, variant by variant."""
+    from scipy.special import stdtrit
+
+    # by how many standard errors steps may differ by chance, given all pairs of a variant's
+    pairs = sum(math.comb(count, 2) for count in Counter(row.variant for row in rows).values())
+    most = float(stdtrit(FREEDOM, 1.0 - 0.5 * CHANCE / max(pairs, 1)))
+    found: list[StepRow] = []
+    for row in reversed(rows):
+        later = [one for one in found if one.variant == row.variant]
+        is_sound = None not in (row.alpha_vs_axial, row.alpha_vs_axial_se) and not row.note
+        agree = all(one.steady and _agree(row, one, most, dimension) for one in later)
+        found.append(replace(row, steady=int(is_sound and agree)))
+    return found[::-1]
+
+
+def _agree(one: StepRow, other: StepRow, most: float, dimension: int) -> bool:
+    """
+    Whether two values differ by no more than so many standard errors of their difference.
+
+    Of two RVs one lies in the other, and they have the grains of the smaller one in common. The
+    variance of a mean over grains falls with their number, so the sample's part in the variance of
+    the difference is the difference of the variances; both follow from the larger RV's, which is
+    the better known.
+    """
+    if one.alpha_vs_axial is None or other.alpha_vs_axial is None:
+        return False
+    nested = 0.0
+    if one.ladder == "rv":
+        small, large = sorted((one, other), key=lambda row: row.rv_radius or 0.0)
+        more = ((large.rv_radius or 0.0) / (small.rv_radius or 1.0)) ** dimension
+        nested = (large.alpha_vs_axial_sample_se or 0.0) * math.sqrt(max(more - 1.0, 0.0))
+    error = math.hypot(one.alpha_vs_axial_se or 0.0, other.alpha_vs_axial_se or 0.0, nested)
+    return abs(one.alpha_vs_axial - other.alpha_vs_axial) <= most * error
+
+
+def first_steady(rows: Sequence[StepRow]) -> float | None:
+    """
+    The first value of a ladder at which all variants are steady; None if there is none.
+
+    The last one alone has nothing to agree with.
+    """
+    steps = [list(step) for _, step in groupby(rows, key=lambda row: row.value)]
+    return next((step[0].value for step in steps[:-1] if all(row.steady for row in step)), None)
+
+
+def _largest(rows: Sequence[StepRow], name: str) -> float | None:
+    return max((row[name] for row in rows if row[name] is not None), default=None)
+
+
+def _finding(ladder: str, rows: list[StepRow]) -> str:
+    """What the rows of a ladder show, in one sentence."""
+    if ladder != "cutoff":
+        steady = first_steady(rows)
+        said = "no step agrees with all later ones"
+        if steady is not None:
+            said = f"from {steady:g} on nothing changes within the errors"
+        return f"{ladder}: {said}{PAPER.get(ladder, '')}"
+    variant = rows[0].variant
+    own = {row.value: row.alpha_vs_axial for row in rows if row.variant == variant}
+    known = {value: alpha for value, alpha in own.items() if alpha is not None}
+    best = max(known, key=lambda value: abs(known[value]))
+    said = (
+        f"cut-off: it decides what is measured; in {variant} the anisotropy is largest "
+        f"({known[best]:.2g}) at {best:g} r_min"
+    )
+    if PAPER_CUTOFF not in known or known[best] == 0:
+        return said
+    return f"{said}; at the paper's 1 r_min it is {known[PAPER_CUTOFF] / known[best]:.0%} of that"

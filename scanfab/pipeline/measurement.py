@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -15,14 +15,16 @@ from scanfab.base.errors import Note
 from scanfab.base.shapes import sphere
 from scanfab.base.typing import FloatArray
 from scanfab.packing.sample import Sample, Variant
+from scanfab.packing.window import Window, inner_ellipsoid
 from scanfab.pipeline.plan import NOISE, Plan
-from scanfab.pipeline.solids import solids_of
 from scanfab.pipeline.tolerance import scan_to_tolerance
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.directions import DirectionRule, design_of, usual_rule
+from scanfab.scan.edges import CLIP, ENDS, START
 from scanfab.scan.gaps import GapSums, scan_gaps
+from scanfab.scan.kernels.periodic import CellGrains
 from scanfab.scan.scan import ScanSums
-from scanfab.scan.solids import Solids, most_lines
+from scanfab.scan.solids import Inner, Solids, margin_of, most_lines
 
 # Of the scan for the sample's scatter: its noise is known from the replicates, and taken off. Lines
 # at one distance in mean radii make as many segments for each grain of a small sample as of a large
@@ -88,10 +90,7 @@ class Measurement:
     def at_cutoffs(self, cutoffs: Iterable[float]) -> Measurement:
         """The same lines evaluated with other cut-offs, in the dump's unit."""
         plan = replace(self.plan, cutoffs=tuple(sorted(cutoffs)), lists_gaps=True)
-        placed, sums = _about(self.solids.origin, self.blocks), self.sums
-        gaps = _every_gap(self.solids, placed, sums, plan)
-        blocked = _blocked_gaps(self.solids, placed, self.block_rule, sums, plan)
-        return replace(self, plan=plan, gaps=gaps, blocked=blocked)
+        return _with_gaps(self.sample, self.solids, self.sums, plan, self.notes)
 
 
 def measure(sample: Sample, plan: Plan, where: str = "the frame") -> tuple[Measurement, ...]:
@@ -108,88 +107,54 @@ def measure(sample: Sample, plan: Plan, where: str = "the frame") -> tuple[Measu
 def _measure(sample: Sample, plan: Plan, where: str) -> Measurement:
     solids = solids_of(sample, plan.window, variants=plan.variants, edge=plan.edge)
     sums, plan, notes = scan_to_tolerance(solids, plan, where)
+    return _with_gaps(sample, solids, sums, plan, tuple(notes))
+
+
+def _with_gaps(
+    sample: Sample, solids: Solids, sums: ScanSums, plan: Plan, notes: tuple[Note, ...]
+) -> Measurement:
+    """What a scan says, with the gaps of its lines if need be, and those by block of fewer."""
     blocks = _blocks(sample, plan)
-    placed = _about(solids.origin, blocks)
-    gaps = _every_gap(solids, placed, sums, plan) if plan.lists_gaps else None
-    block_rule = _block_rule(solids)
-    blocked = _blocked_gaps(solids, placed, block_rule, sums, plan)
-    return Measurement(sample, plan, solids, sums, gaps, blocked, block_rule, blocks, tuple(notes))
-
-
-def _every_gap(
-    solids: Solids, blocks: tuple[Blocks, Blocks], sums: ScanSums, plan: Plan
-) -> GapSums:
-    """All gaps of the lines that the sums are of, at the plan's cut-offs."""
-    return scan_gaps(
+    scan = partial(
+        scan_gaps,
         solids,
-        plan.rule,
-        spacing=plan.spacing,
-        replicates=range(sums.replicates),
-        **_lines(blocks, plan),
-    )
-
-
-def _blocked_gaps(
-    solids: Solids, blocks: tuple[Blocks, Blocks], rule: DirectionRule, sums: ScanSums, plan: Plan
-) -> GapSums:
-    """Gaps of fewer lines, for the sample's scatter."""
-    return scan_gaps(
-        solids,
-        rule,
-        spacing=_block_spacing(solids, rule, sums, plan),
-        replicates=range(BLOCK_REPLICATES),
-        **_lines(blocks, plan),
-    )
-
-
-def _lines(blocks: tuple[Blocks, Blocks], plan: Plan) -> dict[str, Any]:
-    """What both lists of gaps are made with."""
-    return {
-        "cutoffs": plan.cutoffs,
-        "blocks": blocks,
-        "variants": plan.variants,
-        "seed": plan.seed,
-        "workers": plan.workers,
+        cutoffs=plan.cutoffs,
+        blocks=(blocks[0].moved(solids.origin), blocks[1].moved(solids.origin)),
+        variants=plan.variants,
+        seed=plan.seed,
+        workers=plan.workers,
         # what these scans take is known from the one before them
-        "most_steps": math.inf,
-    }
-
-
-def _about(origin: FloatArray, blocks: tuple[Blocks, Blocks]) -> tuple[Blocks, Blocks]:
-    """Blocks of the dump's coordinates as blocks of places from an origin."""
-    whole, window = (replace(one, shift=one.shift + one.matrix @ origin) for one in blocks)
-    return whole, window
+        most_steps=math.inf,
+    )
+    gaps = None
+    if plan.lists_gaps:
+        gaps = scan(plan.rule, spacing=plan.spacing, replicates=range(sums.replicates))
+    # the directions of an auto scan; more of them for fewer grains
+    count = len(solids.grain_radius)
+    rule = usual_rule(solids.space)
+    if len(rule) * count < AXES_TIMES_GRAINS:
+        rule = design_of(AXES_TIMES_GRAINS / max(count, 1), solids.space)
+    most = min(max(CHORDS_A_GRAIN * count, FEWEST_CHORDS), MOST_CHORDS)
+    spacing = coarse_spacing(solids, BLOCK_REPLICATES * len(rule), sums, plan, most)
+    blocked = scan(rule, spacing=spacing, replicates=range(BLOCK_REPLICATES))
+    return Measurement(sample, plan, solids, sums, gaps, blocked, rule, blocks, notes)
 
 
 def _blocks(sample: Sample, plan: Plan) -> tuple[Blocks, Blocks]:
     """The octants about the middle of the sample (of the cell), and about the window's centre."""
-    packing = sample.packing
+    packing, cell = sample.packing, sample.packing.cell
     position = packing.position[sample.gathered]
     low, high = position.min(axis=0), position.max(axis=0)
     radius = float(packing.radius.max())
     reach = float(np.linalg.norm(high - low)) + radius
     whole = Blocks.about(0.5 * (low + high), reach, plan.axis, plan.space)
-    if packing.cell is not None and packing.is_periodic:
-        cell = packing.cell
+    if cell is not None and packing.is_periodic:
         periodic = np.array(cell.periodic)
         whole = Blocks.of_periods(cell.vectors, cell.origin, periodic, position, plan.space)
     if plan.window is None:
         return whole, whole
     reach = plan.window.radius + radius
     return whole, Blocks.about(plan.window.center, reach, plan.axis, plan.space)
-
-
-def _block_rule(solids: Solids) -> DirectionRule:
-    """The directions of an auto scan; more of them for fewer grains."""
-    usual = usual_rule(solids.space)
-    axes = AXES_TIMES_GRAINS / max(len(solids.grain_radius), 1)
-    return usual if axes <= len(usual) else design_of(axes, solids.space)
-
-
-def _block_spacing(solids: Solids, rule: DirectionRule, sums: ScanSums, plan: Plan) -> float:
-    """As close as is of use, but no closer than the sample's scatter is worth."""
-    most = min(max(CHORDS_A_GRAIN * len(solids.grain_radius), FEWEST_CHORDS), MOST_CHORDS)
-    return coarse_spacing(solids, BLOCK_REPLICATES * len(rule), sums, plan, most)
 
 
 def coarse_spacing(solids: Solids, axes: int, before: ScanSums, plan: Plan, most: float) -> float:
@@ -206,3 +171,97 @@ def coarse_spacing(solids: Solids, axes: int, before: ScanSums, plan: Plan, most
     # a line costs as much as a chord, also if it meets nothing
     chords = axes * (solids.chords(spacing) + most_lines(solids, spacing) + steps)
     return spacing * plan.space.apart(max(chords / most, 1.0))
+
+
+def solids_of(
+    sample: Sample, window: Window | None = None, *, variants: str = "abcd", edge: str = CLIP
+) -> Solids:
+    """
+    The spheres that scan lines may meet.
+
+    Parameters
+    ----------
+    sample : Sample
+        Its grains are the solids, boundary particles never; its rattlers are those that b and d
+        remove.
+    window : Window, optional
+        The RV, which the lines of c and d are clipped to; without one these have no lines.
+    variants : str, optional
+        Which of a, b, c, d are to be scanned. Without a and b, grains outside the window are left
+        out, and of a periodic packing the whole.
+    edge : {"clip", "start", "ends"}, optional
+        What counts at the window's surface.
+
+    Returns
+    -------
+    Solids
+        Positions relative to the window's centre; without one, to the mean of the grains' centres.
+        ``origin`` is that point.
+
+    Raises
+    ------
+    SettingsError
+        If the window is wider than a period of the cell.
+    PackingError
+        If the contacts, which tell the rattlers, are not known.
+
+    Examples
+    --------
+    A scan by hand, of a cubic lattice of touching spheres, whose fabric is isotropic:
+
+    >>> import numpy as np
+    >>> from scanfab import Packing, Sample, Window, direction_rule, find_contacts
+    >>> from scanfab import scan_lines, solids_of, sphere, void_fabric
+    >>> grid = np.stack(np.meshgrid(*3 * [np.arange(6.0)]), axis=-1).reshape(-1, 3)
+    >>> sample = Sample(find_contacts(Packing(grid, 0.5), 1e-4), boundary=grid[:, 2] < 0.5)
+    >>> window = Window(np.full(3, 2.5), sphere(1.8))
+    >>> solids = solids_of(sample, window, variants="c")
+    >>> rule = direction_rule("lebedev:11")
+    >>> sums = scan_lines(solids, rule, spacing=0.1, cutoff=0.5, variants="c")
+    >>> fabric = void_fabric(sums.axes, rule.weights, *sums.kept("c"))
+    >>> bool(fabric.tensor.alpha < 0.02)
+    True
+    """
+    packing, grains = sample.packing, sample.grains
+    cell, space = packing.cell, packing.space
+    if window is not None:
+        window.check_fits(packing)
+    whole = "a" in variants or "b" in variants
+    position, radius = packing.position[grains], packing.radius[grains]
+    removed = sample.rattlers[grains]
+    origin = position.mean(axis=0) if window is None else window.center.copy()
+    if space.across is not None:
+        # exactly in the plane, as the mean would not be
+        origin[space.across] = packing.place_across
+    position = np.ascontiguousarray(position - origin)
+    shape = None if window is None else window.shape
+    medium, inner, vectors, periodic = None, None, np.eye(3), np.zeros(3, bool)
+    if cell is not None and packing.is_periodic:
+        vectors, periodic = cell.short_vectors, np.array(cell.periodic)
+        if space.across is not None:
+            # the one across the plane comes last, as long as discs are wide: then what is expected
+            # of mean free paths in space holds here, too
+            order = np.argsort(vectors[:, space.across] != 0.0, kind="stable")
+            vectors, periodic = vectors[order], periodic[order]
+            vectors[2] = 2.0 * float(radius.mean()) * space.normal
+    every = CellGrains(position, radius, removed, vectors, periodic)
+    around = every if edge == START and shape is not None else None
+    margin = 0.0 if around is None else margin_of(around)
+    if cell is not None and packing.is_periodic:
+        medium = every if whole else None
+        reach = 0.0 if shape is None else shape.reach
+        position, row = cell.images_near_origin(position, radius + reach + margin)
+        radius, removed = radius[row], removed[row]
+    elif shape is not None and not whole:
+        near = shape.may_meet(position, radius + margin)
+        position, radius, removed = position[near], radius[near], removed[near]
+    elif edge == ENDS and whole:
+        # where all grains of an open sample are known
+        gathered = sample.gathered
+        largest = float(packing.radius[gathered].max())
+        found = inner_ellipsoid(packing.position[gathered], largest, space)
+        inner = None if found is None else Inner(found.shape, found.center - origin)
+    return Solids(
+        position, radius, removed, shape, medium, origin,
+        edge=edge, around=around, inner=inner, space=space,
+    )  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -26,15 +26,13 @@ TOLERANCE_MISSED = "tolerance_missed"
 """The code of a note: an auto scan ended before its tolerance was met."""
 
 # beyond these there is more overhead than scan
-MAX_REPLICATES = 16_384
-MAX_DIRECTIONS = 3_000
+MAX_REPLICATES, MAX_DIRECTIONS = 16_384, 3_000
 # Closer lines and a finer rule need fewer segments in all than more replicates do. A scan starts
 # afresh with them if its lines must grow by AFRESH_FROM; its rule grows by FINER_UP_TO at most.
 AFRESH_FROM, FINER_UP_TO = 2.0, 8.0
-# a round multiplies the work by this at most: early estimates of the error are uncertain
-GROWTH = 4.0
-# and by this at least, so that there is something to do for several threads
-SMALLEST_ROUND = 1.1
+# A round multiplies the work by GROWTH at most, as early estimates of the error are uncertain, and
+# by SMALLEST_ROUND at least, so that there is something to do for several threads.
+GROWTH, SMALLEST_ROUND = 4.0, 1.1
 # The expected error must lie below the tolerance by a margin. Then the error by the replicates,
 # which is reported, is seldom above the tolerance, and the scan seldom ends at an error that is too
 # small by chance. MARGIN holds where replicates can be added, which makes the error surer. Where
@@ -48,8 +46,6 @@ MOST_EMPTY = 0.005
 # FEW_KEPT: a variant that keeps less than this share of its grains is hardly a packing. HELD_BACK:
 # it no longer counts for the tolerance once it needs this many times the lines of the others.
 FEW_KEPT, HELD_BACK = 0.1, 10.0
-# the message on missing lines names no larger factor
-FAR_MORE = 1000.0
 
 
 class Errors(NamedTuple):
@@ -108,33 +104,6 @@ class Goal:
         return Errors(reported, expected or reported, empty)
 
 
-EACH_VARIANT = Goal()
-
-
-def scan_to_tolerance(
-    solids: Solids, plan: Plan, where: str = "the frame", goal: Goal = EACH_VARIANT
-) -> tuple[Any, Plan, list[Note]]:
-    """
-    Scan one frame as planned, and where the plan is ``auto``, on until the tolerance holds.
-
-    Progress goes to the logger ``scanfab``, where ``where`` names the frame.
-
-    Returns
-    -------
-    sums
-        Of all replicates, as the goal scans them; without one a ScanSums.
-    Plan
-        With the rule and the spacing of each replicate as they were in the end.
-    list of Note
-        What was not reached.
-    """
-    if not plan.auto:
-        return goal.scan(solids, plan, range(plan.replicates), plan.max_chords), plan, []
-    scan = _AutoScan(solids, _within_budget(plan, solids), goal)
-    notes = scan.run(where)
-    return scan.sums, scan.plan, notes
-
-
 def missing_work(errors: Iterable[Errors], plan: Plan, replicates: int) -> float:
     """
     By what factor the lines must grow for these variants to meet the tolerance; <= 1: done.
@@ -160,6 +129,31 @@ def missing_work(errors: Iterable[Errors], plan: Plan, replicates: int) -> float
     return max(expected, min(missing, 1.1))
 
 
+def scan_to_tolerance(
+    solids: Solids, plan: Plan, where: str = "the frame", goal: Goal | None = None
+) -> tuple[Any, Plan, list[Note]]:
+    """
+    Scan one frame as planned, and where the plan is ``auto``, on until the tolerance holds.
+
+    Progress goes to the logger ``scanfab``, where ``where`` names the frame.
+
+    Returns
+    -------
+    sums
+        Of all replicates, as the goal scans them; without one a ScanSums.
+    Plan
+        With the rule and the spacing of each replicate as they were in the end.
+    list of Note
+        What was not reached.
+    """
+    goal = goal or Goal()
+    if not plan.auto:
+        return goal.scan(solids, plan, range(plan.replicates), plan.max_chords), plan, []
+    scan = _AutoScan(solids, _within_budget(plan, solids), goal)
+    notes = scan.run(where)
+    return scan.sums, scan.plan, notes
+
+
 class _AutoScan:
     """A scan that goes on round by round."""
 
@@ -175,15 +169,16 @@ class _AutoScan:
     def run(self, where: str) -> list[Note]:
         """Scan until the tolerance holds or nothing can be added; tell what was not reached."""
         planned, begun = self.plan.spacing, time.perf_counter()
-        notes: list[Note] = []
-        start, stop = 0, self.plan.replicates
+        start, stop, missed = 0, self.plan.replicates, []
         while True:
             self._scan(start, stop)
             counted = self._counted()
             missing = self._missing(counted)
             rest = min(missing, self.plan.max_chords / self.spent) - 1.0
             if rest > 0.0:
-                self._tell_progress(counted, where, rest * (time.perf_counter() - begun))
+                seconds = spelt_time(rest * (time.perf_counter() - begun))
+                reached, tolerance = self._reached(counted)
+                LOGGER.info("%s: error %s of %s, about %s", where, reached, tolerance, seconds)
             # not if the lines of this round had to be wider than planned
             if start == 0 and self.plan.spacing <= planned:
                 better = self._better_plan(missing, counted)
@@ -195,10 +190,10 @@ class _AutoScan:
             more = math.ceil(max(min(missing, GROWTH), SMALLEST_ROUND) * stop)
             more = min(more, MAX_REPLICATES, int(stop + self.left))
             if self.plan.auto == "directions" or more <= stop:
-                notes.append(self._missed(missing))
+                missed = [self._missed(missing)]
                 break
             start, stop = stop, more
-        return [*notes, *self._dropped(counted)]
+        return [*missed, *self._dropped(counted)]
 
     def _scan(self, start: int, stop: int) -> None:
         """Add some replicates; the first of all start afresh."""
@@ -222,19 +217,17 @@ class _AutoScan:
         Only a scan can tell how far lines go through a periodic medium, so one replicate goes
         ahead, and ends when it has used its share.
         """
-        solids, every, most = self.solids, self.plan.replicates, self.plan.max_chords
-        if solids.medium is None:
-            return self.goal.scan(solids, self.plan, range(every))
+        every, most = self.plan.replicates, self.plan.max_chords
+        if self.solids.medium is None:
+            return self.goal.scan(self.solids, self.plan, range(every))
         while True:
             try:
-                sums = self.goal.scan(solids, self.plan, range(1), most / every)
-                if every == 1:
-                    return sums
-                rest = self.goal.scan(solids, self.plan, range(1, every), most)
-                return self.goal.concatenate([sums, rest])
+                first = self.goal.scan(self.solids, self.plan, range(1), most / every)
+                rest = self.goal.scan(self.solids, self.plan, range(1, every), most)
+                return self.goal.concatenate([first, rest])
             except FollowedTooFarError:
                 wider = 2.0 * self.plan.spacing
-                if self.plan.auto != "replicates" or wider > _width(solids):
+                if self.plan.auto != "replicates" or self.solids.chords(wider) < 1.0:
                     raise
                 self.plan = replace(self.plan, spacing=wider)
 
@@ -249,26 +242,25 @@ class _AutoScan:
         A variant that keeps but a few grains does not hold back the others, nor does one whose
         tolerance the budget cannot reach. If that leaves none, all count.
         """
-        space = self.plan.space
         missing = {name: self._missing(name) for name in self.plan.variants}
         few = [name for name in missing if _kept_grains(self.solids, name) < FEW_KEPT]
         usual = max((missing[name] for name in missing if name not in few), default=math.inf)
-        held_back = {
-            name
-            for name in few
-            if missing[name] > HELD_BACK * usual
-            or (usual < math.inf and self.errors[name].is_patchy)
-        }
         # closer lines tell more than more of them; and early estimates of the error are uncertain
-        growth = 1.0 + NOISE[space.dimension].growth / (space.dimension - 1)
+        across = self.plan.space.dimension - 1
+        growth = 1.0 + NOISE[across + 1].growth / across
         reach = GROWTH * (1.0 + self.left / self.sums.replicates) ** growth
-        near = "".join(n for n in missing if n not in held_back and missing[n] <= reach)
-        return near or self.plan.variants
+        counted = ""
+        for name in missing:
+            is_patchy = usual < math.inf and self.errors[name].is_patchy
+            held_back = name in few and (missing[name] > HELD_BACK * usual or is_patchy)
+            if not held_back and missing[name] <= reach:
+                counted += name
+        return counted or self.plan.variants
 
     def _better_plan(self, missing: float, counted: str) -> Plan | None:
         """A plan to start afresh with after the first round, if it is worth it and affordable."""
-        plan, radius = self.plan, self.solids.grain_radius
-        better = plan
+        plan = better = self.plan
+        radius = self.solids.grain_radius
         is_patchy = any(self.errors[name].is_patchy for name in counted)
         if plan.auto == "directions":
             if missing > 1.0 and len(plan.rule) < MAX_DIRECTIONS:
@@ -283,45 +275,44 @@ class _AutoScan:
         affordable = affordable and is_affordable(self.solids, better.spacing)
         return better if growth > 1.0 and affordable else None
 
+    def _reached(self, variants: str) -> tuple[str, str]:
+        """The largest error of some variants, and the tolerance, as messages tell them apart."""
+        errors = [self.errors[name].reported for name in variants]
+        worst = max(filter(math.isfinite, errors), default=math.inf)
+        return spelt_apart(worst, self.plan.tolerance)
+
     def _missed(self, factor: float) -> Note:
-        steps, work = self.sums.steps.sum(), self.sums.work.sum()
-        why = ""
+        steps, why = self.sums.steps.sum(), ""
         if steps > self.sums.chords.sum():
             why = (
-                f"; {steps / work:.0%} of the work was to follow long void segments through the "
-                f"images of the cell: is it too large, or periodic where the sample is not "
-                f"(`cell`, `periodic`)?"
+                f"; {steps / self.sums.work.sum():.0%} of the work was to follow long void "
+                f"segments through the images of the cell: is it too large, or periodic where the "
+                f"sample is not (`cell`, `periodic`)?"
             )
-        more = "at least " if factor >= GROWTH else ""
         text = (
             f"the scan stopped after {self.spent:.2g} chords before the tolerance "
-            f"{self.plan.tolerance:g} was met: alpha_vs_axial_se is what it reached; "
-            f"{more}{min(factor, FAR_MORE):.4g} times as many lines would be needed "
-            f"(`max_chords`, `tolerance`){why}"
+            f"{self.plan.tolerance:g} was met: alpha_vs_axial_se is what it reached; about "
+            f"{factor:.2g} times as many lines would be needed (`max_chords`, `tolerance`){why}"
         )
         return Note(TOLERANCE_MISSED, text)
 
-    def _dropped(self, counted: str) -> Iterator[Note]:
+    def _dropped(self, counted: str) -> list[Note]:
         """What variants have reached that the scan did not go on for."""
+        notes = []
         for name, errors in self.errors.items():
             if name in counted or errors.reported <= self.plan.tolerance:
                 continue
-            reached, tolerance = spelt_apart(errors.reported, self.plan.tolerance)
-            said = f"alpha_vs_axial_se is {reached}, above the tolerance {tolerance}"
-            if math.isinf(errors.reported):
-                said = "there is no void fabric yet"
+            said = "there is no void fabric yet"
+            if math.isfinite(errors.reported):
+                said = "alpha_vs_axial_se is {}, above the tolerance {}".format(
+                    *self._reached(name)
+                )
             text = (
                 f"{said}: it keeps few grains, or would need far more lines than the others "
                 f'(`variants="{name}"` scans it alone)'
             )
-            yield Note("variant_dropped", text, (name,))
-
-    def _tell_progress(self, counted: str, where: str, seconds: float) -> None:
-        """The largest error so far, and about how long the rest of the scan will take."""
-        errors = [self.errors[name].reported for name in counted]
-        worst = max(filter(math.isfinite, errors), default=math.inf)
-        reached, tolerance = spelt_apart(worst, self.plan.tolerance)
-        LOGGER.info("%s: error %s of %s, about %s", where, reached, tolerance, spelt_time(seconds))
+            notes.append(Note("variant_dropped", text, (name,)))
+        return notes
 
 
 def _with_closer_lines(plan: Plan, missing: float, mean_radius: float) -> Plan:
@@ -340,35 +331,17 @@ def _with_closer_lines(plan: Plan, missing: float, mean_radius: float) -> Plan:
 
 def _within_budget(plan: Plan, solids: Solids) -> Plan:
     """The plan, with wider lines if its first round alone would cut more chords than allowed."""
-    chords = solids.chords(plan.spacing) + most_lines(solids, plan.spacing)
-    chords *= len(plan.rule) * plan.replicates
+    axes = len(plan.rule) * plan.replicates
+    chords = axes * (solids.chords(plan.spacing) + most_lines(solids, plan.spacing))
     if chords <= plan.max_chords:
         return plan
-    if plan.auto != "replicates":
+    if plan.auto != "replicates" or plan.max_chords < axes:
         raise SettingsError(
-            f"spacing: {plan.replicates} replicates of {len(plan.rule)} directions would cut "
-            f"{chords:.2g} chords from the grains, more than `max_chords` {plan.max_chords:g}: "
-            f"choose a wider spacing"
+            f"max_chords: {plan.max_chords:g} chords are fewer than the {chords:.2g} that "
+            f"{plan.replicates} replicates of {len(plan.rule)} directions would cut: choose a "
+            f"wider `spacing` or fewer `directions`, or allow more"
         )
-    wider = plan.spacing * plan.space.apart(chords / plan.max_chords)
-    if wider > _width(solids):
-        raise SettingsError(
-            f"max_chords: {plan.max_chords:g} leave less than one line for each of "
-            f"{plan.replicates} replicates of {len(plan.rule)} directions: allow more, or take "
-            f"fewer `directions`"
-        )
-    return replace(plan, spacing=wider)
-
-
-def _width(solids: Solids) -> float:
-    """Of the window, or of the sample (the cell) where there is none."""
-    if solids.window is not None:
-        return 2.0 * solids.reach
-    if solids.medium is not None:
-        return float(np.linalg.norm(solids.medium.vectors, axis=1).max())
-    low = (solids.position - solids.radius[:, None]).min(axis=0)
-    high = (solids.position + solids.radius[:, None]).max(axis=0)
-    return float((high - low).max())
+    return replace(plan, spacing=plan.spacing * plan.space.apart(chords / plan.max_chords))
 
 
 def _kept_grains(solids: Solids, variant: str) -> float:

@@ -34,7 +34,7 @@ def answer(capsys, tmp_path):
         (("--tolerance", "-1e-4"), 2, "tolerance: expected a number above 0, found -0.0001"),
         (("--directions", "fibonacci:1"), 2, "the 1 axes of fibonacci:1 lie in one plane"),
         (("--max-chords", "0"), 2, "max-chords: expected a number of at least 1"),
-        (("--max-chords", "5"), 1, "max-chords: 5 leave less than one line"),
+        (("--max-chords", "5"), 1, "max-chords: 5 chords are fewer than"),
         (("--spacing", "50", "--directions", "20"), 1, "spacing: 50 between lines is more than"),
         (("--spacing", "50"), 1, "spacing: 50 between lines is more than"),
         (("--spacing", "1e-6", "--directions", "20"), 1, "choose a wider spacing"),
@@ -50,7 +50,7 @@ def test_target_out_of_reach_is_told_with_the_error_that_was_reached(answer):
     code, rows, err = answer("--tolerance", "1e-9", "--max-chords", "1e6", "--cutoff", "0.1rmin")
     assert code == 0
     assert "chords before the tolerance 1e-09 was met: alpha_vs_axial_se is what it reached" in err
-    assert "; at least 1000 times as many lines would be needed (--max-chords, --tol" in err
+    assert " times as many lines would be needed (--max-chords, --tol" in err
     assert all(float(row["alpha_vs_axial_se"]) > 1e-9 for row in rows)
 
 

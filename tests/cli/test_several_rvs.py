@@ -127,7 +127,7 @@ def test_the_view_shows_all(series, tmp_path):
 
 def test_a_calibration_is_of_one(series, capsys):
     assert run(["calibrate", str(series), *RVS]) == 1
-    assert "--rv: expected one size" in capsys.readouterr().err
+    assert "nor several rv" in capsys.readouterr().err
 
 
 def test_a_settings_file_may_have_a_list(series, table, tmp_path):

@@ -9,7 +9,7 @@ from scanfab import Cell, Packing, Sample, Window, compute, find_contacts
 from scanfab.base.shapes import circle, ellipse, rectangle
 from scanfab.base.space import Space
 from scanfab.fabric.void import void_fabric
-from scanfab.pipeline.solids import solids_of
+from scanfab.pipeline.measurement import solids_of
 from scanfab.scan.directions import DirectionRule, plane_rule
 from scanfab.scan.lines import drawn_lines, turned_triads
 from scanfab.scan.scan import scan_lines, sums_of

@@ -8,9 +8,9 @@ from scanfab import Cell, Packing, PackingError, SettingsError, compute, find_co
 from scanfab.base.space import SPACE, Space
 from scanfab.fabric.void import void_fabric
 from scanfab.packing.sample import Sample
+from scanfab.pipeline.measurement import solids_of
 from scanfab.pipeline.plan import NOISE
 from scanfab.pipeline.settings import Settings
-from scanfab.pipeline.solids import solids_of
 from scanfab.pipeline.strain import shear_strain
 from scanfab.pipeline.window_settings import settings_in
 from scanfab.scan.directions import plane_rule

@@ -10,7 +10,7 @@ import pytest
 
 from scanfab.base.column import columns_of_fields
 from scanfab.base.errors import ScanfabWarning, SettingsError
-from scanfab.pipeline.calibration_ladders import StepRow
+from scanfab.pipeline.calibration import StepRow
 from scanfab.pipeline.inspection import FrameReport
 from scanfab.table.compare import DIFFERENCES, FRAMES, SUMMARY
 from scanfab.table.row import number_of

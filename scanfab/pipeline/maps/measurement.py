@@ -14,9 +14,8 @@ from scanfab.base.typing import FloatArray, IntArray
 from scanfab.fabric.blocks import BlockFabrics, WithoutParts
 from scanfab.packing.sample import Sample
 from scanfab.pipeline.maps.blocks import splits_of
-from scanfab.pipeline.measurement import coarse_spacing
+from scanfab.pipeline.measurement import coarse_spacing, solids_of
 from scanfab.pipeline.plan import Plan
-from scanfab.pipeline.solids import solids_of
 from scanfab.pipeline.tolerance import Errors, Goal, scan_to_tolerance
 from scanfab.scan.blocks import Blocks
 from scanfab.scan.directions import DirectionRule, design_of
