@@ -85,7 +85,7 @@ def finished_job(
             )
         if followed is not None:
             stack.enter_context(ending_in_order(followed.end))
-            followed.when_idle(_Redraw(job, draw))
+            followed.idle = _Redraw(job, draw)
         with usage_errors():
             stack.enter_context(job.begun(drawn))
         _write_or_say(job, excerpt)

@@ -5,37 +5,20 @@ These names are what a reader of another package may import; see docs/adding-a-r
 are defined may change.
 """
 
-from scanfab.io.columns import grain_table
-from scanfab.io.contacts import join_ids, join_positions
-from scanfab.io.files import file_inside, first_bytes, plain
-from scanfab.io.reader import (
-    Carries,
-    FileKind,
-    GrainTable,
-    JoinedContacts,
-    Reader,
-    ReadOptions,
-    Snapshot,
-)
-from scanfab.io.writer import Left, Writer, more_columns
-from scanfab.packing.contacts import ListedWallForces
-
-__all__ = [
-    "Carries",
-    "FileKind",
-    "GrainTable",
-    "JoinedContacts",
-    "Left",
-    "ListedWallForces",
-    "ReadOptions",
-    "Reader",
-    "Snapshot",
-    "Writer",
-    "file_inside",
-    "first_bytes",
-    "grain_table",
-    "join_ids",
-    "join_positions",
-    "more_columns",
-    "plain",
-]
+from scanfab.io.columns import grain_table as grain_table
+from scanfab.io.contacts import join_ids as join_ids
+from scanfab.io.contacts import join_positions as join_positions
+from scanfab.io.files import file_inside as file_inside
+from scanfab.io.files import first_bytes as first_bytes
+from scanfab.io.files import plain as plain
+from scanfab.io.reader import Carries as Carries
+from scanfab.io.reader import FileKind as FileKind
+from scanfab.io.reader import GrainTable as GrainTable
+from scanfab.io.reader import JoinedContacts as JoinedContacts
+from scanfab.io.reader import Reader as Reader
+from scanfab.io.reader import ReadOptions as ReadOptions
+from scanfab.io.reader import Snapshot as Snapshot
+from scanfab.io.writer import Left as Left
+from scanfab.io.writer import Writer as Writer
+from scanfab.io.writer import more_columns as more_columns
+from scanfab.packing.contacts import ListedWallForces as ListedWallForces

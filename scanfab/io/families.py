@@ -11,7 +11,7 @@ import glob
 import os
 import re
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fnmatch import fnmatch
@@ -27,7 +27,6 @@ from scanfab.io.reader import (
     ReadOptions,
     installed_readers,
     reader_for,
-    reader_named,
 )
 
 PathLike = str | os.PathLike[str]
@@ -139,42 +138,37 @@ class Family:
 
 
 def sort_into_families(
-    files: Iterable[Path],
-    format: str | None,
-    options: ReadOptions | None = None,
-    around: Iterable[Path] = (),
+    files: Iterable[Path], options: ReadOptions, groups: Iterable[Numbered] | None = None
 ) -> list[Family]:
     """
     Sort files into families; the largest file of each tells its reader and kind.
 
-    A ``format`` is the reader of all. Files ``around`` them in their folders show which number in
-    a name is the step.
+    ``groups`` are those of :func:`group_by_name`, where other files were grouped with these: they
+    show which number in a name is the step.
     """
     files = set(files)
-    own = _heads(files)
     return [
-        _family_of(members, files, format, options, len(series) > 1)
-        for series in _series_in({*own, *_heads(around)})
-        if (members := [pair for pair in series if pair[1] in own])
+        _family_of(members, files, options, len(group) > 1)
+        for group in (group_by_name(files) if groups is None else groups)
+        if (members := [pair for pair in group if pair[1] in files])
     ]
 
 
-def _heads(files: Iterable[Path]) -> set[Path]:
-    """The files without those that another one of them lists as its parts."""
-    heads = set(files)
-    for offer in installed_readers().values():
-        if hasattr(offer.plugin, "listed_by"):
-            heads -= {file for file in heads if offer.plugin.listed_by(file) in heads}
-    return heads
+def group_by_name(*listings: Iterable[Path]) -> list[Numbered]:
+    """
+    Group all files whose names differ in the step only, in natural order.
 
-
-def _series_in(files: Iterable[Path]) -> Iterator[Numbered]:
-    """Sort files by their names, in natural order: a series of all that differ in the step only."""
-    groups: dict[str, list[Path]] = defaultdict(list)
-    for file in sorted(files, key=str):
-        groups[NUMBER.sub("*", bare_name(file))].append(file)
-    for _, group in sorted(groups.items()):
-        yield from _split(group)
+    A file that another one of its listing names as one of its parts is left out.
+    """
+    readers = [offer.plugin for offer in installed_readers().values()]
+    listers = [reader for reader in readers if hasattr(reader, "listed_by")]
+    patterns: dict[str, list[Path]] = defaultdict(list)
+    heads = set[Path]()
+    for files in map(set, listings):
+        heads |= {file for file in files if not any(r.listed_by(file) in files for r in listers)}
+    for file in sorted(heads, key=str):
+        patterns[NUMBER.sub("*", bare_name(file))].append(file)
+    return [series for _, alike in sorted(patterns.items()) for series in _split(alike)]
 
 
 def _split(group: list[Path]) -> Iterable[Numbered]:
@@ -208,11 +202,7 @@ def numbers_in(file: Path) -> tuple[int, ...]:
 
 
 def _family_of(
-    members: Numbered,
-    among: Collection[Path],
-    format: str | None,
-    options: ReadOptions | None,
-    has_steps: bool,
+    members: Numbered, among: Collection[Path], options: ReadOptions, has_steps: bool
 ) -> Family:
     """The family of some files; its pattern matches no other file ``among`` which they were."""
     files: dict[int | None, Path] = {}
@@ -224,9 +214,8 @@ def _family_of(
     family = Family(pattern, files, None, "other", None, clash, has_steps)
     kind: FileKind = "other"
     try:
-        sample = family.largest
-        reader = reader_for(sample, options) if format is None else reader_named(format, options)
-        kind = "other" if reader is None else reader.kind(sample)
+        reader = reader_for(family.largest, options)
+        kind = "other" if reader is None else reader.kind(family.largest)
     except UnknownFormatError:
         raise
     except ReadError as error:
@@ -264,24 +253,22 @@ def _owner(file: Path) -> str | None:
     return stem if ending else None
 
 
-def _words(family: Family) -> tuple[list[str], str]:
-    """The words of the pattern, and its ending."""
-    name = bare_name(Path(family.pattern))
-    ending = "".join(re.findall(r"\.[A-Za-z]\w*$", name))
-    return re.findall(r"[^\W_]+", name.removesuffix(ending)), ending
+def _words(family: Family) -> list[str]:
+    """The words of the pattern, without its ending."""
+    name = re.sub(r"(\.[A-Za-z]\w*)+$", "", bare_name(Path(family.pattern)))
+    return re.findall(r"[^\W_]+", name)
 
 
-def _kinship(one: Family, two: Family) -> tuple[int, bool]:
-    """How many words two names begin with in common, and whether they have the same ending."""
-    (own, ending), (others, other_ending) = _words(one), _words(two)
-    common = takewhile(lambda pair: pair[0] == pair[1], zip(own, others, strict=False))
-    return len(list(common)), ending == other_ending
+def _common_words(one: Family, two: Family) -> int:
+    """How many words two names begin with in common."""
+    pairs = zip(_words(one), _words(two), strict=False)
+    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
 
 
 def are_tied(grains: Family, contacts: Family) -> bool:
     """Whether step or name tell that contacts belong to grains: a number or the first word."""
     shared = set(grains.files) & set(contacts.files) - {None}
-    return _kinship(grains, contacts)[0] > 0 or (bool(shared) and not any(contacts.owners))
+    return _common_words(grains, contacts) > 0 or (bool(shared) and not any(contacts.owners))
 
 
 def without_tables(
@@ -312,38 +299,33 @@ def without_tables(
 
 
 def contacts_beside(
-    grains: Family, format: str | None, options: ReadOptions
+    grains: Family, groups: Iterable[Numbered], options: ReadOptions
 ) -> tuple[list[Family], list[Family]]:
     """
-    What lies beside single grain files with their numbers, and which of it are their contacts.
+    The families that lie beside single grain files with their numbers, and those of their contacts.
 
-    Contact files belong to grains if their numbers agree or their names begin with the same word,
-    or if neither has a number; and if no other grains beside them have a name that is as near, and
-    no other contact files are nearer. ``STEM.contacts.csv`` belongs to STEM.
-
-    Returns all families of these numbers, and the contacts. A note tells of these, or which
-    contacts may be meant.
+    ``STEM.contacts.csv`` belongs to STEM. Another contact file belongs to grains of its number if
+    their names begin with more common words than its name and that of any other grains there; of
+    several contact files, those with the most. A note tells which are read, or may be meant.
     """
     if grains.kind == "index":
         return [], []
-    families = without_tables(_families_beside(grains, format, options), (), grains)
+    families = without_tables(_families_beside(grains, groups, options), (), grains)
     frames = [one for one in families if one.kind in ("grains", grains.kind)]
-    rivals = [one for one in frames if _words(one)[0] != _words(grains)[0]]
-    near: dict[float, list[Family]] = defaultdict(list)
-    doubtful = []
-    for family in families:
-        if family.kind != "contacts" or family.clash is not None:
-            continue
-        kin = _kinship(grains, family)
-        closest = max((_kinship(one, family) for one in rivals), default=(-1, False))
-        is_alone = None in grains.files and family.owners == {None}
-        if family.owners <= grains.stems:
-            near[float("inf")].append(family)
-        elif kin > closest and (is_alone or are_tied(grains, family)):
-            near[kin[0]].append(family)
-        elif kin >= closest:
-            doubtful.append(Path(family.pattern).name)
-    own = near[max(near)] if near else []
+    rivals = [one for one in frames if _words(one) != _words(grains)]
+    candidates = [one for one in families if one.kind == "contacts" and one.clash is None]
+
+    def lead(contacts: Family) -> int:
+        """By how many common words the grains are nearer to contacts than their rivals are."""
+        nearest = max((_common_words(one, contacts) for one in rivals), default=-1)
+        return _common_words(grains, contacts) - nearest
+
+    own = [one for one in candidates if one.owners <= grains.stems]
+    if not own:
+        near = [one for one in candidates if one.owners == {None} and lead(one) > 0]
+        most = max((_common_words(grains, one) for one in near), default=0)
+        own = [one for one in near if _common_words(grains, one) == most]
+    doubtful = [Path(one.pattern).name for one in candidates if lead(one) >= 0]
     if own:
         note(f"contacts are read from {', '.join(one.pattern for one in own)}, beside the grains")
     elif doubtful:
@@ -354,17 +336,19 @@ def contacts_beside(
     return families, own
 
 
-def _families_beside(grains: Family, format: str | None, options: ReadOptions) -> list[Family]:
+def _families_beside(
+    grains: Family, groups: Iterable[Numbered], options: ReadOptions
+) -> list[Family]:
     """Other files in the folders of grain files: of the same numbers, or named as theirs."""
+    files = set(grains.files.values())
+    others = [group for group in groups if files.isdisjoint(file for _, file in group)]
+    around = {*files, *(file for group in others for _, file in group)}
     own = {(file.parent, step) for step, file in grains.files.items()}
-    stems = {_own_stem(file): step for step, file in grains.files.items()}
-    around = files_around(grains.files.values())
+    steps = {_own_stem(file): step for step, file in grains.files.items()}
     found = []
-    for series in _series_in(_heads(around)):
-        if not set(grains.files.values()).isdisjoint(file for _, file in series):
-            continue
-        same = [(stems[stem], file) for _, file in series if (stem := _owner(file) or "") in stems]
-        same = same or [(step, file) for step, file in series if (file.parent, step) in own]
+    for group in others:
+        same = [(steps[stem], file) for _, file in group if (stem := _owner(file) or "") in steps]
+        same = same or [(step, file) for step, file in group if (file.parent, step) in own]
         if same:
-            found.append(_family_of(same, around, format, options, len(series) > 1))
+            found.append(_family_of(same, around, options, len(group) > 1))
     return found

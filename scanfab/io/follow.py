@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator
 from contextlib import suppress
-from itertools import islice
+from itertools import zip_longest
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from scanfab.base.errors import PackingError, ReadError, warn
 from scanfab.base.option import refuse_unknown, unusable
@@ -17,7 +18,7 @@ from scanfab.io.families import Family, PathLike, files_in
 from scanfab.io.files import Stamp, growing, stamp_of
 from scanfab.io.frame import Frame
 from scanfab.io.options import take_reading
-from scanfab.io.series import Series
+from scanfab.io.series import ENDLESS, Series
 from scanfab.io.sources import READING, as_text, read_series
 
 # seconds between two looks at the files, or so many times what the last look took
@@ -77,27 +78,33 @@ def follow_series(
     return FollowedSeries(os.fspath(source), seconds, take_reading(dict(options)))
 
 
+class _Taken(NamedTuple):
+    """A frame that was handed on, and how its files were then."""
+
+    frame: Frame
+    size: int
+    """Of the file of grains, in bytes."""
+    has_contacts: bool
+
+
 class FollowedSeries(Series):
     """A series whose frames are waited for; its files are those of the frames taken so far."""
 
     def __init__(self, source: str, seconds: float | None, reading: dict[str, Any]) -> None:
         nothing = Family(source, {}, None, "grains")
         super().__init__(as_text(source), nothing, sources=(source,), reading=reading)
-        self._seconds = seconds
+        self.idle: Callable[[], object] = lambda: None
+        """Is called each time that there is nothing to do but to wait."""
+        self._seconds = math.inf if seconds is None else seconds
         self._is_over = False
-        self._idle: Callable[[], object] = lambda: None
-        self._taken: list[Frame] = []
-        self._sizes: dict[Path, int] = {}
-        """Sizes of the grain files of the taken frames."""
-        self._alone: list[Frame] = []
-        """Taken frames that had no contact file."""
+        self._taken: list[_Taken] = []
         self._since = time.monotonic()
         """When the last frame was taken."""
         self._seen: dict[Path, tuple[Stamp, float]] = {}
         """How each file is, and since when."""
         self._looked: list[Any] = []
         """The files as they were when the series was opened."""
-        self._told: list[Warning | str] = []
+        self._told: list[warnings.WarningMessage] = []
         """What was told when the files were opened, for when the first frame is taken."""
         self._problem: Exception | None = None
         """Why the source cannot be opened, or the next frame cannot be read."""
@@ -115,13 +122,15 @@ class FollowedSeries(Series):
             begun = time.monotonic()
             if number == len(self._taken):
                 self._take_next()
+            while self._taken and self._told:
+                warnings.warn(self._told.pop(0).message, stacklevel=2)
             if number < len(self._taken):
-                yield self._taken[number]
+                yield self._taken[number].frame
                 number += 1
             elif self._is_over:
                 return
             else:
-                self._idle()
+                self.idle()
                 yield None
                 time.sleep(max(PAUSE, PAUSES * (time.monotonic() - begun)))
 
@@ -140,35 +149,20 @@ class FollowedSeries(Series):
         """Why there is no frame yet."""
         return str(self._problem or f"{self.name}: no whole frame has come")
 
-    def when_idle(self, call: Callable[[], object]) -> None:
-        """Call this each time that there is nothing to do but to wait."""
-        self._idle = call
-
-    def frames_expected(self) -> int:
-        """Those that have come."""
-        return len(self._taken)
-
-    def files(self) -> Iterator[Path]:
+    def files(self, number: int = ENDLESS, known: Container[Path] = ()) -> Iterator[Path]:
         """Those of the frames that were taken: others may be in the middle of being written."""
-        if not self._taken:
-            return
-        yield from self.files_through(len(self._taken) - 1)
-        if self.cells is not None:
-            yield self.cells.path
+        return super().files(min(number, len(self._taken) - 1), known)
 
     def _take_next(self) -> None:
         """Take the next frame if it is whole, or broken while a later frame is whole."""
         if self._is_over and self._taken:
             return
         self._look()
-        waiting: list[Frame] = []
-        if self.grains.reader is not None:
-            with growing():
-                waiting = list(islice(self.whole, len(self._taken), None))
+        waiting = self._frames_of(self)[len(self._taken) :]
         waited = time.monotonic() - self._since
         if any(self._is_whole(frame, has_later=frame is not waiting[-1]) for frame in waiting):
             self._take(waiting[0])
-        elif self._is_over or (self._seconds is not None and waited >= self._seconds):
+        elif self._is_over or waited >= self._seconds:
             # from now on nothing is waited for, not even contact files
             self._seconds = 0.0
             if any(map(self._can_be_read, waiting)):
@@ -182,19 +176,14 @@ class FollowedSeries(Series):
                 )
 
     def _take(self, frame: Frame) -> None:
-        path = frame.snapshot.path
-        self._taken.append(frame)
-        if not any(_contacts(frame.series, frame)):
-            self._alone.append(frame)
-        if path.exists():
-            self._sizes[path] = path.stat().st_size
+        has_contacts = any(_contacts(frame.series, frame))
+        self._taken.append(_Taken(frame, _size(frame.snapshot.path), has_contacts))
         self._since = time.monotonic()
-        self._tell()
 
-    def _tell(self) -> None:
-        """Pass on what was told when the files were opened, once there is a frame."""
-        while self._taken and self._told:
-            warnings.warn(self._told.pop(0), stacklevel=2)
+    def _frames_of(self, series: Series) -> list[Frame]:
+        """The frames of a series that are there now, whole or not."""
+        with growing():
+            return [] if series.grains.reader is None else list(series.whole)
 
     def _look(self) -> None:
         """Open the series again if files have changed; ReadError if it cannot be gone on with."""
@@ -209,16 +198,15 @@ class FollowedSeries(Series):
         looked = [(path, self._seen.get(path)) for path in names]
         if looked == self._looked:
             return
-        with warnings.catch_warnings(record=True) as caught, growing():
+        # threads that compute frames are heard, too
+        with warnings.catch_warnings(record=True) as self._told, growing():
             warnings.simplefilter("always")
             try:
                 series = read_series(source, **self.reading)
             except (ReadError, OSError) as error:
                 self._problem, series = error, None
-        # threads that compute frames are heard, too
-        self._told = [one.message for one in caught]
-        self._tell()
         if series is not None:
+            series.known = self.known
             self._check_taken(series)
             self.grains, self.contacts, self.cells = series.grains, series.contacts, series.cells
             self.contacts_from, self.options = series.contacts_from, series.options
@@ -229,24 +217,22 @@ class FollowedSeries(Series):
 
     def _check_taken(self, series: Series) -> None:
         """ReadError if the frames that were taken are not the first of the series any more."""
-        series.known, taken = self.known, self._sizes
-        # an index lists files of any names
-        is_index = series.grains.kind == "index"
-        files = list(taken if is_index else series.grains.files.values())
-        wrong = [(path, "has vanished after its frame was taken") for path in taken]
-        wrong = [one for one in wrong if one[0] not in files]
-        for path in files[: len(taken)]:
-            if path not in taken:
-                wrong.append((path, "is new, and belongs before frames that were taken"))
+        frames = self._frames_of(series) if self._taken else []
+        there = {frame.snapshot.path for frame in frames}
+        taken = {one.frame.snapshot.path for one in self._taken}
+        for old, new in zip_longest(self._taken, frames[: len(self._taken)]):
+            path, what = old.frame.snapshot.path, ""
+            if path not in there:
+                what = "has vanished after its frame was taken"
+            elif new is not None and new.snapshot.path not in taken:
+                path, what = new.snapshot.path, "is new, and belongs before frames that were taken"
             # one file of many snapshots may grow
-            elif len(taken) > 1 and path.exists() and path.stat().st_size != taken[path]:
-                wrong.append((path, "has changed after its frame was taken"))
-        for frame in self._alone:
-            if any(_contacts(series, frame)):
-                wrong.append((frame.snapshot.path, "was taken before its contact file came"))
-        if wrong:
-            path, what = wrong[0]
-            raise ReadError(f"{path}: {what}: compute the finished folder without `follow`")
+            elif new is None or (len(taken) > 1 and _size(path) != old.size):
+                what = "has changed after its frame was taken"
+            elif not old.has_contacts and any(_contacts(series, new)):
+                what = "was taken before its contact file came"
+            if what:
+                raise ReadError(f"{path}: {what}: compute the finished folder without `follow`")
 
     def _is_whole(self, frame: Frame, *, has_later: bool) -> bool:
         """Whether all files of a frame are there, are not written any more, and can be read."""
@@ -284,6 +270,11 @@ class FollowedSeries(Series):
         if path not in self._seen or self._seen[path][0] != stamp:
             self._seen[path] = stamp, now
         return age if age > OLD else now - self._seen[path][1]
+
+
+def _size(path: Path) -> int:
+    """The size of a file in bytes; 0 if it is not there."""
+    return path.stat().st_size if path.exists() else 0
 
 
 def _contacts(series: Series, frame: Frame) -> list[Path | None]:

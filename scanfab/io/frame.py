@@ -11,10 +11,9 @@ import numpy as np
 from scanfab.base.errors import PackingError, ReadError, note, warn
 from scanfab.io.columns import body_numbers
 from scanfab.io.companions import (
+    FrameData,
     check_contacts_are_there,
-    companion_file,
     companion_kind,
-    read_frame,
     with_columns,
 )
 from scanfab.io.families import Family, are_tied
@@ -51,6 +50,8 @@ class Frame:
         The step in the file's name.
     number : int
         In the series, from 0.
+    told : FrameData or None
+        What the frame file beside the dump says, as :func:`scanfab.convert` leaves one.
     problem : ReadError or None
         Why not even the frames of the file can be told.
 
@@ -67,6 +68,7 @@ class Frame:
     snapshot: Snapshot
     name_step: int | None
     number: int = 0
+    told: FrameData | None = None
     problem: ReadError | None = None
 
     def __repr__(self) -> str:
@@ -84,14 +86,15 @@ class Frame:
             With absolute paths.
         """
         series, snapshot = self.series, self.snapshot
+        known = replace(series.known, snapshots={})
         # a series whose space is not known yet looks for it in the frames before
-        is_known = series.dim == 3 or series.known.space is not None
+        is_known = series.dim == 3 or known.space is not None
         steps = (self.name_step, self.step) if is_known else tuple(series.grains.files)
         grains, *contacts = (_of_steps(one, steps) for one in (series.grains, *series.contacts))
         parts = tuple(part.absolute() for part in snapshot.parts)
         return replace(
             self,
-            series=replace(series, grains=grains, contacts=tuple(contacts)),
+            series=replace(series, grains=grains, contacts=tuple(contacts), known=known),
             snapshot=replace(snapshot, path=snapshot.path.absolute(), parts=parts),
         )
 
@@ -143,8 +146,7 @@ class Frame:
 
     def _packing(self) -> Packing:
         series, path = self.series, self.snapshot.path
-        grains, told = self.read_grains(), read_frame(path)
-        grains = with_columns(path, grains, told)
+        grains = with_columns(path, self.read_grains(), self.told)
         takes_own = series.contacts_from in ("auto", "beside", "grains")
         lists = [grains.contacts] if takes_own and grains.contacts is not None else []
         files: list[Path] = []
@@ -156,7 +158,7 @@ class Frame:
         if len(lists) > 1:
             raise ReadError(f"two contact lists for one frame: {named}: choose with `contacts`")
         if not lists and takes_own:
-            check_contacts_are_there(path, told)
+            check_contacts_are_there(path, self.told)
         if not lists and series.contacts_from == "grains":
             raise ReadError(
                 f'{path}: `contacts="file"` was asked for, but there is no contact file'
@@ -199,9 +201,8 @@ class Frame:
         for family in series.contacts:
             try:
                 snapshot = series.contacts_of(self, family)
-                if snapshot is not None:
+                if snapshot is not None and family.reader is not None:
                     files.append(snapshot.path)
-                    assert family.reader is not None
                     parts.append(family.reader.read_contacts(snapshot, options, grains))
             except ReadError as error:
                 if series.contacts_from == "path":
@@ -239,8 +240,7 @@ class Frame:
         """What the dump or its user say of a cell."""
         ask = getattr(self.reader, "carries", None)
         options = self.series.options
-        told = self.series.cells or options.cell or options.periodic is not None
-        told = told or companion_file(self.snapshot.path, "frame").is_file()
+        told = self.told or self.series.cells or options.cell or options.periodic is not None
         with unpacking_up_to(options.max_unpacked):
             return "cell" if told or ask is None else ask(self.snapshot.path)
 
@@ -254,9 +254,8 @@ class Frame:
     def _options(self) -> ReadOptions:
         """How to read this frame, with its cell if a file names those of the frames."""
         options, cells = self.series.options, self.series.cells
-        beside = read_frame(self.snapshot.path)
-        if beside is not None:
-            options = replace(options, beside=beside.cell or "none")
+        if self.told is not None:
+            options = replace(options, beside=self.told.cell or "none")
         if cells is None:
             return options
         found = cells.at(self.number, self.name_step if self.step is None else self.step)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.util import find_spec
@@ -54,6 +55,8 @@ What a file of grains says of a cell: all; a ``box``, but not whether it repeats
 class ReadOptions:
     """What users tell of a dump that the dump does not tell itself."""
 
+    format: str | None = None
+    """Name of the reader; None: the one that knows the content."""
     columns: Mapping[str, str] = field(default_factory=dict)
     """Standard name to the file's own, for instance ``{"radius": "c_rad"}``."""
     contact_columns: str | None = None
@@ -225,17 +228,26 @@ def _told(reader: Reader, options: ReadOptions | None) -> Reader:
     return told
 
 
-def reader_for(path: Path, options: ReadOptions | None = None) -> Reader | None:
-    """The reader that knows a file by its content or extension; any other text may be a table."""
+def _all_readers(options: ReadOptions | None) -> list[Reader]:
+    """All readers; a format that any program may write comes after the programs' own."""
     readers = [_told(one.plugin, options) for one in installed_readers().values()]
-    # a format that any program may write comes after the programs' own
-    readers.sort(key=lambda reader: bool(getattr(reader, "generic", False)))
-    for reader in readers:
+    return sorted(readers, key=lambda reader: bool(getattr(reader, "generic", False)))
+
+
+def _readers_by_ending(path: Path, options: ReadOptions | None) -> list[Reader]:
+    """The readers of files with such an ending; the reader of tables comes last."""
+    readers, name = _all_readers(options), bare_name(path).lower()
+    likely = [one for one in readers if name.endswith(one.extensions) and one.name != TABLE]
+    return [*likely, *(one for one in readers if one.name == TABLE)]
+
+
+def reader_for(path: Path, options: ReadOptions | None = None) -> Reader | None:
+    """The reader that a user names, or that knows the file; any text may be a table."""
+    if options is not None and options.format is not None:
+        return reader_named(options.format, options)
+    for reader in _all_readers(options):
         try:
-            if reader.recognises(path):
-                if (advice := lacking(reader)) is not None:
-                    raise ReadError(f"{path}: {reader.name} needs another package: {advice}")
-                return reader
+            is_known = reader.recognises(path)
         except ReadError:
             raise
         # a plugin may raise anything
@@ -243,28 +255,24 @@ def reader_for(path: Path, options: ReadOptions | None = None) -> Reader | None:
             raise ReadError(
                 f"{path}: the reader {reader.name!r} failed: {type(error).__name__}: {error}"
             ) from error
-    name = bare_name(path).lower()
-    likely = [reader for reader in readers if name.endswith(reader.extensions)]
-    tables = [one for one in readers if one.name == TABLE and one not in likely]
-    return next((reader for reader in [*likely, *tables] if _can_open(reader, path)), None)
+        if is_known and (advice := lacking(reader)) is not None:
+            raise ReadError(f"{path}: {reader.name} needs another package: {advice}")
+        if is_known:
+            return reader
+    # an extension alone proves little: many programs write .txt
+    for reader in _readers_by_ending(path, options):
+        with suppress(ReadError):
+            if reader.kind(path) != "other":
+                return reader
+    return None
 
 
 def why_not(path: Path, options: ReadOptions) -> str:
     """What the last reader of files with such an ending says of one that it cannot read."""
     reason = ""
-    for one in installed_readers().values():
-        reader = _told(one.plugin, options)
-        if reader.name == TABLE or bare_name(path).lower().endswith(reader.extensions):
-            try:
-                reader.kind(path)
-            except ReadError as error:
-                reason = str(error).removeprefix(f"{path}").lstrip(":, ")
+    for reader in _readers_by_ending(path, options):
+        try:
+            reader.kind(path)
+        except ReadError as error:
+            reason = str(error).removeprefix(f"{path}").lstrip(":, ")
     return reason
-
-
-def _can_open(reader: Reader, path: Path) -> bool:
-    """An extension alone proves little: many programs write .txt."""
-    try:
-        return reader.kind(path) != "other"
-    except ReadError:
-        return False

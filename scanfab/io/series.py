@@ -19,7 +19,7 @@ from scanfab.io.families import Family
 from scanfab.io.files import Stamp, stamp_of, unpacking_up_to
 from scanfab.io.frame import Frame
 from scanfab.io.layout import FrameFile
-from scanfab.io.reader import Reader, ReadOptions, Snapshot
+from scanfab.io.reader import ReadOptions, Snapshot
 from scanfab.packing.plane import flat_space, space_of, spelt_plane
 
 # more frames than there can be: the end of frames that nobody has counted
@@ -42,10 +42,6 @@ class Known:
     """Of the files that were looked into, and how these files were then."""
     space: Space | None = None
     """That of the first frame that has particles."""
-
-    def __getstate__(self) -> dict[str, Any]:
-        # another process that computes a frame need not know where all others are
-        return {"snapshots": {}, "space": self.space}
 
 
 @dataclass
@@ -229,26 +225,26 @@ class Series:
 
     def _every(self) -> Iterator[Frame]:
         """All frames of the whole series; one in the place of those of a damaged file."""
-        assert self.grains.reader is not None
         number = 0
         for name_step, path in self.grains.files.items():
-            problem: ReadError | None = None
+            problem, told = None, None
             try:
-                snapshots = self._snapshots_of(self.grains.reader, path)
+                snapshots = self._snapshots_of(self.grains, path)
                 if len(snapshots) == 1 and (told := read_frame(path)) is not None:
                     snapshots = [told.moment_of(snapshots[0])]
             except ReadError as error:
                 snapshots, problem = [Snapshot(path)], error
             for snapshot in snapshots:
-                yield Frame(self, snapshot, name_step, number, problem)
+                yield Frame(self, snapshot, name_step, number, told, problem)
                 number += 1
 
-    def _snapshots_of(self, reader: Reader, path: Path) -> list[Snapshot]:
+    def _snapshots_of(self, family: Family, path: Path) -> list[Snapshot]:
         """The snapshots of a file; it is looked through again if it has changed."""
+        assert family.reader is not None
         stamp = stamp_of(path) if path.exists() else None
         if stamp is None or self.known.snapshots.get(path, (None, []))[0] != stamp:
             with unpacking_up_to(self.options.max_unpacked):
-                self.known.snapshots[path] = stamp, reader.snapshots(path)
+                self.known.snapshots[path] = stamp, family.reader.snapshots(path)
         return self.known.snapshots[path][1]
 
     def frames_expected(self) -> int:
@@ -285,19 +281,18 @@ class Series:
         -------
         Snapshot or None
         """
-        if family.problem is not None or family.reader is None:
-            raise ReadError(f"{family.problem}")
+        if family.problem is not None:
+            raise ReadError(family.problem)
         name_step, step = frame.name_step, frame.snapshot.step
         step = name_step if step is None else step
-        path = family.files.get(name_step, family.files.get(step))
-        if path is None and len(family.files) == 1:
-            (path,) = family.files.values()
+        only = next(iter(family.files.values())) if len(family.files) == 1 else None
+        path = family.files.get(name_step, family.files.get(step, only))
         if path is None:
             return None
         is_numbered = None not in family.files and step is not None
         is_named = self.contacts_from == "path" and len(self.grains.files) == 1
         is_sure = is_named or not is_numbered or bool({name_step, step} & set(family.files))
-        return _of_moment(self._snapshots_of(family.reader, path), frame.snapshot, is_sure)
+        return _of_moment(self._snapshots_of(family, path), frame.snapshot, is_sure)
 
     def beside(self, path: Path) -> list[Path]:
         """
@@ -325,16 +320,15 @@ class Series:
             found += [file for dump in dumps or [path] for file in ask(dump)]
         return found
 
-    def files_through(self, number: int, known: Container[Path] = ()) -> Iterator[Path]:
+    def files(self, number: int = ENDLESS, known: Container[Path] = ()) -> Iterator[Path]:
         """
         The files of the frames up to one, and what is read with them.
 
-        All of these frames have been looked for: one file may hold many.
-
         Parameters
         ----------
-        number : int
-            The last frame, in the whole series.
+        number : int, optional
+            The last frame, in the whole series; all frames up to it have been looked for, as one
+            file may hold many. By default every file, also those of contacts without grains.
         known : container of Path, optional
             Files that are left out, with what is read with them.
 
@@ -342,34 +336,20 @@ class Series:
         ------
         Path
         """
+        if self.cells is not None:
+            yield self.cells.path
         last, met = -1, 0
         for step, path in self.grains.files.items():
+            if met > number:
+                break
             last = max(last, ENDLESS if step is None else step)
             if path not in known:
                 yield path
                 yield from self.beside(path)
             met += len(self.known.snapshots[path][1]) if path in self.known.snapshots else 1
-            if met > number:
-                break
-        for family in self.contacts:
-            for step, path in family.files.items():
-                if (step is None or step <= last) and path not in known:
-                    yield path
-
-    def files(self) -> Iterator[Path]:
-        """
-        Every file that the frames come from.
-
-        Yields
-        ------
-        Path
-        """
-        for family in (self.grains, *self.contacts):
-            yield from family.files.values()
-        for path in self.grains.files.values():
-            yield from self.beside(path)
-        if self.cells is not None:
-            yield self.cells.path
+        for step, path in ((s, p) for one in self.contacts for s, p in one.files.items()):
+            if (step is None or step <= last or number == ENDLESS) and path not in known:
+                yield path
 
 
 def _of_moment(snapshots: Sequence[Snapshot], grains: Snapshot, sure: bool) -> Snapshot | None:

@@ -14,6 +14,7 @@ from scanfab.base.errors import ReadError, UnknownFormatError, note, warn
 from scanfab.base.option import refuse_unknown, takes_options, unusable
 from scanfab.io.families import (
     Family,
+    Numbered,
     PathLike,
     are_tied,
     contacts_beside,
@@ -21,6 +22,7 @@ from scanfab.io.families import (
     files_around,
     files_in,
     files_of,
+    group_by_name,
     named_once,
     some,
     sort_into_families,
@@ -36,8 +38,6 @@ from scanfab.packing.packing import Packing
 
 READING = tuple(one.name for one in READING_OPTIONS)
 """The options of :func:`read_series`, by which commands and manifests know them too."""
-# of these, the files decide; the others say how a file is read
-CHOICES = ("format", "contacts")
 # sub-folders that are looked into for the advice in an error
 MOST_FOLDERS = 50
 # how a fabric table begins, in whatever format
@@ -170,13 +170,14 @@ def read_series(
     """
     arguments = locals()
     reading = {name: arguments[name] for name in READING}
-    checked = take_reading(dict(reading))
-    cell, dim = checked["cell"], checked.pop("dim")
-    cells = None if cell is None or isinstance(cell, tuple) else _cell_file(Path(cell))
-    checked |= {"columns": checked["columns"] or {}, "cell": cell if cells is None else None}
-    options = ReadOptions(**{name: checked[name] for name in checked if name not in CHOICES})
+    told = take_reading(dict(reading))
+    contacts, dim, frame_cell = told.pop("contacts"), told.pop("dim"), told["cell"]
+    cells = _cell_file(Path(frame_cell)) if isinstance(frame_cell, str | os.PathLike) else None
+    told |= {"columns": told["columns"] or {}, "cell": None if cells else frame_cell}
+    options = ReadOptions(**told)
     with unpacking_up_to(options.max_unpacked):
-        return _series(_given(source), options, cells, reading, dim)
+        series = _series(_given(source), contacts, options)
+    return replace(series, cells=cells, reading=reading, dim=dim)
 
 
 def open_sources(sources: Sequence[PathLike], **options: Any) -> list[Series]:
@@ -188,12 +189,12 @@ def open_sources(sources: Sequence[PathLike], **options: Any) -> list[Series]:
 
 
 def _given(source: Any) -> list[PathLike]:
-    """What is named, one by one."""
+    """What is named, one by one, each file and folder once."""
     one = isinstance(source, str | os.PathLike) or not isinstance(source, Iterable)
     given = [source] if one else list(source)
     if not given or not all(isinstance(path, str | os.PathLike) for path in given):
         raise unusable("source", "the path of a folder or file, or several of files", source)
-    return given
+    return named_once(given)
 
 
 def _cell_file(path: Path) -> FrameFile:
@@ -206,32 +207,27 @@ def _cell_file(path: Path) -> FrameFile:
     return FrameFile(path, ["lx", "ly", "lz"], ["xy", "xz", "yz"], positive=3)
 
 
-def _series(
-    given: Sequence[PathLike],
-    options: ReadOptions,
-    cells: FrameFile | None,
-    reading: dict[str, Any],
-    dim: str | int,
-) -> Series:
+def _series(given: Sequence[PathLike], contacts: PathLike, options: ReadOptions) -> Series:
     """The series of what is named: its files sorted out."""
-    format, paths = reading["format"], [Path(one) for one in named_once(given)]
-    name = as_text(os.fspath(given[0]) if len(paths) == len(given) == 1 else _common_folder(paths))
-    are_files = not any(path.is_dir() for path in paths)
+    paths = [Path(one) for one in given]
     files = [file for path in paths for file in files_of(path)]
-    families = sort_into_families(files, format, options, files_around(files) if are_files else ())
-    if format is None:
+    around = [] if any(path.is_dir() for path in paths) else files_around(files)
+    groups = group_by_name(files, around)
+    families = sort_into_families(files, options, groups)
+    if options.format is None:
         families = without_tables(families, paths)
     grains = _choose_grains(paths, families, options)
     _tell_skipped([one for one in families if one is not grains and one.kind != "contacts"])
     is_lone = paths[0].is_dir() and len(paths) == len(grains.files) == 1
     if is_lone and (below := _series_below(paths[0])):
         note(f"{paths[0]}: {Path(grains.pattern).name} alone is read, but {below}")
-    contacts, origin = _choose_contacts(grains, families, are_files, reading, options)
-    for family in (grains, *contacts):
+    chosen, origin = _choose_contacts(grains, families, groups if around else [], contacts, options)
+    for family in (grains, *chosen):
         if family.clash is not None:
             raise ReadError(family.clash)
-    sources = tuple(os.fspath(path) for one in given for path in expanded(one))
-    return Series(name, grains, tuple(contacts), origin, options, cells, sources, reading, dim=dim)
+    name = as_text(os.fspath(given[0]) if len(given) == 1 else _common_folder(paths))
+    sources = tuple(os.fspath(path) for path in given)
+    return Series(name, grains, tuple(chosen), origin, options, sources=sources)
 
 
 def _choose_grains(
@@ -263,15 +259,13 @@ def _no_grains(
         held = ", ".join(f"{HOLDS[one.kind]} ({Path(one.pattern).name})" for one in known[:5])
         return ReadError(f"{where}: no grains: expected points with a radius, found {held}")
     folders = [path for path in paths if path.is_dir()]
-    below = ", ".join(filter(None, map(_series_below, folders)))
-    if below:
+    if below := ", ".join(filter(None, map(_series_below, folders))):
         return ReadError(f"{where}: the folder holds no dumps, but {below}")
     if not families:
         return ReadError(f"{where}: the folder holds no files")
     for table in set(paths).difference(folders):
         with suppress(OSError, ReadError):
-            is_binary = table.suffix == ".parquet"
-            data = table.read_bytes() if is_binary else first_bytes(table, 1 << 14)
+            data = table.read_bytes() if table.suffix == ".parquet" else first_bytes(table, 1 << 14)
             if all(word in data for word in TABLE_WORDS):
                 advice = "scanfab compare or scanfab report take it"
                 return ReadError(f"{table}: this is a fabric table, not a dump: {advice}")
@@ -288,8 +282,8 @@ def _series_below(folder: Path) -> str:
     found = []
     for one in below[:MOST_FOLDERS]:
         with suppress(OSError, ReadError):
-            if any(family.kind in GRAINS for family in sort_into_families(files_in(one), None)):
-                found.append(str(one))
+            families = sort_into_families(files_in(one), ReadOptions())
+            found += [str(one)] if any(family.kind in GRAINS for family in families) else []
     return f"there are series in its folders: name them as sources: {some(found)}" if found else ""
 
 
@@ -316,21 +310,19 @@ def _tell_skipped(families: Sequence[Family]) -> None:
 def _choose_contacts(
     grains: Family,
     families: Sequence[Family],
-    are_files: bool,
-    reading: dict[str, Any],
+    around: Sequence[Numbered],
+    contacts: PathLike,
     options: ReadOptions,
-) -> tuple[list[Family], ContactsFrom]:
+) -> tuple[Sequence[Family], ContactsFrom]:
     """The families of contact files, and where the contacts of the series come from."""
-    contacts, format = reading["contacts"], reading["format"]
     if contacts == "geometric":
         return [], "geometric"
     if contacts not in ("auto", "file"):
-        return _named_contacts(contacts, format, options), "path"
+        return _named_contacts(contacts, options), "path"
     own = [family for family in families if family.kind == "contacts"]
-    origin: ContactsFrom = "auto"
-    if not own and are_files:
-        families, own = contacts_beside(grains, format, options)
-        origin = "beside"
+    is_beside = bool(around) and not own
+    if is_beside:
+        families, own = contacts_beside(grains, around, options)
     in_grains = getattr(grains.reader, "lists_contacts", False)
     if contacts == "file" and not (own or in_grains):
         raise ReadError(
@@ -339,7 +331,7 @@ def _choose_contacts(
     if contacts == "file":
         return own, "path" if own else "grains"
     if own:
-        return own, origin
+        return own, "beside" if is_beside else "auto"
     # a file that cannot be read, and may be the contacts by its name and number, is an error
     damaged = [
         replace(one, kind="contacts", files=dict.fromkeys(grains.files, one.largest), clash=None)
@@ -352,10 +344,10 @@ def _choose_contacts(
     return damaged, "beside"
 
 
-def _named_contacts(contacts: PathLike, format: str | None, options: ReadOptions) -> list[Family]:
+def _named_contacts(contacts: PathLike, options: ReadOptions) -> list[Family]:
     """Contact files from a file, a folder or a glob."""
     files = [file for one in expanded(contacts) for file in files_of(Path(one))]
-    families = sort_into_families(files, format, options)
+    families = sort_into_families(files, options)
     found = [family for family in families if family.kind == "contacts"]
     if not found:
         problem = next((family.problem for family in families if family.problem), None)

@@ -279,7 +279,7 @@ def check_inputs(
     before = {str(one.get("path")): one for one in inputs}
     strains, surfaces = named_files(asked)
     cells = [one.cells.path for one in series if one.cells is not None]
-    read = {*strains, *surfaces, *cells, *(file for one in series for file in one.files())}
+    read = {*strains, *surfaces, *(file for one in series for file in one.files())}
     for gone in before.keys() - {str(file) for file in read}:
         raise refuse(f"{gone} is not among the files that are read now")
     for one in series:
@@ -339,9 +339,7 @@ def _was_skipped(series: Series, step: int | None, rows: FrameRows) -> bool:
 def files_of_rows(series: Sequence[Series], row: Row, known: set[Path]) -> Iterator[Path]:
     """The files that the rows up to one are made of, but for those that are known already."""
     for one in series:
-        if one.cells is not None:
-            yield one.cells.path
         if one.name == row.source:
-            yield from one.files_through(row.frame, known)
+            yield from one.files(row.frame, known)
             return
         yield from one.files()
