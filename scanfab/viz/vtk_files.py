@@ -170,34 +170,23 @@ def block_mesh(blocks: Blocks, values: Mapping[str, npt.ArrayLike]) -> Any:
     import pyvista
 
     if blocks.edges is None:
-        parts = blocks.parts
         corner, edges = blocks.corner_edges
-        at = corner + _lattice(*(np.linspace(0.0, 1.0, n + 1) for n in parts)) @ edges
+        steps = [np.linspace(0.0, 1.0, count + 1) for count in blocks.parts]
+        at = corner + np.stack(np.meshgrid(*steps, indexing="ij"), axis=-1) @ edges
         block = np.arange(len(blocks))
     else:
-        parts = (AZIMUTHS, POLAR, blocks.shells)
-        azimuth, polar, radius = _lattice(
+        azimuth, polar, radius = np.meshgrid(
             np.linspace(0.0, 2.0 * np.pi, AZIMUTHS + 1),
             np.linspace(0.0, np.pi, POLAR + 1),
             np.append(blocks.radii[:, 0], blocks.radius),
-        ).T
+            indexing="ij",
+        )
         unit = [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)]
-        at = blocks.middles[0] + radius[:, None] * np.column_stack(unit)
+        at = blocks.middles[0] + radius[..., None] * np.stack(unit, axis=-1)
         block = np.repeat(np.arange(blocks.shells), AZIMUTHS * POLAR)
-    first, second, third = _lattice(*(np.arange(float(n)) for n in parts)).astype(np.int64).T
-    line, layer = parts[0] + 1, (parts[0] + 1) * (parts[1] + 1)
-    start = first + line * second + layer * third
-    around = np.array([0, 1, line + 1, line])
-    cells = start[:, None] + np.concatenate([around, around + layer])
-    mesh = pyvista.UnstructuredGrid({pyvista.CellType.HEXAHEDRON: cells}, at)
+    mesh = pyvista.StructuredGrid(*np.moveaxis(at, -1, 0)).cast_to_unstructured_grid()
     _add(mesh.cell_data, {name: np.asarray(one)[block] for name, one in values.items()})
     return mesh
-
-
-def _lattice(first: FloatArray, second: FloatArray, third: FloatArray) -> FloatArray:
-    """All places with these coordinates, the first fastest, shape (N, 3)."""
-    z, y, x = np.meshgrid(third, second, first, indexing="ij")
-    return np.column_stack([x.ravel(), y.ravel(), z.ravel()])
 
 
 def save_mesh(mesh: Any, path: Path, fields: Mapping[str, Any]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -59,18 +59,35 @@ def grouped(curves: Sequence[Curve]) -> list[Group]:
     """
     sources = list(dict.fromkeys(curve.source for curve in curves))
     variants = sorted({curve.variant for curve in curves})
-    if len(sources) == 1:
-        return [_group("", curves, curves, _by_variant(variants, True))]
-    if len(variants) == 1:
-        return [_group("", curves, curves, _by_source(sources, f"variant {variants[0]}, "))]
-    if len(sources) <= len(variants):
-        return [
-            _group(plain(source), curves, _of(curves, "source", source), _by_variant(variants))
-            for source in sources
+    # several RVs of a variant cannot all have the one look of the variant
+    several_rvs = len({variant[0] for variant in variants}) < len(variants)
+
+    def by_variant(curve: Curve) -> tuple[Look, str]:
+        name = _spelt(curve.variant) if len(sources) == 1 else f"variant {curve.variant}"
+        place = variants.index(curve.variant) % len(MANY_LOOKS)
+        return MANY_LOOKS[place] if several_rvs else LOOKS.get(curve.variant, OTHER), name
+
+    def by_source(curve: Curve) -> tuple[Look, str]:
+        before = f"variant {variants[0]}, " if len(variants) == 1 else ""
+        place = sources.index(curve.source) % len(MANY_LOOKS)
+        return MANY_LOOKS[place], f"{before}{plain(curve.source)}"
+
+    if len(sources) == 1 or 1 < len(variants) >= len(sources):
+        look = by_variant
+        panels = [
+            (plain(one), [curve for curve in curves if curve.source == one]) for one in sources
+        ]
+    else:
+        look = by_source
+        panels = [
+            (_spelt(name), [one for one in curves if one.variant == name]) for name in variants
         ]
     return [
-        _group(_spelt(variant), curves, _of(curves, "variant", variant), _by_source(sources))
-        for variant in variants
+        Group(
+            title if len(panels) > 1 else "",
+            [Drawn(one, curves.index(one), *look(one)) for one in chosen],
+        )
+        for title, chosen in panels
     ]
 
 
@@ -90,42 +107,6 @@ def group_of(groups: Sequence[Group]) -> Group:
             'for instance by table.select(variant="c")'
         )
     return groups[0]
-
-
-def _of(curves: Sequence[Curve], name: str, value: str) -> list[Curve]:
-    return [curve for curve in curves if getattr(curve, name) == value]
-
-
-def _group(
-    title: str,
-    curves: Sequence[Curve],
-    chosen: Sequence[Curve],
-    looks: Callable[[Curve], tuple[Look, str]],
-) -> Group:
-    return Group(title, [Drawn(one, curves.index(one), *looks(one)) for one in chosen])
-
-
-def _by_variant(
-    variants: Sequence[str], spelt: bool = False
-) -> Callable[[Curve], tuple[Look, str]]:
-    # several RVs of a variant have not the one look that it has alone
-    several = len({variant[0] for variant in variants}) < len(variants)
-
-    def look(curve: Curve) -> tuple[Look, str]:
-        name = _spelt(curve.variant) if spelt else f"variant {curve.variant}"
-        if several:
-            return MANY_LOOKS[variants.index(curve.variant) % len(MANY_LOOKS)], name
-        return LOOKS.get(curve.variant, OTHER), name
-
-    return look
-
-
-def _by_source(sources: Sequence[str], before: str = "") -> Callable[[Curve], tuple[Look, str]]:
-    def look(curve: Curve) -> tuple[Look, str]:
-        place = sources.index(curve.source) % len(MANY_LOOKS)
-        return MANY_LOOKS[place], f"{before}{plain(curve.source)}"
-
-    return look
 
 
 def _spelt(variant: str) -> str:
