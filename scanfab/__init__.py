@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from scanfab.packing.search import find_contacts
     from scanfab.packing.window import Window
     from scanfab.pipeline.calibration import Calibration, calibrate
-    from scanfab.pipeline.cluster.dask_executor import dask_executor
+    from scanfab.pipeline.cluster import dask_executor
     from scanfab.pipeline.compute import compute
     from scanfab.pipeline.maps.fabric_map import fabric_map
     from scanfab.pipeline.measurement import solids_of
@@ -96,7 +96,7 @@ _HOME = {
     "convert": "io.convert",
     "contact_fabric": "fabric.contact",
     "cylinder": "base.shapes",
-    "dask_executor": "pipeline.cluster.dask_executor",
+    "dask_executor": "pipeline.cluster",
     "direction_rule": "scan.directions",
     "ellipsoid": "base.shapes",
     "fabric_map": "pipeline.maps.fabric_map",

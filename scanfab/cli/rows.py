@@ -128,7 +128,7 @@ class _Way(NamedTuple):
 
     def executor(self) -> AbstractContextManager[Executor | None]:
         """That of a cluster, while it is connected; None for this machine."""
-        from scanfab.pipeline.cluster.dask_executor import dask_executor
+        from scanfab.pipeline.cluster import dask_executor
 
         if not self.is_cluster:
             return nullcontext()

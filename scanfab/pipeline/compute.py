@@ -10,9 +10,10 @@ import warnings
 from collections import deque
 from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple
 
 from scanfab.base.errors import SKIPPED, Note, PackingError, ReadError, tell
 from scanfab.base.option import options_of, takes_options, unusable
@@ -21,7 +22,7 @@ from scanfab.packing.cell import Cell
 from scanfab.packing.escaped import ESCAPED
 from scanfab.packing.groupings import Grouping, Groupings, grouping_of
 from scanfab.packing.sample import Sample
-from scanfab.pipeline.cluster.dask_executor import DaskExecutor
+from scanfab.pipeline.cluster import DaskExecutor, DeadWorkersError
 from scanfab.pipeline.frame import FrameResult, compute_frame
 from scanfab.pipeline.frames import Frames, Readable, Source
 from scanfab.pipeline.maps.frame import map_frame
@@ -36,8 +37,6 @@ from scanfab.table.table import Table
 LOGGER = logging.getLogger("scanfab")
 
 Observer = Callable[[FrameResult], None]
-Result = TypeVar("Result")
-Job = TypeVar("Job")
 
 
 @takes_options(options_of(Settings))
@@ -139,8 +138,8 @@ def compute_rows(
         Called with the :class:`FrameResult` of each frame, where that is computed.
     """
     run = _Run(Frames(source, settings))
-    with _Pool(settings.workers, executor) as pool:
-        for computed in pool.in_order(run.jobs(done, observe)):
+    with _pool(settings.workers, executor) as pool:
+        for computed in in_order(pool, run.jobs(done, observe), settings.on_error == "skip"):
             run.tell(computed)
             yield from computed.rows
     if not run.has_grains:
@@ -170,19 +169,26 @@ class _FrameJob:
     plan: Plan
     number: int
     source: str
-    skips_damaged: bool
     observe: Observer | None
-    file: Readable | None = None
+    file: Frame | None = None
     """Where another process finds the frame, if it lies in files."""
     home: tuple[str, int] = field(default_factory=lambda: _here())
     """The machine and process that hears warnings."""
 
+    def __str__(self) -> str:
+        return f"frame {self.number}"
+
     def __getstate__(self) -> dict[str, Any]:
         # what was read here, is read again there
-        if not isinstance(self.file, Frame):
+        if self.file is None:
             return dict(vars(self))
         alone = self.file.alone()
         return {**vars(self), "frame": alone, "file": alone}
+
+    @property
+    def path(self) -> Path | None:
+        """Where the frame is read from, if it lies in a file."""
+        return None if self.file is None else self.file.snapshot.path.absolute()
 
     def __call__(self, threads: int) -> _Computed:
         plan = replace(self.plan, workers=threads)
@@ -192,25 +198,10 @@ class _FrameJob:
             found = self._computed(plan)
         return replace(found, heard=tuple(caught))
 
-    @property
-    def strict(self) -> _FrameJob:
-        """The same, but whoever calls it decides on damaged frames."""
-        return replace(self, skips_damaged=False)
-
-    def given_up(self, error: Exception) -> _Computed:
-        """What is to be had of a frame that cannot be computed; raises if it is to stop the run."""
-        if not self.skips_damaged:
-            raise error
-        text = str(error).removeprefix(f"frame {self.number}: ")
-        return _Computed(self.number, notes=(Note(SKIPPED, text),))
-
     def _computed(self, plan: Plan) -> _Computed:
         begun = time.perf_counter()
-        try:
-            compute_one = map_frame if plan.map_settings else compute_frame
-            found = compute_one(self.frame, plan, number=self.number, source=self.source)
-        except (PackingError, ReadError) as error:
-            return self.given_up(error)
+        compute_one = map_frame if plan.map_settings else compute_frame
+        found = compute_one(self.frame, plan, number=self.number, source=self.source)
         seconds = time.perf_counter() - begun
         grains = found.sample.number(found.sample.grains)
         LOGGER.info("%s: frame %d: %d grains in %.2g s", self.source, self.number, grains, seconds)
@@ -243,7 +234,6 @@ class _Run:
     def jobs(self, done: Container[int], observe: Observer | None) -> Iterator[_FrameJob | None]:
         """The chosen frames that are not done; None where one is still to come."""
         plan = self._plan()
-        name, skips = self.frames.name, self.frames.settings.on_error == "skip"
         for due in self.frames.as_they_come():
             if due is None:
                 yield None
@@ -252,7 +242,7 @@ class _Run:
             known = self.frames.sample_if_read(number, frame)
             if number not in done and known is not None:
                 file = frame if isinstance(frame, Frame) else None
-                yield _FrameJob(known, plan, number, name, skips, observe, file)
+                yield _FrameJob(known, plan, number, self.frames.name, observe, file)
 
     def _plan(self) -> Plan:
         """Settings end here."""
@@ -281,73 +271,64 @@ class _Run:
         tell(grouping, f"frame {computed.number}")
 
 
-class _Pool:
-    """What computes frames; with few frames, each has more threads for its scan."""
-
-    def __init__(self, workers: int, executor: Executor | None) -> None:
-        if not isinstance(executor, Executor | None):
-            raise unusable("executor", "a concurrent.futures.Executor", executor)
-        self.workers = workers
-        self.executor = executor
-        self._own = None if executor is not None else ThreadPoolExecutor(workers)
-
-    def __enter__(self) -> _Pool:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        # an interrupted run does not wait for the frames under way
-        if self._own is not None:
-            self._own.shutdown(wait=False, cancel_futures=True)
-
-    def in_order(self, jobs: Iterator[_FrameJob | None]) -> Iterator[_Computed]:
-        """The results in the order of the jobs, of which one a worker is under way."""
-        pool = self._own or self.executor
-        assert pool is not None
-        if isinstance(pool, DaskExecutor):
-            return shared_in_order(pool, jobs, pool.room, pool.share)
+@contextmanager
+def _pool(workers: int, executor: Executor | None) -> Iterator[_Pool]:
+    """What computes frames; with few frames, each has more threads of this process for its scan."""
+    if isinstance(executor, DaskExecutor):
+        yield _Pool(executor, executor.room)
+    elif isinstance(executor, Executor):
         # how many processors there are elsewhere, only the executor knows
-        threads = self.workers if self._own else 1
-        return shared_in_order(
-            pool, jobs, lambda: self.workers, lambda number: max(threads // number, 1)
-        )
+        yield _Pool(executor, lambda: workers)
+    elif executor is not None:
+        raise unusable("executor", "a concurrent.futures.Executor", executor)
+    else:
+        own = ThreadPoolExecutor(workers)
+        try:
+            yield _Pool(own, lambda: workers, workers)
+        finally:
+            # an interrupted run does not wait for the frames under way
+            own.shutdown(wait=False, cancel_futures=True)
 
 
-def shared_in_order(
-    pool: Executor,
-    jobs: Iterator[Callable[[int], Result] | None],
-    most: Callable[[], int],
-    share: Callable[[int], int],
-) -> Iterator[Result]:
+class _Pool(NamedTuple):
+    """An executor, how many frames may be under way there, and the threads that they share."""
+
+    executor: Executor
+    room: Callable[[], int]
+    threads: int = 1
+
+
+def in_order(
+    pool: _Pool, jobs: Iterator[_FrameJob | None], skips: bool = False
+) -> Iterator[_Computed]:
     """
-    The results of jobs that share threads, in the order of the jobs.
+    The results of jobs, in the order of the jobs.
 
     Parameters
     ----------
-    pool : Executor
+    pool : _Pool
         Does the jobs.
     jobs : iterator
-        Each job is told how many threads it may use. None where the next one is not there yet: a
-        result that is ready then comes meanwhile. If the jobs end in an error, the results of those
-        under way come before it.
-    most : callable
-        How many may be under way.
-    share : callable
-        How many threads each of so many jobs may use.
+        None where the next job is not there yet: a result that is ready then comes meanwhile. If
+        the jobs end in an error, the results of those under way come before it.
+    skips : bool, optional
+        A frame that cannot be computed is told, in place of an error.
     """
-    waiting: deque[Future[Result]] = deque()
-    ready: list[Result] = []
+    waiting: deque[tuple[_FrameJob, Future[_Computed]]] = deque()
     over: Exception | None = None
+    ready: _Computed | None = None
     try:
         while waiting or ready or over is None:
-            fresh, over = ([], over) if over else _taken(jobs, most() - len(waiting))
-            threads = share(len(waiting) + len(fresh)) if fresh else 1
-            waiting.extend(pool.submit(job, threads) for job in fresh)
+            fresh, over = ([], over) if over else _taken(jobs, pool.room() - len(waiting))
+            threads = max(pool.threads // max(len(waiting) + len(fresh), 1), 1)
+            waiting.extend((job, pool.executor.submit(job, threads)) for job in fresh)
             # the next jobs are begun before this, as whoever takes a result may be slow
-            yield from ready
-            ready.clear()
-            if waiting and (waiting[0].done() or over or len(waiting) >= most()):
+            if ready is not None:
+                yield ready
+                ready = None
+            if waiting and (waiting[0][1].done() or over or len(waiting) >= pool.room()):
                 try:
-                    ready.append(waiting.popleft().result())
+                    ready = _result(*waiting.popleft(), skips)
                 except Exception:
                     # where the jobs have failed, this error has the same cause
                     if over is not None and not isinstance(over, StopIteration):
@@ -356,17 +337,28 @@ def shared_in_order(
         if not isinstance(over, StopIteration):
             raise over
     finally:
-        # the pool may go on for others
-        for future in waiting:
+        # the executor may go on for others
+        for _, future in waiting:
             future.cancel()
 
 
-def _taken(jobs: Iterator[Job | None], room: int) -> tuple[list[Job], Exception | None]:
+def _taken(jobs: Iterator[_FrameJob | None], room: int) -> tuple[list[_FrameJob], Exception | None]:
     """Jobs that are there, up to some number, and what ended them: StopIteration, or an error."""
-    fresh: list[Job] = []
+    fresh: list[_FrameJob] = []
     try:
         while len(fresh) < room and (job := next(jobs)) is not None:
             fresh.append(job)
     except Exception as error:
         return fresh, error
     return fresh, None
+
+
+def _result(job: _FrameJob, future: Future[_Computed], skips: bool) -> _Computed:
+    """What has become of a frame; one that cannot be computed is skipped, or ends the run."""
+    try:
+        return future.result()
+    except (PackingError, ReadError, DeadWorkersError) as error:
+        if not skips:
+            raise
+        text = str(error).removeprefix(f"frame {job.number}: ")
+        return _Computed(job.number, notes=(Note(SKIPPED, text),))

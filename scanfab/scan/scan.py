@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
-from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -24,19 +21,6 @@ from scanfab.scan.solids import Solids, check_space, check_spacing
 from scanfab.scan.tallies import tally_triads
 
 JOBS_A_THREAD, MOST_AXES = 4, 16
-# a map() of workers elsewhere
-Spread = Callable[[Callable[[Any], Any], list[Any]], list[Any]]
-_spread: ContextVar[Spread | None] = ContextVar("spread", default=None)
-
-
-@contextmanager
-def spread_over(workers: Spread) -> Iterator[None]:
-    """In the block, these workers do what several threads would do of a scan."""
-    token = _spread.set(workers)
-    try:
-        yield
-    finally:
-        _spread.reset(token)
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,11 +232,9 @@ def in_parts(
     parts = [slice(first, first + axes) for first in range(0, count, axes)]
 
     lines = [(triads[part], shifts[part]) for part in parts]
-    part_of, spread = partial(_scan_part, scan), _spread.get()
+    part_of = partial(_scan_part, scan)
     if workers == 1 or len(lines) == 1:
         found = list(map(part_of, lines))
-    elif spread is not None:
-        found = spread(part_of, lines)
     else:
         with ThreadPoolExecutor(workers) as pool:
             found = list(pool.map(part_of, lines))

@@ -286,7 +286,7 @@ def stages(repo, name):
     named = re.compile(rf"\b({'|'.join(words)})\b") if words else re.compile("(?!)")
     counts = {x: len(set(named.findall(x.read_text()))) for x in tests if x not in near}
     near += sorted((x for x in counts if counts[x]), key=lambda x: -counts[x])[:3]
-    if room == "pipeline" and "cluster" in parts:
+    if name.endswith("pipeline/cluster.py"):
         # the rest of the room by itself, as its tests begin no cluster
         near = sorted((repo / "tests/pipeline/cluster").glob("test_*.py"))
     else:

@@ -6,6 +6,7 @@ import gzip
 import os
 import pickle
 import tempfile
+import threading
 import weakref
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
@@ -118,6 +119,30 @@ def test_an_executor_of_threads_gives_the_same_rows(tmp_path):
         # it belongs to whoever made it, and goes on
         assert executor.submit(int, "3").result() == 3
     assert found == scanfab.compute(series, **SCAN)
+
+
+class FirstIsSlow(ThreadPoolExecutor):
+    """Its first job is begun when a second one is done."""
+
+    def submit(self, job, *args):
+        if not hasattr(self, "second"):
+            self.second = threading.Event()
+            return super().submit(lambda: self.second.wait(10) and job(*args))
+        future = super().submit(job, *args)
+        future.add_done_callback(lambda _: self.second.set())
+        return future
+
+
+def test_rows_come_in_the_order_of_the_frames_and_before_the_error_of_the_source():
+    def broken():
+        yield from packings()
+        raise ValueError("no more")
+
+    with FirstIsSlow(3) as executor:
+        rows = compute_rows(broken(), Settings(workers=3, **SCAN), executor=executor)
+        assert [next(rows).frame for _ in range(8)] == [0, 0, 1, 1, 2, 2, 3, 3]
+        with pytest.raises(ValueError, match="no more"):
+            next(rows)
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,289 @@
+"""Frames on a real Dask cluster of separate processes: the same rows, whatever dies."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import sys
+import threading
+import time
+import weakref
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+pytest.importorskip("distributed")
+
+import scanfab
+from scanfab.cli.main import run
+from scanfab.pipeline import cluster as module
+from tests.helpers.dask_cluster import DaskCluster
+from tests.helpers.dumps import shaken_cubic
+from tests.helpers.growing import SAMPLE
+from tests.helpers.interruptions import write_series
+
+FAST = ("--directions", "9", "--spacing", "0.5rmin", "--cutoff", "0.2rmin")
+QUICK = {"directions": 9, "spacing": "0.5rmin", "contact_tolerance": 0.01}
+pytestmark = [
+    pytest.mark.skipif(sys.platform == "win32", reason="signals are POSIX"),
+    # those of a cluster that has just been started may come in a moment
+    pytest.mark.filterwarnings("ignore:.*the scheduler has no workers yet"),
+]
+
+
+@pytest.fixture(scope="module")
+def cluster(tmp_path_factory):
+    """Two workers; a frame that two workers die of is given up."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES", "1")
+        with DaskCluster(tmp_path_factory.mktemp("cluster")) as found:
+            yield found
+
+
+@pytest.fixture
+def executor(cluster):
+    with scanfab.dask_executor(cluster.address) as found:
+        wait_until(lambda: len(found.client.nthreads()) == 2)
+        yield found
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_series(tmp_path / "dumps", 6)
+    return tmp_path
+
+
+@pytest.fixture
+def is_same(folder):
+    """Whether a table has the bytes of a run on one core."""
+
+    def is_same(*words: str) -> bool:
+        assert compute(*(words or ("dumps", *FAST)), output="one.csv") == 0
+        return Path("t.csv").read_bytes() == Path("one.csv").read_bytes()
+
+    return is_same
+
+
+def compute(*words: str, output: str = "t.csv") -> int:
+    return run(["compute", *words, "-o", output])
+
+
+def wait_until(is_so: Callable[[], bool]) -> None:
+    end = time.monotonic() + 60
+    while not is_so():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+@pytest.fixture
+def after_a_row():
+    """Does something in another thread once the first row is there."""
+    threads = []
+
+    def after_a_row(act: Callable[[], object]) -> None:
+        def wait() -> None:
+            part = Path("t.csv.part")
+            wait_until(lambda: part.exists() and part.stat().st_size > 0)
+            act()
+
+        threads.append(threading.Thread(target=wait))
+        threads[-1].start()
+
+    yield after_a_row
+    for one in threads:
+        one.join()
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("dumps", *FAST), ("yade", *FAST, "--boundary", "mask=3"), ("dumps", "--tolerance", "3e-3")],
+)
+def test_the_bytes_are_those_of_one_core(cluster, folder, is_same, words):
+    """Sources are relative, and the workers stand elsewhere."""
+    (folder / "yade").symlink_to(SAMPLE / "yade_triaxial")
+    assert compute(*words, "--scheduler-file", str(cluster.file)) == 0
+    assert is_same(*words)
+    one, other = (json.loads(Path(f"{n}.csv.manifest.json").read_text()) for n in ("one", "t"))
+    assert one == other
+
+
+def test_every_executor_serves(executor, folder):
+    """Frames in files, packings from anywhere, periodic ones; that of Dask itself too."""
+    packings = [frame.read() for frame in scanfab.read_series("dumps")]
+    expected = scanfab.compute(packings, **QUICK)
+    assert scanfab.compute(iter(packings), executor=executor, **QUICK) == expected
+    dask = executor.client.get_executor()
+    assert scanfab.compute(iter(packings), executor=dask, **QUICK) == expected
+    frame = scanfab.read_series(SAMPLE / "liggghts_periodic")[-1:]
+    far = scanfab.compute(frame, executor=executor, tolerance=5e-3)
+    assert far == scanfab.compute(frame, tolerance=5e-3)
+
+
+def test_a_running_simulation(cluster, is_same):
+    words = ("dumps", *FAST, "--follow-for", "1.5", "--scheduler", cluster.address)
+    assert compute(*words) == 0
+    assert is_same()
+
+
+def test_a_frame_that_cannot_be_read_goes_by_on_error(cluster, folder, capsys):
+    lines = Path("dumps/dump_300.txt").read_text().splitlines(keepends=True)
+    Path("dumps/dump_300.txt").write_text("".join([*lines[:20], "1 2 x\n", *lines[21:]]))
+    words = ("dumps", *FAST, "--scheduler", cluster.address)
+    assert compute(*words, "--on-error", "skip") == 1
+    said = capsys.readouterr().err
+    assert "frame 3 skipped: " in said
+    assert "dump_300.txt" in said
+    assert compute("dumps", *FAST, "--on-error", "skip", output="one.csv") == 1
+    assert Path("t.csv").read_bytes() == Path("one.csv").read_bytes()
+    assert compute(*words, output="stopped.csv") == 1
+    assert "dump_300.txt" in capsys.readouterr().err
+
+
+def test_packings_do_not_pile_up(executor):
+    """Those of a generator are sent away, and forgotten here."""
+    alive: weakref.WeakSet[scanfab.Packing] = weakref.WeakSet()
+    most = []
+
+    def packings() -> Iterator[scanfab.Packing]:
+        for _ in range(40):
+            grains = shaken_cubic(np.random.default_rng(0), 4)
+            packing = scanfab.Packing(grains.position, grains.radius)
+            alive.add(packing)
+            most.append(len(alive))
+            yield packing
+
+    assert len(scanfab.compute(packings(), executor=executor, variants="a", **QUICK)) == 40
+    assert max(most) <= executor.room() + 6
+
+
+def test_a_worker_that_dies_costs_its_frames_again(cluster, is_same, after_a_row):
+    def replace_one() -> None:
+        cluster.add()
+        cluster.kill()
+
+    after_a_row(replace_one)
+    assert compute("dumps", *FAST, "--scheduler-file", str(cluster.file)) == 0
+    assert is_same()
+
+
+class Deadly(scanfab.Packing):
+    """A packing that takes down whoever looks at it."""
+
+    def __len__(self) -> int:
+        os._exit(9)
+
+
+def test_a_frame_that_kills_its_workers_is_named(cluster, folder):
+    packings = [frame.read() for frame in scanfab.read_series("dumps")[:3]]
+    packings[1] = Deadly(packings[1].position, packings[1].radius)
+    for _ in range(2):
+        cluster.add()
+    died = "frame 1 skipped: the workers that computed it died, 2 one after the other"
+    with (
+        scanfab.dask_executor(scheduler_file=cluster.file) as executor,
+        pytest.warns(match=died),
+    ):
+        far = scanfab.compute(packings, executor=executor, on_error="skip", **QUICK)
+    assert {row.frame for row in far} == {0, 2}
+    cluster.forget_the_dead()
+
+
+def test_a_scheduler_that_hangs_is_left(
+    cluster, executor, is_same, after_a_row, capsys, monkeypatch
+):
+    """It is stopped, and closes no connection; the run goes on when it is there again."""
+    monkeypatch.setattr(module, "BEAT", 0.2)
+    monkeypatch.setattr(module, "SILENCE", 1.0)
+    words = ("dumps", *FAST, "--scheduler-file", str(cluster.file))
+    after_a_row(lambda: cluster.scheduler.send_signal(signal.SIGSTOP))
+    assert compute(*words) == 1
+    said = capsys.readouterr().err
+    assert "the scheduler has not answered for 1 s while frames were computed: start it" in said
+    assert said.count("error") == 1
+    cluster.scheduler.send_signal(signal.SIGCONT)
+    assert compute(*words, "--resume") == 0
+    assert is_same()
+
+
+def test_workers_come_late_and_the_scheduler_dies(folder, is_same, after_a_row, capsys):
+    (folder / "first").mkdir()
+    with DaskCluster(folder / "first", workers=0) as first:
+        timer = threading.Timer(1.0, first.add)
+        timer.start()
+        after_a_row(first.kill_scheduler)
+        assert compute("dumps", *FAST, "--quiet", "--scheduler", first.address) == 1
+        timer.join()
+    said = capsys.readouterr().err
+    assert "has no workers yet: frames wait for them, without a limit" in said
+    assert "the scheduler has gone while frames were computed" in said
+    assert said.count("error") == 1
+    (folder / "next").mkdir()
+    with DaskCluster(folder / "next", workers=1) as other:
+        assert compute("dumps", *FAST, "--scheduler-file", str(other.file), "--resume") == 0
+    assert is_same()
+
+
+class Elsewhere(type(Path())):
+    """A path that is another one for the workers."""
+
+    def __reduce__(self) -> Any:
+        return Path, (f"{self}/no/such.txt",)
+
+
+@dataclass
+class Job:
+    """A job that reads a file, and fails."""
+
+    path: Path
+
+    def __call__(self) -> None:
+        raise scanfab.ReadError("cannot be read")
+
+
+def test_a_worker_that_does_not_see_the_files_is_named(executor, folder):
+    job = Job(Elsewhere(folder / "dumps"))
+    seen = rf"tcp://.* cannot read .*such.txt: it sees {folder}/dumps with dump_0.txt, .*, \.\.\."
+    with pytest.raises(module.ClusterError, match=seen):
+        executor.submit(job).result(60)
+    job = Job(Elsewhere(folder / "nowhere"))
+    with pytest.raises(scanfab.ReadError):
+        executor.submit(job).result(60)
+
+
+def test_other_versions_are_an_error_that_names_both(executor, folder, monkeypatch):
+    mine = module.versions_here()
+    monkeypatch.setattr(module, "versions_here", lambda: {**mine, "numpy": "1.0.0"})
+    with pytest.raises(module.ClusterError, match=f"numpy {mine['numpy']} there and 1.0.0 here"):
+        scanfab.compute(scanfab.read_series("dumps"), executor=executor, on_error="skip", **QUICK)
+
+
+def test_who_does_not_answer_is_named(folder, capsys, monkeypatch):
+    monkeypatch.setattr(module, "TIMEOUT", 0.3)
+
+    def said(*words: str) -> str:
+        assert compute("dumps", *FAST, *words) == 1
+        return capsys.readouterr().err
+
+    with socket.socket() as silent:
+        silent.bind(("127.0.0.1", 0))
+        address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
+        assert "no scheduler is there" in said("--scheduler", address)
+        silent.listen()
+        assert f"{address}: does not answer as a Dask sched" in said("--scheduler", address)
+    assert "expected the address of a scheduler" in said("--scheduler", "nonsense")
+    assert "none.json: expected the file that a Dask" in said("--scheduler-file", "none.json")
+    Path("file.json").write_text("{}")
+    assert "found something else: is the scheduler" in said("--scheduler-file", "file.json")
+
+
+def test_wrong_usage(cluster, folder):
+    both = ("--scheduler", cluster.address, "--scheduler-file", str(cluster.file))
+    assert compute("dumps", *both) == 2
+    assert compute("dumps", "--scheduler", cluster.address, "--vtk", "vtk") == 2
