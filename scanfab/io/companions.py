@@ -7,7 +7,6 @@ ending. :func:`scanfab.convert` writes them, and whoever reads the file finds th
 
 from __future__ import annotations
 
-import csv
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -85,8 +84,8 @@ def companions_of(packing: Packing, path: Path, left: Left) -> dict[Path, bytes]
     return {companion_file(path, kind): csv_bytes(table) for kind, table in tables.items()}
 
 
-def _read(path: Path) -> dict[str, npt.NDArray[Any]]:
-    """The columns of a companion file: each whole numbers, numbers or texts, as all words are."""
+def _rows(path: Path) -> Any:
+    """A companion file as a polars table of words, whose first row holds the names of columns."""
     import polars
 
     file = plain(path)
@@ -95,10 +94,17 @@ def _read(path: Path) -> dict[str, npt.NDArray[Any]]:
     if not data.endswith(b"\n"):
         raise ReadError(f"{path}: the last line has no end: the file is incomplete")
     try:
-        # as rows of words, since polars leaves doubled quotes in the names of columns
-        words = polars.read_csv(data, has_header=False, infer_schema=False)
+        # polars leaves doubled quotes in the names of columns, but not in words
+        return polars.read_csv(data, has_header=False, infer_schema=False)
     except polars.exceptions.PolarsError as error:
         raise ReadError(f"{path}: cannot be read: {str(error).partition(chr(10))[0]}") from None
+
+
+def _columns(path: Path) -> dict[str, npt.NDArray[Any]]:
+    """The columns of a companion file: each whole numbers, numbers or texts, as all words are."""
+    import polars
+
+    words = _rows(path)
     if any(words.null_count().row(0)):
         raise ReadError(f"{path}: a line is incomplete")
     found = {}
@@ -121,7 +127,7 @@ def read_contacts(path: Path, grains: GrainTable) -> JoinedContacts:
     """
     if companion_kind(path) != "contacts":
         raise ReadError(f"{path}: expected contacts under the line id1,id2,ix,iy,iz and forces")
-    table = _read(path)
+    table = _columns(path)
     if any(values.dtype.kind == "U" for values in table.values()):
         raise ReadError(f"{path}: expected numbers as {', '.join(table)}, found other words")
     # any file of grains of this name has the same frame file
@@ -174,13 +180,11 @@ def read_frame(path: Path) -> FrameData | None:
     file = companion_there(path, "frame")
     if file is None:
         return None
+    rows = _rows(file).rows()
+    words = {name: word for name, word in zip(rows[0], rows[-1], strict=True) if word}
+    along = words.get("periodic", "")
     try:
-        text = file.read_bytes().decode()
-        rows = list(csv.reader(text.splitlines()))
-        words = {name: word for name, word in zip(rows[0], rows[-1], strict=False) if word}
-        along = words.get("periodic", "")
-        is_whole = text.endswith("\n") and len(rows) == 2 and len(rows[0]) == len(rows[1])
-        if tuple(rows[0]) not in (FRAME, FRAME[:-2]) or not is_whole or set(along) - set("xyz"):
+        if rows[0] not in (FRAME, FRAME[:-2]) or len(rows) != 2 or set(along) - set("xyz"):
             raise ValueError(f"expected the line {','.join(FRAME)} and one row")
         cell = None
         if any(name in words for name in CELL):
@@ -235,7 +239,7 @@ def with_columns(path: Path, grains: GrainTable, told: FrameData | None) -> Grai
     file = companion_there(path, "columns")
     if file is None:
         return grains
-    own = _read(file)
+    own = _columns(file)
     id = np.arange(len(grains.radius)) if grains.id is None else grains.id
     if not np.array_equal(own.pop("scanfab_id"), id):
         raise ReadError(f"{file}: holds columns of other grains than {path.name}")

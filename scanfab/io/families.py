@@ -54,12 +54,9 @@ def named_once(sources: Iterable[PathLike]) -> list[PathLike]:
     first: dict[Path, PathLike] = {}
     again = []
     for source in chain.from_iterable(map(expanded, sources)):
-        place = Path(source).resolve()
-        if place in first:
-            is_same = str(source) == str(first[place])
-            again.append(f"{source}" if is_same else f"{source} (as {first[place]})")
-        else:
-            first[place] = source
+        if (place := Path(source).resolve()) in first:
+            again.append(f"{source}")
+        first.setdefault(place, source)
     if again:
         warn(f"{some(again)}: named twice among the sources, and read once")
     return list(first.values())

@@ -38,8 +38,6 @@ MAGIC_BYTES = max(map(len, DECOMPRESSORS))
 # how many times its compressed size a file may grow to, and bytes that any file may grow to
 MOST_TIMES = 1000.0
 ANYWAY = 64 << 20
-# bytes of a line of text
-LONGEST_LINE = 16 << 20
 # decompressed copies that are kept although nobody is reading them
 KEPT = 16
 # bytes that are copied at a time
@@ -49,7 +47,7 @@ PREFIX = "scanfab-"
 Stamp = tuple[str, int, int, int]
 """What tells a file from others, and from itself after it was changed."""
 _grows: ContextVar[bool] = ContextVar("grows", default=False)
-_times: ContextVar[float | None] = ContextVar("times", default=None)
+_times: ContextVar[float] = ContextVar("times", default=MOST_TIMES)
 Value = TypeVar("Value")
 
 
@@ -126,46 +124,18 @@ def _set(variable: ContextVar[Value], value: Value) -> Iterator[None]:
 
 
 def unpacking_up_to(times: float | None) -> AbstractContextManager[None]:
-    """
-    Inside the block, let files grow to so many times their size, and lines have any length.
-
-    None changes nothing.
-    """
-    return _set(_times, _times.get() if times is None else times)
+    """Inside the block, let files grow to so many times their size; None changes nothing."""
+    return _set(_times, times or _times.get())
 
 
 def check_times(path: Path, packed: int, unpacked: float) -> None:
     """ReadError if a file would unpack to far more than one so small can hold."""
-    times = _times.get() or MOST_TIMES
+    times = _times.get()
     if unpacked > max(ANYWAY, times * packed):
         raise ReadError(
             f"{path}: {packed:,} bytes of it unpack to more than {times:g} times as many: if it "
             f"is a dump, allow more with `max_unpacked`"
         )
-
-
-def check_lines(path: Path, plain: Path) -> None:
-    """
-    ReadError if a line of a text is longer than any table has them.
-
-    Parameters
-    ----------
-    path, plain : Path
-        As users know the file, and the same decompressed.
-    """
-    if _times.get() is not None:
-        return
-    with open(plain, "rb") as stream:
-        size, begin = stream.seek(0, 2), 0
-        while begin + LONGEST_LINE < size:
-            stream.seek(begin)
-            ends = stream.read(LONGEST_LINE).rfind(b"\n") + 1
-            if not ends:
-                raise ReadError(
-                    f"{path}: a line is longer than {LONGEST_LINE >> 20} MiB (it begins at byte "
-                    f"{begin:,}): if it is one of a table, allow it with `max_unpacked`"
-                )
-            begin += ends
 
 
 def check_memory(path: Path, needed: float) -> None:
@@ -219,12 +189,12 @@ def temporary_copy(content: Iterable[bytes], name: str) -> Path:
         return copy
     except BaseException as error:
         shutil.rmtree(folder, ignore_errors=True)
-        if not isinstance(error, OSError):
-            raise
-        raise ReadError(
-            f"{name}: its content cannot be written to {_temporary()}: {_reason(error)}: make "
-            f"room, or name another folder for temporary files by TMPDIR"
-        ) from None
+        if isinstance(error, OSError):
+            raise ReadError(
+                f"{name}: its content cannot be written to {tempfile.tempdir or 'any folder'}: "
+                f"{_reason(error)}: make room, or name another folder for temporary files by TMPDIR"
+            ) from None
+        raise
 
 
 @cache
@@ -253,22 +223,15 @@ def without_temporary(text: str) -> str:
     >>> without_temporary(f"{temporary_copy([], 'standard input')}: no grains")
     'standard input: no grains'
     """
-    folder = re.escape(os.path.join(_temporary(), PREFIX))
+    # the folder is known as soon as there is a copy
+    folder = re.escape(os.path.join(tempfile.tempdir or "", PREFIX))
     return re.sub(rf"{folder}\w+[/\\]tmp\w+[/\\]", "", text)
-
-
-def _temporary() -> str:
-    """The folder for temporary files, which may be none at all."""
-    try:
-        return tempfile.gettempdir()
-    except OSError:
-        return "a temporary file"
 
 
 def _decompressor(head: bytes) -> Any:
     """The module that opens a file that begins with these bytes; None if it is not compressed."""
     name = next((one for key, one in DECOMPRESSORS.items() if head.startswith(key)), None)
-    return None if name is None else import_module(name)
+    return name and import_module(name)
 
 
 def _head(path: Path, count: int) -> bytes:

@@ -25,8 +25,6 @@ from scanfab.io.sources import READING, as_text, read_series
 PAUSE, PAUSES = 0.2, 3.0
 # a file that did not change for so many seconds is whole, if it can be read to its end
 QUIET = 1.0
-# a file that was written so many seconds ago is not watched, whatever the clock of its server says
-OLD = 60.0
 
 
 def follow_series(
@@ -244,7 +242,7 @@ class FollowedSeries(Series):
         if not all(contacts) or not (has_later or quiet >= QUIET):
             return False
         if has_later or frame.number:
-            return (has_later and quiet > OLD) or self._can_be_read(frame)
+            return self._can_be_read(frame)
         # of the first frame alone nobody knows whether contact files will come, nor whether the
         # number in its name is its step
         may_come = series.contacts_from in ("auto", "beside") and not series.contacts
@@ -266,10 +264,9 @@ class FollowedSeries(Series):
             stamp = stamp_of(path)
         except OSError:
             return 0.0
-        now, age = time.monotonic(), time.time() - stamp[-1] / 1e9
         if path not in self._seen or self._seen[path][0] != stamp:
-            self._seen[path] = stamp, now
-        return age if age > OLD else now - self._seen[path][1]
+            self._seen[path] = stamp, time.monotonic()
+        return time.monotonic() - self._seen[path][1]
 
 
 def _size(path: Path) -> int:

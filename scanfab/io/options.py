@@ -176,8 +176,7 @@ READING_OPTIONS = (
     _reading(
         name="max_unpacked",
         parse=parse_max_unpacked,
-        help="Times its size that a packed file may unpack to; given, lines may also be of any "
-        "length (default: 1000, and 16 MiB).",
+        help="Times its size that a packed file may unpack to (default: 1000).",
         meaning="times its size that a packed file may unpack to; not given: 1000",
         takes="float",
         kind=float,

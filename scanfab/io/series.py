@@ -36,7 +36,7 @@ ContactsFrom = Literal["auto", "beside", "geometric", "path", "grains"]
 
 @dataclass
 class Known:
-    """What has been found out of the files of a series."""
+    """What has been found out of the files of a series and all its parts."""
 
     snapshots: dict[Path, tuple[Stamp | None, list[Snapshot]]] = field(default_factory=dict)
     """Of the files that were looked into, and how these files were then."""

@@ -29,7 +29,6 @@ from scanfab.io.families import (
     without_tables,
 )
 from scanfab.io.files import first_bytes, unpacking_up_to
-from scanfab.io.formats.yade_save import is_cell_file
 from scanfab.io.layout import FrameFile
 from scanfab.io.options import READING_OPTIONS, take_reading
 from scanfab.io.reader import FileKind, ReadOptions, why_not
@@ -144,8 +143,7 @@ def read_series(
         2: discs, whose centres share one coordinate. ``auto``: 2 if those of the first frame that
         has any do so, at least ten, and share no second one; with a note. One for all frames.
     max_unpacked : float, optional
-        How many times its compressed size a file may grow to, 1000 by default. If it is given,
-        lines of text may also be longer than 16 MiB.
+        How many times its compressed size a file may grow to, 1000 by default.
 
     Returns
     -------
@@ -172,7 +170,9 @@ def read_series(
     reading = {name: arguments[name] for name in READING}
     told = take_reading(dict(reading))
     contacts, dim, frame_cell = told.pop("contacts"), told.pop("dim"), told["cell"]
-    cells = _cell_file(Path(frame_cell)) if isinstance(frame_cell, str | os.PathLike) else None
+    cells = None
+    if isinstance(frame_cell, str | os.PathLike):
+        cells = FrameFile(Path(frame_cell), ["lx", "ly", "lz"], ["xy", "xz", "yz"], positive=3)
     told |= {"columns": told["columns"] or {}, "cell": None if cells else frame_cell}
     options = ReadOptions(**told)
     with unpacking_up_to(options.max_unpacked):
@@ -195,16 +195,6 @@ def _given(source: Any) -> list[PathLike]:
     if not given or not all(isinstance(path, str | os.PathLike) for path in given):
         raise unusable("source", "the path of a folder or file, or several of files", source)
     return named_once(given)
-
-
-def _cell_file(path: Path) -> FrameFile:
-    """The cells of a CSV file."""
-    if is_cell_file(path):
-        raise ReadError(
-            f"{path}: is the cell of one frame, which is read if it lies beside its spheres: "
-            f"expected a CSV file with the cells of all frames (step, lx, ly, lz)"
-        )
-    return FrameFile(path, ["lx", "ly", "lz"], ["xy", "xz", "yz"], positive=3)
 
 
 def _series(given: Sequence[PathLike], contacts: PathLike, options: ReadOptions) -> Series:

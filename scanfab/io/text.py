@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from scanfab.base.errors import ReadError, warn
 from scanfab.io.fence import fenced
-from scanfab.io.files import check_lines, check_memory, grows, plain
+from scanfab.io.files import check_memory, grows, plain
 from scanfab.io.reader import Snapshot
 
 Columns = dict[str, npt.NDArray[Any]]
@@ -301,7 +301,6 @@ def text_of(snapshot: Snapshot) -> bytes:
     path, file = snapshot.path, plain(snapshot.path)
     stop = file.stat().st_size if snapshot.stop is None else snapshot.stop
     check_memory(path, IN_MEMORY * (stop - snapshot.start))
-    check_lines(path, file)
     with open(file, "rb") as stream:
         stream.seek(snapshot.start)
         data = stream.read(max(stop - snapshot.start, 0))

@@ -29,20 +29,13 @@ PROGRAMS = {
 TEXT = dump_text().encode()
 
 
-@pytest.fixture(params=PROGRAMS)
-def suffix(request):
-    return request.param
-
-
+@pytest.mark.parametrize("suffix", PROGRAMS)
 def test_a_dump_and_its_contacts_are_read_whatever_they_are_packed_with(tmp_path, suffix):
     (tmp_path / f"dump_5.txt{suffix}").write_bytes(PROGRAMS[suffix](dump_text(step=5).encode()))
     (tmp_path / f"pairs_5.txt{suffix}").write_bytes(PROGRAMS[suffix](pairs_text(step=5).encode()))
     packing = scanfab.read_series(tmp_path)[0].read()
-    assert packing.step == 5
-    assert len(packing.contacts) == 2
-
-
-def test_several_parts_one_behind_the_other_are_one_file(tmp_path, suffix):
+    assert (packing.step, len(packing.contacts)) == (5, 2)
+    # several parts one behind the other are one file
     path = tmp_path / f"dump.txt{suffix}"
     path.write_bytes(PROGRAMS[suffix](TEXT[:40]) + PROGRAMS[suffix](TEXT[40:]))
     assert len(scanfab.read(path)) == 3
@@ -63,6 +56,7 @@ def test_packing_is_told_by_the_content(tmp_path, name, data):
     assert files.first_bytes(path, 9) == b"ITEM: TIM"
 
 
+@pytest.mark.parametrize("suffix", PROGRAMS)
 @pytest.mark.parametrize("cut", [5, 0.5, -3])
 def test_a_part_of_a_packed_file_is_an_error(tmp_path, suffix, cut):
     noise = np.random.default_rng(0).uniform(size=(3000, 6)).tolist()
@@ -84,20 +78,6 @@ def test_a_bomb_is_refused_unless_more_is_allowed(tmp_path, monkeypatch, suffix)
         scanfab.read(path)
     with pytest.raises(scanfab.PackingError, match="the id 1 "):
         scanfab.read(path, max_unpacked=1e6)
-
-
-def test_a_line_of_many_megabytes_is_refused_unless_it_is_allowed(tmp_path, monkeypatch):
-    monkeypatch.setattr(files, "LONGEST_LINE", 1 << 17)
-    path = tmp_path / "dump.txt"
-    path.write_text(dump_text() + "9" * (1 << 18) + "\n" + dump_text(step=1))
-    with pytest.raises(ReadError, match=r"a line is longer than .*`max_unpacked`"):
-        scanfab.read(path)
-    with pytest.raises(ReadError, match="the header counts 3 rows, found 4"):
-        scanfab.read(path, max_unpacked=1000)
-    # lines of just the length are none too long, wherever they begin
-    for length in (1 << 16, (1 << 17) - 2):
-        path.write_text(("x" * length + "\n") * 9)
-        files.check_lines(path, path)
 
 
 @pytest.mark.parametrize("wrong", [0, -1, "many"])

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 import scanfab
-from scanfab.base.errors import ReadError, UnknownFormatError
-from scanfab.io import reader as registry
-from scanfab.io.reader import GrainTable, JoinedContacts, Snapshot, reader_for
+from scanfab.base.errors import UnknownFormatError
+from scanfab.io.reader import GrainTable, JoinedContacts, Snapshot, installed_readers, reader_for
 from scanfab.packing.contacts import ContactList
 from tests.helpers.dumps import dump_text, write
 from tests.helpers.plugins import offer
@@ -32,51 +31,31 @@ class NumbersReader:
         return [Snapshot(path)]
 
     def read_grains(self, snapshot, options):
-        values = self._values(snapshot)
+        values = np.loadtxt(snapshot.path, skiprows=1, ndmin=2)
         return GrainTable(values[:, :3], values[:, 3], None, {}, None)
 
     def read_contacts(self, snapshot, options, grains):
-        pairs = self._values(snapshot)[:, :2].astype(int)
+        pairs = np.loadtxt(snapshot.path, skiprows=1, ndmin=2).astype(int)
         return JoinedContacts(ContactList(pairs), np.zeros(len(grains.radius), int))
 
-    def _values(self, snapshot):
-        try:
-            return np.loadtxt(snapshot.path, skiprows=1, ndmin=2)
-        except ValueError as error:
-            raise ReadError(f"{snapshot.path}: {error}") from None
 
-
-def test_the_built_in_readers_are_installed_like_any_other():
-    installed = registry.installed_readers()
-    assert {"liggghts", "vtk", "yade"} <= set(installed)
-    for name, one in installed.items():
-        assert one.plugin.name == name
-        assert one.plugin.description
-        assert all(ending.startswith(".") for ending in one.plugin.extensions)
-    assert installed["yade"].package == "scanfab"
-
-
-@pytest.fixture
-def with_plugin(monkeypatch):
-    """The built-in readers, and a foreign one."""
-    offer(monkeypatch, "scanfab.readers", "numbers", lambda: NumbersReader)
-    registry.installed_readers.cache_clear()
-    yield
-    registry.installed_readers.cache_clear()
-
-
-@pytest.mark.usefixtures("with_plugin")
 @pytest.mark.parametrize("format", [None, "numbers"])
-def test_a_foreign_plugin_reads_a_series_like_the_built_in_ones(tmp_path, format):
+def test_a_foreign_plugin_reads_a_series_like_the_built_in_ones(tmp_path, monkeypatch, format):
+    offer(monkeypatch, "scanfab.readers", "numbers", lambda: NumbersReader)
+    installed_readers.cache_clear()
     for step in (9, 10):
         write(tmp_path / f"g_{step}.dat", f"numbers of grains\n0 0 0 1\n1.9 0 0 1\n0 0 {step} 1\n")
         write(tmp_path / f"c_{step}.dat", "numbers of contacts\n0 1\n")
-    frames = [frame.read() for frame in scanfab.read_series(tmp_path, format=format)]
+    try:
+        frames = [frame.read() for frame in scanfab.read_series(tmp_path, format=format)]
+    finally:
+        installed_readers.cache_clear()
     assert [(frame.step, len(frame)) for frame in frames] == [(9, 3), (10, 3)]
     np.testing.assert_array_equal(frames[1].contacts.pairs, [[0, 1]])
 
 
 def test_a_name_that_does_not_exist_is_an_error_that_lists_those_that_do():
+    assert installed_readers()["yade"].package == "scanfab"
     with pytest.raises(UnknownFormatError, match=r"called 'rocky'.* liggghts, .*, vtk, xyz, yade"):
         scanfab.read(FLOOR / "tutorial.txt", format="rocky")
 

@@ -14,7 +14,7 @@ from scanfab.base.errors import PackingError, ReadError
 from scanfab.base.typing import FloatArray
 from scanfab.io.columns import grain_table, has_radius, whole_numbers
 from scanfab.io.contacts import join_ids
-from scanfab.io.files import check_lines, leave_out_last, plain
+from scanfab.io.files import leave_out_last, plain
 from scanfab.io.reader import (
     Carries,
     FileKind,
@@ -221,7 +221,6 @@ def marked_frames(
     ReadError
         If there is no frame, or one has no step or time.
     """
-    check_lines(path, plain(path))
     starts: list[int] = []
     found: list[Snapshot] = []
     size = 0

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from scanfab.base.errors import ReadError
-from scanfab.io.files import bare_name, check_lines, first_bytes, leave_out_last, plain
+from scanfab.io.files import bare_name, first_bytes, leave_out_last, plain
 from scanfab.io.formats.shared import GrainsOnly, cell_of, numbers
 from scanfab.io.reader import Carries, Snapshot
 from scanfab.io.text import Columns, Layout, read_rows, spelt, text_of
@@ -63,7 +63,6 @@ class XyzReader(GrainsOnly):
     def snapshots(self, path: Path) -> list[Snapshot]:
         """One behind the other."""
         found: list[Snapshot] = []
-        check_lines(path, plain(path))
         with open(plain(path), "rb") as stream:
             start = 0
             while first := stream.readline():

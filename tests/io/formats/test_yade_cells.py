@@ -113,7 +113,7 @@ def test_a_frame_that_the_csv_file_does_not_name_is_an_error_that_names_it(tmp_p
 
 @pytest.mark.parametrize("file", ["after-periCell-00000002.vtk.gz", "rec_pericell.27500.vtu"])
 def test_a_cell_of_yade_is_no_file_of_the_cells_of_all_frames(file):
-    with pytest.raises(ReadError, match=f"{file}: is the cell of one frame.*expected a CSV file"):
+    with pytest.raises(ReadError, match=f"{file}: expected the columns step or frame, and lx"):
         frames("rec_spheres.27500*", cell=STRAINED / file)
 
 
